@@ -65,7 +65,7 @@ class CommandDesk:
             command = _decoder.decode(message)
             self._check(command)
             if not self._queue.submit(command, self._run):
-                return "the run is over" if self._queue.run != self._run else "too many commands at once"
+                return self._queue.refusal(command, self._run) or "too many commands at once"  # which were taken since
         except NOT_A_COMMAND as error:
             return one_line(f"no command: {error}")
         except CommandError as error:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import logging
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -29,6 +31,7 @@ log = logging.getLogger(__name__)
 
 _ROWS = 512  # greatest number of rows in a message
 _TEXTS = 50  # number of newest texts that are kept for viewers that connect late
+_CHANGES = 1000  # number of changes of regions that are kept for them
 
 
 @dataclass
@@ -77,7 +80,10 @@ class Hub:
         self._view_columns = ViewColumns(scenario, columns)
         self._names = {column.name: i for i, column in enumerate(self._view_columns.columns)}
         self._header = header_of(scenario, self._view_columns.columns, isinstance(queue, CommandQueue))
-        self._header["changes"] = []
+        self._changes: list[dict[str, Any]] = []
+        self._header["changes"] = self._changes
+        self._change_numbers: list[int] = []  # of each kept change, from 1
+        self._changed = 0  # number of changes so far
         self._limits = limits_of(scenario)
         self._step = scenario.time.step
         self._goal_center, self._target_radius = shape_center(scenario.goal), 0.0
@@ -132,7 +138,7 @@ class Hub:
             case AddObstacle():
                 name = self._slot_names[self._slots.assign(command.number)]
                 self._change(name, time, Sphere(PARKED_POSITION, command.radius))
-                self._header["changes"][-1]["number"] = command.number  # for commands that move or remove it
+                self._changes[-1]["number"] = command.number  # for commands that move or remove it
             case RemoveObstacle():
                 self._slots.release(command.number)
 
@@ -144,7 +150,13 @@ class Hub:
             shape = Sphere(self._goal_center, self._target_radius)
         gain = self._header["regions"][index]["gain"] if shape or not index else settings[f"regions.{name}.gain"]
         drawn = shape_of(shape or settings.shapes[name], self._limits)
-        self._header["changes"].append({"time": time, "region": index, "shape": drawn, "gain": gain})
+        self._changes.append({"time": time, "region": index, "shape": drawn, "gain": gain})
+        self._changed += 1
+        self._change_numbers.append(self._changed)
+        if len(self._changes) > max(_CHANGES, len(self._regions)):  # drop the oldest one that a later one replaces
+            last = {change["region"]: i for i, change in enumerate(self._changes)}
+            oldest = next(i for i, change in enumerate(self._changes) if last[change["region"]] > i)
+            del self._changes[oldest], self._change_numbers[oldest]
 
     def say(self, text: str, kind: str = "info", time: float | None = None) -> None:
         """Show a `text` to all viewers; `kind` is info, command or warning, `time` simulated [s]."""
@@ -166,7 +178,7 @@ class Hub:
     def is_up_to_date(self, cursor: Cursor) -> bool:
         """Return True if all rows, texts and changes were sent to a viewer."""
         return (cursor.run, cursor.row, cursor.change, cursor.text) == (
-            self.run, self._history.count, len(self._header["changes"]), self._dropped + len(self._texts),
+            self.run, self._history.count, self._changed, self._dropped + len(self._texts),
         )  # fmt: skip
 
     def next_for(self, cursor: Cursor) -> str | bytes | None:
@@ -175,15 +187,15 @@ class Hub:
             return None
         if cursor.run != self.run:
             cursor.run, cursor.row, cursor.text = self.run, 0, self._dropped
-            cursor.change = len(self._header["changes"])
+            cursor.change = self._changed
             return text_of("header", run=self._header)
         rows, number = self._history.since(cursor.row, _ROWS)
         if len(rows):
             cursor.row = number
             return bytes_of(rows)
-        if cursor.change < len(changes := self._header["changes"]):
-            sent, cursor.change = cursor.change, len(changes)
-            return text_of("changes", changes=changes[sent:])
+        if cursor.change < self._changed:
+            first, cursor.change = bisect_right(self._change_numbers, cursor.change), self._changed
+            return text_of("changes", changes=self._changes[first:])
         cursor.text = max(cursor.text, self._dropped)
         if cursor.text < self._dropped + len(self._texts):
             cursor.text += 1

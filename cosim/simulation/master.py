@@ -59,8 +59,8 @@ class Master:
     law : Law, optional
         Control law; default: the scenario's.
     plant : SteppedPlant, optional
-        Plant with the channels of the vehicle's FMU, which the master closes; default: that FMU. Further inputs, as of a
-        coupled plant, are the caller's to set.
+        Plant with the channels of the vehicle's FMU, which the master closes; default: that FMU. Further inputs, such as
+        those of a coupled plant, are set by the caller.
 
     Attributes
     ----------

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from cosim.errors import CosimError, RunError
 from cosim.results.run_result import Run
+from cosim.simulation.commands.sources import RUNS
 from cosim.sitl.flight import Flight
 from cosim.sitl.law import AutopilotLaw
 from cosim.sitl.scenario import SCENARIO, scenario_to_fly
@@ -95,8 +96,11 @@ class Flights:
         Raises
         ------
         RunError, ScenarioError, PlantError, BuildError, DefinitionError
-            If the scenario cannot be flown at this rate, or the run cannot begin; as `scenario_to_fly` and `Flight`.
+            If the scenario cannot be flown at this rate, or the run cannot begin; as `scenario_to_fly` and `Flight`. After
+            `RUNS` runs none begins.
         """
+        if len(self._ended) >= RUNS:
+            raise RunError(f"the autopilot begins again: expected {RUNS} runs of a session at most")
         o = self._options
         scenario = scenario_to_fly(o.scenario, o.overrides, o.vehicle, frame_rate, self._autopilot)
         self.law = self._law_of(scenario.vehicle)

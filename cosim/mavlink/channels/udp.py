@@ -6,16 +6,18 @@ since it releases the interpreter lock.
 
 from __future__ import annotations
 
+import math
 import socket
 import time
 from collections import Counter
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass
 
 from cosim.errors import TelemetryError
 from cosim.mavlink.channels.channel import DATAGRAM
 
 PEERS = 8
-SILENCE = 10.0  # s without a frame, after which a peer is removed
+SILENCE = 10.0  # s without a frame, after which a peer is sent no more
 _BUFFER = 1 << 18  # bytes of the kernel's receive buffer; what exceeds it is lost in the kernel
 
 _NOT_TAKEN = "datagrams not taken by the kernel"
@@ -80,8 +82,20 @@ class UdpOut:
                 return
 
 
+@dataclass
+class _Peer:
+    """When accepted frames of an address were received, and their greatest version."""
+
+    first: float  # s, monotonic
+    last: float
+    version: int
+
+
 class UdpIn:
     """A server. Each address that sent an accepted frame within the last 10 s is a peer, up to 8 of them.
+
+    A silent peer keeps its place until a new address needs it; the one that was heard for longest keeps it always. So
+    frames from many addresses cannot displace a ground station.
 
     Attributes
     ----------
@@ -101,13 +115,13 @@ class UdpIn:
         self._socket = _socket(f"udpin:{host}:{port}", lambda s: s.bind((host, port)))
         self.port: int = self._socket.getsockname()[1]
         self._packets = {1: b"", 2: b""}  # by version
-        self._heard: dict[tuple[str, int], float] = {}  # time of the last accepted frame, by address
-        self._version: dict[tuple[str, int], int] = {}  # the greatest received from each
+        self._known: dict[tuple[str, int], _Peer] = {}
+        self._now = -math.inf  # s, monotonic, time of the last `tend`
 
     @property
     def peers(self) -> list[tuple[str, int]]:
-        """Addresses of the peers."""
-        return list(self._heard)
+        """Addresses of the peers that are not silent, to which frames are sent."""
+        return [address for address, peer in self._known.items() if self._now - peer.last <= SILENCE]
 
     def receive(self) -> tuple[Hashable, bytes] | None:
         """Return a datagram and its sender, or None if there is none."""
@@ -118,11 +132,13 @@ class UdpIn:
         return address, data
 
     def record_version(self, peer: Hashable, version: int) -> None:
-        """Add this address to the peers, or renew it; count the frame if there are 8 already."""
+        """Add this address to the peers, or renew it; count the frame if there is no place."""
         assert isinstance(peer, tuple)
-        if peer in self._heard or len(self._heard) < PEERS:
-            self._heard[peer] = time.monotonic()
-            self._version[peer] = max(self._version.get(peer, 1), version)
+        now, known = time.monotonic(), self._known.get(peer)
+        if known is not None:
+            known.last, known.version = now, max(known.version, version)
+        elif len(self._known) < PEERS or self._forget(now):
+            self._known[peer] = _Peer(now, now, version)
         else:
             self.trouble["frames of peers beyond 8"] += 1
 
@@ -135,22 +151,31 @@ class UdpIn:
         return True
 
     def tend(self, now: float) -> None:
-        """Send the queued datagrams, and remove silent peers."""
+        """Send the queued datagrams."""
+        self._now = now
         self._flush()
-        for peer in [peer for peer, last in self._heard.items() if now - last > SILENCE]:
-            del self._heard[peer], self._version[peer]
 
     def close(self) -> None:
         """Send the queued datagrams, and close the socket."""
         self._flush()
         self._socket.close()
 
+    def _forget(self, now: float) -> bool:
+        """Remove the silent peer that was heard for the shortest time, but not the one heard for longest."""
+        heard = {address: peer.last - peer.first for address, peer in self._known.items()}
+        kept = max(heard, key=heard.__getitem__)
+        silent = [address for address, peer in self._known.items() if now - peer.last > SILENCE and address != kept]
+        if not silent:
+            return False
+        del self._known[min(silent, key=heard.__getitem__)]
+        return True
+
     def _flush(self) -> None:
         packets, self._packets = self._packets, {1: b"", 2: b""}
-        for peer in self._heard:
+        for address in self.peers:
             try:
-                if packet := packets[self._version[peer]]:
-                    self._socket.sendto(packet, peer)
+                if packet := packets[self._known[address].version]:
+                    self._socket.sendto(packet, address)
             except OSError:
                 self.trouble[_NOT_TAKEN] += 1
 

@@ -218,7 +218,7 @@ class VehicleContext:
         -------
         int
             MAV_RESULT: accepted; denied for a read-only vehicle or an invalid command; temporarily rejected if the
-            queue is full or the run is over.
+            run's queue rejects it.
         """
         m = self.mavlink
         if self._commands is None:
@@ -227,7 +227,7 @@ class VehicleContext:
         for command in commands:
             try:
                 if not self._commands.submit(command, self._run):
-                    self.reject("the run is over" if self.run_has_ended else "too many commands at once", "full")
+                    self.reject(self._commands.refusal(command, self._run) or "too many commands at once", "full")
                     return int(m.MAV_RESULT_TEMPORARILY_REJECTED)
             except CommandError as error:
                 self.reject(str(error), "command")

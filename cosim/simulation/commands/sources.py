@@ -13,9 +13,11 @@ import msgspec
 
 from cosim.errors import CommandError, RunError
 from cosim.scenario.validation import MAX_STEPS
-from cosim.simulation.commands.commands import NOT_A_COMMAND, Command, validate_command
+from cosim.simulation.commands.commands import NOT_A_COMMAND, Command, Reset, validate_command
 
 QUEUED = 256  # greatest number of commands between two steps; further ones are rejected
+RUNS = 100  # greatest number of runs of a session: further resets are rejected
+LOG_BYTES = 64_000_000  # greatest size of a run's commands in its log: some hours of sticks; further ones are rejected
 
 
 class CommandSource(Protocol):
@@ -45,6 +47,7 @@ class CommandQueue:
     def __init__(self) -> None:
         self.run = 0
         self._commands: deque[Command] = deque()
+        self._bytes = 0  # size of this run's commands
         self._lock = threading.Lock()
 
     def submit(self, command: Command, run: int | None = None) -> bool:
@@ -60,7 +63,7 @@ class CommandQueue:
         Returns
         -------
         bool
-            False if the queue is full, or that run is over.
+            False if it is rejected; `refusal` returns the reason.
 
         Raises
         ------
@@ -69,15 +72,27 @@ class CommandQueue:
         """
         validate_command(command)
         with self._lock:
-            if len(self._commands) >= QUEUED or run not in (None, self.run):
+            if self.refusal(command, run):
                 return False
+            self._bytes += len(msgspec.json.encode(command))
             self._commands.append(command)
         return True
+
+    def refusal(self, command: Command, run: int | None = None) -> str:
+        """Return the reason why a command for a run is rejected; empty if there is none."""
+        if run not in (None, self.run):
+            return "the run is over"
+        if self.run >= RUNS - 1 and isinstance(command, Reset):
+            return f"no further reset: a session has {RUNS} runs at most"
+        if self._bytes >= LOG_BYTES:
+            return f"no further command: the run's log has {LOG_BYTES // 1_000_000} MB of them"
+        return "too many commands at once" if len(self._commands) >= QUEUED else ""
 
     def end_run(self) -> None:
         """Clear the queue, and reject later commands for the run that is over."""
         with self._lock:
             self.run += 1
+            self._bytes = 0
             self._commands.clear()
 
     def take(self, k: int) -> Sequence[Command]:

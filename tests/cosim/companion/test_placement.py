@@ -60,7 +60,7 @@ def test_start_and_goal_of_every_shipped_scenario_are_in_its_scene(name):
     scenario = load_scenario(name)
     placement = Placement(scenario)
     assert placement.distance(np.array(scenario.initial.position)) == 0.0
-    assert placement.distance(np.array(scenario.initial.position) + (1e5, 0.0, 0.0)) > 1e4
+    assert placement.distance(np.add(scenario.initial.position, (1e5, 0.0, 0.0))) > 1e4
 
 
 @given(st.tuples(*[st.floats(-300.0, 300.0)] * 3))

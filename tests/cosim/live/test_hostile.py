@@ -1,19 +1,26 @@
 """Foreign origins, floods and malformed requests neither command nor disturb the run."""
 
 import contextlib
+import json
 import socket
 import urllib.error
 import urllib.request
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
 from cosim.live.command_desk import MAX_LENGTH
+from cosim.live.hub import Cursor, Hub
 from cosim.live.server import CONNECTIONS
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
+from cosim.simulation.columns import columns_without_plant
+from cosim.simulation.commands import CommandQueue, sources
+from cosim.simulation.commands.commands import ChangeSetting
 from tests.cosim.live.conftest import ARM, WAIT, same
 
 
@@ -162,3 +169,47 @@ def test_excess_connections_are_closed_to_preserve_file_descriptors(live):
         viewer.command(**ARM)
         viewer.until("end")
     assert running.end().summary["status"] == "completed"
+
+
+@pytest.mark.medium
+def test_resets_by_a_viewer_end_at_a_bound_and_the_last_run_goes_on(live, monkeypatch, tmp_path):
+    monkeypatch.setattr(sources, "RUNS", 3)
+    running = live(commands=True, await_arm=False, rate=1.0)
+    with running.viewer() as viewer:
+        while "no further reset: a session has 3 runs at most" not in viewer.texts_of("refused"):
+            if viewer.receive() == "header":
+                viewer.command(command="reset")
+        viewer.until("end")
+    assert [message["status"] for message in viewer.messages_of("end")] == ["reset", "reset", "completed"]
+    assert running.end().summary["status"] == "completed"
+    assert sorted(folder.name for folder in tmp_path.glob("live*")) == ["live", "live-2", "live-3"]
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.booleans()), max_size=60))
+def test_changes_of_regions_for_late_viewers_are_bounded_and_end_in_the_present_state(changes):
+    """Against a list of everything: an early viewer gets all, a late one as many as are kept, the newest of each."""
+    scenario = load_scenario("harbour", ["commands.enabled=true"])
+    names = [secondary.region.name for secondary in scenario.regions][:4]
+    hub, early, everything, received = Hub(), Cursor(), [], []
+    hub.begin(0, scenario, columns_without_plant(scenario), CommandQueue())
+
+    def read(cursor):
+        texts = []
+        while (message := hub.next_for(cursor)) is not None:
+            texts += [json.loads(message)]
+        return texts
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("cosim.live.hub._CHANGES", 8)
+        read(early)
+        for k, (region, looks) in enumerate(changes):
+            everything.append((names[region], k + 1.0))
+            hub.show_commands(k, [ChangeSetting(f"regions.{names[region]}.gain", k + 1.0)])
+            received += read(early) if looks else []
+    late = read(Cursor())[0]["run"]["changes"]
+    kept = [(hub._regions[change["region"]], change["gain"]) for change in late]
+    assert len(kept) <= max(8, len(hub._regions)) and kept == [change for change in everything if change in kept]
+    assert dict(kept) == dict(everything)
+    received += read(early)
+    got = [change["gain"] for text in received if text["type"] == "changes" for change in text["changes"]]
+    assert got == sorted(set(got)) and set(got) >= {gain for _, gain in kept}

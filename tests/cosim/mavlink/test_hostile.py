@@ -1,15 +1,17 @@
 """Hostile input causes no error, leak or delay, and valid frames in between are accepted."""
 
+import random
 import socket
 import time
 import tracemalloc
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from benchmarks.hostile import hostile_datagrams
 from cosim.mavlink import thread
-from cosim.mavlink.channels.udp import PEERS, UdpIn
+from cosim.mavlink.channels.udp import PEERS, SILENCE, UdpIn
 from cosim.mavlink.thread import LinkThread
 from cosim.mavlink.wire.framing import StreamReader
 from cosim.mavlink.wire.link import Link
@@ -164,3 +166,54 @@ def test_a_flooded_port_neither_starves_the_stream_nor_another_link():
     links.close()
     assert not links.failures
     assert len(flooded.peers) <= PEERS
+
+
+@pytest.mark.parametrize("before", [0, 3, 200])  # addresses that sent one frame each before the station came
+@pytest.mark.parametrize("silence", [0.0, 9.0, 11.0, 3600.0])
+def test_flood_of_new_addresses_does_not_displace_a_station_that_was_heard(before, silence, monkeypatch):
+    """The station speaks for a minute, is silent, and speaks again, while thousands of ports send valid frames."""
+    clock = SimpleNamespace(now=100.0, monotonic=lambda: clock.now)
+    channel = UdpIn(HERE, 0)
+    monkeypatch.setattr("cosim.mavlink.channels.udp.time", clock)
+    ports = iter(range(20_000, 60_000))
+    station, rng = (HERE, 14550), random.Random(5)
+
+    def passes(seconds, speaks=False, floods=False):
+        for _ in range(max(1, round(seconds))):
+            clock.now += 1.0
+            if speaks:
+                channel.record_version(station, 2)
+            for _ in range(rng.randrange(8) if floods else 0):
+                channel.record_version((HERE, next(ports)), 2)
+            channel.tend(clock.now)
+            assert len(channel._known) <= PEERS
+
+    for _ in range(before):
+        channel.record_version((HERE, next(ports)), 2)
+        clock.now += 0.5 * SILENCE
+    passes(60.0, speaks=True, floods=True)
+    assert station in channel.peers
+    passes(silence, floods=True)
+    assert (station in channel.peers) == (silence < SILENCE)
+    passes(1.0, speaks=True, floods=True)
+    assert station in channel.peers
+    channel.close()
+
+
+def test_flood_from_many_ports_leaves_the_station_its_answers():
+    link = link_of(UdpIn(HERE, 0))
+    to, sockets = (HERE, link.channel.port), []
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+        station.settimeout(60.0)
+        station.sendto(Station().pack(attitude(0)), to)
+        for i in range(100):
+            sockets.append(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+            sockets[-1].sendto(Station(200, 1).pack(attitude(i)), to)
+            list(link.receive(time.perf_counter() + 60.0))
+        link.send(attitude(7))
+        link.channel.tend(time.monotonic())
+        assert Station().parse(station.recv(1000))[0].time_boot_ms == 7
+    assert len(link.channel.peers) == PEERS
+    for one in sockets:
+        one.close()
+    link.channel.close()

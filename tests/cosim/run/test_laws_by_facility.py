@@ -213,5 +213,5 @@ def test_plant_of_other_channels_is_refused_by_the_first_that_is_missing(change,
 
 @pytest.mark.parametrize("plant", [3, "odin", object()])
 def test_object_that_is_no_plant_is_refused(plant):
-    with pytest.raises(RunError, match="^plant is .* without outputs, expected a plant such as plant_fmu.Plant$"):
+    with pytest.raises(RunError, match=r"^plant is .* without outputs, expected a plant such as plant_fmu\.Plant$"):
         Master(SCENARIO, plant=plant)

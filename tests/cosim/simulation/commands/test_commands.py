@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from cosim.errors import CommandError, RunError
 from cosim.scenario.scenario import load_scenario
+from cosim.simulation.commands import sources
 from cosim.simulation.commands import CommandQueue, LiveSettings, LoggedCommands, ReplayedCommands
 from cosim.simulation.commands.commands import (
     MODES,
@@ -85,6 +86,35 @@ def test_full_queue_rejects_commands():
     assert all(queue.submit(Arm(True)) for _ in range(QUEUED))
     assert not queue.submit(Arm(False))
     assert len(queue.take(0)) == QUEUED
+
+
+def test_resets_of_a_session_are_bounded(monkeypatch):
+    monkeypatch.setattr(sources, "RUNS", 3)
+    queue = CommandQueue()
+    for run in range(3):
+        assert queue.submit(Reset(), run) == (run < 2)
+        assert queue.submit(Arm(True), run)
+        if run == 2:
+            assert queue.refusal(Reset(), run) == "no further reset: a session has 3 runs at most"
+            break
+        queue.end_run()
+    assert queue.take(0) == [Arm(True)]
+
+
+@given(st.lists(COMMANDS_LOG, max_size=30), st.integers(1, 400))
+def test_log_of_a_run_is_bounded(tmp_path_factory, commands, bound):
+    file, queue = tmp_path_factory.mktemp("log") / "commands.jsonl", CommandQueue()
+    logged = LoggedCommands(queue, file)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sources, "LOG_BYTES", bound)
+        accepted = [command for command in commands if queue.submit(command)]
+        refused = bool(commands) and "log has" in queue.refusal(commands[-1])
+    assert list(logged.take(0)) == accepted
+    sizes = [len(msgspec.json.encode(command)) for command in accepted]
+    assert sum(sizes[:-1]) < bound and (refused or sum(sizes) < bound)
+    assert refused or accepted == commands
+    queue.end_run()
+    assert queue.submit(Arm(True))
 
 
 def test_commands_for_a_finished_run_are_rejected():
