@@ -94,6 +94,7 @@ def temporary_files(tmp_path_factory):
     folder = tmp_path_factory.mktemp("temporary")
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("TMPDIR", str(folder))
+        patch.setenv("XDG_STATE_HOME", str(folder / "state"))  # of the timestamps of signatures
         patch.setattr("tempfile.tempdir", str(folder))
         yield
 

@@ -10,7 +10,7 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.framing import V2, Counts, Gate
 from cosim.mavlink.wire.link import Link, Signer, open_channel
-from cosim.mavlink.wire.signing import SigningClock, Verifier
+from cosim.mavlink.wire.signing import SigningClock, Verifier, timestamp_file
 
 _AT_ONCE = 512  # greatest number of messages of one call
 _PAUSE = 0.001  # s, polling period of an idle link
@@ -61,7 +61,7 @@ class GroundLink:
     def __init__(self, endpoint: Endpoint, key: bytes | None = None, identity: Identity = GROUND_STATION) -> None:
         self.name, self.identity = endpoint.text, identity
         self.counts, self.old = Counts(), 0
-        clock = SigningClock()
+        clock = SigningClock(None if key is None else timestamp_file(key, identity))
         gate = Gate(self.counts, verifier=None if key is None else Verifier(key, clock))
         self.channel, _ = open_channel(endpoint)
         signer = None if key is None else Signer(key, clock, link=0)

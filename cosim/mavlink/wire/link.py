@@ -18,7 +18,7 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.framing import V1, Counts, Framer, Gate, StreamReader
 from cosim.mavlink.wire.options import COMPONENT_ID, MavlinkOptions
-from cosim.mavlink.wire.signing import SigningClock, Verifier
+from cosim.mavlink.wire.signing import SigningClock, Verifier, timestamp_file
 
 log = logging.getLogger(__name__)
 
@@ -239,7 +239,8 @@ def open_links(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> list[L
     TelemetryError
         If an endpoint cannot be opened; the others are closed again.
     """
-    source, key, clock = (options.system_id, COMPONENT_ID), options.key, SigningClock()
+    source, key = (options.system_id, COMPONENT_ID), options.key
+    clock = SigningClock(None if key is None else timestamp_file(key, source))
     verifier = None if key is None else Verifier(key, clock)
     links: list[Link] = []
     try:

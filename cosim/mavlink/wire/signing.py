@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import hashlib
 import hmac
+import logging
 import os
 import time
 from enum import Enum
 from pathlib import Path
 from typing import Final
 
+import platformdirs
+
 from cosim.errors import TelemetryError
+from cosim.io.atomic_file import write_atomic
+
+log = logging.getLogger(__name__)
 
 KEY_BYTES = 32
 _LONGEST_KEY = 4096  # bytes of a key file
@@ -18,6 +24,9 @@ STREAMS = 64  # number of senders whose last timestamps are kept
 _EPOCH = 1_420_070_400  # s, 2015-01-01 in Unix time, the epoch of MAVLink's timestamps
 _PER_SECOND = 100_000  # timestamps count 10 us
 _MINUTE = 60 * _PER_SECOND
+_AHEAD = 2 * _PER_SECOND  # by which the kept timestamp is ahead of the clock, so that it is seldom written
+_STEP = _PER_SECOND // 4  # by which it is ahead of the last one at least: a peer's clock may be ahead of ours
+_REMOVE = "remove the file, after which frames of before are accepted again"
 _LAST = (1 << 48) - 1
 _SIGNATURE, _STAMP, _HASH = 13, 6, 6  # bytes of a signature, its timestamp, its hash
 
@@ -82,16 +91,52 @@ def _is_hexadecimal(text: str) -> bool:
     return len(text) == 2 * KEY_BYTES and all(c in "0123456789abcdefABCDEF" for c in text)
 
 
+def timestamp_file(key: bytes, identity: tuple[int, int]) -> Path:
+    """Return the file that keeps the last timestamp of a key and a system and component id, in the user's state folder.
+
+    Its name shows nothing of the key.
+    """
+    name = hmac.new(key, b"timestamps", hashlib.sha256).hexdigest()[:16]
+    return platformdirs.user_state_path("subreach") / "signing" / "{}-{}-{}".format(name, *identity)
+
+
 class SigningClock:
     """Strictly increasing timestamps of all signed frames of this vehicle, also across restarts.
 
     They follow the wall clock, or the latest verified timestamp of a peer, at most a minute ahead: a peer whose clock
-    is ahead would refuse earlier ones as old.
+    is ahead would refuse earlier ones as old. The file is written ahead of the timestamps, every two seconds.
+
+    Parameters
+    ----------
+    file : Path, optional
+        File that keeps a timestamp above all that were used or accepted; default: none is kept.
+
+    Attributes
+    ----------
+    floor : int
+        Timestamp of the file at the start [10 us since 2015]; frames up to it may be those of an earlier process.
+
+    Raises
+    ------
+    TelemetryError
+        If the file cannot be read or written, or the wall clock is more than a minute behind it.
     """
 
-    def __init__(self) -> None:
-        self._last = 0
+    def __init__(self, file: Path | None = None) -> None:
+        self._file = file
         self._offset = time.time() - time.monotonic()  # s: guards against a wall clock that is set back
+        self.floor = self._last = self._kept = 0
+        if file is None:
+            return
+        try:
+            file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            self.floor = self._last = _read_timestamp(file)
+            if self.floor > self.latest_accepted + _AHEAD:
+                ahead = (self.floor - self.latest_accepted + _MINUTE) / _PER_SECOND
+                raise TelemetryError(f"{file}: is {ahead:.0f} s ahead of the clock; set the clock, or {_REMOVE}")
+            self._keep(file)
+        except OSError as error:
+            raise TelemetryError(f"{file}: timestamps cannot be kept: {error.strerror or error}") from error
 
     @property
     def latest_accepted(self) -> int:
@@ -106,12 +151,35 @@ class SigningClock:
 
     def next(self) -> int:
         """Return the timestamp of the next frame."""
-        self._last = min(max(self._last + 1, self.now), _LAST)
+        self.advance_to(min(max(self._last + 1, self.now), _LAST))
         return self._last
 
     def advance_to(self, stamp: int) -> None:
-        """Advance to a timestamp with a valid signature."""
+        """Advance to a timestamp with a valid signature, or of a frame to be sent."""
         self._last = max(self._last, stamp)
+        if self._file is not None and self._last > self._kept:
+            try:
+                self._keep(self._file)
+            except (OSError, TelemetryError) as error:  # the link goes on
+                log.warning("%s: after a restart, frames of now can be replayed: %s", self._file, error)
+                self._file = None
+
+    def _keep(self, file: Path) -> None:
+        """Write a timestamp ahead of the last one and the clock, unless another process has written a later one."""
+        self._kept = min(max(self._last + _STEP, self.latest_accepted - _MINUTE + _AHEAD), _LAST)
+        write_atomic(file, f"{max(self._kept, _read_timestamp(file))}\n")
+
+
+def _read_timestamp(file: Path) -> int:
+    """Return the timestamp of a file, 0 if there is no file."""
+    try:
+        with file.open("rb") as content:
+            text = content.read(20).strip()
+    except FileNotFoundError:
+        return 0
+    if not text.isdigit() or int(text) > _LAST:
+        raise TelemetryError(f"{file}: holds no timestamp; {_REMOVE}")
+    return int(text)
 
 
 class Verifier:
@@ -149,7 +217,7 @@ class Verifier:
         if stamp > self._clock.latest_accepted:  # it would make later valid frames look old
             return Refusal.AHEAD
         oldest = self._clock.now - _MINUTE
-        if latest is None and stamp < oldest:
+        if latest is None and (stamp < oldest or stamp <= self._clock.floor):
             return Refusal.OLD
         if latest is None and len(self._latest) >= STREAMS and not self._forget(oldest):
             return Refusal.CROWDED

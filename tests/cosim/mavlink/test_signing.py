@@ -2,16 +2,22 @@
 
 import hashlib
 import os
+import socket
 import time
+from types import SimpleNamespace
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from cosim.errors import TelemetryError
 from cosim.mavlink.channels.udp import UdpOut
 from cosim.mavlink.wire import signing
-from cosim.mavlink.wire.link import Link, Signer
-from cosim.mavlink.wire.signing import STREAMS, SigningClock, Verifier, read_key
-from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, attitude, heartbeat, mavlink, open_gate
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.link import Link, Signer, open_links
+from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.mavlink.wire.signing import STREAMS, SigningClock, Verifier, read_key, timestamp_file
+from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, attitude, heartbeat, mavlink, open_gate, until
 
 MINUTE = 60 * 100_000
 
@@ -242,3 +248,138 @@ def test_signed_udp_link_sends_to_an_absent_peer():
     link = Link("test", UdpOut("127.0.0.1", 9), open_gate(), SOURCE, signer=Signer(KEY, SigningClock(), 0))
     assert link.send(heartbeat())
     link.channel.close()
+
+
+# ---- across restarts ----
+
+
+class Restarts:
+    """A vehicle that is killed and started again, with a clock of its own."""
+
+    def __init__(self, file, monkeypatch):
+        self.file, self.wall = file, 1.8e9
+        monkeypatch.setattr(signing, "time", SimpleNamespace(time=lambda: self.wall, monotonic=lambda: self.wall))
+        self.start()
+
+    def start(self, after=0.0):
+        self.wall += after
+        self.clock = SigningClock(self.file)
+        self.gate, self.link = open_gate(Verifier(KEY, self.clock)), signed_link(self.clock)
+        return self
+
+    def stamp(self, ahead=0.0):
+        return round((self.wall + ahead - 1420070400) * 1e5)
+
+    def sends(self):
+        self.link.send(heartbeat())
+        return int.from_bytes(self.link.channel.frames[-1][-12:-6], "little")
+
+
+@pytest.fixture
+def vehicle(tmp_path, monkeypatch):
+    return Restarts(tmp_path / "state" / "signing" / "name", monkeypatch)
+
+
+@given(
+    st.lists(
+        st.tuples(
+            st.sampled_from(["restart", "receive", "send"]),
+            st.floats(0.0, 5.0) | st.floats(0.0, 600.0),  # s that go by before
+            st.floats(-50.0, 50.0),  # s by which the peer's clock is ahead
+            st.integers(0, 2),  # link of the peer
+        ),
+        max_size=60,
+    )
+)
+def test_no_frame_is_accepted_twice_and_no_timestamp_used_twice_over_any_restarts(tmp_path_factory, steps):
+    with pytest.MonkeyPatch.context() as patch:
+        vehicle = Restarts(tmp_path_factory.mktemp("state") / "name", patch)
+        captured, sent = [], []
+        for what, after, ahead, link in steps:
+            vehicle.wall += after
+            if what == "restart":
+                vehicle.start()
+            elif what == "send":
+                sent.append(vehicle.sends())
+            else:
+                frame = Station(key=KEY, link=link, stamp=vehicle.stamp(ahead)).pack(heartbeat())
+                if accepts(vehicle.gate, frame):
+                    captured.append(frame)
+            assert not any(accepts(vehicle.gate, frame) for frame in captured)
+        assert sent == sorted(set(sent))
+
+
+def test_station_goes_on_within_two_seconds_of_a_restart_and_at_once_if_it_hears_the_vehicle(vehicle):
+    assert accepts(vehicle.gate, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
+    vehicle.start(after=0.3)
+    assert not accepts(vehicle.gate, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
+    assert refused(vehicle.gate) == {"old": 1}
+    assert accepts(vehicle.gate, Station(key=KEY, stamp=vehicle.sends() + 1).pack(heartbeat()))
+    vehicle.start(after=2.5)
+    assert accepts(vehicle.gate, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
+
+
+def test_many_restarts_in_a_row_do_not_run_ahead_of_the_clock(vehicle):
+    for _ in range(500):
+        vehicle.start(after=0.3)
+        assert vehicle.sends() < vehicle.stamp(3.0)
+    assert vehicle.file.read_text().strip().isdigit()
+
+
+def test_file_is_written_seldom(vehicle, monkeypatch):
+    writes = []
+    monkeypatch.setattr(signing, "write_atomic", lambda file, text: writes.append(text))
+    for _ in range(1000):
+        vehicle.wall += 0.01
+        vehicle.sends()
+        accepts(vehicle.gate, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
+    assert 4 <= len(writes) <= 6  # in 10 s
+
+
+def test_clock_that_was_set_back_and_damaged_files_are_refused_by_name(vehicle):
+    vehicle.sends()
+    vehicle.wall -= 3600.0
+    with pytest.raises(
+        TelemetryError, match=r"name: is 36\d\d s ahead of the clock; set the clock, or remove the file"
+    ):
+        vehicle.start()
+    for damaged in ("", "x", "-1", "1" * 30):
+        vehicle.file.write_text(damaged)
+        with pytest.raises(TelemetryError, match="name: holds no timestamp; remove the file"):
+            vehicle.start()
+    vehicle.file.unlink()
+    vehicle.start()
+
+
+def test_folder_that_cannot_be_written_is_refused_at_the_start_and_warned_of_later(vehicle, tmp_path, caplog):
+    vehicle.file.unlink()
+    vehicle.file.mkdir()
+    vehicle.wall += 10.0
+    assert vehicle.sends() and "can be replayed" in caplog.text
+    assert vehicle.sends() and len(caplog.records) == 1
+    with pytest.raises(TelemetryError, match="name: timestamps cannot be kept: "):
+        vehicle.start()
+    (tmp_path / "file").touch()
+    with pytest.raises(TelemetryError, match="timestamps cannot be kept: "):
+        SigningClock(tmp_path / "file" / "name")
+
+
+def test_each_key_and_identity_has_a_file_that_shows_nothing_of_the_key():
+    names = {timestamp_file(key, who).name for key in (KEY, bytes(32)) for who in ((1, 1), (255, 190), (255, 191))}
+    assert len(names) == 6
+    assert not any(KEY.hex()[:8] in name or hashlib.sha256(KEY).hexdigest()[:8] in name for name in names)
+
+
+def test_frame_captured_from_a_link_is_refused_by_the_next_one(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+    endpoint = Endpoint("udpin", "udpin:127.0.0.1:0", host="127.0.0.1", port=0)
+    frame, heard = Station(key=KEY).pack(attitude(5)), []
+    for _ in range(2):
+        (link,) = open_links([endpoint], MavlinkOptions(key=KEY))
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
+            station.sendto(frame, ("127.0.0.1", link.channel.port))
+            assert until(lambda: heard.extend(link.receive(time.perf_counter() + 60.0)) or link.counts.accepted or
+                         link.counts.old)  # fmt: skip
+        link.channel.close()
+    assert len(heard) == 1
+    assert len(list(tmp_path.rglob("*-1-1"))) == 1
