@@ -59,8 +59,8 @@ class Master:
     law : Law, optional
         Control law; default: the scenario's.
     plant : SteppedPlant, optional
-        Plant with the channels of the vehicle's FMU, which the master closes; default: that FMU. Further inputs, such as
-        those of a coupled plant, are set by the caller.
+        Plant with the channels of the vehicle's FMU, which the master closes; default: that FMU. The caller sets
+        further inputs, such as those of a coupled plant.
 
     Attributes
     ----------

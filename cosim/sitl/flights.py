@@ -96,8 +96,8 @@ class Flights:
         Raises
         ------
         RunError, ScenarioError, PlantError, BuildError, DefinitionError
-            If the scenario cannot be flown at this rate, or the run cannot begin; as `scenario_to_fly` and `Flight`. After
-            `RUNS` runs none begins.
+            If the scenario cannot be flown at this rate, or the run cannot begin; as `scenario_to_fly` and `Flight`. Or
+            if the session has had `RUNS` runs.
         """
         if len(self._ended) >= RUNS:
             raise RunError(f"the autopilot begins again: expected {RUNS} runs of a session at most")

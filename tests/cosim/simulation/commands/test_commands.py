@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 
 from cosim.errors import CommandError, RunError
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import sources
-from cosim.simulation.commands import CommandQueue, LiveSettings, LoggedCommands, ReplayedCommands
+from cosim.simulation.commands import CommandQueue, LiveSettings, LoggedCommands, ReplayedCommands, sources
 from cosim.simulation.commands.commands import (
     MODES,
     AddObstacle,
