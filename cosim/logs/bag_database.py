@@ -56,9 +56,9 @@ class BagDatabase:
             if kind == "table":
                 self.tables.add(name)
         for name in self.tables & {"topics", "messages", "message_definitions"}:
-            query = f"SELECT name, type, pk, hidden FROM pragma_table_xinfo('{name}')"
-            for column, kind, key, hidden in self.rows(query, str, str, int, int):
-                if hidden or (name, column) == ("messages", "id") and (kind.upper(), key) != ("INTEGER", 1):
+            query = "SELECT name, type, pk, hidden FROM pragma_table_xinfo(?)"
+            for column, kind, key, hidden in self._database.execute(query, (name,)):
+                if hidden or ((name, column) == ("messages", "id") and (kind.upper(), key) != ("INTEGER", 1)):
                     raise ImportLogError(f"has the column {column!r} of {name}, which no recorder writes")
 
     def _count(self) -> bool:

@@ -9,10 +9,9 @@ import sqlite3
 import struct
 import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, NamedTuple
 
 from cosim.errors import ImportLogError
 from cosim.logs.bag_database import open_database
@@ -22,9 +21,9 @@ from cosim.logs.format import Moved
 MAX_DECODED = 1 << 20  # bytes, greatest size of a message that is decoded: its objects take up to a hundred times that
 _MAX_TOPICS = 20_000
 _RECORD_HEAD = struct.Struct("<BQ")  # opcode and length of an MCAP record
-_LOG_TIME, _MESSAGE_HEAD = struct.Struct("<Q"), 22  # in an MCAP message after 6 bytes; bytes before the data
-# greatest size of the MCAP records that are read, by opcode: footer, schema, channel, message, chunk [bytes]
-_MAX_RECORD = {2: 1 << 10, 3: 1 << 20, 4: 1 << 20, 5: MAX_PART, 6: MAX_PART}
+_MESSAGE_HEAD, _DATA = struct.Struct("<H4xQ"), 22  # channel and time of an MCAP message; bytes before its data
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = range(2, 7)  # opcodes of the MCAP records that are read
+_MAX_RECORD = {_FOOTER: 1 << 10, _SCHEMA: 1 << 20, _CHANNEL: 1 << 20, _MESSAGE: MAX_PART, _CHUNK: MAX_PART}  # bytes
 _NUMBER = re.compile(r"\d+")
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"  # first bytes of compressed data, RFC 8878
 # exceptions that damaged data raises in libraries
@@ -35,8 +34,7 @@ DAMAGE = (
 SUFFIXES = (".mcap", ".db3", ".bag")
 
 
-@dataclass(frozen=True, slots=True)
-class StoredMessage:
+class StoredMessage(NamedTuple):
     """A stored message, not decoded."""
 
     topic: str
@@ -132,24 +130,28 @@ class _McapFile:
     def messages(self) -> Iterator[StoredMessage]:
         """Yield the messages; raise EOFError if the file ends early."""
         from mcap.data_stream import ReadDataStream
-        from mcap.opcode import Opcode
         from mcap.stream_reader import read_magic
 
-        total = self._path.stat().st_size
+        total, failures = self._path.stat().st_size, _failures()
         with self._path.open("rb") as file:
             read_magic(ReadDataStream(file))
             for opcode, body in _mcap_records(file):
-                if opcode == Opcode.FOOTER:
+                if opcode == _FOOTER:
                     return
+                part = file.tell() / total
                 try:
-                    records = self._chunk(body) if opcode == Opcode.CHUNK else [(opcode, body)]
-                    for record in records:
-                        channel = self._take(*record)
-                        if channel is not None:
-                            time, data = _LOG_TIME.unpack_from(record[1], 6)[0], record[1][_MESSAGE_HEAD:]
-                            yield StoredMessage(*channel, data, time * 1e-9, file.tell() / total)
-                except _failures():
-                    if opcode != Opcode.CHUNK:
+                    for kind, record in self._chunk(body) if opcode == _CHUNK else [(opcode, body)]:
+                        if kind != _MESSAGE:
+                            self._take(kind, record)
+                            continue
+                        key, time = _MESSAGE_HEAD.unpack_from(record)
+                        channel = self._channels.get(key)
+                        if channel is None:
+                            self.unknown += 1
+                            continue
+                        yield StoredMessage(*channel, record[_DATA:], time * 1e-9, part)
+                except failures:
+                    if opcode != _CHUNK:
                         raise
                     self.damaged_chunks += 1
         raise EOFError("the file ends without a footer")
@@ -165,24 +167,18 @@ class _McapFile:
             raise ValueError("a chunk has another checksum")
         yield from _mcap_records(BytesIO(data))
 
-    def _take(self, opcode: int, body: bytes) -> tuple[str, str, str, str, str] | None:
-        """Take a schema or channel; return the channel of a message."""
+    def _take(self, opcode: int, body: bytes) -> None:
+        """Take a schema or channel."""
         from mcap.data_stream import ReadDataStream
-        from mcap.opcode import Opcode
         from mcap.records import Channel, Schema
 
-        if opcode == Opcode.MESSAGE:
-            channel = self._channels.get(int.from_bytes(body[:2], "little"))
-            self.unknown += channel is None
-            return channel
-        if opcode == Opcode.SCHEMA:
+        if opcode == _SCHEMA:
             schema = Schema.read(ReadDataStream(BytesIO(body)))
             self._schemas[schema.id] = schema.name, schema.data.decode(errors="replace"), schema.encoding
-        elif opcode == Opcode.CHANNEL:
-            read = Channel.read(ReadDataStream(BytesIO(body)))
-            schema = self._schemas.get(read.schema_id, ("", "", ""))
-            self._channels[read.id] = read.topic, *schema, read.message_encoding
-        return None
+        elif opcode == _CHANNEL:
+            channel = Channel.read(ReadDataStream(BytesIO(body)))
+            schema = self._schemas.get(channel.schema_id, ("", "", ""))
+            self._channels[channel.id] = channel.topic, *schema, channel.message_encoding
 
 
 def _mcap_records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
