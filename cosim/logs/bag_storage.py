@@ -2,31 +2,39 @@
 
 from __future__ import annotations
 
-import contextlib
+import heapq
+import os
 import re
 import sqlite3
 import struct
+import zlib
 from collections.abc import Iterator
-from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO, NamedTuple
 
 from cosim.errors import ImportLogError
+from cosim.logs.bag_database import open_database
+from cosim.logs.decompression import MAX_PART, Decompressor
 from cosim.logs.format import Moved
 
-_LARGEST = 1 << 28  # bytes, greatest size of an MCAP record
+MAX_DECODED = 1 << 20  # bytes, greatest size of a message that is decoded: its objects take up to a hundred times that
+_MAX_TOPICS = 20_000
+_RECORD_HEAD = struct.Struct("<BQ")  # opcode and length of an MCAP record
+_MESSAGE_HEAD, _DATA = struct.Struct("<H4xQ"), 22  # channel and time of an MCAP message; bytes before its data
+_FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = range(2, 7)  # opcodes of the MCAP records that are read
+_MAX_RECORD = {_FOOTER: 1 << 10, _SCHEMA: 1 << 20, _CHANNEL: 1 << 20, _MESSAGE: MAX_PART, _CHUNK: MAX_PART}  # bytes
 _NUMBER = re.compile(r"\d+")
 _ZSTANDARD = b"\x28\xb5\x2f\xfd"  # first bytes of compressed data, RFC 8878
 # exceptions that damaged data raises in libraries
 DAMAGE = (
     ValueError, KeyError, IndexError, TypeError, AttributeError, EOFError, OSError, RuntimeError, AssertionError,
-    MemoryError, struct.error,
+    ArithmeticError, MemoryError, struct.error,
 )  # fmt: skip
 SUFFIXES = (".mcap", ".db3", ".bag")
 
 
-@dataclass(frozen=True, slots=True)
-class StoredMessage:
+class StoredMessage(NamedTuple):
     """A stored message, not decoded."""
 
     topic: str
@@ -80,20 +88,23 @@ def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[St
     Raises
     ------
     ImportLogError
-        If the first file cannot be read at all.
+        If the first file cannot be read at all, or a file is larger than any recorder's when it is decompressed.
     """
     failures = _failures()
     files, readers = bag_files(path), {".mcap": _of_mcap, ".db3": _of_sqlite, ".bag": _of_ros1}
-    found = False
+    topics: set[str] = set()
     for k, file in enumerate(files):
         try:
             for message in readers[file.suffix.lower()](file, remarks):
                 yield message
-                found = True
+                if message.topic not in topics:
+                    topics.add(message.topic)
+                    if len(topics) > _MAX_TOPICS:
+                        raise ImportLogError(f"has more than {_MAX_TOPICS} topics")
                 moved((k + message.part) / len(files))
         except failures as error:
             words = str(error) or type(error).__name__
-            if not found:
+            if not topics:
                 raise ImportLogError(f"cannot be read as a bag: {words}") from error
             remarks.append(f"{file.name} breaks off: {words}"[:200])
 
@@ -107,76 +118,119 @@ def _failures() -> tuple[type[Exception], ...]:
     return (McapError, ReaderError, ZstdError, sqlite3.Error, *DAMAGE)
 
 
-def _of_mcap(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
-    from mcap.reader import make_reader
-    from mcap.records import Channel, Chunk, Message, Schema
-    from mcap.stream_reader import StreamReader, breakup_chunk
+class _McapFile:
+    """An MCAP file, read in the order of its records."""
 
-    failures, total, lost, unknown = _failures(), path.stat().st_size, 0, 0
-    schemas: dict[int, Any] = {}
-    channels: dict[int, Any] = {}
-    with path.open("rb") as file:
-        # the index at the end, which is missing if the recorder was killed
-        with contextlib.suppress(*failures):
-            summary = make_reader(file, record_size_limit=_LARGEST).get_summary()
-            schemas, channels = dict(summary.schemas), dict(summary.channels)
-        file.seek(0)
-        for whole in StreamReader(file, emit_chunks=True, record_size_limit=_LARGEST).records:
-            try:
-                records = breakup_chunk(whole, validate_crc=True) if isinstance(whole, Chunk) else [whole]
-            except failures:
-                lost += 1
-                continue
-            for record in records:
-                if isinstance(record, Schema):
-                    schemas[record.id] = record
-                elif isinstance(record, Channel):
-                    channels[record.id] = record
-                elif isinstance(record, Message) and record.channel_id not in channels:
-                    unknown += 1
-                elif isinstance(record, Message):
-                    channel = channels[record.channel_id]
-                    schema = schemas.get(channel.schema_id)
-                    yield StoredMessage(
-                        channel.topic,
-                        schema.name if schema else "",
-                        schema.data.decode() if schema else "",
-                        schema.encoding if schema else "",
-                        channel.message_encoding,
-                        record.data,
-                        record.log_time * 1e-9,
-                        file.tell() / total,
-                    )
-    if lost:
-        remarks.append(f"{lost} damaged chunks of {path.name} were passed over.")
-    if unknown:
-        remarks.append(f"{unknown} messages of {path.name} are of no channel, and were passed over.")
+    def __init__(self, path: Path) -> None:
+        self._path, self._parts = path, Decompressor(path)
+        self._schemas: dict[int, tuple[str, str, str]] = {}  # name, definition and language
+        self._channels: dict[int, tuple[str, str, str, str, str]] = {}  # the first fields of a `StoredMessage`
+        self.damaged_chunks = self.unknown = 0
+
+    def messages(self) -> Iterator[StoredMessage]:
+        """Yield the messages; raise EOFError if the file ends early."""
+        from mcap.data_stream import ReadDataStream
+        from mcap.stream_reader import read_magic
+
+        total, failures = self._path.stat().st_size, _failures()
+        with self._path.open("rb") as file:
+            read_magic(ReadDataStream(file))
+            for opcode, body in _mcap_records(file):
+                if opcode == _FOOTER:
+                    return
+                part = file.tell() / total
+                try:
+                    for kind, record in self._chunk(body) if opcode == _CHUNK else [(opcode, body)]:
+                        if kind != _MESSAGE:
+                            self._take(kind, record)
+                            continue
+                        key, time = _MESSAGE_HEAD.unpack_from(record)
+                        channel = self._channels.get(key)
+                        if channel is None:
+                            self.unknown += 1
+                            continue
+                        yield StoredMessage(*channel, record[_DATA:], time * 1e-9, part)
+                except failures:
+                    if opcode != _CHUNK:
+                        raise
+                    self.damaged_chunks += 1
+        raise EOFError("the file ends without a footer")
+
+    def _chunk(self, body: bytes) -> Iterator[tuple[int, bytes]]:
+        """Decompress a chunk, and yield opcode and body of each record."""
+        from mcap.data_stream import ReadDataStream
+        from mcap.records import Chunk
+
+        chunk = Chunk.read(ReadDataStream(BytesIO(body)))
+        data = self._parts.decompress(chunk.compression, chunk.data)
+        if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+            raise ValueError("a chunk has another checksum")
+        yield from _mcap_records(BytesIO(data))
+
+    def _take(self, opcode: int, body: bytes) -> None:
+        """Take a schema or channel."""
+        from mcap.data_stream import ReadDataStream
+        from mcap.records import Channel, Schema
+
+        if opcode == _SCHEMA:
+            schema = Schema.read(ReadDataStream(BytesIO(body)))
+            self._schemas[schema.id] = schema.name, schema.data.decode(errors="replace"), schema.encoding
+        elif opcode == _CHANNEL:
+            channel = Channel.read(ReadDataStream(BytesIO(body)))
+            schema = self._schemas.get(channel.schema_id, ("", "", ""))
+            self._channels[channel.id] = channel.topic, *schema, channel.message_encoding
+
+
+def _mcap_records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
+    """Yield opcode and body of each record that matters here, of a file or a chunk."""
+    while head := file.read(_RECORD_HEAD.size):
+        opcode, length = _RECORD_HEAD.unpack(head)
+        limit = _MAX_RECORD.get(opcode)
+        if limit is None:
+            file.seek(length, os.SEEK_CUR)
+            continue
+        if length > limit:
+            raise ImportLogError(f"has a record of {length} bytes, expected at most {limit}")
+        body = file.read(length)
+        if len(body) < length:
+            raise EOFError(f"a record has {len(body)} bytes of {length}")
+        yield opcode, body
+
+
+def _of_mcap(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
+    file = _McapFile(path)
+    try:
+        yield from file.messages()
+    finally:
+        if file.damaged_chunks:
+            remarks.append(f"{file.damaged_chunks} damaged chunks of {path.name} were passed over.")
+        if file.unknown:
+            remarks.append(f"{file.unknown} messages of {path.name} are of no channel, and were passed over.")
 
 
 def _of_sqlite(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
-    # a recorder that was killed leaves a journal, which a file opened as immutable would not show
-    journal = path.with_name(f"{path.name}-wal").exists()
-    address = f"{path.resolve().as_uri()}?mode=ro" + ("" if journal else "&immutable=1")
-    with contextlib.closing(sqlite3.connect(address, uri=True)) as database:
-        tables = {name for (name,) in database.execute("SELECT name FROM sqlite_master")}
-        if not tables >= {"topics", "messages"}:
+    parts, total, read = Decompressor(path), path.stat().st_size, 0
+    with open_database(path) as database:
+        if not database.tables >= {"topics", "messages"}:
             raise ImportLogError("is a database without topics and messages, expected a bag of ROS 2")
         texts: dict[str, tuple[str, str]] = {}
-        if "message_definitions" in tables:
+        if "message_definitions" in database.tables:
             query = "SELECT topic_type, encoded_message_definition, encoding FROM message_definitions"
-            texts = {name: (text, language) for name, text, language in database.execute(query)}
+            texts = {name: (text, language) for name, text, language in database.rows(query, str, str, str)}
         topics = {
             key: (topic, _three_parts(kind), *texts.get(kind, ("", "")), encoding)
-            for key, topic, kind, encoding in database.execute(
-                "SELECT id, name, type, serialization_format FROM topics"
+            for key, topic, kind, encoding in database.rows(
+                "SELECT id, name, type, serialization_format FROM topics", int, str, str, str
             )
         }
-        total, read = path.stat().st_size, 0
-        for topic, stamp, data in database.execute("SELECT topic_id, timestamp, data FROM messages ORDER BY id"):
+        query = "SELECT topic_id, timestamp, data FROM messages ORDER BY id"
+        for topic, stamp, data in database.rows(query, int, int, bytes):
             if topic not in topics:
                 raise ValueError(f"a message has topic number {topic!r}, expected one of {sorted(topics)}")
             read += len(data)
-            yield StoredMessage(*topics[topic], _unpacked(data), stamp * 1e-9, read / total)
+            if data.startswith(_ZSTANDARD):  # the recorder has compressed each message
+                data = parts.decompress("zstd", data)
+            yield StoredMessage(*topics[topic], data, stamp * 1e-9, read / total)
 
 
 def _three_parts(kind: str) -> str:
@@ -184,22 +238,42 @@ def _three_parts(kind: str) -> str:
     return kind.replace("/", "/msg/") if kind.count("/") == 1 else kind
 
 
-def _unpacked(data: bytes) -> bytes:
-    """Return the data of a message, decompressed if the recorder has compressed each message."""
-    if not data.startswith(_ZSTANDARD):
-        return data
-    from zstandard import ZstdDecompressor
-
-    return ZstdDecompressor().decompressobj().decompress(data)
-
-
 def _of_ros1(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
-    from rosbags.rosbag1 import Reader
+    from rosbags.rosbag1.reader import Header, Reader, ReaderError, RecordType, read_bytes, read_uint32
 
-    with Reader(path) as bag:
-        total = max(1, bag.message_count)
-        for k, (connection, stamp, data) in enumerate(bag.messages()):
+    class BoundedReader(Reader):  # type: ignore[misc]
+        """A reader that refuses to read parts of an index twice."""
+
+        index_size = 0  # bytes, size of the index so far
+
+        def read_index_data(self, pos: int, indexes: dict[int, Any]) -> None:
+            start = self.bio.tell()
+            super().read_index_data(pos, indexes)
+            self.index_size += self.bio.tell() - start
+            if self.index_size > path.stat().st_size:
+                raise ReaderError("the index is larger than the file")
+
+    parts, position, chunk, walked = Decompressor(path), -1, BytesIO(), 0
+    with BoundedReader(path) as bag:
+        total = max(1, sum(map(len, bag.indexes.values())))
+        connections = {connection.id: connection for connection in bag.connections}
+        for k, entry in enumerate(heapq.merge(*(bag.indexes[key] for key in connections))):
+            if entry.chunk_pos != position:
+                position = entry.chunk_pos
+                bag.bio.seek(position)
+                compression = Header.read(bag.bio, RecordType.CHUNK).get_string("compression")
+                chunk = BytesIO(parts.decompress(compression, read_bytes(bag.bio, read_uint32(bag.bio))))
+            chunk.seek(entry.offset)
+            while (header := Header.read(chunk)).get_uint8("op") == RecordType.CONNECTION:
+                chunk.seek(read_uint32(chunk), os.SEEK_CUR)
+            if header.get_uint8("op") != RecordType.MSGDATA or header.get_time("time") != entry.time:
+                raise ReaderError("the index does not lead to its message")
+            data = read_bytes(chunk, read_uint32(chunk))
+            walked += chunk.tell() - entry.offset
+            if walked > parts.total:
+                raise ImportLogError("has more messages in its index than in its chunks")
+            connection = connections[header.get_uint32("conn")]
             text = getattr(connection.msgdef, "data", connection.msgdef)
             yield StoredMessage(
-                connection.topic, connection.msgtype, text, "ros2msg", "ros1", bytes(data), stamp * 1e-9, k / total
+                connection.topic, connection.msgtype, text, "ros2msg", "ros1", data, entry.time * 1e-9, k / total
             )

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.errors import ImportLogError
-from cosim.logs.bag_storage import DAMAGE, StoredMessage, stored_messages
+from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, StoredMessage, stored_messages
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import require_map
 from cosim.logs.format import Moved
@@ -92,6 +92,8 @@ def _find_vehicle(path: Path) -> tuple[bool, tuple[int, int, int]]:
 
 def _parts(stored: StoredMessage) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return header and fields of a message."""
+    if len(stored.data) > MAX_DECODED:
+        raise ValueError("is too large")
     whole = json.loads(stored.data)
     return whole["header"], whole["message"]
 

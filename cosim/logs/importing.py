@@ -39,6 +39,7 @@ from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
 
 _KEPT = ("goal", "regions", "criteria", "arbiter", "intersection", "title")  # keys of a scenario that apply to a log
+_MIN_ROWS, _ROWS_PER_SAMPLE = 500_000, 200  # rows that a log may have: some, and for each of its samples
 _GAPS = 12  # greatest number of gaps of a topic in a report
 
 
@@ -119,7 +120,8 @@ def import_log(
         craft = load_vehicle(Path(vehicle) if str(vehicle).endswith(".toml") else str(vehicle))
         if curve is not None and curve not in CURVES:
             raise ImportLogError(f"curve is {curve!r}, expected one of {', '.join(CURVES)}")
-        with tempfile.TemporaryDirectory(prefix="cosim-import-") as scratch:
+        # a log may hold any numbers, also such that overflow
+        with tempfile.TemporaryDirectory(prefix="cosim-import-") as scratch, np.errstate(all="ignore"):
             contents = LogContents(Path(scratch))
             try:
                 form.read(path, column_map, contents, moved)
@@ -197,8 +199,12 @@ def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, w
     commands = commands_of(command, vehicle, wanted.curve, supply, contents.parameters) if command else None
     hertz = wanted.rate or rate_of(topics)
     steps = max(1, math.floor((end - start) * hertz + 1e-6))
-    if steps >= MAX_ROWS:
-        raise ImportLogError(f"lasts {end - start:.4g} s: {steps} rows at {hertz:g} Hz, expected less than {MAX_ROWS}")
+    samples = sum(topic.count for topic in topics.values())
+    limit = min(MAX_ROWS - 1, max(_MIN_ROWS, _ROWS_PER_SAMPLE * samples))
+    if steps > limit:
+        raise ImportLogError(
+            f"lasts {end - start:.4g} s with {samples} samples: {steps} rows at {hertz:g} Hz, expected at most {limit}"
+        )
     through = commands.through if commands else "thrusters" if vehicle.n_thrusters else "wrench"
     draft = _scenario(path, vehicle, wanted, through, steps, 1.0 / hertz)
     volts = math.nan if wanted.voltage is None else wanted.voltage

@@ -16,6 +16,7 @@ from cosim.logs.quantities import QUANTITIES
 from cosim.simulation.signals import Array
 
 BLOCK = 2**15  # samples that are processed together
+_MAX_STAMP = 1e10  # s, 300 years
 _WAITING = 2**14  # numbers of a source in memory before they go to disk
 
 
@@ -35,10 +36,11 @@ class Source:
     _waiting: array[float] = field(default_factory=lambda: array("d"))
 
     def put(self, stamp: float, written: float, values: Sequence[float]) -> None:
-        """Append a sample; one with a number that is not finite is counted and left out."""
+        """Append a sample; one with a number that is not finite is counted and left out. An absurd stamp is dropped."""
         if not (math.isfinite(written) and all(map(math.isfinite, values))):
             self.broken += 1
             return
+        stamp = stamp if abs(stamp) <= _MAX_STAMP else math.nan
         self._waiting.extend((stamp, written, *values))
         self.count += 1
         if len(self._waiting) > _WAITING:

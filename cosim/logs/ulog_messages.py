@@ -6,6 +6,7 @@ import re
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +77,7 @@ class ULogMessages:
         self.dropouts: list[float] = []
         self.is_damaged = False
         self._formats: dict[str, list[tuple[str, int, str]]] = {}
+        self._dtypes: dict[str, tuple[np.dtype[Any], int]] = {}
         self._topics: dict[int, _Topic | None] = {}  # topics by their id in the file; None: not wanted
         self._has_begun = False
         self._appended: list[int] = []  # bytes, offsets in the file at which data were appended after a crash
@@ -124,9 +126,12 @@ class ULogMessages:
                     raise ValueError
                 topic.waiting += body[2 : 2 + least]
                 return topic
-            case "F":
-                name, _, fields = body.decode().partition(":")
-                self._formats[name] = [_field(text) for text in fields.split(";") if text]
+            case "F" if not self._topics:
+                name, _, texts = body.decode().partition(":")
+                fields = [_field(text) for text in texts.split(";") if text]
+                if not fields:
+                    raise ValueError
+                self._formats[name] = fields
             case "A":
                 number, name = int.from_bytes(body[1:3], "little"), body[3:].decode()
                 if name in self._wanted:
@@ -145,11 +150,19 @@ class ULogMessages:
         return None
 
     def _topic(self, name: str, kind: str) -> _Topic:
-        fields = list(self._flat("", kind, 0))
+        if kind not in self._dtypes:
+            self._dtypes[kind] = self._dtype(kind)
+        return _Topic(name, *self._dtypes[kind])
+
+    def _dtype(self, kind: str) -> tuple[np.dtype[Any], int]:
+        """Return the format of a type's samples without padding at the end, and their size with it [bytes]."""
+        fields = list(islice(self._flat("", kind, 0), _LONGEST + 1))
+        if len(fields) > _LONGEST:
+            raise ValueError
         longest = np.dtype(fields).itemsize
         while fields and fields[-1][0].startswith("_padding"):
             fields.pop()
-        return _Topic(name, np.dtype(fields), longest)
+        return np.dtype(fields), longest
 
     def _flat(self, prefix: str, kind: str, depth: int) -> Iterator[tuple[str, str]]:
         """Yield name and type of each number of a message, also in nested types."""

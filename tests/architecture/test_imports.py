@@ -41,7 +41,7 @@ ONE_PLACE = {
     "pandas": {"cosim.results.run_result"},
     "pymavlink": {"cosim.mavlink.wire.dialect", "cosim.logs.formats.dataflash"},
     "rerun": {"cosim.export.rrd_writer"},
-    "rosbags": {"cosim.logs.bag_storage", "cosim.logs.formats.bag"},
+    "rosbags": {"cosim.logs.bag_storage", "cosim.logs.formats.bag", "cosim.logs.message_definitions"},
     "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},
     "shtab": {"cosim.command_line.completion"},
     "skfuzzy": {"fuzzy_arbiter.engines.scikit"},

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import ImportLogError
-from cosim.logs.bag_storage import DAMAGE, SUFFIXES, StoredMessage, bag_files, stored_messages
+from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, SUFFIXES, StoredMessage, bag_files, stored_messages
 from cosim.logs.blueos import read_recording
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import ColumnMap, TimeColumn, require_map
 from cosim.logs.format import LogFormat, Moved
 from cosim.logs.frames import UNITS
+from cosim.logs.message_definitions import parse_definition, reachable_types
 from cosim.logs.spool import LogContents
 from plant_fmu.toml_tables import hint
 
 _WAITING = 4096  # messages of a quantity that are written together
 _PART = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")  # a field's name or an index in a path
-_IDL_TITLE = re.compile(r"^=+\nIDL: .*\n", re.MULTILINE)  # heading of each type in a definition
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")  # types that definitions may omit
 
 Getter = Callable[[Any], float]
@@ -69,15 +69,15 @@ class Decoder:
     """Decode stored messages by their definitions: those of the bag, of a folder, or of ROS 2 Humble."""
 
     def __init__(self, folder: str) -> None:
-        from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+        from rosbags.typesys import Stores, get_typestore
 
         self._standard = get_typestore(Stores.ROS2_HUMBLE).fielddefs
         self._own: dict[str, Any] = {}
         for path in sorted(Path(folder).rglob("*.msg")) if folder else ():
             package = path.parent.parent if path.parent.name == "msg" else path.parent
             try:
-                self._own |= get_types_from_msg(path.read_text("utf-8"), f"{package.name}/msg/{path.stem}")
-            except (TypesysError, UnicodeDecodeError) as error:
+                self._own |= parse_definition(path.read_text("utf-8"), f"{package.name}/msg/{path.stem}", "ros2msg")
+            except (ImportLogError, UnicodeDecodeError) as error:
                 raise ImportLogError(f"messages: {path} is no message definition: {error}") from error
         self._decoders: dict[str, Callable[[bytes], Any]] = {}
 
@@ -85,31 +85,34 @@ class Decoder:
         """Return a message with its fields as attributes."""
         if message.topic not in self._decoders:
             self._decoders[message.topic] = self._decoder(message)
+        if len(message.data) > MAX_DECODED:
+            raise ValueError("is too large")
         return self._decoders[message.topic](message.data)
 
     def _decoder(self, message: StoredMessage) -> Callable[[bytes], Any]:
-        from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
+        from rosbags.typesys import Stores, TypesysError, get_typestore
 
         if message.encoding not in ("cdr", "ros1"):
             raise ImportLogError(f"{message.topic}: encoding {message.encoding!r}, expected 'cdr'")
-        types: dict[str, Any] = {}
-        try:
-            if message.language == "ros2idl":
-                for text in filter(str.strip, _IDL_TITLE.split(message.definition)):
-                    types |= get_types_from_idl(text)
-            elif message.definition:
-                types = get_types_from_msg(message.definition, message.type)
-            else:
-                types = self._standard | self._own
-        except TypesysError as error:
-            raise ImportLogError(f"{message.topic}: its definition cannot be read: {error}") from error
-        if message.type not in types:
+        types = self._standard | self._own
+        if not message.definition and message.type not in types:
             raise ImportLogError(
                 f"{message.topic} is of type {message.type}, of which the bag has no definition; expected in the map: "
                 'messages = "FOLDER", which holds the .msg files of its package'
             )
-        store = get_typestore(Stores.EMPTY)
-        store.register({name: self._standard[name] for name in _TIMES} | types)
+        try:
+            if message.definition:
+                types = {name: self._standard[name] for name in _TIMES}
+                types |= parse_definition(message.definition, message.type, message.language)
+            found = reachable_types(types, message.type, 1 if message.encoding == "cdr" else 0)
+            store = get_typestore(Stores.EMPTY)
+            store.register(found)
+            for name in found:  # else rosbags would make its code again for each message that it cannot decode
+                store.get_msgdef(name)
+        except ImportLogError as error:
+            raise ImportLogError(f"{message.topic}: the definition of its type {error}") from error
+        except (TypesysError, NameError, SyntaxError, *DAMAGE) as error:
+            raise ImportLogError(f"{message.topic}: the definition of its type cannot be used: {error}") from error
         method = store.deserialize_ros1 if message.encoding == "ros1" else store.deserialize_cdr
         return lambda data: method(data, message.type)
 
@@ -185,11 +188,13 @@ def _stamp_getter(time: TimeColumn, topic: str) -> Getter:
 
     def stamp(message: Any) -> float:
         value = find(message)
-        if hasattr(value, "nanosec"):
-            return float(value.sec + 1e-9 * value.nanosec)
-        return float(value) * UNITS["s"].get(time.unit, 1.0)
+        with contextlib.suppress(TypeError, ValueError, AttributeError):
+            if hasattr(value, "nanosec"):
+                return float(value.sec + 1e-9 * value.nanosec)
+            return float(value) * UNITS["s"].get(time.unit, 1.0)
+        raise ImportLogError(f"{topic}: {time.column} is {type(value).__name__}, expected a time")
 
     return stamp
 
 
-FORMAT = LogFormat(SUFFIXES, read, mapped=True, needs=("mcap>=1.2", "rosbags>=0.10.3"), folder=True)
+FORMAT = LogFormat(SUFFIXES, read, mapped=True, needs=("mcap>=1.2", "rosbags>=0.11.6"), folder=True)

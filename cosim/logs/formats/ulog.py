@@ -39,10 +39,9 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
     log = ULogMessages(path, frozenset(_TOPICS))
     used: dict[tuple[str, str], list[str]] = {}
     names = set()
-    with np.errstate(invalid="ignore"):  # damaged samples may contain signaling NaN
-        for name, samples in log.blocks(moved):
-            names.add(name.split("[")[0])
-            _take(samples, contents, name, used)
+    for name, samples in log.blocks(moved):
+        names.add(name.split("[")[0])
+        _take(samples, contents, name, used)
     contents.autopilot = "px4"
     contents.parameters |= log.parameters
     contents.kind = kind_of(int(contents.parameters.get("MAV_TYPE", 0)))

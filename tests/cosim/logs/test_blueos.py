@@ -125,6 +125,17 @@ def test_a_damaged_chunk_is_a_gap(tmp_path):
         ([("services/x/log", b"{}")], "needs a column map"),
         ([("mavlink/out", b"{}")], "holds no heartbeat of an autopilot, expected a recording of a vehicle"),
         ([("mavlink/1/1/HEARTBEAT", b'{"HEARTBEAT": ')], "holds no heartbeat of an autopilot"),
+        (
+            [
+                (
+                    "mavlink/1/1/HEARTBEAT",
+                    b'{"header": {"component_id": 1, "system_id": Infinity}, "message": {"autopilot": 3, '
+                    b'"mavtype": 12}, "HEARTBEAT": 1}',
+                )
+            ],
+            "holds no heartbeat of an autopilot",
+        ),
+        ([("mavlink/1/1/HEARTBEAT", b'{"header": "HEARTBEAT", "message": ' + b"[" * 2**21)], "holds no heartbeat"),
     ],
 )
 def test_recording_without_a_vehicle_is_refused(messages, what, tmp_path):

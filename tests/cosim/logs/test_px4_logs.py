@@ -25,6 +25,10 @@ def dive():
     return Dive(np.arange(0.0, 30.0, 0.05))
 
 
+def message(kind, body):
+    return struct.pack("<HB", len(body), ord(kind)) + body
+
+
 def write_ulog(path, dive):
     """A log of PX4, byte by byte as its format is described; pyulog must read it as well."""
     formats = {
@@ -35,9 +39,6 @@ def write_ulog(path, dive):
         "battery_status": "uint64_t timestamp;cell[2] cells;float voltage_v;uint8_t warning;uint8_t[3] _padding0;",
         "cell": "uint16_t charge;int32_t[2] raw;",
     }
-
-    def message(kind, body):
-        return struct.pack("<HB", len(body), ord(kind)) + body
 
     with path.open("wb") as file:
         file.write(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 5_000_000))
@@ -158,6 +159,17 @@ def test_junk_behind_a_log_leaves_what_came_before(dive, tmp_path, junk):
     log, ours = read_samples(path)
     assert log.is_damaged
     assert_equal_samples(ours, theirs)
+
+
+def test_nested_formats_are_bounded(tmp_path):
+    """Types without fields, and types whose arrays multiply, are damage."""
+    levels = [f"{name}:{of}[4000] a;".encode() for name, of in zip(["vehicle_attitude", *"ABCD"], "ABCDE", strict=True)]
+    for last in (b"E:", b"E:float x;"):
+        formats = [message("F", text) for text in (*levels, last)]
+        subscription = message("A", b"\0\0\0vehicle_attitude")
+        (tmp_path / "deep.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8) + b"".join(formats) + subscription)
+        log = ULogMessages(tmp_path / "deep.ulg", frozenset(["vehicle_attitude"]))
+        assert not list(log.blocks(lambda part: None)) and log.is_damaged
 
 
 @pytest.mark.medium

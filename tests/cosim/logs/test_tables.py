@@ -285,3 +285,11 @@ with open("/proc/self/status") as status:  # of this process alone
         numbers.append(8e-6 * rows * signals)
     assert numbers[1] - numbers[0] > 100.0
     assert used[1] - used[0] < 20.0, used  # MB
+
+
+def test_few_samples_over_weeks_are_refused(tmp_path):
+    (tmp_path / "map.toml").write_text('time = { column = "t" }\n[depth]\ncolumns = ["d"]\n')
+    (tmp_path / "dive.csv").write_text("t,d\n" + "".join(f"{3599 * k},1\n" for k in range(500)))
+    with pytest.raises(ImportLogError, match=r"with 500 samples: 8979505 rows at 5 Hz, expected at most 500000"):
+        cosim.import_log(tmp_path / "dive.csv", "bluerov2_heavy", tmp_path / "run", columns=tmp_path / "map.toml")
+    assert not (tmp_path / "run").exists()

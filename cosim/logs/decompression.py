@@ -1,0 +1,69 @@
+"""Decompression of parts of a bag, bounded in each part and in total."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+from cosim.errors import ImportLogError
+
+MAX_PART = 1 << 27  # bytes, greatest size of a chunk or message
+_MIN_TOTAL = 1 << 24  # bytes that the parts of any bag may have in total
+_MAX_RATIO = 100  # greatest total size of the parts beyond that, in sizes of the file
+
+
+class Decompressor:
+    """Decompress the parts of a file.
+
+    Parameters
+    ----------
+    path : Path
+        The file, whose size bounds the total size of its parts.
+
+    Attributes
+    ----------
+    total : int
+        Total size of the parts so far [bytes].
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._max_total = max(_MIN_TOTAL, _MAX_RATIO * path.stat().st_size)
+        self.total = 0
+
+    def decompress(self, compression: str, data: bytes) -> bytes:
+        """Decompress a part; `compression` is bz2, lz4, zstd, none or empty.
+
+        Raises
+        ------
+        ImportLogError
+            If the part or all parts are too large, or the compression is unknown.
+        """
+        limit = min(MAX_PART, self._max_total - self.total)
+        if compression not in ("", "none"):
+            with _open(compression, BytesIO(data)) as file:
+                data = file.read(limit + 1)
+        if len(data) > limit:
+            raise ImportLogError(
+                f"decompresses to more than {self.total + limit} bytes, "
+                f"expected at most {MAX_PART} in a part and {self._max_total} in all"
+            )
+        self.total += len(data)
+        return data
+
+
+def _open(compression: str, file: BytesIO) -> Any:
+    """Open compressed data as a file to read from."""
+    if compression == "bz2":
+        from bz2 import BZ2File
+
+        return BZ2File(file)
+    if compression == "lz4":
+        from lz4.frame import LZ4FrameFile
+
+        return LZ4FrameFile(file)
+    if compression == "zstd":
+        from zstandard import ZstdDecompressor
+
+        return ZstdDecompressor(max_window_size=MAX_PART).stream_reader(file)
+    raise ImportLogError(f"is compressed by {compression!r}, expected one of bz2, lz4, zstd")
