@@ -16,6 +16,7 @@ from cosim.simulation.signals import Array
 _WINDOW = 10.0  # s, time before the end that is examined
 _SAMPLES = 500  # greatest number of rows of that time that are read
 _APPROACHING = 0.03  # m/s, least mean rate at which the distance to the goal falls or grows
+_SWIMS = 1.0  # m/s, speed of a vehicle for which a time would not be too short
 _MOVING = 0.1  # m/s, least mean speed of a vehicle that is under way
 _AT_LIMITS = 0.5  # least fraction of the time with an actuator at its limit that counts as a lack of thrust
 _FULL = 0.999  # fraction of a thruster's limit that counts as the limit
@@ -100,6 +101,8 @@ def _cause(scenario: Scenario, end: _End, summary: dict[str, Any]) -> str:
     if silence > coast:
         return f"The vehicle was adrift: the law had no measurement for the last {silence:.1f} s."
     away = f"{distance:.2f} m from {where}"
+    if distance > max(_SWIMS, summary["max_speed"]) * summary["simulated_time"]:
+        return f"The time was too short: the vehicle, {away}, had {summary['simulated_time']:.1f} s."
     if end.closing > _APPROACHING:
         return f"The time was too short: the vehicle, {away}, still came nearer at {end.closing:.2f} m/s."
     between, is_hard = next(_regions_between(scenario, end, distance), ("", False))

@@ -65,12 +65,13 @@ def ran(tmp_path, capsys):
     [
         (REGION.format(name="rock", keep="out", hard="true", shape=BALL), {}, "The goal was blocked: 0."),
         (REGION.format(name="wall", keep="in", hard="true", shape=WALL), {}, "stopped before the hard region wall"),
-        ("", {"duration": 6.0, "goal": 9.0}, "The time was too short: the vehicle, "),
+        ("", {"duration": 0.4}, "The time was too short: the vehicle, 2.50 m from the goal, had 0.4 s."),
+        ("", {"duration": 6.0, "goal": 6.0}, "The time was too short: the vehicle, "),
         ("", {"duration": 14.0, "goal": 3.0}, "The time was too short: the vehicle was in the goal for the last "),
         ("", {"current": -1.6}, "The thrust was not enough: "),
         ("[sensing]\ndead_from = 1.0\ndead_for = 99.0\n", {"goal": 9.0}, "the law had no measurement for the last 19."),
     ],
-    ids=["covered", "wall", "short", "late", "current", "blind"],
+    ids=["covered", "wall", "shortest", "short", "late", "current", "blind"],
 )
 def test_missed_goal_has_its_cause_in_console_summary_and_events(ran, text, changes, words):
     run, printed = ran(text, **changes)
