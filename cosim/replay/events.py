@@ -14,13 +14,16 @@ from controller.regions.region_set import of_attitude
 from cosim.replay.activity import active_at, activity_signals
 from cosim.replay.command_words import command_events
 from cosim.replay.region_changes import Log
+from cosim.results.law_reports import ISOLATED, REJECTED, Isolations, rejects
 from cosim.results.run_result import Run
 from cosim.results.spans import Flags, Span, Spans
-from cosim.results.wording import IMPORTED
+from cosim.results.wording import IMPORTED, isolation_text
 from cosim.scenario.sensor_suite import SENSOR_NAMES
 from cosim.simulation.signals import Array
 
 _MAX_EVENTS = 12  # greatest number of events of a kind; of more, the closest ones are joined
+
+_REJECTIONS_APART = 1.0  # s; rejected samples closer than that are one event, which takes at least as long
 
 _MIN_ABSENCE = 0.1  # s; a shorter absence of the active region is ignored
 
@@ -54,9 +57,11 @@ def events_of(run: Run, log: Log) -> list[Event]:
         *_active(run),
         *_failures(run),
         *_outages(run),
+        *_isolations(run),
+        *_rejections(run),
         *_saturation(run),
     ]
-    return [*sorted(found, key=lambda event: event.time), _end(run)]
+    return [*sorted(found, key=lambda event: event.time), *_goal_miss(run), _end(run)]
 
 
 def _goal(run: Run) -> Iterator[Event]:
@@ -143,6 +148,33 @@ def _outages(run: Run) -> Iterator[Event]:
                 yield Event(time, "failure", f"{SENSOR_NAMES[outage.sensor]} {what}")
 
 
+def _isolations(run: Run) -> Iterator[Event]:
+    if ISOLATED in run.record.units:
+        isolations = Isolations()
+        for block in run.record.blocks(["time", ISOLATED]):
+            isolations.add(block["time"], block[ISOLATED])
+        for time, thruster, isolated in isolations.changes[:_MAX_EVENTS]:
+            yield Event(time, "failure", isolation_text(thruster, isolated))
+
+
+def _rejections(run: Run) -> Iterator[Event]:
+    if REJECTED not in run.record.units:
+        return
+    rejected, before = _JoinedSpans(_MAX_EVENTS // 2, _REJECTIONS_APART), 0.0
+    for block in run.record.blocks(["time", REJECTED]):
+        rejected.add(rejects(block[REJECTED], before), block["time"])
+        before = float(block[REJECTED][-1])
+    for span in rejected.found():
+        if span.end - span.start >= _REJECTIONS_APART:
+            text = f"The law rejects samples of position or velocity {rejected.lasting(span)}"
+            yield Event(span.start, "failure", text, span.end)
+
+
+def _goal_miss(run: Run) -> Iterator[Event]:
+    if run.summary["goal_miss"]:
+        yield Event(run.record.value("time", -1), "goal", f"Misses the goal. {run.summary['goal_miss']}")
+
+
 def _saturation(run: Run) -> Iterator[Event]:
     saturated, flags = _JoinedSpans(_MAX_EVENTS // 2), ("wrench_saturated", "allocation_saturated")
     for block in run.record.blocks(["time", *flags]):
@@ -167,8 +199,8 @@ def _end(run: Run) -> Event:
 class _JoinedSpans:
     """Finds the spans in which a condition holds, and joins the closest ones while there are more than `max_spans`."""
 
-    def __init__(self, max_spans: int) -> None:
-        self._max_spans, self._apart = max_spans, -math.inf  # s, spans at most this far apart are joined
+    def __init__(self, max_spans: int, apart: float = -math.inf) -> None:
+        self._max_spans, self._apart = max_spans, apart  # s, spans at most this far apart are joined
         self._all, self._joined = Spans(), list[Span]()
 
     def add(self, flags: Flags, time: Array, signal: Array | None = None) -> None:
@@ -190,9 +222,10 @@ class _JoinedSpans:
 
     def _join(self, more: list[Span]) -> None:
         spans = [*self._joined, *more]
-        if len(spans) > self._max_spans:
-            gaps = sorted(b.start - a.end for a, b in pairwise(spans))
-            self._apart = max(self._apart, gaps[len(spans) - self._max_spans - 1])
+        gaps = sorted(b.start - a.end for a, b in pairwise(spans))
+        gaps = [gap for gap in gaps if gap > self._apart]
+        if len(gaps) >= self._max_spans:
+            self._apart = gaps[len(gaps) - self._max_spans]
         self._joined = spans[:1]
         for span in spans[1:]:
             last = self._joined[-1]

@@ -17,7 +17,7 @@ from cosim.results.paper_claims import paper_claims
 from cosim.results.record import PARTS, RECORD
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY, Run
 from cosim.results.spans import Spans
-from cosim.results.wording import describe_task, format_number, shape_name, verdict
+from cosim.results.wording import describe_task, format_isolations, format_number, shape_name, verdict
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Sensing
 from cosim.simulation.signals import Array
@@ -213,6 +213,8 @@ def _effort(run: Run) -> Table:
         ("greatest force that acted, norm [N]", format_number(s["max_force"], 4)),
         ("effort: time integral of the acting force's norm [N s]", format_number(s["effort"], 4)),
         ("actuators asked for more than they give, for [s]", format_number(s["saturated_time"], 4)),
+        ("thrusters that the law isolated", format_isolations(s) or "none"),
+        ("position and velocity samples that the law rejected [%]", _percent(s["rejected_samples"])),
         ("weights above ½ at once, at the most [–]", str(s["weights_above_half"])),
         ("sum of the weights, at the most [–]", format_number(s["weights_sum_max"], 4)),
         ("how the run ended", s["status"]),
@@ -225,6 +227,10 @@ def _effort(run: Run) -> Table:
         ),
     )  # fmt: skip
     return Table("Effort and course", (), rows, (1.0, 1.0))
+
+
+def _percent(fraction: float | None) -> str:
+    return "not reported" if fraction is None else format_number(100.0 * fraction, 3)
 
 
 def _estimates(run: Run) -> Table | None:

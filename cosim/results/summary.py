@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from controller.regions.region_set import of_attitude
+from cosim.results.goal_miss import explain_miss
+from cosim.results.law_reports import ISOLATED, REJECTED, Isolations
 from cosim.results.lyapunov_summary import summarise_lyapunov
 from cosim.results.record import Rows
 from cosim.results.spans import Span, Spans
@@ -45,7 +47,8 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
     dict
         Values for JSON; times in s, lengths in m, forces in N. Clearances are distances to the surface of a region at
         its position at that time, or angles [rad] for regions of attitude; positive where it is respected, negative
-        where it is violated (inside a region to keep out of).
+        where it is violated (inside a region to keep out of). ``rejected_samples`` is a fraction, None for a law that
+        reports none; ``goal_miss`` a text, None if the goal is not missed.
 
     Raises
     ------
@@ -66,7 +69,7 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
     simulated = float(last["time"])
     settled = bool(visits and data.inside.open and simulated - visits[-1].start >= SETTLED_FOR)
     least = {name: data.least[f"{name}.clearance"] for name in names}
-    return {
+    summary = {
         "scenario": scenario.name,
         "law": scenario.law.name,
         "arbiter": scenario.arbiter.engine,
@@ -100,6 +103,8 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "weights_sum_max": data.greatest["sum of weights"],
         "effort": data.force.total() * period,
         "saturated_time": data.saturated * period,
+        "isolations": [{"thruster": j, "time": time} for time, j, isolated in data.isolations.changes if isolated],
+        "rejected_samples": last.get(REJECTED),
         "estimate_final": [last[name] for name in _ESTIMATE],
         "estimate_true": scenario.true_restoring_parameters.tolist(),
         "estimate_lowest": [data.least[name] for name in _ESTIMATE],
@@ -109,6 +114,7 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "wall_time": wall_time,
         "real_time_factor": simulated / wall_time if wall_time else None,
     }
+    return summary | {"goal_miss": explain_miss(scenario, record, data.flags, summary)}
 
 
 class _SummaryData:
@@ -118,12 +124,13 @@ class _SummaryData:
         self._clearances = [f"{name}.clearance" for name in names]
         self._together = [self._clearances[i] for i in scenario.intersection]
         flags = ("wrench_saturated", "allocation_saturated")
-        self._flags = [name for name in record.units if name.startswith("thrust_saturated[") or name in flags]
+        self.flags = [name for name in record.units if name.startswith("thrust_saturated[") or name in flags]
         self._weights = [f"weight.{name}" for name in scenario.criterion_names]
         self._place = ["goal.place"] if scenario.goal_then else []
         self.signals = [
             "time", "goal.clearance", *self._clearances, *_FORCE, *_ASKED, *_SPEED, *_POSITION, *_ESTIMATE,
-            *self._weights, *self._flags, *self._place,
+            *self._weights, *self.flags, *self._place,
+            *(name for name in (ISOLATED, REJECTED) if name in record.units),
         ]  # fmt: skip
         self._last_place = len(scenario.goal_then)
         # rows with acting forces that are left: the forces of a complete run's last row do not act
@@ -136,6 +143,7 @@ class _SummaryData:
         self.inside, self._overlap = Spans(), Spans()
         self._visits: list[Span] = []  # the first and the last visit of the goal that ended
         self._windows: list[Span] = []
+        self.isolations = Isolations()
         self.last: dict[str, float] = {}
 
     @property
@@ -164,7 +172,7 @@ class _SummaryData:
         self.force.add(force)
         if self._clearances:
             self.violation.add((np.maximum(-block.stack(self._clearances), 0.0) * self._priorities).sum(axis=1)[acted])
-        self.saturated += int(np.count_nonzero(np.logical_or.reduce([block[n][acted] > 0.0 for n in self._flags])))
+        self.saturated += int(np.count_nonzero(np.logical_or.reduce([block[n][acted] > 0.0 for n in self.flags])))
         weights = block.stack(self._weights)
         self._update_extremes(self.greatest, np.fmax, {
             "goal.clearance": goal,
@@ -176,7 +184,10 @@ class _SummaryData:
             **{name: block[name] for name in _ESTIMATE},
         })  # fmt: skip
         self._update_extremes(self.least, np.fmin, {name: block[name] for name in (*self._clearances, *_ESTIMATE)})
-        self.last = {name: float(block[name][-1]) for name in ("time", *_POSITION, *_ESTIMATE, *self._place)}
+        if ISOLATED in block.units:
+            self.isolations.add(time, block[ISOLATED])
+        rejected = [REJECTED] if REJECTED in block.units else []
+        self.last = {name: float(block[name][-1]) for name in ("time", *_POSITION, *_ESTIMATE, *self._place, *rejected)}
 
     @staticmethod
     def _update_extremes(known: dict[str, float], extreme: np.ufunc, signals: dict[str, Array]) -> None:

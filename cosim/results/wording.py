@@ -10,6 +10,8 @@ from controller.regions.shape import Shape
 from cosim.scenario.scenario import Scenario
 
 IMPORTED = "imported"  # status of a run that was imported from a log
+_MAX_LISTED = 6  # greatest number of isolations that a sentence lists
+_FEW_REJECTED = 0.005  # fraction of rejected samples below which a sentence leaves them out
 
 
 def format_force(force: float) -> str:
@@ -92,7 +94,8 @@ def verdict(summary: dict[str, Any]) -> str:
     Returns
     -------
     str
-        Sentences with the arrival, violated regions, forces and how the run ended.
+        Sentences with the arrival, violated regions, forces, isolated thrusters, rejected samples, how the run ended,
+        and why it missed its goal.
     """
     if not summary["has_goal"]:
         return f"A log of {summary['simulated_time']:.1f} s, without goal and regions.{_commanded_force(summary)}"
@@ -127,7 +130,33 @@ def verdict(summary: dict[str, Any]) -> str:
     }.get(summary["status"], f" The run {summary['status']}.")
     commands = summary.get("commands", 0)
     steered = f" It was given {commands} command{'s' if commands > 1 else ''} on the way." if commands else ""
-    return goal + kept + force + steered + ended
+    return goal + kept + force + _law_reports(summary) + steered + ended + _goal_miss(summary)
+
+
+def isolation_text(thruster: int, isolated: bool) -> str:
+    """Describe that the law isolates a thruster, or uses it again."""
+    return f"The law isolates thruster {thruster}" if isolated else f"The law uses thruster {thruster} again"
+
+
+def format_isolations(summary: dict[str, Any]) -> str:
+    """List the thrusters that the law isolated and when, such as ``3 at 12.30 s``; empty for none."""
+    listed = [f"{one['thruster']} at {one['time']:.2f} s" for one in summary["isolations"]]
+    more = f" and {len(listed) - _MAX_LISTED} more" if len(listed) > _MAX_LISTED else ""
+    return ", ".join(listed[:_MAX_LISTED]) + more
+
+
+def _law_reports(summary: dict[str, Any]) -> str:
+    """Describe isolated thrusters and rejected samples."""
+    isolated, rejected = format_isolations(summary), summary["rejected_samples"] or 0.0
+    text = f" It isolated thruster {isolated}." if isolated else ""
+    if rejected >= _FEW_REJECTED:
+        text += f" It rejected {rejected:.0%} of the position and velocity samples."
+    return text
+
+
+def _goal_miss(summary: dict[str, Any]) -> str:
+    """Describe why the goal was missed."""
+    return f" {summary['goal_miss']}" if summary["goal_miss"] else ""
 
 
 def _commanded_force(summary: dict[str, Any]) -> str:

@@ -33,7 +33,7 @@ from controller.linear_algebra import copy
 from controller.quadratic_program import Workspace
 from controller.regions import Box, DepthBand, HalfSpace, Prism
 from controller.regions.kinds import FIRST_OF_ATTITUDE
-from controller.regions.region_set import PackedRegions, evaluate_packed
+from controller.regions.region_set import PackedRegions, evaluate_packed, place_clearance
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -89,6 +89,13 @@ def empty_observation(n: int) -> RegionObservation:
     )  # fmt: skip
 
 
+def predict_shifts(regions: PackedRegions, time: float, out: Array) -> None:
+    """Write the shifts [m], NED, shape (n, 3), that the regions will have after a time [s]."""
+    for i in range(regions.kinds.size):
+        for axis in range(3):
+            out[i, axis] = regions.shifts[i, axis] + time * regions.velocities[i, axis]
+
+
 def observe_regions(
     observation: RegionObservation, regions: PackedRegions, position: Array, quaternion: Array, velocity: Array
 ) -> None:
@@ -98,8 +105,7 @@ def observe_regions(
     r, place, attitude = regions, zeros(3), zeros(4)
     for axis in range(3):
         place[axis] = position[axis] + _AHEAD * velocity[axis]
-        for i in range(r.kinds.size):
-            s.later_shifts[i, axis] = r.shifts[i, axis] + _AHEAD * r.velocities[i, axis]
+    predict_shifts(regions, _AHEAD, s.later_shifts)
     integrate_attitude(quaternion, velocity[3:], _AHEAD, attitude)
     moved = PackedRegions(
         r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard, r.deviations,
@@ -313,6 +319,19 @@ def add_row(
         return rows
     work.right[rows], work.price[rows] = right, price
     return rows + 1
+
+
+def vehicle_bound(regions: PackedRegions, position: Array, motion: Motion, gains: DeployableGains) -> float:
+    """Return the lower bound [m] of the vehicle's own clearances now, at most 0: it follows the point with barriers.
+
+    `regions` are at their present positions, and the vehicle at a `position`, shape (3,) [m, NED].
+    """
+    bound, n = 0.0, zeros(6)
+    for i in range(regions.kinds.size):
+        if regions.hard[i] and regions.kinds[i] < _ATTITUDE:
+            clearance = place_clearance(regions, i, position, n[:3])
+            bound = min(bound, gains.margin + clearance - _margin(n, motion, regions.deviations[i], False, gains))
+    return bound
 
 
 def update_promise(promised: Array, bound: float, slack: float) -> None:

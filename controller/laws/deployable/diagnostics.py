@@ -29,24 +29,28 @@ DIAGNOSTICS = (
     Diagnostic("barriers", "", "Active barriers"),
     Diagnostic("constraint_slack", "m/s2", "Greatest slack of a barrier"),
     Diagnostic("qp_steps", "", "Steps of the quadratic program, negative if it was cut short"),
-    Diagnostic("failed_thruster", "", "Isolated thruster, from 1; 0 for none"),
+    Diagnostic("failed_thruster", "", "Thruster isolated last, from 1; 0 for none"),
     Diagnostic("time_since_measurement", "s", "Time since the last measurement that was accepted"),
     Diagnostic("bound", "m", "What the clearance of a hard region may fall to from here; -1e6 without an estimate"),
+    Diagnostic("rejected", "", "Fraction of the position and velocity samples so far that the gate rejected"),
 )
+REJECTED = 17  # index of `rejected` in `DIAGNOSTICS`
 
 
 def write_report(report: Array, estimate: Estimate, cost: float, points: int, health: Array, desired: Array) -> None:
-    """Write the `DIAGNOSTICS` of estimate, path and thrusters."""
+    """Write the `DIAGNOSTICS` of estimate, path and thrusters; `report` has the thruster that was isolated last."""
     copy(estimate.position, report[:3])
     copy(estimate.velocity, report[3:6])
     copy(estimate.water_velocity, report[6:8])
     report[8] = length3(desired[0], desired[1], desired[2])
     report[9] = cost
     report[10] = points - 1
-    report[14] = 0.0
-    for j in range(health.size):
-        if health[j] == 0.0:
-            report[14] = j + 1
+    last = int(report[14])
+    if last == 0 or health[last - 1] > 0.0:
+        report[14] = 0.0
+        for j in range(health.size):
+            if health[j] == 0.0:
+                report[14] = j + 1
     report[15] = estimate.time_since_measurement[0]
 
 

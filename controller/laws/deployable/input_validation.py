@@ -120,10 +120,10 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
         estimate_state.initialize(estimate, position, velocity, gains)
         return True
     position_used = _is_new(estimate, 0, position_repeats, gains) and _correct_group(
-        estimate, estimate_state.POSITION, position, position_noise, gains
+        memory, estimate_state.POSITION, position, position_noise, gains
     )
     velocity_used = _is_new(estimate, 1, velocity_repeats, gains) and _correct_group(
-        estimate, estimate_state.VELOCITY, velocity, velocity_noise, gains
+        memory, estimate_state.VELOCITY, velocity, velocity_noise, gains
     )
     if position_used or velocity_used:
         estimate.longest_gap[0] = max(estimate.longest_gap[0], estimate.time_since_measurement[0])
@@ -146,10 +146,14 @@ def _is_new(estimate: Estimate, group: int, repeats: bool, gains: DeployableGain
     return bool(rests and estimate.time_since_valid[group] > gains.coast)
 
 
-def _correct_group(estimate: Estimate, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:
+def _correct_group(memory: DeployableMemory, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:
     """Correct by a position or a velocity; replace the estimate if all were rejected for longer than `coast`."""
-    group = 0 if first == estimate_state.POSITION else 1
-    if observer.correct(estimate, first, measured, noise, gains):
+    estimate, group = memory.state_estimate, 0 if first == estimate_state.POSITION else 1
+    corrected = observer.correct(estimate, first, measured, noise, gains)
+    if not (np.isnan(measured[0]) and np.isnan(measured[1]) and np.isnan(measured[2])):
+        memory.samples[0] += 1.0
+        memory.samples[1] += 0.0 if corrected else 1.0
+    if corrected:
         estimate.time_since_valid[group] = 0.0
         return True
     if estimate.time_since_valid[group] > gains.coast and not np.isnan(measured[0] + measured[1] + measured[2]):

@@ -35,11 +35,19 @@ from controller.laws.deployable.barrier import (
     RegionObservation,
     empty_observation,
     observe_regions,
+    predict_shifts,
     update_promise,
+    vehicle_bound,
     write_rows,
 )
 from controller.laws.deployable.braking import least_forces
-from controller.laws.deployable.diagnostics import DIAGNOSTICS, NO_BOUND, write_program_report, write_report
+from controller.laws.deployable.diagnostics import (
+    DIAGNOSTICS,
+    NO_BOUND,
+    REJECTED,
+    write_program_report,
+    write_report,
+)
 from controller.laws.deployable.estimate import LAG, Estimate, make_estimate
 from controller.laws.deployable.faces import FACES
 from controller.laws.deployable.fault_detection import empty_fault_state
@@ -80,6 +88,7 @@ def step(
 
     # estimate
     input_validation.process_measurement(memory, state, gains)
+    memory.report[REJECTED] = memory.samples[1] / max(memory.samples[0], 1.0)
     write_rotation(memory.quaternion, R)
     # there is no estimate, or it is too old
     if estimate.time_since_measurement[0] < 0.0 or estimate.time_since_measurement[0] > gains.coast:
@@ -97,7 +106,9 @@ def step(
 
     # fault detection
     changed = fault_detection.detect_fault(memory.fault_state, estimate, thrusters, gains)
-    if changed < 0:
+    if changed >= 0:
+        memory.report[14] = changed + 1
+    else:
         quiet = memory.report[11] == 0.0
         changed = fault_detection.try_again(memory.fault_state, estimate, thrusters, memory.reported, quiet, period)
     if changed >= 0 or input_validation.reports_change(state.thruster_health, memory.reported, thrusters.health):
@@ -116,6 +127,17 @@ def step(
     write_rotation(ahead.quaternion, R_ahead)
     model.free_wrench(dynamics, R_ahead, ahead.velocity[:3], ahead.velocity[3:], loads, against)
     model.to_acceleration(dynamics, R_ahead, ahead.velocity[:3], ahead.velocity[3:], loads, against, free)
+    # where goal and regions will be at the time of that state
+    predict_shifts(goal, lag, memory.goal_shifts)
+    predict_shifts(regions, lag, memory.region_shifts)
+    goal_ahead = PackedRegions(
+        goal.kinds, goal.signs, goal.offsets, goal.numbers, memory.goal_shifts, goal.velocities, goal.gains,
+        goal.hard, goal.deviations, goal.crossing_costs,
+    )  # fmt: skip
+    regions_ahead = PackedRegions(
+        regions.kinds, regions.signs, regions.offsets, regions.numbers, memory.region_shifts, regions.velocities,
+        regions.gains, regions.hard, regions.deviations, regions.crossing_costs,
+    )  # fmt: skip
 
     # path planner, bounded attraction
     spread = 0.0
@@ -126,25 +148,25 @@ def step(
     wider = min(spread, _TRUSTED_SPREAD)
     limits = PathLimits(gains.clearance + wider, gains.margin + wider, gains.speed, gains.depth)
     if gains.path_planning > 0.0:
-        improve_path(memory.plan, ahead.position, goal, regions, limits, period)
+        improve_path(memory.plan, ahead.position, goal_ahead, regions_ahead, limits, period)
     else:
-        go_straight(memory.plan, ahead.position, goal, limits)
+        go_straight(memory.plan, ahead.position, goal_ahead, limits)
     desired_velocity(memory.plan, ahead.position, goal.velocities[0], gains, desired)
     _limit_speed(estimate, spread, gains, desired)
     desired_acceleration(desired, ahead.velocity[:3], gains, acceleration[:3])
 
     # desired wrench
-    observe_regions(memory.observation, regions, ahead.position, ahead.quaternion, ahead.velocity)
+    observe_regions(memory.observation, regions_ahead, ahead.position, ahead.quaternion, ahead.velocity)
     share = period / (period + gains.smoothing)
     for axis in range(3):
         memory.filtered_acceleration[axis] += share * (
             acceleration[axis] - free[axis] - memory.filtered_acceleration[axis]
         )
     _force_of(dynamics, R_ahead, memory.filtered_acceleration, wrench)
-    deep = min(clearance_at(goal, 0, memory.plan.path[memory.plan.counts[0] - 1]), gains.depth)
-    entered = min(max(clearance_at(goal, 0, ahead.position) / max(deep, _SHALLOWEST), 0.0), 1.0)
+    deep = min(clearance_at(goal_ahead, 0, memory.plan.path[memory.plan.counts[0] - 1]), gains.depth)
+    entered = min(max(clearance_at(goal_ahead, 0, ahead.position) / max(deep, _SHALLOWEST), 0.0), 1.0)
     _soft_forces(memory.observation, regions, memory.weights[1], desired, entered, R_ahead, dynamics, wrench)
-    attitude_loop.update_desired(memory.attitude, regions, ahead.position, gains, period)
+    attitude_loop.update_desired(memory.attitude, regions_ahead, ahead.position, gains, period)
     attitude_loop.compute_moment(
         memory.attitude, dynamics, ahead.quaternion, ahead.velocity[3:], against, gains, wrench[3:]
     )
@@ -178,9 +200,11 @@ def step(
     if gains.barriers > 0.0:
         yields = memory.report[12] > KEPT  # yielding barriers amplify noise
         rows = write_rows(
-            work, memory.observation, regions, memory.weights[1], motion, lower, upper,
+            work, memory.observation, regions_ahead, memory.weights[1], motion, lower, upper,
             share if yields else 1.0, gains,
         )  # fmt: skip
+        vehicle = vehicle_bound(regions, estimate.position, motion, gains)
+        memory.observation.bound[0] = min(memory.observation.bound[0], vehicle)
 
     # quadratic program
     steps = quadratic_program.solve(work, rows, thrusters.inverse, lower, upper, forces)
@@ -331,6 +355,9 @@ class DeployableLaw(CompiledLaw):
             deviation=np.zeros(12),
             position_variance=np.zeros(3),
             promised=np.full(2, np.nan),
+            goal_shifts=np.zeros((1, 3)),
+            region_shifts=np.zeros((n_regions, 3)),
+            samples=np.zeros(2),
             weights=np.full((2, n_regions), np.nan),
             reported=np.ones(m),
             filtered_acceleration=np.zeros(3),

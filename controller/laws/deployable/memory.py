@@ -40,6 +40,9 @@ class DeployableMemory(NamedTuple):
     deviation: Array  # (12,) standard deviations of the measured state, as in `VehicleState`
     position_variance: Array  # (3,) m2, NED: variance of the estimated position
     promised: Array  # (2,) m: promised lower bound of the clearances; bound of the last step; NaN without a bound
+    goal_shifts: Array  # (1, 3) m, NED: shift of the goal at the time of the predicted state
+    region_shifts: Array  # (n, 3) m, NED: those of the regions
+    samples: Array  # (2,) number of position and velocity samples: that reached the gate; that it rejected
     weights: Array  # (2, n) sanitized weights of the arbiter, smoothed in two stages for hard regions; NaN at first
     reported: Array  # (m,) health of the thrusters as last reported
     filtered_acceleration: Array  # (3,) m/s2, NED: desired acceleration by the thrusters, low-pass filtered

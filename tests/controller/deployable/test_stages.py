@@ -151,8 +151,12 @@ def test_available_braking_accounts_for_lost_thrusters(lost):
 def test_report_holds_the_diagnostics():
     seen, report = make_estimate(ODIN), np.full(len(law.DIAGNOSTICS), np.nan)
     seen.position[:], seen.velocity[:], seen.water_velocity[:2] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0)
+    wanted, report[14] = np.array([2.0, -3.0, 6.0]), 1.0
+    for second in (0.0, 1.0):  # the first one was isolated last
+        diagnostics.write_report(report, seen, 9.5, 4, np.array([0.0, second, 0.0, 1.0]), wanted)
+        assert report[14] == 1.0
     health = np.array([1.0, 1.0, 0.0, 1.0])
-    diagnostics.write_report(report, seen, 9.5, 4, health, np.array([2.0, -3.0, 6.0]))
+    diagnostics.write_report(report, seen, 9.5, 4, health, wanted)
     assert report[:11].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 7.0, 9.5, 3.0]
     assert report[14:16].tolist() == [3.0, -1.0]
     program = np.array([0.0, 2.0, 3.0, 9.0]), np.array([1.0, 0.5, 0.1, 9.0]), 3, -6

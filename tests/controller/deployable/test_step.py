@@ -38,11 +38,13 @@ def expected(memory, state, goal, regions, weights):
     position, velocity, turn = ahead.position, ahead.velocity[:3], ahead.velocity[3:]
     R = rotation_matrix(ahead.quaternion)
     model.free_acceleration(dynamics, R, velocity, turn, loads, free)
+    goal, regions = (r._replace(shifts=r.shifts + seen.state[LAG] * r.velocities) for r in (goal, regions))
     variance = np.diag(seen.covariance)[:3] + state.deviation[:3] ** 2
     wider = 3.0 * np.sqrt(variance.max())
     limits = PathLimits(GAINS.clearance + wider, GAINS.margin + wider, GAINS.speed, GAINS.depth)
     improve_path(memory.plan, position, goal, regions, limits, 0.02)
     desired_velocity(memory.plan, position, goal.velocities[0], GAINS, wanted)
+    wanted *= min(1.0, GAINS.speed / np.linalg.norm(wanted))
     desired_acceleration(wanted, velocity, GAINS, acceleration)
     barrier.observe_regions(memory.observation, regions, position, ahead.quaternion, ahead.velocity)
     pushed = memory.filtered_acceleration + 0.02 / (0.02 + GAINS.smoothing) * (
@@ -83,6 +85,10 @@ def test_step_is_the_sequence_of_its_stages():
     state[VELOCITY : VELOCITY + 3] = sea.velocity = np.array([0.5, 0.1, -0.05])
     publish(own.memory.state_estimate)
     goal, regions, forces, most = pack([GOAL]), pack(ALL), np.empty(8), 0
+    goal.velocities[0], regions.velocities[:3] = (
+        (0.1, -0.2, 0.05),
+        [[-0.9, 0.2, 0.1], [0.3, 0.0, -0.2], [0.1, 0.1, 0.1]],
+    )
     deviation = np.array([0.02, 0.01, 0.03, 0.004, 0.003, 0.005, 0.01, 0.02, 0.015, 0.001, 0.002, 0.001])
     for _ in range(4):
         state, memory = sea.measured()._replace(deviation=deviation), copy.deepcopy(own.memory)

@@ -38,7 +38,9 @@ def made(paper, time, status="completed", failures=(), **signals):
     for name in ("SR1", "SR2", "SR3"):
         signals.setdefault(f"{name}__clearance", np.ones(len(time)))
     summary = paper.summary | {"status": status}
-    record = rows_of(paper.record.units, time, **signals)
+    record = rows_of(
+        [*paper.record.units, *(k.replace("__", ".") for k in signals if k.startswith("law"))], time, **signals
+    )
     return dataclasses.replace(paper, scenario=scenario, record=record, summary=summary)
 
 
@@ -119,6 +121,14 @@ def test_failures_are_listed_if_the_run_reached_them(paper):
         (1.6, "Thruster 2 keeps 40% of its force"),
         (1.7, "Thruster 4 gets stuck"),
     ]
+
+
+def test_rejected_samples_close_to_each_other_are_one_event(paper):
+    """From 2 s to 5 s, with a gap of 0.5 s; a single one at 8 s is none."""
+    time = np.arange(100) / 10.0
+    rejected = ((time >= 2.0) & (time < 3.0)) | ((time >= 3.5) & (time < 5.0)) | (time == 8.0)
+    run = made(paper, time, law__rejected=np.cumsum(rejected) / np.arange(1, 101))
+    assert told(run, "failure") == [(2.0, "The law rejects samples of position or velocity until 5.000 s")]
 
 
 @pytest.mark.parametrize(
