@@ -16,7 +16,7 @@ MAX_ENTRIES = 100_000_000  # greatest number of entries of an array, for which a
 
 # part of the path of the library that is loaded
 _IDENTIFIER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+ -]{0,199}")
-_INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
+INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
 
 
 def validate_description(path: Path, root: ET.Element) -> None:
@@ -32,9 +32,12 @@ def validate_description(path: Path, root: ET.Element) -> None:
     Raises
     ------
     FmuFileError
-        If a number or a name is invalid; the message names the first one.
+        If it is not of FMI 2.0 or 3.0, or a number or a name is invalid; the message names the first one.
     """
-    for interface in _INTERFACES:
+    version = root.get("fmiVersion", "")
+    if root.tag != "fmiModelDescription" or not (version == "2.0" or version.startswith("3.0")):
+        raise FmuFileError(f"{path}: FMI version is {_short(version)}, expected 2.0 or 3.0")
+    for interface in INTERFACES:
         for element in root.findall(interface):
             identifier = element.get("modelIdentifier", "")
             if not _IDENTIFIER.fullmatch(identifier):

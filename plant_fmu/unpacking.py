@@ -7,13 +7,15 @@ import io
 import unicodedata
 import zipfile
 import zlib
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 from typing import IO
 from xml.etree import ElementTree as ET
 
 from plant_fmu.errors import FmuFileError
+from plant_fmu.model_limits import INTERFACES, validate_description
+from plant_fmu.shared_library import SUFFIXES, library_defect
 
 DESCRIPTION = "modelDescription.xml"
 
@@ -24,7 +26,8 @@ FREE_SIZE = 2**26  # number of bytes below which that ratio does not matter
 MAX_READ = 2**24  # greatest number of bytes that are read at once; so the list of files is read, before any check
 MAX_NAME = 1000  # greatest number of characters of a file's name
 MAX_XML = 2**26  # greatest number of bytes of a description
-MAX_ELEMENTS = 2_000_000  # greatest number of elements of a description
+MAX_ELEMENTS = 1_000_000  # greatest number of elements of a description
+MAX_VARIABLES = 200_000  # greatest number of variables and aliases, for each of which an importer takes 50 us
 MAX_DEPTH = 100  # greatest number of levels of nested elements
 
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # methods that FMI allows; others have no bound when unpacked
@@ -73,7 +76,7 @@ def open_fmu(path: Path) -> Iterator[zipfile.ZipFile]:
         raise FmuFileError(f"{path}: is no FMU: {error}; expected a whole zip file") from error
 
 
-def unpack(path: Path, folder: Path, platforms: Collection[str]) -> ET.Element:
+def unpack(path: Path, folder: Path, platforms: Sequence[str]) -> ET.Element:
     """Extract the files that a run needs from an FMU into a folder, and return its model description.
 
     Parameters
@@ -82,8 +85,9 @@ def unpack(path: Path, folder: Path, platforms: Collection[str]) -> ET.Element:
         Path of the FMU.
     folder : Path
         Empty folder of this user alone.
-    platforms : collection of str
-        Folders of the binaries that are needed. Documents and sources are never extracted: no library can rely on them.
+    platforms : sequence of str
+        Names of this machine in FMI 2.0 and 3.0, which are the folders of the binaries that are needed. Documents and
+        sources are never extracted: no library can rely on them.
 
     Returns
     -------
@@ -93,11 +97,11 @@ def unpack(path: Path, folder: Path, platforms: Collection[str]) -> ET.Element:
     Raises
     ------
     FmuFileError
-        If the file cannot be read or is unsafe to extract, or a description is invalid, as in `open_fmu` and
-        `read_descriptions`.
+        If the file cannot be read or is unsafe to extract, or its content is invalid, as in `open_fmu` and
+        `read_description`.
     """
     with open_fmu(path) as archive:
-        root = read_descriptions(path, archive)
+        root = read_description(path, archive, platforms)
         archive.extractall(folder, [name for name in archive.namelist() if _is_needed(name, platforms)])
     return root
 
@@ -107,17 +111,57 @@ def _is_needed(name: str, platforms: Collection[str]) -> bool:
     return below[0] in platforms if top == "binaries" and below else top not in ("documentation", "sources")
 
 
-def read_descriptions(path: Path, archive: zipfile.ZipFile) -> ET.Element:
-    """Return the model description, after a check of all descriptions that an importer parses.
+def read_description(path: Path, archive: zipfile.ZipFile, platforms: Sequence[str]) -> ET.Element:
+    """Return the model description of an open FMU, after a check of all that an importer reads.
+
+    Parameters
+    ----------
+    path : Path
+        Path of the FMU, for messages.
+    archive : ZipFile
+        The FMU, from `open_fmu`.
+    platforms : sequence of str
+        Names of this machine in FMI 2.0 and 3.0; its libraries are checked.
+
+    Returns
+    -------
+    Element
+        Root of ``modelDescription.xml``.
 
     Raises
     ------
     FmuFileError
-        If a description is no XML, declares a document type, or is too large or deep.
+        If a description is no XML, declares a document type, is too large or deep, or has invalid content; if a member
+        is damaged; if a library of this machine is cut short, or of another machine.
     """
     names = set(archive.namelist())
     roots = [_parsed(f"{path}: {name}", archive, name) for name in _DESCRIPTIONS if name in names]
+    validate_description(path, roots[0])
+    damaged = archive.testzip()  # reads no more than the sizes it states, and so finds those that lie
+    if damaged is not None:
+        raise FmuFileError(f"{path}: is no FMU: {damaged!r} is damaged")
+    _check_libraries(path, archive, library_names(roots[0], platforms), platforms)
     return roots[0]
+
+
+def library_names(root: ET.Element, platforms: Sequence[str]) -> dict[str, str]:
+    """Return the names of the libraries that an FMU must have for a machine, by the interface that needs them."""
+    folder = platforms[0 if root.get("fmiVersion", "").startswith("2") else -1]
+    suffix = SUFFIXES.get(platforms[-1].partition("-")[2], "")
+    needed = {element.tag: element.get("modelIdentifier") for element in root if element.tag in INTERFACES}
+    return {interface: f"binaries/{folder}/{name}{suffix}" for interface, name in needed.items()}
+
+
+def _check_libraries(path: Path, archive: zipfile.ZipFile, needed: Mapping[str, str], platforms: Sequence[str]) -> None:
+    """Refuse libraries of this machine that the system's loader would refuse, or that would end this process."""
+    folders = tuple(f"binaries/{platform}/" for platform in platforms)
+    for member in archive.infolist():
+        if not member.is_dir() and member.filename.startswith(folders):
+            is_loaded = member.filename in needed.values()
+            with archive.open(member) as source:
+                defect = library_defect(source, member.file_size, platforms[-1], is_loaded)
+            if defect:
+                raise FmuFileError(f"{path}: {member.filename} {defect}")
 
 
 # ---- the zip file --------------------------------------------------------------------------------------------------
@@ -162,12 +206,17 @@ def _folded(name: str) -> str:
 # ---- its descriptions ----------------------------------------------------------------------------------------------
 
 
+class _TooLargeError(ET.ParseError):
+    """Raised for a document that is XML, but too large."""
+
+
 class _Bounded(ET.TreeBuilder):
     """Build a tree of limited size and depth, from a document without a document type, and so without entities."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._depth = self._count = 0
+        self._depth = self._count = self._variables = 0
+        self._section = ""  # element below the root
 
     def doctype(self, name: str, public: str | None, system: str | None) -> None:
         raise ET.ParseError("a document type is declared, expected none")
@@ -177,7 +226,13 @@ class _Bounded(ET.TreeBuilder):
         if self._depth > MAX_DEPTH:
             raise ET.ParseError(f"elements are nested deeper than {MAX_DEPTH}")
         if self._count > MAX_ELEMENTS:
-            raise ET.ParseError(f"there are more than {MAX_ELEMENTS} elements")
+            raise _TooLargeError(f"has more than {MAX_ELEMENTS} elements")
+        if self._depth == 2:
+            self._section = tag
+        elif self._section == "ModelVariables" and (self._depth == 3 or tag == "Alias"):
+            self._variables += 1
+            if self._variables > MAX_VARIABLES:
+                raise _TooLargeError(f"has more than {MAX_VARIABLES} variables")
         return super().start(tag, attributes)
 
     def end(self, tag: str, /) -> ET.Element:
@@ -192,6 +247,8 @@ def _parsed(where: str, archive: zipfile.ZipFile, name: str) -> ET.Element:
     try:
         with archive.open(name) as source:
             return _tree_of(source.read()) if size <= _PIECE else _tree(source)
+    except _TooLargeError as error:
+        raise FmuFileError(f"{where} {error}") from error
     except ET.ParseError as error:
         raise FmuFileError(f"{where} is no XML that can be read: {error}") from error
     except (LookupError, ValueError) as error:  # an encoding that is unknown, or wrong

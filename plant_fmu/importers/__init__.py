@@ -1,6 +1,6 @@
-"""Other tools' importers, each run on an FMU in a process of its own, with their answers in one form.
+"""Importers of other tools, and `Plant`, each run on an FMU in a process of its own, with their answers in one form.
 
-Imports: nothing.
+Imports: running.
 """
 
 from plant_fmu.importers.fmu_file import FmuFile, FmuVariable, read_fmu

@@ -9,10 +9,10 @@ from xml.etree import ElementTree as ET
 
 import fmpy
 
-from plant_fmu.errors import FmuFileError
 from plant_fmu.importers.task import Task
-from plant_fmu.model_limits import validate_description
-from plant_fmu.unpacking import open_fmu, read_descriptions
+from plant_fmu.unpacking import library_names, open_fmu, read_description
+
+NATIVE = (fmpy.platform, fmpy.platform_tuple)  # names of this machine in FMI 2.0 and 3.0
 
 _INTERFACES = {"CoSimulation": "CS", "ModelExchange": "ME"}
 
@@ -44,7 +44,7 @@ class FmuFile:
     event_indicators: int  # number of event indicators
     stop_time: float  # s, end of its default experiment
     step: float  # s, step of its default experiment
-    runs_here: bool  # it has a binary for this machine
+    libraries: frozenset[str]  # interfaces, of "CS" and "ME", for which it has a library for this machine
 
     def of(self, causality: str) -> tuple[FmuVariable, ...]:
         """Return the scalar double precision variables of a causality, such as ``"output"``."""
@@ -62,31 +62,20 @@ def read_fmu(path: Path) -> FmuFile:
     Raises
     ------
     FmuFileError
-        If there is no such file, it is not safe to extract, or has no valid model description of FMI 2.0 or 3.0.
+        If there is no such file, it is not safe to extract, or its content is invalid, as in `read_description`.
     """
     path = Path(path)
     with open_fmu(path) as archive:
-        root = read_descriptions(path, archive)
-        version = root.get("fmiVersion", "")
-        if root.tag != "fmiModelDescription" or version.split(".")[0] not in ("2", "3"):
-            raise FmuFileError(f"{path}: is of FMI version {version!r}, expected 2.0 or 3.0")
-        validate_description(path, root)
-        damaged = archive.testzip()  # reads no more than the sizes it states, and so finds those that lie
-        if damaged is not None:
-            raise FmuFileError(f"{path}: is no FMU: {damaged!r} is damaged")
-        names = archive.namelist()
-    try:
-        return _describe(path, root, names)
-    except (KeyError, ValueError) as error:
-        raise FmuFileError(f"{path}: modelDescription.xml cannot be understood: {error!r}") from error
-
-
-def _describe(path: Path, root: ET.Element, names: list[str]) -> FmuFile:
-    fmi = int(root.get("fmiVersion", "").split(".")[0])
+        root = read_description(path, archive, NATIVE)
+        libraries = {
+            _INTERFACES.get(interface)
+            for interface, name in library_names(root, NATIVE).items()
+            if name in archive.namelist()
+        }
+    fmi = int(root.get("fmiVersion", "")[0])
     experiment = root.find("DefaultExperiment")
     times = {} if experiment is None else experiment.attrib
     default = Task()
-    folder = fmpy.platform if fmi == 2 else fmpy.platform_tuple
     if fmi == 2:
         indicators = int(root.get("numberOfEventIndicators", "0"))
         states = len(root.findall("ModelStructure/Derivatives/Unknown"))
@@ -102,7 +91,7 @@ def _describe(path: Path, root: ET.Element, names: list[str]) -> FmuFile:
         event_indicators=indicators,
         stop_time=float(times.get("stopTime", default.stop_time)),
         step=float(times.get("stepSize", default.step)),
-        runs_here=any(name.startswith(f"binaries/{folder}/") for name in names),
+        libraries=frozenset(filter(None, libraries)),
     )
 
 

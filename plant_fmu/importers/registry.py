@@ -11,6 +11,8 @@ from packaging.requirements import Requirement
 
 from plant_fmu.importers.fmu_file import FmuFile
 
+MAX_SEARCHED = 20_000  # greatest number of variables for importers that search them one by one: 10 s
+
 
 @dataclass(frozen=True)
 class Importer:
@@ -37,7 +39,7 @@ class Importer:
             return self.inapplicable(fmu)
         if self.interface not in fmu.interfaces:
             return f"the FMU offers no {'co-simulation' if self.interface == 'CS' else 'model exchange'}"
-        if not fmu.runs_here:
+        if self.interface not in fmu.libraries:
             return "the FMU has no binary for this machine"
         return self.inapplicable(fmu)
 
@@ -59,12 +61,17 @@ def _not_state(fmu: FmuFile) -> str:
     return ""
 
 
+def _not_many(fmu: FmuFile) -> str:
+    count = len(fmu.variables)
+    return "" if count <= MAX_SEARCHED else f"takes time with the square of the variables; this FMU has {count}"
+
+
 def _not_casadi(fmu: FmuFile) -> str:
     if fmu.event_indicators:
         return f"integrates no FMU with state events; this one has {fmu.event_indicators} event indicators"
     if not fmu.states:
         return "the FMU has no continuous states"
-    return ""
+    return _not_many(fmu)
 
 
 # ecospy's library needs TBB, and on Linux does not bring it along
@@ -75,8 +82,9 @@ IMPORTERS = (
     Importer("fmu-manipulation-toolbox", "toolbox", ("fmu-manipulation-toolbox>=2.0",), ""),
     Importer("FMPy", "fmpy_stepping", ("fmpy>=0.3.30",), "CS"),
     Importer("FMPy FMU state", "fmpy_state", ("fmpy>=0.3.30",), "CS", _not_state),
+    Importer("plant_fmu", "plant_stepping", ("subreach",), "CS"),
     Importer("libcosim", "libcosim", ("libcosimpy>=0.0.6",), "CS", _not_libcosim),
-    Importer("Ecos", "ecos", ("ecospy>=0.7", *_TBB), "CS"),
+    Importer("Ecos", "ecos", ("ecospy>=0.7", *_TBB), "CS", _not_many),
     Importer("FMPy CVode", "fmpy_cvode", ("fmpy>=0.3.30",), "ME"),
     Importer("CasADi", "casadi_import", ("casadi>=3.8",), "ME", _not_casadi),
 )

@@ -22,8 +22,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from plant_fmu.archive import archive_of
 from plant_fmu.errors import FmuFileError, PlantError
-from plant_fmu.model_limits import validate_description
-from plant_fmu.unpacking import DESCRIPTION, unpack
+from plant_fmu.unpacking import DESCRIPTION, library_names, unpack
 
 log = logging.getLogger(__name__)
 
@@ -103,15 +102,12 @@ class Instance:
             raise
 
     def _load(self, path: Path, folder: str, loaded: list[Any]) -> None:
+        platforms = (fmpy.platform, fmpy.platform_tuple)
         try:
-            root = unpack(path, Path(folder), {fmpy.platform, fmpy.platform_tuple})
-            validate_description(path, root)
+            root = unpack(path, Path(folder), platforms)
         except FmuFileError as error:
             raise PlantError(str(error)) from error
-        version = root.get("fmiVersion", "")
-        if root.tag != "fmiModelDescription" or version[:2] not in ("2.", "3."):
-            raise PlantError(f"{path}: FMI version is {version!r}, expected 2.0 or 3.0")
-        self.fmi = int(version[0])
+        self.fmi = int(root.get("fmiVersion", "")[0])
         interface = root.find("CoSimulation")
         if interface is None:
             raise PlantError(f"{path}: offers no co-simulation, expected the element CoSimulation")
@@ -123,9 +119,9 @@ class Instance:
         self.name, self.token = description.modelName, description.guid
         self.variables = {v.name: v for v in description.modelVariables}
         identifier = description.coSimulation.modelIdentifier
-        place = fmpy.platform if self.fmi == 2 else fmpy.platform_tuple
-        if not Path(folder, "binaries", place, identifier + fmpy.sharedLibraryExtension).is_file():
-            raise PlantError(f"{path}: has no binary for this machine, expected one in binaries/{place}")
+        library = library_names(root, platforms)["CoSimulation"]
+        if not Path(folder, library).is_file():
+            raise PlantError(f"{path}: has no binary for this machine, expected {library}")
         with _LOADING:
             here = os.getcwd()
             try:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from plant_fmu import load_vehicle, unpacking
+from plant_fmu import Plant, PlantError, load_vehicle, unpacking
 from plant_fmu.__main__ import main
 from plant_fmu.build import cached_fmu
 from plant_fmu.check import check_fmu
@@ -111,6 +111,41 @@ def test_missing_importer_does_not_fail_the_check(odin):
     result = run_importer(absent, read_fmu(odin), Task())
     assert (result.status, result.version) == ("not installed", "")
     assert result.note.endswith('-m pip install "no-such-importer>=1"')
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(
+    ("old", "new", "status"),
+    [
+        ('unit="m"', 'unit="parsec"', "failed"),
+        ('instantiationToken="{', 'instantiationToken="{0', "failed"),
+        (' start="', ' was="', "failed"),
+        ('causality="independent"', 'causality="local"', "failed"),
+        ("CoSimulation", "ScheduledExecution", "does not apply"),
+        ('modelIdentifier="odin"', 'modelIdentifier="other"', "does not apply"),
+    ],
+)
+def test_check_says_what_plant_says(odin, tmp_path, old, new, status):
+    path = changed(
+        odin,
+        tmp_path / "it.fmu",
+        lambda name, data: data.replace(old.encode(), new.encode()) if "Desc" in name else data,
+    )
+    with pytest.raises(PlantError) as caught:
+        Plant(path)
+    row = run_importer(next(i for i in IMPORTERS if i.name == "plant_fmu"), read_fmu(path), Task(0.1, 0.1))
+    assert row.status == status
+    if status == "failed":
+        assert row.note == str(caught.value)
+    else:
+        assert row.note.removeprefix("the FMU ").partition(",")[0] in str(caught.value)
+
+
+def test_importers_that_take_time_with_the_square_of_the_variables_do_not_apply_to_many(odin):
+    fmu = read_fmu(odin)
+    many = dataclasses.replace(fmu, variables=fmu.variables[:1] * 100_000)
+    slow = [importer.name for importer in IMPORTERS if "square" in importer.objection(many)]
+    assert slow == ["Ecos", "CasADi"] and not any("square" in importer.objection(fmu) for importer in IMPORTERS)
 
 
 @pytest.mark.medium

@@ -1,4 +1,4 @@
-"""Malicious FMUs: both readers reject each in one line, and nothing of it is written or run."""
+"""Malicious FMUs: both readers reject each in the same line, and nothing of it is written or run."""
 
 import io
 import os
@@ -8,6 +8,7 @@ import struct
 import subprocess
 import sys
 import zipfile
+from pathlib import Path
 
 import fmpy
 import pytest
@@ -19,6 +20,7 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.errors import FmuFileError
 from plant_fmu.importers import read_fmu
 from plant_fmu.running import instance
+from plant_fmu.shared_library import library_defect
 
 SOUND = (
     '<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="t">'
@@ -28,8 +30,8 @@ SOUND = (
 )
 
 
-@pytest.fixture(params=["check", "run"])
-def read(request, tmp_path, monkeypatch):
+@pytest.fixture
+def read(tmp_path, monkeypatch):
     """Return a function that opens an FMU that must be rejected, and returns the message."""
     scratch = tmp_path / "scratch"
     scratch.mkdir()
@@ -37,12 +39,15 @@ def read(request, tmp_path, monkeypatch):
 
     def refused(path):
         before = set(tmp_path.rglob("*"))
-        with pytest.raises((FmuFileError, PlantError)) as caught:
-            read_fmu(path) if request.param == "check" else Plant(path)
-        said = str(caught.value)
-        assert said.startswith(f"{path}: ") and "\n" not in said and len(said) < 2000 + len(str(path))
+        said = []
+        for reader in (read_fmu, Plant):
+            with pytest.raises((FmuFileError, PlantError)) as caught:
+                reader(path)
+            said.append(str(caught.value))
+        assert said[0] == said[1]
+        assert said[0].startswith(f"{path}: ") and "\n" not in said[0] and len(said[0]) < 2000 + len(str(path))
         assert set(tmp_path.rglob("*")) == before
-        return said
+        return said[0]
 
     return refused
 
@@ -108,7 +113,7 @@ def test_no_member_is_written_over_another(tmp_path, read, pair):
 def test_duplicate_folder_entries_are_accepted(tmp_path):
     path = archive(tmp_path / "it.fmu", [("resources/", ""), ("resources/a", "x"), ("resources/", "")])
     assert read_fmu(path).fmi == 3
-    unpacking.unpack(path, tmp_path / "folder", ())
+    unpacking.unpack(path, tmp_path / "folder", ["linux64", "x86_64-linux"])
     assert (tmp_path / "folder" / "resources" / "a").read_text() == "x"
 
 
@@ -127,6 +132,29 @@ def test_decompression_bombs_are_rejected_unread(tmp_path, read):
                 member.write(bytes(2**20))
     assert path.stat().st_size < 200_000
     assert "expected at most 200 times as many" in read(path)
+
+
+@pytest.mark.parametrize("name", ["modelDescription.xml", "resources/it"])
+def test_encrypted_members_are_rejected(tmp_path, read, name):
+    path = archive(tmp_path / "it.fmu", [("resources/it", "x")])
+    content = bytearray(path.read_bytes())
+    with zipfile.ZipFile(path) as made:
+        local = made.getinfo(name).header_offset
+    central = content.rindex(name.encode()) - 46
+    content[local + 6] |= 1
+    content[central + 8] |= 1
+    path.write_bytes(content)
+    assert "encrypted" in read(path)
+
+
+@pytest.mark.parametrize("name", ["modelDescription.xml", "documentation/index.html"])
+def test_damaged_members_are_rejected(tmp_path, read, name):
+    path = archive(tmp_path / "it.fmu", [("documentation/index.html", "words")])
+    content = path.read_bytes()
+    with zipfile.ZipFile(path) as made:
+        start = made.getinfo(name).header_offset + 30 + len(name)
+    path.write_bytes(content[:start] + b"<" + bytes([content[start + 1] ^ 1]) + content[start + 2 :])
+    assert "is no FMU" in read(path) or "no XML" in read(path)
 
 
 @pytest.mark.parametrize("method", [zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA])
@@ -211,6 +239,12 @@ def test_large_descriptions_are_refused_before_they_are_parsed(tmp_path, read, m
     assert "more than 5 elements" in read(
         archive(tmp_path / "it2.fmu", [], SOUND.replace("<ModelS", "<a/><b/><ModelS"))
     )
+    monkeypatch.undo()
+    monkeypatch.setattr(unpacking, "MAX_VARIABLES", 5)
+    alias = '<Alias name="b"/>'
+    for i, more in enumerate((f"<Float64 {VARIABLE}" * 5, f"<Float64 {VARIABLE[:-2]}>{alias * 5}</Float64>")):
+        path = archive(tmp_path / f"it{i + 3}.fmu", [], SOUND.replace("</ModelV", f"{more}</ModelV"))
+        assert "more than 5 variables" in read(path)
 
 
 TEN_THOUSAND = '<Dimension start="10000"/>'
@@ -239,6 +273,10 @@ VARIABLE = 'name="time" valueReference="0" causality="independent"/>'
         ("<ModelV", '<DefaultExperiment stepSize="-1"/><ModelV', "stepSize"),
         ("<ModelV", '<DefaultExperiment stopTime="INF"/><ModelV', "stopTime"),
         ("<ModelV", '<DefaultExperiment startTime="x"/><ModelV', "startTime"),
+        ('fmiVersion="3.0"', 'fmiVersion="1.0"', "FMI version is '1.0', expected 2.0 or 3.0"),
+        ('fmiVersion="3.0"', 'fmiVersion="3"', "FMI version is '3', expected 2.0 or 3.0"),
+        ('fmiVersion="3.0"', 'fmiVersion="2.1"', "FMI version"),
+        ('fmiVersion="3.0"', "", "FMI version is ''"),
         ('modelName="m"', 'modelName="m" numberOfEventIndicators="1000000000"', "numberOfEventIndicators"),
     ],
 )
@@ -264,16 +302,99 @@ def no_fmu(tmp_path_factory):
     return (folder / "it.so").read_bytes()
 
 
-@pytest.mark.skipif(sys.platform != "linux" or platform.machine() != "x86_64", reason="of another machine")
+ON_LINUX = pytest.mark.skipif(sys.platform != "linux" or platform.machine() != "x86_64", reason="of another machine")
+
+
+@ON_LINUX
 def test_libraries_without_fmi_functions_are_rejected(tmp_path, no_fmu):
-    of_another_machine = bytearray(no_fmu)
-    of_another_machine[18] = 0xB7  # AArch64
-    of_32_bits = bytearray(no_fmu)
-    of_32_bits[4] = 1
-    for data in (b"", b"\x7fELF", bytes(of_another_machine), bytes(of_32_bits), no_fmu):
-        with pytest.raises(PlantError) as caught:
-            Plant(binary(tmp_path, data))
-        assert str(caught.value).startswith(str(tmp_path / "it.fmu")) and "\n" not in str(caught.value)
+    with pytest.raises(PlantError) as caught:
+        Plant(binary(tmp_path, no_fmu))
+    assert str(caught.value).startswith(str(tmp_path / "it.fmu")) and "\n" not in str(caught.value)
+
+
+@ON_LINUX
+def test_libraries_for_other_machines_are_rejected(tmp_path, read, no_fmu):
+    def edited(*changes):
+        data = bytearray(no_fmu)
+        for at, byte in changes:
+            data[at] = byte
+        return bytes(data)
+
+    for data, words in (
+        (b"", "is no ELF library"),
+        (b"MZ" + bytes(100), "is no ELF library"),
+        (edited((4, 7)), "is no ELF library: its class or byte order is unknown"),
+        (edited((16, 2)), "is no ELF library but another ELF file"),
+        (edited((18, 0xB7)), "is for processor aarch64, expected x86_64"),
+        (edited((18, 0xF3)), "is for processor 243, expected x86_64"),
+        (edited((5, 2)), ""),  # big-endian: its numbers make no sense
+    ):
+        assert f"binaries/x86_64-linux/odin.so {words}" in read(binary(tmp_path, data))
+
+
+@ON_LINUX
+@pytest.mark.parametrize("kept", [4, 0.2, 0.5, 0.9, -1])
+def test_libraries_that_are_cut_short_are_rejected(tmp_path, read, no_fmu, kept):
+    """The system's loader would map what is not there, and end the process with SIGBUS."""
+    kept = int(kept * len(no_fmu)) if 0 < kept < 1 else kept
+    assert "is cut short" in read(binary(tmp_path, no_fmu[:kept]))
+    if kept > 0:
+        assert "is no ELF library" in read(binary(tmp_path, no_fmu[:kept].ljust(len(no_fmu), b"\0")))
+
+
+@pytest.mark.parametrize(("bits", "order"), [(1, "<"), (1, ">"), (2, "<"), (2, ">")])
+def test_elf_headers_are_read_in_each_class_and_byte_order(bits, order):
+    sizes, words = ((52, 32, 40), "III") if bits == 1 else ((64, 56, 64), "QQQ")
+    header = b"\x7fELF" + bytes([bits, "<>".index(order) + 1, 1]).ljust(12, b"\0")
+    header += struct.pack(
+        f"{order}HHI{words}IHHHHHH", 3, 62 if bits == 2 else 3, 1, 0, sizes[0], 0, 0, *sizes[:2], 1, 0, 0, 0
+    )
+    if bits == 1:
+        program = struct.pack(f"{order}8I", 1, 100, 0, 0, 400, 400, 5, 4096)
+    else:
+        program = struct.pack(f"{order}IIQQQQQQ", 1, 5, 100, 0, 0, 400, 400, 4096)
+    data = (header + program).ljust(500, b"\0")
+    machine = "x86_64-linux" if bits == 2 else "x86-linux"
+    said = "" if order == "<" else f"is for processor {machine[:-6]}, big-endian, expected {machine[:-6]}"
+    assert library_defect(io.BytesIO(data), 500, machine) == said
+    if order == "<":
+        for kept in (4, 10, 50, 60, 90, 130, 499):
+            assert "is cut short" in library_defect(io.BytesIO(data[:kept]), kept, machine)
+    other = "is for processor x86" + ("_64" if bits == 2 else "") + (", big-endian" if order == ">" else "")
+    assert library_defect(io.BytesIO(data), 500, "aarch64-linux") == f"{other}, expected aarch64"
+
+
+@ON_LINUX
+def test_libraries_beside_the_fmus_own_are_checked(tmp_path, read, no_fmu):
+    with zipfile.ZipFile(binary(tmp_path, no_fmu), "a") as made:
+        made.writestr("binaries/x86_64-linux/readme.txt", "not a library")
+        made.writestr("binaries/aarch64-linux/odin.so", b"not checked here")
+        made.writestr("binaries/x86_64-linux/libhelper.so.1", no_fmu[:-10])
+    assert "libhelper.so.1 is cut short" in read(tmp_path / "it.fmu")
+
+
+FOREIGN = [  # libraries that FMPy ships, built by others
+    path for suffix in ("so", "dll", "dylib") for path in sorted(Path(fmpy.__file__).parent.glob(f"**/*.{suffix}"))
+]
+SYSTEMS = {".so": "linux", ".dll": "windows", ".dylib": "darwin"}
+
+
+@pytest.mark.parametrize("path", FOREIGN, ids=lambda path: f"{path.parent.name}/{path.name}")
+def test_libraries_of_each_system_are_accepted_whole_and_refused_cut(path):
+    data = path.read_bytes()
+    processor = next((name for name in ("aarch64", "x86_64") if name in str(path.parent.name)), "x86_64")
+    here = f"{'x86' if path.parent.name in ('win32', 'linux32') else processor}-{SYSTEMS[path.suffix]}"
+
+    def defect(data, platform=here, **more):
+        return library_defect(io.BytesIO(data), len(data), platform, **more)
+
+    assert defect(data) == ""
+    for kept in (40, 200, 1000, len(data) // 2, len(data) - 1):
+        assert "cut short" in defect(data[:kept]) and "cut short" in defect(data[:kept], is_loaded=False)
+    other = "aarch64" if here.startswith("x86") else "x86_64"
+    if path.suffix != ".dylib":  # those are universal
+        assert f"expected {other}" in defect(data, f"{other}-{SYSTEMS[path.suffix]}")
+    assert "is no" in defect(data, "x86_64-linux" if path.suffix != ".so" else "x86_64-windows")
 
 
 def test_extracted_files_are_private_to_the_owner(monkeypatch):
