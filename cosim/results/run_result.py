@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import fnmatch
 from dataclasses import dataclass
 from html import escape
 from pathlib import Path
@@ -18,11 +17,11 @@ from cosim.results.as_flown import scenario_as_flown
 from cosim.results.log_facts import IMPORT
 from cosim.results.record import RECORD, Record, load_record
 from cosim.results.required_columns import require_columns
+from cosim.results.signal_plot import plot_signals
 from cosim.results.summary import summarise
 from cosim.scenario.scenario import Scenario, load_scenario
 from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
-from plant_fmu.toml_tables import hint
 
 SCENARIO = "scenario.toml"
 SUMMARY = "summary.json"
@@ -91,42 +90,31 @@ class Run:
         try:
             import pandas as pd
         except ImportError as error:
-            raise RunError(f"a data frame needs pandas: {install_hint('pandas>=2.2')}") from error
+            command = install_hint("pandas>=2.2")
+            raise RunError(f"a data frame needs pandas, of the extra notebook: {command}") from error
         return pd.DataFrame({column.name: self.record[column.name] for column in self.record.columns})
 
     def plot(self, *signals: str, ax: Any = None) -> Any:
-        """Draw signals over time.
+        """Draw signals over time, each unit in axes of its own, one below the other.
 
         Parameters
         ----------
         *signals : str
             Names, or patterns such as ``"weight.*"``. Default: the clearance of the goal and of each region.
         ax : matplotlib.axes.Axes, optional
-            Axes to draw into; default: new ones.
+            Axes to draw signals of one unit into; default: new ones.
 
         Returns
         -------
         matplotlib.axes.Axes
-            Axes with a line for each signal.
+            Axes with a line for each signal of the first unit; ``ax.figure.axes`` has those of all units.
 
         Raises
         ------
         RunError
-            If the record has no such signal.
+            If the record has no such signal, or `ax` is given for signals of several units.
         """
-        import matplotlib.pyplot as plt
-
-        units = self.record.units
-        names = [name for pattern in signals or ("*.clearance",) for name in fnmatch.filter(units, pattern)]
-        unknown = next((pattern for pattern in signals if not fnmatch.filter(units, pattern)), None)
-        if unknown is not None:
-            raise RunError(f"signal {unknown!r} is unknown; {hint(unknown, list(units))}")
-        ax = plt.subplots()[1] if ax is None else ax
-        for name in dict.fromkeys(names):
-            ax.plot(self.record["time"], self.record[name], label=f"{name} [{units[name]}]" if units[name] else name)
-        ax.set(xlabel="time [s]", title=self.scenario.title)
-        ax.legend()
-        return ax
+        return plot_signals(self.record, signals or ("*.clearance",), self.scenario.title, ax)
 
     def replay(self) -> Path:
         """Return the path of the replay page.

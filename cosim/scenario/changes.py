@@ -17,6 +17,8 @@ from plant_fmu.vehicle import Vehicle
 # keys that no title lists: texts, recording, reporting and commands; seeds, and the text of a named file
 _UNLISTED_TABLES = ("title", "changed", "compare", "intersection", "record", "commands")
 _UNLISTED_KEYS = ("sensing.seed", "plant.parameters.seed", "arbiter.text")
+# keys of the computation, which a title lists behind those of the task
+_COMPUTATION = ("time.", "plant.fmi", "plant.substep", "arbiter.engine", "arbiter.points", "master.")
 _MAX_LISTED = 3  # changes that a title spells out
 
 
@@ -168,6 +170,7 @@ def shown_title(table: dict[str, Any], vehicle: Vehicle, law: str) -> str:
     notes = [] if law in LAWS else [f"flown by {law}"]
     keys = [key for key in table["changed"] if law in LAWS or not f"{key}.".startswith("law.")]
     if keys:
+        keys.sort(key=lambda key: key.startswith(_COMPUTATION))
         more = f" and {len(keys) - _MAX_LISTED} more" if len(keys) > _MAX_LISTED else ""
         notes.append(f"changed: {', '.join(_setting(table, key, vehicle) for key in keys[:_MAX_LISTED])}{more}")
     return f"{table['title']} ({'; '.join(notes)})" if notes else str(table["title"])

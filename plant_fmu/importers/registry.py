@@ -82,7 +82,7 @@ IMPORTERS = (
     Importer("fmu-manipulation-toolbox", "toolbox", ("fmu-manipulation-toolbox>=2.0",), ""),
     Importer("FMPy", "fmpy_stepping", ("fmpy>=0.3.30",), "CS"),
     Importer("FMPy FMU state", "fmpy_state", ("fmpy>=0.3.30",), "CS", _not_state),
-    Importer("plant_fmu", "plant_stepping", ("subreach",), "CS"),
+    Importer("Plant, through FMPy", "plant_stepping", ("fmpy>=0.3.30",), "CS"),
     Importer("libcosim", "libcosim", ("libcosimpy>=0.0.6",), "CS", _not_libcosim),
     Importer("Ecos", "ecos", ("ecospy>=0.7", *_TBB), "CS", _not_many),
     Importer("FMPy CVode", "fmpy_cvode", ("fmpy>=0.3.30",), "ME"),

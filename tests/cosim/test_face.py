@@ -1,6 +1,7 @@
 """The public names of `cosim`, as scripts and notebooks use them."""
 
 import ast
+import dataclasses
 import json
 import subprocess
 import sys
@@ -84,9 +85,35 @@ def test_record_is_a_table_with_units_and_a_data_frame(run):
 def test_signals_can_be_plotted(run):
     ax = run.plot("weight.*")
     assert [line.get_label() for line in ax.lines] == ["weight.obstacle", "weight.shape", "weight.depth"]
-    assert run.plot(ax=ax) is ax and len(ax.lines) > 3
+    assert run.plot("weight.depth", ax=ax) is ax and len(ax.lines) == 4
+    with pytest.raises(RunError, match="signals in m and no unit, expected one unit"):
+        run.plot("position.x", "weight.*", ax=ax)
     with pytest.raises(RunError, match="signal 'wieght' is unknown"):
         run.plot("wieght")
+    plt.close("all")
+
+
+def test_units_are_plotted_in_axes_of_their_own(run):
+    first = run.plot("position.*", "actuation.X", "weight.*", "position.y")
+    shown = [(ax.get_ylabel(), [line.get_label() for line in ax.lines]) for ax in first.figure.axes]
+    assert [unit for unit, _ in shown] == ["[m]", "[N]", ""] and first is first.figure.axes[0]
+    assert [len(names) for _, names in shown] == [3, 1, 3]
+    plt.close("all")
+
+
+@pytest.mark.parametrize("size", [(6.4, 4.8), (3.0, 3.0), (12.0, 4.0)])
+@pytest.mark.parametrize("given", [False, True], ids=["new", "given"])
+def test_titles_of_plots_lie_within_the_figure(run, size, given):
+    """Whatever was changed is listed at the title's end, where it was cut."""
+    changes = {"limit.force": 500.0, "arbiter.ramp": 0.25, "initial.position": [0.0, 0.1, 1.0]}
+    changed = dataclasses.replace(run, scenario=run.scenario.replace(changes))
+    with plt.rc_context({"figure.figsize": size}):
+        ax = plt.figure(layout="constrained").add_subplot() if given else None
+        ax = changed.plot("weight.*", ax=ax)
+    ax.figure.canvas.draw()
+    title, figure = ax.title.get_window_extent(), ax.figure.bbox
+    assert "limit.force = 500 N" in " ".join(ax.get_title().split())
+    assert title.x0 >= 0.0 and title.x1 <= figure.x1 and title.y1 <= figure.y1
     plt.close("all")
 
 
@@ -97,7 +124,7 @@ def test_notebook_representation_is_escaped(run, monkeypatch):
 
 def test_missing_pandas_error_names_the_install_command(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "pandas", None)
-    with pytest.raises(RunError, match=r"a data frame needs pandas: .*pip install"):
+    with pytest.raises(RunError, match=r"a data frame needs pandas, of the extra notebook: .*pip install"):
         run.frame()
 
 

@@ -133,7 +133,7 @@ def test_check_says_what_plant_says(odin, tmp_path, old, new, status):
     )
     with pytest.raises(PlantError) as caught:
         Plant(path)
-    row = run_importer(next(i for i in IMPORTERS if i.name == "plant_fmu"), read_fmu(path), Task(0.1, 0.1))
+    row = run_importer(next(i for i in IMPORTERS if i.module == "plant_stepping"), read_fmu(path), Task(0.1, 0.1))
     assert row.status == status
     if status == "failed":
         assert row.note == str(caught.value)

@@ -78,7 +78,7 @@ def test_the_numbers_of_shipped_titles_are_those_of_their_scenarios():
         (["commands.enabled=true", "sensing.seed=3", "record.lyapunov=false", "compare=''"], ""),
         (
             ["limit.force=1", "limit.time_constant=2", "arbiter.ramp=3", "plant.substep=0.001", "time.duration=5"],
-            " (changed: time.duration = 5 s, plant.substep = 0.001 s, arbiter.ramp = 3 m and 2 more)",
+            " (changed: arbiter.ramp = 3 m, limit.force = 1 N, limit.time_constant = 2 s and 2 more)",
         ),
     ],
 )
@@ -101,7 +101,7 @@ def test_inherited_title_lists_overridden_keys(tmp_path):
     assert load_scenario(one).title == FORCE
     told = f"{LIMITED} (changed: arbiter.ramp = 0.5 m, limit.force = 500 N"
     assert load_scenario(two).title == f"{told})"
-    assert load_scenario(two, ["time.duration=1"]).title.startswith(f"{LIMITED} (changed: time.duration = 1 s, arbiter")
+    assert load_scenario(two, ["time.duration=1"]).title == f"{told}, time.duration = 1 s)"
     assert load_scenario(two, ["limit.force=108"]).title == f"{LIMITED} (changed: arbiter.ramp = 0.5 m)"
 
 
