@@ -42,7 +42,7 @@ def require_version(fmi: int) -> None:
         raise BuildError(f"FMI version is {fmi!r}, expected 2 or 3")
 
 
-def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = NATIVE) -> Path:
+def build_fmu(what: Vehicle | Component, fmi: int, out: str | Path, platforms: str = NATIVE) -> Path:
     """Write the FMU of a vehicle, or of another component.
 
     Parameters
@@ -51,7 +51,7 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: Path, platforms: str = N
         Vehicle, whose numbers become the start values of the FMU's parameters; or another component.
     fmi : int
         FMI version: 2 or 3; that of a vehicle is for co-simulation and model exchange in both.
-    out : Path
+    out : str or Path
         File to write; it is written atomically.
     platforms : str
         Platforms: ``native`` for this machine; ``all``, or FMI 3.0's names with commas between them, such as

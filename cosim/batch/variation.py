@@ -9,6 +9,7 @@ from typing import Any
 from controller import ControllerError
 from cosim.errors import ScenarioError
 from cosim.scenario.changes import join_keys, value_at, with_values
+from cosim.scenario.key_text import plain_key
 from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu.errors import PlantFmuError
 
@@ -40,7 +41,7 @@ class Variation:
     """
 
     def __init__(self, scenario: Scenario, keys: Sequence[str]) -> None:
-        self.base, self.keys = scenario, tuple(keys)
+        self.base, self.keys = scenario, tuple(map(plain_key, keys))
         for i, key in enumerate(self.keys):
             if key in self.keys[:i]:
                 raise ScenarioError(f"key {key!r} comes twice, expected each once")

@@ -41,9 +41,9 @@ class Campaign:
 
 
 def run_campaign(
-    scenes: Path | SceneStore,
+    scenes: str | Path | SceneStore,
     law: str,
-    out: Path,
+    out: str | Path,
     conditions: Conditions | None = None,
     gains: Any = None,
     workers: int = 1,
@@ -54,11 +54,11 @@ def run_campaign(
 
     Parameters
     ----------
-    scenes : Path or SceneStore
+    scenes : str, Path or SceneStore
         File of the scenes with one JSON object per line, ``-`` for standard input; or a store of scenes read before.
     law : str
         Name of the law, a key of `controller.LAWS`.
-    out : Path
+    out : str or Path
         A folder that does not exist, is empty, or holds the same campaign. A complete one gets its summary again, a
         partial one is continued.
     conditions : Conditions, optional
@@ -99,9 +99,10 @@ def run_campaign(
     >>> cosim.run_campaign(Path("scenes.jsonl"), "pd", Path("pd")).summary["scenes"]
     2
     """
+    out = Path(out)
     task = SceneTask(law, gains_from(law) if gains is None else gains, conditions or Conditions())
     with contextlib.ExitStack() as stack:
-        store = scenes if isinstance(scenes, SceneStore) else stack.enter_context(SceneStore(scenes))
+        store = scenes if isinstance(scenes, SceneStore) else stack.enter_context(SceneStore(Path(scenes)))
         work = SceneWork(store, task)
         summary: dict[str, Any] = {}
 

@@ -46,9 +46,9 @@ class Comparison:
 
 
 def compare(
-    scenes: Path,
+    scenes: str | Path,
     laws: Sequence[str],
-    out: Path,
+    out: str | Path,
     conditions: Conditions | None = None,
     gains: Mapping[str, Any] | None = None,
     workers: int = 1,
@@ -58,11 +58,11 @@ def compare(
 
     Parameters
     ----------
-    scenes : Path
+    scenes : str or Path
         File of the scenes with one JSON object per line; ``-`` for standard input.
     laws : sequence of str
         Names of two or more laws, keys of `controller.LAWS`.
-    out : Path
+    out : str or Path
         A folder that does not exist, is empty, or holds a comparison of the same scenes. It has the folder of a
         campaign for each law, which is continued.
     conditions : Conditions, optional
@@ -95,6 +95,7 @@ def compare(
     >>> sorted(path.name for path in comparison.folder.iterdir() if path.is_dir())
     ['pd', 'sun_cheah']
     """
+    scenes, out = Path(scenes), Path(out)
     for law in laws:
         law_named(law)
     if len(laws) < 2 or len(set(laws)) < len(laws):

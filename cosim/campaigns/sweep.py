@@ -15,7 +15,7 @@ from cosim.campaigns.sweeps.rows import SweepWork
 from cosim.campaigns.sweeps.summary import summarize_sweep
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
-from cosim.scenario.scenario import Scenario
+from cosim.scenario.scenario import Scenario, to_scenario
 
 
 @dataclass(frozen=True)
@@ -40,9 +40,9 @@ class Sweep:
 
 
 def run_sweep(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     design: Design,
-    out: Path,
+    out: str | Path,
     engine: str = "fused",
     workers: int = 1,
     executor: Executor | None = None,
@@ -52,11 +52,11 @@ def run_sweep(
 
     Parameters
     ----------
-    scenario : Scenario
-        The base scenario.
+    scenario : Scenario, str or Path
+        The base scenario, or its name or file.
     design : Design
         Values of the keys that vary, row by row.
-    out : Path
+    out : str or Path
         A folder that does not exist, is empty, or holds the same sweep. A complete one gets its summary again, a
         partial one is continued.
     engine : str
@@ -96,7 +96,7 @@ def run_sweep(
     >>> sweep.flown
     2
     """
-    work = SweepWork(scenario, design, engine)
+    work, out = SweepWork(to_scenario(scenario), design, engine), Path(out)
     summary: dict[str, Any] = {}
 
     def conclude(results: Results) -> None:

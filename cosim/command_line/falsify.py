@@ -80,6 +80,7 @@ def _search(options: argparse.Namespace) -> Any:
     from cosim.campaigns.scenes.law_gains import gains_from
     from cosim.campaigns.scenes.work import SceneTask
     from cosim.campaigns.sweeps.design import vary_from
+    from cosim.scenario.key_text import split_change
     from cosim.scenario.scenario import load_scenario
 
     what, settings = options.what, SearchSettings(options.objective, options.budget, options.seed, options.rare_event)
@@ -94,7 +95,7 @@ def _search(options: argparse.Namespace) -> Any:
     if what.endswith(".jsonl"):
         raise RunError(f"{what}: is a file of scenes, expected a family ({', '.join(FAMILIES)}) or a scenario")
     vary = vary_from(options.vary)
-    both = {key.key for key in vary} & {text.partition("=")[0].strip() for text in options.settings}
+    both = {key.key for key in vary} & {split_change(text)[0] for text in options.settings}
     if both:
         raise RunError(f"{min(both)} is set and varies, expected either")
     law = [f"law.name={options.law}"] if options.law else []

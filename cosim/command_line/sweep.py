@@ -71,6 +71,7 @@ def sweep(options: argparse.Namespace) -> int:
     from cosim.campaigns.pages.sweep_page import sweep_lines, write_sweep_page
     from cosim.campaigns.sweep import run_sweep
     from cosim.campaigns.sweeps.design import Design, vary_from, vary_vehicles
+    from cosim.scenario.key_text import split_change
     from cosim.scenario.scenario import load_scenario
 
     if options.scheduler and options.workers:
@@ -78,7 +79,7 @@ def sweep(options: argparse.Namespace) -> int:
     vary = vary_vehicles(options.vehicles) if options.vehicles else vary_from(options.vary)
     kind: Any = options.design or ("paired" if options.vehicles else "random")
     design = Design(vary, kind, options.samples, options.seed)
-    both = {vary.key for vary in design.vary} & {text.partition("=")[0].strip() for text in options.overrides}
+    both = {vary.key for vary in design.vary} & {split_change(text)[0] for text in options.overrides}
     if both:
         raise RunError(f"{min(both)} is set and varies, expected either")
     scenario = load_scenario(options.scenario, options.overrides)

@@ -167,7 +167,7 @@ class Companion:
 
     def run(
         self,
-        out: Path | None = None,
+        out: str | Path | None = None,
         report: bool = True,
         on_state: Callable[[State, str], None] | None = None,
         live: LiveView | None = None,
@@ -176,7 +176,7 @@ class Companion:
 
         Parameters
         ----------
-        out : Path, optional
+        out : str or Path, optional
             The run folder, as for `run_scenario`.
         report : bool
             True to write report and figures too.
@@ -213,7 +213,7 @@ class Companion:
             if live is not None:
                 live.begin(self.scenario, master.signals.columns, _NO_COMMANDS)
             self.prepare(show_state)
-            folder = claim(out, self.scenario)
+            folder = claim(None if out is None else Path(out), self.scenario)
             try:
                 recorder = Recorder(folder.path, master.signals.columns)
             except BaseException:

@@ -22,9 +22,9 @@ _RUN_FILES = frozenset({RECORD, SCENARIO, SUMMARY, COMMANDS_LOG})
 
 
 def export_run(
-    folder: Path,
+    folder: str | Path,
     to: str,
-    out: Path | None = None,
+    out: str | Path | None = None,
     *,
     signals: Sequence[str] = (),
     every: int = 1,
@@ -35,11 +35,11 @@ def export_run(
 
     Parameters
     ----------
-    folder : Path
+    folder : str or Path
         Folder of a run that was completed, interrupted or killed.
     to : str
         Name of the format: csv, mcap, rrd or tlog.
-    out : Path, optional
+    out : str or Path, optional
         File to write; default: the folder's name with the format as suffix, in the current folder.
     signals : sequence of str
         Names or patterns of signals; none for all.
@@ -76,7 +76,8 @@ def export_run(
     form = FORMATS[to]
     if form.whole and (signals or every != 1 or rate is not None):
         raise ExportError(f"--to {to}: expected no --signals, --every or --rate with it: its messages have their own")
-    path = out or Path(f"{folder.resolve().name}.{to}")
+    folder = Path(folder)
+    path = Path(out or f"{folder.resolve().name}.{to}")
     files = [path, *([path.with_suffix(form.beside)] if form.beside else [])]
     for file in files:
         if file.exists() and not (force and file.is_file()):

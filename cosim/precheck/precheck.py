@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 from cosim.precheck.feasibility import region_findings
 from cosim.precheck.finding import Finding
 from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
 from cosim.precheck.thrust import asked_finding, thrust_findings
-from cosim.scenario.scenario import Scenario
+from cosim.scenario.scenario import Scenario, to_scenario
 
 
 @dataclass(frozen=True)
@@ -42,13 +43,13 @@ class Check:
         return tuple(finding for finding in self.findings if finding.status == "fails")
 
 
-def check_scenario(scenario: Scenario) -> Check:
+def check_scenario(scenario: Scenario | str | Path) -> Check:
     """Check a scenario without running it.
 
     Parameters
     ----------
-    scenario : Scenario
-        Scenario with any law; (31)-(45) are checked for the paper's law only.
+    scenario : Scenario, str or Path
+        Scenario with any law, or its name or file; (31)-(45) are checked for the paper's law only.
 
     Returns
     -------
@@ -68,6 +69,7 @@ def check_scenario(scenario: Scenario) -> Check:
     ...     print(finding.name)
     (38) 1, 2
     """
+    scenario = to_scenario(scenario)
     findings = [*vehicle_findings(scenario), *region_findings(scenario), *thrust_findings(scenario)]
     if scenario.law.name == "ismail_dunnigan":
         weights = start_weights(scenario)

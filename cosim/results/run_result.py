@@ -145,12 +145,12 @@ class Run:
         return f"<table>{cells}</table>"
 
 
-def load_run(path: Path) -> Run:
+def load_run(path: str | Path) -> Run:
     """Open a run that was completed, interrupted or killed.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         The run folder.
 
     Returns
@@ -172,6 +172,7 @@ def load_run(path: Path) -> Run:
     >>> cosim.load_run(run.folder).summary["status"]
     'completed'
     """
+    path = Path(path)
     if not (path / SCENARIO).is_file():
         raise RunError(f"{path}: holds no run ({SCENARIO} is missing)")
     scenario = load_scenario(path / SCENARIO, imported=True)

@@ -31,7 +31,9 @@ def plot_signals(record: Record, patterns: Sequence[str], title: str, ax: Any) -
     if ax is None:
         width, height = plt.rcParams["figure.figsize"]
         size = (width, height + _HEIGHT * (len(by_unit) - 1))
-        column = plt.subplots(len(by_unit), sharex=True, squeeze=False, figsize=size, layout="constrained")[1][:, 0]
+        column = list(
+            plt.subplots(len(by_unit), sharex=True, squeeze=False, figsize=size, layout="constrained")[1][:, 0]
+        )
     elif len(by_unit) == 1:
         column = [ax]
     else:

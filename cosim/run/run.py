@@ -17,7 +17,7 @@ from cosim.results.wording import verdict
 from cosim.run.progress import ProgressBar
 from cosim.run.run_folder import RunFolder, claim, conclude
 from cosim.scenario.law_factory import with_custom_law
-from cosim.scenario.scenario import Scenario
+from cosim.scenario.scenario import Scenario, to_scenario
 from cosim.simulation.commands import CommandQueue, LoggedCommands, ReplayedCommands
 from cosim.simulation.master import Master, Observer
 from cosim.simulation.signals import Array
@@ -62,13 +62,13 @@ class _Progress:
 
 
 def run_scenario(
-    scenario: Scenario,
+    scenario: Scenario | str | Path,
     out: str | Path | None = None,
     mavlink: Mavlink | None = None,
     rate: float | None = None,
     progress: bool = False,
     report: bool = True,
-    commands_log: Path | None = None,
+    commands_log: str | Path | None = None,
     live: LiveView | None = None,
     law: Law | None = None,
     overwrite: bool = False,
@@ -79,8 +79,8 @@ def run_scenario(
 
     Parameters
     ----------
-    scenario : Scenario
-        The scenario of the run.
+    scenario : Scenario, str or Path
+        The scenario of the run, or its name or file.
     out : str or Path, optional
         The run folder; it must not exist, or be empty. Default: a new one below ``runs``. Runs after a reset add a
         number to the name.
@@ -92,7 +92,7 @@ def run_scenario(
         Show a bar, if there is a terminal.
     report : bool
         Write the report and its figures.
-    commands_log : Path, optional
+    commands_log : str or Path, optional
         Log of commands of an earlier run, which is replayed; link and viewers then cannot send commands.
     live : LiveView, optional
         Shows the run in browsers, and takes their commands if the scenario's commands are enabled.
@@ -129,10 +129,10 @@ def run_scenario(
     >>> cosim.run_scenario(scenario, "run", report=False).summary["simulated_time"]
     0.2
     """
-    out = None if out is None else Path(out)
+    scenario, out = to_scenario(scenario), None if out is None else Path(out)
     if law is not None:
         scenario = with_custom_law(law, scenario)
-    replayed = _replayed_commands(scenario, commands_log)
+    replayed = None if commands_log is None else _replayed_commands(scenario, Path(commands_log))
     queue = CommandQueue()
     link: LinkThread | None = None
     try:
@@ -177,9 +177,7 @@ def _viewer_queue(scenario: Scenario, replayed: ReplayedCommands | None, queue: 
     return queue if scenario.commands.enabled else "commands are off: start with --commands"
 
 
-def _replayed_commands(scenario: Scenario, commands_log: Path | None) -> ReplayedCommands | None:
-    if commands_log is None:
-        return None
+def _replayed_commands(scenario: Scenario, commands_log: Path) -> ReplayedCommands:
     if not scenario.commands.enabled:
         raise RunError(f"{commands_log}: commands are given, expected a scenario with commands.enabled")
     return ReplayedCommands(commands_log)

@@ -275,6 +275,11 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
         raise ScenarioError(f"{text}: {error}") from error
 
 
+def to_scenario(scenario: Scenario | str | Path) -> Scenario:
+    """Return a scenario itself, or load it by its name or file."""
+    return scenario if isinstance(scenario, Scenario) else load_scenario(scenario)
+
+
 def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, Any]) -> Scenario:
     """Return the scenario with the list of keys in which its table differs from the one that has its title."""
     try:

@@ -9,9 +9,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from cosim.errors import ScenarioError
+from cosim.scenario.key_text import plain_key, shorten, split_change
 from plant_fmu.errors import TableError, printable
-
-_SHOWN = 80  # greatest number of characters quoted in a message
 
 
 def list_scenarios() -> list[str]:
@@ -141,7 +140,8 @@ def override(table: dict[str, Any], text: str) -> None:
     table : dict
         Table of a scenario.
     text : str
-        Change ``key=value``, with dots between the keys and a TOML value, or a bare word; lists by index or name.
+        Change ``key=value``, with dots between the keys, which may be quoted as in TOML, and a TOML value or a bare
+        word; lists by index or name.
         Another ``law.name`` drops the gains of the law before, another ``arbiter.file`` its inputs.
 
     Raises
@@ -151,25 +151,25 @@ def override(table: dict[str, Any], text: str) -> None:
     """
     from plant_fmu.toml_tables import MAX_DEPTH, require_modest
 
-    key, equals, value_text = text.partition("=")
-    if not equals or not key:
-        raise ScenarioError(f"--set {_short(text)!r}: expected key=value")
+    key, value_text = split_change(text)
+    if not key:
+        raise ScenarioError(f"--set {shorten(text)!r}: expected key=value")
     depth = key.count(".")
     if depth >= MAX_DEPTH:
-        raise ScenarioError(f"--set {_short(key)}: {depth} tables within each other, expected less than {MAX_DEPTH}")
+        raise ScenarioError(f"--set {shorten(key)}: {depth} tables within each other, expected less than {MAX_DEPTH}")
     try:
         parsed = tomllib.loads(f"value = {value_text}")
         require_modest(parsed)
     except tomllib.TOMLDecodeError:
         parsed = {"value": value_text.strip()}  # a bare word is a string
     except RecursionError as error:
-        raise ScenarioError(f"--set {_short(text)}: is nested too deeply") from error
+        raise ScenarioError(f"--set {shorten(text)}: is nested too deeply") from error
     except TableError as error:
-        raise ScenarioError(f"--set {_short(text)}: {error}") from error
+        raise ScenarioError(f"--set {shorten(text)}: {error}") from error
     except ValueError as error:
-        raise ScenarioError(f"--set {_short(text)}: a whole number has too many digits") from error
+        raise ScenarioError(f"--set {shorten(text)}: a whole number has too many digits") from error
     if len(parsed) > 1:
-        raise ScenarioError(f"--set {_short(text)!r}: expected one key=value")
+        raise ScenarioError(f"--set {shorten(text)!r}: expected one key=value")
     set_key(table, key, parsed["value"])
 
 
@@ -181,7 +181,7 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     table : dict
         Table of a scenario.
     key : str
-        Key, with dots between its parts; items of lists by index or name. Another ``law.name`` drops the gains of the
+        Key, as `override` has it. Another ``law.name`` drops the gains of the
         law before, another ``arbiter.file`` its inputs.
     value : object
         Value, of a type of TOML.
@@ -191,10 +191,11 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     ScenarioError
         If the table has no place for such a key.
     """
-    *path, last = key.strip().split(".")
-    if key.strip() == "law.name":
+    key = plain_key(key)
+    *path, last = key.split(".")
+    if key == "law.name":
         _name_law(table, value)
-    if key.strip() == "arbiter.file":
+    if key == "arbiter.file":
         _name_rules(table)
     at: Any = table
     for part in path:
@@ -207,11 +208,7 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     elif isinstance(at, dict):
         at[last] = value
     else:
-        raise ScenarioError(f"--set {_short(key)}: there is no table at {_short('.'.join(path))!r}")
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
+        raise ScenarioError(f"--set {shorten(key)}: there is no table at {shorten('.'.join(path))!r}")
 
 
 def _index(items: list[Any], part: str, key: str) -> int:
@@ -222,7 +219,7 @@ def _index(items: list[Any], part: str, key: str) -> int:
     if part.isdecimal() and len(part) < 10 and int(part) < len(items):
         return int(part)
     raise ScenarioError(
-        f"--set {_short(key)}: {_short(part)!r} is not one of {', '.join(map(str, names))}, "
+        f"--set {shorten(key)}: {shorten(part)!r} is not one of {', '.join(map(str, names))}, "
         f"nor a number below {len(items)}"
     )
 

@@ -44,3 +44,22 @@ def test_public_functions_accept_no_arbitrary_keywords():
         for function in [what, *public.members(what)] if what.is_class else [what] if what.is_function else []:
             if (function.is_function or function.is_class) and function.path not in by_input:
                 assert all(p.kind is not griffe.ParameterKind.var_keyword for p in function.parameters), function.path
+
+
+def test_public_functions_take_paths_as_text_and_scenarios_by_name():
+    """Those of a value's fields are results, and have their own type."""
+    found, narrow = set(), []
+    for name in public.names():
+        what = public.target(name)
+        for function in [what] if what.is_function else public.members(what) if what.is_class else []:
+            for parameter in function.parameters if function.is_function else ():
+                kinds = set(re.split(r"[ |\[\],]+", str(parameter.annotation)))
+                by_name = "Scenario" in kinds and what.is_function
+                if "Path" in kinds or by_name:
+                    found.add(f"{function.path}({parameter.name})")
+                    if not {"str", "Path"} <= kinds:
+                        narrow.append(f"{function.path}({parameter.name}: {parameter.annotation})")
+    assert narrow == []
+    assert {"cosim.run.run.run_scenario(scenario)", "cosim.results.run_result.load_run(path)"} <= found and len(
+        found
+    ) > 20

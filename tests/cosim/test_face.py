@@ -74,6 +74,29 @@ def test_loaded_run_equals_the_returned_run(run):
     assert run.replay() == run.folder / "replay.html" and len(repr(run).splitlines()) == 1
 
 
+def test_paths_may_be_texts_and_scenarios_names(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("short.toml").write_text(cosim.load_scenario("paper").replace(SHORT).toml())
+    Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(1)))
+    done = cosim.run_scenario("short.toml", "run", report=False)
+    assert cosim.load_run("run").summary == cosim.load_run(Path("run")).summary == done.summary
+    assert cosim.export_run("run", "npz", "it.npz") == [Path("it.npz")]
+    assert cosim.check_scenario("paper").title == cosim.load_scenario("paper").title
+    design = cosim.Design(cosim.vary_from(["initial.position.1=-1,1"]), "grid")
+    assert cosim.run_sweep("short.toml", design, "sweep").folder == Path("sweep")
+    assert len(list(cosim.read_scenes("scenes.jsonl"))) == 1
+    with pytest.raises(ScenarioError, match="scenario 'dokcing' is unknown; did you mean 'docking'"):
+        cosim.run_scenario("dokcing")
+
+
+@pytest.mark.medium
+def test_campaigns_take_texts_as_paths(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(1)))
+    assert cosim.run_campaign("scenes.jsonl", "pd", "campaign").folder == Path("campaign")
+    assert cosim.compare("scenes.jsonl", ["pd", "sun_cheah"], "comparison").folder == Path("comparison")
+
+
 def test_record_is_a_table_with_units_and_a_data_frame(run):
     table, frame = run.table(), run.frame()
     assert table.column_names == list(frame.columns) == list(run.record.units)

@@ -49,12 +49,12 @@ def decode_scene(line: bytes) -> AnyScene:
     return scene
 
 
-def read_scenes(path: Path) -> Iterator[AnyScene]:
+def read_scenes(path: str | Path) -> Iterator[AnyScene]:
     r"""Read scenes from a file with one JSON object per line; blank lines are skipped.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         File of the scenes.
 
     Yields
@@ -76,7 +76,7 @@ def read_scenes(path: Path) -> Iterator[AnyScene]:
     [0, 1]
     """
     try:
-        with path.open("rb") as file:
+        with Path(path).open("rb") as file:
             yield from scenes_in(file, str(path))
     except OSError as error:
         raise ScenarioError(f"{path}: {error.strerror or error}") from error

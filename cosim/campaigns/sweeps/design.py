@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.campaigns.workers.work import Rows
-from cosim.errors import RunError
+from cosim.errors import RunError, ScenarioError
+from cosim.scenario.key_text import plain_key, split_change
 
 Kind = Literal["grid", "random", "sobol", "lhs", "paired"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -34,6 +35,9 @@ class Vary:
     points: int | None = None  # number of values of a range on a grid
     log: bool = False  # True if the range is logarithmic
     values: tuple[float, ...] = ()  # list of values, instead of a range
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "key", plain_key(self.key))
 
     def at(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the values at each `share` of the range or list, from 0 to 1; the ends are exact."""
@@ -327,8 +331,11 @@ class _Drawn(msgspec.Struct):
 
 
 def _vary(text: str) -> Vary:
-    key, equals, rest = (part.strip() for part in text.partition("="))
-    if not (key and equals and rest):
+    try:
+        key, rest = (part.strip() for part in split_change(text))
+    except ScenarioError as error:
+        raise RunError(str(error)) from error
+    if not (key and rest):
         raise RunError(f"{text!r}: expected key=low:high, key=low:high:points or key=a,b,c")
     if ":" not in rest:
         return Vary(key, values=tuple(_number(key, item) for item in rest.split(",")))

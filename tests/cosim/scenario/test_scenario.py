@@ -6,7 +6,9 @@ import tomllib
 import pytest
 
 from controller.regions import Pipe, Sphere
-from cosim.errors import ScenarioError
+from cosim.batch.variation import Variation
+from cosim.campaigns.sweeps.design import Vary, vary_from
+from cosim.errors import CosimError, ScenarioError
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios
 
@@ -283,6 +285,45 @@ def test_sensing_is_exact_without_sensor_faults(keys, exact):
 def test_wrench_limit_is_rejected_with_thruster_actuation():
     with pytest.raises(ScenarioError, match="limit"):
         load_scenario("paper-limited", ["actuation.through=thrusters"])
+
+
+@pytest.mark.parametrize(
+    "key",
+    [
+        "regions.port wall.gain",
+        'regions."port wall".gain',
+        "regions.'port wall'.gain",
+        ' "regions" . "port\\u0020wall" . \'gain\' ',
+        'regions."1".gain',
+    ],
+)
+def test_keys_may_be_quoted_as_in_toml(key):
+    docking = load_scenario("docking")
+    wanted = load_scenario("docking", ["regions.1.gain=50"]).toml()
+    assert load_scenario("docking", [f"{key}=50"]).toml() == docking.replace({key: 50.0}).toml() == wanted
+    varied = Variation(docking, [key])
+    assert varied.scenario([50.0], docking.sensing.seed).regions[1].region.gain == 50.0
+    assert vary_from([f"{key}=50,60"])[0].key == Vary(key, values=(1.0,)).key == varied.keys[0]
+
+
+@pytest.mark.parametrize(
+    "key", ['regions."port wall.gain', 'regions.port" wall".gain', "regions.'", 'regions."\\x".gain']
+)
+def test_half_quoted_keys_are_refused(key):
+    for act in (
+        lambda: load_scenario("docking", [f"{key}=50"]),
+        lambda: load_scenario("docking").replace({key: 50.0}),
+        lambda: vary_from([f"{key}=1:2"]),
+        lambda: Variation(load_scenario("docking"), [key]),
+    ):
+        with pytest.raises(CosimError, match="regions") as refused:
+            act()
+        assert "\n" not in str(refused.value)
+
+
+def test_values_may_hold_quotes_and_equals_signs():
+    assert load_scenario("docking", ["title=\"a = 'b'\""]).title == "a = 'b'"
+    assert load_scenario("docking", ["title=it's = so"]).title == "it's = so"
 
 
 @pytest.mark.parametrize("missing", ["vehicle", "time", "initial", "goal"])
