@@ -75,7 +75,9 @@ def require(good: bool, shape: str, key: str, received: object, expected: str) -
         If `good` is false.
     """
     if not good:
-        raise RegionError(f"{shape}: {key} is {received}, expected {expected}")
+        of_angle = expected.endswith(" rad") and isinstance(received, int | float) and 0.0 < received < math.inf
+        hint = f"; {received:g} degrees are {math.radians(received):.4g} rad" if of_angle else ""
+        raise RegionError(f"{shape}: {key} is {received}, expected {expected}{hint}")
 
 
 def require_finite(shape: str, **values: float | tuple[float, ...]) -> None:

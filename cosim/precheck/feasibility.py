@@ -17,6 +17,7 @@ from cosim.precheck.path_search import SearchedPath, find_path, path_limits
 from cosim.precheck.region_intersection import Overlap, box_about, box_within, search
 from cosim.precheck.region_values import evaluate_regions
 from cosim.scenario.scenario import Scenario
+from cosim.scenario.water_surface import heights_above_surface, is_submerged_model
 
 Array = NDArray[np.float64]
 
@@ -25,7 +26,7 @@ _MAX_MARGIN = 1e5  # m, greatest margin that is tried
 
 
 def region_findings(scenario: Scenario) -> Iterator[Finding]:
-    """Yield the findings on whether the regions can be satisfied, at their positions at time 0.
+    """Yield the findings on whether start, goal and regions are in the water, and can be satisfied, at time 0.
 
     Parameters
     ----------
@@ -43,6 +44,7 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     low, high = _box(goal, placed, start)
     moving = " Some move: this is how they are at time 0." if scenario.moving else ""
     violated = [region for region in regions if _clearance(region, scenario) < 0.0]
+    yield from _surface(scenario)
     yield from (_start(region, scenario) for region in violated)
     yield from _common(goal, placed, low, high, moving)
     yield from _between(placed, low, high)
@@ -50,6 +52,26 @@ def region_findings(scenario: Scenario) -> Iterator[Finding]:
     if scenario.goal_then:
         text = f"The goal's next {len(scenario.goal_then)} places are not checked: the findings are for the first."
         yield Finding("regions", "next places", "note", text)
+
+
+def _surface(scenario: Scenario) -> Iterator[Finding]:
+    """Yield a finding on what is above the water surface; a note if that is a start from which the vehicle falls."""
+    heights = dict(heights_above_surface(scenario))
+    if not heights:
+        return
+    text = (
+        f"Above the water surface (z < 0; z points down): {', '.join(f'{k} by {h:.2f} m' for k, h in heights.items())}."
+    )
+    if is_submerged_model(scenario):
+        text += " The plant has water everywhere: the vehicle would fly."
+    elif list(heights) == ["the start"]:
+        text += " Buoyancy fades there, and the vehicle falls."
+        yield Finding("regions", "water surface", "note", text, numbers=heights)
+        return
+    else:
+        text += " Buoyancy fades there: the vehicle cannot stay."
+    advice = "Give depths as positive z: 1.5, not -1.5, is 1.5 m deep."
+    yield Finding("regions", "water surface", "fails", text, advice, heights)
 
 
 def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, float]) -> tuple[Array, Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from cosim.precheck.angles import angle_findings
 from cosim.precheck.feasibility import region_findings
 from cosim.precheck.finding import Finding
 from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
@@ -70,7 +71,8 @@ def check_scenario(scenario: Scenario | str | Path) -> Check:
     (38) 1, 2
     """
     scenario = to_scenario(scenario)
-    findings = [*vehicle_findings(scenario), *region_findings(scenario), *thrust_findings(scenario)]
+    findings = [*vehicle_findings(scenario), *angle_findings(scenario), *region_findings(scenario)]
+    findings += thrust_findings(scenario)
     if scenario.law.name == "ismail_dunnigan":
         weights = start_weights(scenario)
         findings += [*gain_findings(scenario, weights), asked_finding(scenario, weights)]

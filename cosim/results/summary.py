@@ -15,6 +15,7 @@ from cosim.results.lyapunov_summary import summarise_lyapunov
 from cosim.results.record import Rows
 from cosim.results.spans import Span, Spans
 from cosim.scenario.scenario import Scenario
+from cosim.scenario.water_surface import heights_above_surface, hull_radius, is_submerged_model
 from cosim.simulation.signals import Array
 
 SETTLED_FOR = 10.0  # s, least time in the goal at the end of a run that counts as settled
@@ -68,6 +69,8 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
     visits, last = data.visits, data.last
     simulated = float(last["time"])
     settled = bool(visits and data.inside.open and simulated - visits[-1].start >= SETTLED_FOR)
+    submerged = scenario.has_goal and not scenario.log and is_submerged_model(scenario)
+    above = [name for name, _ in heights_above_surface(scenario)] if submerged else []
     least = {name: data.least[f"{name}.clearance"] for name in names}
     summary = {
         "scenario": scenario.name,
@@ -105,6 +108,8 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "saturated_time": data.saturated * period,
         "isolations": [{"thruster": j, "time": time} for time, j, isolated in data.isolations.changes if isolated],
         "rejected_samples": last.get(REJECTED),
+        "above_surface": above,
+        "time_above_surface": min(data.above * period, simulated) if submerged else 0.0,
         "estimate_final": [last[name] for name in _ESTIMATE],
         "estimate_true": scenario.true_restoring_parameters.tolist(),
         "estimate_lowest": [data.least[name] for name in _ESTIMATE],
@@ -140,6 +145,7 @@ class _SummaryData:
         self.greatest: dict[str, float] = {}
         self.force, self.violation, self.saturated = _Sum(), _Sum(), 0
         self._priorities = np.array([secondary.priority for secondary in scenario.regions])
+        self._dry, self.above = -hull_radius(scenario), 0  # m, depth of a vehicle in the air; rows above that
         self.inside, self._overlap = Spans(), Spans()
         self._visits: list[Span] = []  # the first and the last visit of the goal that ended
         self._windows: list[Span] = []
@@ -173,6 +179,7 @@ class _SummaryData:
         if self._clearances:
             self.violation.add((np.maximum(-block.stack(self._clearances), 0.0) * self._priorities).sum(axis=1)[acted])
         self.saturated += int(np.count_nonzero(np.logical_or.reduce([block[n][acted] > 0.0 for n in self.flags])))
+        self.above += int(np.count_nonzero(block["position.z"] < self._dry))
         weights = block.stack(self._weights)
         self._update_extremes(self.greatest, np.fmax, {
             "goal.clearance": goal,

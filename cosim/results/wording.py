@@ -130,7 +130,7 @@ def verdict(summary: dict[str, Any]) -> str:
     }.get(summary["status"], f" The run {summary['status']}.")
     commands = summary.get("commands", 0)
     steered = f" It was given {commands} command{'s' if commands > 1 else ''} on the way." if commands else ""
-    return goal + kept + force + _law_reports(summary) + steered + ended + _goal_miss(summary)
+    return goal + kept + _above_surface(summary) + force + _law_reports(summary) + steered + ended + _goal_miss(summary)
 
 
 def isolation_text(thruster: int, isolated: bool) -> str:
@@ -157,6 +157,17 @@ def _law_reports(summary: dict[str, Any]) -> str:
 def _goal_miss(summary: dict[str, Any]) -> str:
     """Describe why the goal was missed."""
     return f" {summary['goal_miss']}" if summary["goal_miss"] else ""
+
+
+def _above_surface(summary: dict[str, Any]) -> str:
+    """Describe what of a run was above the water surface, where the plant does not hold."""
+    parts = [*summary["above_surface"]]
+    if summary["time_above_surface"] > 0.0:
+        share = 100.0 * summary["time_above_surface"] / summary["simulated_time"]
+        parts.append(f"the vehicle for {max(1.0, share):.0f} % of the time")
+    if not parts:
+        return ""
+    return f" Above the water surface (z < 0; z points down), where the simulation does not hold: {', '.join(parts)}."
 
 
 def _commanded_force(summary: dict[str, Any]) -> str:

@@ -6,14 +6,19 @@ import re
 
 import pytest
 
+from controller import LAWS
 from cosim.command_line.cli import main
+from cosim.errors import ScenarioError
+from cosim.precheck.angles import angle_findings
 from cosim.precheck.feasibility import region_findings
 from cosim.precheck.output import check_json, check_text
 from cosim.precheck.precheck import check_scenario
 from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
 from cosim.precheck.thrust import asked_finding, thrust_findings
+from cosim.scenario.keys import unit_of_gain
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios
+from cosim.scenario.water_surface import heights_above_surface
 
 CLOSED = "arbiter.engine=closed"
 MENDED = ("law.gains.sigma_p=0.0004", "law.gains.k_p1=0.05")
@@ -215,6 +220,69 @@ def test_moving_regions_are_checked_at_time_zero():
 def test_scenario_without_regions_has_a_free_path():
     found = of_regions("regions=[]", "intersection=[]")
     assert "goal and regions" not in found and found["way"].status == "holds"
+
+
+IN_THE_AIR = 'regions=[{name="b",criterion="depth",keep="in",gain=1,shape={type="depth_band",depth=-4,tolerance=1}}]'
+
+
+@pytest.mark.parametrize(
+    ("changes", "status", "words"),
+    [
+        (["initial.position=[0,0,-1.5]"], "fails", "the start by 1.50 m. The plant has water everywhere"),
+        (["goal.centre.2=-5"], "fails", r"the goal by 4.\d0 m"),
+        (["goal.then=[[8,0,5],[8,0,-3]]"], "fails", "the goal's place 3 by"),
+        ([IN_THE_AIR, "intersection=[]"], "fails", r"\): b by 3.00 m. The plant has water everywhere"),
+        (["initial.position=[0,0,-1.5]", "plant.parameters.free_surface=true"], "note", "the vehicle falls"),
+        (["goal.centre.2=-5", "plant.parameters.free_surface=true"], "fails", "the vehicle cannot stay"),
+        (["initial.position=[0,0,0]"], "", ""),
+        (["goal.centre.2=0"], "", ""),
+        ([IN_THE_AIR.replace('"in"', '"out"'), "intersection=[]"], "", ""),  # the air may be kept out of
+    ],
+)
+def test_what_is_above_the_water_surface_is_said(changes, status, words):
+    found = next(region_findings(load_scenario("paper", [CLOSED, "record.lyapunov=false", *changes])))
+    assert (found.status if found.name == "water surface" else "") == status
+    assert re.search(words, found.text)
+
+
+def angle_keys():
+    """Keys of angles and their rates: gains by the units in their comments, and one key of each other kind."""
+    for law, of in LAWS.items():
+        for gain in of.gains_type._fields:
+            if unit_of_gain(law, gain) in ("rad", "rad/s"):
+                yield "paper" if of.output != "thrusters" else "docking", f"law.gains.{gain}", [f"law.name={law}"]
+    yield "pipe-inspection", "regions.view.shape.half_angle", []
+    yield "docking", "regions.heading.shape.tolerance", []
+    yield "docking", "plant.parameters.compass.noise", []
+    yield "docking", "initial.velocity.5", ["initial.velocity=[0,0,0,0,0,0]"]
+    yield "docking", "criteria.shape.membership.angle.falling.1", ["criteria.1.membership={angle={falling=[0,1]}}"]
+
+
+@pytest.mark.parametrize(("name", "key", "first"), list(angle_keys()))
+def test_angles_that_look_like_degrees_are_said(name, key, first):
+    value = 3 if "shape.half_angle" in key or "tolerance" in key else 20
+    said = [
+        [finding.text for finding in angle_findings(load_scenario(name, [*first, *more]))]
+        for more in ([], [f"{key}={value}"])
+    ]
+    assert said[0] == []
+    (text,) = said[1]
+    assert text.startswith(f"{key} is {value} rad") and f"write {math.radians(value):.4g}" in text
+
+
+@pytest.mark.parametrize("value", [3, 30])
+def test_refused_angles_are_said_in_radians(value):
+    cone = f'{{type="cone",feature=[2,0,2],axis=[-1,0,0],half_angle={value},range=3}}'
+    with pytest.raises(
+        ScenarioError, match=f"half_angle is {value}.*{value} degrees are {math.radians(value):.4g} rad"
+    ):
+        load_scenario("paper", [f"regions.SR1.shape={cone}"])
+
+
+@pytest.mark.parametrize("name", list_scenarios())
+def test_shipped_scenarios_have_no_doubtful_angles_or_heights(name):
+    scenario = load_scenario(name)
+    assert not list(angle_findings(scenario)) and not list(heights_above_surface(scenario))
 
 
 @pytest.mark.medium

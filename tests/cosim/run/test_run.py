@@ -10,6 +10,7 @@ from cosim.errors import RunError
 from cosim.results.record import load_record
 from cosim.results.recorder import Recorder
 from cosim.results.spans import spans
+from cosim.results.wording import verdict
 from cosim.run.run import run_scenario
 from cosim.run.run_folder import claim, report_again
 from cosim.scenario.scenario import load_scenario
@@ -57,6 +58,19 @@ def test_summary_follows_from_the_record(shipped_run):
     )
     assert summary["min_clearance"]["SR1"] == pytest.approx(distance.min() - 0.5, abs=1e-12)
     assert summary["saturated_time"] == pytest.approx(np.count_nonzero(force > 107.999) * 0.001, abs=0.01)
+
+
+def test_time_above_the_water_surface_is_said(shipped_run):
+    """It starts in the air, and dives."""
+    changes = ("arbiter.engine=closed", "time.duration=2", "initial.position=[0,0,-1.5]")
+    run = shipped_run("paper", *changes)
+    dry = np.count_nonzero(run.record["position.z"] < -0.315) * 0.001  # the hull's radius
+    assert 0.0 < dry < 2.0 and run.summary["time_above_surface"] == pytest.approx(dry)
+    share = f"the vehicle for {100.0 * dry / 2.0:.0f} % of the time."
+    assert "Above the water surface (z < 0; z points down)" in verdict(run.summary)
+    assert f"does not hold: the start, {share}" in verdict(run.summary)
+    below = shipped_run("paper", *SHORT).summary
+    assert below["time_above_surface"] == 0.0 and "water surface" not in verdict(below)
 
 
 @pytest.mark.slow
