@@ -56,6 +56,9 @@ def test_hints_name_all_requirements_of_an_extra():
     extras = required()
     assert set(FORMATS["mcap"].needs) == extras["mcap"]
     assert set(FORMATS["rrd"].needs) == extras["rerun"]
+    assert extras["notebook"] == {"pandas>=2.2"}  # of Run.frame
+    (everything,) = extras["all"]
+    assert set(everything.removeprefix("subreach[")[:-1].split(",")) == extras.keys() - {"", "all", "dev", "docs"}
     named = {text for importer in IMPORTERS for text in importer.packages} - extras[""]
     assert named | {text for text in extras["importers"] if text.startswith("tbb")} == extras["importers"]
 
