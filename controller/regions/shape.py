@@ -75,8 +75,9 @@ def require(good: bool, shape: str, key: str, received: object, expected: str) -
         If `good` is false.
     """
     if not good:
-        of_angle = expected.endswith(" rad") and isinstance(received, int | float) and 0.0 < received < math.inf
-        hint = f"; {received:g} degrees are {math.radians(received):.4g} rad" if of_angle else ""
+        hint = ""
+        if expected.endswith(" rad") and isinstance(received, int | float) and 0.0 < received < math.inf:
+            hint = f"; {received:g} degrees are {math.radians(received):.4g} rad"
         raise RegionError(f"{shape}: {key} is {received}, expected {expected}{hint}")
 
 

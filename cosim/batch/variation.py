@@ -9,8 +9,8 @@ from typing import Any
 from controller import ControllerError
 from cosim.errors import ScenarioError
 from cosim.scenario.changes import join_keys, value_at, with_values
-from cosim.scenario.key_text import plain_key
 from cosim.scenario.scenario import Scenario, validate_scenario
+from cosim.scenario.toml_file import plain_key
 from plant_fmu.errors import PlantFmuError
 
 _SEEDS = ("sensing.seed", "plant.parameters.seed")  # keys that get the seed of a row

@@ -80,8 +80,8 @@ def _search(options: argparse.Namespace) -> Any:
     from cosim.campaigns.scenes.law_gains import gains_from
     from cosim.campaigns.scenes.work import SceneTask
     from cosim.campaigns.sweeps.design import vary_from
-    from cosim.scenario.key_text import split_change
     from cosim.scenario.scenario import load_scenario
+    from cosim.scenario.toml_file import split_change
 
     what, settings = options.what, SearchSettings(options.objective, options.budget, options.seed, options.rare_event)
     if what in FAMILIES:

@@ -71,8 +71,8 @@ def sweep(options: argparse.Namespace) -> int:
     from cosim.campaigns.pages.sweep_page import sweep_lines, write_sweep_page
     from cosim.campaigns.sweep import run_sweep
     from cosim.campaigns.sweeps.design import Design, vary_from, vary_vehicles
-    from cosim.scenario.key_text import split_change
     from cosim.scenario.scenario import load_scenario
+    from cosim.scenario.toml_file import split_change
 
     if options.scheduler and options.workers:
         raise RunError("--workers: expected none with --scheduler: the cluster sets their number")

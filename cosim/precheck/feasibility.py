@@ -16,8 +16,8 @@ from cosim.precheck.finding import Finding, status
 from cosim.precheck.path_search import SearchedPath, find_path, path_limits
 from cosim.precheck.region_intersection import Overlap, box_about, box_within, search
 from cosim.precheck.region_values import evaluate_regions
+from cosim.results.water_surface import heights_above_surface, is_submerged_model
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.water_surface import heights_above_surface, is_submerged_model
 
 Array = NDArray[np.float64]
 

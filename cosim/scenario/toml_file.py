@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import copy
+import re
 import tomllib
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from cosim.errors import ScenarioError
-from cosim.scenario.key_text import plain_key, shorten, split_change
 from plant_fmu.errors import TableError, printable
+
+_SHOWN = 80  # greatest number of characters quoted in a message
+
+# a key: parts with dots between them, and TOML's quotes around those that have blanks; and a key with a value
+_QUOTED = r'"(?:[^"\\]|\\.)*"|\'[^\']*\''
+_PART = re.compile(rf"\s*({_QUOTED}|[^.\"']*)\s*(\.|$)")
+_CHANGE = re.compile(rf"((?:{_QUOTED}|[^=\"'])*)=(.*)", re.S)
 
 
 def list_scenarios() -> list[str]:
@@ -132,6 +139,34 @@ def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     return result
 
 
+def plain_key(text: str) -> str:
+    """Remove the quotes from a key, such as ``regions."my rock".gain``: no name within a key needs them.
+
+    Raises
+    ------
+    ScenarioError
+        If a quote does not end, or stands within a part.
+    """
+    parts, offset, dot = [], 0, "."
+    while dot:
+        match = _PART.match(text, offset)
+        if match is None:
+            raise ScenarioError(f'key {_short(text)}: expected quotes around whole parts, as in regions."my rock".gain')
+        part, dot = match[1].strip(), match[2]
+        try:
+            parts.append(tomllib.loads(f"part = {part}")["part"] if part[:1] in ('"', "'") else part)
+        except tomllib.TOMLDecodeError as error:
+            raise ScenarioError(f"key {_short(text)}: {part} is no text of TOML: {error}") from error
+        offset = match.end()
+    return ".".join(parts)
+
+
+def split_change(text: str) -> tuple[str, str]:
+    """Split ``key=value`` into the key, without its quotes, and the text of the value; "" for a missing key."""
+    match = _CHANGE.fullmatch(text)
+    return (plain_key(match[1]), match[2]) if match else ("", text)
+
+
 def override(table: dict[str, Any], text: str) -> None:
     """Set one key of a table in place.
 
@@ -153,23 +188,23 @@ def override(table: dict[str, Any], text: str) -> None:
 
     key, value_text = split_change(text)
     if not key:
-        raise ScenarioError(f"--set {shorten(text)!r}: expected key=value")
+        raise ScenarioError(f"--set {_short(text)!r}: expected key=value")
     depth = key.count(".")
     if depth >= MAX_DEPTH:
-        raise ScenarioError(f"--set {shorten(key)}: {depth} tables within each other, expected less than {MAX_DEPTH}")
+        raise ScenarioError(f"--set {_short(key)}: {depth} tables within each other, expected less than {MAX_DEPTH}")
     try:
         parsed = tomllib.loads(f"value = {value_text}")
         require_modest(parsed)
     except tomllib.TOMLDecodeError:
         parsed = {"value": value_text.strip()}  # a bare word is a string
     except RecursionError as error:
-        raise ScenarioError(f"--set {shorten(text)}: is nested too deeply") from error
+        raise ScenarioError(f"--set {_short(text)}: is nested too deeply") from error
     except TableError as error:
-        raise ScenarioError(f"--set {shorten(text)}: {error}") from error
+        raise ScenarioError(f"--set {_short(text)}: {error}") from error
     except ValueError as error:
-        raise ScenarioError(f"--set {shorten(text)}: a whole number has too many digits") from error
+        raise ScenarioError(f"--set {_short(text)}: a whole number has too many digits") from error
     if len(parsed) > 1:
-        raise ScenarioError(f"--set {shorten(text)!r}: expected one key=value")
+        raise ScenarioError(f"--set {_short(text)!r}: expected one key=value")
     set_key(table, key, parsed["value"])
 
 
@@ -208,7 +243,11 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     elif isinstance(at, dict):
         at[last] = value
     else:
-        raise ScenarioError(f"--set {shorten(key)}: there is no table at {shorten('.'.join(path))!r}")
+        raise ScenarioError(f"--set {_short(key)}: there is no table at {_short('.'.join(path))!r}")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]} ..."
 
 
 def _index(items: list[Any], part: str, key: str) -> int:
@@ -219,7 +258,7 @@ def _index(items: list[Any], part: str, key: str) -> int:
     if part.isdecimal() and len(part) < 10 and int(part) < len(items):
         return int(part)
     raise ScenarioError(
-        f"--set {shorten(key)}: {shorten(part)!r} is not one of {', '.join(map(str, names))}, "
+        f"--set {_short(key)}: {_short(part)!r} is not one of {', '.join(map(str, names))}, "
         f"nor a number below {len(items)}"
     )
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from cosim.campaigns.workers.work import Rows
 from cosim.errors import RunError, ScenarioError
-from cosim.scenario.key_text import plain_key, split_change
+from cosim.scenario.toml_file import plain_key, split_change
 
 Kind = Literal["grid", "random", "sobol", "lhs", "paired"]
 KINDS: tuple[Kind, ...] = get_args(Kind)

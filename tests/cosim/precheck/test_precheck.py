@@ -15,10 +15,10 @@ from cosim.precheck.output import check_json, check_text
 from cosim.precheck.precheck import check_scenario
 from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
 from cosim.precheck.thrust import asked_finding, thrust_findings
+from cosim.results.water_surface import heights_above_surface
 from cosim.scenario.keys import unit_of_gain
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios
-from cosim.scenario.water_surface import heights_above_surface
 
 CLOSED = "arbiter.engine=closed"
 MENDED = ("law.gains.sigma_p=0.0004", "law.gains.k_p1=0.05")
