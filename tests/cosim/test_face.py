@@ -80,7 +80,7 @@ def test_paths_may_be_texts_and_scenarios_names(tmp_path, monkeypatch):
     Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(1)))
     done = cosim.run_scenario("short.toml", "run", report=False)
     assert cosim.load_run("run").summary == cosim.load_run(Path("run")).summary == done.summary
-    assert cosim.export_run("run", "npz", "it.npz") == [Path("it.npz")]
+    assert cosim.export_run("run", "csv", "it.csv")[0] == Path("it.csv")
     assert cosim.check_scenario("paper").title == cosim.load_scenario("paper").title
     design = cosim.Design(cosim.vary_from(["initial.position.1=-1,1"]), "grid")
     assert cosim.run_sweep("short.toml", design, "sweep").folder == Path("sweep")
