@@ -74,6 +74,7 @@ def test_loaded_run_equals_the_returned_run(run):
     assert run.replay() == run.folder / "replay.html" and len(repr(run).splitlines()) == 1
 
 
+@pytest.mark.medium
 def test_paths_may_be_texts_and_scenarios_names(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("short.toml").write_text(cosim.load_scenario("paper").replace(SHORT).toml())
