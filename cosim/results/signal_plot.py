@@ -17,7 +17,7 @@ _HEIGHT = 2.4  # inches that each further unit adds
 
 
 def plot_signals(record: Record, patterns: Sequence[str], title: str, ax: Any) -> Any:
-    """Draw signals by names or patterns into new axes, one for each unit, or into `ax`; return the first axes."""
+    """Draw signals, by names or patterns, in axes for each unit or in `ax`; return the first. May raise RunError."""
     import matplotlib.pyplot as plt
 
     units = record.units
