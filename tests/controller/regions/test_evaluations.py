@@ -4,7 +4,21 @@ import numpy as np
 import pytest
 
 from controller.quaternion import rotation_matrix
-from controller.regions import Region, Visibility, pack
+from controller.regions import (
+    Box,
+    Cone,
+    Cylinder,
+    DepthBand,
+    Ellipsoid,
+    HalfSpace,
+    Orientation,
+    Pipe,
+    Prism,
+    Region,
+    Sphere,
+    Visibility,
+    pack,
+)
 from controller.regions.kinds import SPHERE, evaluate_shape
 from controller.regions.numbers import ANGLE, LENGTH, PART, SIZE
 from controller.regions.region_set import (
@@ -15,7 +29,60 @@ from controller.regions.region_set import (
     clearance_of_sphere,
     place_clearance,
 )
-from tests.controller.test_c_law import SHAPES
+
+TURNED = (0.9, 0.1, -0.3, 0.2)
+
+# every shape with the places where it has a corner, an edge, a face or a centre
+SHAPES = {
+    "sphere": (Sphere((1.0, -2.0, 3.0), 1.5), [(1.0, -2.0, 3.0), (2.5, -2.0, 3.0)]),
+    "depth band": (DepthBand(4.0, 0.5), [(0.0, 0.0, 4.0), (0.0, 0.0, 4.5), (0.0, 0.0, 3.5)]),
+    "half-space": (HalfSpace((1.0, 2.0, 3.0), (1.0, 1.0, -1.0)), [(1.0, 2.0, 3.0)]),
+    "upright box": (
+        Box((0.0, 0.0, 0.0), (2.0, 4.0, 6.0)),
+        [(0.0, 0.0, 0.0), (1.0, 2.0, 3.0), (1.0, 0.0, 0.0), (2.0, 0.0, 3.0), (-1.0, 2.0, 0.5), (0.5, 0.0, 5.0)],
+    ),
+    "turned box": (Box((1.0, 2.0, 3.0), (2.0, 1.0, 3.0), TURNED), [(1.0, 2.0, 3.0)]),
+    "cylinder": (
+        Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 4.0), 1.0),
+        [(0.0, 0.0, 2.0), (0.0, 0.0, 0.0), (1.0, 0.0, 4.0), (1.0, 0.0, 2.0), (2.0, 0.0, 5.0), (0.0, 0.0, 6.0)],
+    ),
+    "aslant cylinder": (Cylinder((-1.0, 2.0, 1.0), (2.0, 3.0, 5.0), 0.7), [(0.5, 2.5, 3.0), (-1.0, 2.0, 1.0)]),
+    "ellipsoid": (
+        Ellipsoid((1.0, 2.0, 3.0), (3.0, 2.0, 0.5), TURNED),
+        [(1.0, 2.0, 3.0), (1.0 + 1e-9, 2.0, 3.0), (1.0, 2.0, 60.0)],
+    ),
+    "ellipsoid, thin along x": (Ellipsoid((1.0, 2.0, 3.0), (0.5, 3.0, 2.0), TURNED), [(1.0, 2.0, 3.0)]),
+    "ellipsoid, thin along y": (Ellipsoid((1.0, 2.0, 3.0), (3.0, 0.5, 2.0), TURNED), [(1.0, 2.0, 3.0)]),
+    "ball of an ellipsoid": (Ellipsoid((0.0, 0.0, 0.0), (2.0, 2.0, 2.0)), [(0.0, 0.0, 0.0), (2.0, 0.0, 0.0)]),
+    "prism": (
+        Prism(((0.0, 0.0), (4.0, 0.0), (4.0, 3.0), (2.0, 1.0), (0.0, 3.0)), 1.0, 4.0),
+        [
+            (0.0, 0.0, 1.0),
+            (2.0, 1.0, 2.0),
+            (4.0, 1.5, 2.0),
+            (2.0, 0.4, 2.5),
+            (5.0, 4.0, 0.0),
+            (2.0, 0.5, 5.0),
+            *((2.0 + aside, 0.9, 2.0) for aside in (-0.05, -0.02, 0.02, 0.05)),  # under the corner that stands in
+        ],
+    ),
+    "pipe": (
+        Pipe(((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (3.0, 4.0, 1.0)), 0.5),
+        [(0.0, 0.0, 0.0), (3.0, 0.0, 0.0), (1.5, 0.0, 0.0), (1.5, 0.5, 0.0), (-1.0, 0.0, 0.0)],
+    ),
+    "pipe aside": (Pipe(((1.0, -2.0, 0.5), (3.0, 1.0, -1.0), (2.0, 4.0, 1.0)), 0.5), [(3.0, 1.0, -1.0)]),
+    "cone": (
+        Cone((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.5, 4.0),
+        [(0.0, 0.0, 0.0), (0.0, 0.0, 4.0), (0.0, 0.0, 2.0), (0.0, 0.0, -1.0), (0.0, 0.0, 6.0), (5.0, 0.0, 1.0)],
+    ),
+    "aslant cone": (Cone((1.0, 2.0, 3.0), (1.0, -1.0, 2.0), 1.2, 2.0), [(1.0, 2.0, 3.0)]),
+    "orientation": (Orientation(TURNED, 0.3), [(0.0, 0.0, 0.0)]),
+    "visibility": (
+        Visibility((2.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.4, (0.5, 0.0, 0.0)),
+        [(1.5, 0.0, 0.0), (0.0, 0.0, 0.0), (4.0, 0.0, 0.0), (1.0, 1.0, 1.0)],
+    ),
+    "aslant visibility": (Visibility((2.0, -1.0, 0.5), (1.0, -2.0, 0.5), 0.4, (0.5, 0.2, -0.3)), [(2.0, -1.0, 0.5)]),
+}
 
 SCENE = [Region(name, shape, ("in", "out")[i % 2]) for i, (name, (shape, _)) in enumerate(SHAPES.items())]
 
