@@ -192,4 +192,6 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
         except (OSError, ValueError, TimeoutError) as error:
             said = " ".join(str(error).split()) or type(error).__name__
             raise RunError(f"the cluster {scheduler or 'on this machine'} cannot be used: {said}") from error
-        yield stack.enter_context(client.get_executor())
+        executor = client.get_executor()
+        stack.callback(executor.shutdown, wait=False)  # not waiting for batches that no worker may be left to finish
+        yield executor

@@ -59,26 +59,30 @@ def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, No
                 return
             under_way[pool.submit(work.task, work.batch(batch.rows))] = batch
 
-    while True:
-        submit_batches()
-        if not under_way:
-            break
-        done = wait(under_way, _CHECK_PERIOD, FIRST_COMPLETED).done
-        if not done:
-            pool.check()
-        for flight in done:
-            batch, received = under_way.pop(flight), pool.result(flight)
-            if not isinstance(received, WorkerCrash):
-                n_finished, crashes = n_finished + 1, 0
-                batches.measured(len(batch.rows), received[1])
-                yield received[0]
-                yield from refused
-                refused.clear()
-                continue
-            crashes += received.crash_count > 0
-            if crashes > _MAX_CRASHES:
-                raise RunError(f"{crashes} processes crashed in a row, with any rows; what is flown is kept")
-            refused += _retry(work, batches, batch, received)
+    try:
+        while True:
+            submit_batches()
+            if not under_way:
+                break
+            done = wait(under_way, _CHECK_PERIOD, FIRST_COMPLETED).done
+            if not done:
+                pool.check()
+            for flight in done:
+                batch, received = under_way.pop(flight), pool.result(flight)
+                if not isinstance(received, WorkerCrash):
+                    n_finished, crashes = n_finished + 1, 0
+                    batches.measured(len(batch.rows), received[1])
+                    yield received[0]
+                    yield from refused
+                    refused.clear()
+                    continue
+                crashes += received.crash_count > 0
+                if crashes > _MAX_CRASHES:
+                    raise RunError(f"{crashes} processes crashed in a row, with any rows; what is flown is kept")
+                refused += _retry(work, batches, batch, received)
+    finally:
+        for flight in under_way:  # after an error: whoever closes the executor may wait for them
+            flight.cancel()
     if refused and not n_finished:
         raise RunError("every process crashed, with any rows (killed, or out of memory)")
     yield from refused

@@ -1,20 +1,25 @@
 """Sweeps in worker processes and on Dask: worker crashes neither lose nor duplicate rows."""
 
+import contextlib
 import logging
 import os
 import signal
+import subprocess
+import sys
+import threading
+import time
 
 import pyarrow.parquet as pq
 import pytest
 
 from cosim.batch.outcome import FIELDS
 from cosim.campaigns import run_sweep
-from cosim.campaigns.store.folder import RESULTS
+from cosim.campaigns.store.folder import PARTS, RESULTS
 from cosim.campaigns.workers.cluster import _quiet
 from cosim.campaigns.workers.dispatch import KILLED
 from cosim.command_line.cli import main
 from cosim.errors import RunError
-from tests.cosim.campaigns.command import command, command_cache, needs_posix
+from tests.cosim.campaigns.command import ROOT, command, command_cache, needs_posix
 from tests.cosim.campaigns.fake import KEYS, VARY, design, fakes, paper
 from tests.cosim.campaigns.scene_data import batches_of
 from tests.cosim.campaigns.test_sweep import expected
@@ -130,6 +135,54 @@ def test_rows_that_crash_dask_workers_are_rejected_and_others_complete(tmp_path,
     batches_of(monkeypatch, 4)
     run_sweep(paper(), design(60), tmp_path / "out", "poisoned", executor=cluster)
     check_poisoned(tmp_path / "out", 60)
+
+
+@needs_posix
+@pytest.mark.slow
+@pytest.mark.parametrize("verb", [True, False], ids=["verb", "own executor"])
+def test_sweep_ends_after_the_last_dask_worker_is_killed(tmp_path, fakes, monkeypatch, verb):
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setattr("cosim.campaigns.workers.cluster._WORKER_TIMEOUT", 5.0)
+    monkeypatch.setattr("cosim.campaigns.workers.dispatch._CHECK_PERIOD", 0.2)
+    out, said = tmp_path / "out", []
+    with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster, contextlib.ExitStack() as stack:
+        address = cluster.scheduler_address
+
+        def start_worker():
+            worker = subprocess.Popen(
+                [sys.executable, "-m", "distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1",
+                 "--no-dashboard", "--local-directory", tmp_path],
+                env=os.environ | {"PYTHONPATH": str(ROOT)}, stderr=subprocess.DEVNULL,
+            )  # fmt: skip
+            stack.callback(worker.wait)
+            stack.callback(worker.kill)
+            return worker
+
+        def run_verb():
+            said.append(main(["sweep", "paper", "--vary", *VARY, "--samples", f"{N}", "--seed", "3", "--engine", "slow",
+                              "--scheduler", address, "--replays", "0", "--out", str(out)]))  # fmt: skip
+
+        def run_python():
+            with distributed.Client(address) as client, client.get_executor() as executor:
+                try:
+                    run_sweep(paper(), design(N), out, "slow", executor=executor)
+                except RunError as error:
+                    said.append(str(error))
+
+        workers = [start_worker() for _ in range(2)]
+        sweep = threading.Thread(target=run_verb if verb else run_python, daemon=True)
+        sweep.start()
+        deadline = time.monotonic() + 120.0
+        while len(list((out / PARTS).glob("*.parquet"))) < 3 and time.monotonic() < deadline:
+            time.sleep(0.01)
+        for worker in workers:
+            worker.kill()
+        sweep.join(timeout=120.0)
+        assert not sweep.is_alive() and not (out / RESULTS).exists()
+        assert said == [2 if verb else "the cluster has had no workers for 5 s; what is flown is kept"]
+        start_worker()
+        run_verb()
+        assert said[-1] == 0 and rows_of(out) == expected(N)
 
 
 @pytest.mark.slow
