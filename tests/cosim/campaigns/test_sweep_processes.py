@@ -148,7 +148,7 @@ def test_sweep_ends_after_the_last_dask_worker_is_killed(tmp_path, fakes, monkey
     with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster, contextlib.ExitStack() as stack:
         address = cluster.scheduler_address
 
-        def start_worker():
+        def start_worker(n):
             worker = subprocess.Popen(
                 [sys.executable, "-m", "distributed.cli.dask_worker", address, "--no-nanny", "--nthreads", "1",
                  "--no-dashboard", "--local-directory", tmp_path],
@@ -156,6 +156,7 @@ def test_sweep_ends_after_the_last_dask_worker_is_killed(tmp_path, fakes, monkey
             )  # fmt: skip
             stack.callback(worker.wait)
             stack.callback(worker.kill)
+            cluster.wait_for_workers(n, timeout=120)
             return worker
 
         def run_verb():
@@ -169,7 +170,7 @@ def test_sweep_ends_after_the_last_dask_worker_is_killed(tmp_path, fakes, monkey
                 except RunError as error:
                     said.append(str(error))
 
-        workers = [start_worker() for _ in range(2)]
+        workers = [start_worker(n) for n in (1, 2)]
         sweep = threading.Thread(target=run_verb if verb else run_python, daemon=True)
         sweep.start()
         deadline = time.monotonic() + 120.0
@@ -180,7 +181,7 @@ def test_sweep_ends_after_the_last_dask_worker_is_killed(tmp_path, fakes, monkey
         sweep.join(timeout=120.0)
         assert not sweep.is_alive() and not (out / RESULTS).exists()
         assert said == [2 if verb else "the cluster has had no workers for 5 s; what is flown is kept"]
-        start_worker()
+        start_worker(1)
         run_verb()
         assert said[-1] == 0 and rows_of(out) == expected(N)
 
