@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-import secrets
 import tempfile
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
 from plant_fmu.errors import BuildError
+from plant_fmu.temporary import atomic_file
 
 _DATE = (1980, 1, 1, 0, 0, 0)  # the earliest that the format knows
 _UNIX = 3  # else the byte for the system of origin would differ between systems
@@ -26,7 +26,7 @@ def require_place(out: Path) -> None:
     try:
         if out.is_dir() or (out.exists() and not out.is_file()):
             raise BuildError(f"{out}: exists and is no file; expected the name of a new one")
-        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=f".{out.name}-"):
+        with tempfile.TemporaryFile(dir=out.parent):
             pass
     except OSError as error:
         raise BuildError(f"{out}: {error.strerror or error}") from error
@@ -41,15 +41,11 @@ def write_atomic(out: Path, data: bytes) -> None:
         If `out` cannot be written, or is there and is no file.
     """
     require_place(out)
-    scratch = out.with_name(f".{out.name}-{secrets.token_hex(4)}")
     try:
-        with scratch.open("xb") as file:  # not by `tempfile`, whose files are for their owner alone
+        with atomic_file(out) as file:
             file.write(data)
-        scratch.replace(out)
     except OSError as error:
         raise BuildError(f"{out}: {error.strerror or error}") from error
-    finally:
-        scratch.unlink(missing_ok=True)
 
 
 def write_archive(out: Path, members: Mapping[str, bytes]) -> None:

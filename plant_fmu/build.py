@@ -8,8 +8,6 @@ import errno
 import functools
 import logging
 import os
-import shutil
-import tempfile
 import zipfile
 import zlib
 from pathlib import Path
@@ -28,6 +26,7 @@ from plant_fmu.compiling.universal import universal_library
 from plant_fmu.component import Component
 from plant_fmu.description import model_description, token
 from plant_fmu.errors import BuildError
+from plant_fmu.temporary import temporary_folder
 from plant_fmu.vehicle import Vehicle
 from plant_fmu.vehicle_component import of_vehicle
 
@@ -182,9 +181,9 @@ def _compiler_digest() -> str:
 @functools.cache
 def _own_folder() -> Path:
     """Return a temporary folder that is removed with the process."""
-    folder = tempfile.mkdtemp(prefix="plant_fmu-")
-    atexit.register(shutil.rmtree, folder, ignore_errors=True)
-    return Path(folder)
+    stack = contextlib.ExitStack()
+    atexit.register(stack.close)
+    return stack.enter_context(temporary_folder("plant_fmu-"))
 
 
 def _component(what: Vehicle | Component) -> Component:

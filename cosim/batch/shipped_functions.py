@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -44,6 +43,7 @@ from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluat
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
 from plant_fmu.running.native import Native
+from plant_fmu.temporary import temporary_folder
 from plant_fmu.vehicle import load_vehicle
 
 _VEHICLE = "bluerov2_heavy"  # the functions do not depend on the vehicle
@@ -124,8 +124,8 @@ def write_libraries(platforms: str, folder: Path) -> None:
     for platform, _ in compilers:
         (folder / platform.name).mkdir()
     texts = sorted(set(shipped_texts().values()))
-    with tempfile.TemporaryDirectory(prefix="subreach-") as scratch, ThreadPoolExecutor(os.cpu_count()) as pool:
-        sources = [_written(text, Path(scratch)) for text in texts]
+    with temporary_folder("subreach-") as scratch, ThreadPoolExecutor(os.cpu_count()) as pool:
+        sources = [_written(text, scratch) for text in texts]
         made = [pool.submit(_compile, source, folder, *compiler) for source in sources for compiler in compilers]
         for library in made:
             library.result()

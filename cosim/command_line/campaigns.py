@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
+import contextlib
+import os
+from collections.abc import Callable, Iterator
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
 from cosim.command_line.numbers import whole
 from cosim.command_line.process import INTERRUPTED, print_status
 from cosim.command_line.results import say
+from cosim.errors import RunError
 
 WORKERS = whole(1, 1024)
 
@@ -17,7 +21,7 @@ WORKERS = whole(1, 1024)
 def add_verbs(verbs: Any) -> None:
     """Add the verbs to the subparsers of the command."""
     campaign = verbs.add_parser("campaign", help="fly many scenes by one law")
-    _add_scenes(campaign)
+    _add_scenes(campaign, cluster=True)
     campaign.add_argument("--law", required=True, help="such as ismail_dunnigan")
     campaign.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
@@ -41,13 +45,16 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
 
 
-def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True) -> None:
+def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True, cluster: bool = False) -> None:
     verb.add_argument("scenes", type=Path, metavar="SCENES.jsonl", help="a scene a line; - for standard input")
     verb.add_argument(
         "--out", type=Path, required=True, metavar="DIR",
         help="a new folder, or one that this command began: it goes on with what is left",
     )  # fmt: skip
-    verb.add_argument("--workers", type=WORKERS, default=1, metavar="N", help="processes (default: 1)")
+    if cluster:
+        add_cluster(verb)
+    else:
+        verb.add_argument("--workers", type=WORKERS, default=1, metavar="N", help="processes (default: 1)")
     add_replays(verb)
     verb.add_argument("--report-failures", action="store_true", help="report failing thrusters to the law")
     verb.add_argument(
@@ -62,6 +69,32 @@ def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True) -> None:
             help="weigh criteria by their order (default), in reversed order, by memberships of 0 or 1, all with 1, or "
             "by the rules of a file, whose inputs are named as the criteria",
         )  # fmt: skip
+
+
+def add_cluster(verb: argparse.ArgumentParser) -> None:
+    """Add the flags for the processes that fly: on this machine or in a Dask cluster."""
+    verb.add_argument("--workers", type=WORKERS, metavar="N", help="processes (default: 1; with --dask: one a core)")
+    where = verb.add_mutually_exclusive_group()
+    where.add_argument("--dask", action="store_true", help="start a Dask cluster on this machine")
+    where.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="use an existing Dask cluster")
+
+
+def require_one_count(options: argparse.Namespace) -> None:
+    """Raise a RunError if the number of processes is given for an existing cluster."""
+    if options.scheduler and options.workers:
+        raise RunError("--workers: expected none with --scheduler: the cluster sets their number")
+
+
+@contextlib.contextmanager
+def executor_of(options: argparse.Namespace) -> Iterator[Executor | None]:
+    """Connect to the Dask cluster of the flags; yield its executor, or None without one."""
+    if not (options.dask or options.scheduler):
+        yield None
+        return
+    from cosim.campaigns.workers.cluster import cluster_executor
+
+    with cluster_executor(options.scheduler, options.workers or os.cpu_count() or 1) as executor:
+        yield executor
 
 
 def add_replays(verb: argparse.ArgumentParser) -> None:
@@ -85,13 +118,16 @@ def campaign(options: argparse.Namespace) -> int:
     from cosim.campaigns.pages.campaign_page import campaign_lines, write_campaign_page
     from cosim.campaigns.scenes.law_gains import gains_from
 
+    require_one_count(options)
     gains = gains_from(options.law, options.settings)
     conditions = _conditions(options)
 
     def run() -> None:
-        done = run_campaign(
-            options.scenes, options.law, options.out, conditions, gains, options.workers, progress=not options.quiet
-        )
+        with executor_of(options) as executor:
+            n, progress = options.workers or 1, not options.quiet
+            done = run_campaign(
+                options.scenes, options.law, options.out, conditions, gains, n, executor, progress=progress
+            )
         if not done.flown:
             say(options, f"{options.out}: was complete already")
         say(options, *campaign_lines(done.summary))

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import os
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.campaigns import WORKERS, add_replays, resumable
+from cosim.command_line.campaigns import add_cluster, add_replays, executor_of, require_one_count, resumable
 from cosim.command_line.process import INTERRUPTED, print_status
 from cosim.command_line.results import print_run, say
 from cosim.errors import RunError
@@ -50,10 +48,7 @@ def add_verbs(verbs: Any) -> None:
         help="a new folder, or one that this command began: it goes on with what is left",
     )  # fmt: skip
     sweep.add_argument("--engine", default="fused", help=argparse.SUPPRESS)
-    sweep.add_argument("--workers", type=WORKERS, metavar="N", help="processes (default: 1; with --dask: one a core)")
-    where = sweep.add_mutually_exclusive_group()
-    where.add_argument("--dask", action="store_true", help="start a Dask cluster on this machine")
-    where.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="use an existing Dask cluster")
+    add_cluster(sweep)
     add_replays(sweep)
     sweep.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
@@ -74,8 +69,7 @@ def sweep(options: argparse.Namespace) -> int:
     from cosim.scenario.scenario import load_scenario
     from cosim.scenario.toml_file import split_change
 
-    if options.scheduler and options.workers:
-        raise RunError("--workers: expected none with --scheduler: the cluster sets their number")
+    require_one_count(options)
     vary = vary_vehicles(options.vehicles) if options.vehicles else vary_from(options.vary)
     kind: Any = options.design or ("paired" if options.vehicles else "random")
     design = Design(vary, kind, options.samples, options.seed)
@@ -85,13 +79,7 @@ def sweep(options: argparse.Namespace) -> int:
     scenario = load_scenario(options.scenario, options.overrides)
 
     def run() -> None:
-        with contextlib.ExitStack() as stack:
-            executor = None
-            if options.dask or options.scheduler:
-                from cosim.campaigns.workers.cluster import cluster_executor
-
-                n = options.workers or os.cpu_count() or 1
-                executor = stack.enter_context(cluster_executor(options.scheduler, n))
+        with executor_of(options) as executor:
             n = options.workers or 1
             done = run_sweep(scenario, design, options.out, options.engine, n, executor, progress=not options.quiet)
         if not done.flown:

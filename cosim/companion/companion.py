@@ -214,21 +214,22 @@ class Companion:
                 live.begin(self.scenario, master.signals.columns, _NO_COMMANDS)
             self.prepare(show_state)
             folder = claim(None if out is None else Path(out), self.scenario)
-            try:
-                recorder = Recorder(folder.path, master.signals.columns)
-            except BaseException:
-                folder.discard()
-                raise
-            started = time.perf_counter()
-            try:
-                status = self._steer(master, [recorder] if live is None else [recorder, live], show_state)
-            finally:
-                self.session.release(_RELEASE)
-                wall_time = time.perf_counter() - started
-                kept = folder.keep(recorder)
-            if not kept:
-                raise RunError(f"{folder.path}: ended before the first step")
-            run = conclude(folder.path, self.scenario, status, wall_time, report)
+            with folder.writing():
+                try:
+                    recorder = Recorder(folder.path, master.signals.columns)
+                except BaseException:
+                    folder.discard()
+                    raise
+                started = time.perf_counter()
+                try:
+                    status = self._steer(master, [recorder] if live is None else [recorder, live], show_state)
+                finally:
+                    self.session.release(_RELEASE)
+                    wall_time = time.perf_counter() - started
+                    kept = folder.keep(recorder)
+                if not kept:
+                    raise RunError(f"{folder.path}: ended before the first step")
+                run = conclude(folder.path, self.scenario, status, wall_time, report)
             if live is not None:
                 live.end(status, verdict(run.summary))
             return run

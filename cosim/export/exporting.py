@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -12,6 +11,7 @@ from cosim.export.formats import FORMATS
 from cosim.results.record import RECORD
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY
 from plant_fmu.installing import install_hint
+from plant_fmu.temporary import temporary_folder
 
 # formats of earlier versions, and what replaces them
 _REMOVED = {
@@ -86,8 +86,8 @@ def export_run(
             raise ExportError(f"{file}: belongs to the run itself, expected another file")
     excerpt = excerpt_of(folder, signals, every, rate)
     try:
-        with tempfile.TemporaryDirectory(prefix=f".{path.name}-", dir=path.parent) as scratch:
-            for made in form.write(excerpt, Path(scratch) / path.name):
+        with temporary_folder(f".{path.name}-", path.parent) as scratch:
+            for made in form.write(excerpt, scratch / path.name):
                 made.replace(path.parent / made.name)
     except ModuleNotFoundError as error:
         if not form.needs or (error.name or "").startswith("cosim"):

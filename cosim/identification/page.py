@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 from cosim.errors import IdentificationError
@@ -11,6 +10,7 @@ from cosim.identification.identify import Identification
 from cosim.identification.log import UNITS
 from cosim.io.atomic_file import write_atomic
 from cosim.report.web_page import Html, Page, code, inline_figure, number
+from plant_fmu.temporary import temporary_folder
 
 
 def write_page(done: Identification, out: Path) -> Path:
@@ -38,8 +38,8 @@ def write_page(done: Identification, out: Path) -> Path:
     from cosim.identification.figures import figures_of
     from cosim.report.figures.style import STYLE
 
-    with tempfile.TemporaryDirectory(prefix="identify-") as scratch, mpl.rc_context(STYLE):
-        figures = {f.name: inline_figure(f, Path(scratch)) for f in figures_of(done.fit, done.predictions)}
+    with temporary_folder("identify-") as scratch, mpl.rc_context(STYLE):
+        figures = {f.name: inline_figure(f, scratch) for f in figures_of(done.fit, done.predictions)}
     path = out.with_suffix(".html")
     try:
         write_atomic(path, _page(done, out, figures).html())

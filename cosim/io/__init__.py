@@ -2,5 +2,5 @@
 
 Atomic writes of files, strict JSON without NaN, and network addresses with a check whether they are loopback ones.
 
-Imports: nothing.
+Imports: plant_fmu.
 """

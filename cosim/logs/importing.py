@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import math
-import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -37,6 +36,7 @@ from cosim.simulation.signals import Array, Column
 from plant_fmu import Vehicle, load_vehicle
 from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
+from plant_fmu.temporary import temporary_folder
 
 _KEPT = ("goal", "regions", "criteria", "arbiter", "intersection", "title")  # keys of a scenario that apply to a log
 _MIN_ROWS, _ROWS_PER_SAMPLE = 500_000, 200  # rows that a log may have: some, and for each of its samples
@@ -121,8 +121,8 @@ def import_log(
         if curve is not None and curve not in CURVES:
             raise ImportLogError(f"curve is {curve!r}, expected one of {', '.join(CURVES)}")
         # a log may hold any numbers, also such that overflow
-        with tempfile.TemporaryDirectory(prefix="cosim-import-") as scratch, np.errstate(all="ignore"):
-            contents = LogContents(Path(scratch))
+        with temporary_folder("cosim-import-") as scratch, np.errstate(all="ignore"):
+            contents = LogContents(scratch)
             try:
                 form.read(path, column_map, contents, moved)
             except ModuleNotFoundError as error:
@@ -132,7 +132,7 @@ def import_log(
             _require_vehicle(contents, craft)
             folder = None if out is None else Path(out)
             wanted = _Wanted(str(vehicle), scenario, folder, rate, curve, voltage, report, overwrite)
-            return _write(path, contents, Path(scratch), craft, wanted)
+            return _write(path, contents, scratch, craft, wanted)
     except ImportLogError as error:
         raise ImportLogError(f"{path}: {error}") from error
     except OSError as error:

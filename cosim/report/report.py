@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.report.contents import contents_of
 from cosim.results.run_result import REPORT, Run
+from plant_fmu.temporary import temporary_folder
 
 if TYPE_CHECKING:  # see write_report
     from cosim.report.figures.style import FigureData
@@ -38,15 +38,12 @@ def write_report(run: Run, formats: Collection[str] = ("html",)) -> list[Path]:
     # importing Matplotlib takes as long as all other imports together
     from cosim.report.figures.sampled_rows import make_figure_data
 
-    scratch = Path(tempfile.mkdtemp(prefix=".report-", dir=run.folder))
-    try:
+    with temporary_folder(".report-", run.folder) as scratch:
         files = _with_figures(run, make_figure_data(run), formats, scratch)
         shutil.rmtree(run.folder / FIGURES, ignore_errors=True)
         (scratch / FIGURES).replace(run.folder / FIGURES)
         written = [file.replace(run.folder / file.name) for file in files]
         return written + sorted((run.folder / FIGURES).iterdir())
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
 
 
 def _with_figures(run: Run, data: FigureData, formats: Collection[str], folder: Path) -> list[Path]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import html
 import math
 import shutil
-import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from string import Template
@@ -13,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.report.inline_svg import inline_svg
 from cosim.report.report import FIGURES
+from plant_fmu.temporary import temporary_folder
 
 if TYPE_CHECKING:  # importing Matplotlib takes as long as all other imports together
     from cosim.report.figures.style import NamedFigure
@@ -160,16 +160,13 @@ def write_figures(folder: Path, drawings: Iterable[NamedFigure]) -> dict[str, Ht
 
     from cosim.report.figures.style import STYLE
 
-    scratch = Path(tempfile.mkdtemp(prefix=f".{FIGURES}-", dir=folder))
-    try:
+    with temporary_folder(f".{FIGURES}-", folder) as scratch:
         with mpl.rc_context(STYLE):  # applies while figures are drawn and written
             shown = {drawing.name: inline_figure(drawing, scratch) for drawing in drawings}
         scratch.chmod(0o755)
         shutil.rmtree(folder / FIGURES, ignore_errors=True)
         if shown:
             scratch.replace(folder / FIGURES)
-    finally:
-        shutil.rmtree(scratch, ignore_errors=True)
     return shown
 
 

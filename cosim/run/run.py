@@ -147,7 +147,7 @@ def run_scenario(
                     link.start()
                 if live is not None:
                     live.begin(scenario, master.signals.columns, _viewer_queue(scenario, replayed, queue))
-                try:
+                with folder.writing():
                     source = LoggedCommands(
                         replayed or queue, folder.path / COMMANDS_LOG, live.show_commands if live else None
                     )
@@ -158,8 +158,6 @@ def run_scenario(
                     run = conclude(folder.path, scenario, status, wall_time, report)
                     if live is not None:
                         live.end(status, verdict(run.summary))
-                except OSError as error:
-                    raise RunError(f"{folder.path}: {error.strerror or error}") from error
             if failure:
                 raise failure
             if status != "reset" or replayed:

@@ -5,15 +5,15 @@ from __future__ import annotations
 import contextlib
 import itertools
 import shutil
-import tempfile
-from collections.abc import Collection
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from shlex import quote
 from typing import Any
 
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_atomic
+from cosim.io.atomic_file import reason, write_atomic
 from cosim.io.strict_json import json_text
 from cosim.replay.pages import write_replay
 from cosim.report.report import FIGURES, write_report
@@ -22,6 +22,11 @@ from cosim.results.record import PARTS, RECORD, part_files, require_utf8
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
+from plant_fmu.temporary import is_temporary, temporary_folder
+
+_MADE = frozenset(
+    {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, PARTS, SUMMARY, REPORT, REPLAY, FIGURES}
+)  # names of the files and folders that a run makes
 
 
 @dataclass(frozen=True)
@@ -32,7 +37,7 @@ class RunFolder:
     created: bool  # True if the run made the folder, False if it existed and was empty
 
     def keep(self, recorder: Recorder | None) -> bool:
-        """Close the record of a run; without any rows, remove all files of the run.
+        """Close the record of a run; discard a run without any rows.
 
         Parameters
         ----------
@@ -47,7 +52,7 @@ class RunFolder:
         Raises
         ------
         OSError
-            If the record cannot be written; parts that were written stay.
+            If the record cannot be written; parts that were written stay, and commands with which it can be repeated.
         """
         if recorder is None or not recorder.rows:
             self.discard()
@@ -55,19 +60,49 @@ class RunFolder:
         try:
             recorder.close()
         except OSError:
-            if not (part_files(self.path) or (self.path / RECORD).exists()):
+            if not (self._has_record() or self._has_commands()):
                 self.discard()
             raise
         return True
 
     def discard(self) -> None:
-        """Remove all files of a run without a record. May be called twice."""
-        for name in (SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD):
-            (self.path / name).unlink(missing_ok=True)
-        shutil.rmtree(self.path / PARTS, ignore_errors=True)
+        """Remove all files of the run. May be called twice."""
+        for file in list(self.path.iterdir()) if self.path.exists() else ():
+            if file.name in _MADE:
+                _remove(file)
         if self.created:
             with contextlib.suppress(OSError):  # the folder is not empty: its user has put files there
                 self.path.rmdir()
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[None]:
+        """Convert an OSError within a block to a RunError that says what is kept, and which verb reads it.
+
+        Raises
+        ------
+        RunError
+            If a file cannot be written.
+        """
+        try:
+            yield
+        except OSError as error:
+            raise RunError(f"{self.path}: {reason(error)}; {self._kept()}") from error
+
+    def _kept(self) -> str:
+        """Describe what is left of a run that could not be written to its end."""
+        if self._has_record():
+            return f"the rows that were written are kept, and `cosim report {quote(str(self.path))}` reads them"
+        if self._has_commands():
+            scenario, commands = (quote(str(self.path / name)) for name in (SCENARIO, COMMANDS_LOG))
+            return f"no row is kept, but `cosim run {scenario} --replay-commands {commands}` repeats the run"
+        return "nothing of the run is kept"
+
+    def _has_record(self) -> bool:
+        return bool(part_files(self.path)) or (self.path / RECORD).exists()
+
+    def _has_commands(self) -> bool:
+        log = self.path / COMMANDS_LOG
+        return log.exists() and b"\n" in log.read_bytes()
 
 
 def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunFolder:
@@ -120,17 +155,26 @@ def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunF
     return folder
 
 
+def _remove(file: Path) -> None:
+    if file.is_dir() and not file.is_symlink():
+        shutil.rmtree(file, ignore_errors=True)
+    else:
+        file.unlink(missing_ok=True)
+
+
 def _remove_run(path: Path) -> None:
     """Remove the files of a run from its folder; raise a RunError if the folder holds any other file."""
-    made = {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, PARTS, SUMMARY, REPORT, REPLAY, FIGURES}
-    odd = sorted(file.name for file in path.iterdir() if file.name not in made and not file.match("report*.*"))
+    odd = sorted(
+        file.name
+        for file in path.iterdir()
+        if not (file.name in _MADE or file.match("report*.*") or is_temporary(file.name))
+    )
     if odd or not (path / SCENARIO).is_file():
         what = f"{odd[0]!r}, which no run makes" if odd else "no run"
         raise RunError(f"{path}: holds {what}; expected a run to be replaced, or a new folder")
-    aside = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))
-    for file in path.iterdir():
-        file.replace(aside / file.name)
-    shutil.rmtree(aside)
+    with temporary_folder(f".{path.name}-", path.parent) as aside:
+        for file in path.iterdir():
+            file.replace(aside / file.name)
 
 
 def _new_folder(parent: Path, name: str) -> Path:

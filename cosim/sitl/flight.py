@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import contextlib
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
-from cosim.errors import RunError
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import Run
 from cosim.run.run_folder import claim, conclude
@@ -112,8 +109,12 @@ class Flight:
     def _record(self) -> None:
         """Record the row of the last step, if one is due."""
         if self.steps % self._every == 0:
-            with self._writing():
-                self._recorder.observe(self.steps, self._master.row)
+            with self._claimed.writing():
+                try:
+                    self._recorder.observe(self.steps, self._master.row)
+                except OSError:
+                    self.end()  # so that the error says what is kept
+                    raise
 
     def end(self) -> None:
         """Close plant and record; raise RunError if it cannot be written. May be called twice."""
@@ -126,7 +127,7 @@ class Flight:
                 self._record()
         finally:
             self._master.close()
-            with self._writing():
+            with self._claimed.writing():
                 self._claimed.keep(self._recorder)
 
     def conclude(self, status: str, report: bool) -> Run:
@@ -149,12 +150,5 @@ class Flight:
         RunError
             If the folder cannot be written.
         """
-        with self._writing():
+        with self._claimed.writing():
             return conclude(self.folder, self.scenario, status, self._wall_time, report)
-
-    @contextlib.contextmanager
-    def _writing(self) -> Iterator[None]:
-        try:
-            yield
-        except OSError as error:
-            raise RunError(f"{self.folder}: {error.strerror or error}") from error

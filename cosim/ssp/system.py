@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Mapping, Sequence
 from itertools import permutations
 from pathlib import Path
@@ -23,6 +22,7 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import NATIVE
 from plant_fmu.component import Component
 from plant_fmu.contents.parameter_set import parameter_set
+from plant_fmu.temporary import temporary_folder
 from plant_fmu.variables import AXES, FORCES, VELOCITIES
 from plant_fmu.vehicle_component import of_vehicle
 
@@ -149,8 +149,8 @@ def _origin(scenario: Scenario) -> dict[str, bytes]:
 def _fmu(component: Component, fmi: int, platforms: str) -> bytes:
     if platforms == NATIVE:
         return cached_fmu(component, fmi).read_bytes()
-    with tempfile.TemporaryDirectory(prefix="cosim-") as folder:
-        return build_fmu(component, fmi, Path(folder) / f"{component.name}.fmu", platforms).read_bytes()
+    with temporary_folder("cosim-") as folder:
+        return build_fmu(component, fmi, folder / f"{component.name}.fmu", platforms).read_bytes()
 
 
 def _require(scenario: Scenario) -> None:

@@ -9,7 +9,6 @@ import shlex
 import shutil
 import subprocess
 import sys
-import tempfile
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -17,6 +16,7 @@ from pathlib import Path
 from plant_fmu.compiling.platforms import Platform, native_platform
 from plant_fmu.errors import BuildError
 from plant_fmu.installing import install_hint
+from plant_fmu.temporary import temporary_folder
 
 log = logging.getLogger(__name__)
 
@@ -120,8 +120,8 @@ def compile_library(
         # linker has no -s, and ziglang's, with that flag, makes some numbers of a table vary between builds.
         link = [f"-Wl,-install_name,@rpath/{library.name}"]
     options = [*FLAGS, *_WARNINGS, *flags, *(f"-I{folder}" for folder in includes)]
-    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
-        objects = [Path(scratch) / f"{source.stem}.o" for source in sources]
+    with temporary_folder("plant_fmu-") as scratch:
+        objects = [scratch / f"{source.stem}.o" for source in sources]
         with ThreadPoolExecutor(os.cpu_count()) as pool:  # a process each: they take turns if there is but one core
             commands = [
                 [*compiler, *options, *_compact(source), "-c", str(source), "-o", str(made)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import re
-import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from plant_fmu.compiling.compiler import FLAGS, compile_library
 from plant_fmu.compiling.platforms import Platform
 from plant_fmu.compiling.sources import c_sources, compiled_files, header
 from plant_fmu.component import Component
+from plant_fmu.temporary import temporary_folder
 
 FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
@@ -46,8 +46,7 @@ def compiled_libraries(
         If a compiler fails.
     """
     made = []
-    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
-        folder = Path(scratch)
+    with temporary_folder("plant_fmu-") as folder:
         for name, data in {**c_sources(component, fmi), component.header: header(component, token).encode()}.items():
             (folder / name).write_bytes(data)
         files = [folder / file for file in compiled_files(component, fmi)]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import sys
-import tempfile
 from collections.abc import Mapping
 from importlib import resources
 from pathlib import Path
@@ -19,6 +18,7 @@ from plant_fmu.component import Component
 from plant_fmu.errors import BuildError
 from plant_fmu.installing import install_hint
 from plant_fmu.markup import xml_text
+from plant_fmu.temporary import temporary_folder
 
 _TARGET = Platform("wasm", (), "wasm32-wasi", ".wasm")
 _WITHOUT = ("-fPIC", "-shared")  # a module is loaded once, at one place
@@ -59,9 +59,9 @@ def module(component: Component, token: str, beside: Mapping[str, bytes] | None 
     >>> module(odin, token(odin, 3))[1:4]  # doctest: +SKIP
     b'asm'
     """
-    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
+    with temporary_folder("plant_fmu-") as scratch:
         exports = () if beside else ("-Wl,--export-dynamic", "-Wl,--export=malloc,--export=free")
-        return _compile_module(component, token, Path(scratch), dict(beside or {}), exports)
+        return _compile_module(component, token, scratch, dict(beside or {}), exports)
 
 
 def component_binary(component: Component, token: str) -> bytes:
@@ -89,8 +89,7 @@ def component_binary(component: Component, token: str) -> bytes:
     glue = resources.files("plant_fmu") / "csrc" / "wasm"
     more = {file.name: file.read_bytes() for file in glue.iterdir() if file.name.endswith((".c", ".h"))}
     flags = ("-DMODEL_EXCHANGE_OFFERED",) if component.has_states else ()
-    with tempfile.TemporaryDirectory(prefix="plant_fmu-") as scratch:
-        folder = Path(scratch)
+    with temporary_folder("plant_fmu-") as folder:
         core, typed, whole = folder / "core.wasm", folder / "typed.wasm", folder / "component.wasm"
         core.write_bytes(_compile_module(component, token, folder, more, flags))
         (folder / "fmu.wit").write_text(wit(component.has_states), encoding="utf-8")

@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import tempfile
 from dataclasses import asdict
 from pathlib import Path
 
@@ -15,6 +14,7 @@ from plant_fmu.importers.fmu_file import FmuFile
 from plant_fmu.importers.registry import Importer
 from plant_fmu.importers.task import Result, Task
 from plant_fmu.installing import install_hint
+from plant_fmu.temporary import temporary_folder
 
 TIMEOUT = 120.0  # s, time limit of a task in an importer
 
@@ -54,8 +54,7 @@ def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = 
         return result("not installed", install_hint(*missing))
     if objection := importer.objection(fmu):
         return result("does not apply", objection)
-    with tempfile.TemporaryDirectory(prefix="plant_fmu-", ignore_cleanup_errors=True) as scratch:
-        folder = Path(scratch)
+    with temporary_folder("plant_fmu-") as folder:
         request = {"module": importer.module, "fmu": str(fmu.path), "task": asdict(task)}
         (folder / "request.json").write_text(json.dumps(request), encoding="utf-8")
         code, said = _run_child(folder, timeout)

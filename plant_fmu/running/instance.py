@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import functools
 import io
 import logging
 import os
-import shutil
-import tempfile
 import threading
 import weakref
 from collections import deque
@@ -22,6 +21,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from plant_fmu.archive import archive_of
 from plant_fmu.errors import FmuFileError, PlantError
+from plant_fmu.temporary import temporary_folder
 from plant_fmu.unpacking import DESCRIPTION, library_names, unpack
 
 log = logging.getLogger(__name__)
@@ -86,9 +86,10 @@ class Instance:
         self.messages = Messages()
         self._states: dict[int, Any] = {}  # handles to free, by address
         self._dropped: deque[int] = deque()  # addresses of states without references
-        folder = tempfile.mkdtemp(prefix="plant_fmu-")
+        extracted = contextlib.ExitStack()
+        folder = extracted.enter_context(temporary_folder("plant_fmu-"))
         loaded: list[Any] = []
-        self._end = weakref.finalize(self, _release, loaded, self._states, folder)
+        self._end = weakref.finalize(self, _release, loaded, self._states, extracted)
         try:
             self._load(path, folder, loaded)
         except PlantError:
@@ -101,10 +102,10 @@ class Instance:
             self._end()
             raise
 
-    def _load(self, path: Path, folder: str, loaded: list[Any]) -> None:
+    def _load(self, path: Path, folder: Path, loaded: list[Any]) -> None:
         platforms = (fmpy.platform, fmpy.platform_tuple)
         try:
-            root = unpack(path, Path(folder), platforms)
+            root = unpack(path, folder, platforms)
         except FmuFileError as error:
             raise PlantError(str(error)) from error
         self.fmi = int(root.get("fmiVersion", "")[0])
@@ -204,7 +205,7 @@ def _described(xml: bytes) -> Any:
     return fmpy.read_model_description(io.BytesIO(archive_of({DESCRIPTION: xml})))
 
 
-def _release(loaded: list[Any], states: dict[int, Any], folder: str) -> None:
+def _release(loaded: list[Any], states: dict[int, Any], extracted: contextlib.ExitStack) -> None:
     try:
         for fmu in loaded:
             if fmu.component:
@@ -217,7 +218,7 @@ def _release(loaded: list[Any], states: dict[int, Any], folder: str) -> None:
         log.warning("FMU not freed: %s", _one_line(error))
     finally:
         states.clear()
-        shutil.rmtree(folder, ignore_errors=True)
+        extracted.close()
 
 
 def _one_line(error: Exception) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -26,6 +25,7 @@ from cosim.campaigns.sweeps.rows import SweepBatch, SweepWork
 from cosim.campaigns.workers.work import Rows
 from cosim.errors import RunError
 from cosim.scenario.scenario import Scenario
+from plant_fmu.temporary import temporary_folder
 from plant_fmu.toml_tables import hint
 
 Objective = Literal["clearance", "violation", "arrival"]
@@ -133,8 +133,8 @@ class SceneSearch:
 
     def fly_random(self, out: Path, workers: int, progress: bool) -> Results:
         """Fly random scenes of the generator, as many as the budget."""
-        with TemporaryDirectory() as folder:
-            scenes = Path(folder) / "scenes.jsonl"
+        with temporary_folder("falsify-") as folder:
+            scenes = folder / "scenes.jsonl"
             scenes.write_text("\n".join(generate_scenes(len(self), self.settings.seed, self.family)))
             task = self.task
             return run_campaign(scenes, task.law, out, task.conditions, task.gains, workers, progress=progress).results

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,6 +18,7 @@ from cosim.report.web_page import Html, Page, link
 from cosim.results.run_result import REPLAY, load_run
 from cosim.run.run import run_scenario
 from plant_fmu import PlantError
+from plant_fmu.temporary import temporary_folder
 
 WORST = "worst"  # folder of the replays
 _FLOWN = "flown.json"  # file beside a replay with remarks on differing flights
@@ -114,8 +114,7 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
     place = out / WORST / str(key)
     if not (place / _FLOWN).exists():
         place.parent.mkdir(exist_ok=True)
-        scratch = Path(tempfile.mkdtemp(prefix=f".{key}-", dir=place.parent))
-        try:
+        with temporary_folder(f".{key}-", place.parent) as scratch:
             traces, remarks = [], []
             for folder in folders:
                 name = f"{folder.name}: " if len(folders) > 1 else ""
@@ -128,8 +127,6 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
             scratch.chmod(0o755)
             shutil.rmtree(place, ignore_errors=True)
             scratch.replace(place)
-        finally:
-            shutil.rmtree(scratch, ignore_errors=True)
     stored = read_json(place / _FLOWN).get("remarks")
     if not (isinstance(stored, list) and all(isinstance(remark, str) for remark in stored)):
         raise RunError(f"{place / _FLOWN}: cannot be read: remarks are missing")

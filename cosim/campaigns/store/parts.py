@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from cosim.campaigns.workers.work import Rows
 from cosim.errors import RunError
-from cosim.io.atomic_file import atomic_file
+from plant_fmu.temporary import atomic_file
 
 log = logging.getLogger(__name__)
 

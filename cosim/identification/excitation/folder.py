@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -19,6 +18,7 @@ from cosim.identification.fit import STAGES
 from cosim.io.atomic_file import write_atomic
 from cosim.report.web_page import Html, Page, inline_figure, number
 from cosim.scenario.scenario import VEHICLE_COPY
+from plant_fmu.temporary import temporary_folder
 
 SCENARIO, COMMANDS, STICKS, PAGE = "excite.toml", "commands.jsonl", "sticks.csv", "excite.html"
 _AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")
@@ -134,8 +134,8 @@ def _page(done: Design, out: Path) -> Page:
         f"{done.depth:g} m, by hand or by a mode that holds position.",
         faint=True,
     )
-    with tempfile.TemporaryDirectory(prefix="excite-") as scratch, mpl.rc_context(STYLE):
-        page.add(inline_figure(figure_of(done), Path(scratch)))
+    with temporary_folder("excite-") as scratch, mpl.rc_context(STYLE):
+        page.add(inline_figure(figure_of(done), scratch))
     page.heading("The segments")
     page.table(
         ("Begin [s]", "Input", "Mode", "Greatest stick, X Y Z K M N"),

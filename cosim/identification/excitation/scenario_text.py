@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import tempfile
 from pathlib import Path
 
 from cosim.scenario.scenario import Scenario, load_scenario
+from plant_fmu.temporary import temporary_folder
 
 ROW = 0.05  # s, period of the record's rows and of the law
 
@@ -71,7 +71,7 @@ def load(text: str, vehicle: str) -> Scenario:
         Scenario of the text; a vehicle's path is relative to the working folder.
     """
     path = str(Path(vehicle).resolve()) if vehicle.endswith(".toml") else vehicle
-    with tempfile.TemporaryDirectory(prefix="excite-") as folder:
-        file = Path(folder) / "excite.toml"
+    with temporary_folder("excite-") as folder:
+        file = folder / "excite.toml"
         file.write_text(text.replace(json.dumps(vehicle), json.dumps(path), 1))
         return load_scenario(file)

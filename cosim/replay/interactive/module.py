@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,6 +17,7 @@ from plant_fmu.compiling.libraries import digest
 from plant_fmu.compiling.sources import c_sources, header
 from plant_fmu.compiling.webassembly import module
 from plant_fmu.description import token
+from plant_fmu.temporary import temporary_folder
 from plant_fmu.vehicle_component import of_vehicle
 
 
@@ -62,8 +62,8 @@ def flight_module(scenario: Scenario) -> FlightModule:
     if is_whole(kept):
         return FlightModule(flight, memory, kept.read_bytes())
     binary = module(component, key, sources)
-    with tempfile.TemporaryDirectory(prefix="flight-") as scratch:
-        built = Path(scratch) / name
+    with temporary_folder("flight-") as scratch:
+        built = scratch / name
         built.write_bytes(binary)
         keep(built, kept.parent)
     return FlightModule(flight, memory, binary)

@@ -15,13 +15,14 @@ import pytest
 from cosim.batch.outcome import FIELDS
 from cosim.campaigns import run_sweep
 from cosim.campaigns.store.folder import PARTS, RESULTS
+from cosim.campaigns.store.results import Results
 from cosim.campaigns.workers.cluster import _quiet
 from cosim.campaigns.workers.dispatch import KILLED
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from tests.cosim.campaigns.command import ROOT, command, command_cache, needs_posix
 from tests.cosim.campaigns.fake import KEYS, VARY, design, fakes, paper
-from tests.cosim.campaigns.scene_data import batches_of
+from tests.cosim.campaigns.scene_data import batches_of, many, rows, write
 from tests.cosim.campaigns.test_sweep import expected
 
 __all__ = ["command", "command_cache", "fakes"]
@@ -128,6 +129,18 @@ def test_dask_gives_the_same_rows(tmp_path, fakes, cluster, capfd):
     assert rows_of(tmp_path / "two") == expected()
     said = capfd.readouterr()
     assert "50 of 50 rows flown" in said.out and said.err == ""
+
+
+@pytest.mark.slow
+def test_campaign_on_dask_gives_the_same_rows(tmp_path, cluster, capfd):
+    scenes = write(tmp_path / "s.jsonl", many(4))
+    words = ["campaign", str(scenes), "--law", "ismail_dunnigan", "--replays", "0", "--quiet"]
+    address = cluster._client.scheduler.address
+    assert main([*words, "--out", str(tmp_path / "one")]) == 0
+    assert main([*words, "--scheduler", address, "--out", str(tmp_path / "two")]) == 0
+    assert rows(Results(tmp_path / "one" / RESULTS)) == rows(Results(tmp_path / "two" / RESULTS))
+    assert main([*words, "--scheduler", address, "--workers", "2", "--out", str(tmp_path / "three")]) == 2
+    assert capfd.readouterr().err == "cosim: --workers: expected none with --scheduler: the cluster sets their number\n"
 
 
 @pytest.mark.slow
