@@ -111,10 +111,8 @@ def identify(options: argparse.Namespace) -> int:
     """Run ``cosim identify``."""
     from cosim.identification import findings
     from cosim.identification.identify import identify as identify_runs
-    from cosim.identification.identify import write_vehicle
-    from cosim.identification.page import write_page
     from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES
-    from cosim.identification.posterior import write_posterior
+    from cosim.identification.result_files import write_results
     from cosim.identification.vehicle_file import name_of_file
     from cosim.run.progress import ProgressBar
 
@@ -125,9 +123,7 @@ def identify(options: argparse.Namespace) -> int:
             options.runs, options.vehicle, DEFAULT_FREE if options.free is None else options.free,
             DEFAULT_NUISANCES if options.nuisance is None else options.nuisance, options.held_out, bar.update_to,
         )  # fmt: skip
-    write_vehicle(done, options.out)
-    posterior = write_posterior(done.fit, done.vehicle, options.out)
-    page = write_page(done, options.out)
+    posterior, page = write_results(done, options.out)
     say(options, findings.verdict(done.fit), *findings.warnings(done.fit, done.logs), str(posterior), str(page))
     print(options.out)
     return 0

@@ -20,7 +20,6 @@ from cosim.identification.parameters import (
 )
 from cosim.identification.validation import Prediction, validate
 from cosim.identification.vehicle_file import name_of_file, vehicle_text
-from cosim.io.atomic_file import write_atomic
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 
@@ -104,21 +103,8 @@ def identify(
     return Identification(start, vehicle, logs, others, found, tuple(predictions))
 
 
-def write_vehicle(done: Identification, out: Path) -> None:
-    """Write the identified vehicle, and check that its file can be read.
-
-    Parameters
-    ----------
-    done : Identification
-        Result of the identification.
-    out : Path
-        Path of the file, which ends in ``.toml``.
-
-    Raises
-    ------
-    IdentificationError
-        If the file cannot be written, or its name is not valid for a vehicle.
-    """
+def vehicle_contents(done: Identification, out: Path) -> str:
+    """Return the content of the identified vehicle's file `out`; raise IdentificationError if its name is invalid."""
     names = ", ".join(log.name for log in done.logs)
     provenance = [
         f"Identified by cosim identify from {names}, starting from {done.vehicle.name}. Behind a number stands half of "
@@ -126,10 +112,4 @@ def write_vehicle(done: Identification, out: Path) -> None:
         findings.verdict(done.fit),
         *findings.warnings(done.fit, done.logs),
     ]
-    text = vehicle_text(done.start, done.vehicle, done.fit, name_of_file(out), provenance)
-    try:
-        out.parent.mkdir(parents=True, exist_ok=True)
-        write_atomic(out, text)
-    except OSError as error:
-        raise IdentificationError(f"{out}: {error.strerror or error}") from error
-    load_vehicle(out)
+    return vehicle_text(done.start, done.vehicle, done.fit, name_of_file(out), provenance)

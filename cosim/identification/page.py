@@ -4,35 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from cosim.errors import IdentificationError
 from cosim.identification import findings
 from cosim.identification.identify import Identification
 from cosim.identification.log import UNITS
-from cosim.io.atomic_file import write_atomic
 from cosim.report.web_page import Html, Page, code, inline_figure, number
 from plant_fmu.temporary import temporary_folder
 
 
-def write_page(done: Identification, out: Path) -> Path:
-    """Write the page beside the vehicle's file.
-
-    Parameters
-    ----------
-    done : Identification
-        Result of the identification.
-    out : Path
-        Path of the vehicle's file.
-
-    Returns
-    -------
-    Path
-        Path of the page: that of the vehicle's file, with ``.html``.
-
-    Raises
-    ------
-    IdentificationError
-        If the page cannot be written.
-    """
+def page_contents(done: Identification, out: Path) -> str:
+    """Return the page of an identification whose vehicle's file is `out`."""
     import matplotlib as mpl
 
     from cosim.identification.figures import figures_of
@@ -40,12 +20,7 @@ def write_page(done: Identification, out: Path) -> Path:
 
     with temporary_folder("identify-") as scratch, mpl.rc_context(STYLE):
         figures = {f.name: inline_figure(f, scratch) for f in figures_of(done.fit, done.predictions)}
-    path = out.with_suffix(".html")
-    try:
-        write_atomic(path, _page(done, out, figures).html())
-    except OSError as error:
-        raise IdentificationError(f"{path}: {error.strerror or error}") from error
-    return path
+    return _page(done, out, figures).html()
 
 
 def _page(done: Identification, out: Path, figures: dict[str, Html]) -> Page:

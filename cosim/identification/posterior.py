@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +10,6 @@ from numpy.typing import NDArray
 from cosim.errors import IdentificationError
 from cosim.identification.fit import Fit
 from cosim.identification.parameters import with_values
-from cosim.io.atomic_file import write_atomic
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -20,35 +18,9 @@ DRAWS = 256  # number of drawn vehicles
 _TRIES = 100  # most tries per drawn vehicle, until its mass matrix is positive definite
 
 
-def write_posterior(fit: Fit, vehicle: Vehicle, out: Path) -> Path:
-    """Write vehicles drawn from an identification beside its vehicle's file, one per line.
-
-    Parameters
-    ----------
-    fit : Fit
-        Fit, for its values and the covariance of the jackknife.
-    vehicle : Vehicle
-        Vehicle with the start values of the search.
-    out : Path
-        Path of the identified vehicle's file.
-
-    Returns
-    -------
-    Path
-        Path of the written file: that of the vehicle's file, with ``.posterior.jsonl``.
-
-    Raises
-    ------
-    IdentificationError
-        If the file cannot be written, or hardly any draw has a positive definite mass matrix.
-    """
-    path = out.with_suffix(".posterior.jsonl")
-    lines = [json.dumps({"draw": i, "parameters": p}) for i, p in enumerate(draw_plants(fit, vehicle, seed=0))]
-    try:
-        write_atomic(path, "".join(f"{line}\n" for line in lines))
-    except OSError as error:
-        raise IdentificationError(f"{path}: {error.strerror or error}") from error
-    return path
+def posterior_lines(fit: Fit, vehicle: Vehicle) -> list[str]:
+    """Draw vehicles from an identification that began at `vehicle`; return a line of JSON for each."""
+    return [json.dumps({"draw": i, "parameters": p}) for i, p in enumerate(draw_plants(fit, vehicle, seed=0))]
 
 
 def draw_plants(fit: Fit, vehicle: Vehicle, seed: int, count: int = DRAWS) -> list[dict[str, float]]:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Mapping
 from pathlib import Path
 
 from plant_fmu.temporary import atomic_file
@@ -31,6 +33,31 @@ def write_atomic(path: Path, content: bytes | str) -> Path:
     with atomic_file(path) as file:
         file.write(content.encode() if isinstance(content, str) else content)
     return path
+
+
+def write_together(contents: Mapping[Path, str]) -> None:
+    """Write files that belong together: whenever an error or a kill comes, those that exist are of one call.
+
+    All are written to temporary files first. Then the old ones are removed, except the first, and each is renamed.
+
+    Parameters
+    ----------
+    contents : mapping of Path to str
+        Content of each file. The first is the one that the others belong to: it is replaced, never missing.
+
+    Raises
+    ------
+    OSError
+        If a file cannot be written.
+    """
+    _, *others = contents
+    with contextlib.ExitStack() as renames:
+        for path in reversed([*contents]):  # the first is the last that is opened, and so the first that is renamed
+            file = renames.enter_context(atomic_file(path))
+            file.write(contents[path].encode())
+            file.flush()
+        for path in others:
+            path.unlink(missing_ok=True)
 
 
 def reason(error: OSError) -> str:

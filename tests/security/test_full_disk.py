@@ -3,20 +3,26 @@
 import contextlib
 import errno
 import os
+import shlex
 import shutil
 import subprocess
+from pathlib import Path
+from unittest import mock
 
 import pyarrow.parquet as pq
 import pytest
 
 from cosim.errors import RunError
-from cosim.results.run_result import load_run
+from cosim.results.run_result import COMMANDS_LOG, load_run
 from cosim.run.run import run_scenario
 from cosim.run.run_folder import claim
 from cosim.scenario.scenario import load_scenario
+from cosim.simulation.commands.commands import ManualControl, SetTarget
+from cosim.simulation.commands.sources import ScheduledCommands, read_log
 from cosim.sitl.flight import Flight
 from cosim.sitl.law import law_of_pwm
 from cosim.sitl.scenario import scenario_to_fly
+from tests.faults import FAIL_ON, FAIL_ONCE, arm, call_with_faults, count, needs_faults
 
 ROOM = 4096  # bytes: for the scenario, and no record
 
@@ -139,3 +145,69 @@ def test_d9_run_on_a_full_small_disk_is_rejected(tmp_path):
         assert run_scenario(scenario(), disk / "run", report=False).summary["status"] == "completed"
     finally:
         subprocess.run(["umount", disk], check=True)
+
+
+# ---- the n-th system call that changes a file fails, for each n ----
+
+COMMANDS = [(0, SetTarget((1.0, 0.0, 1.0))), (20, ManualControl((0.5, 0.0, 0.0, 0.0, 0.0, 0.0)))]
+
+
+def fly(out, commands, report):
+    own = scenario().replace({"commands.enabled": True}) if commands else scenario()
+    with contextlib.ExitStack() as stack:
+        if commands:  # as a pilot sends them
+            stack.enter_context(mock.patch("cosim.run.run.CommandQueue", return_value=Pilot(COMMANDS)))
+        return run_scenario(own, out, report=report)
+
+
+class Pilot(ScheduledCommands):
+    def end_run(self):
+        pass
+
+
+def check_run(out, line, commands):
+    """Require that what a failed run says of its folder is what is there, and that it holds no half file."""
+    files = {file.relative_to(out).as_posix() for file in out.rglob("*")} if out.exists() else set()
+    assert not [name for name in files if ".tmp" in name or Path(name).name.startswith(".")]
+    if "rows that were written are kept" in line:
+        assert f"`cosim report {out}`" in line
+        assert len(load_run(out).record) > 0
+    elif "no row is kept" in line:
+        assert commands and read_log(out / COMMANDS_LOG)
+        words = shlex.split(line.split("`")[1])
+        again = run_scenario(load_scenario(words[2]), out / "again", report=False, commands_log=Path(words[4]))
+        assert again.summary["status"] == "completed" and again.summary["commands"] == len(read_log(Path(words[4])))
+    else:
+        assert not files, line
+
+
+def fly_on_failing_disks(folder, commands, report):
+    """Fly the same run with a fault at each call in turn, once and from there on."""
+    commands, report = bool(commands), bool(report)
+    arm(folder, 0)
+    fly(Path(folder, "whole"), commands, report)
+    total = count()
+    said = set()
+    for kind in (FAIL_ONCE, FAIL_ON):
+        for n in sorted({*range(1, 13), *range(13, total, max(1, total // 12)), *range(total - 12, total + 1)}):
+            out = Path(folder, f"run-{kind}-{n}")
+            arm(folder, n, kind)
+            line = ""
+            try:
+                fly(out, commands, report)
+            except RunError as error:
+                line = str(error)
+            arm("", 0)
+            if line:
+                assert "No space left on device" in line, (n, line)
+                check_run(out, line, commands)
+                said.add(line.partition(";")[2][:25])
+            shutil.rmtree(out, ignore_errors=True)
+    assert len(said) >= 2, said
+
+
+@needs_faults
+@pytest.mark.slow
+@pytest.mark.parametrize(("commands", "report"), [("", ""), ("x", ""), ("x", "x")])
+def test_each_failing_call_leaves_what_the_line_says(tmp_path, commands, report):
+    call_with_faults(fly_on_failing_disks, tmp_path, commands, report)

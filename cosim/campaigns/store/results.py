@@ -18,6 +18,7 @@ from cosim.campaigns.store.parts import check_schema
 from cosim.errors import RunError
 from cosim.simulation.signals import Array
 
+_MAX_NUMBER = 1e100  # greatest size of a number, whose powers are still finite
 _PIECE = 1000  # number of rows that are read at once
 
 
@@ -50,9 +51,15 @@ class Results:
         return self._rows
 
     def __getitem__(self, name: str) -> Any:
-        """Return a column, shape (rows,), with NaN or None for null."""
+        """Return a column, shape (rows,), with NaN or None for null; raise a RunError for numbers beyond statistics."""
         with self._readable():
-            return to_array(self._read([name])[name])
+            column = to_array(self._read([name])[name])
+        if column.dtype == np.float64 and (beyond := np.isfinite(column) & (np.abs(column) > _MAX_NUMBER)).any():
+            i = int(np.argmax(beyond))
+            raise RunError(
+                f"{self.path}: column {name!r} holds {column[i]:g} in row {i}, expected at most {_MAX_NUMBER:g} in size"
+            )
+        return column
 
     def number(self, name: str, absent: float = np.nan) -> Array:
         """Return a column of numbers, shape (rows,), with `absent` for null and NaN."""

@@ -12,7 +12,7 @@ from cosim.campaigns.sweeps.design import vary_vehicles
 from cosim.command_line.cli import main
 from cosim.errors import IdentificationError, RunError
 from cosim.identification.parameters import DEFAULT_FREE, free_parameters
-from cosim.identification.posterior import draw_plants, write_posterior
+from cosim.identification.posterior import draw_plants, posterior_lines
 from plant_fmu import load_vehicle
 
 VEHICLE = load_vehicle("bluerov2_heavy")
@@ -66,7 +66,8 @@ def test_numbers_without_a_body_are_refused():
 def test_a_sweep_flies_each_vehicle_and_says_which_number_decides(tmp_path, capsys):
     """The law knows the scenario's own vehicle: what differs is the plant."""
     fit = fit_of(("hydrostatics.buoyancy", "thrusters.time_constant"), values=[130.0, 0.1], deviations=0.5)
-    path = write_posterior(fit, VEHICLE, tmp_path / "mine.toml")
+    path = tmp_path / "mine.posterior.jsonl"
+    path.write_text("\n".join(posterior_lines(fit, VEHICLE)))
     drawn = [json.loads(line)["parameters"] for line in path.read_text().splitlines()]
     out = tmp_path / "sweep"
     settings = ["arbiter.engine=closed", "vehicle=bluerov2_heavy", "actuation.through=thrusters", "time.duration=3"]
