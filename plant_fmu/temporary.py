@@ -41,8 +41,8 @@ def temporary_folder(prefix: str, parent: Path | None = None) -> Iterator[Path]:
     parent = Path(tempfile.gettempdir()) if parent is None else parent
     remove_abandoned(parent, prefix)
     folder = parent / f"{prefix}{secrets.token_hex(8)}"
-    folder.mkdir(mode=0o700)
     try:
+        folder.mkdir(mode=0o700)
         with _opened(folder) as descriptor:
             _lock(descriptor)
             yield folder
@@ -83,6 +83,10 @@ def atomic_file(path: Path) -> Iterator[BinaryIO]:
             _lock(file.fileno())
             yield file
         scratch.replace(path)
+    except OSError as error:
+        if error.filename in (None, str(scratch)):  # no write names its file, and nobody knows the temporary one
+            error.filename, error.filename2 = str(path), None
+        raise
     finally:
         scratch.unlink(missing_ok=True)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.command_line.numbers import whole
-from cosim.command_line.process import INTERRUPTED, print_status
+from cosim.command_line.process import say_if_interrupted
 from cosim.command_line.results import say
 from cosim.errors import RunError
 
@@ -195,9 +195,4 @@ def resumable(run: Callable[[], None], out: Path) -> int:
     int
         Exit code.
     """
-    try:
-        run()
-    except KeyboardInterrupt:
-        print_status(f"interrupted; what is flown is kept in {out}, and the same command goes on")
-        return INTERRUPTED
-    return 0
+    return say_if_interrupted(run, f"what is flown is kept in {out}, and the same command goes on")

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.command_line.numbers import number, whole
+from cosim.command_line.process import say_if_interrupted
 
 
 def add_verbs(verbs: Any) -> None:
@@ -51,12 +52,14 @@ def export(options: argparse.Namespace) -> int:
     """Run ``cosim export``."""
     from cosim.export import export_run
 
-    for file in export_run(
-        options.folder, options.to, options.out,
-        signals=options.signals, every=options.every, rate=options.rate, force=options.force,
-    ):  # fmt: skip
-        print(file)
-    return 0
+    def run() -> None:
+        for file in export_run(
+            options.folder, options.to, options.out,
+            signals=options.signals, every=options.every, rate=options.rate, force=options.force,
+        ):  # fmt: skip
+            print(file)
+
+    return say_if_interrupted(run, "nothing is written, and the same command begins again")
 
 
 def package(options: argparse.Namespace) -> int:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.command_line.numbers import number
+from cosim.command_line.process import say_if_interrupted
 from cosim.command_line.results import print_run
 
 _BAR = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
@@ -42,11 +43,13 @@ def import_(options: argparse.Namespace) -> int:
     from cosim.logs import import_log
     from cosim.run.progress import ProgressBar
 
-    with ProgressBar(not options.quiet, _BAR, total=1.0, desc=options.log.name) as bar:
-        run = import_log(
-            options.log, options.vehicle, options.out,
-            scenario=options.scenario, columns=options.columns, rate=options.rate, curve=options.curve,
-            voltage=options.voltage, report=not options.no_report, overwrite=options.overwrite, moved=bar.update_to,
-        )  # fmt: skip
-    print_run(options, run, not options.no_report)
-    return 0
+    def run() -> None:
+        with ProgressBar(not options.quiet, _BAR, total=1.0, desc=options.log.name) as bar:
+            done = import_log(
+                options.log, options.vehicle, options.out,
+                scenario=options.scenario, columns=options.columns, rate=options.rate, curve=options.curve,
+                voltage=options.voltage, report=not options.no_report, overwrite=options.overwrite, moved=bar.update_to,
+            )  # fmt: skip
+        print_run(options, done, not options.no_report)
+
+    return say_if_interrupted(run, "nothing is written, and the same command begins again")

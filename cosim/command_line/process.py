@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable, Iterator
 from threading import current_thread, main_thread
 from types import FrameType
+from typing import Any, TextIO
 
 from plant_fmu.errors import one_line
 
@@ -36,11 +37,12 @@ def run_guarded(run: Callable[[], int]) -> int:
         print_status("standard output is closed; expected it open, such as on /dev/null")
         return FAULT
     try:
-        try:
-            with kills_interrupt():
-                return run()
-        finally:
-            _flush()
+        with contextlib.redirect_stdout(_NamedOutput(sys.stdout)):
+            try:
+                with kills_interrupt():
+                    return run()
+            finally:
+                sys.stdout.flush()
     except KeyboardInterrupt:
         print_status("interrupted")
         return INTERRUPTED
@@ -51,6 +53,16 @@ def run_guarded(run: Callable[[], int]) -> int:
             print_status(one_line(f"{error.filename}: {what}" if error.filename else what))
         _drop_output()
         return NO_READER if unread else FAULT
+
+
+def say_if_interrupted(run: Callable[[], None], what: str) -> int:
+    """Run a verb and return its exit status; after Ctrl-C or a kill print what is left, and how to go on."""
+    try:
+        run()
+    except KeyboardInterrupt:
+        print_status(f"interrupted; {what}")
+        return INTERRUPTED
+    return 0
 
 
 def print_status(what: str) -> None:
@@ -100,13 +112,32 @@ def _catchable(names: tuple[str, ...]) -> list[signal.Signals]:
     return [number for number in numbers if signal.getsignal(number) not in (signal.SIG_IGN, None)]
 
 
-def _flush() -> None:
-    try:
-        sys.stdout.flush()
-    except BrokenPipeError:
-        raise
-    except OSError as error:
-        raise OSError(error.errno, error.strerror, "standard output") from error
+class _NamedOutput:
+    """Standard output, whose errors name it as those of files do."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def write(self, text: str) -> int:
+        """Write a text."""
+        with self._named():
+            return self._stream.write(text)
+
+    def flush(self) -> None:
+        """Write what is buffered."""
+        with self._named():
+            self._stream.flush()
+
+    @contextlib.contextmanager
+    def _named(self) -> Iterator[None]:
+        try:
+            yield
+        except OSError as error:
+            error.filename = "standard output"
+            raise
 
 
 def _is_unread() -> bool:

@@ -85,10 +85,16 @@ def export_run(
         if file.name in _RUN_FILES and file.parent.resolve() == folder.resolve():
             raise ExportError(f"{file}: belongs to the run itself, expected another file")
     excerpt = excerpt_of(folder, signals, every, rate)
+    new = [file for file in files if not file.exists()]
     try:
-        with temporary_folder(f".{path.name}-", path.parent) as scratch:
-            for made in form.write(excerpt, scratch / path.name):
-                made.replace(path.parent / made.name)
+        try:
+            with temporary_folder(f".{path.name}-", path.parent) as scratch:
+                for made in form.write(excerpt, scratch / path.name):
+                    made.replace(path.parent / made.name)
+        except BaseException:
+            for file in new:  # so that the same command does not meet the first of two
+                file.unlink(missing_ok=True)
+            raise
     except ModuleNotFoundError as error:
         if not form.needs or (error.name or "").startswith("cosim"):
             raise

@@ -43,6 +43,6 @@ def write_results(done: Identification, out: Path) -> tuple[Path, Path]:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_together(contents)
     except OSError as error:
-        raise IdentificationError(f"{error.filename2 or error.filename or out}: {reason(error)}") from error
+        raise IdentificationError(f"{error.filename or out}: {reason(error)}") from error
     load_vehicle(out)
     return posterior, page

@@ -134,13 +134,14 @@ def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunF
             path, created = _new_folder(where, f"{scenario.name}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"), True
         else:
             path, created = out, not out.exists()
-            path.mkdir(parents=True, exist_ok=True)
-            if overwrite and any(path.iterdir()):
-                _remove_run(path)
-            if any(path.iterdir()):
-                raise RunError(f"{path}: exists and is not empty; expected a new folder")
+            if not created:
+                if overwrite and any(path.iterdir()):
+                    _remove_run(path)
+                if any(path.iterdir()):
+                    raise RunError(f"{path}: exists and is not empty; expected a new folder")
         folder = RunFolder(path, created)
         try:
+            path.mkdir(parents=True, exist_ok=True)
             with (path / SCENARIO).open("x", encoding="utf-8") as file:
                 file.write(scenario.toml(VEHICLE_COPY if scenario.vehicle_file else None))
             if scenario.vehicle_file:

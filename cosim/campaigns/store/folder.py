@@ -19,6 +19,7 @@ from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.format_number import FORMAT, require_format
 from cosim.io.strict_json import read_json
+from plant_fmu.temporary import is_temporary
 
 PLAN = "campaign.json"
 RESULTS = "results.parquet"
@@ -64,7 +65,9 @@ class CampaignFolder:
             raise
 
     def _refuse_other_files(self) -> None:
-        if not (self.path / PLAN).exists() and any(p.name not in (LOCK, f".{PLAN}") for p in self.path.iterdir()):
+        if not (self.path / PLAN).exists() and any(
+            p.name != LOCK and not is_temporary(p.name) for p in self.path.iterdir()
+        ):
             raise RunError(f"{self.path}: exists and holds no campaign, expected a new folder or that of a campaign")
 
     def _claim(self, work: Work) -> None:
