@@ -80,8 +80,13 @@ def write_folder(done: Design, out: Path) -> Path:
         if own:
             files[VEHICLE_COPY] = Path(done.start).read_bytes()
         out.mkdir(parents=True, exist_ok=True)
-        for name, content in files.items():
-            write_atomic(out / name, content)
+        try:
+            for name, content in files.items():
+                write_atomic(out / name, content)
+        except BaseException:
+            for name in files:  # the folder was empty, and the same command expects it so
+                (out / name).unlink(missing_ok=True)
+            raise
     except OSError as error:
         raise IdentificationError(f"{out}: {error.strerror or error}") from error
     return out / PAGE

@@ -9,6 +9,7 @@ from multiprocessing import current_process, get_context
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 from scipy.stats import norm
@@ -54,6 +55,26 @@ def test_one_row_per_design_point_in_order(tmp_path, fakes):
     assert schema.equals(schema_of(KEYS))
     units = {f.name: f.metadata[b"unit"].decode() for f in schema}
     assert units["reach_time"] == "s" and units["effort"] == "N.s" and all(f.metadata[b"description"] for f in schema)
+
+
+@pytest.mark.slow
+def test_extreme_numbers_are_blamed_on_the_results(tmp_path, fakes, capsys):
+    """Their statistics overflow: the file that holds them is named, whichever column it is, and not the summary."""
+    words = [*WORDS, "--engine", "fake", "--replays", "0", "--out", str(tmp_path / "out")]
+    assert main(words) == 0
+    file = tmp_path / "out" / RESULTS
+    table = pq.read_table(file)
+    numbers = [field for field in table.schema if str(field.type) == "double" and field.name != "stopped_at"]
+    for i, field in enumerate(numbers):
+        column = table[field.name].to_pylist()
+        column[7:9] = [-1e308, 1e308] if i % 2 else [1e308, 1e101]
+        spoiled = pa.array(column, field.type)
+        pq.write_table(table.set_column(table.schema.get_field_index(field.name), field, spoiled), file)
+        capsys.readouterr()
+        assert main(words) == 2
+        said = f"column {field.name!r} holds {column[7]:g} in row 7, expected at most 1e+100 in size"
+        assert capsys.readouterr().err == f"cosim: {file}: {said}\n"
+    assert len(numbers) > 10
 
 
 def test_folder_records_the_complete_sweep(tmp_path, fakes):

@@ -30,9 +30,8 @@ WORDS = {  # smallest commands; {out} is what they write
     "sweep": f"sweep paper --vary initial.position.1=-2:2 --samples 2 {BRIEF} --replays 1 --out {{out}}",
     "rerun": "rerun sweep 0 --out {out}",
     "falsify": f"falsify paper --vary initial.position.1=-2:2 --budget 2 {BRIEF} --replays 1 --out {{out}}",
-    "excite": "excite --vehicle odin --time 10 --free hydrostatics.buoyancy --nuisance --out {out}",
 }
-ELSEWHERE = {"identify", "sitl", "companion"}  # test_result_files.py; and two that need a vehicle on a link
+ELSEWHERE = {"excite", "identify", "sitl", "companion"}  # two take minutes, two need a vehicle on a link
 
 
 def call(words):
@@ -58,13 +57,16 @@ def fill_disk_at_each_call(folder, command):
 
     fresh()
     arm(place, 0)
-    assert call(words) == (0, "")
+    status, said = call(words)
+    assert (status, said) == (0, ""), said
     total = count()
-    for n in sorted({1, 2, 3, *range(4, total, max(1, total // 5))}):
+    for n in sorted({1, 2, 3, *range(4, total, max(1, total // 3))}):
         fresh()
         arm(place, n, FAIL_ON)
         status, said = call(words)
         arm("", 0)
+        if n == total and status == 0:  # a rename, for which the disk has room
+            continue
         assert status == 2, (n, said)
         (line,) = said.splitlines()
         assert line.startswith("cosim: ") and str(place / "made") in line and "No space left" in line, (n, line)
