@@ -111,8 +111,8 @@ def identify(options: argparse.Namespace) -> int:
     """Run ``cosim identify``."""
     from cosim.identification import findings
     from cosim.identification.identify import identify as identify_runs
+    from cosim.identification.page import write_results
     from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES
-    from cosim.identification.result_files import write_results
     from cosim.identification.vehicle_file import name_of_file
     from cosim.run.progress import ProgressBar
 

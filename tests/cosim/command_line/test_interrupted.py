@@ -23,7 +23,7 @@ WORDS = {
     "import": "import dive.csv --vehicle bluerov2_heavy --map dive.toml --no-report --out",
     "import with report": "import dive.csv --vehicle bluerov2_heavy --map dive.toml --out",
     "csv": "export run --to csv --out",
-    "mat": "export run --to mat --out",
+    "mcap": "export run --to mcap --out",
 }
 LINE = "cosim: interrupted; nothing is written, and the same command begins again\n"
 
