@@ -30,6 +30,7 @@ first_use = logging.getLogger("controller.compiling.first_use")  # logs at INFO 
 first_use.propagate = False  # only for listeners by its name
 
 PREBUILT = Path(__file__).parents[1] / "prebuilt"  # one folder a platform in a wheel; missing in a checkout
+_MAX_WRITING = 3600.0  # s; no process writes a library for so long
 _MACHINE = {"amd64": "x86_64", "arm64": "aarch64"}
 _SYSTEM = {"win32": "windows"}
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
@@ -164,6 +165,7 @@ def keep(built: Path, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         if not _is_trusted(folder):
             return built
+        _remove_old_parts(folder)
         library = built.read_bytes()
         _write_atomic(checksum_path(kept), digest_of(library).encode())
         _write_atomic(kept, library)
@@ -171,6 +173,14 @@ def keep(built: Path, folder: Path) -> Path:
         log.warning("cache %s: %s; compiled for this process alone", folder, error.strerror or error)
         return built
     return kept
+
+
+def _remove_old_parts(folder: Path) -> None:
+    """Remove what processes that were killed while they wrote have left in the cache, which only its user can write."""
+    for part in folder.glob(".*.part"):
+        with contextlib.suppress(OSError):
+            if time.time() - part.stat().st_mtime > _MAX_WRITING:
+                part.unlink()
 
 
 def _write_atomic(path: Path, data: bytes) -> None:

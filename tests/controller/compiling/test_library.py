@@ -4,6 +4,7 @@ import ctypes
 import os
 import subprocess
 import sys
+import time
 
 import pytest
 
@@ -136,3 +137,15 @@ def test_processes_that_compile_the_same_at_once_leave_one_whole_library(cache):
     (path,) = cache.glob("*.so")
     assert ctypes.CDLL(str(path)).answer() == 42 and library.is_whole(path)
     assert len(list(cache.iterdir())) == 2
+
+
+@pytest.mark.medium
+def test_what_a_killed_process_left_in_the_cache_is_removed_once_it_is_old(cache):
+    answer()
+    for name, age in (("old", 2.0), ("young", 0.5)):
+        part = cache / f".{name}.part"
+        part.write_bytes(b"half")
+        then = time.time() - age * library._MAX_WRITING
+        os.utime(part, (then, then))
+    answer(TEXT.replace("42", "43"))
+    assert [path.name for path in cache.glob(".*")] == [".young.part"]
