@@ -93,8 +93,8 @@ class RunFolder:
         if self._has_record():
             return f"the rows that were written are kept, and `cosim report {quote(str(self.path))}` reads them"
         if self._has_commands():
-            scenario, commands = (quote(str(self.path / name)) for name in (SCENARIO, COMMANDS_LOG))
-            return f"no row is kept, but `cosim run {scenario} --replay-commands {commands}` repeats the run"
+            command = f"cd {quote(str(self.path))} && cosim run {SCENARIO} --replay-commands {COMMANDS_LOG}"
+            return f"no row is kept, but `{command}` repeats the run"
         return "nothing of the run is kept"
 
     def _has_record(self) -> bool:

@@ -76,6 +76,7 @@ def fill_disk_at_each_call(folder, command):
 
 
 @needs_faults
+@pytest.mark.timeout(1200)
 @pytest.mark.slow
 @pytest.mark.parametrize("command", WORDS.values(), ids=WORDS)
 def test_full_disk_is_one_line_that_names_the_place(tmp_path, command):
