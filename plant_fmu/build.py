@@ -15,7 +15,7 @@ from pathlib import Path
 import fmpy
 import platformdirs
 
-from plant_fmu.archive import require_place, write_archive
+from plant_fmu.archive import require_place, temporary_folder, write_archive
 from plant_fmu.compiling import webassembly
 from plant_fmu.compiling.compiler import FLAGS, cross_compiler, find_compiler
 from plant_fmu.compiling.libraries import compiled_libraries, digest
@@ -26,7 +26,6 @@ from plant_fmu.compiling.universal import universal_library
 from plant_fmu.component import Component
 from plant_fmu.description import model_description, token
 from plant_fmu.errors import BuildError
-from plant_fmu.temporary import temporary_folder
 from plant_fmu.vehicle import Vehicle
 from plant_fmu.vehicle_component import of_vehicle
 

@@ -40,10 +40,10 @@ from cosim.scenario.vehicle_model import vehicle_model
 from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, pack_inputs, write_arbiter_state
 from cosim.simulation.compiled_rules import rules_text
 from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluate_places
+from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
 from plant_fmu.running.native import Native
-from plant_fmu.temporary import temporary_folder
 from plant_fmu.vehicle import load_vehicle
 
 _VEHICLE = "bluerov2_heavy"  # the functions do not depend on the vehicle

@@ -32,7 +32,7 @@ def add_verb(verbs: Any) -> None:
 def scenes(options: argparse.Namespace) -> int:
     """Run ``cosim scenes``."""
     from cosim.campaigns.scenes.generator import generate_scenes
-    from plant_fmu.temporary import atomic_file
+    from plant_fmu.archive import atomic_file
 
     lines = generate_scenes(options.count, options.seed, options.kind)
     if options.out is None:

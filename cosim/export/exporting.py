@@ -10,8 +10,8 @@ from cosim.export.excerpt import excerpt_of
 from cosim.export.formats import FORMATS
 from cosim.results.record import RECORD
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY
+from plant_fmu.archive import temporary_folder
 from plant_fmu.installing import install_hint
-from plant_fmu.temporary import temporary_folder
 
 # formats of earlier versions, and what replaces them
 _REMOVED = {

@@ -11,7 +11,7 @@ from cosim.identification.log import UNITS
 from cosim.identification.posterior import posterior_lines
 from cosim.io.atomic_file import reason, write_together
 from cosim.report.web_page import Html, Page, code, inline_figure, number
-from plant_fmu.temporary import temporary_folder
+from plant_fmu.archive import temporary_folder
 from plant_fmu.vehicle import load_vehicle
 
 

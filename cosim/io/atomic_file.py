@@ -7,7 +7,7 @@ import os
 from collections.abc import Mapping
 from pathlib import Path
 
-from plant_fmu.temporary import atomic_file
+from plant_fmu.archive import atomic_file
 
 
 def write_atomic(path: Path, content: bytes | str) -> Path:
@@ -28,7 +28,7 @@ def write_atomic(path: Path, content: bytes | str) -> Path:
     Raises
     ------
     OSError
-        If the file cannot be written, as for `plant_fmu.temporary.atomic_file`.
+        If the file cannot be written, as for `plant_fmu.archive.atomic_file`.
     """
     with atomic_file(path) as file:
         file.write(content.encode() if isinstance(content, str) else content)

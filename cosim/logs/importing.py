@@ -34,9 +34,9 @@ from cosim.scenario.scenario import Scenario, load_scenario, validate_scenario
 from cosim.simulation.columns import columns_without_plant
 from cosim.simulation.signals import Array, Column
 from plant_fmu import Vehicle, load_vehicle
+from plant_fmu.archive import temporary_folder
 from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
-from plant_fmu.temporary import temporary_folder
 
 _KEPT = ("goal", "regions", "criteria", "arbiter", "intersection", "title")  # keys of a scenario that apply to a log
 _MIN_ROWS, _ROWS_PER_SAMPLE = 500_000, 200  # rows that a log may have: some, and for each of its samples

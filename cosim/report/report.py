@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from cosim.report.contents import contents_of
 from cosim.results.run_result import REPORT, Run
-from plant_fmu.temporary import temporary_folder
+from plant_fmu.archive import temporary_folder
 
 if TYPE_CHECKING:  # see write_report
     from cosim.report.figures.style import FigureData

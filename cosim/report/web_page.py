@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.report.inline_svg import inline_svg
 from cosim.report.report import FIGURES
-from plant_fmu.temporary import temporary_folder
+from plant_fmu.archive import temporary_folder
 
 if TYPE_CHECKING:  # importing Matplotlib takes as long as all other imports together
     from cosim.report.figures.style import NamedFigure

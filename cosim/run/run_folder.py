@@ -22,7 +22,7 @@ from cosim.results.record import PARTS, RECORD, part_files, require_utf8
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
-from plant_fmu.temporary import is_temporary, temporary_folder
+from plant_fmu.archive import is_temporary, temporary_folder
 
 _MADE = frozenset(
     {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, PARTS, SUMMARY, REPORT, REPLAY, FIGURES}

@@ -17,12 +17,11 @@ from cosim.ssp.variable_groups import osp_model_description
 from fuzzy_arbiter import ArbiterError
 from fuzzy_arbiter.export import to_c
 from plant_fmu import build_fmu
-from plant_fmu.archive import require_place, write_archive
+from plant_fmu.archive import require_place, temporary_folder, write_archive
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import NATIVE
 from plant_fmu.component import Component
 from plant_fmu.contents.parameter_set import parameter_set
-from plant_fmu.temporary import temporary_folder
 from plant_fmu.variables import AXES, FORCES, VELOCITIES
 from plant_fmu.vehicle_component import of_vehicle
 

@@ -13,10 +13,10 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
+from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.platforms import Platform, native_platform
 from plant_fmu.errors import BuildError
 from plant_fmu.installing import install_hint
-from plant_fmu.temporary import temporary_folder
 
 log = logging.getLogger(__name__)
 

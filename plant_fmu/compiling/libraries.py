@@ -9,11 +9,11 @@ from pathlib import Path
 
 import fmpy
 
+from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import FLAGS, compile_library
 from plant_fmu.compiling.platforms import Platform
 from plant_fmu.compiling.sources import c_sources, compiled_files, header
 from plant_fmu.component import Component
-from plant_fmu.temporary import temporary_folder
 
 FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
 _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)

@@ -9,6 +9,7 @@ from importlib import resources
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
+from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import FLAGS, cross_compiler, run_compiler
 from plant_fmu.compiling.component_model import DRAFT, FOLDER, PLATFORM, wit
 from plant_fmu.compiling.libraries import FMI_HEADERS
@@ -18,7 +19,6 @@ from plant_fmu.component import Component
 from plant_fmu.errors import BuildError
 from plant_fmu.installing import install_hint
 from plant_fmu.markup import xml_text
-from plant_fmu.temporary import temporary_folder
 
 _TARGET = Platform("wasm", (), "wasm32-wasi", ".wasm")
 _WITHOUT = ("-fPIC", "-shared")  # a module is loaded once, at one place

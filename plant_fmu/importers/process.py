@@ -10,11 +10,11 @@ import sys
 from dataclasses import asdict
 from pathlib import Path
 
+from plant_fmu.archive import temporary_folder
 from plant_fmu.importers.fmu_file import FmuFile
 from plant_fmu.importers.registry import Importer
 from plant_fmu.importers.task import Result, Task
 from plant_fmu.installing import install_hint
-from plant_fmu.temporary import temporary_folder
 
 TIMEOUT = 120.0  # s, time limit of a task in an importer
 

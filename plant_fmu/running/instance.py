@@ -19,9 +19,8 @@ from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi2 import defaultCallbacks as default_callbacks
 from fmpy.fmi3 import FMU3Slave
 
-from plant_fmu.archive import archive_of
+from plant_fmu.archive import archive_of, temporary_folder
 from plant_fmu.errors import FmuFileError, PlantError
-from plant_fmu.temporary import temporary_folder
 from plant_fmu.unpacking import DESCRIPTION, library_names, unpack
 
 log = logging.getLogger(__name__)

@@ -10,14 +10,14 @@ from pathlib import Path
 
 import pytest
 
-from plant_fmu.temporary import _MIN_AGE, atomic_file, is_temporary, temporary_folder
+from plant_fmu.archive import _MIN_AGE, atomic_file, is_temporary, temporary_folder
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="needs locks of folders")
 
 _HOLD = """
 import sys, time
 from pathlib import Path
-from plant_fmu.temporary import atomic_file, temporary_folder
+from plant_fmu.archive import atomic_file, temporary_folder
 place = Path(sys.argv[1])
 with temporary_folder("work-", place) as folder, atomic_file(place / "it.csv") as file:
     (folder / "some.bin").write_bytes(b"x")

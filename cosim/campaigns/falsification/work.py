@@ -25,7 +25,7 @@ from cosim.campaigns.sweeps.rows import SweepBatch, SweepWork
 from cosim.campaigns.workers.work import Rows
 from cosim.errors import RunError
 from cosim.scenario.scenario import Scenario
-from plant_fmu.temporary import temporary_folder
+from plant_fmu.archive import temporary_folder
 from plant_fmu.toml_tables import hint
 
 Objective = Literal["clearance", "violation", "arrival"]

@@ -18,7 +18,7 @@ from cosim.report.web_page import Html, Page, link
 from cosim.results.run_result import REPLAY, load_run
 from cosim.run.run import run_scenario
 from plant_fmu import PlantError
-from plant_fmu.temporary import temporary_folder
+from plant_fmu.archive import temporary_folder
 
 WORST = "worst"  # folder of the replays
 _FLOWN = "flown.json"  # file beside a replay with remarks on differing flights

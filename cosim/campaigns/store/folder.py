@@ -19,7 +19,7 @@ from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.format_number import FORMAT, require_format
 from cosim.io.strict_json import read_json
-from plant_fmu.temporary import is_temporary
+from plant_fmu.archive import is_temporary
 
 PLAN = "campaign.json"
 RESULTS = "results.parquet"

@@ -16,7 +16,7 @@ import pyarrow.parquet as pq
 
 from cosim.campaigns.workers.work import Rows
 from cosim.errors import RunError
-from plant_fmu.temporary import atomic_file
+from plant_fmu.archive import atomic_file
 
 log = logging.getLogger(__name__)
 

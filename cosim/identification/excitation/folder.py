@@ -18,7 +18,7 @@ from cosim.identification.fit import STAGES
 from cosim.io.atomic_file import write_atomic
 from cosim.report.web_page import Html, Page, inline_figure, number
 from cosim.scenario.scenario import VEHICLE_COPY
-from plant_fmu.temporary import temporary_folder
+from plant_fmu.archive import temporary_folder
 
 SCENARIO, COMMANDS, STICKS, PAGE = "excite.toml", "commands.jsonl", "sticks.csv", "excite.html"
 _AXES = ("surge", "sway", "heave", "roll", "pitch", "yaw")

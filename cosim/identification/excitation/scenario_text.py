@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from cosim.scenario.scenario import Scenario, load_scenario
-from plant_fmu.temporary import temporary_folder
+from plant_fmu.archive import temporary_folder
 
 ROW = 0.05  # s, period of the record's rows and of the law
 

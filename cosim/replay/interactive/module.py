@@ -12,12 +12,12 @@ from cosim.replay.interactive.flight import Flight
 from cosim.replay.interactive.sources import flight_sources
 from cosim.scenario.scenario import Scenario
 from cosim.ssp.memory import Memory
+from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import FLAGS
 from plant_fmu.compiling.libraries import digest
 from plant_fmu.compiling.sources import c_sources, header
 from plant_fmu.compiling.webassembly import module
 from plant_fmu.description import token
-from plant_fmu.temporary import temporary_folder
 from plant_fmu.vehicle_component import of_vehicle
 
 
