@@ -25,12 +25,18 @@ import platformdirs
 
 from controller.compiling.compiler import FLAGS, compile_file
 
+try:
+    import fcntl
+except ModuleNotFoundError:  # on Windows
+    fcntl = None  # type: ignore[assignment]
+
 log = logging.getLogger(__name__)
 first_use = logging.getLogger("controller.compiling.first_use")  # logs at INFO before something is compiled
 first_use.propagate = False  # only for listeners by its name
 
 PREBUILT = Path(__file__).parents[1] / "prebuilt"  # one folder a platform in a wheel; missing in a checkout
 _MAX_WRITING = 3600.0  # s; no process writes a library for so long
+_OWN = "subreach-functions-"  # beginning of the name of a process's temporary folder
 _MACHINE = {"amd64": "x86_64", "arm64": "aarch64"}
 _SYSTEM = {"win32": "windows"}
 _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
@@ -197,7 +203,26 @@ def _write_atomic(path: Path, data: bytes) -> None:
 
 @functools.cache
 def _own_folder() -> Path:
-    """Return a temporary folder that is removed with the process."""
-    folder = tempfile.mkdtemp(prefix="subreach-")
+    """Return a temporary folder that is removed with the process, or by a later one if the process is killed."""
+    _remove_abandoned(Path(tempfile.gettempdir()))
+    folder = tempfile.mkdtemp(prefix=_OWN)
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    if fcntl is not None:  # the lock ends with the process, however it ends
+        fcntl.flock(os.open(folder, os.O_RDONLY), fcntl.LOCK_SH)
     return Path(folder)
+
+
+def _remove_abandoned(parent: Path) -> None:
+    """Remove the folders of killed processes of this user."""
+    if fcntl is None:
+        return
+    for folder in parent.glob(f"{_OWN}*"):
+        with contextlib.suppress(OSError):  # in use, or another process removes it
+            descriptor = os.open(folder, os.O_RDONLY | os.O_NOFOLLOW | os.O_DIRECTORY)
+            try:
+                about = os.fstat(descriptor)
+                if about.st_uid == os.geteuid() and time.time() - about.st_mtime > _MAX_WRITING:
+                    fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    shutil.rmtree(folder, ignore_errors=True)
+            finally:
+                os.close(descriptor)

@@ -7,7 +7,6 @@ import functools
 import hashlib
 import os
 import subprocess
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 
 from controller.compiling.library import is_whole, keep
 from cosim.errors import IdentificationError
+from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import FLAGS, compile_library, find_compiler
 from plant_fmu.compiling.platforms import native_platform
 from plant_fmu.compiling.sources import c_sources, header
@@ -201,8 +201,7 @@ def load_tuned_library(
     path = Path(platformdirs.user_cache_dir("subreach")) / "shooting" / name
     if is_whole(path):
         return ctypes.CDLL(str(path))
-    with tempfile.TemporaryDirectory(prefix="shooting-", ignore_cleanup_errors=True) as scratch:
-        folder = Path(scratch)
+    with temporary_folder("subreach-shooting-") as folder:
         for file, text in files.items():
             (folder / file).write_bytes(text)
         built = folder / name

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 
@@ -149,3 +150,32 @@ def test_what_a_killed_process_left_in_the_cache_is_removed_once_it_is_old(cache
         os.utime(part, (then, then))
     answer(TEXT.replace("42", "43"))
     assert [path.name for path in cache.glob(".*")] == [".young.part"]
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such locks")
+@pytest.mark.parametrize("killed", [True, False])
+def test_temporary_folder_of_a_killed_process_is_removed_by_a_later_one(tmp_path, killed):
+    """Once it is old; that of a process which still runs, and folders of others, stay."""
+    environment = os.environ | {"TMPDIR": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    script = "from controller.compiling.library import _own_folder; print(_own_folder(), flush=True); input()"
+
+    def begin():
+        process = subprocess.Popen(
+            [sys.executable, "-c", script], env=environment, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        return process, Path(process.stdout.readline().strip())
+
+    first, folder = begin()
+    other = tmp_path / "subreach-other"
+    other.mkdir()
+    if killed:
+        first.kill()
+        first.communicate(timeout=60)
+    long_ago = time.time() - 2.0 * library._MAX_WRITING
+    for path in (folder, other):
+        os.utime(path, (long_ago, long_ago))
+    second, own = begin()
+    assert folder.exists() is not killed and other.exists() and own.exists()
+    for process in (first, second)[killed:]:
+        process.communicate("\n", timeout=60)
+    assert not own.exists() and not folder.exists()
