@@ -346,7 +346,7 @@ def test_ineffective_thruster_is_isolated_without_an_estimate_jump():
     estimate.covariance[EFFECTIVENESS + 5, EFFECTIVENESS + 5] = 0.02**2
     estimate.misfit[0] = 5.0  # the model does not fit
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
-    estimate.misfit[0], estimate.state[EFFECTIVENESS : EFFECTIVENESS + 5] = 0.8, 0.3  # all thrusters seem weak
+    estimate.misfit[0], estimate.state[EFFECTIVENESS : EFFECTIVENESS + 5] = 0.8, 0.1  # all thrusters seem weak
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
     estimate.state[EFFECTIVENESS : EFFECTIVENESS + 5] = 0.95
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == 5
