@@ -43,4 +43,5 @@ def command_for(force: float, limit: float, ceiling: float, spread: float) -> fl
         return force
     if 2.0 * excess >= most - least:
         return sign * most
-    return sign * (most - (most - least) * np.sqrt(1.0 - 2.0 * excess / (most - least)))
+    command: float = sign * (most - (most - least) * np.sqrt(1.0 - 2.0 * excess / (most - least)))
+    return command
