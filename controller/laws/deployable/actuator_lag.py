@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from controller.arithmetic import exponential, length3
 from controller.laws.deployable.attitude import integrate_attitude
-from controller.laws.deployable.estimate import LAG, Estimate
+from controller.laws.deployable.estimate import EFFECTIVENESS, LAG, Estimate
 from controller.laws.deployable.model import Thrusters
+from controller.laws.deployable.thrust_limit import limited_force
 
 Array = NDArray[np.float64]
 
@@ -36,8 +37,20 @@ def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> No
     remains, average = _of_lag(lag, period)
     remains_least, average_least = _of_lag(least, period)
     remains_most, average_most = _of_lag(most, period)
-    for j in range(thrusters.forces.size):
-        commanded = thrusters.forces[j] if np.isnan(thrusters.stuck[j]) else thrusters.stuck[j]
+    m, by_ceiling = thrusters.forces.size, estimate.by_ceiling
+    for j in range(m):
+        commanded, slope, k = thrusters.stuck[j], 0.0, EFFECTIVENESS + m + j
+        if np.isnan(commanded):
+            limit = thrusters.nominal_upper[j] if thrusters.forces[j] > 0.0 else thrusters.nominal_lower[j]
+            spread = np.sqrt(estimate.covariance[k, k])
+            commanded, slope = limited_force(thrusters.forces[j], limit, estimate.state[k], spread)
+        change = by_ceiling[1, j] * (estimate.state[k] - by_ceiling[2, j])
+        by_ceiling[2, j] = estimate.state[k]
+        now[j] += change
+        bracket[0, j] += change
+        bracket[1, j] += change
+        by_ceiling[0, j] = slope + average * (by_ceiling[1, j] - slope)
+        by_ceiling[1, j] = slope + remains * (by_ceiling[1, j] - slope)
         # deviation from the command, if the lag had always been the present estimate
         behind = _between(bracket[0, j], now[j], bracket[1, j], lags, lag) - commanded
         behind_least = _between(bracket[0, j], now[j], bracket[1, j], lags, least) - commanded

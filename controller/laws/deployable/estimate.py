@@ -25,18 +25,20 @@ _GRAVITY = 9.81  # m/s2
 # m, initial standard deviations: height of the center of gravity; lever arm of the weight in the restoring moments
 _FIRST_HEIGHT, _FIRST_ARM = 0.05, 0.15
 _FIRST_EFFECTIVENESS, _FIRST_COMMON = 0.12, 0.12  # initial standard deviations: of each thruster alone; common to all
+_FIRST_CEILING, _FIRST_COMMON_CEILING = 0.12, 0.2  # the same of the ceilings: a battery that sags weakens all
 _FIRST_LAG = 0.3  # s, initial lag and its standard deviation if the vehicle's own is 0
 _KNOWN_LAG = 1e-6  # s, standard deviation of a lag that is not estimated
-_GREATEST_EFFECTIVENESS = 1.1  # upper bound of an estimated effectiveness
+_GREATEST_EFFECTIVENESS = 1.1  # upper bound of an estimated effectiveness, and of a ceiling
+_LEAST_CEILING = 0.3  # lower bound of an estimated ceiling
 
 
 class Estimate(NamedTuple):
     """State and covariance of the filter, and the parts that other modules read."""
 
-    first_state: Array  # (14 + m,) state before the first measurement
-    first_covariance: Array  # (14 + m, 14 + m) covariance before the first measurement
-    state: Array  # (14 + m,) in the order of `observer`; SI, NED, moments in body axes
-    covariance: Array  # (14 + m, 14 + m) covariance of the state
+    first_state: Array  # (14 + 2 m,) state before the first measurement
+    first_covariance: Array  # (14 + 2 m, 14 + 2 m) covariance before the first measurement
+    state: Array  # (14 + 2 m,) in the order of `observer`; SI, NED, moments in body axes
+    covariance: Array  # (14 + 2 m, 14 + 2 m) covariance of the state
     position: Array  # (3,) m, NED
     velocity: Array  # (3,) m/s over ground, NED
     water_velocity: Array  # (3,) m/s, NED; its down component is 0
@@ -55,33 +57,40 @@ class Estimate(NamedTuple):
     bracket: Array  # (2, m) N, forces at the end of the period, for the least and the greatest of `lags`
     by_lag: Array  # (m,) N/s, secant of the acting forces between the least and the greatest of `lags`
     curvature: Array  # (m,) N, difference of the acting forces from that secant
-    transition: Array  # (3, 14 + m) derivative of the next velocity by the state
-    product: Array  # (3, 14 + m) transition times covariance
-    row: Array  # (14 + m,) derivative of a measured number by the state
-    gain: Array  # (14 + m,) Kalman gain of a measured number
-    deviation: Array  # (2 m, 14 + m) true state less estimate by each hypothesis: j, thruster j is lost; m + j, stuck
+    # (3, m) N, by the ceiling: derivative of the acting forces; of those at the end of the period; (-) the ceilings
+    # of these forces
+    by_ceiling: Array
+    transition: Array  # (3, 14 + 2 m) derivative of the next velocity by the state
+    product: Array  # (3, 14 + 2 m) transition times covariance
+    row: Array  # (14 + 2 m,) derivative of a measured number by the state
+    gain: Array  # (14 + 2 m,) Kalman gain of a measured number
+    deviation: Array  # (2 m, 14 + 2 m) true state less estimate by each hypothesis: j, thruster j is lost; m + j, stuck
     supposed: Array  # (2, m) hypothesis of a stuck thruster: its effectiveness; its force [N] at effectiveness 1
     missing: Array  # (m,) N, difference of a stuck thruster's force from the expected one
     direct: Array  # (2 m,) direct effect of the missing force on the last measured number
     # (2, 2 m) of the last measurements, divided by variances: innovations times those that each hypothesis expects;
     # the expected ones squared
     evidence: Array
+    bias: Array  # (9,) low-passed innovations over their standard deviations: of moments, position, velocity
+    misfit: Array  # (1,) mean square of `bias`, smoothed, relative to that of a model that fits
 
 
 def make_estimate(vehicle: VehicleModel) -> Estimate:
     """Return the estimate before the first measurement."""
     mass, m = vehicle.rigid_mass[0, 0], vehicle.thruster_matrix.shape[1]
-    mass_scale, n = max(mass / _LIGHT, 1.0), EFFECTIVENESS + m
+    mass_scale, n = max(mass / _LIGHT, 1.0), EFFECTIVENESS + 2 * m
     state, deviations = np.zeros(n), np.zeros(n)
     lag = float(np.mean(vehicle.thrust_time_constant)) or _FIRST_LAG
-    state[EFFECTIVENESS:], state[LAG] = 0.95, lag
+    state[EFFECTIVENESS : EFFECTIVENESS + m], state[EFFECTIVENESS + m :], state[LAG] = 0.95, 1.0, lag
     deviations[CURRENT:NET_WEIGHT] = _FIRST_CURRENT
     deviations[NET_WEIGHT] = _FIRST_RESTORING * mass_scale
     deviations[MOMENTS:HEIGHT] = _FIRST_ARM * _GRAVITY * mass
     deviations[HEIGHT], deviations[LAG] = _FIRST_HEIGHT, lag
-    deviations[EFFECTIVENESS:] = _FIRST_EFFECTIVENESS
+    deviations[EFFECTIVENESS : EFFECTIVENESS + m] = _FIRST_EFFECTIVENESS
+    deviations[EFFECTIVENESS + m :] = _FIRST_CEILING
     covariance = np.diag(deviations**2)
-    covariance[EFFECTIVENESS:, EFFECTIVENESS:] += _FIRST_COMMON**2
+    covariance[EFFECTIVENESS : EFFECTIVENESS + m, EFFECTIVENESS : EFFECTIVENESS + m] += _FIRST_COMMON**2
+    covariance[EFFECTIVENESS + m :, EFFECTIVENESS + m :] += _FIRST_COMMON_CEILING**2
     return Estimate(
         first_state=state,
         first_covariance=covariance,
@@ -105,6 +114,7 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
         bracket=np.zeros((2, m)),
         by_lag=np.zeros(m),
         curvature=np.zeros(m),
+        by_ceiling=np.vstack([np.zeros((2, m)), np.ones(m)]),
         transition=np.zeros((3, n)),
         product=np.zeros((3, n)),
         row=np.zeros(n),
@@ -114,6 +124,8 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
         missing=np.zeros(m),
         direct=np.zeros(2 * m),
         evidence=np.zeros((2, 2 * m)),
+        bias=np.zeros(9),
+        misfit=np.ones(1),
     )
 
 
@@ -199,8 +211,10 @@ def project(estimate: Estimate, gains: DeployableGains) -> None:
         _bound(estimate, i, -bound, bound)
     for i in range(CURRENT, NET_WEIGHT):
         _bound(estimate, i, -gains.current_bound, gains.current_bound)
-    for i in range(EFFECTIVENESS, estimate.state.size):
-        _bound(estimate, i, 0.0, _GREATEST_EFFECTIVENESS)
+    m = estimate.missing.size
+    for j in range(m):
+        _bound(estimate, EFFECTIVENESS + j, 0.0, _GREATEST_EFFECTIVENESS)
+        _bound(estimate, EFFECTIVENESS + m + j, _LEAST_CEILING, _GREATEST_EFFECTIVENESS)
     _bound(estimate, LAG, 0.0, gains.lag_bound)
     publish(estimate)
 

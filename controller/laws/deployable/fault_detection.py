@@ -10,6 +10,9 @@ A moment or a velocity that can have other causes has little weight, since the c
 them: an uncertain effectiveness or lag, unknown restoring moments, W - B, current, the height of the center of gravity.
 So a thruster that fails at low thrust is detected when it is used.
 
+While the innovations are biased, the model does not fit, and evidence counts less: by the square of their misfit. A
+thruster that saturates does not count as failed, since its true limit is estimated (`thrust_limit`).
+
 A thruster has failed if its sum exceeds the threshold, and that of every other thruster by a lead. By the likeliest
 loss it is kept with its remaining effectiveness, or isolated. The deviation is added to the state. A thruster isolated
 by a narrow lead is tried again, once, when another one is isolated. If several are isolated, one of them may be a false
@@ -34,6 +37,7 @@ Array = NDArray[np.float64]
 _MOST_A_STEP = 3.0  # limit of the log-likelihood ratio per step, so that no single outlier decides
 _LOSS = 0.6  # fraction of force that the hypothesis of a loss assumes lost: close enough to both a half and all
 _USEFUL = 0.15  # effectiveness below which a thruster is isolated
+_FITTING = 0.5  # mean effectiveness below which that is less in proportion: then the model does not fit
 _SPREADS = 3.0  # number of standard deviations by which an estimate must be below that
 _LEAD = 8.0  # least lead of the log-likelihood ratio of the likeliest thruster over the next
 _STUCK_SPREAD = 0.5  # standard deviation of a stuck thruster's force, as a fraction of that force
@@ -112,9 +116,13 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
             return -1
         _isolate(fault_state, estimate, thrusters, at, force)
         return at
+    usual = 0.0  # mean effectiveness
     for j in range(m):
-        spread = np.sqrt(estimate.covariance[EFFECTIVENESS + j, EFFECTIVENESS + j])
-        if thrusters.health[j] > 0.0 and x[EFFECTIVENESS + j] + _SPREADS * spread < _USEFUL:
+        usual += x[EFFECTIVENESS + j] / m
+    useful = _USEFUL * min(usual / _FITTING, 1.0)
+    for j in range(m):
+        spread = max(estimate.misfit[0], 1.0) * np.sqrt(estimate.covariance[EFFECTIVENESS + j, EFFECTIVENESS + j])
+        if thrusters.health[j] > 0.0 and x[EFFECTIVENESS + j] + _SPREADS * spread < useful:
             fault_state.tentative[j] += 1
             _isolate(fault_state, estimate, thrusters, j, np.nan)
             return j
@@ -170,7 +178,8 @@ def _likelier(fault_state: FaultState, j: int, m: int) -> int:
 
 def _add_evidence(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, j: int, hypothesis: int) -> None:
     """Add the evidence of the last measurements for a hypothesis about thruster j."""
-    innovations, squares = estimate.evidence[0, hypothesis], estimate.evidence[1, hypothesis]
+    weight = 1.0 / square(max(estimate.misfit[0], 1.0))
+    innovations, squares = weight * estimate.evidence[0, hypothesis], weight * estimate.evidence[1, hypothesis]
     loss = _LOSS if hypothesis == j else 1.0
     step = loss * innovations - 0.5 * square(loss) * squares
     fault_state.ratio[hypothesis] += min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
@@ -205,6 +214,8 @@ def _isolate(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, 
             thrusters.health[j], thrusters.stuck[j] = 1.0, np.nan
             set_effectiveness(estimate, j, 1.0)
     fault_state.waited[0] = 0.0
+    estimate.bias[:] = 0.0
+    estimate.misfit[0] = 1.0
     thrusters.health[failed], thrusters.stuck[failed] = 0.0, force
     set_effectiveness(estimate, failed, 0.0 if np.isnan(force) else 1.0)
     if not np.isnan(force):  # the force is uncertain, and may be zero

@@ -69,6 +69,7 @@ _SEED = 1  # seed of the path planner's random numbers
 _ON_THE_WAY = 0.3  # m/s, desired speed from which soft regions do not push the vehicle back at all
 _SHALLOWEST = 1e-3  # m, lower bound of the depth in the goal region at which they push back in full again
 _LEAST_EFFECTIVENESS = 0.5  # effectiveness below which the desired force of a thruster is reduced in proportion
+_LEAST_SHARE = 0.4  # least share of the desired force, so that a thruster is not kept within its dead band
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 
 
@@ -175,7 +176,7 @@ def step(
         work.nominal[j] = 0.0
         for k in range(6):
             work.nominal[j] += thrusters.allocator[j, k] * wrench[k]
-        work.nominal[j] *= min(thrusters.effectiveness[j] / _LEAST_EFFECTIVENESS, 1.0)
+        work.nominal[j] *= min(max(thrusters.effectiveness[j] / _LEAST_EFFECTIVENESS, _LEAST_SHARE), 1.0)
     lower, upper = memory.given_limits[0], memory.given_limits[1]
     model.write_given_limits(thrusters, memory.given_limits)
 

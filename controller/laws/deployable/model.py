@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.law import VehicleModel
+from controller.laws.deployable.thrust_limit import command_for, limited_force
 from controller.linear_algebra import invert_symmetric, product
 from controller.stack_array import zeros
 
@@ -47,6 +48,7 @@ class Thrusters(NamedTuple):
     health: Array  # (m,) 1 working, 0 failed
     stuck: Array  # (m,) N, constant force of a stuck thruster; NaN for all others
     effectiveness: Array  # (m,) estimated ratio of each thruster's force to the commanded one
+    ceiling: Array  # (2, m) estimated true limits, as a fraction of the nominal ones, and their standard deviations
     forces: Array  # (m,) N, commanded forces of the last period
     acting: Array  # (m,) N, mean forces behind the lag over that period
     acting_now: Array  # (m,) N, forces behind the lag at its end
@@ -111,6 +113,7 @@ def make_thrusters(vehicle: VehicleModel) -> Thrusters:
         health=np.ones(m),
         stuck=np.full(m, np.nan),
         effectiveness=np.ones(m),
+        ceiling=np.vstack([np.full(m, 2.0), np.zeros(m)]),
         forces=np.zeros(m),
         acting=np.zeros(m),
         acting_now=np.zeros(m),
@@ -278,8 +281,11 @@ def write_given_limits(thrusters: Thrusters, limits: Array) -> None:
             thrusters.lower[j] = thrusters.upper[j] = thrusters.stuck[j] * thrusters.effectiveness[j]
             limits[0, j] = limits[1, j] = thrusters.lower[j]
         else:
-            limits[0, j] = thrusters.lower[j] * thrusters.effectiveness[j]
-            limits[1, j] = thrusters.upper[j] * thrusters.effectiveness[j]
+            ceiling, spread = thrusters.ceiling[0, j], thrusters.ceiling[1, j]
+            least, _ = limited_force(thrusters.lower[j], thrusters.nominal_lower[j], ceiling, spread)
+            most, _ = limited_force(thrusters.upper[j], thrusters.nominal_upper[j], ceiling, spread)
+            limits[0, j] = least * thrusters.effectiveness[j]
+            limits[1, j] = most * thrusters.effectiveness[j]
 
 
 def command_forces(thrusters: Thrusters, forces: Array) -> None:
@@ -291,7 +297,10 @@ def command_forces(thrusters: Thrusters, forces: Array) -> None:
         if not np.isnan(thrusters.stuck[j]):
             forces[j] = 0.0
         elif thrusters.effectiveness[j] > 0.0:
-            forces[j] = min(max(forces[j] / thrusters.effectiveness[j], thrusters.lower[j]), thrusters.upper[j])
+            limit = thrusters.nominal_upper[j] if forces[j] > 0.0 else thrusters.nominal_lower[j]
+            needed = forces[j] / thrusters.effectiveness[j]
+            command = command_for(needed, limit, thrusters.ceiling[0, j], thrusters.ceiling[1, j])
+            forces[j] = min(max(command, thrusters.lower[j]), thrusters.upper[j])
 
 
 def smallest(values: Array) -> float:
@@ -307,12 +316,14 @@ def available_braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
 
     Each further failure halves it, which is a rule of thumb.
     """
-    worst, lost = smallest(dynamics.braking), 0
+    worst, lost, ceiling = smallest(dynamics.braking), 0, 1.0
     for j in range(thrusters.health.size):
         if thrusters.health[j] == 0.0:
             worst = dynamics.braking[j] if lost == 0 else 0.5 * min(worst, dynamics.braking[j])
             lost += 1
-    return worst
+        else:
+            ceiling = min(ceiling, thrusters.ceiling[0, j])
+    return ceiling * worst
 
 
 def thrust_acceleration(dynamics: Dynamics, thrusters: Thrusters, R: Array, forces: Array, out: Array) -> None:

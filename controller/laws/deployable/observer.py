@@ -1,11 +1,12 @@
 """Observer: one Kalman filter of the motion and of all unknown parameters that affect it.
 
 The states: position (3), velocity over ground (3), current (2), W - B, the restoring moments phi_2..phi_4 of (12),
-height of the center of gravity below the origin, lag of the thrusters, and the effectiveness of each. The prediction is
-the model (11) with its coupled mass matrix, under the commanded forces within their limits behind the lag, so that a
-saturated thruster causes no wind-up. The states are corrected by the moment from measured rates, and by measured
-position and velocity. A joint filter attributes each effect to the right state; `fault_detection` tests its hypotheses
-by the innovations of the same filter. Projection keeps current, W - B, moments, lag and effectiveness in bounds.
+height of the center of gravity below the origin, lag of the thrusters, effectiveness and ceiling (`thrust_limit`) of
+each. The prediction is the model (11) with its coupled mass matrix, under the commanded forces within their estimated
+limits behind the lag, so that a saturated thruster causes no wind-up. The states are corrected by the moment from
+measured rates, and by measured position and velocity. A joint filter attributes each effect to the right state;
+`fault_detection` tests its hypotheses by the innovations of the same filter. Projection keeps all but position,
+velocity and height in bounds.
 """
 
 from __future__ import annotations
@@ -39,9 +40,14 @@ _UNMODELLED = 0.03  # m/s2/sqrt(Hz), acceleration noise of the model
 _SLOWEST = 0.15  # m/s against the water, least speed at which drag is linearized
 _GATE = 6.0  # number of standard deviations beyond which a measurement is rejected
 _ANGULAR = 0.019  # rad/s2/sqrt(Hz), angular acceleration noise of the model
+_BIAS_SHARE = 0.06  # weight of one innovation in the low-passed ones: 0.3 s at 50 Hz
+_USUAL_BIAS = 0.02  # mean square of the low-passed innovations of a model that fits
+_MISFIT_MEMORY = 3.0  # s, time constant of the misfit
+_GREATEST_MISFIT = 8.0  # limit of what is averaged, so that a failure is detected before it counts as a misfit
 _GAP_MEMORY = 1.0  # s, time constant at which the longest gap decays
 _RIPPLE = 0.05  # standard deviation of a thruster's force in one period, relative to it
 _WEAR = 0.01  # 1/sqrt(s), drift of an effectiveness
+_SAG = 0.01  # 1/sqrt(s), drift of a ceiling
 _LAG_DRIFT = 0.003  # s/sqrt(s), drift of the lag
 _CURVED = 0.9  # s, correlation time of the error of the lag's secant, which scales it as noise
 _OUTLIER = 3.0  # standard deviations to which an innovation is limited, by increasing its variance
@@ -62,12 +68,13 @@ def predict(
     `thruster_acceleration`, shape (6, m), is the acceleration by one newton of each thruster.
     """
     x, P, F = estimate.state, estimate.covariance, estimate.transition
-    mass, T = dynamics.translational_mass[0], period
+    mass, T, m = dynamics.translational_mass[0], period, thrusters.acting.size
     free, curvature = zeros(6), zeros(3)
     loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
     free_acceleration(dynamics, R, estimate.velocity, omega_body, loads, free)
     linear = (dynamics.linear_damping[0] + dynamics.linear_damping[1] + dynamics.linear_damping[2]) / 3.0
     quadratic = (dynamics.quadratic_damping[0] + dynamics.quadratic_damping[1] + dynamics.quadratic_damping[2]) / 3.0
+    _update_misfit(estimate, T)
     F[:, :] = 0.0
     for axis in range(3):
         relative = abs(estimate.velocity[axis] - estimate.water_velocity[axis])
@@ -78,10 +85,11 @@ def predict(
         else:
             F[axis, NET_WEIGHT] = T / mass
         acceleration = free[axis]
-        for j in range(thrusters.acting.size):
+        for j in range(m):
             effectiveness, by_force = x[EFFECTIVENESS + j], thruster_acceleration[axis, j]
             acceleration += by_force * thrusters.acting[j] * effectiveness
             F[axis, EFFECTIVENESS + j] = T * by_force * thrusters.acting[j]
+            F[axis, EFFECTIVENESS + m + j] = T * by_force * estimate.by_ceiling[0, j] * effectiveness
             F[axis, LAG] += T * by_force * estimate.by_lag[j] * effectiveness
             curvature[axis] += T * by_force * estimate.curvature[j] * effectiveness
         estimate.acceleration[axis] = acceleration
@@ -96,10 +104,13 @@ def predict(
         P[CURRENT + axis, CURRENT + axis] += square(gains.current_drift) * T
     P[NET_WEIGHT, NET_WEIGHT] += square(gains.restoring_drift * estimate.mass_scale[0]) * T
     P[LAG, LAG] += square(_LAG_DRIFT) * T
-    for j in range(thrusters.health.size):
-        thrusters.effectiveness[j] = x[EFFECTIVENESS + j]
+    for j in range(m):
+        k = EFFECTIVENESS + m + j
+        thrusters.effectiveness[j], thrusters.ceiling[0, j] = x[EFFECTIVENESS + j], x[k]
+        thrusters.ceiling[1, j] = np.sqrt(P[k, k])
         if P[EFFECTIVENESS + j, EFFECTIVENESS + j] > 0.0:
             P[EFFECTIVENESS + j, EFFECTIVENESS + j] += square(_WEAR) * T
+        P[k, k] += square(_SAG) * T
     freeze(estimate, gains)
     _propagate_deviations(estimate, thrusters, thruster_acceleration, T)
     estimate.evidence[:, :] = 0.0
@@ -108,6 +119,15 @@ def predict(
         estimate.time_since_valid[group] += period
     estimate.longest_gap[0] *= 1.0 - period / _GAP_MEMORY
     publish(estimate)
+
+
+def _update_misfit(estimate: Estimate, period: float) -> None:
+    """Update the misfit of the model over a period [s]: innovations of a model that fits are white."""
+    mean = 0.0
+    for i in range(estimate.bias.size):
+        mean += square(estimate.bias[i]) / estimate.bias.size
+    relative = min(mean / _USUAL_BIAS, _GREATEST_MISFIT)
+    estimate.misfit[0] += period / (period + _MISFIT_MEMORY) * (relative - estimate.misfit[0])
 
 
 def _propagate_covariance(estimate: Estimate, period: float) -> None:
@@ -201,11 +221,13 @@ def correct_by_moment(
             estimate.direct[m + j] = thrusters.matrix[3 + i, j] * estimate.missing[j]
             given = thrusters.matrix[3 + i, j] * thrusters.acting[j]
             row[EFFECTIVENESS + j] = given
+            by_ceiling = thrusters.matrix[3 + i, j] * estimate.by_ceiling[0, j]
+            row[EFFECTIVENESS + m + j] = by_ceiling * x[EFFECTIVENESS + j]
             expected += given * x[EFFECTIVENESS + j]
             row[LAG] += thrusters.matrix[3 + i, j] * estimate.by_lag[j] * x[EFFECTIVENESS + j]
             variance += square(_RIPPLE * given)
             variance += _CURVED / period * square(thrusters.matrix[3 + i, j] * estimate.curvature[j])
-        _correct(estimate, moment[i] - expected, variance, 1.0, 0, row.size)
+        _correct(estimate, moment[i] - expected, variance, 1.0, i, 0, row.size)
     estimate.direct[:] = 0.0
     project(estimate, gains)
 
@@ -246,12 +268,14 @@ def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains
             estimate.row[:] = 0.0
             estimate.row[first + axis] = 1.0
             at = first + axis
-            _correct(estimate, measured[axis] - x[at], square(noise), estimate.weight[0], at, at + 1)
+            _correct(estimate, measured[axis] - x[at], square(noise), estimate.weight[0], 3 + at, at, at + 1)
     project(estimate, gains)
     return True
 
 
-def _correct(estimate: Estimate, innovation: float, noise: float, weight: float, begin: int, end: int) -> None:
+def _correct(
+    estimate: Estimate, innovation: float, noise: float, weight: float, channel: int, begin: int, end: int
+) -> None:
     """Correct by one number; add weighted evidence of each hypothesis, and propagate its deviation.
 
     Before the call, set the `row` of the number; it must be 0 outside `begin` to `end` (exclusive).
@@ -266,6 +290,7 @@ def _correct(estimate: Estimate, innovation: float, noise: float, weight: float,
     for i in range(begin, end):
         variance += gain[i] * row[i]
     variance = max(variance, square(innovation / _OUTLIER))
+    estimate.bias[channel] += _BIAS_SHARE * (innovation / np.sqrt(variance) - estimate.bias[channel])
     for i in range(n):
         share = gain[i] / variance
         estimate.state[i] += share * innovation

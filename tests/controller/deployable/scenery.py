@@ -32,13 +32,13 @@ RIGHTING = np.array([0.0, 0.0, 30.0])  # N m, phi_2..phi_4 of the sea's vehicle
 
 class Sea:
     """ODIN in a steady current, integrated in small steps by the law's own model: what is tested is what the law does
-    with it. Its thrusters may lag, come late by some periods (`delay`), lose part of their force (`left`), or be stuck
-    at a force."""
+    with it. Its thrusters may lag, come late by some periods (`delay`), lose part of their force (`left`), have
+    lower limits (`limit`, a part of the model's), or be stuck at a force."""
 
     def __init__(self, current=(0.1, -0.15, 0.0), restoring=-8.0, noise=(0.0, 0.0), lag=0.0, seed=0, delay=0):
         self.dynamics, self.thrusters = make_dynamics(ODIN, np.ones(9)), make_thrusters(ODIN)
         self.current, self.net_weight, self.noise, self.lag = np.array(current), restoring, noise, lag
-        self.left, self.stuck, self.given = np.ones(8), np.full(8, np.nan), np.zeros(8)
+        self.left, self.limit, self.stuck, self.given = np.ones(8), np.ones(8), np.full(8, np.nan), np.zeros(8)
         self.position, self.quaternion = np.array([0.0, 0.0, 2.5]), LEVEL.copy()
         self.velocity, self.omega = np.zeros(3), np.zeros(3)
         self.rng, self.late = np.random.default_rng(seed), [np.zeros(8)] * delay
@@ -51,7 +51,8 @@ class Sea:
 
     def step(self, forces, period, substeps=4):
         self.late.append(forces.copy())
-        commanded = np.where(np.isnan(self.stuck), self.late.pop(0), self.stuck)
+        within = np.clip(self.late.pop(0), self.limit * ODIN.thrust_min, self.limit * ODIN.thrust_max)
+        commanded = np.where(np.isnan(self.stuck), within, self.stuck)
         h = period / substeps
         for _ in range(substeps):
             remains = np.exp(-h / self.lag) if self.lag else 0.0

@@ -6,16 +6,18 @@ from scipy.integrate import solve_ivp
 
 from controller.laws.deployable import actuator_lag
 from controller.laws.deployable.actuator_lag import empty_prediction, predict_state
-from controller.laws.deployable.estimate import LAG, make_estimate
+from controller.laws.deployable.estimate import EFFECTIVENESS, LAG, make_estimate
 from controller.laws.deployable.model import make_thrusters
 from tests.controller.deployable.scenery import LEVEL, ODIN
 
 PERIOD = 0.02
+CEILING = EFFECTIVENESS + 8
 
 
 def lagging(lag, spread):
     estimate = make_estimate(ODIN)
     estimate.state[LAG], estimate.covariance[LAG, LAG] = lag, spread**2
+    estimate.covariance[CEILING:, CEILING:] = 0.0  # the limits are known
     return estimate, make_thrusters(ODIN)
 
 

@@ -220,11 +220,11 @@ def test_evidence_is_the_log_likelihood_ratio():
     rng = np.random.default_rng(2)
     for _ in range(20):
         estimate, _, _ = started()
-        estimate.row[:], estimate.deviation[:] = rng.normal(size=22), rng.normal(size=(16, 22)) * 0.1
+        estimate.row[:], estimate.deviation[:] = rng.normal(size=30), rng.normal(size=(16, 30)) * 0.1
         variance = 1.0 + estimate.row @ estimate.covariance @ estimate.row
         innovation = rng.normal() * np.sqrt(variance)
         expected = estimate.deviation @ estimate.row
-        observer._correct(estimate, innovation, 1.0, 1.0, 0, estimate.row.size)
+        observer._correct(estimate, innovation, 1.0, 1.0, 0, 0, estimate.row.size)
         ratio = estimate.evidence[0] - 0.5 * estimate.evidence[1]
         densities = norm.logpdf(innovation, expected, np.sqrt(variance)) - norm.logpdf(
             innovation, 0.0, np.sqrt(variance)
@@ -245,14 +245,24 @@ def test_evidence_is_summed_since_the_hypothetical_failure():
     assert state.ratio[2] == 0.0 and not state.sums[:, 2].any()
 
 
+def test_evidence_counts_less_by_the_square_of_the_misfit():
+    for misfit, weight in ((0.5, 1.0), (3.0, 1.0 / 9.0)):
+        estimate, thrusters, state = started()
+        estimate.evidence[:, 2], estimate.misfit[0] = (3.0, 2.0), misfit
+        fault_detection._add_evidence(state, estimate, thrusters, 2, 2)
+        assert state.sums[:, 2] == pytest.approx([3.0 * weight, 2.0 * weight])
+        fault_detection._isolate(state, estimate, thrusters, 2, np.nan)  # it explains the misfit
+        assert estimate.misfit[0] == 1.0
+
+
 def test_innovations_are_clipped_at_three_standard_deviations():
     for sigmas, counted in ((2.9, 2.9), (30.0, 3.0)):
         estimate, _, _ = started()
-        estimate.row[:] = np.eye(22)[3]
+        estimate.row[:] = np.eye(30)[3]
         spread = np.sqrt(1.0 + estimate.covariance[3, 3])
         estimate.deviation[0, 3] = 1.0
         before, gain = estimate.state[3], estimate.covariance[3, 3]
-        observer._correct(estimate, sigmas * spread, 1.0, 1.0, 0, estimate.row.size)
+        observer._correct(estimate, sigmas * spread, 1.0, 1.0, 0, 0, estimate.row.size)
         effective = spread * sigmas / counted
         assert estimate.state[3] - before == pytest.approx(gain / effective**2 * sigmas * spread, rel=1e-9)
         assert estimate.evidence[0, 0] == pytest.approx(counted / effective, rel=1e-9)
@@ -268,7 +278,7 @@ def test_detection_requires_threshold_and_lead_over_the_next_hypothesis():
             state.ratio[hypothesis] = state.sums[0, hypothesis] = 2.0 * ratio
             state.ratio[hypothesis] = ratio
             state.sums[1, hypothesis] = 2.0 * ratio  # the likeliest loss is all of the force
-        estimate.deviation[:8, EFFECTIVENESS:] = -0.95 * np.eye(8)
+        estimate.deviation[:8, EFFECTIVENESS : EFFECTIVENESS + 8] = -0.95 * np.eye(8)
         assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == found
 
 
@@ -333,6 +343,11 @@ def test_ineffective_thruster_is_isolated_without_an_estimate_jump():
     estimate.covariance[EFFECTIVENESS:, :EFFECTIVENESS] = 0.0
     estimate.covariance[EFFECTIVENESS + 5, EFFECTIVENESS + 5] = 0.1**2  # it may give a third
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
-    estimate.covariance[EFFECTIVENESS + 5, EFFECTIVENESS + 5] = 0.03**2
+    estimate.covariance[EFFECTIVENESS + 5, EFFECTIVENESS + 5] = 0.02**2
+    estimate.misfit[0] = 5.0  # the model does not fit
+    assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
+    estimate.misfit[0], estimate.state[EFFECTIVENESS : EFFECTIVENESS + 5] = 0.8, 0.1  # all thrusters seem weak
+    assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
+    estimate.state[EFFECTIVENESS : EFFECTIVENESS + 5] = 0.95
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == 5
     assert thrusters.health[5] == 0.0 and estimate.state[EFFECTIVENESS + 5] == 0.0 and state.tentative[5] == 1

@@ -37,7 +37,8 @@ from tests.controller.deployable.scenery import MODELS, ODIN, Sea, fly, law_for
 GAINS = DeployableGains()
 PERIOD = 0.02
 RATES = np.array([0.001, 0.002, 0.0015])  # rad/s, standard deviation
-N = EFFECTIVENESS + 8
+CEILING = EFFECTIVENESS + 8
+N = CEILING + 8
 
 
 def started(position=(0.0, 0.0, 2.0), velocity=(0.0, 0.0, 0.0), model=ODIN):
@@ -78,8 +79,9 @@ def transition(estimate, dynamics, thrusters, by_force):
         row = F[VELOCITY + axis]
         row[VELOCITY + axis] -= slope * PERIOD
         row[CURRENT + axis if axis < 2 else NET_WEIGHT] = PERIOD * (slope if axis < 2 else 1.0 / mass)
-        row[EFFECTIVENESS:] = PERIOD * by_force[axis] * thrusters.acting
-        row[LAG] = PERIOD * np.sum(by_force[axis] * estimate.by_lag * x[EFFECTIVENESS:])
+        row[EFFECTIVENESS:CEILING] = PERIOD * by_force[axis] * thrusters.acting
+        row[CEILING:] = PERIOD * by_force[axis] * estimate.by_ceiling[0] * x[EFFECTIVENESS:CEILING]
+        row[LAG] = PERIOD * np.sum(by_force[axis] * estimate.by_lag * x[EFFECTIVENESS:CEILING])
     return F
 
 
@@ -88,7 +90,9 @@ def random_estimate(rng, thrusters):
     root = rng.normal(size=(N, N)) * 0.05
     estimate.covariance[:] = root @ root.T
     estimate.state[CURRENT : CURRENT + 2], estimate.state[NET_WEIGHT] = rng.normal(size=2) * 0.2, 4.0
-    estimate.state[EFFECTIVENESS:], estimate.state[LAG] = rng.uniform(0.6, 1.0, 8), 0.15
+    estimate.state[EFFECTIVENESS:CEILING], estimate.state[LAG] = rng.uniform(0.6, 1.0, 8), 0.15
+    estimate.state[CEILING:], estimate.by_ceiling[2] = rng.uniform(0.5, 0.9, (2, 8))
+    estimate.by_ceiling[:2] = rng.uniform(0.0, 20.0, (2, 8))
     publish(estimate)
     thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
     estimate.bracket[:] = rng.uniform(-20.0, 20.0, (2, 8))
@@ -104,9 +108,12 @@ def test_prediction_covariance_matches_a_kalman_filter():
         dynamics.linear_damping[:] = rng.uniform(5.0, 50.0, 6)
         before, P = copy.deepcopy(estimate), estimate.covariance.copy()
         predict(estimate, dynamics, thrusters)
-        before.by_lag[:] = estimate.by_lag
+        before.by_lag[:], before.by_ceiling[:] = estimate.by_lag, estimate.by_ceiling
         by_force = pushes(dynamics, thrusters, np.eye(3))
-        F, curvature = transition(before, dynamics, thrusters, by_force), estimate.curvature * before.state[-8:]
+        F, curvature = (
+            transition(before, dynamics, thrusters, by_force),
+            estimate.curvature * before.state[EFFECTIVENESS:CEILING],
+        )
         expected = F @ P @ F.T
         Q = np.zeros(N)
         Q[VELOCITY:CURRENT] = 0.03**2 * PERIOD + 0.9 * PERIOD * (by_force[:3] @ curvature) ** 2
@@ -127,7 +134,7 @@ def test_deviations_of_hypotheses_grow_as_errors_of_the_state_do():
     estimate.deviation[:], estimate.supposed[:] = rng.normal(size=(16, N)), rng.normal(size=(2, 8)) * [[1.0], [9.0]]
     before = copy.deepcopy(estimate)
     predict(estimate, dynamics, thrusters)
-    before.by_lag[:] = estimate.by_lag
+    before.by_lag[:], before.by_ceiling[:] = estimate.by_lag, estimate.by_ceiling
     by_force = pushes(dynamics, thrusters, np.eye(3))
     expected = before.deviation @ transition(before, dynamics, thrusters, by_force).T
     missing = before.supposed[0] * (before.supposed[1] - thrusters.acting)
@@ -147,7 +154,7 @@ def test_correction_matches_the_joint_kalman_update():
         assert correct(estimate, measured[:3], measured[3:], GAINS._replace(current_bound=9.0))
         K = P @ H.T @ np.linalg.inv(H @ P @ H.T + noise)
         theirs = x + K @ (measured - x[:6])
-        if np.all((theirs[EFFECTIVENESS:] > 0.0) & (theirs[EFFECTIVENESS:] < 1.1)) and 0.0 < theirs[LAG] < 1.0:
+        if np.all((theirs[EFFECTIVENESS:] < 1.1) & (theirs[EFFECTIVENESS:] > 0.3)) and 0.0 < theirs[LAG] < 1.0:
             assert estimate.state == pytest.approx(theirs, rel=1e-8, abs=1e-10)
         assert estimate.covariance == pytest.approx((np.eye(N) - K @ H) @ P, rel=1e-6, abs=1e-12)
 
@@ -159,20 +166,24 @@ def test_moment_correction_matches_the_kalman_update():
         estimate, dynamics = random_estimate(rng, thrusters)
         thrusters.acting[:] = rng.uniform(-20.0, 20.0, 8)
         estimate.by_lag[:], estimate.curvature[:] = rng.normal(size=8), 0.1 * rng.normal(size=8)
+        estimate.by_ceiling[0] = rng.normal(size=8)
         estimate.acceleration[:], estimate.state[HEIGHT] = rng.normal(size=3), 0.02
         estimate.state[MOMENTS:HEIGHT] = rng.normal(size=3) * 20.0
         turned, omega, by_current = Rotation.random(random_state=rng), rng.normal(size=3), rng.normal(size=(3, 2))
         R, x, P = turned.as_matrix(), estimate.state.copy(), estimate.covariance.copy()
-        k, e = R[2] + 0.5 * PERIOD * np.cross(omega, R[2]), x[EFFECTIVENESS:]
+        k, e = R[2] + 0.5 * PERIOD * np.cross(omega, R[2]), x[EFFECTIVENESS:CEILING]
         H, given = np.zeros((3, N)), thrusters.matrix[3:] * thrusters.acting
         H[:, CURRENT:NET_WEIGHT] = by_current
         H[:, MOMENTS:HEIGHT] = -np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
         H[:, HEIGHT] = -dynamics.rigid_mass[0] * np.cross([0.0, 0.0, 1.0], R.T @ estimate.acceleration)
-        H[:, LAG], H[:, EFFECTIVENESS:] = thrusters.matrix[3:] @ (estimate.by_lag * e), given
+        H[:, LAG], H[:, EFFECTIVENESS:CEILING] = thrusters.matrix[3:] @ (estimate.by_lag * e), given
+        H[:, CEILING:] = thrusters.matrix[3:] * estimate.by_ceiling[0] * e
         noise = (0.019 * np.diag(dynamics.mass)[3:]) ** 2 / PERIOD + np.sum((0.05 * given) ** 2, axis=1)
         noise += 0.9 / PERIOD * np.sum((thrusters.matrix[3:] * estimate.curvature) ** 2, axis=1)
         noise += 2.0 * (np.diag(dynamics.mass)[3:] * RATES / PERIOD) ** 2
-        expected = H @ x - H[:, CURRENT:NET_WEIGHT] @ x[CURRENT:NET_WEIGHT] - H[:, LAG] * x[LAG]
+        expected = (
+            H @ x - H[:, CURRENT:NET_WEIGHT] @ x[CURRENT:NET_WEIGHT] - H[:, LAG] * x[LAG] - H[:, CEILING:] @ x[CEILING:]
+        )
         moment = expected + 0.1 * np.sqrt(noise) * rng.uniform(-1.0, 1.0, 3)
         quaternion = turned.as_quat()[[3, 0, 1, 2]]
         seen = copy.deepcopy(estimate)
@@ -192,7 +203,7 @@ def test_bounds_are_enforced_by_the_most_likely_state():
     rng, thrusters = np.random.default_rng(4), make_thrusters(ODIN)
     for _ in range(5):
         estimate, _ = random_estimate(rng, thrusters)
-        estimate.state[EFFECTIVENESS:] = 0.9
+        estimate.state[EFFECTIVENESS:CEILING] = 0.9
         estimate.state[EFFECTIVENESS + 3] = 1.13
         before, weight = estimate.state.copy(), np.linalg.inv(estimate.covariance)
         project(estimate, GAINS._replace(current_bound=9.0))
@@ -279,19 +290,20 @@ def test_prediction_follows_the_vehicle_model():
         estimate, dynamics, thrusters = started(velocity=(0.6, -0.4, 0.1), model=model)
         R, x = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix(), estimate.state
         x[CURRENT:NET_WEIGHT], x[NET_WEIGHT], x[MOMENTS:HEIGHT] = (0.2, -0.1), 7.0, (0.3, -0.2, 4.0)
-        x[EFFECTIVENESS:], x[LAG] = rng.uniform(0.5, 1.0, 8), 0.0
+        x[EFFECTIVENESS:CEILING], x[LAG] = rng.uniform(0.5, 1.0, 8), 0.0
+        estimate.covariance[CEILING:] = 0.0  # the limits are known
         publish(estimate)
         thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
         free, pushed = np.empty(6), np.empty(6)
         loads = Loads(estimate.water_velocity, np.array([7.0]), estimate.moments)
         free_acceleration(dynamics, R, estimate.velocity, omega, loads, free)
-        thrust_acceleration(dynamics, thrusters, R, thrusters.forces * x[EFFECTIVENESS:], pushed)
+        thrust_acceleration(dynamics, thrusters, R, thrusters.forces * x[EFFECTIVENESS:CEILING], pushed)
         a, v, p = (free + pushed)[:3], estimate.velocity.copy(), estimate.position.copy()
         predict(estimate, dynamics, thrusters, R, omega)
         assert estimate.acceleration == pytest.approx(a, rel=1e-10)
         assert estimate.position == pytest.approx(p + PERIOD * v + 0.5 * PERIOD**2 * a, rel=1e-12)
         assert estimate.velocity == pytest.approx(v + PERIOD * a, rel=1e-12)
-        assert thrusters.effectiveness == pytest.approx(x[EFFECTIVENESS:], rel=1e-12)
+        assert thrusters.effectiveness == pytest.approx(x[EFFECTIVENESS:CEILING], rel=1e-12)
         assert estimate.time_since_measurement[0] == PERIOD
 
 
@@ -314,7 +326,7 @@ def test_observer_initializes_without_velocity():
     assert np.diag(estimate.covariance)[:6] == pytest.approx([0.02**2] * 3 + [0.3**2] * 3)
 
 
-def test_reset_keeps_only_thruster_effectiveness():
+def test_reset_keeps_only_effectiveness_and_ceilings():
     estimate, dynamics, thrusters = started(velocity=(0.3, 0.0, 0.0))
     for _ in range(20):
         predict(estimate, dynamics, thrusters)
