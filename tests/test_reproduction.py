@@ -69,7 +69,7 @@ def test_documented_goal_region_times_match_the_runs(records):
     assert not switches["paper-limited"].size
     assert switches["paper-calibrated"].size == 8 and "in and out four times" in said
     away = position(records["paper-calibrated"])[records["paper-calibrated"]["time"] >= switches["paper-calibrated"][0]]
-    assert f"up to {np.linalg.norm(away - CENTRE, axis=1).max():.1f} m from the centre" in said
+    assert f"up to {np.linalg.norm(away - CENTRE, axis=1).max():.1f} m from the center" in said
 
 
 @pytest.mark.slow
