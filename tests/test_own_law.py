@@ -1,7 +1,6 @@
-"""The page on custom laws, followed in a copy of the packages: its law runs."""
+"""The example of a law in the package flies in a copy of the packages."""
 
 import json
-import re
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -9,7 +8,7 @@ import pytest
 
 from tests.copies import ROOT, copy_of_the_packages, python
 
-PAGE = (ROOT / "docs" / "howto" / "own-law.md").read_text()
+LAW = (ROOT / "examples" / "laws" / "sliding_mode.py").read_text()
 
 SCENARIO = """
 vehicle = "odin"
@@ -42,10 +41,9 @@ pytestmark = pytest.mark.slow
 
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """A copy of the packages with the page's one file."""
+    """A copy of the packages with the law."""
     folder = copy_of_the_packages(tmp_path_factory.mktemp("copy"))
-    (code,) = re.findall(r"<!-- file: sliding_mode.py -->\n```python\n(.*?)```", PAGE, re.DOTALL)
-    (folder / "controller" / "laws" / "sliding_mode.py").write_text(code)
+    (folder / "controller" / "laws" / "sliding_mode.py").write_text(LAW)
     return folder
 
 

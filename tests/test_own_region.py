@@ -1,13 +1,11 @@
-"""The page on custom regions, followed in a copy of the packages: its shape runs."""
-
-import re
+"""The example of a custom shape runs in a copy of the packages."""
 
 import pyarrow.parquet as pq
 import pytest
 
 from tests.copies import ROOT, copy_of_the_packages, python
 
-PAGE = (ROOT / "docs" / "howto" / "own-region.md").read_text()
+TORUS = (ROOT / "examples" / "shapes" / "torus.py").read_text()
 
 SCENARIO = """
 vehicle = "odin"
@@ -98,16 +96,11 @@ shape = { type = "torus", centre = [0.0, 1.0, 2.0], axis = [0.0, 0.0, 1.0], radi
 """
 
 
-def of_page(name, language):
-    (code,) = re.findall(rf"<!-- file: {re.escape(name)} -->\n```{language}\n(.*?)```", PAGE, re.DOTALL)
-    return code
-
-
 @pytest.fixture(scope="module")
 def copy(tmp_path_factory):
-    """A copy of the packages with the page's one Python file, and how a command is run in it."""
+    """A copy of the packages with the shape."""
     folder = copy_of_the_packages(tmp_path_factory.mktemp("copy"))
-    (folder / "controller" / "regions" / "shapes" / "torus.py").write_text(of_page("torus.py", "python"))
+    (folder / "controller" / "regions" / "shapes" / "torus.py").write_text(TORUS)
     (folder / "ring.toml").write_text(SCENARIO)
     (folder / "struck.toml").write_text(STRUCK)
     return folder

@@ -1,0 +1,83 @@
+"""Sliding mode: a velocity towards the goal and away from regions, kept by a force that saturates.
+
+    s = nu - nu_ref,   tau = -K sat(s / layer)
+
+The velocity wanted is that of a potential field, so that the law needs no model of the vehicle.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from controller.law import Array, VehicleState, WrenchLaw
+from controller.potential_field import Field, add_turned, empty_field, evaluate_field, set_point_error
+from controller.quaternion import error_parts, write_rotation
+from controller.regions.region_set import PackedRegions
+from controller.stack_array import zeros
+
+
+class SlidingModeGains(NamedTuple):
+    """Defaults: chosen by hand for ODIN."""
+
+    slope: float = 0.5  # 1/s, of the velocity wanted over the distance to go
+    speed: float = 0.5  # m/s, greatest velocity wanted towards the goal
+    turning: float = 0.5  # 1/s, of the angular velocity wanted over the attitude error
+    force: float = 400.0  # N, K
+    moment: float = 200.0  # N m, K
+    layer: float = 0.2  # m/s or rad/s, within which the force is proportional
+    inset: float = 0.5  # m, clearance of the set point within the goal region
+    repulsion: float = 0.02  # 1/s, velocity away from a region of gain 1 over the depth in its reach
+    reach: float = 1.0  # m, clearance at which regions begin to push
+
+
+class SlidingModeMemory(NamedTuple):
+    """Nothing that lasts; where it computes."""
+
+    desired_quaternion: Array  # (4,)
+    estimate: Array  # (4,) zero: it estimates nothing
+    report: Array  # (0,)
+    field: Field
+    wanted: Array  # (6,) velocity, body frame [m/s, rad/s]
+
+
+def step(
+    state: VehicleState,
+    goal: PackedRegions,
+    regions: PackedRegions,
+    weights: Array,
+    gains: SlidingModeGains,
+    memory: SlidingModeMemory,
+    forces: Array,
+) -> None:
+    """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
+    R, field, wanted = zeros(3, 3), memory.field, memory.wanted
+    write_rotation(state.quaternion, R)
+    evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
+    set_point_error(field, gains.inset, gains.speed / gains.slope)
+    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]
+    for i in range(3):
+        wanted[i], wanted[3 + i] = 0.0, -gains.turning * e_att[i]
+    add_turned(R, field.error, -gains.slope, wanted)
+    add_turned(R, field.push, 1.0, wanted)
+    for i in range(6):
+        s = (state.velocity_body[i] - wanted[i]) / gains.layer
+        forces[i] = -(gains.force if i < 3 else gains.moment) * min(1.0, max(-1.0, s))
+
+
+def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> SlidingModeMemory:
+    """Return the memory before the first step; `period` [s] has shape (1,)."""
+    return SlidingModeMemory(desired_quaternion, np.zeros(4), np.zeros(0), empty_field(n_regions), np.zeros(6))
+
+
+class SlidingModeLaw(WrenchLaw):
+    """Sliding mode about a velocity field."""
+
+    function = staticmethod(step)
+    make_memory = staticmethod(make_memory)
+    gains_type = SlidingModeGains
+    above_zero = ("slope", "layer")
+
+
+LAW = SlidingModeLaw
