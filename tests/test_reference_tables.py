@@ -3,21 +3,34 @@
 import dataclasses
 import re
 from pathlib import Path
+from typing import get_args
 
+import pytest
 from pymavlink.dialects.v20 import all as dialect
 
 from controller.regions.shapes import ENTRIES
+from cosim.campaigns.ablation import VARIANTS
+from cosim.companion.outputs import SteerBy
+from cosim.logs.column_map import ColumnMap
+from cosim.logs.quantities import QUANTITIES
 from cosim.mavlink.messages.table import MESSAGES
+from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.scenario.arbiter_rules import Kind
+from cosim.scenario.criteria import Quantity
+from fuzzy_arbiter.definition import Normalization
+from plant_fmu import load_vehicle
 from plant_fmu.autopilot import Autopilot
+from plant_fmu.compiling.platforms import PLATFORMS
+from plant_fmu.variables.table import variables
 
 DOCS = Path(__file__).parents[1] / "docs"
 
 
-def rows(page, name):
-    """Return the rows of the table in a block of figures, as lists of cells."""
+def rows(page, name, head=False):
+    """Return the rows of the table in a block of figures, as lists of cells; `head`: with that of the titles."""
     block = re.search(rf"<!-- figures: {re.escape(name)} -->\n(.*?)<!-- end", (DOCS / page).read_text(), re.S)[1]
     lines = [line[1:-1] for line in block.splitlines() if line.startswith("| ")]
-    return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)] for line in lines[1:]]
+    return [[cell.strip() for cell in re.split(r"(?<!\\)\|", line)] for line in lines[0 if head else 1 :]]
 
 
 def test_streamed_messages_are_documented_at_their_rates():
@@ -47,3 +60,49 @@ def test_shapes_are_documented_with_their_keys():
     assert documented.keys() == ENTRIES.keys()
     for kind, keys in documented.items():
         assert sorted(keys) == sorted(field.name for field in dataclasses.fields(ENTRIES[kind].shape)), kind
+
+
+def test_modes_and_sticks_of_each_profile_are_documented():
+    names, autopilots, _, *modes, sticks = rows("mavlink.md", "profiles of cosim/mavlink/vehicle/profile.py", head=True)
+    for column, name in enumerate(names[1:], 1):
+        profile = PROFILES[re.findall(r"`(\w+)`", name)[0]]
+        assert autopilots[column].split()[-1] == str(profile.autopilot)
+        assert sticks[column] == str(profile.centred_stick)
+        for number, row in zip(profile.numbers.values(), modes, strict=True):
+            main, sub = number >> 16 & 0xFF, number >> 24
+            expected = ([main, sub] if sub else [main]) if profile.packed else [number]
+            assert [int(digits) for digits in re.findall(r"\d+", row[column].partition("(")[0])] == expected, row
+
+
+def test_quantities_of_a_column_map_are_documented():
+    tables = rows("howto/logs.md", "quantities of cosim/logs/column_map.py")
+    documented = [name for keys, *_ in tables for name in re.findall(r"`(\w+)`", keys)]
+    assert sorted(documented) == sorted(set(QUANTITIES) & {field.name for field in dataclasses.fields(ColumnMap)})
+
+
+def test_variants_of_an_ablation_are_documented():
+    tables = rows("campaigns.md", "variants of cosim/campaigns/ablation.py")
+    assert [name for keys, _ in tables for name in re.findall(r"`([\w-]+)`", keys)] == list(VARIANTS)
+
+
+def test_documented_variables_of_the_fmu_exist():
+    names = {re.sub(r"\[\d\]", "[i]", variable.name) for variable in variables(load_vehicle("odin"), coupled=True)}
+    for table in ("parameters of the FMU", "inputs of a coupled FMU"):
+        for row in rows("fmu.md", table):
+            for name in re.findall(r"`(\w[\w.]*(?:\[i\])?)`", " ".join(row)):
+                assert name in names or any(other.startswith(f"{name}.") for other in names), name
+
+
+@pytest.mark.parametrize(
+    ("page", "table", "names"),
+    [
+        ("criteria.md", "reasons of a criterion", get_args(Quantity)),
+        ("criteria.md", "inputs of rules", [kind for kind in get_args(Kind) if kind != "given"]),
+        ("howto/companion.md", "ways to steer", get_args(SteerBy)),
+        ("arbiter.md", "normalizations", get_args(Normalization)),
+        ("fmu.md", "platforms", PLATFORMS),
+    ],
+)
+def test_documented_choices_are_those_of_the_code(page, table, names):
+    documented = [name for row in rows(page, table) for name in re.findall(r"`([a-z]\w*(?:-\w+)?)[\w.]*`", row[0])]
+    assert sorted(documented) == sorted(names)
