@@ -11,12 +11,14 @@ from pymavlink.dialects.v20 import all as dialect
 from controller.regions.shapes import ENTRIES
 from cosim.campaigns.ablation import VARIANTS
 from cosim.companion.outputs import SteerBy
+from cosim.export.formats import FORMATS
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.quantities import QUANTITIES
 from cosim.mavlink.messages.table import MESSAGES
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.scenario.arbiter_rules import Kind
 from cosim.scenario.criteria import Quantity
+from cosim.scenario.toml_file import list_scenarios
 from fuzzy_arbiter.definition import Normalization
 from plant_fmu import load_vehicle
 from plant_fmu.autopilot import Autopilot
@@ -101,6 +103,8 @@ def test_documented_variables_of_the_fmu_exist():
         ("howto/companion.md", "ways to steer", get_args(SteerBy)),
         ("arbiter.md", "normalizations", get_args(Normalization)),
         ("fmu.md", "platforms", PLATFORMS),
+        ("scenarios.md", "shipped scenarios", list_scenarios()),
+        ("export.md", "formats of cosim/export", FORMATS),
     ],
 )
 def test_documented_choices_are_those_of_the_code(page, table, names):
