@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.io.atomic_file import write_atomic
-from plant_fmu.html_templates import make_environment
+from plant_fmu.contents.html_templates import make_environment
 
 SCENE_SCRIPTS = (
     "palette.js", "vectors.js", "camera.js", "solids.js", "planes.js", "painter.js", "sights.js",

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from cosim.report.inline_svg import inline_svg
 from cosim.results.wording import format_number
 from plant_fmu.archive import temporary_folder
-from plant_fmu.html_templates import make_environment
+from plant_fmu.contents.html_templates import make_environment
 
 if TYPE_CHECKING:  # importing Matplotlib takes as long as all other imports together
     from jinja2 import Environment

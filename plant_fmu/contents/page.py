@@ -7,7 +7,7 @@ from functools import cache
 from importlib import metadata, resources
 from typing import TYPE_CHECKING, NamedTuple
 
-from plant_fmu.html_templates import make_environment
+from plant_fmu.contents.html_templates import make_environment
 from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
