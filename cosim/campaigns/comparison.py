@@ -23,7 +23,7 @@ from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
-from cosim.report.report import FIGURES
+from cosim.report.web_page import FIGURES
 
 
 @dataclass(frozen=True)

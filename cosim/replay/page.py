@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import html
 import json
 import re
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
-from string import Template
 from typing import Any
 
 from cosim.io.atomic_file import write_atomic
+from plant_fmu.contents.html_templates import make_environment
 
 SCENE_SCRIPTS = (
     "palette.js", "vectors.js", "camera.js", "solids.js", "planes.js", "painter.js", "sights.js",
@@ -58,13 +57,12 @@ def replay_page(runs: Sequence[dict[str, Any]], title: str, flight: dict[str, An
         for names in (_STYLES, _SCRIPTS)
     )
     worker = _COMMENT.sub("", (assets / _WORKER).read_text(encoding="utf-8")) if flight else ""
-    return Template((assets / "page.html").read_text(encoding="utf-8")).substitute(
-        title=html.escape(title),
-        style=style,
-        runs=_embedded(list(runs)),
-        flight=_embedded(flight),
-        flier=worker,
-        script=script,
+    return (
+        make_environment()
+        .get_template("cosim.replay/assets/page.html.j2")
+        .render(
+            title=title, style=style, runs=_embedded(list(runs)), flight=_embedded(flight), flier=worker, script=script
+        )
     )
 
 

@@ -7,7 +7,7 @@ import re
 
 _COLOUR = re.compile(r"#[0-9a-fA-F]{6}\b")
 _STYLE = re.compile(r'style="([^"]*)"')
-DARK_GROUND, _DARK_INK = (0x16, 0x18, 0x1A), (0xE6, 0xE6, 0xE3)  # as in page.html
+DARK_GROUND, _DARK_INK = (0x16, 0x18, 0x1A), (0xE6, 0xE6, 0xE3)  # as in base.html.j2
 _GREY = 24  # difference of channels below which a colour is a grey
 _CONTRAST = 3.0  # least contrast of a line or mark to the ground
 

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from cosim.report.contents import contents_of
-from cosim.results.run_result import REPORT, Run
+from cosim.report.web_page import FIGURES, inline_figure, render_page
+from cosim.results.run_result import REPORT, SCENARIO, SUMMARY, Run
 from plant_fmu.archive import temporary_folder
 
 if TYPE_CHECKING:  # see write_report
     from cosim.report.figures.style import FigureData
 
-FIGURES = "figures"
 FORMATS = ("html", "png")
 
 
@@ -51,16 +51,13 @@ def _with_figures(run: Run, data: FigureData, formats: Collection[str], folder: 
     from cosim.report.figures.figures import drawings
 
     (folder / FIGURES).mkdir()
-    shown = [
-        (drawing.name, drawing.caption, drawing.write(folder / FIGURES, png="png" in formats))
-        for drawing in drawings(data)
-    ]
+    shown = {drawing.name: inline_figure(drawing, folder / FIGURES, "png" in formats) for drawing in drawings(data)}
     if "html" not in formats:
         return []
-    from cosim.report.html import html_report
-
+    files = {path.name for path in run.folder.iterdir()} | {SUMMARY, SCENARIO}
+    values = {"run": run, "contents": contents_of(run), "about": about(run), "figures": shown, "files": files}
     page = folder / REPORT
-    page.write_text(html_report(contents_of(run), about(run), shown), encoding="utf-8")
+    page.write_text(render_page("cosim.report/run_report.html.j2", **values), encoding="utf-8")
     return [page]
 
 

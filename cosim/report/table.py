@@ -12,4 +12,3 @@ class Table:
     title: str
     head: tuple[str, ...]  # names of the columns; empty for a table of names and values
     rows: tuple[tuple[str, ...], ...]
-    widths: tuple[float, ...]  # relative widths of the columns

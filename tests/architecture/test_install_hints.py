@@ -29,7 +29,7 @@ def required():
 def test_install_commands_occur_only_in_install_hints():
     """Nor of the name of this distribution in an index, which has none there."""
     files = [
-        path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".html", ".txt")
+        path for package in PACKAGES for path in (ROOT / package).rglob("*") if path.suffix in (".py", ".j2", ".txt")
     ]
     assert len(files) > len(FILES)
     wrong = re.compile(r"pip3? install|subreach\[")

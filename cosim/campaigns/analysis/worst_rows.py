@@ -11,10 +11,6 @@ import numpy as np
 from cosim.campaigns.store.results import Results
 
 LISTED = 10  # greatest number of rows that summaries and pages list
-ORDER = (
-    "First what violated a hard region, the deepest first (a flight that the plant stopped counts as one, as deep as "
-    "it had come), then what never reached the goal, then the rest, the slowest first."
-)
 
 
 def violated_column(results: Results) -> str:
@@ -42,7 +38,8 @@ def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
     Returns
     -------
     list of Worst
-        Rows in the order that `ORDER` describes; equally bad rows in the order of their keys.
+        First what violated a hard region or was stopped by the plant, the deepest first, then what never reached the
+        goal, then the rest, the slowest first; equally bad rows in the order of their keys.
     """
     names = results.schema.names
     keys, reached = results[names[0]], results.fact("reached")
@@ -69,7 +66,7 @@ def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
     return found
 
 
-def worst_table(results: Results, folder: Path) -> list[dict[str, Any]]:
+def worst_table(results: Results, folder: Path, count: int = LISTED) -> list[dict[str, Any]]:
     """Return the worst rows for a summary, each with the command that repeats it.
 
     Parameters
@@ -78,13 +75,15 @@ def worst_table(results: Results, folder: Path) -> list[dict[str, Any]]:
         Rows of the campaign.
     folder : Path
         The campaign's folder.
+    count : int
+        Greatest number of rows.
 
     Returns
     -------
     list of dict
         For each row its key ``row``, the reason ``why``, and the ``command`` that repeats it.
     """
-    return [{"row": key, "why": why, "command": rerun_command(folder, key)} for key, why in worst_rows(results)]
+    return [{"row": key, "why": why, "command": rerun_command(folder, key)} for key, why in worst_rows(results, count)]
 
 
 def rerun_command(folder: Path, key: int) -> str:

@@ -7,72 +7,45 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.campaigns.pages.replays import Replay, write_page_with_replays
-from cosim.campaigns.pages.sections import basis, refused_section
+from cosim.campaigns.pages.replays import write_page_with_replays
 from cosim.campaigns.reruns.repeat import require_complete
-from cosim.campaigns.store.folder import PLAN, RESULTS, SUMMARY, held
+from cosim.campaigns.store.folder import SUMMARY, held
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json, understood
-from cosim.report.web_page import Html, Page, code, number, write_figures
+from cosim.report.web_page import number
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
 
 PAGE = "falsification.html"
 _LABELS = {"clearance": "least clearance [m]", "violation": "weighted violation [m s]", "arrival": "arrival [s]"}
-_UNITS = {"clearance": "m", "violation": "m s", "arrival": "s"}
+_UNITS = {objective: label[label.index("[") + 1 : -1] for objective, label in _LABELS.items()}
 
 
 def write_falsification_page(folder: Path, replays: int) -> Path:
-    """Write ``falsification.html`` and its figure, and replays of the worst rows.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of a complete search.
-    replays : int
-        Number of listed worst rows that are flown again step by step, each with its own page.
-
-    Returns
-    -------
-    Path
-        Path of the page.
-
-    Raises
-    ------
-    RunError
-        If the folder holds no such search, or cannot be written.
-    KeyboardInterrupt
-        After Ctrl-C; the page is written without the replays.
-    """
+    """Write ``falsification.html`` and its figure, and replays of the worst rows."""
     require_complete(folder)
     summary = read_json(folder / SUMMARY)
     if not isinstance(summary.get("search"), dict):
         raise RunError(f"{folder / SUMMARY}: holds no search")
     with held(folder):
         with understood(folder / SUMMARY):
-            figures = write_figures(folder, _drawings(summary))
-            worst = [row["row"] for row in summary["worst"]][:replays]
-        write_page_with_replays(
-            folder / PAGE, folder / SUMMARY, lambda shown: _page(summary, figures, shown), worst, [folder],
+            random = summary["random"]["worst"] if summary["random"] else []
+            values = {
+                "s": summary, "unit": "scene" if summary["kind"] == "scenes" else "row", "random": random,
+                "label": _LABELS[summary["search"]["objective"]], "worst": list(zip_longest(summary["worst"], random)),
+                "estimate": _estimated(summary["estimate"]) if summary["estimate"] else "",
+                "value": lambda row, unit=False: _value(summary, row, unit),
+            }  # fmt: skip
+            keys = [row["row"] for row in summary["worst"]][:replays]
+        return write_page_with_replays(
+            folder / PAGE, folder / SUMMARY, _drawings(summary), values, keys, [folder],
             lambda key: f"{summary['title']}: {key}",
         )  # fmt: skip
-    return folder / PAGE
 
 
 def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:
-    """Yield the lines about a search for a terminal.
-
-    Parameters
-    ----------
-    summary : dict
-        Summary from `cosim.campaigns.falsification.falsification.run_falsification`.
-
-    Yields
-    ------
-    str
-        Line without a newline.
-    """
+    """Yield the lines about a search for a terminal."""
     s = summary
     if s["estimate"]:
         yield f"{s['title']}: {_estimated(s['estimate'])}, from {s['flown']} flights"
@@ -107,82 +80,15 @@ def _drawings(s: dict[str, Any]) -> Iterator[NamedFigure]:
     yield NamedFigure("convergence", "The worst of the search and of random flights, after so many flights.", figure)
 
 
-def _page(s: dict[str, Any], figures: Mapping[str, Html], shown: Mapping[int, Replay]) -> Page:
-    search, unit = s["search"], "scene" if s["kind"] == "scenes" else "row"
-    rare = s["estimate"]
-    page = Page(f"{s['title']}: {'how rare a violation is' if rare else 'the worst that a search finds'}")
-    page.verdict(_verdict(s, unit))
-    page.heading("Level by level" if rare else "Flight by flight")
-    for figure in figures.values():
-        page.add(figure)
-    if rare:
-        page.paragraph(
-            "Adaptive multilevel splitting replaces the half of the flights with more clearance by variations of the "
-            "other half, again and again. The interval takes variations of the same first flight for dependent: the "
-            f"last ones come from {rare['families']} of the first.",
-            faint=True,
-        )
-        page.table(
-            [_LABELS["clearance"], "probability of less"],
-            [[number(level), f"{share:.2e}"] for level, share in rare["levels"]],
-        )
-    else:
-        page.paragraph(
-            "A tenth of the flights is random. Then CMA-ES searches by turns widely and narrowly, in the generator's "
-            "ranges or those given, and normal numbers within three standard deviations. The flights of a search are "
-            "no sample: shares of them are no rates.",
-            faint=True,
-        )
-    page.heading(f"The worst {unit}s")
-    page.paragraph(f"Of {unit}s that are near to each other, the worst one. A replay shows the flight in the browser.")
-    label, random = _LABELS[search["objective"]], s["random"]["worst"] if s["random"] else []
-    page.table(
-        [f"{unit} found", label, *(["at random", label] if random else []), "replay", "command that repeats it"],
-        [
-            [
-                *_cells(s, found),
-                *(_cells(s, drawn) if random else []),
-                shown[found["row"]].cell() if found and found["row"] in shown else "–",
-                code(found["command"]) if found else "–",
-            ]
-            for found, drawn in zip_longest(s["worst"], random)
-        ],
-    )
-    refused_section(page, unit, s["refused"], {})
-    page.heading("What it rests on")
-    page.paragraph(
-        Html(
-            f"Every flight is a row of {code(RESULTS)}; every number of this page is in {code(SUMMARY)}. "
-            f"The rows follow from what {code(PLAN)} names, the seed of the search included."
-        )
-    )
-    page.table(["", ""], [[key.replace("_", " "), str(value)] for key, value in search.items()])
-    basis(page, s)
-    return page
-
-
-def _verdict(s: dict[str, Any], unit: str) -> str:
-    if s["estimate"]:
-        return f"The probability of a violation: {_estimated(s['estimate'])}, from {s['flown']} flights."
-
-    def of(found: dict[str, Any]) -> str:
-        worst = f"; the worst is {_value(s, found['worst'][0], True)}" if found["worst"] else ""
-        return f"{found['violations']} {unit}s with a violation and {found['not_reached']} that did not arrive{worst}"
-
-    return f"In {s['flown']} flights the search found {of(s)}. As many random ones: {of(s['random'])}."
-
-
 def _estimated(estimate: Mapping[str, Any]) -> str:
     if not estimate["probability"]:
         return f"below {estimate['high']:.2g} (97.5 %), none was found"
     return f"{estimate['probability']:.2g} ({estimate['low']:.2g} to {estimate['high']:.2g} at 95 %)"
 
 
-def _cells(s: dict[str, Any], row: dict[str, Any] | None) -> list[str]:
-    return [str(row["row"]), _value(s, row)] if row else ["–", "–"]
-
-
-def _value(s: dict[str, Any], row: dict[str, Any], unit: bool = False) -> str:
+def _value(s: dict[str, Any], row: dict[str, Any] | None, unit: bool = False) -> str:
+    if row is None:
+        return "–"
     objective = s["search"]["objective"]
     if objective == "arrival" and -row["cost"] >= s["horizon"]:
         return "never"

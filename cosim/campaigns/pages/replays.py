@@ -6,19 +6,23 @@ import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from cosim.campaigns.pages.sections import SECTIONS
 from cosim.campaigns.reruns.repeat import Repeat, repeat_of
 from cosim.errors import CosimError, RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text, read_json, understood
 from cosim.replay.page import write_page
 from cosim.replay.trace import trace_of
-from cosim.report.web_page import Html, Page, link
+from cosim.report.web_page import render_page, write_figures
 from cosim.results.run_result import REPLAY, load_run
 from cosim.run.run import run_scenario
 from plant_fmu import PlantError
 from plant_fmu.archive import temporary_folder
+
+if TYPE_CHECKING:
+    from cosim.report.figures.style import NamedFigure
 
 WORST = "worst"  # folder of the replays
 _FLOWN = "flown.json"  # file beside a replay with remarks on differing flights
@@ -31,32 +35,28 @@ class Replay:
     page: str | None  # path of the replay's page, relative to the folder
     remarks: tuple[str, ...]  # remarks, such as differences between flight and row
 
-    def cell(self) -> Html:
-        """Format it as a cell of a table."""
-        import html
-
-        shown = [link(self.page, "replay")] if self.page else []
-        return Html("; ".join([*shown, *map(html.escape, self.remarks)]))
-
 
 def write_page_with_replays(
     path: Path,
     numbers: Path,
-    page: Callable[[Mapping[int, Replay]], Page],
+    drawings: Iterable[NamedFigure],
+    values: Mapping[str, Any],
     keys: Iterable[int],
     folders: Sequence[Path],
     title: Callable[[int], str],
-) -> None:
-    """Write a page, fly rows again, and write the page again with their replays.
+) -> Path:
+    """Write a page and its figures, fly rows again, and write the page again with their replays.
 
     Parameters
     ----------
     path : Path
-        Path of the page; the replays are written into the folder ``worst`` beside it.
+        Path of the page; its template has the same name, and the replays are written into the folder ``worst`` beside.
     numbers : Path
         File with the numbers of the page, for error messages.
-    page : callable
-        Function that makes the page, given the replays by key of the row.
+    drawings : iterable of NamedFigure
+        Figures of the page.
+    values : mapping of str to Any
+        Values of the template, by name.
     keys : iterable of int
         Keys of the rows to fly again.
     folders : sequence of Path
@@ -64,23 +64,33 @@ def write_page_with_replays(
     title : callable
         Function that makes the title of a replay, given the key of its row.
 
+    Returns
+    -------
+    Path
+        Path of the page.
+
     Raises
     ------
     RunError
-        If the numbers are not those of such a page, or a folder cannot be read.
-    OSError
-        If the page or a replay cannot be written.
+        If the numbers are not those of such a page, or a file cannot be read or written.
     KeyboardInterrupt
         After Ctrl-C; the page is written without the replays.
     """
+    template = f"cosim.campaigns.pages/{path.name}.j2"
 
     def write(shown: Mapping[int, Replay]) -> None:
         with understood(numbers):
-            write_atomic(path, page(shown).html())
+            write_atomic(path, render_page(template, **values, **SECTIONS, figures=figures, shown=shown))
 
-    write({})
-    if shown := {key: replay_of(path.parent, key, folders, title(key)) for key in keys}:
-        write(shown)
+    try:
+        with understood(numbers):
+            figures = write_figures(path.parent, drawings)
+        write({})
+        if shown := {key: replay_of(path.parent, key, folders, title(key)) for key in keys}:
+            write(shown)
+    except OSError as error:
+        raise RunError(f"{path.parent}: {error.strerror or error}") from error
+    return path
 
 
 def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Replay:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -16,7 +17,7 @@ from cosim.identification.excitation.scenario_text import ROW, scenario_text
 from cosim.identification.excitation.segments import PERIOD, SECONDS
 from cosim.identification.fit import STAGES
 from cosim.io.atomic_file import write_atomic
-from cosim.report.web_page import Html, Page, inline_figure, number
+from cosim.report.web_page import inline_figure, render_page
 from cosim.scenario.scenario import VEHICLE_COPY
 from plant_fmu.archive import temporary_folder
 
@@ -74,7 +75,7 @@ def write_folder(done: Design, out: Path) -> Path:
         SCENARIO: scenario_text(vehicle, done.depth, done.duration, done.vehicle.name).encode(),
         COMMANDS: b"".join(msgspec.json.encode({"step": k, "command": c}) + b"\n" for k, c in done.commands),
         STICKS: "".join(f"{line}\n" for line in _stick_lines(done)).encode(),
-        PAGE: _page(done, out).html().encode(),
+        PAGE: _page(done, out).encode(),
     }
     try:
         if own:
@@ -117,61 +118,32 @@ def _of_prior(done: Design) -> NDArray[np.float64]:
     return np.array([d / p.deviation for d, p in zip(done.deviations, done.parameters, strict=True)])
 
 
-def _page(done: Design, out: Path) -> Page:
+def _page(done: Design, out: Path) -> str:
     import matplotlib as mpl
 
     from cosim.identification.excitation.figures import figure_of
     from cosim.report.figures.style import STYLE
 
-    page = Page(f"Stick inputs for {done.vehicle.title}")
-    page.verdict(verdict(done))
-    for text in warnings(done):
-        page.paragraph(text)
-    page.block(
-        f"cosim run {out}/{SCENARIO} --replay-commands {out}/{COMMANDS} --out runs/{out.name}\n"
-        f"cosim identify runs/{out.name} --vehicle {done.start} --out mine.toml"
-    )
-    page.paragraph(
-        f"{STICKS} holds the same for a pilot or a script: stick values from −1 to 1 at full pilot gain, each until "
-        f"the time of the next, {PERIOD:g} s on average. The times are uneven on purpose: even ones could keep step "
-        "with a log at an even rate, which would then miss the same part of each change of thrust. manual, stabilize "
-        "and depth_hold are ArduSub's MANUAL, STABILIZE and ALT_HOLD; return means back to the center of the box at "
-        f"{done.depth:g} m, by hand or by a mode that holds position.",
-        faint=True,
-    )
     with temporary_folder("excite-") as scratch, mpl.rc_context(STYLE):
-        page.add(inline_figure(figure_of(done), scratch))
-    page.heading("The segments")
-    page.table(
-        ("Begin [s]", "Input", "Mode", "Greatest stick, X Y Z K M N"),
-        [
-            (f"{BEGIN + k * (SECONDS + RETURN):g}", s.title, s.mode,
-             ", ".join(f"{x:.2f}" for x in np.abs(s.sticks).max(axis=0)))
-            for k, s in enumerate(done.segments)
-        ],
+        figure = figure_of(done)
+        figures = {figure.name: inline_figure(figure, scratch)}
+    segments = [
+        {
+            "begin": BEGIN + k * (SECONDS + RETURN), "title": segment.title, "mode": segment.mode,
+            "sticks": ", ".join(f"{x:.2f}" for x in np.abs(segment.sticks).max(axis=0)),
+        }
+        for k, segment in enumerate(done.segments)
+    ]  # fmt: skip
+    return render_page(
+        "cosim.identification.excitation/excite.html.j2", vehicle=done.vehicle.title, start=done.start, out=out,
+        verdict=verdict(done), warnings=warnings(done), figures=figures, segments=segments, numbers=_numbers(done),
+        depth=done.depth, period=PERIOD, window=STAGES[0], noise=NOISE, row_period=ROW,
     )  # fmt: skip
-    page.paragraph(
-        "Chosen one by one, each as the candidate that adds most information on the free numbers (the determinant of "
-        "their covariance, nuisances included), and then exchanged for better ones.",
-        faint=True,
-    )
-    page.heading("What to expect")
-    page.table(
-        ("Number", "Known before", "± 95 % before", "± 95 % expected", "Unit", "Part of the number"), _rows(done)
-    )
-    noise = ", ".join(f"{name.replace('_', ' ')} {size:g}" for name, size in NOISE.items())
-    page.paragraph(
-        f"By the exact sensitivities of the identification in windows of {STAGES[0]:g} s, about the numbers as they "
-        f"are known before, with white noise of {noise} (SI units; velocities at 6.7 Hz, the rest at {1 / ROW:g} Hz). "
-        "Disturbances and a wrong model make intervals wider: those of cosim identify count.",
-        faint=True,
-    )
-    return page
 
 
-def _rows(done: Design) -> Iterator[tuple[str | Html, ...]]:
+def _numbers(done: Design) -> Iterator[dict[str, Any]]:
     for i in done.vehicle_part():
-        p = done.parameters[i]
-        half = _NORMAL * float(done.deviations[i])
+        p, half = done.parameters[i], _NORMAL * float(done.deviations[i])
         part = f"{100 * half / abs(p.start):.2g} %" if p.start else "–"
-        yield p.name, number(p.start), number(_NORMAL * p.deviation, 2), number(half, 2), p.unit, part
+        before = {"name": p.name, "start": p.start, "before": _NORMAL * p.deviation, "unit": p.unit}
+        yield before | {"half": half, "part": part}

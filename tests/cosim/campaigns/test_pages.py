@@ -2,6 +2,7 @@
 
 import json
 import re
+import shutil
 from html.parser import HTMLParser
 from xml.etree import ElementTree as ET
 
@@ -13,15 +14,16 @@ from cosim.campaigns.analysis.statistics import quantiles
 from cosim.campaigns.pages.campaign_page import write_campaign_page
 from cosim.campaigns.pages.comparison_page import write_comparison_page
 from cosim.campaigns.pages.figures import distributions, shares_up_to
-from cosim.campaigns.pages.sections import Group, quantiles_table
+from cosim.campaigns.pages.sections import SECTIONS
 from cosim.campaigns.pages.sweep_page import write_sweep_page
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.command_line.cli import main
 from cosim.errors import RunError
-from cosim.report.web_page import Page, number
+from cosim.report.web_page import number
 from tests.cosim.campaigns.fake import design, fakes, paper
 from tests.cosim.campaigns.scene_data import BRIEF, HARD, PLAIN, write
 from tests.cosim.campaigns.test_comparison import idle
+from tests.security.test_pages import Elements
 
 __all__ = ["fakes", "idle"]
 
@@ -236,12 +238,52 @@ def test_replay_count_must_be_a_number(capsys):
         assert "from 0 to 1000" in capsys.readouterr().err
 
 
-def test_text_of_a_page_is_escaped():
-    page = Page("<a>")
-    page.paragraph("1 < 2 & 3")
-    page.table(["<th>"], [["<b>"]])
-    text = page.html()
-    assert "&lt;a&gt;" in text and "1 &lt; 2 &amp; 3" in text and "&lt;b&gt;" in text and "<b>" not in text
+ATTACK = """</script></title><script>harm()</script><img src=x onerror="harm()"> {{ s }} 5 %"""
+LOOKED_UP = {"kind", "completed_by", "beside"}  # keys whose texts decide what a page shows
+FREE = {"versions", "gains", "conditions", "reasons"}  # tables whose keys are names from outside
+
+
+def hostile(value, free=False):
+    """Return numbers of a page with an attack in place of each text and of each name from outside."""
+    if isinstance(value, dict):
+        return {
+            f"{ATTACK} {i}" if free else key: item if key in LOOKED_UP else hostile(item, key in FREE)
+            for i, (key, item) in enumerate(value.items())
+        }
+    if isinstance(value, list):
+        return [hostile(item) for item in value]
+    return ATTACK if isinstance(value, str) else value
+
+
+def attack(numbers, write_page):
+    """Check that a page whose numbers hold attacks has the elements that it has without them."""
+    page = write_page(numbers.parent, 0)
+    plain = Elements(page.read_text()).found
+    table = json.loads(numbers.read_text())
+    assert hostile(table) != table
+    numbers.write_text(json.dumps(hostile(table)))
+    write_page(numbers.parent, 0)
+    attacked = page.read_text()
+    assert Elements(attacked).found == plain and "script" not in {tag for tag, _ in plain}
+    assert "harm()" in attacked and "{{ s }} 5\N{NO-BREAK SPACE}%" in attacked
+
+
+@pytest.mark.medium
+def test_hostile_texts_of_a_campaign_are_escaped(flown, tmp_path):
+    shutil.copytree(flown, tmp_path / "out")
+    attack(tmp_path / "out" / "summary.json", write_campaign_page)
+
+
+@pytest.mark.medium
+def test_hostile_texts_of_a_sweep_are_escaped(tmp_path, fakes):
+    run_sweep(paper(), design(20), tmp_path / "out", "choosy")
+    attack(tmp_path / "out" / "summary.json", write_sweep_page)
+
+
+@pytest.mark.slow
+def test_hostile_texts_of_a_comparison_are_escaped(tmp_path, idle):
+    compare(write(tmp_path / "s.jsonl", [*HARD[:2], REFUSED]), ["ismail_dunnigan", "idle"], tmp_path / "out", BRIEF)
+    attack(tmp_path / "out" / "compare.json", write_comparison_page)
 
 
 @pytest.mark.parametrize(
@@ -259,10 +301,9 @@ def test_median_marker_matches_the_table(n, never):
     (drawn,) = distributions({"effort": {"": values}}, "")
     (axes,) = (axes for axes in drawn.figure.axes if axes.get_visible())
     (dot,) = (line for line in axes.lines if line.get_marker() == "o")
-    page = Page("")
-    quantiles_table(page, [Group("", len(values), {}, {"effort": quantiles(values)})])
-    ((_, *head), (_, *row)) = Checker(page.html()).rows
-    assert number(dot.get_xdata()[0]) == row[head.index("median")]
+    ((_, _, row),) = SECTIONS["quantile_rows"]({"all": {"quantiles": {"effort": quantiles(values)}}})
+    table = dict(zip(SECTIONS["quantile_names"], row, strict=True))
+    assert number(dot.get_xdata()[0]) == number(table["median"])
     finite = sorted(values[:n])
     assert dot.get_xdata()[0] == pytest.approx((finite[(n - 1) // 2] + finite[n // 2]) / 2)
     (curve,) = (line for line in axes.lines if line is not dot)

@@ -28,7 +28,7 @@ from cosim.replay.events import events_of
 from cosim.replay.page import is_page, write_page
 from cosim.replay.region_changes import changes_of
 from cosim.replay.trace import trace_of
-from cosim.report.web_page import Html
+from cosim.report.web_page import InlineFigure
 from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
 from cosim.results.record import PARTS, RECORD, load_record
 from cosim.results.run_result import _read_summary, load_run, open_run
@@ -199,18 +199,21 @@ def part_of_campaign(seeds: Seeds) -> Case:
     return Case((content,), read, str(folder))
 
 
-def _without_drawing(seeds: Seeds, module: str) -> None:
-    seeds.patch.setattr(f"cosim.campaigns.pages.{module}.write_figures", lambda folder, _: _AnyFigure())
+def _without_drawing(seeds: Seeds) -> None:
+    seeds.patch.setattr("cosim.campaigns.pages.replays.write_figures", lambda folder, _: _AnyFigure())
 
 
-class _AnyFigure(dict[str, Html]):
-    def __missing__(self, name: str) -> Html:
-        return Html("")
+class _AnyFigure(dict[str, InlineFigure]):
+    def __contains__(self, name: object) -> bool:
+        return True
+
+    def __missing__(self, name: str) -> InlineFigure:
+        return InlineFigure("", "")
 
 
 @reader("summary of a campaign", "json", "cosim.io.strict_json:read_json")
 def summary_of_campaign(seeds: Seeds) -> Case:
-    _without_drawing(seeds, "campaign_page")
+    _without_drawing(seeds)
     return seeds.file(
         SUMMARY, lambda path: write_campaign_page(path.parent, 0), of=seeds.comparison / "ismail_dunnigan"
     )
@@ -218,14 +221,14 @@ def summary_of_campaign(seeds: Seeds) -> Case:
 
 @reader("summary of a sweep", "json", "cosim.io.strict_json:read_json")
 def summary_of_sweep(seeds: Seeds) -> Case:
-    _without_drawing(seeds, "sweep_page")
+    _without_drawing(seeds)
     case = seeds.file(SUMMARY, lambda path: write_sweep_page(path.parent, 0), of=seeds.sweep)
     return replace(case, named=str(Path(case.named).parent))
 
 
 @reader("comparison", "json", "cosim.io.strict_json:read_json")
 def comparison(seeds: Seeds) -> Case:
-    _without_drawing(seeds, "comparison_page")
+    _without_drawing(seeds)
     case = seeds.file(NUMBERS, lambda path: write_comparison_page(path.parent, 0), of=seeds.comparison)
     return replace(case, named=str(Path(case.named).parent))
 
@@ -234,6 +237,6 @@ def comparison(seeds: Seeds) -> Case:
 def remarks(seeds: Seeds) -> Case:
     return seeds.file(
         "worst/1/flown.json",
-        lambda path: replay_of(path.parents[2], 1, [], "it").cell(),
+        lambda path: replay_of(path.parents[2], 1, [], "it"),
         b'{"remarks": ["printed: step by step it came out otherwise"]}',
     )
