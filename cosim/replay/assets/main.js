@@ -7,15 +7,11 @@ const OLD_BROWSER =
 
 /** Return the runs of the page; show the error and return null if they cannot be read. */
 async function runsOfPage(page) {
-  if (JSON.parse(document.getElementById("runs").textContent).length && typeof DecompressionStream === "undefined") {
-    page.nothing(OLD_BROWSER);
-    page.say(OLD_BROWSER, "error");
-    return null;
-  }
   try {
     return await loadRuns();
   } catch (error) {
-    const text = `The numbers of this page are damaged and cannot be read; write the page again. (${error.message})`;
+    const damaged = `The numbers of this page are damaged and cannot be read; write the page again. (${error.message})`;
+    const text = typeof DecompressionStream === "undefined" ? OLD_BROWSER : damaged;
     page.nothing(text);
     page.say(text, "error");
     return null;
@@ -41,26 +37,19 @@ async function main() {
     whatIf: null,
     page,
     player: page.player,
-    get runs() {
-      return page.runs;
-    },
-    get scene() {
-      return page.scene();
-    },
-    get scenes() {
-      return page.stage.scenes;
-    },
-    get charts() {
-      return page.board.charts;
-    },
+    get runs() { return page.runs; },
+    get scene() { return page.scene(); },
+    get scenes() { return page.stage.scenes; },
+    get charts() { return page.board.charts; },
     show: (runs) => page.show(runs),
     paint: () => page.paint(),
   };
   const runs = await runsOfPage(page);
-  if (runs?.length) await page.show(runs);
-  else if (runs && location.protocol.startsWith("http")) await startLive(page);
+  if (runs?.length) {
+    await page.show(runs);
+    window.subreach.whatIf = await startWhatIf(page);
+  } else if (runs && location.protocol.startsWith("http")) await startLive(page);
   else if (runs) page.nothing(NO_RUN);
-  if (runs?.length) window.subreach.whatIf = await startWhatIf(page);
   window.subreach.ready = true;
 }
 
