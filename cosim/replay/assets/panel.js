@@ -42,7 +42,7 @@ class Panel {
     this.run = runs[selected];
     if (!this.run) return;
     const { imported, regions, criteria, rules, events = [] } = this.run.header;
-    this.events = events;
+    this.events = [...events]; // of a live run, the header gets more
     const hidden = { // no arbiter decided in a log
       runs: runs.length < 2, weights: imported, rules: imported, events: !events.length,
       distances: imported && regions.length === 1,
