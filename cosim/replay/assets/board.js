@@ -9,7 +9,8 @@ class Board {
     this.player = player;
     this.charts = [];
     this.window = null; // null for the whole run
-    this._out = new Set(["memberships", "asked", "acting", "moments", "turning"]); // hidden until the reader selects them
+    // hidden until the reader selects them
+    this._out = new Set(["memberships", "asked", "acting", "moments", "turning"]);
     this._updated = 0;
     this._pending = 0;
     this._watcher = new IntersectionObserver((entries) => {
@@ -20,9 +21,6 @@ class Board {
       for (const { target } of entries) target.chart.stale = true;
       this._later();
     });
-    byId("charts-in").onclick = () => this.zoom(0.5);
-    byId("charts-out").onclick = () => this.zoom(2);
-    byId("charts-whole").onclick = () => this.whole();
   }
 
   /**

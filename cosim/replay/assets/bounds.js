@@ -13,7 +13,7 @@ const widenedBox = ([low, high], by) => [low.map((x) => x - by), high.map((x) =>
 
 const isInBox = (p, [low, high]) => p.every((x, i) => x >= low[i] && x <= high[i]);
 
-/** Return the corners of boxes about the vehicle at sampled rows, and about the goal at start and end, or at each place. */
+/** Return corners of boxes about the vehicle at sampled rows, and about the goal at start and end, or each place. */
 function placesOf(run) {
   const columns = run.columns("position");
   const stride = Math.max(1, Math.floor(run.rows / 200));
@@ -33,8 +33,8 @@ function placesOf(run) {
 /**
  * Return the points of a region that the camera frames.
  *
- * A bounded region counts where it is near the path, cut to the limits: a long pipeline must not reduce the vehicle to a
- * dot. Of a plane it is the point that is nearest to the middle of the path.
+ * A bounded region counts where it is near the path, cut to the limits: a long pipeline must not reduce the vehicle
+ * to a dot. Of a plane it is the point that is nearest to the middle of the path.
  */
 function reachOf(shape, shift, middle, limits) {
   const solid = surfaceOf(shape);

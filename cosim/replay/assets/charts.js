@@ -60,7 +60,7 @@ class Chart {
     this.frame = new Frame(width, height, this.window, this.rest, range, down);
     paintPlot(context, this.frame, this.spec, this.curves);
     const { top, bottom, x } = this.frame;
-    context.fillStyle = COLOURS.curveInk;
+    context.fillStyle = COLOURS.ink;
     if (cursor !== null) context.fillRect(x(cursor) - 0.75, top, 1.5, bottom - top);
     this.stale = false;
   }

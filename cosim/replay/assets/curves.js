@@ -1,7 +1,5 @@
 // Curves of the charts: signals of the runs with names, colors and dashes.
 
-// criterion colors of the palette are drawn as hues of the theme; other colors stay
-const HUE_OF = { "#D55E00": "vermillion", "#E69F00": "orange", "#56B4E9": "sky", "#CC79A7": "purple", "#009E73": "green" };
 const IN_TURN = ["blue", "vermillion", "green", "purple"];
 const DASHES = [[], [7, 4], [2, 3], [10, 3, 2, 3], [14, 4], [4, 2, 1, 2, 1, 2]];
 const NAMED = 6; // number of regions that the distance chart names
@@ -9,13 +7,13 @@ const NAMED = 6; // number of regions that the distance chart names
 /** Return the dash pattern of a run on a page with several. */
 const runDash = (index) => DASHES[index % DASHES.length];
 
-/** Return the hue name of a header color "#RRGGBB"; the color itself if it has no name. */
-const hueOf = (colour) => HUE_OF[colour.toUpperCase()] ?? colour;
+/** Return the hue of the theme for a color of the header in the palette; other colors stay. */
+const hueOf = (colour) => Object.keys(PALETTE).find((hue) => PALETTE[hue] === colour.toLowerCase()) ?? colour;
 
 /** Return the CSS color of a hue or of "#rrggbb", mixed with the share `shade` of ink. */
 function hueColour(hue, shade = 0) {
   const base = COLOURS[hue] ?? legible(hue);
-  return shade ? mixedColour(base, COLOURS.curveInk, shade) : base;
+  return shade ? mixedColour(base, COLOURS.ink, shade) : base;
 }
 
 /** Return the criteria of some runs, each name once, in the order of priority. */
@@ -83,8 +81,8 @@ const estimates = (indices) => indices.flatMap((i) => {
 /**
  * Return the charts of some runs, without charts for which no run has a signal.
  *
- * @returns {object[]} with key, title, unit, signals (name, label, hue, shade, dash, faint, context, values(run)); optional
- *   are zero (values below 0 are violations), fixed ([least, most]), down (the axis points down)
+ * @returns {object[]} with key, title, unit, signals (name, label, hue, shade, dash, faint, context, values(run));
+ *   optional are zero (values below 0 are violations), fixed ([least, most]), down (the axis points down)
  */
 function chartsOf(runs) {
   const criteria = (kind) => criteriaOf(runs).map(({ name, colour }, i) =>

@@ -80,8 +80,8 @@ class Run {
   goalPlace(t) { return this.held("goal.place", t) || 0; }
 
   /**
-   * Return the displacement of a region from its shape's place at a time [s] [m, NED]; with `place`, that of the goal at
-   * one of its places.
+   * Return the displacement of a region from its shape's place at a time [s] [m, NED]; with `place`, that of the goal
+   * at one of its places.
    */
   shift(region, t, place = null) {
     const { name, comes, places } = this.header.regions[region];
@@ -93,7 +93,7 @@ class Run {
     return leaps ? this.vectorHeld(`${name}.shift`, t) : this.vectorAt(`${name}.shift`, t);
   }
 
-  /** Return the velocity of the water at the vehicle [m/s, NED] as of a time [s]; null at rest, or if it is not known. */
+  /** Return the velocity of the water at the vehicle [m/s, NED] as of a time [s]; null at rest, or if not known. */
   current(t) {
     const velocity = this.vectorHeld("water_velocity", t);
     return Vec.norm(velocity) >= 0.0005 && Vec.finite(velocity) ? velocity : null; // less is shown as 0
@@ -132,8 +132,9 @@ class Run {
     let row = last;
     while (row > 0 && limits.every(([column, limit]) => Math.abs(column[row - 1] - column[last]) <= limit)) row -= 1;
     const events = (this.header.events ?? []).filter(({ kind }) => kind !== "end");
-    const time = Math.max(this.rows ? this.time[row] : 0, ...events.flatMap(({ time, until }) => [time, until ?? time]));
-    return time + 0.05 * (time - this.start);
+    const times = events.flatMap(({ time, until }) => [time, until ?? time]);
+    const rest = Math.max(this.rows ? this.time[row] : 0, ...times);
+    return rest + 0.05 * (rest - this.start);
   }
 
   /** Append one row of a live run, in the order of the header's signals. */

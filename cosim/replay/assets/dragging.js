@@ -8,14 +8,13 @@ const SETTLES = 250; // ms, for which the ghost stays after the release
 /** Pointer drags of regions, with a preview of the new position. */
 class Dragging {
   /**
-   * @param {LiveLink|WhatIf} link with page, run, acceptsCommands; time, for which the regions are shown [s]; refusal, the
-   * reason why nothing can be moved, or ""; canMove(region, place); move(region, from, to, place), with the place of a
-   * goal in turn
+   * @param {LiveLink|WhatIf} link with page, run, acceptsCommands; time, for which the regions are shown [s]; refusal,
+   * the reason why nothing can be moved, or ""; canMove(region, place); move(region, from, to, place), with the place
+   * of a goal in turn
    */
   constructor(link) {
     this.link = link;
     this.canvas = link.page.canvas;
-    this.ghost = new Ghost(this.canvas);
     this.held = null;
     listen(this.canvas, {
       pointermove: (event) => this._move(event),
@@ -30,12 +29,15 @@ class Dragging {
   /** End the drag without a command. */
   cancel() {
     this.held = null;
-    this.ghost.clear();
+    this._show(null);
   }
 
-  /** Redraw the ghost, as the camera may have moved. */
-  draw() {
-    if (this.held?.moved) this.ghost.draw(this.link.page.scene(), this.held);
+  /** Show a ghost; null for none. */
+  _show(ghost) {
+    const scene = this.link.page.scene();
+    if (!scene) return;
+    scene.ghost = ghost;
+    this.link.page.later();
   }
 
   /** Return the region at a pixel that may be dragged, and the place of a goal in turn; null if there is none. */
@@ -77,7 +79,7 @@ class Dragging {
     held.to = this._dragged(held, [x, y], shiftKey);
     held.last = [x, y];
     this.canvas.style.cursor = "grabbing";
-    this.draw();
+    this._show(held);
   }
 
   /** Return the new position: on a level plane, vertical with `up`, or on the upright plane in an edge-on view. */
@@ -104,7 +106,7 @@ class Dragging {
       const round = held.to.map((x, i) => (x === held.from[i] ? x : Number(x.toFixed(3))));
       link.move(held.region, held.from, round, held.place);
     }
-    setTimeout(() => this.held ?? this.ghost.clear(), SETTLES);
+    setTimeout(() => this.held ?? this._show(null), SETTLES);
   }
 
   /** Set the cursor shape over draggable regions, at most every 80 ms, as picking takes time. */

@@ -169,7 +169,7 @@ function activeRegions(run, criteria) {
     const weight = weights.map((column) => column[row]);
     const leads = weight.reduce((best, x, i) => (x > (weight[best] ?? -Infinity) ? i : best), 0);
     const gap = (region) => clearances[region][row];
-    const regions = [...criteria.keys()].map((i) => i + 1).filter((i) => criteria[i - 1] === leads && !Number.isNaN(gap(i)));
+    const regions = [...clearances.keys()].filter((i) => criteria[i - 1] === leads && !Number.isNaN(gap(i)));
     if (!regions.length || !(memberships[leads][row] > 0 && weight[leads] >= ASKS)) return 0;
     const region = regions.reduce((a, b) => (gap(b) < gap(a) ? b : a));
     const rests = gap(0) >= 0 && Math.hypot(...speeds.map((speed) => speed[row])) < 0.02;

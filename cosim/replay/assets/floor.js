@@ -37,7 +37,8 @@ function paintFloor(painter, labels, bounds, named) {
   const nearSide = (ticks, at, low, high) => {
     const sides = [[low, -1], [high, 1]].map(([side, sign]) => {
       const [, y, depth] = camera.project(at(0.5 * (ticks[0] + ticks.at(-1)), side));
-      return { side, sign, y, depth, shown: ticks.filter((tick) => camera.isInPicture(camera.project(at(tick, side)))) };
+      const shown = ticks.filter((tick) => camera.isInPicture(camera.project(at(tick, side))));
+      return { side, sign, y, depth, shown };
     });
     sides.sort((a, b) => (Math.abs(a.y - b.y) > 1 ? b.y - a.y : a.depth - b.depth));
     return sides.find(({ shown }) => shown.length > 1) ?? sides[0];
@@ -105,7 +106,7 @@ function paintCompass(painter, labels) {
   Object.assign(context, { lineCap: "round", textAlign: "center", textBaseline: "middle" });
   [..."NED"].forEach((name, i) => {
     const [dx, dy] = [size * camera.right[i], -size * camera.up[i]];
-    const fillStyle = name === "N" ? COLOURS.sceneInk : COLOURS.soft;
+    const fillStyle = name === "N" ? COLOURS.ink : COLOURS.soft;
     painter.strokeLines([[[x, y], [x + dx, y + dy]]], fillStyle, name === "N" ? 2.6 : 1.8);
     const length = Math.hypot(dx, dy);
     const [u, v] = [x + (dx * (length + 9)) / length, y + (dy * (length + 9)) / length];
@@ -123,10 +124,10 @@ function paintScale(painter, labels, magnified) {
   const pixels = camera.focal / camera.distance;
   const length = roundStep(60 / pixels) > 110 / pixels ? roundStep(30 / pixels) : roundStep(60 / pixels);
   const [left, right, y] = [camera.width - 16 - length * pixels, camera.width - 16, camera.height - 18];
-  painter.strokeLines([[[left, y - 4], [left, y], [right, y], [right, y - 4]]], COLOURS.sceneInk, 1.5);
+  painter.strokeLines([[[left, y - 4], [left, y], [right, y], [right, y - 4]]], COLOURS.ink, 1.5);
   const text = length < 1000 ? `${length} m` : `${length / 1000} km`;
   const size = magnified > 1.05 ? ` · vehicle ×${magnified.toPrecision(2)}` : "";
-  const style = { font: FONT, textAlign: "right", textBaseline: "bottom", fillStyle: COLOURS.sceneInk };
+  const style = { font: FONT, textAlign: "right", textBaseline: "bottom", fillStyle: COLOURS.ink };
   writeText(context, text + size, right, y - 6, style);
   labels.block(Math.min(left, camera.width - 150) - 6, y - 22, 180, 40);
 }

@@ -30,7 +30,8 @@ class Forces {
 
   _look() {
     const { run } = this;
-    const thrusters = run.header.vehicle.thrusters.map((_, i) => run.column(`thruster_force[${i + 1}]`)).filter(Boolean);
+    const { thrusters: all } = run.header.vehicle;
+    const thrusters = all.map((_, i) => run.column(`thruster_force[${i + 1}]`)).filter(Boolean);
     const body = run.columns("actuation", "XYZ").filter(Boolean);
     for (; this._rows < run.rows; this._rows++) {
       this._thrusters ||= thrusters.some((force) => Math.abs(force[this._rows]) > 0);

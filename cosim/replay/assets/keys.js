@@ -1,4 +1,4 @@
-// Keyboard: one table for the key handler and for the help.
+// Keyboard: one table for the key handler, for buttons that do the same (data-key), and for the help.
 
 /** Return the keys of the page: group, keys as shown, text and actions; `whatIf` where the page can simulate. */
 function keysOf(page, whatIf = null) {
@@ -62,6 +62,9 @@ function closeMenu() {
   }
 }
 
+/** Return the action of a key, by its name. */
+const actionOf = (keys, name) => keys.map(([, , , actions]) => actions[name]).find(Boolean);
+
 /** Return the name of a key with its modifiers, as in the table. */
 function keyName({ key, altKey, shiftKey }) {
   const name = key.length === 1 ? key.toLowerCase() : key;
@@ -82,7 +85,7 @@ function listenToKeys(page) {
   document.addEventListener("keydown", (event) => {
     if (event.ctrlKey || event.metaKey || event.defaultPrevented) return;
     const name = keyName(event);
-    const does = page.keys.map(([, , , actions]) => actions[name]).find(Boolean);
+    const does = actionOf(page.keys, name);
     if (!does || wants(event.target, name) || document.querySelector("dialog[open]")) return;
     event.preventDefault();
     does();
@@ -93,7 +96,8 @@ function listenToKeys(page) {
 function fillHelp(keys) {
   const groups = [...new Set(keys.map(([group]) => group))].map((group) => {
     const rows = keys.filter(([of]) => of === group).flatMap(([, label, text]) => {
-      const parts = label.split(" ").flatMap((part) => [h("kbd", {}, part.length > 1 ? part.replace(",", "") : part), " "]);
+      const caps = label.split(" ").map((cap) => (cap.length > 1 ? cap.replace(",", "") : cap));
+      const parts = caps.flatMap((cap) => [h("kbd", {}, cap), " "]);
       return [h("dt", {}, ...parts), h("dd", {}, text)];
     });
     return h("section", {}, h("h3", {}, group), h("dl", {}, ...rows));

@@ -31,9 +31,9 @@ class Labels {
 
   /**
    * Add a label for the next draw().
-   * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold, chip:
-   * background color or null, pad: pixels that stay free beside it, far: true if it may stand farther off, with a leader
-   * line in the color `edge`, sides: of "above below right left here" in the order in which they are tried}
+   * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold,
+   * chip: background color or null, pad: pixels that stay free beside it, far: true if it may stand farther off, with
+   * a leader line in the color `edge`, sides: of "above below right left here" in the order in which they are tried}
    */
   add(word) { this._words.push(word); }
 

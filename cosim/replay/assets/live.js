@@ -110,19 +110,18 @@ class LiveLink {
     this.dragging.cancel();
     this.commandPanel.update();
     if (this.over) return;
-    this.page.say(this.run ? "The connection is lost; trying again …" : "No run answers here; trying again …", "warning");
+    this.page.say(`${this.run ? "The connection is lost" : "No run answers here"}; trying again …`, "warning");
     if (!this.run) this.page.nothing("Waiting for a run.");
     setTimeout(() => this.connect(), this._wait);
     this._wait = Math.min(RETRY[1], 2 * this._wait);
   }
 
-  /** Update page, panel and ghost once with the next frame. */
+  /** Update page and panel once with the next frame. */
   _later() {
     this._next ||= requestAnimationFrame(() => {
       this._next = 0;
       this.page.refresh();
       this.commandPanel.update();
-      this.dragging.draw();
     });
   }
 }

@@ -1,7 +1,7 @@
 // Entry point: show the runs of the page; without runs, connect to a live run on the page's own host.
 
 const NO_RUN =
-  "This page holds no run. A run folder has its replay.html; “cosim replay RUN” writes one, of several runs as well.";
+  "This page holds no run. A run folder has its replay.html; “cosim replay RUN” writes one, of several runs too.";
 const OLD_BROWSER =
   "This browser cannot unpack the numbers of the run: it has no DecompressionStream. Any browser since 2023 has it.";
 
@@ -29,7 +29,8 @@ async function main() {
    * - charts: Chart[]; each has series() -> [{run (index in runs), name, label, time, values}], the arrays that are
    *   drawn, paint(), setWindow(from, to), spec.key
    * - show(runs): replace the runs; paint(): paint now, not with the next frame of the screen
-   * - whatIf: the WhatIf of a page that simulates, else null: set(key, value), move(region, from, to), fail(), reset(), last
+   * - whatIf: the WhatIf of a page that simulates, else null: set(key, value), move(region, from, to), fail(),
+   *   reset(), last
    * - page: the Page, as startLive() gets it (theme, setTheme, setSide, showRun, select, refresh, say)
    */
   window.subreach = {

@@ -14,7 +14,7 @@ function farthestFirst(entries, eye) {
   const { corners, normal } = plane.sheet;
   const side = (p) => Vec.dot(Vec.sub(p, corners[0]), normal) > 0;
   const others = entries.filter((entry) => entry !== plane);
-  const [beyond, before] = [false, true].map((is) => others.filter(({ middle }) => (side(middle) === side(eye)) === is));
+  const [beyond, before] = [!side(eye), side(eye)].map((is) => others.filter(({ middle }) => side(middle) === is));
   return [...farthestFirst(beyond, eye), plane, ...farthestFirst(before, eye)];
 }
 
@@ -23,7 +23,8 @@ function farthestFirst(entries, eye) {
  *
  * Of two spheres that do not touch, the one with the smaller power is never behind the other.
  */
-const remoteness = ({ solid, middle }, eye) => Vec.distance(middle, eye) ** 2 - (solid.ellipsoid ? solid.radius ** 2 : 0);
+const remoteness = ({ solid: { ellipsoid, radius }, middle }, eye) =>
+  Vec.distance(middle, eye) ** 2 - (ellipsoid ? radius ** 2 : 0);
 
 /** Return a function that is true for points that an entry hides or contains. */
 function hiderOf({ solid, sheet, shift, style }, eye) {

@@ -14,13 +14,15 @@ function outcomeOf(data, result, run, failure) {
     settle_time: settled ? lastEntered * data.step : null,
     min_clearance: Object.fromEntries(least),
   };
-  return { summary, verdict: verdictOf(result, run, summary), events: eventsOf(run, summary, failure), status: "completed" };
+  const [verdict, events] = [verdictOf(result, run, summary), eventsOf(run, summary, failure)];
+  return { summary, verdict, events, status: "completed" };
 }
 
 function verdictOf({ metrics, said }, run, { reach_time: reach, settle_time: settled, min_clearance: least }) {
   const [goal, ...regions] = run.header.regions;
   const [goals, at, closest] = [goal.places?.length ?? 1, run.goalPlace(run.end), -metrics[5]];
-  const near = Number.isFinite(closest) ? `it came within ${decimals(closest, 2)} m of it` : "how near it came is not recorded";
+  const unknown = "how near it came is not recorded";
+  const near = Number.isFinite(closest) ? `it came within ${decimals(closest, 2)} m of it` : unknown;
   const entered = `The vehicle entered the goal region at ${decimals(reach, 2)} s`;
   let words = `The vehicle never entered the goal region; ${near}`;
   if (settled !== null && settled === reach) words = `${entered} and stayed`;

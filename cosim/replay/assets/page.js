@@ -194,26 +194,13 @@ class Page {
   }
 
   _listen() {
-    const { player, stage } = this;
-    const presses = {
-      play: () => player.toggle(),
-      "to-start": () => player.seek(player.start),
-      "row-back": () => player.stepRows(-1, this.run),
-      "row-on": () => player.stepRows(1, this.run),
-      follow: () => player.setFollow(!player.follow),
-      labels: () => this.setLabels(!stage.labels),
-      side: () => this.setSide(!stage.side),
-      theme: () => this.switchTheme(),
-      "help-open": () => this.help(),
-      fit: () => stage.camera("fit"),
-      live: () => {
-        player.live = !player.live;
-      },
-    };
-    for (const [id, onclick] of Object.entries(presses)) byId(id).onclick = onclick;
-    for (const button of document.querySelectorAll("[data-look]")) {
-      button.onclick = () => stage.camera("look", button.dataset.look);
+    const { player } = this;
+    for (const button of document.querySelectorAll("[data-key]")) {
+      button.onclick = () => actionOf(this.keys, button.dataset.key)();
     }
+    byId("live").onclick = () => {
+      player.live = !player.live;
+    };
     byId("speed").append(...SPEEDS.map((x) => new Option(`${x}×`, x)));
     byId("speed").onchange = ({ target }) => player.setSpeed(Number(target.value));
     this.dark.onchange = () => this.setTheme(this.dark.matches ? "dark" : "light");

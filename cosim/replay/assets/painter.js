@@ -101,7 +101,7 @@ function paintSurfaceSide(painter, view, style, near) {
   paintEdges(painter, view, style, near);
 }
 
-/** Return the ellipse that an ellipsoid projects to: center and matrix from the unit circle; null if it is no ellipse. */
+/** Return the ellipse that an ellipsoid projects to: center and matrix from the unit circle; null if it is none. */
 function outlineOf(camera, { centre, axes }, shift) {
   const c = Vec.sub(Vec.add(centre, shift), camera.eye);
   const rows = [camera.right, Vec.scale(camera.up, -1), camera.forward];
@@ -118,7 +118,8 @@ function outlineOf(camera, { centre, axes }, shift) {
   const s = Math.sqrt(Math.max(0, xx * yy - xy * xy));
   const k = f / Math.sqrt(xx + yy + 2 * s);
   if (!Number.isFinite(k)) return null;
-  return { x: 0.5 * camera.width + f * x, y: 0.5 * camera.height + f * y, xx: k * (xx + s), xy: k * xy, yy: k * (yy + s) };
+  const [u, v] = [0.5 * camera.width + f * x, 0.5 * camera.height + f * y];
+  return { x: u, y: v, xx: k * (xx + s), xy: k * xy, yy: k * (yy + s) };
 }
 
 /** Draw the fill and the outline of an ellipse; the fill is brighter where light from above falls. */

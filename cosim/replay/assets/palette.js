@@ -11,8 +11,12 @@ function readColours() {
   }
 }
 
+/** Colors of Okabe and Ito, which criteria have; curves have them as hues of the theme. */
+const PALETTE = { vermillion: "#d55e00", orange: "#e69f00", sky: "#56b4e9", purple: "#cc79a7", green: "#009e73" };
+
 /** Colors of the paths of several runs; first those that no criterion has. */
-const RUN_COLOURS = ["#0072B2", "#CC79A7", "#9A7B00", "#7C8A94", "#009E73", "#E69F00", "#D55E00", "#56B4E9"];
+const { purple, green, orange, vermillion, sky } = PALETTE;
+const RUN_COLOURS = ["#0072b2", purple, "#9a7b00", "#7c8a94", green, orange, vermillion, sky];
 
 /** Return the color of a run's trail on a page with several runs. */
 const runColour = (index) => RUN_COLOURS[index % RUN_COLOURS.length];

@@ -1,7 +1,7 @@
 // Side panel: state of the selected run at the cursor, as text and bars.
 
 /** Return the CSS color of a region or criterion in text: as in the header if the palette has it, else legible. */
-const textColour = (colour) => (colour.toUpperCase() in HUE_OF ? colour : legible(colour));
+const textColour = (colour) => (hueOf(colour) === colour ? legible(colour) : colour);
 
 /** Set the shape and color of a mark to those of a region's criterion; without a region clear them. */
 function setMark(mark, run, region) {

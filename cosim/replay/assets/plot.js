@@ -104,7 +104,8 @@ function paintAxes(context, { left, right, top, bottom, range, window, width, ax
 function nameRest(context, { axis, x, y, top, bottom, right }, curves) {
   const at = x(axis.rest);
   const lines = curves.map(({ values }) => y(values.at(-1)));
-  const free = [top + 8, (top + bottom) / 2, bottom - 24].find((row) => !lines.some((line) => Math.abs(line - row) < 10));
+  const rows = [top + 8, (top + bottom) / 2, bottom - 24];
+  const free = rows.find((row) => !lines.some((line) => Math.abs(line - row) < 10));
   if (free === undefined || right - at <= 40) return;
   const style = { textAlign: "center", textBaseline: "middle", fillStyle: COLOURS.muted };
   writeOutlined(context, "at rest", (at + right) / 2, free, style);

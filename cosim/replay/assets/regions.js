@@ -3,8 +3,8 @@
 const NAMED_IN_SCENE = 6; // number of keep-out regions with labels, the nearest of each scene
 
 /**
- * Return the regions of some runs as entries to draw, one for each surface, sheet or sight; equal regions of several runs
- * are one entry.
+ * Return the regions of some runs as entries to draw, one for each surface, sheet or sight; equal regions of several
+ * runs are one entry.
  * @param {Run[]} runs  @param {number} t time [s]  @param {object[]} poses of the vehicles, null where there is none
  * @param {number[]} target of the camera [m, NED]  @param {number[][]} bounds to which sheets are clipped
  */
@@ -89,10 +89,12 @@ function rightmostSeen(corners, camera) {
 
 /** Return the entries of keep-out regions, sorted by clearance, the nearest first. */
 function nearestFirst(entries, runs, t) {
-  const gap = ({ of, region }) => runs[of.run].held(`${region.name}.clearance`, t);
-  const gaps = new Map(entries.map((entry) => [entry, gap(entry)]));
-  const finite = (entry) => (Number.isNaN(gaps.get(entry)) ? Number.MAX_VALUE : gaps.get(entry));
-  return entries.filter(({ region }) => region.criterion && region.keep === "out").sort((a, b) => finite(a) - finite(b));
+  const finite = ({ of, region }) => {
+    const clearance = runs[of.run].held(`${region.name}.clearance`, t);
+    return Number.isNaN(clearance) ? Number.MAX_VALUE : clearance;
+  };
+  const out = entries.filter(({ region }) => region.criterion && region.keep === "out");
+  return out.sort((a, b) => finite(a) - finite(b));
 }
 
 /**
@@ -122,7 +124,7 @@ function nameRegions(labels, camera, entries, runs, t) {
     labels.add({
       key, x: seen[0], y: seen[1], gap: 6, of, size: camera.width < 480 && !active ? 10 : 12,
       text: (active ? "▶ " : "") + name + (entry.solid && isTwice ? `, ${names[of.run]}` : ""),
-      colour: active ? COLOURS.sceneInk : COLOURS.soft, edge: entry.colour, bold: active, chip: COLOURS.chip,
+      colour: active ? COLOURS.ink : COLOURS.soft, edge: entry.colour, bold: active, chip: COLOURS.chip,
       rank: active ? 0 : isGoal ? 1 + Number(next) : 10 + place, far: active || isGoal,
       sides: ["above", "right", "left", "below"],
     });
@@ -137,7 +139,7 @@ function nameVehicles(labels, camera, marks, vehicles) {
     const { name, colour } = marks[i];
     labels.add({
       key: `vehicle ${i}`, x, y, gap: 1.5 * vehicle.size * camera.scaleAt(vehicle.pose.position),
-      text: name, colour: COLOURS.sceneInk, edge: colour, bold: true, chip: COLOURS.chip, rank: 0.5, far: true,
+      text: name, colour: COLOURS.ink, edge: colour, bold: true, chip: COLOURS.chip, rank: 0.5, far: true,
       sides: ["below", "right", "left", "above"],
     });
   });

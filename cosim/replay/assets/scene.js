@@ -10,6 +10,7 @@ class Scene {
     this.context = canvas.getContext("2d", { alpha: false });
     this.labels = new Labels(this.context);
     this.runs = [];
+    this.ghost = null; // of a region that is dragged
     this._last = null; // time and options of the last frame
     this._followed = null; // where the followed vehicle was in it [m, NED]
     this._redraw = () => this._later();
@@ -31,8 +32,8 @@ class Scene {
   /**
    * Show other runs; the camera stays.
    * @param {Run[]} runs
-   * @param {{name: string, colour: string}[]|null} marks of the runs; null for one run, whose path has the colors of the
-   * active regions
+   * @param {{name: string, colour: string}[]|null} marks of the runs; null for one run, whose path has the colors of
+   * the active regions
    */
   setRuns(runs, marks) {
     this.runs = runs;
@@ -55,7 +56,7 @@ class Scene {
     this._later();
   }
 
-  /** Return what the last frame showed: time, and for each run the pose, active region, current and color of each region. */
+  /** Return what the last frame showed: time, and for each run pose, active region, current, colors of regions. */
   get drawn() { return this._drawn; }
 
   /** Return the pixel [CSS pixels] of a position [m, NED] in the canvas. */
@@ -65,8 +66,8 @@ class Scene {
   }
 
   /**
-   * Return the region whose label, feature or surface is at a pixel: {run, region, place of a goal in turn}; null if there
-   * is none.
+   * Return the region whose label, feature or surface is at a pixel: {run, region, place of a goal in turn}; null if
+   * there is none.
    */
   pick(x, y) {
     this._fitsPicture();
@@ -143,6 +144,7 @@ class Scene {
     if (options.labels) nameRegions(labels, camera, regions, runs, t);
     if (options.labels && this._runMarks) nameVehicles(labels, camera, this._runMarks, vehicles);
     labels.draw();
+    if (this.ghost) paintGhost(this, this.ghost);
     this._note(t, poses, regions);
   }
 

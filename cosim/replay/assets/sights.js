@@ -16,7 +16,7 @@ const rimOf = (apex, axis, angle, length) =>
 
 /** Functions from a shape of attitude, a pose, a shift and a size [m] to its sight. */
 const SIGHTS = {
-  /** Return the cone within the tolerance of the wanted heading, with lines along the wanted and the current heading. */
+  /** Return the cone within the tolerance of the wanted heading, with lines along the wanted and current headings. */
   orientation(shape, { position, quaternion }, shift, size) {
     const [axis, nose] = [shape.quaternion, quaternion].map((q) => Vec.turned(Vec.matrix(q), [1, 0, 0]));
     const length = 5 * size;

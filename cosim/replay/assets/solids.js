@@ -159,9 +159,9 @@ function ellipsoidOf(centre, axes) {
     };
   };
   return {
-    points: circles.flat(), faces: [], normals: [], edges: [], lines, ellipsoid: { centre, axes }, inverse, from, centre,
-    radius: Math.max(...axes.map(Vec.norm)), top: centre[2] - Math.hypot(...axes.map((axis) => axis[2])), long: false,
-    shadows: [ellipseFromAbove(centre, axes)],
+    points: circles.flat(), faces: [], normals: [], edges: [], lines, ellipsoid: { centre, axes }, inverse, from,
+    centre, radius: Math.max(...axes.map(Vec.norm)), top: centre[2] - Math.hypot(...axes.map((axis) => axis[2])),
+    long: false, shadows: [ellipseFromAbove(centre, axes)],
   };
 }
 

@@ -26,7 +26,7 @@ class Stage {
   /**
    * Show runs.
    * @param {Run[]} runs all runs  @param {boolean[]} shown visible runs
-   * @param {boolean} same true for runs of the scenario that is shown: the view stays, as far as they are in the picture
+   * @param {boolean} same true for runs of the scenario that is shown: the view stays, as far as it shows them
    */
   setRuns(runs, shown, same = runs === this.runs) {
     const kept = same && this.scene;

@@ -1,8 +1,8 @@
 // Movable regions of a run: the target, and regions with a position.
 
 /**
- * Return the handle of a region at a time [s]: a point of it or of its plane [m, NED]; null if it has none. With `place`,
- * that of the goal at one of its places.
+ * Return the handle of a region at a time [s]: a point of it or of its plane [m, NED]; null if it has none. With
+ * `place`, that of the goal at one of its places.
  */
 function placeOf(run, index, t, place = null) {
   if (!run.rows || !run.there(index, t)) return null;

@@ -57,7 +57,8 @@ class Timeline {
     if (!active || this.run.rows < 2) return;
     const { time, header } = this.run;
     const x = (t) => this.axis.x(t) * width;
-    const bar = (from, to, top, least) => context.fillRect(x(from), top, Math.max(least, x(to) - x(from)), height - top);
+    const bar = (from, to, top, least) =>
+      context.fillRect(x(from), top, Math.max(least, x(to) - x(from)), height - top);
     for (const { from, until, value } of stretches(active)) {
       const { colour, criterion } = header.regions[value] ?? { colour: COLOURS.grid };
       Object.assign(context, { fillStyle: colour, globalAlpha: criterion ? 1 : 0.45 });

@@ -65,8 +65,8 @@ class Trail {
   }
 
   /**
-   * Return the marks of direction at a spacing [m]: [{row, time, from, middle}], two points of the path each; moves below
-   * half the vehicle's radius are ignored.
+   * Return the marks of direction at a spacing [m]: [{row, time, from, middle}], two points of the path each; moves
+   * below half the vehicle's radius are ignored.
    */
   marks(spacing) {
     const { run } = this;

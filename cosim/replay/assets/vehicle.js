@@ -3,7 +3,8 @@
 /** Return a color of the hull in one of eight steps of light. */
 function shaded(colour, light) {
   const part = Math.round(7 * clamp(light, 0, 1)) / 7;
-  return part < 0.6 ? mixedColour(colour, "#0a141b", 1.1 * (0.6 - part)) : mixedColour(colour, "#ffffff", 0.5 * (part - 0.6));
+  const [to, most] = part < 0.6 ? ["#0a141b", 1.1] : ["#ffffff", 0.5];
+  return mixedColour(colour, to, most * Math.abs(part - 0.6));
 }
 
 /** Return the hull's faces towards the eye, in the world frame: [{corners, middle, colour}]. */
@@ -31,11 +32,11 @@ function paintBodyAxis(painter, { line, name, width }) {
   const { context, camera } = painter;
   painter.begin();
   painter.segment(...line);
-  painter.stroke(COLOURS.sceneInk, width, 0.8);
+  painter.stroke(COLOURS.ink, width, 0.8);
   const [[x, y, near], [u, v, depth]] = line.map((p) => camera.project(p));
   const length = Math.hypot(u - x, v - y);
   if (Math.min(near, depth) < camera.near || length < 14) return;
   const font = "italic 11px system-ui, sans-serif";
-  const style = { fillStyle: COLOURS.sceneInk, font, textAlign: "center", textBaseline: "middle" };
+  const style = { fillStyle: COLOURS.ink, font, textAlign: "center", textBaseline: "middle" };
   writeText(context, name, u + (8 * (u - x)) / length, v + (8 * (v - y)) / length, style);
 }

@@ -2,7 +2,7 @@
 
 const ARROW = 24; // pixels, length of the arrow of a current across the line of sight
 
-/** Paint the currents beside the compass, in a narrow picture above it: equal ones of several runs once, none at rest. */
+/** Paint the currents beside the compass, in a narrow picture above it: equal ones once, none at rest. */
 function paintCurrents(painter, labels, runs, t) {
   const names = runNames(runs);
   const byWords = new Map(); // current, and names of the runs
@@ -25,8 +25,8 @@ function paintCurrents(painter, labels, runs, t) {
     const along = Vec.scale(Vec.unit(current), 0.5 * ARROW);
     const [dx, dy] = [Vec.dot(along, camera.right), -Vec.dot(along, camera.up)];
     context.lineCap = "round";
-    painter.strokeLines(arrowLines([x - dx, y - dy], [x + dx, y + dy], 9), COLOURS.water, 2.6);
-    Object.assign(context, { lineCap: "butt", fillStyle: COLOURS.sceneInk, textAlign: "left", textBaseline: "middle" });
+    painter.strokeLines(arrowLines([x - dx, y - dy], [x + dx, y + dy], 9), COLOURS.accent, 2.6);
+    Object.assign(context, { lineCap: "butt", fillStyle: COLOURS.ink, textAlign: "left", textBaseline: "middle" });
     context.fillText(text, x + 26, y + 0.5, width);
     y -= 36;
   }

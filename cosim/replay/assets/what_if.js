@@ -22,7 +22,7 @@ class WhatIf {
 
   canMove(region, place) { return this._movable(region, place) !== undefined; }
 
-  /** Return what can be moved, each place of the goal by itself: {region, place, name, axes}, with the keys of each axis. */
+  /** Return what can be moved, each place of the goal by itself: {region, place, name, axes: keys of each axis}. */
   movable() {
     const { moves, goals } = this.flight.data;
     const all = this.recorded.header.regions.flatMap((of, region) =>

@@ -115,7 +115,8 @@ class WhatIfPanel extends FieldPanel {
     const { whatIf } = this;
     const { regions } = whatIf.recorded.header;
     const sets = whatIf.movable().map(({ region, place, name, axes }) => {
-      const handle = () => placeOf(whatIf.run, region, whatIf.run.start, place) ?? axes.map(([key]) => whatIf.value(key));
+      const values = () => axes.map(([key]) => whatIf.value(key));
+      const handle = () => placeOf(whatIf.run, region, whatIf.run.start, place) ?? values();
       const fields = [...axes.keys()].filter((axis) => axes[axis].length).map((axis) => {
         const [letter, direction] = DIRECTIONS[axis];
         const changed = (value) => whatIf.move(region, handle(), handle().with(axis, value), place);
