@@ -13,7 +13,7 @@ from cosim.io.atomic_file import write_atomic
 from plant_fmu.contents.html_templates import make_environment
 
 SCENE_SCRIPTS = (
-    "palette.js", "vectors.js", "camera.js", "solids.js", "planes.js", "painter.js", "sights.js",
+    "vectors.js", "palette.js", "elements.js", "camera.js", "solids.js", "planes.js", "painter.js", "sights.js",
     "hull.js", "vehicle.js", "forces.js", "trail.js", "shadows.js", "bounds.js", "order.js",
     "regions.js", "labels.js", "water.js", "floor.js", "controls.js", "scene.js",
 )  # fmt: skip
@@ -21,7 +21,7 @@ _PLAYER = (
     "player.js", "words.js", "curves.js", "axes.js", "plot.js", "charts.js", "board.js", "timeline.js", "panel.js",
     "stage.js", "head.js", "keys.js", "page.js",
 )  # fmt: skip
-_LIVE = ("things.js", "ghost.js", "dragging.js", "command_panel.js", "live.js")
+_LIVE = ("things.js", "ghost.js", "dragging.js", "fields.js", "command_panel.js", "live.js")
 _FLYING = ("flight.js", "outcome.js", "saving.js", "what_if_panel.js", "what_if.js")
 _SCRIPTS = ("data.js", *SCENE_SCRIPTS, *_PLAYER, *_LIVE, *_FLYING, "main.js")
 _WORKER = "flier.js"

@@ -20,34 +20,51 @@ class TimeAxis {
   }
 }
 
-/** Return the multiples of a round step from low to high, at most about `most` of them. */
+/** Return the least of 1, 2 or 5 times a power of ten that is not below `least`. */
+function roundStep(least) {
+  const power = 10 ** Math.floor(Math.log10(least));
+  return power * [1, 2, 5, 10].find((k) => k * power >= least * (1 - 1e-9));
+}
+
+/** Return the multiples of a step within two bounds. */
+function multiples(low, high, step) {
+  const from = Math.ceil(low / step - 1e-6);
+  const to = Math.floor(high / step + 1e-6);
+  return Array.from({ length: Math.max(0, to - from + 1) }, (_, i) => (from + i) * step);
+}
+
+/** Return the digits after the point that multiples of a step need. */
+const digitsOf = (step) => clamp(-Math.floor(Math.log10(step) + 1e-9), 0, 9);
+
+/** Return round values from low to high, at most about `most` of them. */
 function ticks(low, high, most) {
   const span = high - low;
-  if (!(span > 0) || !Number.isFinite(span)) return [low];
-  const rough = span / Math.max(1, most);
-  const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((x) => x * power).find((x) => x >= rough);
-  const first = Math.ceil(low / step - 1e-9);
-  const count = Math.floor(high / step + 1e-9) - first;
-  return Array.from({ length: count + 1 }, (_, i) => (first + i) * step);
+  return span > 0 && Number.isFinite(span) ? multiples(low, high, roundStep(span / Math.max(1, most))) : [low];
 }
 
 /** Return tick labels with just enough digits to differ; thousands as k from 10000 on. */
 function tickTexts(values) {
   const step = values.length > 1 ? Math.abs(values[1] - values[0]) : Math.abs(values[0]) || 1;
-  const kilo = Math.max(...values.map(Math.abs)) >= 10000;
-  const shown = kilo ? step / 1000 : step;
-  const digits = Math.max(0, Math.min(9, -Math.floor(Math.log10(shown) + 1e-9)));
+  const scale = Math.max(...values.map(Math.abs)) >= 10000 ? 1000 : 1;
   return values.map((value) => {
-    const text = decimals(kilo ? value / 1000 : value, digits);
-    return text + (kilo && Number(text) !== 0 ? "k" : "");
+    const text = decimals(value / scale, digitsOf(step / scale));
+    return text + (scale > 1 && Number(text) !== 0 ? "k" : "");
   });
 }
 
 /** Return the rows that cover a time window, one beyond on each side: [first, past the last]. */
-function rowsIn(run, [from, to]) {
-  if (!run.rows) return [0, 0];
-  return [run.row(from), Math.min(run.rows, run.row(to) + 2)];
+const rowsIn = (run, [from, to]) => (run.rows ? [run.row(from), Math.min(run.rows, run.row(to) + 2)] : [0, 0]);
+
+/** Return the least and the greatest finite value of some curves in a time window. */
+function extentIn(curves, window) {
+  let [low, high] = [Infinity, -Infinity];
+  for (const { run, values } of curves) {
+    for (const value of values.subarray(...rowsIn(run, window))) {
+      if (value < low && value !== -Infinity) low = value;
+      if (value > high && value !== Infinity) high = value;
+    }
+  }
+  return [low, high];
 }
 
 /**
@@ -58,26 +75,18 @@ function rowsIn(run, [from, to]) {
  * @returns {?number[]} [low, high], with low < high; null if there is no number
  */
 function rangeOf(curves, window, zero) {
-  const extent = (some) => {
-    let [low, high] = [Infinity, -Infinity];
-    for (const { run, values } of some) {
-      const [first, last] = rowsIn(run, window);
-      for (let i = first; i < last; i++) {
-        if (values[i] < low && values[i] !== -Infinity) low = values[i];
-        if (values[i] > high && values[i] !== Infinity) high = values[i];
-      }
-    }
-    return [low, high];
-  };
-  let [low, high] = extent(curves.filter((curve) => !curve.signal.context));
-  if (!(low <= high)) [low, high] = extent(curves);
+  let [low, high] = extentIn(curves.filter((curve) => !curve.signal.context), window);
+  if (!(low <= high)) [low, high] = extentIn(curves, window);
   if (!(low <= high)) return null;
-  const room = Math.max(high - low, 1e-9);
+  const span = Math.max(high - low, 1e-9);
+  const widen = (least, most) => {
+    [low, high] = [Math.min(low, least), Math.max(high, most)];
+  };
   for (const curve of curves.filter((one) => one.signal.context)) {
-    const [least, most] = extent([curve]);
-    if (least >= low - 2 * room && most <= high + 2 * room) [low, high] = [Math.min(low, least), Math.max(high, most)];
+    const [least, most] = extentIn([curve], window);
+    if (least >= low - 2 * span && most <= high + 2 * span) widen(least, most);
   }
-  if (zero) [low, high] = [Math.min(low, 0), Math.max(high, 0)];
+  if (zero) widen(0, 0);
   const pad = high - low > 1e-9 ? 0.06 * (high - low) : 0.5 * Math.abs(high) || 1;
   return [low - pad, high + pad];
 }
@@ -90,34 +99,31 @@ function rangeOf(curves, window, zero) {
  */
 function traceCurve(context, { run, values }, window, toX, toY) {
   const [first, last] = rowsIn(run, window);
-  const time = run.time;
+  const { time } = run;
+  const dense = last - first > 3 * Math.abs(toX(window[1]) - toX(window[0]));
+  context.beginPath();
   let pen = false;
   const point = (x, value) => {
     if (pen) context.lineTo(x, toY(value));
     else context.moveTo(x, toY(value));
     pen = true;
   };
-  const alone = (i) => !Number.isFinite(values[i + 1]) && (i === first || !Number.isFinite(values[i - 1]));
-  const dense = last - first > 3 * Math.abs(toX(window[1]) - toX(window[0]));
-  context.beginPath();
-  for (let i = first; i < last; ) {
+  for (let i = first; i < last; i++) {
     if (!Number.isFinite(values[i])) {
       pen = false;
-      i += 1;
       continue;
     }
     const x = toX(time[i]);
+    const alone = !pen && !Number.isFinite(values[i + 1]);
     point(x, values[i]);
-    if (alone(i)) context.lineTo(x + 1, toY(values[i])); // a single number between gaps stays visible
-    let [low, high, end] = [values[i], values[i], values[i]];
-    i += 1;
-    if (!dense) continue;
+    if (alone) point(x + 1, values[i]); // a single number between gaps stays visible
     const column = Math.floor(x);
-    for (; i < last && Number.isFinite(values[i]) && Math.floor(toX(time[i])) === column; i++) {
-      end = values[i];
-      if (end < low) low = end;
-      else if (end > high) high = end;
+    let [low, high] = [values[i], values[i]];
+    const goesOn = () => i + 1 < last && Number.isFinite(values[i + 1]) && Math.floor(toX(time[i + 1])) === column;
+    while (dense && goesOn()) {
+      i += 1;
+      [low, high] = [Math.min(low, values[i]), Math.max(high, values[i])];
     }
-    if (low < high) for (const value of [low, high, end]) point(x, value);
+    if (low < high) for (const value of [low, high, values[i]]) point(x, value);
   }
 }

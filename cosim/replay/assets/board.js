@@ -1,24 +1,26 @@
 // All charts of the page, with one time window and one cursor.
 
+const SHORTEST = 0.02; // s, of a window of time
+
 /** Charts below the scene, with one time window and one cursor. */
 class Board {
-  /** @param {Player} player  @param {string} theme "light" or "dark" */
-  constructor(player, theme) {
+  /** @param {Player} player */
+  constructor(player) {
     this.player = player;
-    this.theme = theme;
     this.charts = [];
     this.window = null; // null for the whole run
-    this.holder = document.getElementById("charts");
-    this._out = new Set(["memberships", "asked", "acting", "moments", "turning"]); // hidden until the reader selects them
+    // hidden until the reader selects them
+    this._out = new Set(["memberships", "asked", "acting", "moments", "turning"]);
     this._updated = 0;
     this._pending = 0;
-    const watch = (entries) => this._seen(entries);
-    this._watcher = new IntersectionObserver(watch, { rootMargin: "200px" });
-    this._sizes = new ResizeObserver((entries) => this._resized(entries));
-    const press = (id, fn) => document.getElementById(id).addEventListener("click", fn);
-    press("charts-in", () => this.zoom(0.5));
-    press("charts-out", () => this.zoom(2));
-    press("charts-whole", () => this.whole());
+    this._watcher = new IntersectionObserver((entries) => {
+      for (const { target, isIntersecting } of entries) target.chart.near = isIntersecting;
+      this._later();
+    }, { rootMargin: "200px" });
+    this._sizes = new ResizeObserver((entries) => {
+      for (const { target } of entries) target.chart.stale = true;
+      this._later();
+    });
   }
 
   /**
@@ -38,20 +40,19 @@ class Board {
     this._frame();
   }
 
-  setTheme(theme) {
-    this.theme = theme;
-    for (const chart of this.charts) chart.setTheme(theme);
+  /** Repaint in the colors of the theme. */
+  repaint() {
+    for (const chart of this.charts) chart.makeLegend();
     this._later();
   }
 
   /** Repaint after rows were appended, at most eight times a second. */
   grown() {
-    if (this._pending) return;
-    this._pending = setTimeout(() => {
+    this._pending ||= setTimeout(() => {
       this._pending = 0;
       // other regions may have become the nearest ones
       if (performance.now() - this._asked > 3000) this.setRuns(this.runs, this.shown, this.selected);
-      for (const chart of this.charts) chart.grown();
+      for (const chart of this.charts) chart.collect();
       this._frame();
     }, 125);
   }
@@ -59,10 +60,9 @@ class Board {
   /** Multiply the length of the time window by a factor, about a time [s]. */
   zoom(factor, about = this.player.t) {
     const [from, to] = this.shownWindow();
-    const length = Math.max((to - from) * factor, 0.02);
-    if (length >= this.player.duration) return this.whole();
-    const share = to > from ? Math.min(1, Math.max(0, (about - from) / (to - from))) : 0.5;
-    return this._show(about - share * length, length);
+    const length = Math.max((to - from) * factor, SHORTEST);
+    if (length >= this.player.duration) this.whole();
+    else this._show(about - clamp((about - from) / (to - from), 0, 1) * length, length);
   }
 
   pan(seconds) {
@@ -70,7 +70,7 @@ class Board {
   }
 
   setWindow(from, to) {
-    this._show(from, Math.max(to - from, 0.02));
+    this._show(from, Math.max(to - from, SHORTEST));
   }
 
   whole() {
@@ -94,8 +94,7 @@ class Board {
     const now = performance.now();
     const due = !playing || now - this._updated > 90; // limits the rate of text updates
     if (due) this._updated = now;
-    for (const chart of this.charts) {
-      if (!chart.near || chart.element.hidden) continue;
+    for (const chart of this.charts.filter(({ near, element }) => near && !element.hidden)) {
       chart.paint();
       chart.point(live && !this.window ? Math.min(t, chart.window[1]) : t); // the newest rows are not drawn yet
       if (due && !this._hovering) chart.update(t, this.selected);
@@ -104,26 +103,28 @@ class Board {
 
   /** Paint every chart, also those off screen; `onPaper` draws the cursor into the canvas. */
   paintAll(onPaper) {
+    const { t } = this.player;
     for (const chart of this.charts) {
       chart.stale = true;
-      chart.paint(onPaper ? this.player.t : null);
-      chart.point(this.player.t);
-      chart.update(this.player.t, this.selected);
+      chart.paint(onPaper ? t : null);
+      chart.point(t);
+      chart.update(t, this.selected);
     }
   }
 
   _show(from, length) {
     const { start, end } = this.player;
-    const first = Math.min(Math.max(from, start), Math.max(start, end - length));
+    const first = clamp(from, start, Math.max(start, end - length));
     this.window = [first, first + length];
     this._frame();
   }
 
   _frame() {
     const [from, to] = this.shownWindow();
-    for (const chart of this.charts) chart.setWindow(from, to, this.window ? null : this.player.rest);
-    document.getElementById("charts-whole").disabled = !this.window;
-    document.getElementById("charts-window").textContent = this.window ? `${clock(from)} to ${clock(to)}` : "whole run";
+    const rest = this.window ? null : this.player.rest;
+    for (const chart of this.charts) chart.setWindow(from, to, rest);
+    byId("charts-whole").disabled = !this.window;
+    byId("charts-window").textContent = this.window ? `${clock(from)} to ${clock(to)}` : "whole run";
     this._later();
   }
 
@@ -135,8 +136,9 @@ class Board {
   _rebuild(specs) {
     this._watcher.disconnect();
     this._sizes.disconnect();
+    const { player } = this;
     const on = {
-      seek: (t) => this.player.seek(t),
+      seek: (t) => player.seek(t),
       hover: (t, chart, y) => this._hover(t, chart, y),
       zoom: (factor, t) => this.zoom(factor, t),
       pan: (seconds) => this.pan(seconds),
@@ -144,58 +146,33 @@ class Board {
       whole: () => this.whole(),
       changed: () => this._later(),
     };
-    this.charts = specs.map((spec) => new Chart(spec, this.theme, on));
-    this.holder.replaceChildren(...this.charts.map((chart) => chart.element));
-    this._choices();
+    this.charts = specs.map((spec) => new Chart(spec, on));
+    byId("charts").replaceChildren(...this.charts.map((chart) => chart.element));
+    byId("charts-choice").replaceChildren(...this.charts.map((chart) => this._choice(chart)));
     for (const chart of this.charts) {
+      chart.element.chart = chart.plot.chart = chart;
       this._watcher.observe(chart.element);
       this._sizes.observe(chart.plot);
     }
   }
 
-  _choices() {
-    const list = document.getElementById("charts-choice");
-    list.replaceChildren(
-      ...this.charts.map((chart) => {
-        const label = element("label", "choice");
-        const box = element("input");
-        box.type = "checkbox";
-        box.checked = !this._out.has(chart.spec.key);
-        chart.element.hidden = !box.checked;
-        box.addEventListener("change", () => {
-          chart.element.hidden = !box.checked;
-          if (box.checked) this._out.delete(chart.spec.key);
-          else this._out.add(chart.spec.key);
-          this._later();
-        });
-        label.append(box, chart.spec.title);
-        return label;
-      }),
-    );
+  /** Return the box that shows or hides a chart. */
+  _choice({ element, spec: { key, title } }) {
+    element.hidden = this._out.has(key);
+    const box = checkbox(!element.hidden, title, () => {
+      element.hidden = !box.checked;
+      if (box.checked) this._out.delete(key);
+      else this._out.add(key);
+      this._later();
+    });
+    return h("label.choice", {}, box, title);
   }
 
   _hover(t, over, y) {
     this._hovering = t !== null;
-    for (const chart of this.charts) {
-      if (!chart.near) continue;
+    for (const chart of this.charts.filter(({ near }) => near)) {
       chart.hover(t, chart === over ? y : null);
       chart.update(t ?? this.player.t, this.selected);
     }
-  }
-
-  _seen(entries) {
-    for (const { target, isIntersecting } of entries) {
-      const chart = this.charts.find((one) => one.element === target);
-      if (chart) chart.near = isIntersecting;
-    }
-    this._later();
-  }
-
-  _resized(entries) {
-    for (const { target } of entries) {
-      const chart = this.charts.find((one) => one.plot === target);
-      if (chart) chart.stale = true;
-    }
-    this._later();
   }
 }

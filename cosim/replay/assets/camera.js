@@ -3,6 +3,7 @@
 const HALF_VIEW = (24 * Math.PI) / 180; // rad, half of the angle of view across the picture's diagonal
 const STEEPEST = Math.PI / 2;
 const NEARER = 0.8; // share of the distance at which refit() comes nearer to content that has shrunk
+const VIEWS = { top: [Math.PI, STEEPEST], side: [Math.PI / 2, 0], front: [Math.PI, 0] }; // azimuth, elevation [rad]
 
 /** Perspective camera that orbits a target. Several scenes may share one. */
 class Camera {
@@ -25,8 +26,7 @@ class Camera {
   /** Set the size of the picture [CSS pixels]. */
   resize(width, height) {
     if (this.width === width && this.height === height) return;
-    this.width = Math.max(1, width);
-    this.height = Math.max(1, height);
+    Object.assign(this, { width, height });
     if (this.fitted) this.fit();
     else this._update();
   }
@@ -41,26 +41,25 @@ class Camera {
   /** Rotate about the target for a drag of dx, dy [CSS pixels]. */
   orbit(dx, dy) {
     this.azimuth += 0.008 * dx;
-    this.elevation = Math.min(STEEPEST, Math.max(-STEEPEST, this.elevation + 0.008 * dy));
+    this.elevation = clamp(this.elevation + 0.008 * dy, -STEEPEST, STEEPEST);
     this._changed();
   }
 
   /** Translate the camera so that the scene at the target moves by dx, dy [CSS pixels]. */
   pan(dx, dy) {
     const metres = this.distance / this.focal;
-    this.target = Vec.along(Vec.along(this.target, this.right, -dx * metres), this.up, dy * metres);
-    this._changed();
+    this.aim(Vec.along(Vec.along(this.target, this.right, -dx * metres), this.up, dy * metres));
   }
 
   /** Divide the distance to the target by a factor. */
   zoom(factor) {
-    this.distance = Math.min(1e6, Math.max(0.2, this.distance / factor));
+    this.distance = clamp(this.distance / factor, 0.2, 1e6);
     this._changed();
   }
 
   /** Set the target [m, NED] and keep the view direction. */
   aim(target) {
-    this.target = [...target];
+    this.target = target;
     this._changed();
   }
 
@@ -70,23 +69,16 @@ class Camera {
    * east, north to the right; front: towards north, east to the right
    */
   look(name) {
-    const views = { top: [Math.PI, STEEPEST], side: [Math.PI / 2, 0], front: [Math.PI, 0] };
     const length = (view) => {
       [this.azimuth, this.elevation] = view;
       this._fit();
-      return this._lengthOfWay();
+      const [low, high] = boxAbout(this.way.map((p) => this.project(p)));
+      return Math.hypot(high[0] - low[0], high[1] - low[1]);
     };
-    // oblique: the direction from which the path appears longest
-    const [best] = views[name] ? [views[name]] : this._aslant().sort((a, b) => length(b) - length(a));
-    [this.azimuth, this.elevation] = best;
+    const views = VIEWS[name] ? [VIEWS[name]] : this._aslant();
+    if (views.length > 1 && this.way.length) views.sort((a, b) => length(b) - length(a));
+    [this.azimuth, this.elevation] = views[0];
     this.fit();
-  }
-
-  /** Return the diagonal of the path's bounding box in the picture [pixels]. */
-  _lengthOfWay() {
-    const seen = this.way.map((p) => this.project(p));
-    const extent = (k) => seen.reduce((x, p) => Math.max(x, p[k]), -Infinity) - seen.reduce((x, p) => Math.min(x, p[k]), Infinity);
-    return Math.hypot(extent(0), extent(1));
   }
 
   /** Return oblique directions [azimuth, elevation] [rad] from which the path runs from left to right. */
@@ -128,7 +120,8 @@ class Camera {
 
   /** Return the widths of the picture's edges that fit() leaves empty [CSS pixels]; buttons are at the top. */
   _margins() {
-    return { side: Math.min(36, 0.08 * this.width), top: Math.min(50, 0.16 * this.height), bottom: Math.min(28, 0.1 * this.height) };
+    const { width, height } = this;
+    return { side: Math.min(36, 0.08 * width), top: Math.min(50, 0.16 * height), bottom: Math.min(28, 0.1 * height) };
   }
 
   _fit() {
@@ -150,34 +143,38 @@ class Camera {
     this._update();
   }
 
+  /**
+   * Return the least distance from eye to target that frames all content along one axis of the picture.
+   *
+   * `below` and `above` are tangents of the half angles. `middle` maps a distance to the middle of the content along
+   * `side`. Both bounds are linear in the distance, so the solution is closed.
+   */
+  _bounded(side, below, above) {
+    const places = this.content.map((p) => [Vec.dot(p, side), Vec.dot(Vec.sub(p, this.target), this.forward)]);
+    const most = Math.max(...places.map(([across, ahead]) => across - above * ahead));
+    const least = Math.min(...places.map(([across, ahead]) => across + below * ahead));
+    return {
+      least: (most - least) / (above + below),
+      middle: (distance) => 0.5 * (most - above * distance + least + below * distance),
+    };
+  }
+
   /** Return pixels and depth [m] of a point: [x, y, depth]; valid only if depth exceeds `near`. */
   project(p) {
-    const [x, y, z] = [p[0] - this.eye[0], p[1] - this.eye[1], p[2] - this.eye[2]];
-    const depth = x * this.forward[0] + y * this.forward[1] + z * this.forward[2];
-    const k = this.focal / depth;
+    const { right, up, forward, eye } = this;
+    const [x, y, z] = [p[0] - eye[0], p[1] - eye[1], p[2] - eye[2]];
+    const depth = x * forward[0] + y * forward[1] + z * forward[2];
+    const scale = this.focal / depth;
     return [
-      0.5 * this.width + k * (x * this.right[0] + y * this.right[1] + z * this.right[2]),
-      0.5 * this.height - k * (x * this.up[0] + y * this.up[1] + z * this.up[2]),
+      0.5 * this.width + scale * (x * right[0] + y * right[1] + z * right[2]),
+      0.5 * this.height - scale * (x * up[0] + y * up[1] + z * up[2]),
       depth,
     ];
   }
 
-  /** Project `count` points, three numbers each, after a shift [m]; write x, y and depth of each to `out`. */
-  projectAll(points, count, shift, out) {
-    const [r, u, f] = [this.right, this.up, this.forward];
-    const [ex, ey, ez] = Vec.sub(this.eye, shift);
-    const [r0, r1, r2, u0, u1, u2, f0, f1, f2] = [...r, ...u, ...f];
-    const [cx, cy, focal] = [0.5 * this.width, 0.5 * this.height, this.focal];
-    for (let i = 0; i < 3 * count; i += 3) {
-      const x = points[i] - ex;
-      const y = points[i + 1] - ey;
-      const z = points[i + 2] - ez;
-      const depth = x * f0 + y * f1 + z * f2;
-      const k = focal / depth;
-      out[i] = cx + k * (x * r0 + y * r1 + z * r2);
-      out[i + 1] = cy - k * (x * u0 + y * u1 + z * u2);
-      out[i + 2] = depth;
-    }
+  /** Return true if a projected point is before the camera and in the picture. */
+  isInPicture([x, y, depth]) {
+    return depth > this.near && x > 0 && y > 0 && x < this.width && y < this.height;
   }
 
   /** Return the unit vector from the eye through a pixel. */
@@ -187,31 +184,15 @@ class Camera {
     return Vec.unit(Vec.along(Vec.along(this.forward, this.right, right), this.up, up));
   }
 
-  /** Return the scale at a point [pixels/m]. */
-  scaleAt(p) {
-    return this.focal / Vec.dot(Vec.sub(p, this.eye), this.forward);
+  /** Return the point at a pixel on the plane through a point [m, NED]; null if there is none. */
+  placeOnPlane(x, y, through, normal) {
+    const ray = this.ray(x, y);
+    const length = Vec.dot(Vec.sub(through, this.eye), normal) / Vec.dot(ray, normal);
+    return length > 0 && Number.isFinite(length) ? Vec.along(this.eye, ray, length) : null;
   }
 
-  /**
-   * Return the least distance from eye to target that frames all content along one axis of the picture.
-   *
-   * `below` and `above` are tangents of the half angles. `middle` maps a distance to the middle of the content along `side`.
-   * Both bounds are linear in the distance, so the solution is closed.
-   */
-  _bounded(side, below, above) {
-    let most = -Infinity;
-    let least = Infinity;
-    for (const p of this.content) {
-      const across = Vec.dot(p, side);
-      const ahead = Vec.dot(Vec.sub(p, this.target), this.forward);
-      most = Math.max(most, across - above * ahead);
-      least = Math.min(least, across + below * ahead);
-    }
-    return {
-      least: (most - least) / (above + below),
-      middle: (distance) => 0.5 * (most - above * distance + least + below * distance),
-    };
-  }
+  /** Return the scale at a point [pixels/m]. */
+  scaleAt(p) { return this.focal / Vec.dot(Vec.sub(p, this.eye), this.forward); }
 
   _changed() {
     this.fitted = false;
@@ -220,11 +201,10 @@ class Camera {
   }
 
   _update() {
-    const [ca, sa, ce, se] = [
-      Math.cos(this.azimuth), Math.sin(this.azimuth), Math.cos(this.elevation), Math.sin(this.elevation),
-    ];
-    this.forward = [-ce * ca, -ce * sa, se];
-    this.right = [sa, -ca, 0];
+    const [cosA, sinA] = [Math.cos(this.azimuth), Math.sin(this.azimuth)];
+    const [cosE, sinE] = [Math.cos(this.elevation), Math.sin(this.elevation)];
+    this.forward = [-cosE * cosA, -cosE * sinA, sinE];
+    this.right = [sinA, -cosA, 0];
     this.up = Vec.cross(this.right, this.forward);
     this.eye = Vec.along(this.target, this.forward, -this.distance);
     this.focal = (0.5 * Math.hypot(this.width, this.height)) / Math.tan(HALF_VIEW);

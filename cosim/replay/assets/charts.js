@@ -1,51 +1,7 @@
 // Strip chart: a legend with the values at the cursor, and a plot that seeks.
 
 /** Return a fixed range of values with room for the lines at its ends. */
-function widened([least, most]) {
-  return [least - 0.03 * (most - least), most + 0.06 * (most - least)];
-}
-
-/** Return a new element with a class and a text. */
-function element(tag, className = "", text = "") {
-  const made = document.createElement(tag);
-  if (className) made.className = className;
-  if (text) made.textContent = text;
-  return made;
-}
-
-/** Return a new button that calls `does` when it is pressed. */
-function pressable(className, text, title, does) {
-  const button = element("button", className, text);
-  Object.assign(button, { type: "button", title });
-  button.addEventListener("click", does);
-  return button;
-}
-
-/** Return a label with a number field in it, for screen readers named `said`: [label, field]. */
-function numberField(text, said, step) {
-  const label = element("label", "", text);
-  const field = element("input");
-  Object.assign(field, { type: "number", step: String(step) });
-  field.setAttribute("aria-label", said);
-  label.append(field);
-  return [label, field];
-}
-
-/** Return a short SVG line in the color and dash of a curve; SVG also prints. */
-function swatch(colour, dash) {
-  const space = "http://www.w3.org/2000/svg";
-  const svg = document.createElementNS(space, "svg");
-  const line = document.createElementNS(space, "line");
-  for (const [name, value] of Object.entries({ width: 22, height: 8, viewBox: "0 0 22 8", "aria-hidden": "true" })) {
-    svg.setAttribute(name, value);
-  }
-  for (const [name, value] of Object.entries({ x1: 0, x2: 22, y1: 4, y2: 4, "stroke-width": 2.5 })) line.setAttribute(name, value);
-  line.setAttribute("stroke", colour);
-  line.setAttribute("stroke-dasharray", dash.join(" "));
-  svg.append(line);
-  svg.setAttribute("class", "swatch");
-  return svg;
-}
+const widened = ([least, most]) => [least - 0.03 * (most - least), most + 0.06 * (most - least)];
 
 /**
  * Strip chart of one kind of signals, for all shown runs.
@@ -54,68 +10,58 @@ function swatch(colour, dash) {
  * zoom(factor, t), pan(seconds), window(from, to), whole(), changed().
  */
 class Chart {
-  constructor(spec, theme, on) {
-    this.spec = spec;
-    this.theme = theme;
-    this.on = on;
+  constructor(spec, on) {
+    Object.assign(this, { spec, on, frame: null, window: [0, 1], curves: [] });
     this.near = true; // true if it is on the screen or close to it
     this.stale = true;
-    this.window = [0, 1];
-    this.curves = [];
-    this.frame = null;
     this._off = new Set(); // names of signals that the reader has hidden
-    this._build();
+    const { title, signals } = spec;
+    const unit = spec.unit === "rad" ? "°" : unitText(spec.unit);
+    const names = signals.map(({ label }) => label);
+    const listed = names.slice(0, 8).join(", ") + (names.length > 8 ? ` and ${names.length - 8} more` : "");
+    const ariaLabel = `${title} against time: ${listed}. Values at the cursor stand above.`;
+    this.legend = h("div.legend");
+    this.canvas = h("canvas", { role: "img", ariaLabel });
+    this.ghost = h("div.ghost");
+    this.cursor = h("div.cursor");
+    this.brush = h("div.brush", { hidden: true });
+    this.tip = h("div.tip", { hidden: true });
+    this.plot = h("div.plot", {}, this.canvas, this.brush, this.ghost, this.cursor, this.tip);
+    const heading = h("h3", {}, title, unit && h("span.unit", {}, ` [${unit}]`));
+    this.element = h("figure.chart", {}, h("figcaption", {}, heading, this.legend), this.plot);
+    handlePlot(this);
   }
 
-  /** @param {{run: Run, index: number, name: string}[]} shown  @param {boolean} several true if the page has several runs */
+  /** @param {{run: Run, index: number, name: string}[]} shown  @param {boolean} several true if the page has several */
   setRuns(shown, several) {
-    this._shown = shown;
-    this._several = several;
-    this._collect();
-    this._legend();
+    Object.assign(this, { _shown: shown, _several: several });
+    this.collect();
+    this.makeLegend();
   }
 
   /** Return the drawn curves: index of the run in the page, signal, label, times [s] and values. */
   series() {
-    return this.curves.map(({ index, run, signal: of, values }) => ({
-      run: index, name: of.name, label: of.label, time: run.time, values,
+    return this.curves.map(({ index, run, signal: { name, label }, values }) => ({
+      run: index, name, label, time: run.time, values,
     }));
-  }
-
-  setTheme(theme) {
-    this.theme = theme;
-    this.stale = true;
-    if (this._shown) this._legend();
   }
 
   /** Show a time window [s]; `rest` is the start of the final rest [s], or null for a time axis without break. */
   setWindow(from, to, rest = null) {
-    this.window = [from, to];
-    this.rest = rest;
-    this.stale = true;
-  }
-
-  /** Collect the curves again after rows were appended. */
-  grown() {
-    this._collect();
+    Object.assign(this, { window: [from, to], rest, stale: true });
   }
 
   /** Paint the canvas if it is stale; with `cursor` [s], paint a cursor there too. */
   paint(cursor = null) {
-    if (!this.stale || this.element.hidden) return;
-    const { clientWidth: width, clientHeight: height } = this.plot;
-    if (width < 80 || height < 40) return;
-    const dots = window.devicePixelRatio || 1;
-    if (this.canvas.width !== Math.round(width * dots)) this.canvas.width = Math.round(width * dots);
-    if (this.canvas.height !== Math.round(height * dots)) this.canvas.height = Math.round(height * dots);
-    const context = this.canvas.getContext("2d");
-    context.setTransform(dots, 0, 0, dots, 0, 0);
+    if (!this.stale || this.plot.clientWidth < 80 || this.plot.clientHeight < 40) return;
+    const { context, width, height } = clearedCanvas(this.canvas);
     const { fixed, zero, down } = this.spec;
     const range = fixed ? widened(fixed) : rangeOf(this.curves, this.window, zero);
     this.frame = new Frame(width, height, this.window, this.rest, range, down);
-    paintPlot(context, this.frame, this.spec, this.curves, this.theme);
-    context.fillStyle = hueColour("ink", this.theme);
-    if (cursor !== null) context.fillRect(this.frame.x(cursor) - 0.75, this.frame.top, 1.5, this.frame.bottom - this.frame.top);
+    paintPlot(context, this.frame, this.spec, this.curves);
+    const { top, bottom, x } = this.frame;
+    context.fillStyle = COLOURS.ink;
+    if (cursor !== null) context.fillRect(x(cursor) - 0.75, top, 1.5, bottom - top);
     this.stale = false;
   }
 
@@ -128,8 +74,7 @@ class Chart {
   update(t, index) {
     for (const { of, value } of this._entries) {
       const curve = this.curves.find((one) => one.signal === of && one.index === index);
-      const text = curve ? reading(valueAt(curve, t), this.spec.unit) : "";
-      if (value.textContent !== text) value.textContent = text;
+      setText(value, curve ? reading(valueAt(curve, t), this.spec.unit) : "");
     }
   }
 
@@ -141,8 +86,8 @@ class Chart {
     const nearest = this._nearest(t, y);
     this.tip.textContent = `${clock(t)}${nearest ? ` · ${nearest}` : ""}`;
     const x = this.frame.x(t);
-    const right = x > this.frame.width / 2;
-    this.tip.style.transform = `translate(${x + (right ? -8 : 8)}px, 0) translateX(${right ? "-100%" : "0"})`;
+    const [off, part] = x > this.frame.width / 2 ? [-8, "-100%"] : [8, "0"];
+    this.tip.style.transform = `translate(${x + off}px, 0) translateX(${part})`;
   }
 
   _place(line, t) {
@@ -154,142 +99,104 @@ class Chart {
   _nearest(t, y) {
     let best = { gap: 26, text: "" };
     for (const curve of this.curves) {
-      const { index, signal: of } = curve;
       const value = valueAt(curve, t);
-      const gap = Math.abs(this.frame.y(value) - y) + (of.faint ? 4 : 0);
-      if (!(gap < best.gap)) continue;
-      const whose = this._several ? `${this._names[index]}: ` : "";
-      best = { gap, text: `${whose}${of.label} ${quantity(value, this.spec.unit)}` };
+      const gap = Math.abs(this.frame.y(value) - y) + (curve.signal.faint ? 4 : 0);
+      const whose = this._several ? `${curve.name}: ` : "";
+      if (gap < best.gap) best = { gap, text: `${whose}${curve.signal.label} ${quantity(value, this.spec.unit)}` };
     }
     return best.text;
   }
 
-  _collect() {
-    this.curves = this._shown.flatMap(({ run, index }) =>
-      this.spec.signals
-        .filter((of) => !this._off.has(of.name))
-        .map((of) => ({ index, run, signal: of, values: of.values(run), dash: this._several && !of.context ? runDash(index) : of.dash }))
-        .filter(({ values }) => values),
-    );
-    this._names = Object.fromEntries(this._shown.map(({ index, name }) => [index, name]));
+  /** Collect the curves, again after rows were appended. */
+  collect() {
+    const signals = this.spec.signals.filter(({ name }) => !this._off.has(name));
+    const curves = this._shown.flatMap((one) => signals.map((of) => ({
+      ...one, signal: of, values: of.values(one.run),
+      dash: this._several && !of.context ? runDash(one.index) : of.dash,
+    })));
+    this.curves = curves.filter(({ values }) => values);
     this.stale = true;
   }
 
-  _legend() {
-    const faint = this.spec.signals.filter((of) => of.faint);
-    this._entries = [];
-    const items = this.spec.signals.filter((of) => !of.faint).map((of) => {
-      const button = pressable("key", "", `Put ${of.label} in or out`, () => {
-        if (!this._off.delete(of.name)) this._off.add(of.name);
-        button.setAttribute("aria-pressed", String(!this._off.has(of.name)));
-        this._collect();
+  /** Make the legend, in the colors of the theme. */
+  makeLegend() {
+    const faint = this.spec.signals.filter((of) => of.faint).length;
+    this._entries = this.spec.signals.filter((of) => !of.faint).map((of) => ({ of, value: h("span.value") }));
+    const items = this._entries.map(({ of, value }) => {
+      const { name, label, context } = of;
+      const line = swatch(hueColour(of.hue, of.shade), this._several && !context ? [] : of.dash);
+      const onclick = () => {
+        if (!this._off.delete(name)) this._off.add(name);
+        key.ariaPressed = !this._off.has(name);
+        this.collect();
         this.on.changed();
-      });
-      button.setAttribute("aria-pressed", String(!this._off.has(of.name)));
-      const value = element("span", "value");
-      button.append(swatch(hueColour(of.hue, this.theme, of.shade), this._several && !of.context ? [] : of.dash), of.label, value);
-      this._entries.push({ of, value });
-      return button;
+      };
+      const props = { title: `Put ${label} in or out`, ariaPressed: !this._off.has(name), onclick };
+      const key = h("button.key", props, line, label, value);
+      return key;
     });
-    if (faint.length) {
-      const rest = element("span", "key");
-      rest.append(swatch(hueColour("grey", this.theme), []), `${faint.length} farther regions`);
-      items.push(rest);
-    }
-    this.legend.replaceChildren(...items);
-  }
-
-  _build() {
-    this.element = element("figure", "chart");
-    const caption = element("figcaption");
-    const unit = this.spec.unit === "rad" ? "°" : this.spec.unit.replace(".", "\u00b7");
-    const title = element("h3", "", this.spec.title);
-    if (unit) title.append(element("span", "unit", ` [${unit}]`));
-    this.legend = element("div", "legend");
-    caption.append(title, this.legend);
-    this.plot = element("div", "plot");
-    this.canvas = element("canvas");
-    this.canvas.setAttribute("role", "img");
-    const names = this.spec.signals.map((of) => of.label);
-    const listed = names.slice(0, 8).join(", ") + (names.length > 8 ? ` and ${names.length - 8} more` : "");
-    this.canvas.setAttribute("aria-label", `${this.spec.title} against time: ${listed}. Values at the cursor stand above.`);
-    this.ghost = element("div", "ghost");
-    this.cursor = element("div", "cursor");
-    this.brush = element("div", "brush");
-    this.tip = element("div", "tip");
-    this.tip.hidden = this.brush.hidden = true;
-    this.plot.append(this.canvas, this.brush, this.ghost, this.cursor, this.tip);
-    this.element.append(caption, this.plot);
-    handlePlot(this);
+    const rest = faint ? [h("span.key", {}, swatch(COLOURS.grey, []), `${faint} farther regions`)] : [];
+    this.legend.replaceChildren(...items, ...rest);
+    this.stale = true;
   }
 }
 
 /** Return the value of a curve at a time [s]; a growing run may have rows that the curve lacks. */
-function valueAt({ run, values }, t) {
-  return values.length ? values[Math.min(run.row(t), values.length - 1)] : NaN;
-}
+const valueAt = ({ run, values }, t) => values[Math.min(run.row(t), values.length - 1)] ?? NaN;
 
 /** Listen to the pointer: drag seeks, Shift+drag selects a window, Ctrl or Shift+wheel zooms, double click resets. */
 function handlePlot(chart) {
-  const { plot, on } = chart;
-  let from = null; // {x, y, mode} of a press
-  const place = (event) => {
-    const box = plot.getBoundingClientRect();
-    return { x: event.clientX - box.left, y: event.clientY - box.top };
-  };
+  const { plot, brush, on } = chart;
+  let press = null; // {x, mode}
+  const x = (event) => event.clientX - plot.getBoundingClientRect().left;
+  const seek = (event) => on.seek(chart.frame.time(x(event)));
   const done = () => {
-    from = null;
-    chart.brush.hidden = true;
+    press = null;
+    brush.hidden = true;
   };
-  plot.addEventListener("pointerdown", (event) => {
-    if (event.button !== 0 || !chart.frame) return;
-    const { x, y } = place(event);
-    // a finger may be about to scroll the page
-    from = { x, y, mode: event.pointerType === "touch" ? "perhaps" : event.shiftKey ? "window" : "seek" };
-    plot.setPointerCapture(event.pointerId);
-    if (from.mode === "seek") on.seek(chart.frame.time(x));
-  });
-  plot.addEventListener("pointermove", (event) => {
-    if (!chart.frame) return;
-    const { x, y } = place(event);
-    if (!from) {
-      if (event.pointerType !== "touch") on.hover(chart.frame.time(x), chart, y);
-      return;
-    }
-    if (from.mode === "perhaps" && Math.abs(x - from.x) > 8) from.mode = "seek";
-    if (from.mode === "seek") on.seek(chart.frame.time(x));
-    if (from.mode === "window") {
-      const [left, right] = [Math.min(x, from.x), Math.max(x, from.x)];
-      chart.brush.hidden = false;
-      chart.brush.style.left = `${left}px`;
-      chart.brush.style.width = `${right - left}px`;
-    }
-  });
-  plot.addEventListener("pointerup", (event) => {
-    if (!from) return;
-    const { x } = place(event);
-    if (from.mode === "perhaps") on.seek(chart.frame.time(x));
-    if (from.mode === "window" && Math.abs(x - from.x) > 4) {
-      on.window(chart.frame.time(Math.min(x, from.x)), chart.frame.time(Math.max(x, from.x)));
-    }
-    done();
-  });
-  plot.addEventListener("pointercancel", done);
-  plot.addEventListener("pointerleave", () => on.hover(null));
-  plot.addEventListener("dblclick", () => on.whole());
-  plot.addEventListener(
-    "wheel",
-    (event) => {
-      if (!chart.frame) return;
-      const turn = event.deltaY || event.deltaX;
-      if (event.ctrlKey || event.shiftKey || event.metaKey) {
-        event.preventDefault();
-        on.zoom(Math.exp(Math.sign(turn) * Math.min(0.4, Math.abs(turn) / 300)), chart.frame.time(place(event).x));
-      } else if (Math.abs(event.deltaX) > Math.abs(event.deltaY)) {
-        event.preventDefault();
-        on.pan((event.deltaX / (chart.frame.right - chart.frame.left)) * (chart.window[1] - chart.window[0]));
-      }
+  listen(plot, {
+    pointerdown(event) {
+      if (event.button !== 0 || !chart.frame) return;
+      // a finger may be about to scroll the page
+      press = { x: x(event), mode: event.pointerType === "touch" ? "perhaps" : event.shiftKey ? "window" : "seek" };
+      plot.setPointerCapture(event.pointerId);
+      if (press.mode === "seek") seek(event);
     },
-    { passive: false },
-  );
+    pointermove(event) {
+      if (!chart.frame) return;
+      if (!press) {
+        const y = event.clientY - plot.getBoundingClientRect().top;
+        if (event.pointerType !== "touch") on.hover(chart.frame.time(x(event)), chart, y);
+        return;
+      }
+      const moved = x(event) - press.x;
+      if (press.mode === "perhaps" && Math.abs(moved) > 8) press.mode = "seek";
+      if (press.mode === "seek") seek(event);
+      if (press.mode !== "window") return;
+      brush.hidden = false;
+      Object.assign(brush.style, { left: `${Math.min(x(event), press.x)}px`, width: `${Math.abs(moved)}px` });
+    },
+    pointerup(event) {
+      if (press?.mode === "perhaps") seek(event);
+      if (press?.mode === "window" && Math.abs(x(event) - press.x) > 4) {
+        const [from, to] = [x(event), press.x].map(chart.frame.time);
+        on.window(Math.min(from, to), Math.max(from, to));
+      }
+      done();
+    },
+    pointercancel: done,
+    pointerleave: () => on.hover(null),
+    dblclick: () => on.whole(),
+  });
+  const wheel = (event) => {
+    const { deltaX, deltaY, ctrlKey, shiftKey, metaKey } = event;
+    const turn = deltaY || deltaX;
+    const zooms = ctrlKey || shiftKey || metaKey;
+    if (!chart.frame || (!zooms && Math.abs(deltaX) <= Math.abs(deltaY))) return;
+    event.preventDefault();
+    const { left, right, time } = chart.frame;
+    if (zooms) on.zoom(Math.exp(clamp(turn / 300, -0.4, 0.4)), time(x(event)));
+    else on.pan((deltaX / (right - left)) * (chart.window[1] - chart.window[0]));
+  };
+  listen(plot, { wheel }, { passive: false });
 }

@@ -3,23 +3,15 @@
 const MODE_NAMES = ["manual", "hold", "reach", "mission", "surface", "stabilize", "depth_hold"];
 const SURE = 4000; // ms, within which Reset must be pressed again
 const NEW_OBSTACLES = 1001; // first number of obstacles from this page, above the numbers that sensors use
+const HINT = "Drag target and regions in the scene (Shift: up and down), or give numbers in metres: north, east, down.";
 
 /** Panel of buttons and number fields over the scene. */
-class CommandPanel {
+class CommandPanel extends FieldPanel {
   /** @param {LiveLink} link */
   constructor(link) {
+    super(link.page, "Steer");
     this.link = link;
-    this.holder = element("details", "commands");
-    this.holder.id = "commands";
-    this.holder.open = matchMedia("(min-width: 960px)").matches;
     this.holder.hidden = true;
-    this.state = element("span", "note");
-    const summary = element("summary", "", "Steer ");
-    summary.append(this.state);
-    this.body = element("div", "command-body");
-    this.holder.append(summary, this.body);
-    document.getElementById("stage").append(this.holder);
-    link.page.stage.coveredBy(this.holder);
     this._rows = [];
   }
 
@@ -28,90 +20,71 @@ class CommandPanel {
     this.run = run;
     this.holder.hidden = false;
     this._rows = [];
-    this.body.replaceChildren();
     if (!run.header.commands) {
       this.holder.open = false; // it offers nothing, and would hide a part of the scene
-      this.body.append(element("p", "", "Watching only. Start the run with --commands to steer it from here."));
-    } else {
-      this.body.append(this._buttons(), this._list(), this._adding());
+      this.body.replaceChildren(h("p", {}, "Watching only. Start the run with --commands to steer it from here."));
+      return this.update();
     }
-    this.update();
+    this._rows = [...run.header.regions.keys()].filter((index) => canMove(run, index)).map((index) => this._row(index));
+    const props = { title: "A sphere to keep out of, ahead of the vehicle", onclick: () => this._addObstacle() };
+    const list = h("div.command-list", {}, h("p.hint", {}, HINT), ...this._rows.map(({ set }) => set));
+    this.body.replaceChildren(this._buttons(), list, h("button", props, "New obstacle"));
+    return this.update();
   }
 
   /** Show mode, arming, connection and current positions. */
   update() {
     const { run, link } = this;
     if (!run) return;
-    const mode = run.rows && run.has("commands.mode") ? MODE_NAMES[run.held("commands.mode", run.end)] : null;
-    const armed = run.has("commands.armed") ? run.held("commands.armed", run.end) > 0 : true;
-    let state = "watching";
-    if (link.over) state = "the run has ended";
-    else if (run.header.commands) state = link.acceptsCommands ? `${armed ? "armed" : "disarmed"}, ${mode ?? "waiting"}` : "no connection";
-    setText(this.state, state);
-    this.body.inert = Boolean(run.header.commands) && !link.acceptsCommands;
-    for (const button of this.body.querySelectorAll("[data-mode]")) button.setAttribute("aria-pressed", String(button.dataset.mode === mode));
-    for (const button of this.body.querySelectorAll("[data-armed]")) button.setAttribute("aria-pressed", String(button.dataset.armed === String(armed)));
+    const mode = MODE_NAMES[run.held("commands.mode", run.end)];
+    const armed = run.held("commands.armed", run.end) !== 0;
+    const commands = Boolean(run.header.commands);
+    const steers = link.acceptsCommands ? `${armed ? "armed" : "disarmed"}, ${mode ?? "waiting"}` : "no connection";
+    setText(this.state, link.over ? "the run has ended" : commands ? steers : "watching");
+    this.body.inert = commands && !link.acceptsCommands;
+    for (const button of this.body.querySelectorAll("[data-mode], [data-armed]")) {
+      button.ariaPressed = [mode, String(armed)].includes(button.dataset.mode ?? button.dataset.armed);
+    }
     for (const row of this._rows) this._place(row);
   }
 
   _buttons() {
-    const group = element("div", "command-buttons");
-    group.setAttribute("role", "group");
-    group.setAttribute("aria-label", "Commands");
-    const add = (text, title, command, data = {}) => {
-      const button = pressable("", text, title, () => this.link.command(command));
-      Object.assign(button.dataset, data);
-      group.append(button);
+    const group = byId("steer").content.firstElementChild.cloneNode(true);
+    for (const button of group.querySelectorAll("[data-mode], [data-armed]")) {
+      const { mode, armed } = button.dataset;
+      const command = mode ? { command: "set_mode", mode } : { command: "arm", armed: armed === "true" };
+      button.onclick = () => this.link.command(command);
+    }
+    const reset = group.querySelector(".reset"); // must be pressed twice
+    let sure = 0;
+    const rest = () => {
+      clearTimeout(sure);
+      sure = 0;
+      setText(reset, "Reset");
     };
-    add("Arm", "Let the thrusters work", { command: "arm", armed: true }, { armed: "true" });
-    add("Disarm", "Stop the thrusters", { command: "arm", armed: false }, { armed: "false" });
-    add("Reach", "Go to the target region", { command: "set_mode", mode: "reach" }, { mode: "reach" });
-    add("Hold", "Stay here", { command: "set_mode", mode: "hold" }, { mode: "hold" });
-    add("Surface", "Come up", { command: "set_mode", mode: "surface" }, { mode: "surface" });
-    group.append(this._reset());
+    reset.onclick = () => {
+      if (sure) {
+        this.link.command({ command: "reset" });
+        rest();
+      } else {
+        setText(reset, "Really reset?");
+        sure = setTimeout(rest, SURE);
+      }
+    };
     return group;
   }
 
-  /** Return the reset button, which must be pressed twice. */
-  _reset() {
-    let sure = 0;
-    const button = pressable("", "Reset", "End this run, and begin it again", () => {
-      if (sure) this.link.command({ command: "reset" });
-      clearTimeout(sure);
-      setText(button, sure ? "Reset" : "Really reset?");
-      sure = sure ? 0 : setTimeout(() => {
-        sure = 0;
-        setText(button, "Reset");
-      }, SURE);
+  _row(index) {
+    const { comes, name: regionName } = this.run.header.regions[index];
+    const name = index === 0 ? "target" : regionName;
+    const fields = DIRECTIONS.map(([letter, direction], axis) => {
+      const props = { disabled: axis < 2 && isFlat(this.run, index), onchange: () => this._moved(row) };
+      return numberField(letter, `${name}, ${direction} in metres`, 0.1, props);
     });
-    return button;
-  }
-
-  _list() {
-    const list = element("div", "command-list");
-    list.append(element("p", "hint", "Drag target and regions in the scene (Shift: up and down), or give numbers in metres: north, east, down."));
-    this.run.header.regions.forEach((region, index) => {
-      if (canMove(this.run, index)) list.append(this._row(region, index));
-    });
-    return list;
-  }
-
-  _row(region, index) {
-    const set = element("fieldset");
-    const name = index === 0 ? "target" : region.name;
-    const legend = element("legend", "", name);
-    set.append(legend);
-    const fields = ["N", "E", "D"].map((letter, axis) => {
-      const [label, field] = numberField(letter, `${name}, ${["north", "east", "down"][axis]} in metres`, 0.1);
-      field.disabled = axis < 2 && isFlat(this.run, index);
-      field.addEventListener("change", () => this._moved(row));
-      set.append(label);
-      return field;
-    });
-    const row = { index, set, fields };
-    if (region.comes) set.append(pressable("gone", "Remove", "", () => this._forget(index)));
-    this._rows.push(row);
-    return set;
+    const set = fieldSet(name, ...fields.map(([label]) => label));
+    if (comes) set.append(h("button.gone", { onclick: () => this._forget(index) }, "Remove"));
+    const row = { index, set, fields: fields.map(([, field]) => field) };
+    return row;
   }
 
   /** Write the position of a region into its fields, unless one of them has the focus. */
@@ -120,8 +93,7 @@ class CommandPanel {
     set.hidden = !place;
     if (!place || set.contains(document.activeElement)) return;
     fields.forEach((field, axis) => {
-      const text = field.disabled ? "" : shortNumber(Number(place[axis].toFixed(2)));
-      if (field.value !== text) field.value = text;
+      field.value = field.disabled ? "" : shortNumber(Number(place[axis].toFixed(2)));
     });
   }
 
@@ -129,27 +101,22 @@ class CommandPanel {
     const { run } = this;
     const from = placeOf(run, index, run.end);
     if (!from) return;
-    const to = fields.map((field, axis) => {
-      const written = field.valueAsNumber;
-      // a field that shows the rounded position keeps the exact one
-      return !Number.isFinite(written) || Math.abs(written - from[axis]) <= 0.005 ? from[axis] : written;
-    });
-    if (Vec.norm(Vec.sub(to, from)) > 0) this.link.move(index, from, to);
+    // a field that shows the rounded position keeps the exact one
+    const to = fields.map(({ valueAsNumber: x }, axis) => (Math.abs(x - from[axis]) > 0.005 ? x : from[axis]));
+    if (Vec.distance(to, from) > 0) this.link.move(index, from, to);
   }
 
-  /** Return the button that adds a spherical obstacle ahead of the vehicle. */
-  _adding() {
-    return pressable("", "New obstacle", "A sphere to keep out of, ahead of the vehicle", () => {
-      const { run } = this;
-      if (!run.rows) return;
-      const { position, quaternion } = run.pose(run.end);
-      const radius = Number(Math.max(0.3, run.header.vehicle.radius).toFixed(2));
-      const ahead = Vec.turned(Vec.matrix(quaternion), [1, 0, 0]);
-      const way = Vec.unit([ahead[0], ahead[1], 0]);
-      const place = Vec.along(position, way, 4 * radius + run.header.vehicle.radius);
-      const known = run.header.changes.map((change) => change.number ?? 0);
-      this.link.command({ command: "add_obstacle", number: Math.max(NEW_OBSTACLES - 1, ...known) + 1, position: place, radius });
-    });
+  /** Add a spherical obstacle ahead of the vehicle. */
+  _addObstacle() {
+    const { run } = this;
+    if (!run.rows) return;
+    const { position, quaternion } = run.pose(run.end);
+    const { vehicle, changes } = run.header;
+    const radius = Number(Math.max(0.3, vehicle.radius).toFixed(2));
+    const [north, east] = Vec.turned(Vec.matrix(quaternion), [1, 0, 0]);
+    const place = Vec.along(position, Vec.unit([north, east, 0]), 4 * radius + vehicle.radius);
+    const number = Math.max(NEW_OBSTACLES - 1, ...changes.map((change) => change.number ?? 0)) + 1;
+    this.link.command({ command: "add_obstacle", number, position: place, radius });
   }
 
   _forget(index) {

@@ -1,16 +1,16 @@
 // Web worker that runs the scenario's WebAssembly: it sets the inputs, simulates, and returns the results.
 
+const ARRAYS = { trace: "trace", reasons: "reasons", rules: "strengths" }; // results, and the functions that have them
 let flight = null; // exports of the module
 
 /** Write numbers into an array of the module: [[index, value], ...]. */
-function put(array, numbers) {
+function put(Type, address, numbers) {
+  const array = new Type(flight.memory.buffer, address);
   for (const [place, value] of numbers) array[place] = value;
 }
 
 /** Return a copy of `count` numbers at an address of the module. */
-function copied(address, count) {
-  return new Float64Array(flight.memory.buffer, address, count).slice();
-}
+const copied = (address, count) => new Float64Array(flight.memory.buffer, address, count).slice();
 
 /** Return the last message of the plant. */
 function said() {
@@ -18,18 +18,23 @@ function said() {
   return new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0)));
 }
 
+/** Throw the last message of the plant if it has refused. */
+function check(ok) {
+  if (!ok) throw new Error(said());
+}
+
 /** Simulate one flight and return its results. */
-function flown({ numbers, integers, gains, starts, noise, sizes, metrics }) {
-  if (!flight.begin()) throw new Error(said());
-  put(new Float64Array(flight.memory.buffer, flight.numbers()), numbers);
-  put(new BigInt64Array(flight.memory.buffer, flight.integers()), integers.map(([place, value]) => [place, BigInt(value)]));
-  put(new Float64Array(flight.memory.buffer, flight.gains()), gains);
-  for (const [reference, value] of starts) if (!flight.set_start(reference, value)) throw new Error(said());
+function flown({ numbers, integers, gains, starts, noise, sizes, metrics: [first, count] }) {
+  check(flight.begin());
+  put(Float64Array, flight.numbers(), numbers);
+  put(BigInt64Array, flight.integers(), integers.map(([place, value]) => [place, BigInt(value)]));
+  put(Float64Array, flight.gains(), gains);
+  for (const [reference, value] of starts) check(flight.set_start(reference, value));
   const began = performance.now();
-  if (!flight.fly(...noise)) throw new Error(said());
+  check(flight.fly(...noise));
   const took = performance.now() - began;
-  const result = { took, said: said(), metrics: copied(flight.numbers() + 8 * metrics[0], metrics[1]) };
-  for (const [name, size] of Object.entries(sizes)) result[name] = copied({ trace: flight.trace, reasons: flight.reasons, rules: flight.strengths }[name](), size);
+  const result = { took, said: said(), metrics: copied(flight.numbers() + 8 * first, count) };
+  for (const [name, size] of Object.entries(sizes)) result[name] = copied(flight[ARRAYS[name]](), size);
   return result;
 }
 
@@ -41,7 +46,7 @@ self.onmessage = async ({ data }) => {
       self.postMessage({ ready: true });
     } else {
       const result = flown(data);
-      self.postMessage(result, ["trace", "reasons", "rules"].map((name) => result[name].buffer));
+      self.postMessage(result, Object.keys(ARRAYS).map((name) => result[name].buffer));
     }
   } catch (error) {
     self.postMessage({ refused: error.message || "the flight was refused" });

@@ -11,9 +11,7 @@ class Flight {
   /** Start the worker; reject if the browser has no WebAssembly, or no workers for pages from disk. */
   async start() {
     if (typeof WebAssembly === "undefined") throw new Error("no WebAssembly");
-    const packed = Uint8Array.from(atob(this.data.wasm), (letter) => letter.charCodeAt(0));
-    const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate-raw"));
-    const module = await new Response(stream).arrayBuffer();
+    const module = await inflated(this.data.wasm);
     const code = new Blob([document.getElementById("flier").textContent], { type: "text/javascript" });
     this._worker = new Worker(URL.createObjectURL(code));
     const { refused } = await this._ask({ module }, [module]);
@@ -28,20 +26,25 @@ class Flight {
    */
   async fly(values, failure) {
     const { data } = this;
-    const job = { numbers: [], integers: [], gains: [], starts: [], noise: [...data.noise], metrics: data.metrics, sizes: {} };
-    for (const [name, width] of Object.entries(data.widths)) job.sizes[name] = width * data.rows;
-    const to = { number: job.numbers, gain: job.gains, start: job.starts };
-    for (const [key, value] of values) {
-      for (const [kind, place] of this.slots.get(key).places) {
-        if (kind === "noise") job.noise[place] = value;
-        else if (kind === "middle") job.numbers.push([place, (value + (values.get(otherEnd(key)) ?? this.slots.get(otherEnd(key)).value)) / 2]);
-        else to[kind]?.push([place, value]);
-      }
-    }
     const value = (key) => values.get(key) ?? this.slots.get(key)?.value;
-    for (const [i, place] of goalPlaces(data, value).slice(1).entries()) {
-      place.forEach((x, axis) => job.numbers.push([this.slots.get(`goal.then.${i}.${axis}`).places[0][1], x]));
+    const sizes = Object.entries(data.widths).map(([name, width]) => [name, width * data.rows]);
+    const job = { numbers: [], integers: [], gains: [], starts: [], noise: [...data.noise], metrics: data.metrics };
+    job.sizes = Object.fromEntries(sizes);
+    for (const [key, x] of values) {
+      const put = {
+        number: (place) => job.numbers.push([place, x]),
+        gain: (place) => job.gains.push([place, x]),
+        start: (reference) => job.starts.push([reference, x]),
+        middle: (place) => job.numbers.push([place, (x + value(otherEnd(key))) / 2]),
+        noise: (place) => {
+          job.noise[place] = x;
+        },
+      };
+      for (const [kind, place] of this.slots.get(key).places) put[kind]?.(place);
     }
+    goalPlaces(data, value).slice(1).forEach((place, i) => place.forEach((x, axis) => {
+      job.numbers.push([this.slots.get(`goal.then.${i}.${axis}`).places[0][1], x]);
+    }));
     if (failure && data.failures) this._fail(job, failure);
     return { ...(await this._ask(job)), value };
   }
@@ -50,20 +53,20 @@ class Flight {
   _fail({ numbers, integers }, { thruster, time }) {
     const { failed, steps, remaining, own, reported, lower, upper, limits } = this.data.failures;
     const step = Math.ceil(time / this.data.step - 1e-6); // as in cosim/batch/fused.py
-    const all = [...own, [step, thruster - 1, 0]].sort((a, b) => a[0] - b[0] || a[1] - b[1] || (a[2] ?? NaN) - (b[2] ?? NaN));
+    const all = [...own, [step, thruster - 1, 0]];
+    all.sort((a, b) => a[0] - b[0] || a[1] - b[1] || (a[2] ?? NaN) - (b[2] ?? NaN));
     all.forEach(([at, which, left], i) => {
       integers.push([steps + i, at], [failed + i, which]);
       numbers.push([remaining + i, left ?? NaN]);
     });
     if (!reported) return;
     const health = limits[0].map(() => 1);
-    let stage = 0;
-    for (const [, which, left] of all) {
-      if (left > 0) continue;
+    all.filter(([, , left]) => !(left > 0)).forEach(([, which], k) => {
       health[which] = 0;
-      stage += 1;
-      [lower, upper].forEach(([place, , count], side) => health.forEach((h, i) => numbers.push([place + stage * count + i, limits[side][i] * h])));
-    }
+      [lower, upper].forEach(([place, , count], side) => health.forEach((one, i) => {
+        numbers.push([place + (k + 1) * count + i, limits[side][i] * one]);
+      }));
+    });
   }
 
   _ask(message, transfer = []) {
@@ -76,18 +79,16 @@ class Flight {
 }
 
 /** Return the key of a cylinder's other end. */
-function otherEnd(key) {
-  return key.includes(".start.") ? key.replace(".start.", ".end.") : key.replace(".end.", ".start.");
-}
+const otherEnd = (key) => key.replace(/\.(start|end)\./, (_, end) => (end === "start" ? ".end." : ".start."));
 
 /** Return the shifts of the goal to its places in turn [m, NED], from the numbers of `value(key)`. */
-function goalPlaces(data, value) {
-  const center = data.goal_center.map((x, axis) => {
+function goalPlaces({ goals, goal_center: recorded }, value) {
+  const center = recorded.map((x, axis) => {
     const [middle, start, end] = ["centre", "start", "end"].map((name) => value(`goal.${name}.${axis}`));
     return middle ?? (start === undefined ? x : (start + end) / 2);
   });
-  const shift = (i) => center.map((x, axis) => value(`goal.then.${i}.${axis}`) - x);
-  return [[0, 0, 0], ...Array.from({ length: data.goals }, (_, i) => shift(i))];
+  const later = Array.from({ length: goals }, (_, i) => center.map((x, axis) => value(`goal.then.${i}.${axis}`) - x));
+  return [[0, 0, 0], ...later];
 }
 
 const MOST_ROWS = 6000; // limit of the rows of a simulated run; more would not be visible
@@ -103,33 +104,35 @@ function runOfFlight(data, result, header, times = []) {
   const stride = Math.ceil(rows / MOST_ROWS);
   const number = (array, place) => (row) => result[array][row * data.widths[array] + place];
   const time = number("trace", 0);
-  const asked = Array.from(times, (t) => Math.round(t / (data.step * data.every))).filter((row, i) => row < rows && time(row) === times[i]);
-  const even = Array.from({ length: Math.ceil(rows / stride) }, (_, i) => i * stride);
-  const kept = [...new Set([...even, ...asked, rows - 1])].sort((a, b) => a - b);
+  const asked = Array.from(times, (t) => Math.round(t / (data.step * data.every)));
+  const kept = new Set(asked.filter((row, i) => row < rows && time(row) === times[i])).add(rows - 1);
+  for (let row = 0; row < rows; row += stride) kept.add(row);
+  const order = [...kept].sort((a, b) => a - b);
   const signals = header.signals.filter(({ name }) => name in data.signals);
-  const columns = signals.map(({ name }) => Float64Array.from(kept, signalOf(data, data.signals[name], number, result.value)));
+  const columns = signals.map(({ name }) => {
+    const [kind, ...rest] = data.signals[name];
+    const of = SIGNALS[kind]?.(data, rest, number, result.value) ?? number(kind, rest[0]);
+    return Float64Array.from(order, (row) => of(row));
+  });
   const run = new Run({ ...header, signals }, columns);
-  const active = signals.findIndex((signal) => signal.name === "active");
-  if (active >= 0) columns[active].set(activeRegions(run, data.criteria));
+  run.column("active")?.set(activeRegions(run, data.criteria));
   return run;
 }
 
-/** Return a function from row to value of a signal; 0 for the active region, which is computed afterwards. */
-function signalOf(data, [kind, ...rest], number, value) {
-  if (kind === "sum") {
-    const [array, first, factors] = rest;
+/** Functions from row to value of the signals that are no numbers of an array of the worker. */
+const SIGNALS = {
+  sum(data, [array, first, factors], number) {
     const parts = factors.map((_, i) => number(array, first + i));
     return (row) => factors.reduce((sum, factor, i) => sum + factor * parts[i](row), 0);
-  }
-  if (kind === "shift") {
-    const [region, axis] = rest;
+  },
+
+  shift(data, [region, axis], number, value) {
     const [time, place] = [number("trace", 0), number("reasons", data.place)];
     const places = goalPlaces(data, value);
     return (row) => data.velocities[region][axis] * time(row) + (region === 0 ? places[place(row)][axis] : 0);
-  }
-  if (kind === "water") {
-    const [axis] = rest;
-    const { surface, shear, period, variation } = data.water;
+  },
+
+  water({ water: { surface, shear, period, variation } }, [axis], number, value) {
     const [time, depth] = [number("trace", 0), number("trace", 3)];
     const now = value(`plant.current.${axis}`) ?? surface[axis];
     return (row) => {
@@ -137,38 +140,39 @@ function signalOf(data, [kind, ...rest], number, value) {
       const [before, after] = [Math.floor(knot), Math.ceil(knot)].map((k) => variation[k]?.[axis] ?? 0);
       return now + shear[axis] * Math.max(0, depth(row)) + before + (knot % 1) * (after - before);
     };
-  }
-  if (kind === "attitude") {
-    const [w, x, y, z] = [4, 5, 6, 7].map((place) => number("trace", place));
-    return {
-      roll: (row) => Math.atan2(2 * (w(row) * x(row) + y(row) * z(row)), 1 - 2 * (x(row) ** 2 + y(row) ** 2)),
-      pitch: (row) => Math.asin(Math.max(-1, Math.min(1, 2 * (w(row) * y(row) - x(row) * z(row))))),
-      yaw: (row) => Math.atan2(2 * (w(row) * z(row) + x(row) * y(row)), 1 - 2 * (y(row) ** 2 + z(row) ** 2)),
-    }[rest[0]];
-  }
-  return kind === "active" ? () => 0 : number(kind, rest[0]);
-}
+  },
+
+  attitude(data, [angle], number) {
+    const numbers = [4, 5, 6, 7].map((place) => number("trace", place));
+    const angles = {
+      roll: (w, x, y, z) => Math.atan2(2 * (w * x + y * z), 1 - 2 * (x ** 2 + y ** 2)),
+      pitch: (w, x, y, z) => Math.asin(Math.max(-1, Math.min(1, 2 * (w * y - x * z)))),
+      yaw: (w, x, y, z) => Math.atan2(2 * (w * z + x * y), 1 - 2 * (y ** 2 + z ** 2)),
+    };
+    return (row) => angles[angle](...numbers.map((of) => of(row)));
+  },
+
+  active: () => () => 0, // computed afterwards
+};
 
 const ASKS = 0.005; // least weight of an active criterion: less is shown as 0.00
 const LEADS = 0.5; // least weight with which a criterion leads while the vehicle rests in the goal
 
 /** Return the active region of each row, as in cosim/replay/activity.py. */
 function activeRegions(run, criteria) {
-  const column = (name) => run.column(name);
   const names = run.header.criteria.map(({ name }) => name);
-  const [weights, memberships] = ["weight", "membership"].map((kind) => names.map((name) => column(`${kind}.${name}`)));
-  const clearances = run.header.regions.map(({ name }) => column(`${name}.clearance`));
-  const speeds = ["u", "v", "w"].map((axis) => column(`velocity.${axis}`));
+  const [weights, memberships] = ["weight", "membership"].map((kind) => run.columns(kind, names));
+  const clearances = run.header.regions.map(({ name }) => run.column(`${name}.clearance`));
+  const speeds = run.columns("velocity", "uvw");
   return run.time.map((_, row) => {
     if (!criteria.length) return 0;
-    const leads = weights.reduce((best, weight, i) => (weight[row] > (weights[best][row] ?? -Infinity) ? i : best), 0);
-    let region = 0;
-    criteria.forEach((of, i) => {
-      const gap = clearances[i + 1][row];
-      if (of === leads && !Number.isNaN(gap) && !(region && gap >= clearances[region][row])) region = i + 1;
-    });
-    if (!region || !(memberships[leads][row] > 0 && weights[leads][row] >= ASKS)) return 0;
-    const rests = clearances[0][row] >= 0 && Math.hypot(...speeds.map((speed) => speed[row])) < 0.02;
-    return rests && weights[leads][row] < LEADS && clearances[region][row] >= 0 ? 0 : region;
+    const weight = weights.map((column) => column[row]);
+    const leads = weight.reduce((best, x, i) => (x > (weight[best] ?? -Infinity) ? i : best), 0);
+    const gap = (region) => clearances[region][row];
+    const regions = [...clearances.keys()].filter((i) => criteria[i - 1] === leads && !Number.isNaN(gap(i)));
+    if (!regions.length || !(memberships[leads][row] > 0 && weight[leads] >= ASKS)) return 0;
+    const region = regions.reduce((a, b) => (gap(b) < gap(a) ? b : a));
+    const rests = gap(0) >= 0 && Math.hypot(...speeds.map((speed) => speed[row])) < 0.02;
+    return rests && weight[leads] < LEADS && gap(region) >= 0 ? 0 : region;
   });
 }

@@ -4,121 +4,103 @@
 class Labels {
   constructor(context) {
     this.context = context;
-    this._widths = new Map();
     this._sides = new Map(); // position of each label in the last frame, which is tried first
     this.begin(0, 0);
   }
 
   /** Remove all labels and set the size of the picture [CSS pixels]. */
   begin(width, height) {
-    this.width = width;
-    this.height = height;
+    Object.assign(this, { width, height });
     this._words = [];
-    this._taken = [];
+    this._taken = []; // boxes
     this.placed = []; // boxes of drawn labels: {of: {run, region} or null, x, y, width, height} [pixels]
   }
 
   /** Return the run and region whose label is at a pixel; null if there is none. */
   nameAt(x, y) {
-    const inside = (box) => x >= box.x && x <= box.x + box.width && y >= box.y && y <= box.y + box.height;
-    return this.placed.find((box) => box.of && inside(box))?.of ?? null;
+    return this.placed.find((box) => box.of && overlap(box, { x, y, width: 0, height: 0 }))?.of ?? null;
   }
 
   /** Keep labels out of a rectangle [pixels]. */
-  block(x, y, width, height) {
-    this._taken.push([x, y, x + width, y + height]);
+  block(x, y, width, height) { this._taken.push({ x, y, width, height }); }
+
+  /** Keep labels out of a square about a projected point [pixels]. */
+  blockAround([x, y, depth], half) {
+    if (depth > 0) this.block(x - half, y - half, 2 * half, 2 * half);
   }
 
   /**
    * Add a label for the next draw().
-   * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold, chip:
-   * background color or null, pad: pixels that stay free beside it, far: true if it may stand farther off, with a leader
-   * line in the color `edge`, sides: of "above below right left here" in the order in which they are tried}
+   * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold,
+   * chip: background color or null, pad: pixels that stay free beside it, far: true if it may stand farther off, with
+   * a leader line in the color `edge`, sides: of "above below right left here" in the order in which they are tried}
    */
-  add(word) {
-    this._words.push(word);
-  }
+  add(word) { this._words.push(word); }
 
   /** Draw all labels for which there is space. */
   draw() {
-    const { context } = this;
     const known = this._sides;
     this._sides = new Map();
-    context.textBaseline = "middle";
-    context.textAlign = "left";
-    this._words.sort((a, b) => a.rank - b.rank);
-    const written = [];
-    for (const word of this._words) {
-      const font = `${word.bold ? "600 " : ""}${word.size ?? 12}px system-ui, sans-serif`;
-      const width = this._width(word.text, font) + (word.chip ? 10 : 2);
-      const height = (word.size ?? 12) + (word.chip ? 7 : 2);
-      const before = known.get(word.key);
+    for (const word of this._words.sort((a, b) => a.rank - b.rank)) {
       const spots = (word.far ? [0, 24, 48, 80] : [0]).flatMap((off) => word.sides.map((side) => [side, off]));
-      if (before && spots.some(([side, off]) => side === before[0] && off === before[1])) spots.unshift(before);
-      for (const [side, off] of spots) {
-        const [x, y] = this._corner(side, word.gap + off, word, width, height);
-        const pad = word.pad ?? 0;
-        if (!this._free(x - pad, y, width + 2 * pad, height)) continue;
-        this._taken.push([x - 2, y - 1, x + width + 2, y + height + 1]);
-        this._sides.set(word.key, [side, off]);
-        this.placed.push({ of: word.of ?? null, x, y, width, height });
-        if (off) this._lead(word, x, y, width, height);
-        written.push([word, font, x, y, width, height]);
-        break;
-      }
+      const before = spots.find((spot) => String(spot) === String(known.get(word.key)));
+      if (before) spots.unshift(before);
+      const size = this._sizeOf(word);
+      const spot = spots.find((one) => this._isFree(boxAt(word, one, size), word.pad ?? 0));
+      if (!spot) continue;
+      const box = boxAt(word, spot, size);
+      this.block(box.x - 2, box.y - 1, box.width + 4, box.height + 2);
+      this._sides.set(word.key, spot);
+      this.placed.push({ of: word.of ?? null, ...box, word, leads: spot[1] > 0 });
     }
-    for (const placed of written) this._write(...placed); // on top of all leader lines
+    for (const box of this.placed.filter(({ leads }) => leads)) this._lead(box);
+    for (const box of this.placed) this._write(box); // on top of all leader lines
   }
 
   /** Draw a leader line from a label to its point. */
-  _lead(word, x, y, width, height) {
+  _lead({ word, x, y, width, height }) {
     const { context } = this;
-    context.beginPath();
-    context.moveTo(word.x, word.y);
-    context.lineTo(Math.min(x + width, Math.max(x, word.x)), Math.min(y + height, Math.max(y, word.y)));
-    context.strokeStyle = word.edge;
-    context.lineWidth = 1;
+    beginLines(context, [[word.x, word.y], [clamp(word.x, x, x + width), clamp(word.y, y, y + height)]]);
+    Object.assign(context, { strokeStyle: word.edge, lineWidth: 1 });
     context.stroke();
   }
 
-  _write(word, font, x, y, width, height) {
+  _write({ word, x, y, width, height }) {
     const { context } = this;
-    context.font = font;
-    if (word.chip) {
-      context.fillStyle = word.chip;
-      context.beginPath();
-      context.roundRect(x, y, width, height, 4);
-      context.fill();
-      if (word.bold) {
-        context.strokeStyle = word.edge;
-        context.lineWidth = 1.5;
-        context.stroke();
-      }
+    if (word.chip) fillRounded(context, word.chip, x, y, width, height, 4);
+    if (word.chip && word.bold) {
+      Object.assign(context, { strokeStyle: word.edge, lineWidth: 1.5 });
+      context.stroke();
     }
-    context.fillStyle = word.colour;
-    context.fillText(word.text, x + (word.chip ? 5 : 1), y + 0.5 * height + 0.5);
+    const style = { font: fontOf(word), fillStyle: word.colour, textAlign: "left", textBaseline: "middle" };
+    writeText(context, word.text, x + (word.chip ? 5 : 1), y + 0.5 * height + 0.5, style);
   }
 
-  _corner(side, gap, { x, y }, width, height) {
-    if (side === "above") return [x - 0.5 * width, y - gap - height];
-    if (side === "below") return [x - 0.5 * width, y + gap];
-    if (side === "right") return [x + gap, y - 0.5 * height];
-    if (side === "left") return [x - gap - width, y - 0.5 * height];
-    return [x - 0.5 * width, y - 0.5 * height];
+  _isFree({ x, y, width, height }, pad) {
+    if (x - pad < 2 || y < 2 || x + width + pad > this.width - 2 || y + height > this.height - 2) return false;
+    const padded = { x: x - pad, y, width: width + 2 * pad, height };
+    return !this._taken.some((box) => overlap(box, padded));
   }
 
-  _free(x, y, width, height) {
-    if (x < 2 || y < 2 || x + width > this.width - 2 || y + height > this.height - 2) return false;
-    return !this._taken.some((box) => x < box[2] && x + width > box[0] && y < box[3] && y + height > box[1]);
+  _sizeOf(word) {
+    this.context.font = fontOf(word);
+    const { width } = this.context.measureText(word.text);
+    const height = word.size ?? 12;
+    return word.chip ? [width + 10, height + 7] : [width + 2, height + 2];
   }
+}
 
-  _width(text, font) {
-    const key = `${font}|${text}`;
-    if (!this._widths.has(key)) {
-      if (this._widths.size > 2000) this._widths.clear();
-      this.context.font = font;
-      this._widths.set(key, this.context.measureText(text).width);
-    }
-    return this._widths.get(key);
-  }
+const fontOf = ({ bold, size = 12 }) => `${bold ? "600 " : ""}${size}px system-ui, sans-serif`;
+
+const overlap = (a, b) =>
+  a.x < b.x + b.width && b.x < a.x + a.width && a.y < b.y + b.height && b.y < a.y + a.height;
+
+/** Return the box of a label at a side of its point, at a distance beyond its gap. */
+function boxAt(word, [side, off], [width, height]) {
+  const gap = word.gap + off;
+  const [dx, dy] = {
+    above: [-0.5 * width, -gap - height], below: [-0.5 * width, gap],
+    right: [gap, -0.5 * height], left: [-gap - width, -0.5 * height], here: [-0.5 * width, -0.5 * height],
+  }[side];
+  return { x: word.x + dx, y: word.y + dy, width, height };
 }

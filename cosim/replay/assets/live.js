@@ -21,28 +21,22 @@ class LiveLink {
   }
 
   /** Return the time at which regions are dragged [s]: the end of the run. */
-  get time() {
-    return this.run.end;
-  }
+  get time() { return this.run.end; }
 
   /** Return the reason why nothing can be dragged now; "" if regions can be dragged. */
   get refusal() {
     return this.page.player.live ? "" : "What is in the past cannot be moved: go to the end (End) to drag regions.";
   }
 
-  canMove(region) {
-    return canMove(this.run, region);
-  }
+  canMove(region) { return canMove(this.run, region); }
 
   /** Send the command that moves a region from one point to another [m, NED]. */
-  move(region, from, to) {
-    return this.command(commandToMove(this.run, region, from, to, this.run.end));
-  }
+  move(region, from, to) { this.command(commandToMove(this.run, region, from, to, this.run.end)); }
 
   /** Connect; the promise resolves at the first message or when the connection closes. */
   connect() {
     return new Promise((settled) => {
-      const socket = new WebSocket(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/ws`);
+      const socket = new WebSocket(`${location.protocol.replace("http", "ws")}//${location.host}/ws`);
       this._socket = socket;
       socket.binaryType = "arraybuffer";
       socket.onopen = () => {
@@ -51,6 +45,7 @@ class LiveLink {
       socket.onmessage = ({ data }) => {
         if (typeof data === "string") this._receive(JSON.parse(data));
         else this._rows(new Float64Array(data));
+        this._later();
         settled();
       };
       socket.onclose = () => {
@@ -60,14 +55,13 @@ class LiveLink {
     });
   }
 
-  /** Send a command, in the format of the run's log of commands; return true if it was sent. */
+  /** Send a command, in the format of the run's log of commands. */
   command(command) {
-    if (!this.acceptsCommands) {
-      this.page.say(this.over ? "The run has ended: nothing can be commanded any more." : "Nothing can be commanded: the connection is lost, or commands are off.", "warning");
-      return false;
-    }
-    this._socket.send(JSON.stringify(command));
-    return true;
+    const reason = this.over
+      ? "The run has ended: nothing can be commanded any more."
+      : "Nothing can be commanded: the connection is lost, or commands are off.";
+    if (this.acceptsCommands) this._socket.send(JSON.stringify(command));
+    else this.page.say(reason, "warning");
   }
 
   _receive(message) {
@@ -78,7 +72,6 @@ class LiveLink {
       end: () => this._end(message),
     };
     does[message.type]?.();
-    this._later();
   }
 
   _begin(header) {
@@ -96,7 +89,6 @@ class LiveLink {
   _rows(numbers) {
     const width = this.run.header.signals.length;
     for (let i = 0; i < numbers.length; i += width) this.run.append(numbers.subarray(i, i + width));
-    this._later();
   }
 
   _said({ kind, text, time }) {
@@ -107,32 +99,29 @@ class LiveLink {
   _end({ status, verdict }) {
     Object.assign(this.run.header, { status, verdict });
     this.over = true;
-    const { player } = this.page;
     this.page.refresh();
-    player.pause();
-    player.growing = false;
+    this.page.player.pause();
+    this.page.player.growing = false;
     this.page.select(0); // shows the verdict
     this.page.say(`The run has ended (${status}). This page replays what it has received.`, "good");
-    this.commandPanel.update();
   }
 
   _lost() {
     this.dragging.cancel();
     this.commandPanel.update();
     if (this.over) return;
-    this.page.say(this.run ? "The connection is lost; trying again …" : "No run answers here; trying again …", "warning");
+    this.page.say(`${this.run ? "The connection is lost" : "No run answers here"}; trying again …`, "warning");
     if (!this.run) this.page.nothing("Waiting for a run.");
     setTimeout(() => this.connect(), this._wait);
     this._wait = Math.min(RETRY[1], 2 * this._wait);
   }
 
-  /** Update page, panel and ghost once with the next frame. */
+  /** Update page and panel once with the next frame. */
   _later() {
     this._next ||= requestAnimationFrame(() => {
       this._next = 0;
       this.page.refresh();
       this.commandPanel.update();
-      this.dragging.draw();
     });
   }
 }
@@ -140,7 +129,5 @@ class LiveLink {
 /** Show the live run of the page's own host. */
 async function startLive(page) {
   page.nothing("Waiting for a run.");
-  const link = new LiveLink(page);
-  await link.connect();
-  return link;
+  await new LiveLink(page).connect();
 }

@@ -1,21 +1,17 @@
 // Entry point: show the runs of the page; without runs, connect to a live run on the page's own host.
 
 const NO_RUN =
-  "This page holds no run. A run folder has its replay.html; “cosim replay RUN” writes one, of several runs as well.";
+  "This page holds no run. A run folder has its replay.html; “cosim replay RUN” writes one, of several runs too.";
 const OLD_BROWSER =
   "This browser cannot unpack the numbers of the run: it has no DecompressionStream. Any browser since 2023 has it.";
 
 /** Return the runs of the page; show the error and return null if they cannot be read. */
 async function runsOfPage(page) {
-  if (JSON.parse(document.getElementById("runs").textContent).length && typeof DecompressionStream === "undefined") {
-    page.nothing(OLD_BROWSER);
-    page.say(OLD_BROWSER, "error");
-    return null;
-  }
   try {
     return await loadRuns();
   } catch (error) {
-    const text = `The numbers of this page are damaged and cannot be read; write the page again. (${error.message})`;
+    const damaged = `The numbers of this page are damaged and cannot be read; write the page again. (${error.message})`;
+    const text = typeof DecompressionStream === "undefined" ? OLD_BROWSER : damaged;
     page.nothing(text);
     page.say(text, "error");
     return null;
@@ -33,7 +29,8 @@ async function main() {
    * - charts: Chart[]; each has series() -> [{run (index in runs), name, label, time, values}], the arrays that are
    *   drawn, paint(), setWindow(from, to), spec.key
    * - show(runs): replace the runs; paint(): paint now, not with the next frame of the screen
-   * - whatIf: the WhatIf of a page that simulates, else null: set(key, value), move(region, from, to), fail(), reset(), last
+   * - whatIf: the WhatIf of a page that simulates, else null: set(key, value), move(region, from, to), fail(),
+   *   reset(), last
    * - page: the Page, as startLive() gets it (theme, setTheme, setSide, showRun, select, refresh, say)
    */
   window.subreach = {
@@ -41,26 +38,19 @@ async function main() {
     whatIf: null,
     page,
     player: page.player,
-    get runs() {
-      return page.runs;
-    },
-    get scene() {
-      return page.scene();
-    },
-    get scenes() {
-      return page.stage.scenes;
-    },
-    get charts() {
-      return page.board.charts;
-    },
+    get runs() { return page.runs; },
+    get scene() { return page.scene(); },
+    get scenes() { return page.stage.scenes; },
+    get charts() { return page.board.charts; },
     show: (runs) => page.show(runs),
     paint: () => page.paint(),
   };
   const runs = await runsOfPage(page);
-  if (runs?.length) await page.show(runs);
-  else if (runs && location.protocol.startsWith("http")) await startLive(page);
+  if (runs?.length) {
+    await page.show(runs);
+    window.subreach.whatIf = await startWhatIf(page);
+  } else if (runs && location.protocol.startsWith("http")) await startLive(page);
   else if (runs) page.nothing(NO_RUN);
-  if (runs?.length) window.subreach.whatIf = await startWhatIf(page);
   window.subreach.ready = true;
 }
 

@@ -9,15 +9,13 @@
 
 /** Return the entries from the farthest to the nearest; a sheet separates entries beyond it from those before it. */
 function farthestFirst(entries, eye) {
-  const sheets = entries.filter((entry) => entry.sheet);
-  if (!sheets.length) return [...entries].sort((a, b) => remoteness(b, eye) - remoteness(a, eye));
-  const sheet = sheets[0];
-  const side = (p) => Vec.dot(Vec.sub(p, sheet.sheet.corners[0]), sheet.sheet.normal) > 0;
-  const others = entries.filter((entry) => entry !== sheet);
-  const eyeSide = side(eye);
-  const beyond = others.filter((entry) => side(entry.middle) !== eyeSide);
-  const before = others.filter((entry) => side(entry.middle) === eyeSide);
-  return [...farthestFirst(beyond, eye), sheet, ...farthestFirst(before, eye)];
+  const plane = entries.find((entry) => entry.sheet);
+  if (!plane) return entries.toSorted((a, b) => remoteness(b, eye) - remoteness(a, eye));
+  const { corners, normal } = plane.sheet;
+  const side = (p) => Vec.dot(Vec.sub(p, corners[0]), normal) > 0;
+  const others = entries.filter((entry) => entry !== plane);
+  const [beyond, before] = [!side(eye), side(eye)].map((is) => others.filter(({ middle }) => side(middle) === is));
+  return [...farthestFirst(beyond, eye), plane, ...farthestFirst(before, eye)];
 }
 
 /**
@@ -25,44 +23,31 @@ function farthestFirst(entries, eye) {
  *
  * Of two spheres that do not touch, the one with the smaller power is never behind the other.
  */
-function remoteness({ solid, middle }, eye) {
-  const off = Vec.sub(middle, eye);
-  const radius = solid.ellipsoid ? solid.radius : 0;
-  return Vec.dot(off, off) - radius * radius;
-}
+const remoteness = ({ solid: { ellipsoid, radius }, middle }, eye) =>
+  Vec.distance(middle, eye) ** 2 - (ellipsoid ? radius ** 2 : 0);
 
-/** Return a function that is true for points that an entry hides or contains; null for an entry that is clear. */
+/** Return a function that is true for points that an entry hides or contains. */
 function hiderOf({ solid, sheet, shift, style }, eye) {
   if (sheet) return throughSheet(sheet, eye);
-  if (!style.filled) return null;
-  const [sx, sy, sz] = shift;
+  if (!style.filled) return () => false;
   const hides = solid.from(Vec.sub(eye, shift));
-  return (x, y, z) => hides(x - sx, y - sy, z - sz);
+  return (p) => hides(Vec.sub(p, shift));
 }
 
-function throughSheet({ corners, normal }, eye) {
-  const [nx, ny, nz] = normal;
-  const offset = Vec.dot(normal, corners[0]);
-  const before = Vec.dot(normal, eye) - offset;
-  const [points, face] = [corners.flat(), corners.map((_, i) => i)];
-  return (x, y, z) => {
-    const after = nx * x + ny * y + nz * z - offset;
-    if (before > 0 === after > 0) return false;
-    const at = Vec.along(eye, [x - eye[0], y - eye[1], z - eye[2]], before / (before - after));
-    return holds(points, face, at, normal);
-  };
-}
+const throughSheet = ({ corners, normal }, eye) => (p) => {
+  const [before, after] = [eye, p].map((q) => Vec.dot(normal, Vec.sub(q, corners[0])));
+  if (before > 0 === after > 0) return false;
+  return holds(corners, Vec.along(eye, Vec.sub(p, eye), before / (before - after)), normal);
+};
 
 /** Return thin things in lists: list k is drawn before entry k, the first that hides them; the last list is on top. */
 function placedAmong(entries, things, eye) {
-  const lists = Array.from({ length: entries.length + 1 }, () => []);
   const hiders = entries.map((entry) => hiderOf(entry, eye));
+  const lists = Array.from({ length: entries.length + 1 }, () => []);
   for (const thing of things) {
-    const [x, y, z] = thing.middle;
-    let k = 0;
-    while (k < entries.length && !hiders[k]?.(x, y, z)) k++;
-    thing.off = (x - eye[0]) ** 2 + (y - eye[1]) ** 2 + (z - eye[2]) ** 2;
-    lists[k].push(thing);
+    const first = hiders.findIndex((hides) => hides(thing.middle));
+    thing.off = Vec.distance(thing.middle, eye);
+    lists.at(first).push(thing); // the last one if none hides it
   }
   for (const list of lists) list.sort((a, b) => b.off - a.off);
   return lists;

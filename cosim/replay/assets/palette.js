@@ -1,51 +1,28 @@
-// Colors of Okabe and Ito, which color-blind readers can distinguish, on paper and on a dark screen.
+// Colors: those of the theme are CSS variables; criteria and runs have colors of Okabe and Ito.
+
+const COLOURS = {}; // of the page's theme, by name, as style.css has them
+
+/** Read the colors of the theme; call this when it changes. */
+function readColours() {
+  const root = [...document.styleSheets[0].cssRules].find(({ selectorText }) => selectorText === ":root");
+  const style = getComputedStyle(document.documentElement);
+  for (const name of root.style) {
+    if (name.startsWith("--")) COLOURS[name.slice(2)] = style.getPropertyValue(name).trim();
+  }
+}
+
+/** Colors of Okabe and Ito, which criteria have; curves have them as hues of the theme. */
+const PALETTE = { vermillion: "#d55e00", orange: "#e69f00", sky: "#56b4e9", purple: "#cc79a7", green: "#009e73" };
 
 /** Colors of the paths of several runs; first those that no criterion has. */
-const RUN_COLOURS = ["#0072B2", "#CC79A7", "#9A7B00", "#7C8A94", "#009E73", "#E69F00", "#D55E00", "#56B4E9"];
+const { purple, green, orange, vermillion, sky } = PALETTE;
+const RUN_COLOURS = ["#0072b2", purple, "#9a7b00", "#7c8a94", green, orange, vermillion, sky];
 
-/** Colors of the scene, other than those of regions. */
-const SCENE_THEMES = {
-  light: {
-    skyTop: "#f7fbfd",
-    skyBottom: "#d9e8f1",
-    ink: "#1d2b36",
-    soft: "#5b6f7e",
-    grid: "rgba(40, 75, 100, 0.16)",
-    gridMajor: "rgba(40, 75, 100, 0.34)",
-    floor: "rgba(255, 255, 255, 0.45)",
-    shadow: "rgba(20, 45, 65, 0.13)",
-    halo: "rgba(247, 251, 253, 0.85)",
-    chip: "rgba(255, 255, 255, 0.82)",
-    future: "rgba(29, 43, 54, 0.46)",
-    muted: "#a9b4bc",
-    thrust: "#A6407A",
-    water: "#0060a8",
-    hull: { float: "#E8C81F", frame: "#33424d", tube: "#8fa1ad", dome: "#a5dcf3", skid: "#4a5a66", duct: "#51626e" },
-  },
-  dark: {
-    skyTop: "#12212d",
-    skyBottom: "#070e14",
-    ink: "#e6eef4",
-    soft: "#93a8b7",
-    grid: "rgba(150, 195, 225, 0.13)",
-    gridMajor: "rgba(150, 195, 225, 0.30)",
-    floor: "rgba(90, 140, 170, 0.05)",
-    shadow: "rgba(0, 0, 0, 0.38)",
-    halo: "rgba(7, 14, 20, 0.75)",
-    chip: "rgba(14, 25, 34, 0.82)",
-    future: "rgba(230, 238, 244, 0.42)",
-    muted: "#6f808c",
-    thrust: "#F29AC8",
-    water: "#7cc0f5",
-    hull: { float: "#F0DC4E", frame: "#5b6b77", tube: "#a5b6c1", dome: "#b5e6fa", skid: "#71828e", duct: "#7d8f9b" },
-  },
-};
+/** Return the color of a run's trail on a page with several runs. */
+const runColour = (index) => RUN_COLOURS[index % RUN_COLOURS.length];
 
 /** Return the red, green and blue channels of "#rrggbb". */
-function channelsOf(colour) {
-  const number = parseInt(colour.slice(1), 16);
-  return [(number >> 16) & 255, (number >> 8) & 255, number & 255];
-}
+const channelsOf = (colour) => [1, 3, 5].map((i) => parseInt(colour.slice(i, i + 2), 16));
 
 /** Return the color at the share `part` from one "#rrggbb" to another. */
 function mixedColour(from, to, part) {
@@ -54,28 +31,21 @@ function mixedColour(from, to, part) {
   return `#${hex.join("")}`;
 }
 
-/** Return a color mixed with ink until its contrast to the background of a theme is 3 to 1. */
-function legible(colour, theme) {
-  const [ground, ink] = theme === "dark" ? ["#121c25", "#ffffff"] : ["#ffffff", "#000000"];
-  const light = (hex) => {
-    const linear = channelsOf(hex).map((x) => (x <= 10 ? x / 3295 : ((x / 255 + 0.055) / 1.055) ** 2.4));
-    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05;
-  };
-  const contrast = (hex) => Math.max(light(hex) / light(ground), light(ground) / light(hex));
-  let part = 0;
-  while (contrast(mixedColour(colour, ink, part)) < 3) part += 0.05;
-  return mixedColour(colour, ink, part);
+/** Return the relative luminance of a color, plus 0.05, as WCAG defines contrast. */
+function luminance(colour) {
+  const linear = channelsOf(colour).map((x) => (x <= 10 ? x / 3295 : ((x / 255 + 0.055) / 1.055) ** 2.4));
+  return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2] + 0.05;
 }
 
-/**
- * Return the color of a region: full if it is active, else muted in the same hue.
- * @param {object} region of the header  @param {boolean} active  @param {"light"|"dark"} theme
- */
-function regionColour(region, active, theme) {
-  return active ? region.colour : mixedColour(region.colour, SCENE_THEMES[theme].muted, 0.45);
+/** Return a color mixed with black or white until its contrast to the cards of the theme is 3 to 1. */
+function legible(colour) {
+  const ground = luminance(COLOURS.card);
+  const ink = ground < 0.5 ? "#ffffff" : "#000000";
+  for (let part = 0; ; part += 0.05) {
+    const light = luminance(mixedColour(colour, ink, part));
+    if (Math.max(light / ground, ground / light) >= 3) return mixedColour(colour, ink, part);
+  }
 }
 
-/** Return the color of a run's trail on a page with several runs. */
-function runColour(index) {
-  return RUN_COLOURS[index % RUN_COLOURS.length];
-}
+/** Return the color of a region of the header in the scene: full if it is active, else muted in the same hue. */
+const regionColour = ({ colour }, active) => (active ? colour : mixedColour(colour, COLOURS.faded, 0.45));

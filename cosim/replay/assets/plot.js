@@ -3,176 +3,121 @@
 const MARGIN = { left: 50, right: 10, top: 8, bottom: 20 };
 const FONT = "11px system-ui, sans-serif";
 
-/** Return the page's colors of the current theme, for a canvas. */
-function pageColours() {
-  const style = getComputedStyle(document.documentElement);
-  const of = (name) => style.getPropertyValue(name).trim();
-  return { ink: of("--ink"), muted: of("--muted"), grid: of("--grid"), zone: of("--zone"), bad: of("--bad"), card: of("--card") };
-}
-
 /** Placement of a plot in its canvas [CSS pixels], and its scales of time and value. */
 class Frame {
   constructor(width, height, window, rest, range, down) {
-    Object.assign(this, { width, height, window, range });
-    this.left = MARGIN.left;
-    this.right = width - MARGIN.right;
-    this.top = MARGIN.top;
-    this.bottom = height - MARGIN.bottom;
-    this.axis = new TimeAxis(window, rest, this.left, this.right);
+    const [left, right, top, bottom] = [MARGIN.left, width - MARGIN.right, MARGIN.top, height - MARGIN.bottom];
+    Object.assign(this, { width, height, window, range, left, right, top, bottom });
+    this.axis = new TimeAxis(window, rest, left, right);
     this.x = this.axis.x;
-    this.time = (x) => this.axis.time(Math.min(this.right, Math.max(this.left, x)));
+    this.time = (x) => this.axis.time(clamp(x, left, right));
     const [low, high] = range ?? [0, 1];
-    const up = (this.bottom - this.top) / (high - low);
-    this.y = down ? (value) => this.top + (value - low) * up : (value) => this.bottom - (value - low) * up;
+    const scale = (bottom - top) / (high - low);
+    this.y = down ? (value) => top + (value - low) * scale : (value) => bottom - (value - low) * scale;
   }
 }
 
 /** Paint a plot without its cursor. */
-function paintPlot(context, frame, spec, curves, theme) {
-  const colours = pageColours();
-  context.clearRect(0, 0, frame.width, frame.height);
-  context.font = FONT;
-  context.lineJoin = "round";
-  if (!frame.range) {
-    context.fillStyle = colours.muted;
-    context.textAlign = "center";
-    context.fillText("no numbers in this window", (frame.left + frame.right) / 2, (frame.top + frame.bottom) / 2);
+function paintPlot(context, frame, spec, curves) {
+  const { left, right, top, bottom, range, window, x, y } = frame;
+  Object.assign(context, { font: FONT, lineJoin: "round" });
+  if (!range) {
+    const style = { fillStyle: COLOURS.muted, textAlign: "center" };
+    writeText(context, "no numbers in this window", (left + right) / 2, (top + bottom) / 2, style);
     return;
   }
-  if (spec.zero) paintZone(context, frame, colours);
-  paintAxes(context, frame, spec, colours);
+  if (spec.zero) {
+    const zero = clamp(y(0), top, bottom);
+    context.fillStyle = COLOURS.zone;
+    context.fillRect(left, zero, right - left, bottom - zero);
+  }
+  paintAxes(context, frame, spec);
   context.save();
   context.beginPath();
-  context.rect(frame.left, frame.top - 1, frame.right - frame.left, frame.bottom - frame.top + 2);
+  context.rect(left, top - 1, right - left, bottom - top + 2);
   context.clip();
   for (const curve of [...curves].sort((a, b) => b.signal.faint - a.signal.faint)) {
-    context.strokeStyle = hueColour(curve.signal.hue, theme, curve.signal.shade);
-    context.lineWidth = curve.signal.faint ? 0.8 : 1.6;
-    context.globalAlpha = curve.signal.faint ? 0.75 : 1;
+    const { hue, shade, faint } = curve.signal;
+    const [lineWidth, globalAlpha] = faint ? [0.8, 0.75] : [1.6, 1];
+    Object.assign(context, { strokeStyle: hueColour(hue, shade), lineWidth, globalAlpha });
     context.setLineDash(curve.dash);
-    traceCurve(context, curve, frame.window, frame.x, frame.y);
+    traceCurve(context, curve, window, x, y);
     context.stroke();
   }
   context.restore();
-  if (spec.zero) nameZone(context, frame, colours);
-  if (frame.axis.broken) nameRest(context, frame, curves, colours);
-  paintBeyond(context, frame, spec, curves, theme, colours.card);
-}
-
-/** Paint the zone below zero, where a region is violated. */
-function paintZone(context, frame, colours) {
-  const zero = Math.min(frame.bottom, Math.max(frame.top, frame.y(0)));
-  context.fillStyle = colours.zone;
-  context.fillRect(frame.left, zero, frame.right - frame.left, frame.bottom - zero);
-}
-
-/** Write the name of the zone over the curves. */
-function nameZone(context, frame, colours) {
-  if (frame.bottom - frame.y(0) < 16) return;
-  context.textAlign = "right";
-  context.textBaseline = "bottom";
-  paintText(context, "below 0: violated (goal: outside)", frame.right - 4, frame.bottom - 3, colours.bad, colours.card);
+  if (spec.zero && bottom - y(0) >= 16) {
+    const style = { textAlign: "right", textBaseline: "bottom", fillStyle: COLOURS.bad };
+    writeOutlined(context, "below 0: violated (goal: outside)", right - 4, bottom - 3, style);
+  }
+  if (frame.axis.broken) nameRest(context, frame, curves);
+  paintBeyond(context, frame, spec, curves);
 }
 
 /** Draw a text with an outline in the background color, so that it is legible over curves. */
-function paintText(context, text, x, y, colour, ground) {
-  context.lineWidth = 4;
-  context.strokeStyle = ground;
+function writeOutlined(context, text, x, y, style) {
+  Object.assign(context, style, { lineWidth: 4, strokeStyle: COLOURS.card });
   context.strokeText(text, x, y);
-  context.fillStyle = colour;
   context.fillText(text, x, y);
 }
 
-function paintAxes(context, frame, spec, colours) {
-  const scale = spec.unit === "rad" ? DEGREES : 1;
-  const [low, high] = frame.range;
-  const heights = ticks(low * scale, high * scale, Math.max(2, (frame.bottom - frame.top) / 20));
-  const { axis } = frame;
-  const across = ticks(frame.window[0], axis.rest, Math.max(2, (frame.x(axis.rest) - frame.left) / 70));
-  context.lineWidth = 1;
-  context.strokeStyle = colours.grid;
-  context.fillStyle = colours.muted;
-  context.textAlign = "right";
-  context.textBaseline = "middle";
-  context.beginPath();
-  const words = tickTexts(heights);
-  heights.forEach((value, i) => {
-    const y = Math.round(frame.y(value / scale)) + 0.5;
-    context.moveTo(frame.left, y);
-    context.lineTo(frame.right, y);
-    context.fillText(words[i], frame.left - 6, y);
-  });
-  for (const t of across) {
-    const x = Math.round(frame.x(t)) + 0.5;
-    context.moveTo(x, frame.top);
-    context.lineTo(x, frame.bottom);
-  }
+function paintAxes(context, { left, right, top, bottom, range, window, width, axis, x, y }, { unit }) {
+  const scale = unit === "rad" ? DEGREES : 1;
+  const [low, high] = range.map((value) => value * scale);
+  const heights = ticks(low, high, Math.max(2, (bottom - top) / 20));
+  const times = ticks(window[0], axis.rest, Math.max(2, (x(axis.rest) - left) / 70));
+  const rowOf = (value) => Math.round(y(value / scale)) + 0.5;
+  const level = (value) => [[left, rowOf(value)], [right, rowOf(value)]];
+  const upright = (t) => [top, bottom].map((end) => [Math.round(x(t)) + 0.5, end]);
+  beginLines(context, ...heights.map(level), ...times.map(upright));
+  Object.assign(context, { lineWidth: 1, strokeStyle: COLOURS.grid, fillStyle: COLOURS.muted });
   context.stroke();
-  context.textBaseline = "top";
-  const times = tickTexts(across);
+  const beside = { textAlign: "right", textBaseline: "middle" };
+  tickTexts(heights).forEach((text, i) => writeText(context, text, left - 6, rowOf(heights[i]), beside));
+  const texts = tickTexts(times);
   if (axis.broken) {
-    across.push(frame.window[1]);
-    times.push(String(Number(frame.window[1].toFixed(1))));
+    times.push(window[1]);
+    texts.push(String(Number(window[1].toFixed(1))));
   }
-  across.forEach((t, i) => {
-    const last = i === across.length - 1;
-    const text = last ? `${times[i]} s` : times[i];
-    const half = context.measureText(text).width / 2;
-    context.textAlign = "center";
-    context.fillText(text, Math.min(frame.x(t), frame.width - half - 1), frame.bottom + 5);
+  texts.push(`${texts.pop()} s`);
+  times.forEach((t, i) => {
+    const half = context.measureText(texts[i]).width / 2;
+    const place = Math.min(x(t), width - half - 1);
+    writeText(context, texts[i], place, bottom + 5, { textAlign: "center", textBaseline: "top" });
   });
-  if (axis.broken) paintBreak(context, frame, colours);
+  context.strokeStyle = COLOURS.muted;
+  if (axis.broken) {
+    const at = x(axis.rest); // nothing moves after it
+    Object.assign(context, { fillStyle: COLOURS.grid, globalAlpha: 0.45, lineWidth: 1.5 });
+    context.fillRect(at, top, right - at, bottom - top);
+    context.globalAlpha = 1;
+    beginLines(context, ...[at - 2, at + 2].map((cut) => [[cut - 2.5, bottom + 4], [cut + 2.5, bottom - 4]]));
+    context.stroke();
+    context.lineWidth = 1;
+  }
   if (low < 0 && high > 0) {
-    context.strokeStyle = colours.muted;
-    context.beginPath();
-    const y = Math.round(frame.y(0)) + 0.5;
-    context.moveTo(frame.left, y);
-    context.lineTo(frame.right, y);
+    beginLines(context, level(0));
     context.stroke();
   }
 }
 
-/** Mark the break of the time axis; nothing moves after it. */
-function paintBreak(context, { axis, x, top, bottom, right }, colours) {
-  const at = x(axis.rest);
-  context.fillStyle = colours.grid;
-  context.globalAlpha = 0.45;
-  context.fillRect(at, top, right - at, bottom - top);
-  context.globalAlpha = 1;
-  context.strokeStyle = colours.muted;
-  context.lineWidth = 1.5;
-  context.beginPath();
-  for (const aside of [-2, 2]) {
-    context.moveTo(at + aside - 2.5, bottom + 4);
-    context.lineTo(at + aside + 2.5, bottom - 4);
-  }
-  context.stroke();
-  context.lineWidth = 1;
-}
-
 /** Write "at rest" after the break of the time axis: at the top, in the middle or at the bottom, where no curve is. */
-function nameRest(context, frame, curves, colours) {
-  const { axis, top, bottom, right } = frame;
-  const at = frame.x(axis.rest);
-  if (right - at <= 40) return;
-  const lines = curves.filter(({ values }) => values.length).map(({ values }) => frame.y(values[values.length - 1]));
-  const free = [top + 8, (top + bottom) / 2, bottom - 24].find((y) => lines.every((line) => !(Math.abs(line - y) < 10)));
-  if (free === undefined) return;
-  context.textAlign = "center";
-  context.textBaseline = "middle";
-  paintText(context, "at rest", (at + right) / 2, free, colours.muted, colours.card);
+function nameRest(context, { axis, x, y, top, bottom, right }, curves) {
+  const at = x(axis.rest);
+  const lines = curves.map(({ values }) => y(values.at(-1)));
+  const rows = [top + 8, (top + bottom) / 2, bottom - 24];
+  const free = rows.find((row) => !lines.some((line) => Math.abs(line - row) < 10));
+  if (free === undefined || right - at <= 40) return;
+  const style = { textAlign: "center", textBaseline: "middle", fillStyle: COLOURS.muted };
+  writeOutlined(context, "at rest", (at + right) / 2, free, style);
 }
 
 /** Write the true values that lie beyond the range of the curves, a line of text each, with an arrow. */
-function paintBeyond(context, frame, spec, curves, theme, ground) {
-  let line = 0;
-  for (const { signal: of, values } of curves.filter((curve) => curve.signal.context && curve.values.length)) {
-    const [low, high] = frame.range;
-    if (values[0] >= low && values[0] <= high) continue;
-    context.textAlign = "right";
-    context.textBaseline = "top";
-    const text = `${of.label} is at ${quantity(values[0], spec.unit)} ${values[0] > high ? "↑" : "↓"}`;
-    paintText(context, text, frame.right - 4, frame.top + 2 + 14 * line, hueColour(of.hue, theme, of.shade), ground);
-    line += 1;
-  }
+function paintBeyond(context, { range: [low, high], right, top }, { unit }, curves) {
+  const beyond = curves.filter(({ signal: { context: isContext }, values: [value] }) =>
+    isContext && (value < low || value > high));
+  beyond.forEach(({ signal: { label, hue, shade }, values: [value] }, line) => {
+    const text = `${label} is at ${quantity(value, unit)} ${value > high ? "↑" : "↓"}`;
+    const style = { textAlign: "right", textBaseline: "top", fillStyle: hueColour(hue, shade) };
+    writeOutlined(context, text, right - 4, top + 2 + 14 * line, style);
+  });
 }

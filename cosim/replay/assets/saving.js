@@ -1,9 +1,7 @@
 // Export of the scenario with the reader's numbers, as a file for `cosim run`.
 
 /** Format a number as a TOML float. */
-function tomlNumber(x) {
-  return Number.isInteger(x) ? x.toFixed(1) : String(x);
-}
+const tomlNumber = (x) => (Number.isInteger(x) ? x.toFixed(1) : String(x));
 
 /** Return the TOML text of the scenario with the current numbers. */
 function scenarioText(whatIf) {
@@ -20,10 +18,9 @@ function scenarioText(whatIf) {
 
 /** Download the scenario file. */
 function saveScenario(whatIf) {
-  const link = element("a");
-  link.href = URL.createObjectURL(new Blob([scenarioText(whatIf)], { type: "application/toml" }));
-  link.download = `${whatIf.flight.data.name}-what-if.toml`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 60000);
-  whatIf.page.say(`Saved as ${link.download}: “cosim run ${link.download}” flies it again.`, "good");
+  const href = URL.createObjectURL(new Blob([scenarioText(whatIf)], { type: "application/toml" }));
+  const download = `${whatIf.flight.data.name}-what-if.toml`;
+  h("a", { href, download }).click();
+  setTimeout(() => URL.revokeObjectURL(href), 60000);
+  whatIf.page.say(`Saved as ${download}: “cosim run ${download}” flies it again.`, "good");
 }

@@ -4,29 +4,23 @@ const LEAST_HULL = 15; // pixels, least radius at which the vehicle is drawn; le
 
 /** 3D scene of some runs on a canvas. */
 class Scene {
-  /**
-   * @param {HTMLCanvasElement} canvas  @param {Run[]} runs  @param {"light"|"dark"} theme
-   * @param {{name: string, colour: string}[]|null} marks as for setRuns()
-   */
-  constructor(canvas, runs, theme, marks = null) {
+  /** @param {HTMLCanvasElement} canvas */
+  constructor(canvas) {
     this.canvas = canvas;
     this.context = canvas.getContext("2d", { alpha: false });
     this.labels = new Labels(this.context);
-    this.theme = theme;
+    this.runs = [];
+    this.ghost = null; // of a region that is dragged
     this._last = null; // time and options of the last frame
     this._followed = null; // where the followed vehicle was in it [m, NED]
     this._redraw = () => this._later();
     this.camera = new Camera();
     controlCamera(canvas, () => this.camera);
     this.resize();
-    this.setRuns(runs, marks);
-    this.camera.look("iso");
   }
 
   /** Return the camera; scenes side by side share one. */
-  get camera() {
-    return this._camera;
-  }
+  get camera() { return this._camera; }
 
   set camera(camera) {
     this._camera?.listeners.delete(this._redraw);
@@ -35,46 +29,35 @@ class Scene {
     this.painter = new Painter(this.context, camera);
   }
 
-  /** @param {"light"|"dark"} theme */
-  setTheme(theme) {
-    this.theme = theme;
-    this._sky = null;
-    this._later();
-  }
-
   /**
    * Show other runs; the camera stays.
    * @param {Run[]} runs
-   * @param {{name: string, colour: string}[]|null} marks of the runs; null: default marks for several runs, none for one,
-   * whose path then has the colors of the active regions
+   * @param {{name: string, colour: string}[]|null} marks of the runs; null for one run, whose path has the colors of
+   * the active regions
    */
-  setRuns(runs, marks = null) {
+  setRuns(runs, marks) {
     this.runs = runs;
-    const own = runs.map(({ header }, i) => ({ name: header.name, colour: runColour(i) }));
-    this._runMarks = marks ?? (runs.length > 1 ? own : null);
+    this._runMarks = marks;
     this._trails = runs.map((run) => new Trail(run));
     this._forces = runs.map((run) => new Forces(run));
-    this._regions = new Regions(runs);
     this._drawn = { time: 0, runs: [] };
     this._measure();
     this._later();
   }
 
-  /** Fit the canvas to its size in the page. */
+  /** Fit the canvas to its size in the page, in the colors of the theme. */
   resize() {
-    const { clientWidth, clientHeight } = this.canvas;
-    this._ratio = Math.min(2, window.devicePixelRatio || 1);
-    this.canvas.width = Math.max(1, Math.round(clientWidth * this._ratio));
-    this.canvas.height = Math.max(1, Math.round(clientHeight * this._ratio));
+    const { canvas } = this;
+    this._ratio = Math.min(2, window.devicePixelRatio);
+    canvas.width = Math.max(1, Math.round(canvas.clientWidth * this._ratio));
+    canvas.height = Math.max(1, Math.round(canvas.clientHeight * this._ratio));
     this._sky = null;
     this._fitsPicture();
     this._later();
   }
 
-  /** Return what the last frame showed: time, and for each run the pose, active region, current and color of each region. */
-  get drawn() {
-    return this._drawn;
-  }
+  /** Return what the last frame showed: time, and for each run pose, active region, current, colors of regions. */
+  get drawn() { return this._drawn; }
 
   /** Return the pixel [CSS pixels] of a position [m, NED] in the canvas. */
   project(position) {
@@ -82,120 +65,104 @@ class Scene {
     return this.camera.project(position).slice(0, 2);
   }
 
-  /** Return north and east of the point at a pixel and a depth [m]; null if there is none. */
-  placeOnPlane(x, y, depth) {
-    this._fitsPicture();
-    const { eye } = this.camera;
-    const ray = this.camera.ray(x, y);
-    const length = (depth - eye[2]) / ray[2];
-    return length > 0 && Number.isFinite(length) ? [eye[0] + length * ray[0], eye[1] + length * ray[1]] : null;
-  }
-
-  /** Return the region whose label, feature or surface is at a pixel: {run, region, place of a goal in turn}; null if there is none. */
+  /**
+   * Return the region whose label, feature or surface is at a pixel: {run, region, place of a goal in turn}; null if
+   * there is none.
+   */
   pick(x, y) {
-    const named = this.labels.nameAt(x, y);
-    if (named) return named;
     this._fitsPicture();
     const { eye } = this.camera;
     const far = Vec.along(eye, this.camera.ray(x, y), 1e5);
-    for (const { feature, of } of this._sights ?? []) {
-      const [u, v] = feature ? this.camera.project(feature) : [Infinity, Infinity];
-      if (Math.hypot(u - x, v - y) < 14) return of;
-    }
-    for (const { solid, shift, of } of [...(this._entries ?? [])].reverse()) {
-      if (solid?.from(Vec.sub(eye, shift))(...Vec.sub(far, shift))) return of;
-    }
-    return null;
+    const isSeen = ({ sight, solid, shift }) => {
+      if (solid) return solid.from(Vec.sub(eye, shift))(Vec.sub(far, shift));
+      if (!sight?.feature) return false;
+      const [u, v] = this.camera.project(sight.feature);
+      return Math.hypot(u - x, v - y) < 14;
+    };
+    const entries = [...(this._sights ?? []), ...(this._entries ?? []).toReversed()];
+    return this.labels.nameAt(x, y) ?? entries.find(isSeen)?.of ?? null;
   }
 
   /**
    * Draw the scene at a time.
-   * @param {number} t [s]  @param {{follow: boolean, trail: boolean, labels: boolean, covered: number[][]}} options
+   * @param {number} t [s]  @param {{follow: boolean, labels: boolean, covered: number[][]}} options
    */
-  draw(t, options = {}) {
+  draw(t, options) {
     this._last = [t, options];
-    if (this._waiting) cancelAnimationFrame(this._waiting); // this frame replaces the requested one
+    cancelAnimationFrame(this._waiting); // this frame replaces the requested one
     this._waiting = 0;
-    const { trail = true, labels = true } = options;
     this._fitsPicture();
     this._grow();
-    const poses = this.runs.map((run) => poseOf(run, t));
+    const { runs, context, painter, camera, labels } = this;
+    const poses = runs.map((run) => poseOf(run, t));
     this._follow(options.follow ? poses.find(Boolean) : null);
-    const { context, painter, camera } = this;
-    const colours = SCENE_THEMES[this.theme];
     context.lineJoin = "bevel"; // round joins cost as much as the lines
-    this._paintSky(colours);
-    this.labels.begin(camera.width, camera.height);
-    for (const box of options.covered ?? []) this.labels.block(...box);
+    this._paintSky();
+    labels.begin(camera.width, camera.height);
+    for (const box of options.covered) labels.block(...box);
 
-    const regions = this._regions.at(t, poses, camera.target, this.theme);
-    this._entries = farthestFirst(regions.filter((entry) => entry.solid || entry.sheet), camera.eye);
-    this._sights = regions.filter((entry) => entry.sight).map((entry) => ({ ...entry, feature: entry.sight.feature }));
-    paintSurface(painter, this.bounds, colours);
-    paintFloor(painter, this.labels, this.bounds, colours, labels);
-    paintRuler(painter, this.labels, this.bounds, colours, labels);
+    const regions = regionsAt(runs, t, poses, camera.target, this.bounds);
+    this._entries = farthestFirst(regions.filter(({ sight }) => !sight), camera.eye);
+    this._sights = regions.filter(({ sight }) => sight);
+    paintSurface(painter, this.bounds);
+    paintFloor(painter, labels, this.bounds, options.labels);
+    paintRuler(painter, labels, this.bounds, options.labels);
+    paintShadows(painter, this._entries, this.bounds);
     const vehicles = poses.map((pose, i) => pose && this._vehicle(pose, i));
+    const present = vehicles.filter(Boolean);
     const floor = this.bounds[1][2];
-    paintShadows(painter, this._entries, this.bounds, colours);
-    const things = vehicles.flatMap((vehicle) => (vehicle ? vehicle.things : []));
-    if (trail) {
-      this._trails.forEach((way, i) => {
-        const chunks = this._way(way, i, t, colours);
-        paintWayBelow(painter, chunks, floor, colours);
-        things.push(...chunks, ...this._marks(way, i, t, vehicles[i], colours));
-      });
-    }
-    for (const vehicle of vehicles) if (vehicle) paintPlumb(painter, vehicle, floor, colours);
-    // a sight begins at the vehicle and is drawn just behind it
-    for (const entry of this._sights) {
-      things.push({ ...entry, middle: Vec.along(entry.sight.apex, camera.forward, entry.size) });
-    }
-    const lists = placedAmong(this._entries, things, camera.eye);
-    this._entries.forEach((entry, k) => {
-      if (entry.solid) paintBack(painter, entry.solid, entry.shift, entry.style);
-      this._paintThings(lists[k], colours);
-      if (entry.solid) paintFront(painter, entry.solid, entry.shift, entry.style);
-      else paintSheet(painter, entry.sheet, entry.style);
+    const things = present.flatMap((vehicle) => vehicle.things);
+    runs.forEach((run, i) => {
+      const chunks = this._way(i, t);
+      paintWayBelow(painter, chunks, floor);
+      things.push(...chunks, ...this._marks(i, t, vehicles[i]));
     });
-    this._paintThings(lists[this._entries.length], colours);
+    for (const vehicle of present) paintPlumb(painter, vehicle, floor);
+    // a sight begins at the vehicle and is drawn just behind it
+    const behind = ({ sight, size }) => Vec.along(sight.apex, camera.forward, size);
+    things.push(...this._sights.map((entry) => ({ ...entry, middle: behind(entry) })));
+    const lists = placedAmong(this._entries, things, camera.eye);
+    this._entries.forEach(({ solid, sheet, shift, style }, k) => {
+      const view = solid && painter.look(solid, shift);
+      if (solid) paintSurfaceSide(painter, view, style, false);
+      this._paintThings(lists[k]);
+      if (solid) paintSurfaceSide(painter, view, style, true);
+      else paintSheet(painter, sheet, style);
+    });
+    this._paintThings(lists.at(-1));
     vehicles.forEach((vehicle, i) => {
-      if (!vehicle) return;
-      const { radius } = this.runs[i].header.vehicle;
-      paintForces(painter, vehicle.pose, this._forces[i].at(t), vehicle.size, radius, this.theme);
+      if (vehicle) paintForces(painter, vehicle, this._forces[i].at(t), runs[i].header.vehicle.radius);
     });
 
-    paintCompass(painter, this.labels, colours);
-    paintCurrents(painter, this.labels, colours, this.runs, t);
-    paintScale(painter, this.labels, colours, Math.max(1, ...vehicles.map((vehicle) => vehicle?.magnified ?? 1)));
-    for (const vehicle of vehicles) if (vehicle) blockVehicle(this.labels, camera, vehicle);
-    if (labels) nameRegions(this.labels, camera, regions, colours, this.runs, t);
-    if (labels && this._runMarks) nameVehicles(this.labels, camera, this._runMarks, vehicles, colours);
-    this.labels.draw();
+    paintCompass(painter, labels);
+    paintCurrents(painter, labels, runs, t);
+    paintScale(painter, labels, Math.max(1, ...present.map(({ magnified }) => magnified)));
+    for (const { pose: { position }, size } of present) { // with its axes and forces, unless it fills the picture
+      const half = Math.min(0.2 * camera.width, 0.2 * camera.height, 2 * size * camera.scaleAt(position));
+      labels.blockAround(camera.project(position), half);
+    }
+    if (options.labels) nameRegions(labels, camera, regions, runs, t);
+    if (options.labels && this._runMarks) nameVehicles(labels, camera, this._runMarks, vehicles);
+    labels.draw();
+    if (this.ghost) paintGhost(this, this.ghost);
     this._note(t, poses, regions);
   }
 
   _later() {
-    if (!this._last || this._waiting) return;
-    this._waiting = requestAnimationFrame(() => {
-      this._waiting = 0;
-      this.draw(...this._last);
-    });
+    if (this._last) this._waiting ||= requestAnimationFrame(() => this.draw(...this._last));
   }
 
-  _fitsPicture() {
-    this.camera.resize(this.canvas.width / this._ratio, this.canvas.height / this._ratio);
-  }
+  _fitsPicture() { this.camera.resize(this.canvas.width / this._ratio, this.canvas.height / this._ratio); }
 
   _measure() {
-    const { way: places, content, bounds } = extentOf(this.runs);
-    this.bounds = bounds;
+    const { way, content, bounds } = extentOf(this.runs);
+    Object.assign(this, { bounds, content });
     this._rows = this.runs.map((run) => run.rows);
-    this._regions.bounds = bounds;
-    Object.assign(this.camera, { content, way: places });
+    Object.assign(this.camera, { content, way });
     const lead = this.runs.find((run) => run.rows);
     if (!lead) return;
-    const way = Vec.sub(lead.pose(lead.end).position, lead.pose(lead.start).position);
-    if (Vec.finite(way)) this.camera.bearing = Math.atan2(way[1], way[0]);
+    const [dx, dy] = Vec.sub(lead.pose(lead.end).position, lead.pose(lead.start).position);
+    if (Number.isFinite(dx + dy)) this.camera.bearing = Math.atan2(dy, dx);
   }
 
   /** Measure the scene again if a live run has left the bounds. */
@@ -203,7 +170,7 @@ class Scene {
     const left = this.runs.some((run, i) => {
       if (run.rows === this._rows[i]) return false;
       const { position } = run.pose(run.end);
-      return Vec.finite(position) && position.some((x, k) => x < this.bounds[0][k] || x > this.bounds[1][k]);
+      return Vec.finite(position) && !isInBox(position, this.bounds);
     });
     if (!left) return;
     const { fitted } = this.camera;
@@ -216,7 +183,7 @@ class Scene {
       const moved = Vec.sub(pose.position, this._followed ?? this.camera.target);
       if (Vec.norm(moved) > 0) this._quiet(() => this.camera.aim(Vec.add(this.camera.target, moved)));
     }
-    this._followed = pose ? pose.position : null;
+    this._followed = pose?.position;
   }
 
   /** Move the camera within a frame, without a request for another frame. */
@@ -227,99 +194,88 @@ class Scene {
   }
 
   /** Paint the background; the gradient is cached, as copying is several times as fast. */
-  _paintSky(colours) {
-    const { context, canvas } = this;
+  _paintSky() {
+    const { context, canvas: { width, height } } = this;
     if (!this._sky) {
-      this._sky = new OffscreenCanvas(canvas.width, canvas.height);
+      this._sky = new OffscreenCanvas(width, height);
       const sky = this._sky.getContext("2d", { alpha: false });
-      const gradient = sky.createLinearGradient(0, 0, 0, canvas.height);
-      gradient.addColorStop(0, colours.skyTop);
-      gradient.addColorStop(1, colours.skyBottom);
-      sky.fillStyle = gradient;
-      sky.fillRect(0, 0, canvas.width, canvas.height);
+      sky.fillStyle = sky.createLinearGradient(0, 0, 0, height);
+      sky.fillStyle.addColorStop(0, COLOURS.skyTop);
+      sky.fillStyle.addColorStop(1, COLOURS.skyBottom);
+      sky.fillRect(0, 0, width, height);
     }
     context.setTransform(1, 0, 0, 1, 0, 0);
     context.drawImage(this._sky, 0, 0);
     context.setTransform(this._ratio, 0, 0, this._ratio, 0, 0);
   }
 
-  _vehicle(pose, index) {
+  _vehicle({ position, quaternion }, index) {
     const { vehicle } = this.runs[index].header;
-    const pixels = vehicle.radius * this.camera.scaleAt(pose.position);
-    const least = Math.min(LEAST_HULL, 0.028 * Math.min(this.camera.width, this.camera.height));
-    const magnified = pixels > 0 ? Math.max(1, least / pixels) : 1;
+    const { width, height, eye } = this.camera;
+    const pixels = vehicle.radius * this.camera.scaleAt(position);
+    const magnified = pixels > 0 ? Math.max(1, Math.min(LEAST_HULL, 0.028 * width, 0.028 * height) / pixels) : 1;
     const size = vehicle.radius * magnified;
-    const placed = { position: pose.position, R: Vec.matrix(pose.quaternion) };
-    const things = [...hullAt(vehicle, placed, size, this.camera.eye, this.theme), ...bodyAxes(placed, size)];
-    return { pose: placed, size, magnified, things };
+    const pose = { position, R: Vec.matrix(quaternion) };
+    return { pose, size, magnified, things: [...hullAt(vehicle, pose, size, eye), ...bodyAxes(pose, size)] };
   }
 
-  _way(way, index, t, colours) {
-    const chunks = way.chunks(this.camera, t);
-    for (const chunk of chunks) chunk.colour = this._wayColour(index, chunk.past, chunk.active, colours);
+  _way(index, t) {
+    const chunks = this._trails[index].chunks(this.camera, t);
+    for (const chunk of chunks) chunk.colour = this._wayColour(index, chunk.past, chunk.active);
     return chunks;
   }
 
   /** Return the color of a piece of a path: the run's, if there are several; else the active region's for the past. */
-  _wayColour(index, past, active, colours) {
+  _wayColour(index, past, active) {
     if (this._runMarks) return this._runMarks[index].colour;
-    const { regions } = this.runs[index].header;
-    return past ? regions[Number.isFinite(active) ? active : 0].colour : colours.future;
+    return past ? this.runs[index].header.regions[active || 0].colour : COLOURS.future;
   }
 
-  _marks(way, index, t, vehicle, colours) {
+  _marks(index, t, vehicle) {
     const { camera } = this;
-    const active = way.run.column("active");
+    const active = this.runs[index].column("active");
     const spacing = roundStep((110 * camera.distance) / camera.focal);
-    return way.marks(spacing).flatMap(({ row, time, from, middle }) => {
+    return this._trails[index].marks(spacing).flatMap(({ row, time, from, middle }) => {
       const [[x, y, near], [u, v, depth]] = [camera.project(from), camera.project(middle)];
       const length = Math.hypot(u - x, v - y);
-      if (Math.min(near, depth) < camera.near || !(length > 1)) return [];
-      const onHull = vehicle && Vec.norm(Vec.sub(middle, vehicle.pose.position)) < 1.5 * vehicle.size;
-      if (onHull) return [];
+      const onHull = vehicle && Vec.distance(middle, vehicle.pose.position) < 1.5 * vehicle.size;
+      if (Math.min(near, depth) < camera.near || !(length > 1) || onHull) return [];
       const past = time <= t;
       const onTop = Vec.along(middle, Vec.sub(camera.eye, middle), 0.02); // above the line that it marks
-      const colour = this._wayColour(index, past, active?.[row], colours);
+      const colour = this._wayColour(index, past, active?.[row]);
       return [{ mark: [u, v, (u - x) / length, (v - y) / length], middle: onTop, past, colour }];
     });
   }
 
   /** Paint the thin things of one list: faces one by one, consecutive lines of one color in one stroke. */
-  _paintThings(things, colours) {
-    const { context, painter } = this;
-    for (let k = 0; k < things.length; ) {
-      const thing = things[k];
-      if (!thing.points) {
-        k += 1;
-        if (thing.sight) paintSight(painter, thing.sight, thing.style);
-        else if (thing.line) paintBodyAxis(painter, thing, colours.ink);
-        else if (thing.mark) paintMark(painter, thing, colours);
-        else {
-          painter.begin();
-          painter.polygon(thing.corners);
-          painter.fill(thing.colour);
-          painter.stroke(thing.colour, 0.7); // closes the seams between faces
-        }
-        continue;
+  _paintThings(things) {
+    const { painter } = this;
+    let lines = [];
+    things.forEach((thing, k) => {
+      const { points, sight, line, mark, corners, colour, past, style } = thing;
+      if (sight) paintSight(painter, sight, style);
+      else if (line) paintBodyAxis(painter, thing);
+      else if (mark) paintMark(painter, thing);
+      else if (corners) {
+        painter.begin();
+        painter.polygon(corners);
+        painter.fill(colour);
+        painter.stroke(colour, 0.7); // closes the seams between faces
+      } else {
+        lines.push(points);
+        const next = things[k + 1];
+        if (next?.points && next.colour === colour && next.past === past) return;
+        if (past) painter.strokeLines(lines, COLOURS.halo, 6);
+        painter.strokeLines(lines, colour, past ? 3 : 1);
+        lines = [];
       }
-      context.beginPath();
-      const goesOn = (next) => next?.points && next.colour === thing.colour && next.past === thing.past;
-      for (; goesOn(things[k]); k++) {
-        const { points } = things[k];
-        context.moveTo(points[0], points[1]);
-        for (let i = 2; i < points.length; i += 2) context.lineTo(points[i], points[i + 1]);
-      }
-      if (thing.past) painter.stroke(colours.halo, 6);
-      painter.stroke(thing.colour, thing.past ? 3 : 1);
-    }
+    });
   }
 
   _note(t, poses, entries) {
     const runs = this.runs.map((run, r) => {
-      const colours = run.header.regions.map((region, i) => {
-        const entry = entries.find(({ owners }) => owners.some(([a, b]) => a === r && b === i));
-        return entry ? entry.colour : null;
-      });
+      const colours = run.header.regions.map((_, i) =>
+        entries.find(({ owners }) => owners.some(([a, b]) => a === r && b === i))?.colour ?? null);
       const { position = null, quaternion = null } = poses[r] ?? {};
       return { position, quaternion, active: run.active(t), current: run.current(t), colours };
     });
@@ -329,7 +285,7 @@ class Scene {
 
 /** Return the pose of a run's vehicle with its radius [m]; null if it is not finite or there are no rows. */
 function poseOf(run, t) {
-  if (!run.rows) return null;
-  const pose = run.pose(t);
-  return Vec.finite(pose.position) && Vec.finite(pose.quaternion) ? { ...pose, size: run.header.vehicle.radius } : null;
+  const pose = run.rows && run.pose(t);
+  const finite = pose && Vec.finite([...pose.position, ...pose.quaternion]);
+  return finite ? { ...pose, size: run.header.vehicle.radius } : null;
 }

@@ -2,22 +2,19 @@
 
 /** Return the closed boundary lines [north, east] of a surface's upward faces, which hide what lies below. */
 function shadowsOf({ points, faces, normals }) {
-  const up = faces.map((_, i) => normals[3 * i + 2] < -1e-9);
   const onward = new Map(); // boundary edges: those of upward faces whose other face is not upward
-  faces.forEach((face, i) => {
-    if (!up[i]) return;
+  for (const face of faces.filter((_, i) => normals[i][2] < -1e-9)) {
     face.forEach((a, k) => {
       const b = face[(k + 1) % face.length];
-      if (onward.get(b)?.delete(a)) return;
-      onward.set(a, (onward.get(a) ?? new Set()).add(b));
+      if (!onward.get(b)?.delete(a)) onward.set(a, (onward.get(a) ?? new Set()).add(b));
     });
-  });
+  }
   const lines = [];
   for (const [start, next] of onward) {
     while (next.size) {
       const line = [];
       for (let a = start; onward.get(a)?.size; ) {
-        line.push([points[3 * a], points[3 * a + 1]]);
+        line.push(points[a].slice(0, 2));
         const [b] = onward.get(a);
         onward.get(a).delete(b);
         a = b;
@@ -40,48 +37,41 @@ function ellipseFromAbove(centre, axes) {
   });
 }
 
-/** Return a shifted outline on the floor, clipped to the bounds. */
-function onFloor(outline, shift, [low, high]) {
-  let polygon = outline.map(([n, e]) => [n + shift[0], e + shift[1], high[2]]);
-  for (let axis = 0; axis < 2; axis++) {
-    polygon = cutPolygon(polygon, (p) => p[axis] - low[axis]);
-    polygon = cutPolygon(polygon, (p) => high[axis] - p[axis]);
-  }
-  return polygon;
-}
-
-/** Paint the shadows of surfaces; keep-inside regions as outlines only. */
-function paintShadows(painter, entries, bounds, colours) {
-  const add = ({ solid, shift }) => {
-    for (const outline of solid.shadows) painter.polygon(onFloor(outline, shift, bounds));
+/** Paint the shadows of surfaces, clipped to the bounds; keep-inside regions as outlines only. */
+function paintShadows(painter, entries, bounds) {
+  const floor = bounds[1][2];
+  const trace = (filled) => {
+    painter.begin();
+    for (const { solid, shift } of entries.filter(({ solid, style }) => solid && style.filled === filled)) {
+      for (const outline of solid.shadows) {
+        const below = outline.map(([n, e]) => [n + shift[0], e + shift[1], floor]);
+        painter.polygon(cutToBox(below, bounds, [0, 1]));
+      }
+    }
   };
-  const surfaces = entries.filter((entry) => entry.solid);
-  painter.begin();
-  surfaces.filter((entry) => entry.style.filled).forEach(add);
-  painter.fill(colours.shadow);
-  painter.begin();
-  surfaces.filter((entry) => !entry.style.filled).forEach(add);
-  painter.stroke(colours.soft, 1, 0.5, [4, 4]);
+  trace(true);
+  painter.fill(COLOURS.shadow);
+  trace(false);
+  painter.stroke(COLOURS.soft, 1, 0.5, [4, 4]);
 }
 
 /** Paint the shadow of a vehicle, and the plumb line to it. */
-function paintPlumb(painter, { pose, size }, floor, colours) {
-  const [n, e] = pose.position;
-  const foot = [n, e, floor];
+function paintPlumb(painter, { pose: { position }, size }, floor) {
+  const foot = [position[0], position[1], floor];
   painter.begin();
-  painter.segment(pose.position, foot);
-  painter.stroke(colours.soft, 1, 0.9, [3, 3]);
+  painter.segment(position, foot);
+  painter.stroke(COLOURS.soft, 1, 0.9, [3, 3]);
   painter.begin();
-  painter.polygon(rimOf(foot, [0, 0, 1], 0.5 * Math.PI, size));
-  painter.fill(colours.shadow);
-  painter.stroke(colours.soft, 1, 0.6);
+  painter.polygon(Vec.circle(foot, [0, 0, 1], size, 36));
+  painter.fill(COLOURS.shadow);
+  painter.stroke(COLOURS.soft, 1, 0.6);
 }
 
 /** Paint the shadow of the past path, through the first points of its chunks. */
-function paintWayBelow(painter, chunks, floor, colours) {
+function paintWayBelow(painter, chunks, floor) {
   painter.begin();
   for (const { middle, past, next } of chunks) {
     if (past && next) painter.segment([middle[0], middle[1], floor], [next.middle[0], next.middle[1], floor]);
   }
-  painter.stroke(colours.shadow, 2.5);
+  painter.stroke(COLOURS.shadow, 2.5);
 }

@@ -1,44 +1,24 @@
 // Scrubber: a ribbon of the active regions, marks of events, and the cursor.
 
-const REACHED = "goal reached";
-
 /** Return the events of a run as marks; without events in the header, the goal of the summary. */
-function marksOf(run) {
-  const { events, summary } = run.header;
-  if (events) return events;
-  const marks = [];
-  if (Number.isFinite(summary?.reach_time)) marks.push({ time: summary.reach_time, kind: "goal", text: REACHED });
-  return marks;
-}
-
-/** Paint two oblique cuts through the ribbon, after which time is compressed. */
-function paintGap(context, x, height) {
-  context.strokeStyle = pageColours().card;
-  context.lineWidth = 2.5;
-  context.beginPath();
-  for (const aside of [-3, 3]) {
-    context.moveTo(x + aside - 3, height);
-    context.lineTo(x + aside + 3, 0);
-  }
-  context.stroke();
+function marksOf({ header: { events, summary } }) {
+  const time = summary?.reach_time;
+  return events ?? (Number.isFinite(time) ? [{ time, kind: "goal", text: "goal reached" }] : []);
 }
 
 /** Scrubber of the selected run. */
 class Timeline {
   constructor(player) {
     this.player = player;
-    this.input = document.getElementById("scrubber");
-    this.canvas = document.getElementById("ribbon");
-    this.marks = document.getElementById("marks");
-    this.clock = document.getElementById("clock");
+    this.input = byId("scrubber");
+    this.canvas = byId("ribbon");
     this.axis = new TimeAxis([0, 1], null, 0, 1);
-    this.input.addEventListener("input", () => player.seek(this.axis.time(Number(this.input.value))));
+    this.input.oninput = () => player.seek(this.axis.time(Number(this.input.value)));
     new ResizeObserver(() => this.paint()).observe(this.canvas);
   }
 
-  setRun(run, theme) {
+  setRun(run) {
     this.run = run;
-    this.theme = theme;
     this.grown();
   }
 
@@ -46,7 +26,12 @@ class Timeline {
   grown() {
     const { start, end, rest } = this.player;
     this.axis = new TimeAxis([start, Math.max(end, start + 1e-9)], rest, 0, 1); // positions from 0 to 1
-    this._marks();
+    const marks = (this.run ? marksOf(this.run) : []).slice(0, 200).map(({ time, kind, text }) => {
+      // keyboard users have keys and the list of events
+      const props = { title: `${clock(time)}: ${text}`, onclick: () => this.player.seek(time) };
+      return h(`span.mark-at.${kind}`, { ...props, style: `left: ${100 * this.axis.x(time)}%` });
+    });
+    byId("marks").replaceChildren(...marks);
     this.paint();
     this.point();
   }
@@ -54,64 +39,38 @@ class Timeline {
   /** Move the cursor. */
   point() {
     const { t, end, playing, live } = this.player;
-    const part = Math.min(1, Math.max(0, this.axis.x(t))); // the axis of a live run is a little behind its cursor
+    const part = clamp(this.axis.x(t), 0, 1); // the axis of a live run is a little behind its cursor
     this.input.value = part;
-    setText(this.clock, `${clock(t)} / ${clock(end, 1)}`);
-    // screen readers announce it only when the cursor rests
-    if (!playing && !live) this.input.setAttribute("aria-valuetext", this.run ? `${clock(t)}, ${activeWords(this.run, t).name} active` : clock(t));
     this.input.parentElement.style.setProperty("--part", part.toFixed(5));
+    setText(byId("clock"), `${clock(t)} / ${clock(end, 1)}`);
+    // screen readers announce it only when the cursor rests
+    const who = this.run ? `, ${activeWords(this.run, t).name} active` : "";
+    if (!playing && !live) this.input.ariaValueText = clock(t) + who;
   }
 
   /** Paint the ribbon: the color of the active region in full height, violations as notches below. */
   paint() {
-    const { clientWidth: width, clientHeight: height } = this.canvas;
-    if (!width || !height) return;
-    const dots = window.devicePixelRatio || 1;
-    this.canvas.width = Math.round(width * dots);
-    this.canvas.height = Math.round(height * dots);
-    const context = this.canvas.getContext("2d");
-    context.scale(dots, dots);
-    const x = (t) => this.axis.x(t) * width;
-    context.fillStyle = pageColours().grid;
+    const { context, width, height } = clearedCanvas(this.canvas);
+    context.fillStyle = COLOURS.grid;
     context.fillRect(0, 0, width, height);
     const active = this.run?.column("active");
     if (!active || this.run.rows < 2) return;
-    const { time, rows, header } = this.run;
-    let from = 0;
-    for (let i = 1; i <= rows; i++) {
-      if (i < rows && active[i] === active[from]) continue;
-      const region = header.regions[active[from]];
-      if (region) {
-        context.fillStyle = region.colour;
-        context.globalAlpha = region.criterion ? 1 : 0.45;
-        const left = x(time[from]);
-        context.fillRect(left, 0, Math.max(1, x(time[Math.min(i, rows - 1)]) - left), height);
-      }
-      from = i;
+    const { time, header } = this.run;
+    const x = (t) => this.axis.x(t) * width;
+    const bar = (from, to, top, least) =>
+      context.fillRect(x(from), top, Math.max(least, x(to) - x(from)), height - top);
+    for (const { from, until, value } of stretches(active)) {
+      const { colour, criterion } = header.regions[value] ?? { colour: COLOURS.grid };
+      Object.assign(context, { fillStyle: colour, globalAlpha: criterion ? 1 : 0.45 });
+      bar(time[from], time[until], 0, 1);
     }
-    context.globalAlpha = 1;
-    context.fillStyle = pageColours().ink;
-    for (const region of header.regions.filter((one) => one.criterion)) {
-      for (const [first, last] of below(this.run, `${region.name}.clearance`)) {
-        context.fillRect(x(first), height - 4, Math.max(2, x(last) - x(first)), 4);
-      }
+    Object.assign(context, { fillStyle: COLOURS.ink, globalAlpha: 1, strokeStyle: COLOURS.card, lineWidth: 2.5 });
+    for (const { name } of header.regions.filter(({ criterion }) => criterion)) {
+      for (const [from, until] of below(this.run, `${name}.clearance`)) bar(from, until, height - 4, 2);
     }
-    if (this.axis.broken) paintGap(context, x(this.axis.rest), height);
-  }
-
-  _marks() {
-    const marks = this.run ? marksOf(this.run) : [];
-    const key = JSON.stringify([this.axis.time(0), this.axis.time(1), marks]);
-    if (key === this._key) return;
-    this._key = key;
-    this.marks.replaceChildren(
-      ...marks.slice(0, 200).map(({ time, kind, text }) => {
-        const mark = element("span", `mark-at ${kind}`);
-        mark.style.left = `${100 * this.axis.x(time)}%`;
-        mark.title = `${clock(time)}: ${text}`;
-        mark.addEventListener("click", () => this.player.seek(time)); // keyboard users have keys and the list of events
-        return mark;
-      }),
-    );
+    if (!this.axis.broken) return;
+    const at = x(this.axis.rest); // after these cuts, time is compressed
+    beginLines(context, ...[at - 3, at + 3].map((cut) => [[cut - 3, height], [cut + 3, 0]]));
+    context.stroke();
   }
 }

@@ -1,177 +1,143 @@
 // Fields over the scene for the numbers that a reader may change, also by keyboard or without a position.
 
+const WHAT_IF_HINT =
+  "Drag the goal or a region in the scene (Shift: up and down), or change a number: the run is flown again.";
+
 /** Panel of the fields and buttons of a `WhatIf`. */
-class WhatIfPanel {
+class WhatIfPanel extends FieldPanel {
   /** @param {WhatIf} whatIf */
   constructor(whatIf) {
+    super(whatIf.page, "What if");
     this.whatIf = whatIf;
     this.slots = whatIf.flight.slots;
     this._fields = []; // each with a function that returns its current text
-    this.holder = element("details", "commands");
-    this.holder.id = "commands";
-    this.holder.open = matchMedia("(min-width: 960px)").matches;
-    this.state = element("span", "note");
-    const summary = element("summary", "", "What if ");
-    summary.append(this.state);
-    this.body = element("div", "command-body");
-    const hint = "Drag the goal or a region in the scene (Shift: up and down), or change a number: the run is flown again.";
-    this.body.append(this._buttons(), element("p", "hint", hint), this._water(), this._noise(), this._thruster(), this._gain(), this._places());
-    this.holder.append(summary, this.body);
-    document.getElementById("stage").append(this.holder);
-    whatIf.page.stage.coveredBy(this.holder);
+    const reset = { title: "Back to the run as it was recorded (R)", onclick: () => whatIf.reset() };
+    const save = { title: "A file that “cosim run” repeats (S)", onclick: () => saveScenario(whatIf) };
+    this.resetting = h("button", reset, "Reset");
+    const buttons = h("div.command-buttons.of-two", {}, this.resetting, h("button", save, "Save scenario"));
+    const water = h("div.command-list", {}, ...this._water());
+    const sets = [water, ...this._noise(), ...this._thruster(), ...this._gain(), this._places()];
+    this.body.append(buttons, h("p.hint", {}, WHAT_IF_HINT), ...sets);
     this.update();
   }
 
-  say(text) {
-    setText(this.state, text);
-  }
+  say(text) { setText(this.state, text); }
 
   /** Write the current numbers into all fields except an input field with the focus. */
   update() {
     for (const { field, now } of this._fields) {
-      if (field === document.activeElement && field.tagName === "INPUT") continue;
       const text = now();
-      if (field.value !== text) field.value = text;
+      if (field !== document.activeElement || field.tagName === "SELECT") field.value = text;
     }
     this.resetting.disabled = !this.whatIf.changed;
   }
 
-  _buttons() {
-    const group = element("div", "command-buttons of-two");
-    this.resetting = pressable("", "Reset", "Back to the run as it was recorded (R)", () => this.whatIf.reset());
-    group.append(this.resetting, pressable("", "Save scenario", "A file that “cosim run” repeats (S)", () => saveScenario(this.whatIf)));
-    return group;
-  }
-
-  /** Add a number field to a set of fields and return it. */
-  _number(set, label, said, step, now, changed) {
-    const [holder, field] = numberField(label, said, step);
-    field.addEventListener("input", () => {
+  /** Return the label of a number field; `now` returns its number, `changed` gets a new one. */
+  _number(text, ariaLabel, step, now, changed, props = {}) {
+    const oninput = () => {
       if (Number.isFinite(field.valueAsNumber)) changed(field.valueAsNumber);
-    });
-    field.addEventListener("blur", () => this.update());
-    set.append(holder);
-    this._fields.push({ field, now });
-    return field;
+    };
+    const [label, field] = numberField(text, ariaLabel, step, { oninput, onblur: () => this.update(), ...props });
+    this._fields.push({ field, now: () => shortNumber(now()) });
+    return label;
   }
 
-  _ofKey(set, label, said, step, key) {
-    const least = key.startsWith("plant.current") || key.includes("centre") ? null : 0;
-    const field = this._number(set, label, said, step, () => shortNumber(this.whatIf.value(key)), (value) => this.whatIf.set(key, value));
-    if (least !== null) field.min = String(least);
+  _ofKey(text, ariaLabel, step, key, props) {
+    const { whatIf } = this;
+    return this._number(text, ariaLabel, step, () => whatIf.value(key), (value) => whatIf.set(key, value), props);
   }
 
-  _set(title) {
-    const set = element("fieldset");
-    set.append(element("legend", "", title));
+  /** Return a selection of [value, text] options. */
+  _choice(ariaLabel, options, now, onchange) {
+    const choice = h("select", { ariaLabel, onchange }, ...options.map(([value, text]) => new Option(text, value)));
+    this._fields.push({ field: choice, now });
+    return choice;
+  }
+
+  _pair(title, ...fields) {
+    const set = fieldSet(title, ...fields);
+    set.classList.add("of-two");
     return set;
   }
 
   _water() {
-    const both = element("div", "command-list");
-    const current = this._set("Current, m/s");
-    ["N", "E", "D"].forEach((letter, axis) => this._ofKey(current, letter, `current ${["north", "east", "down"][axis]} in metres a second`, 0.05, `plant.current.${axis}`));
-    both.append(current);
-    const { key, weight } = this.whatIf.flight.data.restoring;
-    if (!this.slots.has(key)) return both;
-    const set = this._set("Weight less buoyancy, N");
-    set.classList.add("of-two");
-    const now = () => shortNumber(weight - this.whatIf.value(key));
-    this._number(set, "W−B", "weight less buoyancy in newtons", 0.5, now, (value) => this.whatIf.set(key, Number((weight - value).toFixed(4))));
-    both.append(set);
-    return both;
+    const { whatIf } = this;
+    const current = DIRECTIONS.map(([letter, direction], axis) =>
+      this._ofKey(letter, `current ${direction} in metres a second`, 0.05, `plant.current.${axis}`));
+    const { key, weight } = whatIf.flight.data.restoring;
+    const sets = [fieldSet("Current, m/s", ...current)];
+    if (!this.slots.has(key)) return sets;
+    const now = () => weight - whatIf.value(key);
+    const changed = (value) => whatIf.set(key, Number((weight - value).toFixed(4)));
+    const field = this._number("W−B", "weight less buoyancy in newtons", 0.5, now, changed);
+    return [...sets, this._pair("Weight less buoyancy, N", field)];
   }
 
   _noise() {
-    const set = this._set("Noise of what is measured");
-    const keys = ["sensing.position_noise", "sensing.velocity_noise"];
-    set.hidden = !keys.every((key) => this.slots.has(key));
-    set.classList.add("of-two");
-    if (!set.hidden) keys.forEach((key, i) => this._ofKey(set, ["m", "m/s"][i], this.slots.get(key).words, [0.005, 0.005][i], key));
-    return set;
+    const keys = [["m", "sensing.position_noise"], ["m/s", "sensing.velocity_noise"]];
+    if (!keys.every(([, key]) => this.slots.has(key))) return [];
+    const fields = keys.map(([unit, key]) => this._ofKey(unit, this.slots.get(key).words, 0.005, key, { min: 0 }));
+    return [this._pair("Noise of what is measured", ...fields)];
   }
 
   _thruster() {
     const { whatIf } = this;
-    const set = this._set("Thruster that fails");
     const { failures } = whatIf.flight.data;
-    set.hidden = !failures;
-    if (!failures) return set;
-    set.classList.add("of-two");
+    if (!failures) return [];
     let time = Number((0.25 * whatIf.recorded.end).toFixed(1));
-    const choice = element("select");
-    choice.setAttribute("aria-label", "thruster that fails");
-    choice.append(new Option("none", "0"), ...failures.limits[0].map((_, i) => new Option(`thruster ${i + 1}`, String(i + 1))));
     const apply = () => whatIf.fail(choice.value === "0" ? null : { thruster: Number(choice.value), time });
-    choice.addEventListener("change", apply);
-    set.append(choice);
-    this._fields.push({ field: choice, now: () => String(whatIf.failure?.thruster ?? 0) });
-    this._number(set, "at s", "time at which it fails, in seconds", 0.5, () => String(time), (value) => {
-      time = Math.min(Math.max(0, value), whatIf.recorded.header.duration);
+    const options = failures.limits[0].map((_, i) => [i + 1, `thruster ${i + 1}`]);
+    const now = () => whatIf.failure?.thruster ?? 0;
+    const choice = this._choice("thruster that fails", [[0, "none"], ...options], now, apply);
+    const changed = (value) => {
+      time = clamp(value, 0, whatIf.recorded.header.duration);
       if (whatIf.failure) apply();
-    }).min = "0";
-    return set;
+    };
+    const field = this._number("at s", "time at which it fails, in seconds", 0.5, () => time, changed, { min: 0 });
+    return [this._pair("Thruster that fails", choice, field)];
   }
 
   _gain() {
     const { whatIf } = this;
-    const set = this._set("Gain of the law");
     const keys = [...this.slots.keys()].filter((key) => key.startsWith("law.gains."));
-    set.hidden = !keys.length;
-    if (!keys.length) return set;
-    set.classList.add("of-two");
-    const choice = element("select");
-    choice.setAttribute("aria-label", "gain");
-    const options = keys.map((key) => new Option("", key));
-    choice.append(...options);
-    choice.addEventListener("change", () => this.update());
-    set.append(choice);
-    const names = () => options.forEach((option, i) => setText(option, `${whatIf.values.has(keys[i]) ? "• " : ""}${keys[i].slice(10).replaceAll("_", " ")}`));
-    const now = () => {
-      names();
-      return shortNumber(whatIf.value(choice.value));
-    };
-    this._number(set, "", "value of the gain", "any", now, (value) => whatIf.set(choice.value, value));
-    return set;
+    if (!keys.length) return [];
+    const name = (key) => (whatIf.values.has(key) ? "• " : "") + key.slice(10).replaceAll("_", " ");
+    const choice = this._choice("gain", keys.map((key) => [key, ""]), () => {
+      for (const option of choice.options) setText(option, name(option.value));
+      return choice.value;
+    }, () => this.update());
+    const now = () => whatIf.value(choice.value);
+    const changed = (value) => whatIf.set(choice.value, value);
+    return [this._pair("Gain of the law", choice, this._number("", "value of the gain", "any", now, changed))];
   }
 
   _places() {
     const { whatIf } = this;
-    const list = element("div", "command-list");
-    list.append(element("p", "hint", "Places in metres:"));
     const { regions } = whatIf.recorded.header;
-    for (const { region, place, name, axes } of whatIf.movable()) {
-      const set = this._set(name);
-      axes.forEach((keys, axis) => {
-        if (!keys.length) return;
-        const now = () => placeOf(whatIf.run, region, whatIf.run.start, place)?.[axis] ?? whatIf.value(keys[0]);
-        const said = `${name}, ${["north", "east", "down"][axis]} in metres`;
-        this._number(set, ["N", "E", "D"][axis], said, 0.1, () => shortNumber(now()), (value) => {
-          const from = [0, 0, 0].map((_, i) => (i === axis ? now() : 0));
-          whatIf.move(region, from, from.map((x, i) => (i === axis ? value : x)), place);
-        });
+    const sets = whatIf.movable().map(({ region, place, name, axes }) => {
+      const values = () => axes.map(([key]) => whatIf.value(key));
+      const handle = () => placeOf(whatIf.run, region, whatIf.run.start, place) ?? values();
+      const fields = [...axes.keys()].filter((axis) => axes[axis].length).map((axis) => {
+        const [letter, direction] = DIRECTIONS[axis];
+        const changed = (value) => whatIf.move(region, handle(), handle().with(axis, value), place);
+        return this._number(letter, `${name}, ${direction} in metres`, 0.1, () => handle()[axis], changed);
       });
-      list.append(set);
-    }
+      return fieldSet(name, ...fields);
+    });
     const fixed = regions.filter((_, region) => !whatIf.canMove(region));
-    if (fixed.length) list.append(element("p", "hint", wordsOfFixed(fixed)));
-    return list;
+    if (fixed.length) sets.push(h("p.hint", {}, wordsOfFixed(fixed)));
+    return h("div.command-list", {}, h("p.hint", {}, "Places in metres:"), ...sets);
   }
 }
 
 /** Return a text that explains why some regions cannot be moved here. */
 function wordsOfFixed(regions) {
-  const named = (those) => those.map(({ name }) => name).join(", ");
   const isTurned = ({ shape }) => shape.kind in SIGHTS && !shape.feature;
-  const [turned, placed] = [regions.filter(isTurned), regions.filter((region) => !isTurned(region))];
+  const [turned, placed] = [true, false].map((is) =>
+    regions.filter((region) => isTurned(region) === is).map(({ name }) => name).join(", "));
   return [
-    turned.length ? `Attitude alone, without a place: ${named(turned)}.` : "",
-    placed.length ? `Not moved in this page, as the law is given other numbers than the scenario: ${named(placed)}.` : "",
+    turned && `Attitude alone, without a place: ${turned}.`,
+    placed && `Not moved in this page, as the law is given other numbers than the scenario: ${placed}.`,
     "Change these in the saved scenario.",
   ].filter(Boolean).join(" ");
-}
-
-/** Format a number with at most four decimals for an input field, which is empty without one. */
-function shortNumber(x) {
-  return Number.isFinite(x) ? String(Number(x.toFixed(4))) : "";
 }

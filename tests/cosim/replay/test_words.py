@@ -10,7 +10,7 @@ from cosim.results.wording import format_force, format_number, verdict
 from tests.cosim.replay.test_solids import ASSETS, pytestmark, run  # noqa: F401
 
 NOT_SHOWN = re.compile(r"NaN|Infinity|undefined|null|\bnan\b|\binf\b")
-SCRIPTS = ("vectors.js", "data.js", "words.js", "axes.js", "floor.js", "outcome.js", "what_if_panel.js")
+SCRIPTS = ("vectors.js", "data.js", "words.js", "axes.js", "floor.js", "outcome.js")
 EACH = """
 const numbers = [NaN, Infinity, -Infinity, null, undefined, -0, -0.00004, 0.5, 12345.678, -99.99];
 const formats = {
