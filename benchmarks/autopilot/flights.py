@@ -22,19 +22,19 @@ from typing import Any
 from benchmarks.autopilot.judgement import Flown, judge
 from benchmarks.autopilot.scenes import random_scene
 from benchmarks.autopilot.simulated_link import FAULTS, SimulatedLink
-from cosim.companion.companion import Companion
+from cosim.companion.companion_options import CompanionOptions
+from cosim.companion.companion_run import Companion
 from cosim.companion.frame_alignment import SceneOrigin
-from cosim.companion.options import CompanionOptions
 from cosim.errors import CosimError, RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GROUND_STATION, GroundLink
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.scenario.scenario import Scenario, load_scenario
-from cosim.sitl.autopilot_link import AutopilotLink, DvlOptions
-from cosim.sitl.flights import FlightOptions, Flights
+from cosim.sitl.json_server import JsonServer
 from cosim.sitl.law import law_of_pwm
-from cosim.sitl.server import JsonServer
+from cosim.sitl.sitl_link import AutopilotLink, DvlOptions
+from cosim.sitl.sitl_session import FlightOptions, Flights
 
 _RANDOM = "random-"  # prefix of random scenes, before the seed
 RATE = 400  # Hz, rate of the autopilot's frames, that of its main loop

@@ -47,12 +47,12 @@ def _ground_link(options: argparse.Namespace) -> Any:
     from cosim.errors import TelemetryError
     from cosim.mavlink.wire.endpoint import parse_endpoint
     from cosim.mavlink.wire.ground_end import GroundLink
-    from cosim.mavlink.wire.signing import read_key
+    from cosim.mavlink.wire.signing import load_key
 
     endpoint = parse_endpoint(options.endpoint, options.allow_remote)
     if endpoint.kind == "tlog":
         raise TelemetryError(f"endpoint {options.endpoint!r}: expected a network or a serial device, not a file")
-    return GroundLink(endpoint, read_key(options.signing_key) if options.signing_key else None)
+    return GroundLink(endpoint, load_key(options.signing_key) if options.signing_key else None)
 
 
 # ---- listen --------------------------------------------------------------------------------------------------------

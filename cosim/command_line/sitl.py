@@ -14,7 +14,7 @@ from cosim.io.network_address import resolve_host
 
 if TYPE_CHECKING:
     from cosim.results.run_result import Run
-    from cosim.sitl.autopilot_link import AutopilotLink
+    from cosim.sitl.sitl_link import AutopilotLink
 
 _PORTS = {"ardupilot": 9002, "px4": 4560}  # ports at which an autopilot expects its simulator: UDP, TCP
 
@@ -75,10 +75,10 @@ def add_verbs(verbs: Any) -> None:
 
 def sitl(options: argparse.Namespace) -> int:
     """Run ``cosim sitl``."""
-    from cosim.sitl.flights import FlightOptions, Flights
-    from cosim.sitl.hil import HilServer
+    from cosim.sitl.hil_server import HilServer
+    from cosim.sitl.json_server import JsonServer
     from cosim.sitl.law import law_of_controls, law_of_pwm
-    from cosim.sitl.server import JsonServer
+    from cosim.sitl.sitl_session import FlightOptions, Flights
 
     _check(options)
     address = _address(options.host, options.port or _PORTS[options.backend], options.allow_remote)
@@ -121,7 +121,7 @@ def _check(options: argparse.Namespace) -> None:
 def _autopilot_link(options: argparse.Namespace) -> AutopilotLink | None:
     """Open the link to a port of the autopilot, None if none is given."""
     from cosim.mavlink.wire.endpoint import parse_endpoint
-    from cosim.sitl.autopilot_link import AutopilotLink, DvlOptions
+    from cosim.sitl.sitl_link import AutopilotLink, DvlOptions
 
     if options.autopilot is None:
         return None

@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.companion.safety import CONDITIONS, STATES
 from cosim.companion.session import AutopilotSession
-from cosim.mavlink.vehicle.layout import euler_of
+from cosim.mavlink.vehicle.row_layout import euler_of
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 from cosim.simulation.stepped_plant import vehicle_channels

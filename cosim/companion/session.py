@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from cosim.companion.autopilot_link import AutopilotLink
 from cosim.companion.clock_sync import timesync
+from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment
 from cosim.companion.heading import HeadingWatch, LevelDive
-from cosim.companion.link import AutopilotLink
-from cosim.companion.options import CompanionOptions
 from cosim.companion.outputs import Output, steered_in, uses_sticks
 from cosim.companion.safety import GAIN_OFF, Observation, State, Supervisor
 from cosim.companion.vehicle_state import RATES, ReportedState

@@ -10,8 +10,8 @@ import numpy as np
 
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.vehicle_state import ReportedState
-from cosim.mavlink.vehicle.layout import euler_of
-from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, with_thrust_body
+from cosim.mavlink.vehicle.row_layout import euler_of
+from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, make_attitude_target
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
@@ -245,4 +245,4 @@ def attitude_target(mavlink: Any, system: int, attitude: Array, force: Array | N
     if force is None:
         return mavlink.MAVLink_set_attitude_target_message(*fields)
     ahead, right, down = force.tolist()
-    return with_thrust_body(mavlink, *fields, thrust_body=(ahead, right, down))
+    return make_attitude_target(mavlink, *fields, thrust_body=(ahead, right, down))

@@ -10,8 +10,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from cosim.mavlink.vehicle.profile import Profile
-from cosim.mavlink.vehicle.sticks import (
+from cosim.mavlink.vehicle.ardusub_sticks import (
     CLIMB_DEAD_ZONE,
     LEAN,
     LEAN_DEAD_ZONE,
@@ -19,6 +18,7 @@ from cosim.mavlink.vehicle.sticks import (
     MotorMixer,
     deflection_of,
 )
+from cosim.mavlink.vehicle.profile import Profile
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.stick_stabilizer import YAW_RATE
 from cosim.simulation.signals import Array

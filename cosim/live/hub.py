@@ -15,7 +15,7 @@ from controller.regions.shape import Shape
 from cosim.errors import CommandError
 from cosim.live.command_desk import CommandDesk
 from cosim.live.history import History
-from cosim.live.messages import bytes_of, text_of
+from cosim.live.viewer_messages import bytes_of, text_of
 from cosim.replay.command_words import command_words
 from cosim.replay.header import header_of, limits_of, shape_of
 from cosim.replay.view_columns import ViewColumns

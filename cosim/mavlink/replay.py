@@ -9,7 +9,7 @@ from pathlib import Path
 
 from cosim.errors import RunError
 from cosim.mavlink.autopilot import Autopilot
-from cosim.mavlink.setup import max_lead
+from cosim.mavlink.run_links import max_lead
 from cosim.mavlink.thread import SNAPSHOT_PERIOD, SNAPSHOTS, LinkThread
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
@@ -86,7 +86,7 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
             time.sleep(_WAITING)
     finally:
         thread.close()
-    return Replayed(simulated, time.perf_counter() - started, thread.troubles())
+    return Replayed(simulated, time.perf_counter() - started, thread.loss_reports())
 
 
 def _rows(record: Record, every: int, names: Sequence[str]) -> Iterator[tuple[int, Array]]:

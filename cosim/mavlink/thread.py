@@ -15,7 +15,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-from cosim.mavlink.channels.tlog import Tlog
+from cosim.mavlink.channels.tlog_file import Tlog
 from cosim.mavlink.wire.link import Link
 from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.simulation.signals import Array
@@ -88,7 +88,7 @@ class LinkThread:
         self._vehicle, self._links = vehicle, list(links)
         self._logs = [link.channel for link in links if isinstance(link.channel, Tlog)]
         for tlog in self._logs:
-            tlog.begin_earlier(ahead)
+            tlog.advance_start(ahead)
         for link in links:
             link.logs = [other for other in links if other is not link and isinstance(other.channel, Tlog)]
         self._every = max(1, round(SNAPSHOT_PERIOD / step))
@@ -132,15 +132,15 @@ class LinkThread:
                 return
         else:
             self._close_links()
-        troubles = self.troubles()
+        troubles = self.loss_reports()
         if troubles:
             log.warning("MAVLink: %s", "; ".join(troubles))
 
-    def troubles(self) -> list[str]:
+    def loss_reports(self) -> list[str]:
         """Return a text for each kind of loss or refusal, with its count."""
         found = [f"{self.dropped} snapshots dropped"] if self.dropped else []
         found += [f"{n} times {what}" for what, n in self.failures.items()]
-        return found + [f"{link.name}: {', '.join(link.troubles())}" for link in self._links if link.troubles()]
+        return found + [f"{link.name}: {', '.join(link.loss_reports())}" for link in self._links if link.loss_reports()]
 
     # ---- in the thread ----
 
@@ -151,7 +151,7 @@ class LinkThread:
             time.sleep(self._run_slice())  # not an event, which releases the interpreter lock several times
         deadline = time.perf_counter() + _DRAINING
         while self._send_queued(time.perf_counter() + _SENDING) and time.perf_counter() < deadline:
-            self._tend(time.monotonic())
+            self._poll(time.monotonic())
         self.dropped += len(self._queue)
         self._guard("close", self._vehicle.close, time.monotonic())
         self._close_links()
@@ -167,7 +167,7 @@ class LinkThread:
         if now >= self._next_tick:
             self._next_tick = now + _SOON
             self._guard("tick", self._vehicle.tick, now)
-        self._tend(now)
+        self._poll(now)
         sent = time.perf_counter()
         rest = max(_REST_RECEIVING * (received - began), _REST_SENDING * (sent - received))
         rest = min(rest, _LONGEST_REST)
@@ -179,9 +179,9 @@ class LinkThread:
         self._shown, self._looked = 0, began
         return max(rest, _RUSHING if rushing else _PERIOD)
 
-    def _tend(self, now: float) -> None:
+    def _poll(self, now: float) -> None:
         for link in self._links:
-            self._guard("tend", link.channel.tend, now)
+            self._guard("poll", link.channel.poll, now)
 
     def _receive(self, link: Link, until: float) -> None:
         for frame, message in link.receive(until):

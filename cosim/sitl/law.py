@@ -12,7 +12,7 @@ from controller.law import Diagnostic, Output
 from controller.regions.region_set import PackedRegions
 from cosim.errors import RunError
 from cosim.simulation.signals import Array
-from cosim.sitl.autopilot_link import ESTIMATE, AutopilotLink
+from cosim.sitl.sitl_link import ESTIMATE, AutopilotLink
 from plant_fmu import Vehicle
 from plant_fmu.autopilot import Curve, effort_of_pulse
 

@@ -19,9 +19,9 @@ from cosim.run.run_folder import claim
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.commands import ManualControl, SetTarget
 from cosim.simulation.commands.sources import ScheduledCommands, read_log
-from cosim.sitl.flight import Flight
+from cosim.sitl.sitl_flight import Flight
 from cosim.sitl.law import law_of_pwm
-from cosim.sitl.scenario import scenario_to_fly
+from cosim.sitl.sitl_scenario import scenario_to_fly
 from tests.faults import FAIL_ON, FAIL_ONCE, arm, call_with_faults, count, needs_faults
 
 ROOM = 4096  # bytes: for the scenario, and no record

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from cosim.mavlink.listening.watch import printable
+from cosim.mavlink.listening.telemetry_table import printable
 
 _DEG = 180.0 / math.pi
 _LISTED = 8  # fields shown of a message without an entry below

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
-from cosim.mavlink.listening.watch import Watch
+from cosim.mavlink.listening.telemetry_table import Watch
 from cosim.mavlink.wire.ground_end import GroundLink
 
 _BEAT = 1.0  # s between two heartbeats
@@ -38,8 +38,8 @@ def follow(
     started = now = time.monotonic()
     due, beat = started + period, started
     while (seconds is None or now - started < seconds) and (count is None or watch.total < count):
-        if now >= beat and link.speaks_first:
-            link.beat()
+        if now >= beat and link.sends_first:
+            link.send_heartbeat()
             beat = now + _BEAT
         end = due if seconds is None else min(due, started + seconds)
         for heard in link.receive(min(_SLICE, max(0.0, end - now))):

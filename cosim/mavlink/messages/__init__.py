@@ -5,6 +5,6 @@ One table of messages with their builders, rates and groups, and the streams tha
 Imports: mavlink.vehicle, mavlink.wire, scenario, simulation.commands.
 """
 
-from cosim.mavlink.messages.table import MESSAGES, Spec
+from cosim.mavlink.messages.message_table import MESSAGES, Spec
 
 __all__ = ["MESSAGES", "Spec"]

@@ -22,10 +22,10 @@ def heartbeat(context: VehicleContext) -> list[Any]:
     """HEARTBEAT."""
     m = context.mavlink
     state = m.MAV_STATE_ACTIVE if context.armed else m.MAV_STATE_STANDBY
-    return [beat(context, m.MAV_STATE_CRITICAL if context.failsafe else state)]
+    return [heartbeat_message(context, m.MAV_STATE_CRITICAL if context.failsafe else state)]
 
 
-def beat(context: VehicleContext, state: int) -> Any:
+def heartbeat_message(context: VehicleContext, state: int) -> Any:
     """Return a HEARTBEAT with a MAV_STATE."""
     profile, mode = context.profile, context.mode
     base = profile.base_mode(mode, context.armed)

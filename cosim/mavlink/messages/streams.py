@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from cosim.mavlink.messages import MESSAGES, Spec
-from cosim.mavlink.messages.table import HEARTBEAT
+from cosim.mavlink.messages.message_table import HEARTBEAT
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.message_sink import MessageSink
 
@@ -57,7 +57,7 @@ class Streams:
         self._earliest = min(self._earliest, self._due[message_id])
 
     def _load(self, spec: Spec, interval_us: int) -> float:
-        size: int = (self._context.make.size_of[spec.id] + _FRAME) * spec.several
+        size: int = (self._context.make.payload_sizes[spec.id] + _FRAME) * spec.several
         return size * _SECOND / interval_us
 
     @property

@@ -7,7 +7,7 @@ from typing import Any
 
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
-from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, thrust_body_of
+from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, get_thrust_body
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import Mode, SetAttitude, SetTarget
 from cosim.simulation.commands.stick_stabilizer import CLIMB_RATE
@@ -55,11 +55,11 @@ class AttitudeTargets(Service):
         else:
             context.submit(SetAttitude(None))
         text = f"No attitude for {_LASTS[mode]:g} s: {'the vehicle stays' if mode == 'reach' else 'sticks steer'}"
-        context.say(text, context.mavlink.MAV_SEVERITY_WARNING)
+        context.send_text(text, context.mavlink.MAV_SEVERITY_WARNING)
 
     def _attitude(self, sender: Sender, message: Any) -> None:
         context = self.context
-        if not self.may_steer(sender):
+        if not self.accept_control(sender):
             return
         fault = self._fault(message)
         if fault:
@@ -84,7 +84,7 @@ class AttitudeTargets(Service):
             return "thrust along each axis is not followed; a rate of climb is"
         if mask & _THRUST_IGNORED and self.context.profile.name != "ardusub":
             return "a thrust is needed"
-        asked = thrust_body_of(message) if mask & THRUST_BODY_SET else (0.0 if mask & _THRUST_IGNORED else thrust,)
+        asked = get_thrust_body(message) if mask & THRUST_BODY_SET else (0.0 if mask & _THRUST_IGNORED else thrust,)
         return "" if all(-1.0 <= part <= 1.0 for part in asked) else "a thrust is beyond -1 to 1"
 
     def _applies(self, message: Any) -> bool:
@@ -100,13 +100,13 @@ class AttitudeTargets(Service):
         if context.now - self._waits_since >= _PATIENCE:
             modes = "ALT_HOLD without thrust, in GUIDED with it" if context.profile.name == "ardusub" else "offboard"
             text = f"Attitude set-points wait: they count in {modes}"
-            context.say(text, context.mavlink.MAV_SEVERITY_NOTICE, "early attitude", _REPORT_PERIOD)
+            context.send_text(text, context.mavlink.MAV_SEVERITY_NOTICE, "early attitude", _REPORT_PERIOD)
 
     def _command(self, message: Any) -> SetAttitude:
         q0, q1, q2, q3 = message.q
         attitude, mask = (q0, q1, q2, q3), message.type_mask
         if self.context.profile.name != "ardusub":
-            ahead, right, down = thrust_body_of(message) if mask & THRUST_BODY_SET else (message.thrust, 0.0, 0.0)
+            ahead, right, down = get_thrust_body(message) if mask & THRUST_BODY_SET else (message.thrust, 0.0, 0.0)
             return SetAttitude(attitude, (ahead, right, down))
         if mask & _THRUST_IGNORED:
             return SetAttitude(attitude)

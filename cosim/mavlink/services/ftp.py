@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cosim.mavlink.services.packed_parameters import bare_crc32, pack_parameters
-from cosim.mavlink.services.parameters import Parameters
+from cosim.mavlink.services.parameter_protocol import ParameterProtocol
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 
@@ -60,15 +60,15 @@ class RefusedError(Exception):
 class FileServer(Service):
     """FILE_TRANSFER_PROTOCOL.
 
-    Parameters
+    ParameterProtocol
     ----------
     context : VehicleContext
         The vehicle.
-    parameters : Parameters
+    parameters : ParameterProtocol
         Service with the parameters that the file contains.
     """
 
-    def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
+    def __init__(self, context: VehicleContext, parameters: ParameterProtocol) -> None:
         super().__init__(context)
         self._parameters = parameters
         self._clients: OrderedDict[tuple[str, int, int], _Client] = OrderedDict()

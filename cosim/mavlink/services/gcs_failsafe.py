@@ -38,7 +38,9 @@ class GcsFailsafe(Service):
         elif context.failsafe and not lost:
             context.failsafe = False
             self._acted = True
-            context.say(f"Link to station {context.active_gcs.commander} regained", context.mavlink.MAV_SEVERITY_NOTICE)
+            context.send_text(
+                f"Link to station {context.active_gcs.commander} regained", context.mavlink.MAV_SEVERITY_NOTICE
+            )
         if not self._acted:
             self._acted = self._act()
 
@@ -47,7 +49,7 @@ class GcsFailsafe(Service):
         action = context.loss_action
         then = "" if action == "warn" else f": {action}"
         text = f"Link to station {context.active_gcs.commander} lost for {silence:.0f} s{then}"
-        context.say(text, context.mavlink.MAV_SEVERITY_CRITICAL)
+        context.send_text(text, context.mavlink.MAV_SEVERITY_CRITICAL)
 
     def _act(self) -> bool:
         """Submit the command of the loss action; return False if the queue was full."""

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.sticks import (
+from cosim.mavlink.vehicle.ardusub_sticks import (
     CLIMB_DEAD_ZONE,
     LEAN,
     LEAN_DEAD_ZONE,
@@ -33,7 +33,7 @@ _FORCE_AXES: dict[Mode, int] = {"manual": 6, "stabilize": 3, "depth_hold": 2}
 _NEUTRAL: Vector6 = (0.0,) * 6
 
 
-class Manual(Service):
+class ManualControlService(Service):
     """Convert sticks to fractions of the greatest wrench, in the modes of manual control."""
 
     def __init__(self, context: VehicleContext) -> None:
@@ -64,7 +64,7 @@ class Manual(Service):
         self._received_at = None
         if context.mode_ahead in STICK_MODES:
             self._submit(_NEUTRAL, by_gain=True)
-            context.say("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
+            context.send_text("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
 
     def _manual_control(self, sender: Sender, message: Any) -> None:
         if message.target == self.context.options.system_id:
@@ -84,7 +84,7 @@ class Manual(Service):
         context = self.context
         if context.accepts_commands and context.mode_ahead not in STICK_MODES:
             return
-        if not self.may_steer(sender):
+        if not self.accept_control(sender):
             return
         self._received_at = context.now
         self._submit(sticks, by_gain)

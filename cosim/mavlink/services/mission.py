@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cosim.mavlink.services.mission_items import ItemError, decode_mission_item, home_item
-from cosim.mavlink.services.parameters import Parameters
-from cosim.mavlink.services.service import Call, Service, place_of, unscaled
+from cosim.mavlink.services.parameter_protocol import ParameterProtocol
+from cosim.mavlink.services.service import CommandRequest, Service, to_local_position, unscale_position
 from cosim.mavlink.services.targets import Targets
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
-from cosim.mavlink.wire.encode import whole
+from cosim.mavlink.wire.encode import round_finite
 from cosim.simulation.commands.commands import ChangeSetting, Command, MissionItem, SetCurrentItem, SetMission, SetMode
 from cosim.simulation.commands.mission_executor import passed_items
 
@@ -35,22 +35,22 @@ class _Upload:
     retries: int = 0
 
 
-class Missions(Service):
+class MissionProtocol(Service):
     """MISSION_*: one mission of regions; fences and rally points are always empty.
 
     In ArduPilot's profile item 0 is home: it is added to downloads, and ignored in uploads.
 
-    Parameters
+    ParameterProtocol
     ----------
     context : VehicleContext
         The vehicle.
     targets : Targets
         Service that executes guided items at once.
-    parameters : Parameters
+    parameters : ParameterProtocol
         Service that is updated with the settings that a mission changes.
     """
 
-    def __init__(self, context: VehicleContext, targets: Targets, parameters: Parameters) -> None:
+    def __init__(self, context: VehicleContext, targets: Targets, parameters: ParameterProtocol) -> None:
         super().__init__(context)
         m = context.mavlink
         self._targets, self._parameters = targets, parameters
@@ -188,8 +188,8 @@ class Missions(Service):
         if message.command != m.MAV_CMD_NAV_WAYPOINT:
             return int(m.MAV_MISSION_UNSUPPORTED)
         item = _received_item(message, m)
-        x, y = (0.0, 0.0) if item is None else unscaled(item.frame, item.x, item.y)
-        place = None if item is None else place_of(context, item.frame, x, y, item.z)
+        x, y = (0.0, 0.0) if item is None else unscale_position(item.frame, item.x, item.y)
+        place = None if item is None else to_local_position(context, item.frame, x, y, item.z)
         if place is None:
             return int(m.MAV_MISSION_INVALID if item is None else m.MAV_MISSION_UNSUPPORTED_FRAME)
         if message.current == _CHANGE_DEPTH:
@@ -258,12 +258,12 @@ class Missions(Service):
     def _set_current(self, sender: Sender, message: Any) -> None:
         self._begin(sender, message.seq)
 
-    def _command_current(self, call: Call) -> int:
-        seq = call.whole(1)
-        return self._begin(call.sender, seq if seq is None or seq >= 0 else self.context.view.item + self._first)
+    def _command_current(self, request: CommandRequest) -> int:
+        seq = request.int_param(1)
+        return self._begin(request.sender, seq if seq is None or seq >= 0 else self.context.view.item + self._first)
 
-    def _start(self, call: Call) -> int:
-        return self._begin(call.sender, max(call.whole(1) or 0, 0), SetMode("mission"))
+    def _start(self, request: CommandRequest) -> int:
+        return self._begin(request.sender, max(request.int_param(1) or 0, 0), SetMode("mission"))
 
 
 def _scale(frame: int, mavlink: Any) -> float:
@@ -275,7 +275,7 @@ def _received_item(message: Any, mavlink: Any) -> ReceivedMissionItem | None:
     """Return a received item, or None if its position is not finite or exceeds the integer fields."""
     x, y = message.x, message.y
     if message.get_type() == "MISSION_ITEM":
-        x, y = (whole(v * _scale(message.frame, mavlink)) for v in (x, y))
+        x, y = (round_finite(v * _scale(message.frame, mavlink)) for v in (x, y))
         if x is None or y is None or max(abs(x), abs(y)) > 0x7FFFFFFF:
             return None
     numbers = message.param1, message.param2, message.param3, message.param4

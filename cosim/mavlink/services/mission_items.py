@@ -6,12 +6,12 @@ import math
 from collections.abc import Sequence
 
 from cosim.errors import CommandError
-from cosim.mavlink.services.parameters import shortest
-from cosim.mavlink.services.service import place_of, unscaled
+from cosim.mavlink.services.parameter_protocol import shortest
+from cosim.mavlink.services.service import to_local_position, unscale_position
 from cosim.mavlink.services.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import whole
+from cosim.mavlink.wire.encode import round_finite
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import ChangeSetting, MissionItem, SetHeading
 
@@ -122,7 +122,7 @@ def _change_heading(context: VehicleContext, item: ReceivedMissionItem) -> Missi
 
 def _jump(context: VehicleContext, item: ReceivedMissionItem, count: int) -> MissionItem:
     m, first = context.mavlink, int(context.profile.home_is_first)
-    to, times = whole(item.param1), whole(item.param2)
+    to, times = round_finite(item.param1), round_finite(item.param2)
     if to is None or not 0 <= to - first < count:
         raise ItemError(
             m.MAV_MISSION_INVALID_PARAM1, f"a jump to item {item.param1:g} of {first} to {count - 1 + first}"
@@ -134,8 +134,8 @@ def _jump(context: VehicleContext, item: ReceivedMissionItem, count: int) -> Mis
 
 def _place(context: VehicleContext, item: ReceivedMissionItem) -> Vector3:
     m = context.mavlink
-    x, y = unscaled(item.frame, item.x, item.y)
-    place = place_of(context, item.frame, x, y, item.z)
+    x, y = unscale_position(item.frame, item.x, item.y)
+    place = to_local_position(context, item.frame, x, y, item.z)
     if place is None:
         raise ItemError(m.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame}; it may be 0, 1, 3, 5 or 6")
     results = m.MAV_MISSION_INVALID_PARAM5_X, m.MAV_MISSION_INVALID_PARAM6_Y, m.MAV_MISSION_INVALID_PARAM7

@@ -7,7 +7,7 @@ from typing import Any
 
 from cosim.mavlink.messages import MESSAGES, status
 from cosim.mavlink.messages.streams import Streams
-from cosim.mavlink.services.service import Call, Service
+from cosim.mavlink.services.service import CommandRequest, Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.mavlink.wire.message_sink import MessageSink
 
@@ -41,33 +41,33 @@ class Requests(Service):
             m.MAV_CMD_DO_SEND_BANNER: self._banner,
         }
 
-    def _set_interval(self, call: Call) -> int:
+    def _set_interval(self, request: CommandRequest) -> int:
         m, context = self.context.mavlink, self.context
-        message_id, interval = call.whole(1), call.whole(2)
+        message_id, interval = request.int_param(1), request.int_param(2)
         if message_id is None or interval is None:
             return int(m.MAV_RESULT_DENIED)
         if message_id not in MESSAGES:
             return int(m.MAV_RESULT_FAILED)
-        if not self._streams[call.sender.link].set([(message_id, interval)]):
+        if not self._streams[request.sender.link].set([(message_id, interval)]):
             context.reject("the link would carry too much", "load")
             return int(m.MAV_RESULT_DENIED)
         return int(m.MAV_RESULT_ACCEPTED)
 
-    def _get_interval(self, call: Call) -> int:
-        m, context, link = self.context.mavlink, self.context, call.sender.link
-        message_id = call.whole(1)
+    def _get_interval(self, request: CommandRequest) -> int:
+        m, context, link = self.context.mavlink, self.context, request.sender.link
+        message_id = request.int_param(1)
         interval = 0 if message_id is None else self._streams[link].interval(message_id)
         link.send(context.make("MESSAGE_INTERVAL", message_id or 0, interval))
         return int(m.MAV_RESULT_ACCEPTED if interval else m.MAV_RESULT_FAILED)
 
-    def _message(self, call: Call) -> int:
+    def _message(self, request: CommandRequest) -> int:
         """REQUEST_MESSAGE: any message of the table; parameter 2 is a mode's index. Others fail, as in ArduPilot."""
-        m, context, link = self.context.mavlink, self.context, call.sender.link
-        message_id = call.whole(1)
+        m, context, link = self.context.mavlink, self.context, request.sender.link
+        message_id = request.int_param(1)
         spec = None if message_id is None else MESSAGES.get(message_id)
         if spec is None and message_id != m.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return int(m.MAV_RESULT_FAILED)
-        which = call.whole(2) or 0
+        which = request.int_param(2) or 0
         if spec is None:
             link.send(context.make("MESSAGE_INTERVAL", which, self._streams[link].interval(which)))
             return int(m.MAV_RESULT_ACCEPTED)
@@ -77,15 +77,15 @@ class Requests(Service):
             link.send(message)
         return int(m.MAV_RESULT_ACCEPTED if messages else m.MAV_RESULT_FAILED)
 
-    def _version(self, call: Call) -> int:
+    def _version(self, request: CommandRequest) -> int:
         for message in status.autopilot_version(self.context):
-            call.sender.link.send(message)
+            request.sender.link.send(message)
         return int(self.context.mavlink.MAV_RESULT_ACCEPTED)
 
-    def _banner(self, call: Call) -> int:
+    def _banner(self, request: CommandRequest) -> int:
         for line in banner(self.context):
-            for message in self.context.text(line):
-                call.sender.link.send(message)
+            for message in self.context.make_text(line):
+                request.sender.link.send(message)
         return int(self.context.mavlink.MAV_RESULT_ACCEPTED)
 
     def _group(self, sender: Sender, message: Any) -> None:

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import Any
 
 from cosim.errors import CommandError
-from cosim.mavlink.services.parameters import Parameters, shortest
-from cosim.mavlink.services.service import Call, Service, place_of, unscaled
+from cosim.mavlink.services.parameter_protocol import ParameterProtocol, shortest
+from cosim.mavlink.services.service import CommandRequest, Service, to_local_position, unscale_position
 from cosim.mavlink.services.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.keep_in_regions import KeepInRegions
 from cosim.mavlink.vehicle.profile import MODE_NAMES
@@ -37,15 +37,15 @@ class Targets(Service):
     1 s of silence: QGroundControl's change of depth, made twice. A velocity without a position moves a sphere about
     the vehicle; it ends after 3 s without a set-point.
 
-    Parameters
+    ParameterProtocol
     ----------
     context : VehicleContext
         The vehicle.
-    parameters : Parameters
+    parameters : ParameterProtocol
         Service that sets the speed.
     """
 
-    def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
+    def __init__(self, context: VehicleContext, parameters: ParameterProtocol) -> None:
         super().__init__(context)
         self._parameters, self._keep_in = parameters, KeepInRegions(context.scenario)
         m = context.mavlink
@@ -80,14 +80,14 @@ class Targets(Service):
             moving, self._drifting, self._last = any(self._drifting), None, ()
             if moving and context.mode_ahead == "reach":
                 context.submit(SetTarget(context.view.position_ned, context.settings["commands.hold_radius"]))
-                context.say(
+                context.send_text(
                     f"No velocity for {_VELOCITY_LASTS:g} s: the vehicle stays", context.mavlink.MAV_SEVERITY_WARNING
                 )
         if early is not None and context.now - early[0] >= _PATIENCE:
             self._early = None
             now, then = (MODE_NAMES[mode].lower() for mode in (context.mode_ahead, "reach"))
             text = f"Set-points wait: the mode is {now}, they count in {then}"
-            context.say(text, context.mavlink.MAV_SEVERITY_NOTICE, "early", 10.0)
+            context.send_text(text, context.mavlink.MAV_SEVERITY_NOTICE, "early", 10.0)
 
     def restart(self) -> None:
         """Clear the last set-point."""
@@ -107,8 +107,8 @@ class Targets(Service):
         frame = message.coordinate_frame
         place = None
         if frame != _LOCAL:
-            latitude, longitude = unscaled(frame, message.lat_int, message.lon_int)
-            place = place_of(self.context, frame, latitude, longitude, message.alt)
+            latitude, longitude = unscale_position(frame, message.lat_int, message.lon_int)
+            place = to_local_position(self.context, frame, latitude, longitude, message.alt)
         if place is None:
             self.context.reject(f"set-point in frame {frame}; it may be 0, 3, 5 or 6", "frame")
             return
@@ -134,7 +134,7 @@ class Targets(Service):
 
     def _set_point(self, sender: Sender, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
         context, mask = self.context, message.type_mask
-        if not self.may_steer(sender):
+        if not self.accept_control(sender):
             return
         fault = _fault(message)
         if fault:
@@ -178,7 +178,7 @@ class Targets(Service):
     def warn_about(self, place: Vector3, of: str = "target") -> None:
         """Send a warning for each objection to a target, which is accepted nevertheless.
 
-        Parameters
+        ParameterProtocol
         ----------
         place : tuple of float
             Center of the target [m, NED].
@@ -187,24 +187,24 @@ class Targets(Service):
         """
         context = self.context
         for words in self._keep_in.objections(place, context.view, context.settings):
-            context.say(
+            context.send_text(
                 f"Warning: {of} {words}", context.mavlink.MAV_SEVERITY_WARNING, f"{of} {words}", _WARNING_PERIOD
             )
 
     # ---- commands ----
 
-    def _reposition(self, call: Call) -> int:
+    def _reposition(self, request: CommandRequest) -> int:
         m, context = self.context.mavlink, self.context
-        place = place_of(context, call.frame, call[5], call[6], call[7])
+        place = to_local_position(context, request.frame, request[5], request[6], request[7])
         if place is None:
-            context.reject(f"frame {call.frame} of a position", "frame")
+            context.reject(f"frame {request.frame} of a position", "frame")
             return int(m.MAV_RESULT_UNSUPPORTED)
-        return self.go(call.sender, place, call[4])
+        return self.go(request.sender, place, request[4])
 
     def go(self, sender: Sender, place: Vector3, yaw: float = math.nan) -> int:
         """Move the target region, and reach it; without a finite coordinate, hold, as QGroundControl pauses PX4.
 
-        Parameters
+        ParameterProtocol
         ----------
         sender : Sender
             Sender of the command.
@@ -219,7 +219,7 @@ class Targets(Service):
             MAV_RESULT.
         """
         context = self.context
-        if not self.may_steer(sender):
+        if not self.accept_control(sender):
             return int(context.mavlink.MAV_RESULT_DENIED)
         x, y, z = (a if math.isfinite(a) else b for a, b in zip(place, context.view.position_ned, strict=True))
         commands: list[Command] = [SetTarget((x, y, z)) if any(map(math.isfinite, place)) else SetMode("hold")]
@@ -231,29 +231,29 @@ class Targets(Service):
             self.warn_about((x, y, z))
         return result
 
-    def _turn(self, call: Call) -> int:
+    def _turn(self, request: CommandRequest) -> int:
         context = self.context
-        angle = math.radians(call[1])
-        if not math.isfinite(angle) or not math.isfinite(call[4]):
+        angle = math.radians(request[1])
+        if not math.isfinite(angle) or not math.isfinite(request[4]):
             return int(context.mavlink.MAV_RESULT_DENIED)
-        if call[4] == 1.0:
-            angle = context.view.euler[2] + math.copysign(1.0, -1.0 if call[3] < 0.0 else 1.0) * angle
-        if not self.may_steer(call.sender):
+        if request[4] == 1.0:
+            angle = context.view.euler[2] + math.copysign(1.0, -1.0 if request[3] < 0.0 else 1.0) * angle
+        if not self.accept_control(request.sender):
             return int(context.mavlink.MAV_RESULT_DENIED)
         return context.submit(SetHeading(angle))
 
-    def _speed(self, call: Call) -> int:
+    def _speed(self, request: CommandRequest) -> int:
         m, context = self.context.mavlink, self.context
         if not self._parameters.has(SPEED):
             return int(m.MAV_RESULT_UNSUPPORTED)
         try:
-            speed = resolve_speed(context, shortest(call[2]) if math.isfinite(call[2]) else call[2])
+            speed = resolve_speed(context, shortest(request[2]) if math.isfinite(request[2]) else request[2])
         except CommandError as error:
             context.reject(str(error), "speed")
             return int(m.MAV_RESULT_DENIED)
         if speed is None:
             return int(m.MAV_RESULT_ACCEPTED)
-        if not self.may_steer(call.sender):
+        if not self.accept_control(request.sender):
             return int(m.MAV_RESULT_DENIED)
         return self._parameters.change(SPEED, speed)
 

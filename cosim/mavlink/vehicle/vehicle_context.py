@@ -10,10 +10,10 @@ from typing import Any
 from cosim.errors import CommandError
 from cosim.mavlink.vehicle.active_gcs import ActiveGcs
 from cosim.mavlink.vehicle.geodesy import LocalFrame
-from cosim.mavlink.vehicle.layout import Layout
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.vehicle.proximity import Proximity
+from cosim.mavlink.vehicle.row_layout import Layout
 from cosim.mavlink.vehicle.status_texts import StatusTexts
 from cosim.mavlink.vehicle.view import View
 from cosim.mavlink.wire.dialect import dialect
@@ -79,7 +79,7 @@ class VehicleContext:
     home : tuple of float
         North and east of home [m]; home is at the surface.
     status_texts : StatusTexts
-        Sender of texts; `say`, `reject` and `text` are its methods.
+        Sender of texts; `send_text`, `reject` and `make_text` are its methods.
     now : float
         Wall clock at the last call of the autopilot [s].
     failsafe : bool
@@ -123,7 +123,8 @@ class VehicleContext:
         self._outputs, self._curves = table.channels, [pulse_of_effort(table, sign) for sign in signs]
         self._commands = commands if options.commands and live and scenario.commands.enabled else None
         self.status_texts = StatusTexts(self.mavlink, self.make, self.links, lambda: self.now)
-        self.say, self.reject, self.text = self.status_texts.say, self.status_texts.reject, self.status_texts.text
+        self.send_text, self.reject = self.status_texts.send_text, self.status_texts.reject
+        self.make_text = self.status_texts.make_text
         self.restart()
 
     def restart(self) -> None:

@@ -6,7 +6,7 @@ import math
 from functools import cached_property
 
 from controller.quaternion import rotation_rows
-from cosim.mavlink.vehicle.layout import Layout
+from cosim.mavlink.vehicle.row_layout import Layout
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import MODES, Mode
 from cosim.simulation.signals import Array

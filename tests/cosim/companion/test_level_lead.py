@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.companion.companion import scenario_to_steer
+from cosim.companion.companion_run import scenario_to_steer
 from cosim.companion.outputs import Output
 from cosim.companion.set_points import LevelLead
 from tests.cosim.companion.test_parts import HEAVY, VECTORED_6DOF, decoded, reported

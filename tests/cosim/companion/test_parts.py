@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from cosim.companion.autopilot_link import NetworkLink
 from cosim.companion.clock_sync import ClockSync
-from cosim.companion.companion import Companion
+from cosim.companion.companion_options import CompanionOptions
+from cosim.companion.companion_run import Companion
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
 from cosim.companion.heading import HeadingWatch, LevelDive
-from cosim.companion.link import NetworkLink
-from cosim.companion.options import CompanionOptions
 from cosim.companion.outputs import require_taken
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
 from cosim.companion.set_points import TurnLead, VelocityLead, attitude_target, velocity_target
@@ -22,10 +22,10 @@ from cosim.companion.sticks import channels_override, channels_released, manual_
 from cosim.companion.vehicle_state import RATES, ReportedState
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.geodesy import LocalFrame
-from cosim.mavlink.vehicle.layout import euler_of
 from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.mavlink.vehicle.row_layout import euler_of
 from cosim.mavlink.wire.endpoint import parse_endpoint
-from cosim.mavlink.wire.thrust_body import thrust_body_of
+from cosim.mavlink.wire.thrust_body import get_thrust_body
 from cosim.simulation.commands.commands import ManualControl
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station, scenario
@@ -269,10 +269,10 @@ def test_three_axis_thrust_uses_the_published_attitude_target_extension():
     frame = message.pack(mavlink.MAVLink(None, 255, 191))
     assert frame[1] == 51 and struct.unpack("<3f", frame[10 + 39 : 10 + 51]) == (0.25, -0.5, 0.125)
     (found,) = mavlink.MAVLink(None).parse_buffer(frame)
-    assert found.type_mask == 0b100111 and thrust_body_of(found) == (0.25, -0.5, 0.125)
+    assert found.type_mask == 0b100111 and get_thrust_body(found) == (0.25, -0.5, 0.125)
     assert frame == message.pack(mavlink.MAVLink(None, 255, 191))  # it can be sent again
     without = attitude_target(mavlink, 1, np.array([1.0, 0.0, 0.0, 0.0]), None)
-    assert decoded(without).type_mask == 0b1000111 and thrust_body_of(decoded(without)) == (0.0, 0.0, 0.0)
+    assert decoded(without).type_mask == 0b1000111 and get_thrust_body(decoded(without)) == (0.0, 0.0, 0.0)
 
 
 def test_velocity_setpoint_leads_by_the_desired_acceleration():

@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.companion.companion import Companion
+from cosim.companion.companion_options import CompanionOptions
+from cosim.companion.companion_run import Companion
 from cosim.companion.frame_alignment import SceneOrigin
-from cosim.companion.options import CompanionOptions
 from cosim.companion.placement import FARTHEST, Placement
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.geodesy import LocalFrame

@@ -14,7 +14,7 @@ from websockets.sync.client import connect
 
 from cosim.live.command_desk import MAX_LENGTH
 from cosim.live.hub import Cursor, Hub
-from cosim.live.server import CONNECTIONS
+from cosim.live.view_server import CONNECTIONS
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario

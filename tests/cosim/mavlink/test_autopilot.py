@@ -279,7 +279,7 @@ def test_run_restart_is_announced():
     station = Station()
     station.look(5.0)
     station.look(0.0)
-    assert "The run begins again" in station.wire.texts
+    assert "The run has restarted" in station.wire.texts
     station.wire.clear()
     for k in range(1, 101):
         station.look(0.01 * k)
@@ -301,7 +301,7 @@ def test_commands_between_runs_are_rejected(last):
     assert station.send(radius)[-1].param_value == before.param_value
     assert station.commanded() == []
     station.look(0.0)
-    assert "The run begins again" in station.wire.texts
+    assert "The run has restarted" in station.wire.texts
     assert station.command(400, 1.0) == accepted
     assert station.send(radius)[-1].param_value == 0.75
     assert len(station.commanded()) == 2

@@ -16,10 +16,10 @@ from pymavlink.dialects.v20 import all as mavlink
 from cosim.command_line.cli import main
 from cosim.mavlink.listening import Watch, follow, picture
 from cosim.mavlink.listening.fields import values
-from cosim.mavlink.listening.watch import ROWS, TEXTS
-from cosim.mavlink.vehicle.modes import mode_name
+from cosim.mavlink.listening.telemetry_table import ROWS, TEXTS
+from cosim.mavlink.vehicle.mode_names import mode_name
 from cosim.mavlink.wire.endpoint import parse_endpoint
-from cosim.mavlink.wire.ground_end import GroundLink, Heard
+from cosim.mavlink.wire.ground_end import GroundLink, ReceivedMessage
 
 ESCAPE = "\x1b[31mred\x07"
 
@@ -35,7 +35,7 @@ def heartbeat(autopilot=12, base_mode=0x81, custom_mode=6 << 16, kind=12):
 
 
 def received(message, at=0.0, system=1, component=1):
-    return Heard(at, system, component, 0, message.get_type(), message)
+    return ReceivedMessage(at, system, component, 0, message.get_type(), message)
 
 
 @pytest.fixture
@@ -192,8 +192,8 @@ def test_broken_frames_are_ignored_and_mavlink_1_is_received(link):
         found = []
         while len(found) < 2:
             found += link.receive(2.0)
-    assert [h.kind for h in found] == ["HEARTBEAT", "ATTITUDE"]
-    assert link.old == 1 and link.counts.malformed == 2
+    assert [h.name for h in found] == ["HEARTBEAT", "ATTITUDE"]
+    assert link.v1_frames == 1 and link.stats.malformed == 2
 
 
 def test_with_a_key_only_signed_frames_are_received():
@@ -202,10 +202,10 @@ def test_with_a_key_only_signed_frames_are_received():
     with GroundLink(endpoint, key=bytes(32)) as link:
         for key in (None, b"\1" * 32, bytes(32)):
             with GroundLink(speaker, key, identity=(1, 1)) as vehicle:
-                vehicle.beat()
+                vehicle.send_heartbeat()
         found = link.receive(2.0) + link.receive(0.1)
-    assert [h.kind for h in found] == ["HEARTBEAT"]
-    assert (link.counts.unsigned, link.counts.forged, link.counts.accepted) == (1, 1, 1)
+    assert [h.name for h in found] == ["HEARTBEAT"]
+    assert (link.stats.unsigned, link.stats.forged, link.stats.accepted) == (1, 1, 1)
     assert "1 frames forged" in picture(link, Watch(), 0.0)[0]
 
 

@@ -11,9 +11,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.mavlink.messages.control import weight_names
 from cosim.mavlink.vehicle.geodesy import LocalFrame
-from cosim.mavlink.vehicle.layout import Layout, euler_of
+from cosim.mavlink.vehicle.row_layout import Layout, euler_of
 from cosim.mavlink.vehicle.view import View
-from cosim.mavlink.wire.encode import Encoder, float32, whole, wrap_time
+from cosim.mavlink.wire.encode import Encoder, clip_to_float32, round_finite, wrap_time
 from cosim.simulation.columns import column_names
 from cosim.simulation.signals import Column
 from plant_fmu import load_vehicle
@@ -266,8 +266,11 @@ def test_out_of_range_values_are_clamped_to_the_field():
 
 
 def test_link_numbers_are_rounded_clamped_and_wrapped():
-    assert [whole(x) for x in (1.4, math.nan, math.inf, -2.0, 3)] == [1, None, None, -2, 3]
-    assert float32(math.inf) == float32(1e300) == pytest.approx(3.4028234e38) and float32(-0.5) == -0.5
+    assert [round_finite(x) for x in (1.4, math.nan, math.inf, -2.0, 3)] == [1, None, None, -2, 3]
+    assert (
+        clip_to_float32(math.inf) == clip_to_float32(1e300) == pytest.approx(3.4028234e38)
+        and clip_to_float32(-0.5) == -0.5
+    )
     assert wrap_time(2**32 * 1000 + 5000) == 5 and wrap_time(2**32 + 7, 1) == 7
 
 

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.services.packed_parameters import bare_crc32, hash_check
 from cosim.mavlink.services.parameter_names import parameter_names
-from cosim.mavlink.services.parameters import shortest
+from cosim.mavlink.services.parameter_protocol import shortest
 from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios

@@ -4,9 +4,9 @@ import threading
 
 import pytest
 
-from cosim.sitl.flights import FlightOptions, Flights
+from cosim.sitl.json_server import JsonServer
 from cosim.sitl.law import law_of_pwm
-from cosim.sitl.server import JsonServer
+from cosim.sitl.sitl_session import FlightOptions, Flights
 
 
 class Served(threading.Thread):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.layout import euler_of
+from cosim.mavlink.vehicle.row_layout import euler_of
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import AddObstacle, RemoveObstacle
@@ -27,7 +27,7 @@ class _Known:
     received: float  # s, wall clock at the last message about it
 
 
-class Obstacles(Service):
+class ReceivedObstacles(Service):
     """Add each obstacle as a sphere to keep out of, about the received point.
 
     In LOCAL_FRD forward is the vehicle's heading at time 0.

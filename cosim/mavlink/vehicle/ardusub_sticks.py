@@ -66,7 +66,7 @@ def beyond_dead_zone(deflection: float, dead_zone: float) -> float:
 
     Examples
     --------
-    >>> from cosim.mavlink.vehicle.sticks import beyond_dead_zone, deflection_of
+    >>> from cosim.mavlink.vehicle.ardusub_sticks import beyond_dead_zone, deflection_of
     >>> beyond_dead_zone(0.1, 0.2), round(beyond_dead_zone(deflection_of(-0.3, 0.2), 0.2), 6)
     (0.0, -0.3)
     """

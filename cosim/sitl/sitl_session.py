@@ -9,9 +9,9 @@ from pathlib import Path
 from cosim.errors import CosimError, RunError
 from cosim.results.run_result import Run
 from cosim.simulation.commands.sources import RUNS
-from cosim.sitl.flight import Flight
 from cosim.sitl.law import AutopilotLaw
-from cosim.sitl.scenario import SCENARIO, scenario_to_fly
+from cosim.sitl.sitl_flight import Flight
+from cosim.sitl.sitl_scenario import SCENARIO, scenario_to_fly
 from plant_fmu import PlantFmuError, Vehicle
 from plant_fmu.build import cached_fmu
 
@@ -21,7 +21,7 @@ _CHECKED_RATE = 1000  # Hz, frame rate for the validation of a scenario before a
 
 
 @dataclass
-class Counts:
+class FrameCounts:
     """Counts of the autopilot's frames, by treatment."""
 
     steps: int = 0
@@ -38,7 +38,7 @@ class Outcome:
     """Runs of a SITL session, and counts of its frames."""
 
     runs: list[Run]
-    counts: Counts
+    counts: FrameCounts
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class Flights:
                 self._ended.append((flight, status))
                 flight.conclude(status, report=False)
 
-    def fly(self, serve: Callable[[], str], counts: Counts) -> Outcome:
+    def fly(self, serve: Callable[[], str], counts: FrameCounts) -> Outcome:
         """Run a server until it ends, and conclude its runs.
 
         Parameters

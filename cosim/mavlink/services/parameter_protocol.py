@@ -15,7 +15,7 @@ from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
-from cosim.mavlink.wire.encode import float32
+from cosim.mavlink.wire.encode import clip_to_float32
 from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.mavlink.wire.options import LossAction
 from cosim.simulation.commands.commands import ChangeSetting
@@ -35,7 +35,7 @@ class _Own:
     write: Callable[[float], str | None] | None = None  # returns the expected range for an invalid value
 
 
-class Parameters(Service):
+class ParameterProtocol(Service):
     """PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET; all parameters are REAL32.
 
     The list is sent in slices, one per tick, and at most once at a time on a link: a request while it is under way
@@ -89,7 +89,7 @@ class Parameters(Service):
         """Return a parameter's value, limited to the range of float32."""
         own = self._own.get(name)
         value = self._values[self._key_of[name]] if own is None else own.read()
-        return float32(value)
+        return clip_to_float32(value)
 
     def all(self) -> list[tuple[str, float]]:
         """Return names and values of all parameters, in the order of the list."""
@@ -233,6 +233,6 @@ def shortest(value: float) -> float:
     same = _as_float32(value)
     for digits in range(6, 10):
         candidate = float(f"{value:.{digits}g}")
-        if _as_float32(float32(candidate)) == same:
+        if _as_float32(clip_to_float32(candidate)) == same:
             return candidate
     return value

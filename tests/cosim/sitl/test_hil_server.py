@@ -12,8 +12,8 @@ import pytest
 from cosim.errors import RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.results.record import load_record
-from cosim.sitl.hil import LEFT, HilServer
 from cosim.sitl.hil_messages import FIELD_NED, RATE, hil_messages, pressure_at
+from cosim.sitl.hil_server import LEFT, HilServer
 from cosim.sitl.law import law_of_controls
 from cosim.sitl.motion import Motion
 

@@ -13,7 +13,7 @@ import numpy as np
 from controller.law import Diagnostic
 from cosim.companion.vehicle_state import ReportedState
 from cosim.errors import TelemetryError
-from cosim.mavlink.vehicle.layout import euler_of
+from cosim.mavlink.vehicle.row_layout import euler_of
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.ground_end import GroundLink, Identity
@@ -57,7 +57,7 @@ class Dvl:
     --------
     Each delta has the autopilot's time [us], the interval [us], the rotation [rad] and the displacement [m] in it:
 
-    >>> from cosim.sitl.autopilot_link import Dvl, DvlOptions
+    >>> from cosim.sitl.sitl_link import Dvl, DvlOptions
     >>> from cosim.sitl.motion import Motion
     >>> still, ahead = (0.0, 0.0, 0.0), (0.25, 0.0, 0.0)
     >>> motion = Motion(0.0, still, still, still, ahead, still, (1.0, 0.0, 0.0, 0.0), None, ahead)

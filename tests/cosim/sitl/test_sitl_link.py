@@ -9,11 +9,11 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.results.record import load_record
-from cosim.sitl.autopilot_link import AutopilotLink, Dvl, DvlOptions
-from cosim.sitl.flights import FlightOptions, Flights
+from cosim.sitl.json_server import JsonServer
 from cosim.sitl.law import law_of_pwm
 from cosim.sitl.motion import Motion
-from cosim.sitl.server import JsonServer
+from cosim.sitl.sitl_link import AutopilotLink, Dvl, DvlOptions
+from cosim.sitl.sitl_session import FlightOptions, Flights
 from tests.cosim.sitl.conftest import Served
 from tests.cosim.sitl.stand_in import DISARMED, StandIn, frame
 from tests.cosim.sitl.test_command import free_port

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from cosim.mavlink.wire.dialect import dialect
-from cosim.mavlink.wire.ground_end import Heard
+from cosim.mavlink.wire.ground_end import ReceivedMessage
 
 ROWS = 300  # kinds of messages that have a row
 TEXTS = 5  # status texts that are kept
@@ -65,10 +65,10 @@ class Watch:
         self._mavlink = dialect()
         self._sampled = 0.0
 
-    def add(self, heard: Heard) -> None:
+    def add(self, heard: ReceivedMessage) -> None:
         """Add a received message."""
         self.total += 1
-        label, message = heard.kind, heard.message
+        label, message = heard.name, heard.message
         if label in _NAMED:
             label = f"{label}:{printable(message.name)}"
         key = Key(heard.system, heard.component, label)
@@ -78,14 +78,14 @@ class Watch:
                 self.beyond += 1
                 return
             row = self.rows[key] = Row(message, heard.time)
-            row.samples.append((heard.time, 0 if heard.kind == "STATUSTEXT" else 1))
+            row.samples.append((heard.time, 0 if heard.name == "STATUSTEXT" else 1))
         row.message, row.last = message, heard.time
         row.count += 1
-        if heard.kind == "STATUSTEXT":
+        if heard.name == "STATUSTEXT":
             self.texts.append((heard.time, message))
-        elif heard.kind == "HEARTBEAT" and self.vehicle is None and self._is_autopilot(message):
+        elif heard.name == "HEARTBEAT" and self.vehicle is None and self._is_autopilot(message):
             self.vehicle = (heard.system, heard.component)
-        elif heard.kind == "AVAILABLE_MODES" and len(self.modes) < ROWS:
+        elif heard.name == "AVAILABLE_MODES" and len(self.modes) < ROWS:
             self.modes[message.custom_mode] = printable(message.mode_name)
 
     def sample(self, now: float) -> None:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller.laws.deployable.gains import SPREADS
-from cosim.companion.link import AutopilotLink
-from cosim.companion.options import CompanionOptions
+from cosim.companion.autopilot_link import AutopilotLink
+from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.outputs import SteerBy
 from cosim.companion.placement import FARTHEST, Placement, meters
 from cosim.companion.remote_vehicle import RemoteVehicle
@@ -34,7 +34,7 @@ from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
 if TYPE_CHECKING:  # websockets wait until a flight is shown
-    from cosim.live.view import LiveView
+    from cosim.live.live_view import LiveView
 
 _RELEASE = 2.0  # s, longest time to release the sticks and change to the hold mode at the end
 _NO_COMMANDS = "a companion's page shows alone: take over at the autopilot's ground station"

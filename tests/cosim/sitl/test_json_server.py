@@ -13,11 +13,11 @@ from cosim.errors import RunError
 from cosim.results.record import load_record
 from cosim.simulation.master import Master
 from cosim.sitl import motion
-from cosim.sitl.flights import RESTARTED, FlightOptions, Flights
+from cosim.sitl.json_server import JsonServer
 from cosim.sitl.law import law_of_pwm
 from cosim.sitl.lockstep import Lockstep
-from cosim.sitl.scenario import scenario_to_fly
-from cosim.sitl.server import JsonServer
+from cosim.sitl.sitl_scenario import scenario_to_fly
+from cosim.sitl.sitl_session import RESTARTED, FlightOptions, Flights
 from plant_fmu import load_vehicle
 from tests.cosim.sitl.stand_in import DISARMED, NEUTRAL, StandIn, frame, heave, newest_line, parse
 
@@ -270,7 +270,7 @@ def test_second_sender_is_rejected_while_the_first_is_active(serve):
 @pytest.mark.medium
 def test_autopilot_on_another_port_replaces_a_silent_one(serve, monkeypatch):
     """With the next count the run continues, as behind a relay; any other count starts a new run."""
-    monkeypatch.setattr("cosim.sitl.server._SENDER_TIMEOUT", 0.05)
+    monkeypatch.setattr("cosim.sitl.json_server._SENDER_TIMEOUT", 0.05)
     served = serve("time.duration=0.1")
     for first, steps in ((0, 10), (10, 10), (15, 120)):
         time.sleep(0.1)

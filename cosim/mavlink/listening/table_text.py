@@ -7,8 +7,8 @@ import time
 from typing import Any
 
 from cosim.mavlink.listening.fields import values
-from cosim.mavlink.listening.watch import Watch, printable
-from cosim.mavlink.vehicle.modes import mode_name
+from cosim.mavlink.listening.telemetry_table import Watch, printable
+from cosim.mavlink.vehicle.mode_names import mode_name
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.ground_end import GroundLink
 
@@ -55,7 +55,7 @@ def picture(link: GroundLink, watch: Watch, now: float, width: int = 120, height
 
 def _link_line(link: GroundLink, watch: Watch, now: float) -> str:
     rate = sum(row.rate(now) for row in watch.rows.values())
-    return ", ".join([f"{link.name}: {watch.total} messages", f"{rate:.1f} a second", *link.troubles()])
+    return ", ".join([f"{link.name}: {watch.total} messages", f"{rate:.1f} a second", *link.loss_reports()])
 
 
 def _vehicle_lines(watch: Watch, now: float) -> list[str]:

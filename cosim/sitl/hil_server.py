@@ -12,10 +12,10 @@ from cosim.errors import RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.simulation.pace import Pace
-from cosim.sitl.flight import Flight
-from cosim.sitl.flights import Counts, Flights, Outcome
 from cosim.sitl.hil_messages import RATE, hil_messages
 from cosim.sitl.motion import Motion, at_rest
+from cosim.sitl.sitl_flight import Flight
+from cosim.sitl.sitl_session import Flights, FrameCounts, Outcome
 
 log = logging.getLogger(__name__)
 
@@ -79,7 +79,7 @@ class HilServer:
     ) -> None:
         self._mavlink, self._speedup = dialect(), speedup
         self._flights, self._timeout, self._report = flights, timeout, report or log.info
-        self.counts = Counts()
+        self.counts = FrameCounts()
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

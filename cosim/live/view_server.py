@@ -20,7 +20,7 @@ from websockets.http11 import Request, Response
 from cosim.live.address import LiveAddress, foreign_origin
 from cosim.live.command_desk import MAX_LENGTH
 from cosim.live.hub import Cursor, Hub
-from cosim.live.messages import text_of
+from cosim.live.viewer_messages import text_of
 from cosim.replay.page import replay_page
 
 log = logging.getLogger(__name__)

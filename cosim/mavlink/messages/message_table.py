@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.mavlink.messages import control, obstacles, pose, sensors, status
+from cosim.mavlink.messages import control, obstacle_distance, pose, sensors, status
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.options import PROFILES, ProfileName
 
@@ -63,14 +63,14 @@ _TABLE = (
     Spec(242, pose.home_position, 1.0),
     Spec(245, status.extended_sys_state, 1.0),
     Spec(251, control.named_value_float, 2.0, EXTENDED_STATUS, several=18),
-    Spec(330, obstacles.obstacle_distance, 1.0),
+    Spec(330, obstacle_distance.obstacle_distance, 1.0),
     Spec(331, pose.odometry, 0.0),
     Spec(350, control.debug_float_array, 1.0, several=5),
     Spec(375, control.actuator_output_status, 0.0),
     Spec(435, status.available_modes, 0.0),
     Spec(436, status.current_mode, 0.5),
     Spec(437, status.available_modes_monitor, 0.2),
-    Spec(11037, obstacles.obstacle_distance_3d, 1.0, several=8),
+    Spec(11037, obstacle_distance.obstacle_distance_3d, 1.0, several=8),
     Spec(11038, sensors.water_depth, 2.0, EXTRA3),
 )
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.errors import RunError
+from cosim.sitl.json_protocol import decode, encode
 from cosim.sitl.motion import Motion
-from cosim.sitl.wire import decode, encode
 from tests.cosim.sitl.stand_in import newest_line, parse
 
 AT_REST = Motion(

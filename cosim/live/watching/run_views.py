@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from cosim.errors import RunError, TelemetryError
-from cosim.live.messages import rows_of
+from cosim.live.viewer_messages import rows_of
 from cosim.replay.header import header_of
 from cosim.replay.view_columns import ViewColumns
 from cosim.results.record import PARTS, RECORD, Record
