@@ -20,7 +20,7 @@ from benchmarks.hostile import hostile_datagrams
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing, time_calls
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
-from cosim.mavlink.messages import MESSAGES
+from cosim.mavlink.messages.message_table import message_specs
 from cosim.mavlink.thread import LinkThread
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.dialect import dialect
@@ -83,7 +83,7 @@ class Seventeen:
                 self._send(number)
 
     def _send(self, number: int) -> None:
-        for message in MESSAGES[number].build(self._context):
+        for message in message_specs()[number].build(self._context):
             self._context.send(message)
 
     def close(self, now: float) -> None:

@@ -90,7 +90,7 @@ class AutopilotSession:
         )  # fmt: skip
         self._steered_in = steered_in(options.profile, options.steer_by)
         self._dive_mode: Mode = self._steered_in if options.steer_by == "velocity" else "hold"
-        self._mode = self.profile.numbers[self._steered_in]
+        self._mode = self.profile.custom_modes[self._steered_in]
         self.reported = ReportedState(link.identity)
         self.alignment = FrameAlignment(options.origin)
         self.heading = HeadingWatch()
@@ -177,7 +177,7 @@ class AutopilotSession:
         else:
             return
         while self._link.clock() <= until or (
-            self._link.clock() < waits and self.reported.mode != self.profile.numbers["hold"]
+            self._link.clock() < waits and self.reported.mode != self.profile.custom_modes["hold"]
         ):
             now = self._link.clock()
             self.exchange(np.zeros(6), now, now + 0.05)
@@ -245,7 +245,7 @@ class AutopilotSession:
         has_to_dive = (
             alignment.offset is not None and self.is_placed and has_state and self.dive.is_needed(reported, now)
         )
-        in_mode = reported.mode == (self.profile.numbers[self._dive_mode] if has_to_dive else self._mode)
+        in_mode = reported.mode == (self.profile.custom_modes[self._dive_mode] if has_to_dive else self._mode)
         self._was_in_mode |= in_mode and self.supervisor.state == "diving"
         is_ours = self.supervisor.state == "steering" or (has_to_dive and self._was_in_mode)
         if not self._options.dry_run:
@@ -284,8 +284,8 @@ class AutopilotSession:
         for name in self.failsafes.wanted(now) if is_up else ():
             self._link.send(m.MAVLink_param_request_read_message(self.reported.system, 1, name.encode(), -1))
         if self._due("rates", _RATES, now):
-            for message_id, rate in RATES.items():
-                self._command(m.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate)
+            for name, rate in RATES.items():
+                self._command(m.MAV_CMD_SET_MESSAGE_INTERVAL, getattr(m, f"MAVLINK_MSG_ID_{name}"), 1e6 / rate)
 
     def _act(self, state: State, now: float, wrench: Array, period: float) -> None:
         output, messages = self.output, ()  # type: Output, Sequence[Any]
@@ -299,7 +299,7 @@ class AutopilotSession:
             self._command(self._mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         elif state == "diving":
             self.supervisor.asked_for_mode(now)
-            if self.reported.mode != self.profile.numbers[self._dive_mode]:
+            if self.reported.mode != self.profile.custom_modes[self._dive_mode]:
                 self._send_mode(self._dive_mode, now)
                 messages = output.still(self.reported)
             else:
@@ -318,7 +318,7 @@ class AutopilotSession:
 
     def _hold(self, now: float) -> Sequence[Any]:
         """Request the hold mode, or depth hold if that is refused; return the messages that release the sticks."""
-        since, modes = now - self._held_at, self.profile.numbers
+        since, modes = now - self._held_at, self.profile.custom_modes
         if self.reported.mode == modes["hold"] and since > self.output.releases_for:
             return ()
         refused = since > _FALLBACK
@@ -328,8 +328,8 @@ class AutopilotSession:
 
     def _send_mode(self, mode: Mode, now: float) -> None:
         if self._due("mode", _REPEAT, now):
-            number = self.profile.numbers[mode]
-            first, second = (number >> 16 & 0xFF, number >> 24) if self.profile.packed else (number, 0)
+            number = self.profile.custom_modes[mode]
+            first, second = (number >> 16 & 0xFF, number >> 24) if self.profile.is_packed else (number, 0)
             self._command(self._mavlink.MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, first, second)
 
     def _command(self, number: int, *parameters: float) -> None:

@@ -195,7 +195,7 @@ def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: S
 def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:
     """Return MANUAL_CONTROL; with `all_axes` it includes roll and pitch."""
     surge, sway, heave, roll, pitch, yaw = sticks.tolist()
-    center = profile.centred_stick
+    center = profile.centered_stick
     x, y, r = (round(_FULL * part) for part in (surge, sway, yaw))
     z = round(center - (_FULL - center) * heave)
     message = mavlink.MAVLink_manual_control_message(system, x, y, z, r, 0)

@@ -13,19 +13,19 @@ from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.clock_sync import ClockSync
 from cosim.simulation.signals import Array
 
-RATES = {  # Hz, requested message rates by message id
-    0: 5.0,  # HEARTBEAT, with mode and arming; a PX4 refuses, and sends one per second
-    436: 10.0,  # CURRENT_MODE, PX4 only
-    31: 50.0,  # ATTITUDE_QUATERNION
-    32: 50.0,  # LOCAL_POSITION_NED
-    33: 5.0,  # GLOBAL_POSITION_INT
-    36: 10.0,  # SERVO_OUTPUT_RAW
-    1: 2.0,  # SYS_STATUS
-    29: 10.0,  # SCALED_PRESSURE
-    137: 10.0,  # SCALED_PRESSURE2
-    132: 5.0,  # DISTANCE_SENSOR
-    193: 2.0,  # EKF_STATUS_REPORT, ArduPilot only
-    230: 2.0,  # ESTIMATOR_STATUS, PX4 only
+RATES = {  # Hz, requested rates of messages
+    "HEARTBEAT": 5.0,  # mode and arming; a PX4 refuses, and sends one per second
+    "CURRENT_MODE": 10.0,  # PX4 only
+    "ATTITUDE_QUATERNION": 50.0,
+    "LOCAL_POSITION_NED": 50.0,
+    "GLOBAL_POSITION_INT": 5.0,
+    "SERVO_OUTPUT_RAW": 10.0,
+    "SYS_STATUS": 2.0,
+    "SCALED_PRESSURE": 10.0,
+    "SCALED_PRESSURE2": 10.0,
+    "DISTANCE_SENSOR": 5.0,
+    "EKF_STATUS_REPORT": 2.0,  # ArduPilot only
+    "ESTIMATOR_STATUS": 2.0,  # PX4 only
 }
 _ARMED, _CRITICAL = 128, 5  # bit of HEARTBEAT.base_mode; MAV_STATE_CRITICAL: from it on a failsafe is active
 _LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME

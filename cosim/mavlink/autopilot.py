@@ -8,7 +8,6 @@ from typing import Any
 
 from cosim.mavlink.event_texts import EventTexts
 from cosim.mavlink.messages import status
-from cosim.mavlink.messages.message_table import HEARTBEAT
 from cosim.mavlink.messages.streams import Streams
 from cosim.mavlink.services.attitude_targets import AttitudeTargets
 from cosim.mavlink.services.command_protocol import CommandProtocol
@@ -196,7 +195,7 @@ class Autopilot:
                 streams.heartbeat_sent = False
                 self._heartbeat_at[link] = now
             elif now - self._heartbeat_at[link] >= _HEARTBEAT_PERIOD:
-                streams.send(HEARTBEAT)
+                streams.send(context.mavlink.MAVLINK_MSG_ID_HEARTBEAT)
 
     def close(self, now: float) -> None:
         """Send a status text that the run has ended, and a last heartbeat in standby."""

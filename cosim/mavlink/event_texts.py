@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from controller.regions.region_set import of_attitude
 from cosim.mavlink.messages import status
-from cosim.mavlink.vehicle.profile import MODE_NAMES
+from cosim.mavlink.vehicle.profile import MODE_TABLE
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.vehicle.view import View
 from cosim.simulation.commands.mission_executor import passed_items
@@ -53,7 +53,7 @@ class EventTexts:
         if view.armed != before.armed:
             context.send_text("Armed" if view.armed else "Disarmed", m.MAV_SEVERITY_NOTICE)
         if view.mode != before.mode:
-            context.send_text(f"Mode: {MODE_NAMES[view.mode]}", m.MAV_SEVERITY_NOTICE)
+            context.send_text(f"Mode: {MODE_TABLE[view.mode].name}", m.MAV_SEVERITY_NOTICE)
         if (view.armed, view.mode) != (before.armed, before.mode):
             for message in (*status.heartbeat(context), *status.current_mode(context)):
                 context.send(message)
@@ -70,7 +70,7 @@ class EventTexts:
         context = self._context
         if not 0 <= item < len(context.mission_items) or context.mission_items[item].position is None:
             return
-        number = item + int(context.profile.home_is_first)
+        number = item + int(context.profile.has_home_item)
         context.send(context.make("MISSION_ITEM_REACHED", number))
         context.send_text(f"Reached mission item {number}")
 

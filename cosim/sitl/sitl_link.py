@@ -29,7 +29,7 @@ ESTIMATE = (
     Diagnostic("armed", "", "The autopilot says that it is armed"),
 )
 
-_RATES = {0: 5.0, 31: 50.0, 32: 50.0}  # Hz, by message id: HEARTBEAT, ATTITUDE_QUATERNION, LOCAL_POSITION_NED
+_RATES = {"HEARTBEAT": 5.0, "ATTITUDE_QUATERNION": 50.0, "LOCAL_POSITION_NED": 50.0}  # Hz
 _RECEIVE_PERIOD = 0.005  # s of simulated time between two readings of the link
 _REQUEST_PERIOD, _HEARTBEAT_PERIOD = 10.0, 1.0  # s of the link's clock
 _MICRO = 1e6
@@ -157,7 +157,8 @@ class AutopilotLink:
             self._link.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, m.MAV_STATE_ACTIVE, 3))
         if system is not None and now - self._requested >= _REQUEST_PERIOD:
             self._requested = now
-            for message_id, rate in _RATES.items():
+            for name, rate in _RATES.items():
+                message_id = getattr(m, f"MAVLINK_MSG_ID_{name}")
                 self._link.send(
                     m.MAVLink_command_long_message(
                         system, 1, m.MAV_CMD_SET_MESSAGE_INTERVAL, 0, message_id, 1e6 / rate, 0, 0, 0, 0, 0

@@ -146,7 +146,7 @@ class FileServer(Service):
         name, _, query = path.lstrip("/").partition("?")
         if name != f"{_FOLDER}/{_FILE}":
             raise RefusedError(_NOT_FOUND)
-        everything = self._parameters.all()
+        everything = self._parameters.list_values()
         start, count = _number(query, "start", 0), _number(query, "count", len(everything))
         return pack_parameters(everything[start : start + count], len(everything))
 

@@ -123,7 +123,7 @@ class ManualControlService(Service):
 
     def _wrench(self, message: Any) -> Vector6:
         """Return X Y Z K M N from -1 to 1; the vertical stick is positive up, Z is positive down."""
-        center = self.context.profile.centred_stick
+        center = self.context.profile.centered_stick
         up = 0.0 if message.z == _INVALID else _part((message.z - center) / (_FULL - center))
         full = self.context.profile.full_tilt_stick
         roll = _axis(message.t, full) if message.enabled_extensions & _ROLL else 0.0

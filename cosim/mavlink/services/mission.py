@@ -56,7 +56,7 @@ class MissionProtocol(Service):
         self._targets, self._parameters = targets, parameters
         self._under_way = -1  # item of the last snapshot
         self._upload: _Upload | None = None
-        self._first = int(context.profile.home_is_first)
+        self._first = int(context.profile.has_home_item)
         self.messages = {
             "MISSION_REQUEST_LIST": self._count,
             "MISSION_REQUEST": self._item,

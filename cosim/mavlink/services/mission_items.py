@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from cosim.errors import CommandError
-from cosim.mavlink.services.parameter_protocol import shortest
+from cosim.mavlink.services.parameter_protocol import shorten_float32
 from cosim.mavlink.services.service import to_local_position, unscale_position
 from cosim.mavlink.services.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
@@ -99,7 +99,7 @@ def _change_speed(context: VehicleContext, item: ReceivedMissionItem) -> Mission
     if math.isnan(before) and item.param2 != -1.0:
         raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"law {context.scenario.law.name} has no speed")
     try:
-        speed = resolve_speed(context, shortest(item.param2))
+        speed = resolve_speed(context, shorten_float32(item.param2))
         if speed is None:
             return MissionItem(None)
         context.settings.change(SPEED, speed)
@@ -121,7 +121,7 @@ def _change_heading(context: VehicleContext, item: ReceivedMissionItem) -> Missi
 
 
 def _jump(context: VehicleContext, item: ReceivedMissionItem, count: int) -> MissionItem:
-    m, first = context.mavlink, int(context.profile.home_is_first)
+    m, first = context.mavlink, int(context.profile.has_home_item)
     to, times = round_finite(item.param1), round_finite(item.param2)
     if to is None or not 0 <= to - first < count:
         raise ItemError(

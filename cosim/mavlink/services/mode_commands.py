@@ -6,12 +6,12 @@ import math
 from typing import Any
 
 from cosim.mavlink.services.service import CommandRequest, Service
-from cosim.mavlink.vehicle.profile import MODE_NAMES, STANDARD_MODES, is_custom
+from cosim.mavlink.vehicle.profile import MODE_TABLE, is_custom
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.simulation.commands.commands import Arm, Command, Mode, Reset, SetMode, SetTarget
 
 _FORCE = 20190226  # PREFLIGHT_REBOOT_SHUTDOWN, parameter 6
-_MODES_BY_STANDARD: dict[int, Mode] = {number: mode for mode, number in STANDARD_MODES.items() if number}
+_MODES_BY_STANDARD: dict[int, Mode] = {entry.standard: mode for mode, entry in MODE_TABLE.items() if entry.standard}
 
 
 class ModeCommands(Service):
@@ -50,7 +50,7 @@ class ModeCommands(Service):
         if is_custom(message.base_mode) and self.context.profile.is_return(message.custom_mode):
             self._return_home(sender)
         elif is_custom(message.base_mode):
-            self._mode(sender, self.context.profile.mode_of(message.custom_mode), f"{message.custom_mode}")
+            self._mode(sender, self.context.profile.find_mode(message.custom_mode), f"{message.custom_mode}")
         else:
             self._mode(sender, None, f"of base mode {message.base_mode}")
 
@@ -61,7 +61,7 @@ class ModeCommands(Service):
         if self.context.profile.is_return(first << 16 | second << 24):  # MAVSDK's return to launch
             return self._return_home(request.sender)
         named = f"{first}" if not second else f"{first}, {second}"
-        return self._mode(request.sender, self.context.profile.mode_of_command(first, second), named)
+        return self._mode(request.sender, self.context.profile.find_commanded_mode(first, second), named)
 
     def _standard_mode(self, request: CommandRequest) -> int:
         number = request.int_param(1)
@@ -72,8 +72,8 @@ class ModeCommands(Service):
     def _mode(self, sender: Sender, mode: Mode | None, named: str) -> int:
         context = self.context
         if mode is None:
-            numbers = context.profile.numbers
-            known = ", ".join(f"{MODE_NAMES[mode].lower()} {number}" for mode, number in numbers.items())
+            numbers = context.profile.custom_modes
+            known = ", ".join(f"{MODE_TABLE[mode].name.lower()} {number}" for mode, number in numbers.items())
             context.reject(f"no such mode: {named}; profile {context.profile.name} has {known}", "mode")
             return int(context.mavlink.MAV_RESULT_FAILED)
         return self._steer(sender, mode)

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from cosim.errors import CommandError
-from cosim.mavlink.services.parameter_protocol import ParameterProtocol, shortest
+from cosim.mavlink.services.parameter_protocol import ParameterProtocol, shorten_float32
 from cosim.mavlink.services.service import CommandRequest, Service, to_local_position, unscale_position
 from cosim.mavlink.services.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.keep_in_regions import KeepInRegions
-from cosim.mavlink.vehicle.profile import MODE_NAMES
+from cosim.mavlink.vehicle.profile import MODE_TABLE
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import Command, SetHeading, SetMode, SetTarget
@@ -85,7 +85,7 @@ class Targets(Service):
                 )
         if early is not None and context.now - early[0] >= _PATIENCE:
             self._early = None
-            now, then = (MODE_NAMES[mode].lower() for mode in (context.mode_ahead, "reach"))
+            now, then = (MODE_TABLE[mode].name.lower() for mode in (context.mode_ahead, "reach"))
             text = f"Set-points wait: the mode is {now}, they count in {then}"
             context.send_text(text, context.mavlink.MAV_SEVERITY_NOTICE, "early", 10.0)
 
@@ -244,10 +244,10 @@ class Targets(Service):
 
     def _speed(self, request: CommandRequest) -> int:
         m, context = self.context.mavlink, self.context
-        if not self._parameters.has(SPEED):
+        if not self._parameters.has_setting(SPEED):
             return int(m.MAV_RESULT_UNSUPPORTED)
         try:
-            speed = resolve_speed(context, shortest(request[2]) if math.isfinite(request[2]) else request[2])
+            speed = resolve_speed(context, shorten_float32(request[2]) if math.isfinite(request[2]) else request[2])
         except CommandError as error:
             context.reject(str(error), "speed")
             return int(m.MAV_RESULT_DENIED)

@@ -447,7 +447,7 @@ def test_deflected_foreign_sticks_count_as_a_pilot(system, component, x, z, coun
 
 def test_a_px4_mode_is_known_before_its_next_heartbeat():
     """It sends a heartbeat a second, and refuses an interval for them; a mode is waited for 0.8 s."""
-    state, offboard = reported((0.0, 0.0, 0.0)), PROFILES["px4"].numbers["reach"]
+    state, offboard = reported((0.0, 0.0, 0.0)), PROFILES["px4"].custom_modes["reach"]
     state.take(1, 1, mavlink.MAVLink_current_mode_message(0, offboard, offboard), 5.0)
     assert state.mode == offboard
     assert RATES[mavlink.MAVLINK_MSG_ID_CURRENT_MODE] >= 5.0

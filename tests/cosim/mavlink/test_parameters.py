@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.services.packed_parameters import bare_crc32, hash_check
 from cosim.mavlink.services.parameter_names import parameter_names
-from cosim.mavlink.services.parameter_protocol import shortest
+from cosim.mavlink.services.parameter_protocol import shorten_float32
 from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios
@@ -276,7 +276,7 @@ def test_px4_parameter_hash_identifies_the_list():
 @settings(max_examples=examples(200))
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
 def test_shortest_decimal_round_trips_as_float32(value):
-    short = shortest(value)
+    short = shorten_float32(value)
     assert struct.pack("<f", short) == struct.pack("<f", value)
     assert significant(short) <= significant(value)
 
