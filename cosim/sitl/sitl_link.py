@@ -143,7 +143,7 @@ class AutopilotLink:
         self._received = motion.time
         now, reported = time.monotonic(), self._reported
         for one in self._link.receive(0.0):
-            reported.take(one.system, one.component, one.message, now)
+            reported.receive(one.system, one.component, one.message, now)
         self._request_streams(now)
         self.estimate[:3], self.estimate[3:6] = reported.position, reported.velocity
         if math.isfinite(reported.age(now)):

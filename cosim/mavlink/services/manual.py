@@ -9,11 +9,11 @@ import numpy as np
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.ardusub_sticks import (
     CLIMB_DEAD_ZONE,
-    LEAN,
     LEAN_DEAD_ZONE,
+    MAX_LEAN,
     YAW_DEAD_ZONE,
     MotorMixer,
-    beyond_dead_zone,
+    apply_dead_zone,
 )
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector6
@@ -114,10 +114,12 @@ class ManualControlService(Service):
             mixed = np.clip(self._mixer.wrench(np.where(is_force, scaled, 0.0)) * self._reciprocal, -1.0, 1.0) / scale
             parts[is_force] = mixed[is_force]
         if mode != "manual":  # beyond a dead zone, a rate of turn and angles
-            parts[5] = beyond_dead_zone(scaled[5], gain * YAW_DEAD_ZONE) / scale
-            parts[3:5] = [beyond_dead_zone(part, LEAN_DEAD_ZONE) * LEAN / GREATEST_TILT for part in parts[3:5].tolist()]
+            parts[5] = apply_dead_zone(scaled[5], gain * YAW_DEAD_ZONE) / scale
+            parts[3:5] = [
+                apply_dead_zone(part, LEAN_DEAD_ZONE) * MAX_LEAN / GREATEST_TILT for part in parts[3:5].tolist()
+            ]
         if mode == "depth_hold":  # likewise of the depth
-            parts[2] = beyond_dead_zone(scaled[2], gain * CLIMB_DEAD_ZONE)
+            parts[2] = apply_dead_zone(scaled[2], gain * CLIMB_DEAD_ZONE)
         x, y, z, k, m, n = np.clip(parts, -1.0, 1.0).tolist()
         return x, y, z, k, m, n
 

@@ -449,7 +449,7 @@ def test_conflicting_system_id_is_reported_once(tmp_path, caplog):
     flight = Flight(tmp_path, 4.0, link=link, events=told)
     assert flight.status == "completed"
     assert [r.getMessage() for r in caplog.records if "compete" in r.getMessage()] == [
-        "component 190 has the companion's system id 255: its sticks compete; give it another"
+        "component 190 has the companion's system id 255: its sticks compete; change its system id"
     ]
 
 
@@ -472,7 +472,7 @@ def test_documented_tables_match_the_code():
     page = (ROOT / "docs" / "howto" / "companion.md").read_text()
     for condition in CONDITIONS:
         limit = f"{condition.limit:g} {condition.unit}" if condition.unit else "any"
-        assert f"| {condition.name} | {limit} | {condition.words} | {condition.then} |" in page
+        assert f"| {condition.name} | {limit} | {condition.words} | {condition.next_state} |" in page
     for number, state in enumerate(STATES):
         assert f"| {number} | {state.replace('_', ' ')} | {MEANINGS[state]} |" in page
 

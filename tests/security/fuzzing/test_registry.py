@@ -24,7 +24,7 @@ METHODS = {
 }  # fmt: skip
 ITS_OWN = {  # what parses nothing that comes from outside: why
     "controller.laws.deployable.braking:_least_forces": "an array in memory",
-    "cosim.companion.failsafes:Failsafes.take": "the four bytes of a number of a message",
+    "cosim.companion.failsafes:Failsafes.receive": "the four bytes of a number of a message",
     "cosim.campaigns.reruns.repeat:_of_sweep": "a copy of the plan, which was read",
     "cosim.campaigns.store.folder:CampaignFolder._claim": "a copy of its own plan",
     "cosim.campaigns.sweeps.rows:_for_json": "a copy of its own plan",
