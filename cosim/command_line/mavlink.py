@@ -60,16 +60,20 @@ def _ground_link(options: argparse.Namespace) -> Any:
 
 def listen(options: argparse.Namespace) -> int:
     """Run ``cosim listen``."""
-    from cosim.mavlink.listening import Watch, follow, picture
+    from cosim.mavlink.listening import TelemetryTable, follow, format_table
 
-    watch = Watch()
+    watch = TelemetryTable()
     live = sys.stdout.isatty() and not options.once
     seconds = options.seconds or (_ONCE if options.once else None)
     period = _REDRAW if live else max(_SNAPSHOT, (seconds or 0.0) + 1.0 if options.once else 0.0)
     with _ground_link(options) as link, _screen(live) as show:
         for now in follow(link, watch, period, seconds, options.count):
             size = shutil.get_terminal_size((_WIDE, 24))
-            show(picture(link, watch, now, size.columns, size.lines) if live else picture(link, watch, now, _WIDE))
+            show(
+                format_table(link, watch, now, size.columns, size.lines)
+                if live
+                else format_table(link, watch, now, _WIDE)
+            )
     return 0 if watch.total else 1
 
 
@@ -106,6 +110,6 @@ def stream(options: argparse.Namespace) -> int:
     endpoints, mavlink = links_from(options)
     done = replay(options.folder, endpoints, mavlink, None if options.rate == math.inf else options.rate)
     say(options, f"{options.folder}: {done.simulated:.1f} s streamed in {done.wall:.1f} s")
-    for trouble in done.troubles:
+    for trouble in done.loss_reports:
         print_status(trouble)
     return 0

@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.companion.safety import CONDITIONS, STATES
 from cosim.companion.session import AutopilotSession
-from cosim.mavlink.vehicle.row_layout import euler_of
+from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 from cosim.simulation.stepped_plant import vehicle_channels
@@ -119,13 +119,13 @@ class RemoteVehicle:
         self._write("position.x", position)
         self._write("quaternion.e0", quaternion)
         self._write("velocity.u", reported.velocity_body)
-        self._write("attitude.roll", euler_of(quaternion.tolist()))
+        self._write("attitude.roll", quaternion_to_euler(quaternion.tolist()))
         self._write("altitude", (reported.altitude,))
         self._write("measured.depth", (position[2],))
         self._write("measured.velocity.u", reported.velocity_body[:3])
         self._write("measured.altitude", (reported.altitude,))
         self._write("measured.angular_velocity.p", rates)
-        self._write("measured.heading", (euler_of(quaternion.tolist())[2],))
+        self._write("measured.heading", (quaternion_to_euler(quaternion.tolist())[2],))
         self._write("measured.position.x", position)
         self._write_forces()
         supervisor = session.supervisor
@@ -138,7 +138,7 @@ class RemoteVehicle:
         )
         self._write("companion.state", (state, reason, session.lateness, reported.sync.round_trip))
         output = session.output
-        self._write("stick.X", (*output.sticks, *output.velocity, *euler_of(output.attitude.tolist())))
+        self._write("stick.X", (*output.sticks, *output.velocity, *quaternion_to_euler(output.attitude.tolist())))
 
     def _write_forces(self) -> None:
         """Write the thruster forces [N] of the autopilot's servo outputs, and their wrench."""

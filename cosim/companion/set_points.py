@@ -10,7 +10,7 @@ import numpy as np
 
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.vehicle_state import ReportedState
-from cosim.mavlink.vehicle.row_layout import euler_of
+from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
 from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, make_attitude_target
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
@@ -61,7 +61,7 @@ class TurnLead:
         weight, drag and eccentric thrusters do not mean a tilt.
         """
         roll, pitch, yaw = np.clip(_ANGLE_LAG * self.rates(wrench, state), -_MAX_LEAD, _MAX_LEAD)
-        now = euler_of(state.quaternion.tolist())
+        now = quaternion_to_euler(state.quaternion.tolist())
         tilt = [
             min(max(angle + lead, -_MAX_TILT), _MAX_TILT) for angle, lead in zip(now[:2], (roll, pitch), strict=True)
         ]

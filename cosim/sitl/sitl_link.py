@@ -13,7 +13,7 @@ import numpy as np
 from controller.law import Diagnostic
 from cosim.companion.vehicle_state import ReportedState
 from cosim.errors import TelemetryError
-from cosim.mavlink.vehicle.row_layout import euler_of
+from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.ground_end import GroundLink, Identity
@@ -147,7 +147,7 @@ class AutopilotLink:
         self._request_streams(now)
         self.estimate[:3], self.estimate[3:6] = reported.position, reported.velocity
         if math.isfinite(reported.age(now)):
-            self.estimate[6:9] = euler_of(reported.quaternion.tolist())
+            self.estimate[6:9] = quaternion_to_euler(reported.quaternion.tolist())
         self.estimate[9:] = reported.mode, reported.is_armed
 
     def _request_streams(self, now: float) -> None:

@@ -60,7 +60,7 @@ def vfr_hud(context: VehicleContext) -> list[Any]:
     north, east, down = view.velocity_ned
     speed = math.hypot(*view.velocity_body)
     heading = round(degrees(view.heading)) % 360 if math.isfinite(view.heading) else math.nan
-    throttle = max(map(abs, context.thrust_parts()), default=0.0)
+    throttle = max(map(abs, context.thrust_fractions()), default=0.0)
     values = speed, math.hypot(north, east), heading, 100.0 * throttle, -view.position_ned[2], -down
     return [context.make("VFR_HUD", *values)]
 

@@ -40,9 +40,9 @@ class ManualControlService(Service):
         super().__init__(context)
         self.messages = {"MANUAL_CONTROL": self._manual_control, "RC_CHANNELS_OVERRIDE": self._override}
         vehicle = context.scenario.vehicle
-        reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+        max_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._mixer = None if vehicle.autopilot is None else MotorMixer(vehicle)
-        self._reciprocal = np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0)
+        self._reciprocal = np.divide(1.0, max_wrench, out=np.zeros(6), where=max_wrench > 0.0)
         self._received_at: float | None = None
         self._state = (context.armed, context.mode)
 
@@ -75,7 +75,7 @@ class ManualControlService(Service):
         surge, sway, heave, roll, pitch, yaw = self.context.sticks
         before = pitch, roll, -heave, yaw, surge, sway
         pitch, roll, up, yaw, surge, sway = (
-            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTER) / _SWING)
+            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _clip((pulse - _CENTER) / _SWING)
             for pulse, old in zip(pulses, before, strict=True)
         )
         self._apply(sender, (surge, sway, -up + 0.0, roll, pitch, yaw), by_gain=False)
@@ -93,11 +93,11 @@ class ManualControlService(Service):
         context = self.context
         if sticks == context.sticks:
             return
-        command = ManualControl(self._parts(sticks, by_gain), by_gain)
+        command = ManualControl(self._wrench_fractions(sticks, by_gain), by_gain)
         if context.submit(command) == context.mavlink.MAV_RESULT_ACCEPTED:
             context.sticks = sticks
 
-    def _parts(self, sticks: Vector6, by_gain: bool) -> Vector6:
+    def _wrench_fractions(self, sticks: Vector6, by_gain: bool) -> Vector6:
         """Return the fractions of the greatest wrench that the sticks command, before the pilot gain.
 
         ArduSub commands its thrusters by gain times stick, and their force is proportional to the square of the sum.
@@ -126,7 +126,7 @@ class ManualControlService(Service):
     def _wrench(self, message: Any) -> Vector6:
         """Return X Y Z K M N from -1 to 1; the vertical stick is positive up, Z is positive down."""
         center = self.context.profile.centered_stick
-        up = 0.0 if message.z == _INVALID else _part((message.z - center) / (_FULL - center))
+        up = 0.0 if message.z == _INVALID else _clip((message.z - center) / (_FULL - center))
         full = self.context.profile.full_tilt_stick
         roll = _axis(message.t, full) if message.enabled_extensions & _ROLL else 0.0
         pitch = _axis(message.s, full) if message.enabled_extensions & _PITCH else 0.0
@@ -134,8 +134,8 @@ class ManualControlService(Service):
 
 
 def _axis(value: int, full: float = _FULL) -> float:
-    return 0.0 if value == _INVALID else _part(value / full)
+    return 0.0 if value == _INVALID else _clip(value / full)
 
 
-def _part(value: float) -> float:
+def _clip(value: float) -> float:
     return max(-1.0, min(1.0, value))

@@ -12,7 +12,7 @@ from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 
 _E7 = 1e-7
 _MM = 1e-3
-_FARTHEST_HOME = 1e5  # m
+_MAX_HOME_DISTANCE = 1e5  # m
 
 
 class Origin(Service):
@@ -47,14 +47,14 @@ class Origin(Service):
         m, context = self.context.mavlink, self.context
         if not context.accepts_commands:
             return context.submit()
-        place = (
+        position = (
             context.view.position_ned
             if request[1] == 1.0
             else to_local_position(context, request.frame, request[5], request[6], 0.0)
         )
-        if place is None or not math.hypot(place[0], place[1]) <= _FARTHEST_HOME:
+        if position is None or not math.hypot(position[0], position[1]) <= _MAX_HOME_DISTANCE:
             return int(m.MAV_RESULT_DENIED)
-        context.home = place[0], place[1]
+        context.home = position[0], position[1]
         context.active_gcs.record_command(request.sender.system)
         for message in pose.home_position(context):
             context.send(message)

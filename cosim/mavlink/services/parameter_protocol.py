@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.errors import CommandError
-from cosim.mavlink.services.packed_parameters import hash_check
+from cosim.mavlink.services.packed_parameters import hash_parameters
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.services.station_parameters import station_parameters
@@ -155,7 +155,7 @@ class ParameterProtocol(Service):
 
     def _send_hash(self, link: MessageSink) -> None:
         m = self.context.mavlink
-        (bits,) = struct.unpack("<f", struct.pack("<I", hash_check(dict(self.list_values()))))
+        (bits,) = struct.unpack("<f", struct.pack("<I", hash_parameters(dict(self.list_values()))))
         link.send(
             m.MAVLink_param_value_message(_HASH.encode(), bits, m.MAV_PARAM_TYPE_UINT32, len(self.names), _NO_INDEX)
         )

@@ -23,7 +23,7 @@ from cosim.companion.vehicle_state import RATES, ReportedState
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.profile import PROFILES
-from cosim.mavlink.vehicle.row_layout import euler_of
+from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.thrust_body import get_thrust_body
 from cosim.simulation.commands.commands import ManualControl
@@ -223,7 +223,7 @@ def test_state_is_predicted_over_its_age():
     state.receive(1, 1, mavlink.MAVLink_attitude_quaternion_message(0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3), 10.0)
     position, quaternion = state.predict(10.04)
     assert position == pytest.approx([1.02, 2.0, 2.99])
-    assert euler_of(quaternion.tolist()) == pytest.approx((0.0, 0.0, 0.012))
+    assert quaternion_to_euler(quaternion.tolist()) == pytest.approx((0.0, 0.0, 0.012))
     assert state.predict(20.0)[0] == pytest.approx([1.05, 2.0, 2.975])
     never = ReportedState((255, 191))
     assert np.isnan(never.predict(0.0)[0]).all()
@@ -257,10 +257,10 @@ def test_attitude_setpoint_leads_by_the_desired_moment():
     acceleration = (angle / 0.3 - state.rates) / 0.3
     assert acceleration * inertia == pytest.approx([0.1, 0.0, -0.2], abs=0.01)
     far = lead.attitude(np.array([0, 0, 0, 1e3, 0.0, 0.0]), state)
-    assert euler_of(far.tolist())[0] == pytest.approx(0.1)  # the autopilot keeps it level but for so much
+    assert quaternion_to_euler(far.tolist())[0] == pytest.approx(0.1)  # the autopilot keeps it level but for so much
     still = reported((0.0, 0.0, 0.0))
     assert lead.attitude(np.full(6, math.nan), still) == pytest.approx([1.0, 0.0, 0.0, 0.0])
-    assert euler_of(lead.attitude(np.array([0, 0, 0, 0, 0, 1e3]), still).tolist())[2] == pytest.approx(0.35)
+    assert quaternion_to_euler(lead.attitude(np.array([0, 0, 0, 0, 0, 1e3]), still).tolist())[2] == pytest.approx(0.35)
 
 
 def test_three_axis_thrust_uses_the_published_attitude_target_extension():

@@ -144,7 +144,7 @@ def test_ignored_setpoints_are_announced(station):
         station.send(local())
         station.wait(0.1)
     (text,) = texts(station)
-    assert text == "Set-points wait: the mode is position hold, they count in region reaching"
+    assert text == "Set-points wait: the mode is position hold, they apply in region reaching"
     assert {m.severity for m in station.wire.of("STATUSTEXT")} == {mavlink.MAV_SEVERITY_NOTICE}
 
 

@@ -246,12 +246,12 @@ def test_a_budget_thins_streams_before_answers(monkeypatch):
 def test_stalled_thread_drops_oldest_snapshots_and_reports_the_count(caplog):
     vehicle = StubVehicle()
     links = LinkThread(vehicle, [], step=0.01)
-    for k in range(thread.SNAPSHOTS + 904):
+    for k in range(thread.MAX_SNAPSHOTS + 904):
         links.observe(k, row(k * 0.01))
     assert links.dropped == 904
     links.start()
     links.close()
-    assert vehicle.rows[0][0] == pytest.approx(9.04) and len(vehicle.rows) == thread.SNAPSHOTS
+    assert vehicle.rows[0][0] == pytest.approx(9.04) and len(vehicle.rows) == thread.MAX_SNAPSHOTS
     assert "904 snapshots dropped" in caplog.text
 
 

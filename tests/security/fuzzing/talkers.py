@@ -18,8 +18,8 @@ from cosim.live.address import foreign_origin, parse_live
 from cosim.live.command_desk import MAX_LENGTH, CommandDesk
 from cosim.live.viewer_messages import bytes_of, text_of
 from cosim.live.watching import looks, picture
-from cosim.mavlink.listening import Watch
-from cosim.mavlink.listening import picture as table
+from cosim.mavlink.listening import TelemetryTable
+from cosim.mavlink.listening import format_table as table
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.framing import FrameFilter, RxStats, StreamReader
 from cosim.mavlink.wire.ground_end import ReceivedMessage
@@ -157,7 +157,7 @@ def to_ground(seeds: Seeds) -> Case:
             return []
 
     def read(content: bytes) -> None:
-        watch = Watch()
+        watch = TelemetryTable()
         for _, m in FrameFilter(RxStats()).read_datagram(content):
             watch.add(ReceivedMessage(1.0, m.get_srcSystem(), m.get_srcComponent(), m.get_seq(), m.get_type(), m))
         watch.sample(2.0)
