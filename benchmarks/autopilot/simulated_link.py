@@ -13,7 +13,7 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GROUND_STATION, GroundLink, ReceivedMessage
 from cosim.sitl.json_server import JsonServer
-from cosim.sitl.sitl_session import Flights
+from cosim.sitl.sitl_session import SitlSession
 
 _DOWN, _UP = 0.010, 0.020  # s, delays of messages from the autopilot and to it
 _READ_EVERY = 0.004  # s, period of reading the autopilot's port
@@ -24,7 +24,7 @@ class SimulatedLink:
 
     Parameters
     ----------
-    flights : Flights
+    flights : SitlSession
         Runs of the plant.
     server : JsonServer
         Server that answers the autopilot's frames.
@@ -43,7 +43,7 @@ class SimulatedLink:
         Times [s] and functions to call at them, in the order of time.
     """
 
-    def __init__(self, flights: Flights, server: JsonServer, endpoint: str) -> None:
+    def __init__(self, flights: SitlSession, server: JsonServer, endpoint: str) -> None:
         self._flights, self._server = flights, server
         self._link = GroundLink(parse_endpoint(endpoint), identity=COMPANION)
         self.name, self.identity = endpoint, COMPANION

@@ -16,7 +16,7 @@ from cosim.campaigns import vary_from
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.live.address import foreign_origin, parse_live
 from cosim.live.command_desk import MAX_LENGTH, CommandDesk
-from cosim.live.viewer_messages import bytes_of, text_of
+from cosim.live.viewer_messages import format_message, write_rows
 from cosim.live.watching import looks, picture
 from cosim.mavlink.listening import TelemetryTable
 from cosim.mavlink.listening import format_table as table
@@ -29,7 +29,7 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import CommandQueue
 from cosim.sitl import json_protocol
 from cosim.sitl.hil_server import HilServer
-from cosim.sitl.law import law_of_controls, law_of_pwm
+from cosim.sitl.law import make_control_law, make_pwm_law
 from cosim.sitl.sitl_session import FrameCounts as HilCounts
 from fuzzy_arbiter.rule_text import parse_rule
 from plant_fmu import load_vehicle
@@ -73,17 +73,17 @@ class _Connection:
         return iter(self._messages)
 
 
-@reader("live view", "jsonl", "cosim.live.watching.run_views:_live", "cosim.live.viewer_messages:rows_of")
+@reader("live view", "jsonl", "cosim.live.watching.run_views:_live", "cosim.live.viewer_messages:read_rows")
 def live_view(seeds: Seeds) -> Case:
     scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
     columns = load_columns(seeds)
     viewing = ViewColumns(scenario, columns)
     header = header_of(scenario, viewing.columns, commands=True)
-    rows = bytes_of(np.zeros((2, len(viewing.columns))))
+    rows = write_rows(np.zeros((2, len(viewing.columns))))
     texts = [
-        text_of("header", run=header),
-        text_of("said", kind="info", text="a word", time=None),
-        text_of("end", status="completed", verdict="It came to its end."),
+        format_message("header", run=header),
+        format_message("said", kind="info", text="a word", time=None),
+        format_message("end", status="completed", verdict="It came to its end."),
     ]
     console = Console(width=100, quiet=True)
 
@@ -170,7 +170,7 @@ def to_ground(seeds: Seeds) -> Case:
 def to_simulator(seeds: Seeds) -> Case:
     server: Any = HilServer.__new__(HilServer)
     server.counts, server._mavlink = HilCounts(), mavlink
-    law = law_of_controls(load_vehicle("bluerov2_heavy"))
+    law = make_control_law(load_vehicle("bluerov2_heavy"))
     codec = mavlink.MAVLink(None, 1, 1)
     frames = b"".join(
         mavlink.MAVLink_hil_actuator_controls_message(1, [0.1] * 16, 128, 0).pack(codec) for _ in range(3)
@@ -184,16 +184,18 @@ def to_simulator(seeds: Seeds) -> Case:
     return Case((frames,), read)
 
 
-@reader("servo packet", "bytes", "cosim.sitl.json_protocol:decode")
+@reader("servo packet", "bytes", "cosim.sitl.json_protocol:parse_packet")
 def servos(seeds: Seeds) -> Case:
-    law = law_of_pwm(load_vehicle("bluerov2_heavy"))
+    law = make_pwm_law(load_vehicle("bluerov2_heavy"))
 
     def read(content: bytes) -> None:
-        packet = json_protocol.decode(content)
+        packet = json_protocol.parse_packet(content)
         if packet is not None:
             law.set_outputs(packet.pwm)
 
-    packets = [json_protocol._MAGICS[magic].pack(magic, 400, 7, *[1500] * n) for magic, n in ((18458, 16), (29569, 32))]
+    packets = [
+        json_protocol._PACKINGS[magic].pack(magic, 400, 7, *[1500] * n) for magic, n in ((18458, 16), (29569, 32))
+    ]
     return Case(tuple(packets), read)
 
 
