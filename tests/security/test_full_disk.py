@@ -19,8 +19,8 @@ from cosim.run.run_folder import claim
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.commands import ManualControl, SetTarget
 from cosim.simulation.commands.sources import ScheduledCommands, read_log
-from cosim.sitl.sitl_flight import Flight
 from cosim.sitl.law import make_pwm_law
+from cosim.sitl.sitl_flight import Flight
 from cosim.sitl.sitl_scenario import scenario_to_fly
 from tests.faults import FAIL_ON, FAIL_ONCE, arm, call_with_faults, count, needs_faults
 
