@@ -20,11 +20,11 @@ from benchmarks.hostile import hostile_datagrams
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing, time_calls
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
-from cosim.mavlink.messages import MESSAGES
+from cosim.mavlink.messages.message_table import message_specs
 from cosim.mavlink.thread import LinkThread
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.dialect import dialect
-from cosim.mavlink.wire.framing import Counts, Gate
+from cosim.mavlink.wire.framing import FrameFilter, RxStats
 from cosim.mavlink.wire.link import Link, Signer
 from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
@@ -83,7 +83,7 @@ class Seventeen:
                 self._send(number)
 
     def _send(self, number: int) -> None:
-        for message in MESSAGES[number].build(self._context):
+        for message in message_specs()[number].build(self._context):
             self._context.send(message)
 
     def close(self, now: float) -> None:
@@ -133,10 +133,10 @@ def _messages(calls: int, repeats: int) -> list[Row]:
             "message: the same, signed": lambda: signed.send(attitude),
             "message: encode and send ODOMETRY": lambda: plain.send(odometry),
         }
-        gate = Gate(Counts(), _SOURCE)
+        rx = FrameFilter(RxStats(), _SOURCE)
         frames = {"accepted": attitude.pack(mavlink.MAVLink(None, 255, 190)), "random": next(hostile_datagrams(1, 0))}
         for name, frame in frames.items():
-            works[f"message: check and decode, {name}"] = lambda frame=frame: list(gate.datagram(frame))
+            works[f"message: check and decode, {name}"] = lambda frame=frame: list(rx.read_datagram(frame))
         for name, work in works.items():
             timings[name] = time_calls(work, calls, repeats)
         plain.channel.close()
@@ -227,7 +227,7 @@ def _under_flood(datagrams: int, steps: int, repeats: int) -> list[Row]:
                 errors += failures
                 if case == "flood":
                     grown = max(grown, _resident() - before if repeat else 0.0)  # the first repeat fills the caches
-                    looked.append(_total_count(link.counts) / datagrams)
+                    looked.append(_total_count(link.stats) / datagrams)
         timings: dict[str, Timing | str] = {}
         for case, all_times in found.items():
             for quantile, word in ((0.5, "median"), (0.999, "99.9th percentile")):
@@ -250,7 +250,7 @@ def _flooded(datagrams: int, steps: int, pace: float | None, seed: int, *, at_us
         Time of each step from its due time to its end [s], the link, and the number of errors in its thread.
     """
     channel = UdpIn("127.0.0.1", 0)
-    link = Link("flooded", channel, Gate(Counts(), _SOURCE), _SOURCE)
+    link = Link("flooded", channel, FrameFilter(RxStats(), _SOURCE), _SOURCE)
     times = []
     with (
         _endless() as master,
@@ -291,7 +291,7 @@ def _attacker(port: int, datagrams: int, seed: int) -> Iterator[Callable[[int, i
         yield lambda k, steps: (k + 1) % 16 > 0 or process.poll() is None  # poll every 16 steps
 
 
-def _total_count(counts: Counts) -> int:
+def _total_count(counts: RxStats) -> int:
     return sum(getattr(counts, name) for name in counts.__slots__)
 
 
@@ -305,7 +305,7 @@ def _resident() -> float:
 
 
 def _link(port: int, signer: Signer | None = None) -> Link:
-    return Link("benchmark", UdpOut("127.0.0.1", port), Gate(Counts(), _SOURCE), _SOURCE, signer=signer)
+    return Link("benchmark", UdpOut("127.0.0.1", port), FrameFilter(RxStats(), _SOURCE), _SOURCE, signer=signer)
 
 
 @contextlib.contextmanager

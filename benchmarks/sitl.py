@@ -12,10 +12,10 @@ from benchmarks import sitl_pilot
 from benchmarks.sitl_pilot import HEAD, MAGIC, PULSES, RATE, WARMING
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing, time_calls
-from cosim.sitl import wire
-from cosim.sitl.flights import FlightOptions, Flights
-from cosim.sitl.law import law_of_pwm
-from cosim.sitl.server import JsonServer
+from cosim.sitl import json_protocol
+from cosim.sitl.json_server import JsonServer
+from cosim.sitl.law import make_pwm_law
+from cosim.sitl.sitl_session import FlightOptions, SitlSession
 
 STEPS = 12_000
 RATIO = "how many times as long as the plant's step"
@@ -36,11 +36,11 @@ def measure(steps: int, repeats: int) -> list[Row]:
     """
     timings: dict[str, Timing | str] = {}
     with tempfile.TemporaryDirectory() as folder:
-        flights = Flights(FlightOptions(out=Path(folder) / "run", report=False), "ardupilot", law_of_pwm)
+        flights = SitlSession(FlightOptions(out=Path(folder) / "run", report=False), "ardupilot", make_pwm_law)
         flight = flights.begin(RATE)
         packet = HEAD.pack(MAGIC, RATE, 7) + PULSES
         motion = flight.step()
-        decoded = wire.decode(packet)
+        decoded = json_protocol.parse_packet(packet)
         assert decoded is not None
         outputs = decoded.pwm
 
@@ -48,10 +48,10 @@ def measure(steps: int, repeats: int) -> list[Row]:
             timings[name] = time_calls(work, steps, repeats)
 
         add_calls("FMU: one step", lambda: flight._master.plant.step(1.0 / RATE))
-        add_calls("packet read", lambda: wire.decode(packet))
+        add_calls("packet read", lambda: json_protocol.parse_packet(packet))
         add_calls("pulses to forces", lambda: flights.law.take(outputs))
         add_calls("master's step, record at 100 Hz, motion", flight.step)
-        add_calls("answer written", lambda: wire.encode(motion))
+        add_calls("answer written", lambda: json_protocol.format_motion(motion))
         flights.end("ended: measured")
     for what, record_rate in (("record at 100 Hz", 100.0), ("every step recorded", float(RATE))):
         timing = lockstep(steps, repeats, record_rate)
@@ -81,7 +81,7 @@ def lockstep(steps: int, repeats: int, record_rate: float = 100.0) -> Timing:
             options = FlightOptions(
                 overrides=overrides, out=Path(folder) / "run", record_rate=record_rate, report=False
             )  # fmt: skip
-            server = JsonServer(Flights(options, "ardupilot", law_of_pwm), ("127.0.0.1", 0), timeout=10.0)
+            server = JsonServer(SitlSession(options, "ardupilot", make_pwm_law), ("127.0.0.1", 0), timeout=10.0)
             command = [sys.executable, sitl_pilot.__file__, str(server.address[1]), str(steps)]
             with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as pilot:
                 server.serve()

@@ -20,14 +20,14 @@ if TYPE_CHECKING:
     from cosim.campaigns.scenes.generator import generate_scenes
     from cosim.campaigns.scenes.scene import Scene
     from cosim.campaigns.scenes.scene_file import read_scenes
-    from cosim.companion.companion import Companion
+    from cosim.companion.autopilot_link import NetworkLink
+    from cosim.companion.companion_options import CompanionOptions
+    from cosim.companion.companion_run import Companion
     from cosim.companion.frame_alignment import SceneOrigin
-    from cosim.companion.link import NetworkLink
-    from cosim.companion.options import CompanionOptions
     from cosim.errors import CosimError, RunError
     from cosim.export import export_run
     from cosim.logs import import_log
-    from cosim.mavlink.setup import Mavlink
+    from cosim.mavlink.run_links import Mavlink
     from cosim.mavlink.wire.endpoint import parse_endpoint
     from cosim.mavlink.wire.options import MavlinkOptions
     from cosim.precheck.precheck import Check, check_scenario
@@ -80,14 +80,14 @@ _EXPORTS = {
     "campaigns.scenes.generator": {"generate_scenes"},
     "campaigns.scenes.scene": {"Scene"},
     "campaigns.scenes.scene_file": {"read_scenes"},
-    "companion.companion": {"Companion"},
+    "companion.companion_run": {"Companion"},
     "companion.frame_alignment": {"SceneOrigin"},
-    "companion.link": {"NetworkLink"},
-    "companion.options": {"CompanionOptions"},
+    "companion.autopilot_link": {"NetworkLink"},
+    "companion.companion_options": {"CompanionOptions"},
     "errors": {"CosimError", "RunError"},
     "export": {"export_run"},
     "logs": {"import_log"},
-    "mavlink.setup": {"Mavlink"},
+    "mavlink.run_links": {"Mavlink"},
     "mavlink.wire.endpoint": {"parse_endpoint"},
     "mavlink.wire.options": {"MavlinkOptions"},
     "precheck.precheck": {"Check", "check_scenario"},

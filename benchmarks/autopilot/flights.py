@@ -22,19 +22,19 @@ from typing import Any
 from benchmarks.autopilot.judgement import Flown, judge
 from benchmarks.autopilot.scenes import random_scene
 from benchmarks.autopilot.simulated_link import FAULTS, SimulatedLink
-from cosim.companion.companion import Companion
+from cosim.companion.companion_options import CompanionOptions
+from cosim.companion.companion_run import Companion
 from cosim.companion.frame_alignment import SceneOrigin
-from cosim.companion.options import CompanionOptions
 from cosim.errors import CosimError, RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GROUND_STATION, GroundLink
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.scenario.scenario import Scenario, load_scenario
-from cosim.sitl.autopilot_link import AutopilotLink, DvlOptions
-from cosim.sitl.flights import FlightOptions, Flights
-from cosim.sitl.law import law_of_pwm
-from cosim.sitl.server import JsonServer
+from cosim.sitl.json_server import JsonServer
+from cosim.sitl.law import make_pwm_law
+from cosim.sitl.sitl_link import DvlOptions, SitlLink
+from cosim.sitl.sitl_session import FlightOptions, SitlSession
 
 _RANDOM = "random-"  # prefix of random scenes, before the seed
 RATE = 400  # Hz, rate of the autopilot's frames, that of its main loop
@@ -110,12 +110,12 @@ def fly(task: Task, ardusub: Path, instance: int, folder: Path) -> dict[str, Any
     port = 5760 + 10 * instance
     endpoints = [parse_endpoint(f"tcp:127.0.0.1:{port + i}") for i in (2, 3)]
     with contextlib.ExitStack() as stack:
-        estimate = AutopilotLink(endpoints[0], DvlOptions(8.0, 0.05) if task.is_random else None)
+        estimate = SitlLink(endpoints[0], DvlOptions(8.0, 0.05) if task.is_random else None)
         stack.callback(estimate.close)
         options = FlightOptions(
             file, (f"time.duration={_LONGEST}",), out=folder / "plant", record_rate=100.0, report=False
         )  # fmt: skip
-        flights = Flights(options, "ardupilot", lambda vehicle: law_of_pwm(vehicle, estimate))
+        flights = SitlSession(options, "ardupilot", lambda vehicle: make_pwm_law(vehicle, estimate))
         server = JsonServer(flights, ("127.0.0.1", 0), timeout=_PATIENCE)
         stack.callback(server.close)
         stack.enter_context(_running(ardusub, instance, server.address[1], folder, task))

@@ -7,13 +7,13 @@ from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from cosim.companion.link import COMPANION
+from cosim.companion.autopilot_link import COMPANION
 from cosim.errors import RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import parse_endpoint
-from cosim.mavlink.wire.ground_end import GROUND_STATION, GroundLink, Heard
-from cosim.sitl.flights import Flights
-from cosim.sitl.server import JsonServer
+from cosim.mavlink.wire.ground_end import GROUND_STATION, GroundLink, ReceivedMessage
+from cosim.sitl.json_server import JsonServer
+from cosim.sitl.sitl_session import SitlSession
 
 _DOWN, _UP = 0.010, 0.020  # s, delays of messages from the autopilot and to it
 _READ_EVERY = 0.004  # s, period of reading the autopilot's port
@@ -24,7 +24,7 @@ class SimulatedLink:
 
     Parameters
     ----------
-    flights : Flights
+    flights : SitlSession
         Runs of the plant.
     server : JsonServer
         Server that answers the autopilot's frames.
@@ -43,14 +43,14 @@ class SimulatedLink:
         Times [s] and functions to call at them, in the order of time.
     """
 
-    def __init__(self, flights: Flights, server: JsonServer, endpoint: str) -> None:
+    def __init__(self, flights: SitlSession, server: JsonServer, endpoint: str) -> None:
         self._flights, self._server = flights, server
         self._link = GroundLink(parse_endpoint(endpoint), identity=COMPANION)
         self.name, self.identity = endpoint, COMPANION
         self.cut, self.lost = False, set[str]()
         self.others: GroundLink | None = None
         self._up: deque[tuple[float, Any]] = deque()
-        self._down: deque[Heard] = deque()
+        self._down: deque[ReceivedMessage] = deque()
         self._read_at = -math.inf
         self.events: list[tuple[float, Callable[[], None]]] = []
 
@@ -64,7 +64,7 @@ class SimulatedLink:
         flight = self._flights.flight
         return 0.0 if flight is None else flight.waited * flight.scenario.time.step
 
-    def receive(self, timeout: float) -> Sequence[Heard]:
+    def receive(self, timeout: float) -> Sequence[ReceivedMessage]:
         """Advance the plant by `timeout` [s], and return the messages that have arrived."""
         until = self.clock() + timeout
         while self.clock() < until - 1e-9:
@@ -95,7 +95,7 @@ class SimulatedLink:
         if self.others is not None:
             self.others.receive(0.0)  # connects the link as well
         for one in self._link.receive(0.0):
-            if not self.cut and one.kind not in self.lost:
+            if not self.cut and one.name not in self.lost:
                 self._down.append(one._replace(time=now + _DOWN))
 
     def close(self) -> None:
@@ -114,7 +114,7 @@ def _pilot_takes(mode: int) -> Callable[[SimulatedLink], None]:
 def _pause(link: SimulatedLink) -> None:
     system, component = COMPANION
     m = dialect().MAVLink_command_long_message(system, component, 193, 0, 0, 0, 0, 0, 0, 0, 0)
-    link._down.append(Heard(link.clock() + _DOWN, *GROUND_STATION, 0, m.get_type(), m))
+    link._down.append(ReceivedMessage(link.clock() + _DOWN, *GROUND_STATION, 0, m.get_type(), m))
 
 
 FAULTS: dict[str, Callable[[SimulatedLink], None]] = {

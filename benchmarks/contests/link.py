@@ -43,7 +43,7 @@ def _frame(_: ExitStack) -> Contestant:
     framer, message = Framer(SOURCE), dialect().MAVLink_attitude_message(*ATTITUDE)
 
     def frame() -> None:
-        framer.frame(message)
+        framer.encode(message)
         framer.seq = (framer.seq + 1) % 256
 
     return Own(each(frame))

@@ -105,13 +105,13 @@ def add_verb(verbs: Any) -> None:
 
 def companion(options: argparse.Namespace) -> int:
     """Run ``cosim companion``."""
-    from cosim.companion.companion import Companion
+    from cosim.companion.autopilot_link import NetworkLink
+    from cosim.companion.companion_options import CompanionOptions
+    from cosim.companion.companion_run import Companion
     from cosim.companion.frame_alignment import SceneOrigin
-    from cosim.companion.link import NetworkLink
-    from cosim.companion.options import CompanionOptions
     from cosim.errors import TelemetryError
     from cosim.mavlink.wire.endpoint import parse_endpoint
-    from cosim.mavlink.wire.signing import read_key
+    from cosim.mavlink.wire.signing import load_key
     from cosim.scenario.scenario import load_scenario
 
     endpoint = parse_endpoint(options.endpoint, options.allow_remote)
@@ -124,7 +124,7 @@ def companion(options: argparse.Namespace) -> int:
         options.timeout,
     )  # fmt: skip
     scenario = load_scenario(options.scenario, options.overrides)
-    key = read_key(options.signing_key) if options.signing_key else None
+    key = load_key(options.signing_key) if options.signing_key else None
     with contextlib.ExitStack() as stack:
         link = stack.enter_context(NetworkLink(endpoint, key, (options.system_id, _COMPONENT), options.speedup))
         companion = Companion(scenario, link, chosen)

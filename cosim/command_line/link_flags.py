@@ -15,7 +15,7 @@ from cosim.live.address import HOST, PORT, parse_live
 from cosim.mavlink.wire.options import LOSS_ACTIONS, PROFILES, MavlinkOptions
 
 if TYPE_CHECKING:
-    from cosim.live.view import LiveView
+    from cosim.live.live_view import LiveView
     from cosim.mavlink.wire.endpoint import Endpoint
 
 _MAX_TIMEOUT = 3600.0  # s
@@ -104,7 +104,7 @@ def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOpti
         is given without another one that it requires.
     """
     from cosim.mavlink.wire.endpoint import parse_endpoint
-    from cosim.mavlink.wire.signing import read_key
+    from cosim.mavlink.wire.signing import load_key
 
     for name in ("await_arm", "link_loss", "link_timeout"):
         if getattr(options, name) and not options.commands:
@@ -113,7 +113,7 @@ def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOpti
     return [parse_endpoint(text, options.allow_remote) for text in options.mavlink], MavlinkOptions(
         profile=options.profile,
         commands=options.commands,
-        key=read_key(options.signing_key) if options.signing_key else None,
+        key=load_key(options.signing_key) if options.signing_key else None,
         allowed_systems=options.allow_system,
         system_id=options.system_id,
         origin=options.origin,
@@ -157,7 +157,7 @@ def open_live(options: argparse.Namespace, stack: contextlib.ExitStack) -> LiveV
     """
     if options.live is None:
         return None
-    from cosim.live.view import LiveView
+    from cosim.live.live_view import LiveView
 
     live = stack.enter_context(LiveView(parse_live(options.live, options.allow_remote)))
     print_status(f"the run is shown at {live.url}")

@@ -47,12 +47,12 @@ def _ground_link(options: argparse.Namespace) -> Any:
     from cosim.errors import TelemetryError
     from cosim.mavlink.wire.endpoint import parse_endpoint
     from cosim.mavlink.wire.ground_end import GroundLink
-    from cosim.mavlink.wire.signing import read_key
+    from cosim.mavlink.wire.signing import load_key
 
     endpoint = parse_endpoint(options.endpoint, options.allow_remote)
     if endpoint.kind == "tlog":
         raise TelemetryError(f"endpoint {options.endpoint!r}: expected a network or a serial device, not a file")
-    return GroundLink(endpoint, read_key(options.signing_key) if options.signing_key else None)
+    return GroundLink(endpoint, load_key(options.signing_key) if options.signing_key else None)
 
 
 # ---- listen --------------------------------------------------------------------------------------------------------
@@ -60,16 +60,20 @@ def _ground_link(options: argparse.Namespace) -> Any:
 
 def listen(options: argparse.Namespace) -> int:
     """Run ``cosim listen``."""
-    from cosim.mavlink.listening import Watch, follow, picture
+    from cosim.mavlink.listening import TelemetryTable, follow, format_table
 
-    watch = Watch()
+    watch = TelemetryTable()
     live = sys.stdout.isatty() and not options.once
     seconds = options.seconds or (_ONCE if options.once else None)
     period = _REDRAW if live else max(_SNAPSHOT, (seconds or 0.0) + 1.0 if options.once else 0.0)
     with _ground_link(options) as link, _screen(live) as show:
         for now in follow(link, watch, period, seconds, options.count):
             size = shutil.get_terminal_size((_WIDE, 24))
-            show(picture(link, watch, now, size.columns, size.lines) if live else picture(link, watch, now, _WIDE))
+            show(
+                format_table(link, watch, now, size.columns, size.lines)
+                if live
+                else format_table(link, watch, now, _WIDE)
+            )
     return 0 if watch.total else 1
 
 
@@ -106,6 +110,6 @@ def stream(options: argparse.Namespace) -> int:
     endpoints, mavlink = links_from(options)
     done = replay(options.folder, endpoints, mavlink, None if options.rate == math.inf else options.rate)
     say(options, f"{options.folder}: {done.simulated:.1f} s streamed in {done.wall:.1f} s")
-    for trouble in done.troubles:
+    for trouble in done.loss_reports:
         print_status(trouble)
     return 0

@@ -15,7 +15,7 @@ from cosim.command_line.results import print_run
 from cosim.errors import TelemetryError
 
 if TYPE_CHECKING:
-    from cosim.mavlink.setup import Mavlink
+    from cosim.mavlink.run_links import Mavlink
     from cosim.results.run_result import Run
 
 
@@ -93,6 +93,6 @@ def _mavlink(options: argparse.Namespace) -> Mavlink | None:
     endpoints, link = links_from(options)
     if not endpoints:
         return None
-    from cosim.mavlink.setup import Mavlink
+    from cosim.mavlink.run_links import Mavlink
 
     return Mavlink(tuple(endpoints), link)

@@ -14,7 +14,7 @@ from cosim.io.network_address import resolve_host
 
 if TYPE_CHECKING:
     from cosim.results.run_result import Run
-    from cosim.sitl.autopilot_link import AutopilotLink
+    from cosim.sitl.sitl_link import SitlLink
 
 _PORTS = {"ardupilot": 9002, "px4": 4560}  # ports at which an autopilot expects its simulator: UDP, TCP
 
@@ -75,10 +75,10 @@ def add_verbs(verbs: Any) -> None:
 
 def sitl(options: argparse.Namespace) -> int:
     """Run ``cosim sitl``."""
-    from cosim.sitl.flights import FlightOptions, Flights
-    from cosim.sitl.hil import HilServer
-    from cosim.sitl.law import law_of_controls, law_of_pwm
-    from cosim.sitl.server import JsonServer
+    from cosim.sitl.hil_server import HilServer
+    from cosim.sitl.json_server import JsonServer
+    from cosim.sitl.law import make_control_law, make_pwm_law
+    from cosim.sitl.sitl_session import FlightOptions, SitlSession
 
     _check(options)
     address = _address(options.host, options.port or _PORTS[options.backend], options.allow_remote)
@@ -89,18 +89,18 @@ def sitl(options: argparse.Namespace) -> int:
     server: JsonServer | HilServer
     link = None
     if options.backend == "px4":
-        flights, speedup = Flights(chosen, options.backend, law_of_controls), options.speedup or 1.0
+        flights, speedup = SitlSession(chosen, options.backend, make_control_law), options.speedup or 1.0
         server = HilServer(flights, address, options.timeout, print_status, speedup=speedup)
         print_status("waiting for PX4 on TCP {}:{}".format(*server.address))
     else:
         link = _autopilot_link(options)
-        flights = Flights(chosen, options.backend, lambda vehicle: law_of_pwm(vehicle, link))
+        flights = SitlSession(chosen, options.backend, lambda vehicle: make_pwm_law(vehicle, link))
         server = JsonServer(flights, address, options.timeout, print_status)
         print_status("waiting for ArduPilot on UDP {}:{}".format(*server.address))
     with contextlib.closing(link) if link is not None else contextlib.nullcontext():
         outcome = server.serve()
     c = outcome.counts
-    ignored = f"{c.malformed} datagrams malformed, {c.refused} of other senders"
+    ignored = f"{c.malformed} datagrams malformed, {c.rejected} of other senders"
     say(options, f"{c.steps} steps after {c.waited} frames at rest, {c.resent} resent, {c.lost} lost; {ignored}")
     for run in outcome.runs:
         print_run(options, run, not options.no_report)
@@ -118,16 +118,16 @@ def _check(options: argparse.Namespace) -> None:
         raise RunError("--autopilot: supported with --backend ardupilot alone")
 
 
-def _autopilot_link(options: argparse.Namespace) -> AutopilotLink | None:
+def _autopilot_link(options: argparse.Namespace) -> SitlLink | None:
     """Open the link to a port of the autopilot, None if none is given."""
     from cosim.mavlink.wire.endpoint import parse_endpoint
-    from cosim.sitl.autopilot_link import AutopilotLink, DvlOptions
+    from cosim.sitl.sitl_link import DvlOptions, SitlLink
 
     if options.autopilot is None:
         return None
     endpoint = parse_endpoint(options.autopilot, options.allow_remote)
     dvl = None if options.dvl is None else DvlOptions(options.dvl, options.dvl_latency, options.dvl_dropout)
-    return AutopilotLink(endpoint, dvl)
+    return SitlLink(endpoint, dvl)
 
 
 def _code(runs: list[Run]) -> int:

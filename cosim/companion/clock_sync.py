@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from typing import Any
 
-_KEPT = 16  # number of last answers; the offset is that of the one with the shortest round trip
+_MAX_ANSWERS = 16  # latest ones; the offset is that of the one with the shortest round trip
 _NANO = 1e9
-_SLACK = 0.005  # s, allowed drift of the two clocks between the fastest kept answer and a new one
-_OPEN = 8  # number of last requests whose answers are accepted
+_OFFSET_TOLERANCE = 0.005  # s, allowed drift of the two clocks between the fastest kept answer and a new one
+_MAX_REQUESTS = 8  # latest ones, whose answers are accepted
 
 
 class ClockSync:
@@ -20,34 +19,34 @@ class ClockSync:
     >>> from cosim.companion.clock_sync import ClockSync
     >>> sync = ClockSync()
     >>> sent = sync.request(100.0)
-    >>> sync.take(7_005_000_000, sent, 100.01)  # 7.005 s since boot in the middle of the round trip
+    >>> sync.add_answer(7_005_000_000, sent, 100.01)  # 7.005 s since boot in the middle of the round trip
     >>> round(sync.offset, 6)
     93.0
     """
 
     def __init__(self) -> None:
-        self._asked: deque[int] = deque(maxlen=_OPEN)
-        self._answers: deque[tuple[float, float]] = deque(maxlen=_KEPT)  # round trip [s], offset [s]
+        self._requests: deque[int] = deque(maxlen=_MAX_REQUESTS)
+        self._answers: deque[tuple[float, float]] = deque(maxlen=_MAX_ANSWERS)  # round trip [s], offset [s]
 
     def request(self, now: float) -> int:
         """Return the field ``ts1`` [ns] of a request that is sent at our time `now` [s]."""
         stamp = max(1, round(now * _NANO))
-        self._asked.append(stamp)
+        self._requests.append(stamp)
         return stamp
 
-    def take(self, tc1: int, ts1: int, now: float) -> None:
+    def add_answer(self, tc1: int, ts1: int, now: float) -> None:
         """Process an answer, with its fields in ns, that arrived at our time `now` [s].
 
         An answer without an open request is ignored. If the offset differs from that of the fastest kept answer by more
         than their round trips explain, the answer replaces all earlier ones: the autopilot's clock has restarted, or
         runs at another rate.
         """
-        if tc1 <= 0 or ts1 not in self._asked:
+        if tc1 <= 0 or ts1 not in self._requests:
             return
-        self._asked.remove(ts1)
+        self._requests.remove(ts1)
         sent = ts1 / _NANO
         round_trip, offset = now - sent, (now + sent) / 2.0 - tc1 / _NANO
-        if self._answers and abs(offset - self.offset) > 0.5 * (round_trip + self.round_trip) + _SLACK:
+        if self._answers and abs(offset - self.offset) > 0.5 * (round_trip + self.round_trip) + _OFFSET_TOLERANCE:
             self._answers.clear()
         self._answers.append((round_trip, offset))
 
@@ -60,8 +59,3 @@ class ClockSync:
     def round_trip(self) -> float:
         """Round-trip time of the fastest kept answer [s]; NaN before the first answer."""
         return min(self._answers)[0] if self._answers else math.nan
-
-
-def timesync(mavlink: Any, ts1: int) -> Any:
-    """Return the TIMESYNC message of a request with time stamp `ts1` [ns]."""
-    return mavlink.MAVLink_timesync_message(0, ts1)

@@ -9,8 +9,8 @@ from typing import Any
 
 from cosim.mavlink.wire.options import ProfileName
 
-_EVERY = 0.5  # s, between two requests of the missing parameters
-_PATIENCE = 3.0  # s, from the first request on; an ArduSub does not answer requests of parameters that it lacks
+_REQUEST_PERIOD = 0.5  # s, between two requests of the missing parameters
+_READ_TIMEOUT = 3.0  # s, from the first request on; an ArduSub does not answer requests of parameters that it lacks
 _MAV_PARAM_TYPE_INT32 = 6
 
 _ON_SILENCE = {0: "does nothing", 1: "warns", 2: "disarms"}
@@ -33,18 +33,18 @@ class Parameter:
 
 PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
     "ardusub": (
-        Parameter("FS_PILOT_INPUT", "on sticks that stop coming", _ON_SILENCE),
+        Parameter("FS_PILOT_INPUT", "when sticks stop", _ON_SILENCE),
         Parameter("FS_PILOT_TIMEOUT", "s until then"),
-        Parameter("RC_OVERRIDE_TIME", "s for which it keeps the last sticks, -1 for ever"),
+        Parameter("RC_OVERRIDE_TIME", "s for which the last sticks stay active, -1 for ever"),
         Parameter("FS_GCS_ENABLE", "on a ground station that falls silent", _ON_GCS_LOSS),
         Parameter("FS_GCS_TIMEOUT", "s until then"),
-        Parameter("FS_EKF_ACTION", "on an estimate that is not to be trusted", _ON_SILENCE),
-        Parameter("FS_EKF_THRESH", "variance from which on it is not"),
+        Parameter("FS_EKF_ACTION", "on an unreliable estimate", _ON_SILENCE),
+        Parameter("FS_EKF_THRESH", "variance above which the estimate is unreliable"),
         Parameter("FS_LEAK_ENABLE", "on a leak", {0: "does nothing", 1: "warns", 2: "surfaces"}),
         Parameter("FS_CRASH_CHECK", "on a crash", _ON_SILENCE),
         Parameter("BATT_FS_LOW_ACT", "on a low battery", {0: "does nothing", 2: "disarms", 3: "surfaces"}),
-        Parameter("SYSID_MYGCS", "system that sticks are taken from"),
-        Parameter("MAV_GCS_SYSID", "system that sticks are taken from, from 4.7 on"),
+        Parameter("SYSID_MYGCS", "system whose sticks are accepted"),
+        Parameter("MAV_GCS_SYSID", "system whose sticks are accepted, from 4.7 on"),
         Parameter("JS_GAIN_DEFAULT", "pilot gain"),
         Parameter("EK3_MAG_CAL", "when it learns the magnetic field, 2: never"),
         Parameter("ACRO_YAW_P", "yaw rate of a full stick, in 45 deg/s"),
@@ -57,25 +57,25 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
         Parameter("PILOT_SPEED_DN", "its descent rate, in cm/s, 0 for the climb rate"),
     ),
     "px4": (
-        Parameter("COM_OF_LOSS_T", "s until set-points that stop coming count as lost"),
+        Parameter("COM_OF_LOSS_T", "s until stopped set-points count as lost"),
         Parameter("COM_OBL_RC_ACT", "on lost set-points", _ON_LOST_SET_POINTS),
-        Parameter("COM_RC_LOSS_T", "s until sticks that stop coming count as lost"),
+        Parameter("COM_RC_LOSS_T", "s until stopped sticks count as lost"),
         Parameter("NAV_RCL_ACT", "on lost sticks", _ON_LOST_LINK),
         Parameter("COM_DL_LOSS_T", "s until a ground station that falls silent counts as lost"),
         Parameter("NAV_DLL_ACT", "on a lost ground station", _ON_LOST_LINK),
-        Parameter("UUV_THRUST_SAT", "greatest part of the force along each axis"),
-        Parameter("UUV_TORQUE_SAT", "greatest part of the moment about each axis"),
+        Parameter("UUV_THRUST_SAT", "maximum fraction of the force along each axis"),
+        Parameter("UUV_TORQUE_SAT", "maximum fraction of the moment about each axis"),
     ),
     "generic": (),
 }
-_ACTS = {  # parameters of the reaction to a lost companion; at least one of them must be nonzero
+_REACTIONS = {  # parameters of the reaction to a lost companion; at least one of them must be nonzero
     "ardusub": ("FS_PILOT_INPUT", "FS_GCS_ENABLE"),
     "px4": ("COM_OF_LOSS_T",),
 }
 _STICK_SYSTEM = ("SYSID_MYGCS", "MAV_GCS_SYSID")
-_OF_SOME_VERSIONS = (*_STICK_SYSTEM, "ATC_ANGLE_MAX", "ANGLE_MAX")  # absent in some versions: no warning without them
-_KEPT = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # times [s] the last sticks act: with a radio, and without one
-_LONGEST_KEPT = 1.0  # s
+_OPTIONAL = (*_STICK_SYSTEM, "ATC_ANGLE_MAX", "ANGLE_MAX")  # absent in some versions: no warning without them
+_HOLD_TIMES = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # times [s] the last sticks act: with a radio, and without one
+_MAX_HOLD_TIME = 1.0  # s
 _NEVER = 2.0  # value of EK3_MAG_CAL: never learn the magnetic field
 _BY_STICKS = (0.0, 1.0, 2.0)  # values of COM_OBL_RC_ACT: modes that need sticks; without them NAV_RCL_ACT applies
 _SATURATION = "UUV_THRUST_SAT"
@@ -98,7 +98,7 @@ class Failsafes:
     --------
     >>> from cosim.companion.failsafes import Failsafes
     >>> failsafes = Failsafes("ardusub")
-    >>> failsafes.wanted(100.0)[:2]
+    >>> failsafes.names_to_request(100.0)[:2]
     ['FS_PILOT_INPUT', 'FS_PILOT_TIMEOUT']
     """
 
@@ -107,15 +107,15 @@ class Failsafes:
         self.values: dict[str, float] = {}
         self._first, self._last = math.inf, -math.inf  # our times [s] of the first and the last request
 
-    def wanted(self, now: float) -> list[str]:
+    def names_to_request(self, now: float) -> list[str]:
         """Return the names of missing parameters to request at our time `now` [s]; none for 0.5 s after a request."""
-        if self.is_read(now) or now - self._last < _EVERY:
+        if self.is_read(now) or now - self._last < _REQUEST_PERIOD:
             return []
         self._first = min(self._first, now)
         self._last = now
         return self._missing()
 
-    def take(self, message: Any) -> None:
+    def receive(self, message: Any) -> None:
         """Store the value of a PARAM_VALUE, if it is a finite one of the profile's parameters."""
         name, value = message.param_id, float(message.param_value)
         if name in {parameter.name for parameter in PARAMETERS[self._profile]}:
@@ -126,44 +126,44 @@ class Failsafes:
 
     def is_read(self, now: float) -> bool:
         """Return True if all parameters were received, or the wait for the missing ones is over."""
-        return not self._missing() or now - self._first > _PATIENCE
+        return not self._missing() or now - self._first > _READ_TIMEOUT
 
     def text(self) -> list[str]:
         """Return the received parameters as lines of text; the last ones are warnings."""
         lines = [self._line(parameter) for parameter in PARAMETERS[self._profile] if parameter.name in self.values]
-        silent = [name for name in self._missing() if name not in _OF_SOME_VERSIONS]
+        silent = [name for name in self._missing() if name not in _OPTIONAL]
         if silent:
             lines.append(f"not answered by the autopilot: {', '.join(silent)}")
-        acts = _ACTS.get(self._profile, ())
-        if acts and all(self.values.get(name, 0.0) == 0.0 for name in acts):
+        reactions = _REACTIONS.get(self._profile, ())
+        if reactions and all(self.values.get(name, 0.0) == 0.0 for name in reactions):
             lines.append(
-                f"WARNING: nothing is known to follow if the companion dies: {', '.join(acts)} are 0 or unknown"
+                f"WARNING: no reaction is known if the companion fails: {', '.join(reactions)} are 0 or unknown"
             )
         lost, sticks = self.values.get("COM_OBL_RC_ACT"), self.values.get("NAV_RCL_ACT")
         if lost in _BY_STICKS and sticks == 0.0:
             lines.append(
-                f"WARNING: without sticks the last forces act for ever on lost set-points: COM_OBL_RC_ACT is {lost:g} "
-                "and NAV_RCL_ACT 0; expected COM_OBL_RC_ACT 5, which holds"
+                "WARNING: without sticks, the last forces act for ever after set-points are lost: "
+                f"COM_OBL_RC_ACT is {lost:g} and NAV_RCL_ACT 0; expected COM_OBL_RC_ACT 5, which holds"
             )
-        part = self.values.get(_SATURATION, 1.0)
-        if part < 1.0:
+        saturation = self.values.get(_SATURATION, 1.0)
+        if saturation < 1.0:
             lines.append(
-                f"WARNING: {_SATURATION} is {part:g}, but the law counts on the thrusters' full force; expected 1"
+                f"WARNING: {_SATURATION} is {saturation:g}, but the law counts on the thrusters' full force; expected 1"
             )
-        kept = [(name, self.values[name]) for name in _KEPT if name in self.values]
-        if any(not 0.0 <= time <= _LONGEST_KEPT for _, time in kept):
-            now = ", ".join(f"{name} is {time:g}" for name, time in kept)
+        hold_times = [(name, self.values[name]) for name in _HOLD_TIMES if name in self.values]
+        if any(not 0.0 <= time <= _MAX_HOLD_TIME for _, time in hold_times):
+            values = ", ".join(f"{name} is {time:g}" for name, time in hold_times)
             lines.append(
-                f"WARNING: the last sticks act on where the link is cut: {now}; expected {_LONGEST_KEPT:g} s or less"
+                f"WARNING: the last sticks outlast a lost link: {values}; expected {_MAX_HOLD_TIME:g} s or less"
             )
         return lines
 
     def ignored_sticks(self, system: int) -> str:
         """Return the reason why the autopilot ignores sticks of a system id; empty if none is known."""
         for name in _STICK_SYSTEM:
-            heard = self.values.get(name)
-            if heard is not None and heard != system:
-                return f"{name} is {heard:g}, and the companion's system id {system}: its sticks would not be taken"
+            accepted = self.values.get(name)
+            if accepted is not None and accepted != system:
+                return f"{name} is {accepted:g}, and the companion's system id {system}: its sticks would be ignored"
         return ""
 
     def learns_magnetic_field(self) -> bool:

@@ -19,7 +19,7 @@ from cosim.simulation.signals import Array
 _SAMPLES = 10  # consecutive samples of the offset that must agree before it is known
 _SPREAD = 0.15  # m, greatest standard deviation of each coordinate among them
 _GRAVITY = 9.80665  # m/s2
-_JUMP = 0.3  # m, change between two positions that the velocity does not explain, above which it is a jump
+_MIN_JUMP = 0.3  # m, change between two positions that the velocity does not explain, above which it is a jump
 _SMOOTHING = 0.1  # weight of a new sample in the exponential mean of the drift
 
 
@@ -69,21 +69,21 @@ class FrameAlignment:
         self.jump = self.reckoned = 0.0
         self._reference: Array | None = None  # first mean offset, which later samples are compared with
         self._drift: Array = np.zeros(3)
-        self._taken = 0, 0  # counts of the processed messages: local position, second source
+        self._processed = 0, 0  # counts of the processed messages: local position, second source
         self._before: tuple[Array, Array, float, int] | None = None
 
     def update(self, state: ReportedState, now: float) -> None:
         """Update the alignment from the messages received since the last call; `now` is our time [s]."""
         if not np.isfinite(state.position).all():
             return
-        came, before = state.came, self._taken
+        counts, before = state.message_counts, self._processed
         # the pressure is that of SCALED_PRESSURE2 once one was received
-        pressure = came["SCALED_PRESSURE2"] or came["SCALED_PRESSURE"]
-        second = came["GLOBAL_POSITION_INT"] if self._frame is not None else pressure
-        self._taken = came["LOCAL_POSITION_NED"] + came["ODOMETRY"], second
-        if self.offset is not None and self._taken[0] != before[0]:
-            self._watch(state, now)
-        sample = self._sample(state) if self._taken[1] != before[1] else None
+        pressure = counts["SCALED_PRESSURE2"] or counts["SCALED_PRESSURE"]
+        second = counts["GLOBAL_POSITION_INT"] if self._frame is not None else pressure
+        self._processed = counts["LOCAL_POSITION_NED"] + counts["ODOMETRY"], second
+        if self.offset is not None and self._processed[0] != before[0]:
+            self._check_jump(state, now)
+        sample = self._sample(state) if self._processed[1] != before[1] else None
         if sample is None:
             return
         if self.offset is None:
@@ -100,7 +100,7 @@ class FrameAlignment:
 
     @property
     def drift(self) -> float:
-        """Smoothed change of the offset by the second sources, globe and pressure, since it was first known [m]."""
+        """Smoothed change of the offset by global position and pressure since it was first known [m]."""
         return float(np.linalg.norm(self._drift))
 
     def to_scene(self, position: Array) -> Array:
@@ -113,7 +113,7 @@ class FrameAlignment:
         if self.offset is not None:
             return ""
         if self._frame is None:
-            return "where the scene's origin is: give --scene-origin or --surveyed-origin"
+            return "the scene's origin: give --scene-origin or --surveyed-origin"
         if not np.isfinite(state.position).all():
             return "LOCAL_POSITION_NED"
         if state.global_position is None:
@@ -131,7 +131,7 @@ class FrameAlignment:
         self.jump, self.reckoned, self._drift, self._before = 0.0, 0.0, np.zeros(3), None
 
     def _sample(self, state: ReportedState) -> Array | None:
-        """Return the offset by the second sources, globe and pressure, shape (3,) [m, NED].
+        """Return the offset by the second sources, global position and pressure, shape (3,) [m, NED].
 
         A surveyed frame needs its depth alone; north and east are NaN without a global position. None if a needed
         coordinate is missing.
@@ -141,17 +141,17 @@ class FrameAlignment:
         if self._frame is not None and state.global_position is not None:
             north, east, _ = self._frame.to_local(*state.global_position[:2], 0.0)
         sample: Array = np.array([north, east, depth]) - state.position
-        wanted = sample[2:] if self._origin.surveyed is not None else sample
-        return sample if np.isfinite(wanted).all() else None
+        required = sample[2:] if self._origin.surveyed is not None else sample
+        return sample if np.isfinite(required).all() else None
 
-    def _watch(self, state: ReportedState, now: float) -> None:
+    def _check_jump(self, state: ReportedState, now: float) -> None:
         before = self._before
         self._before = state.position.copy(), state.velocity.copy(), now, state.resets
         if before is None:
             return
-        position, velocity, at, resets = before
-        explained = 0.5 * (velocity + state.velocity) * (now - at)
+        position, velocity, time, resets = before
+        expected = 0.5 * (velocity + state.velocity) * (now - time)
         self.reckoned += float(np.linalg.norm((state.position - position)[:2])) if state.is_reckoned else 0.0
-        leap = float(np.linalg.norm(state.position - position - np.nan_to_num(explained)))
-        if leap > _JUMP or resets != state.resets:
-            self.jump = max(self.jump, leap)
+        jump = float(np.linalg.norm(state.position - position - np.nan_to_num(expected)))
+        if jump > _MIN_JUMP or resets != state.resets:
+            self.jump = max(self.jump, jump)

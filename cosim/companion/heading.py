@@ -14,14 +14,17 @@ from cosim.simulation.signals import Array
 
 log = logging.getLogger(__name__)
 
-_LONGEST_GAP = 0.2  # s, between two attitudes; over longer ones their rates do not predict the turn
+_MAX_GAP = 0.2  # s, between two attitudes; over longer ones their rates do not predict the turn
 _ALIGNED = "in-flight", "yaw alignment complete"  # parts of ArduSub's STATUSTEXT after an alignment
-_GAIN, _FASTEST = 0.5, 0.25  # 1/s, gain from remaining depth to speed; m/s, greatest speed of the dive
-_NEAR, _SLOW = 0.05, 0.05  # m, m/s, depth error and speed below which the vehicle has reached the depth
-_ALIGNS_FOR = 6.0  # s, from arming to the earliest end of the dive
-_SETTLES_FOR = 1.0  # s, from the last alignment to the earliest end of the dive
-_PATIENCE = 3.0  # s, to wait at the depth for the text, or for the descent to begin
-_LEAST_CLEARANCE, _SPACING = 0.3, 0.1  # m, required on the path down; m, between the points where it is computed
+_GAIN, _MAX_SPEED = 0.5, 0.25  # 1/s, gain from remaining depth to speed; m/s, maximum speed of the dive
+_DEPTH_TOLERANCE, _SPEED_TOLERANCE = (
+    0.05,
+    0.05,
+)  # m, m/s, depth error and speed below which the vehicle has reached the depth
+_MIN_DIVE_TIME = 6.0  # s, from arming to the earliest end of the dive
+_SETTLING_TIME = 1.0  # s, from the last alignment to the earliest end of the dive
+_DIVE_TIMEOUT = 3.0  # s, to wait at the depth for the text, or for the descent to begin
+_MIN_CLEARANCE, _SPACING = 0.3, 0.1  # m, required on the path down; m, between the points where it is computed
 
 
 class HeadingWatch:
@@ -43,15 +46,15 @@ class HeadingWatch:
 
     def update(self, state: ReportedState) -> None:
         """Compare the last reported attitude with the one before; nothing changes without a new one."""
-        at, before = state.attitude_boot, self._before
-        if not math.isfinite(at) or (before is not None and at == before[0]):
+        time, before = state.attitude_boot, self._before
+        if not math.isfinite(time) or (before is not None and time == before[0]):
             return
-        self._before = at, state.quaternion.copy(), state.rates.copy()
-        if before is None or not 0.0 < at - before[0] <= _LONGEST_GAP:
+        self._before = time, state.quaternion.copy(), state.rates.copy()
+        if before is None or not 0.0 < time - before[0] <= _MAX_GAP:
             return
-        turned = 0.5 * (at - before[0]) * (before[2] + state.rates)
-        angle = float(np.linalg.norm(turned))
-        expected = multiply(before[1], from_axis_angle(turned / angle, angle)) if angle > 0.0 else before[1]
+        rotation = 0.5 * (time - before[0]) * (before[2] + state.rates)
+        angle = float(np.linalg.norm(rotation))
+        expected = multiply(before[1], from_axis_angle(rotation / angle, angle)) if angle > 0.0 else before[1]
         e0, _, _, e3 = multiply(state.quaternion, expected * (1.0, -1.0, -1.0, -1.0)).tolist()
         self.leap = max(self.leap, abs(2.0 * math.atan(e3 / e0)) if e0 else math.pi)
 
@@ -72,7 +75,7 @@ class LevelDive:
     Attributes
     ----------
     clearance : callable, optional
-        Returns the least clearance of hard regions [m] at a position in the autopilot's local frame.
+        Returns the minimum clearance of hard regions [m] at a position in the autopilot's local frame.
     outside : float
         Violation of hard regions now, less that at the start of the dive [m]; 0 or more.
     """
@@ -85,7 +88,7 @@ class LevelDive:
         self._armed_depth: float | None = None  # m, depth at arming
         self._armed_at = self._aligned_at = math.inf  # our time [s] of arming, and of the last alignment
         self._begun: tuple[float, float] | None = None  # start of the dive: our time [s]; clearance then [m]
-        self._place: Array = np.zeros(2)  # m, NE, horizontal position at the start of the dive
+        self._start: Array = np.zeros(2)  # m, NE, horizontal position at the start of the dive
         self._arrived_at: float | None = None
         self._is_done = False
         self._texts_read = 0  # number of the autopilot's texts that were processed
@@ -101,14 +104,14 @@ class LevelDive:
             self._armed_depth, self._armed_at = float(state.position[2]), now
         if self._armed_depth is None:
             return
-        is_near = self._depth_left(state) < _NEAR and abs(state.velocity[2]) < _SLOW
+        is_near = self._depth_left(state) < _DEPTH_TOLERANCE and abs(state.velocity[2]) < _SPEED_TOLERANCE
         if self._arrived_at is None and is_near:
             self._arrived_at = now
         if any(all(part in text for part in _ALIGNED) for text in texts):
             self._aligned_at = now
-        if self._arrived_at is not None and now - self._armed_at > _ALIGNS_FOR:
-            is_settled = now - self._aligned_at > _SETTLES_FOR  # False where there was no alignment
-            self._is_done |= is_settled or (math.isinf(self._aligned_at) and now - self._arrived_at > _PATIENCE)
+        if self._arrived_at is not None and now - self._armed_at > _MIN_DIVE_TIME:
+            is_settled = now - self._aligned_at > _SETTLING_TIME  # False where there was no alignment
+            self._is_done |= is_settled or (math.isinf(self._aligned_at) and now - self._arrived_at > _DIVE_TIMEOUT)
 
     def is_needed(self, state: ReportedState, now: float) -> bool:
         """Return True while the vehicle must dive. Warn, and skip the dive, if hard regions are too near."""
@@ -116,14 +119,14 @@ class LevelDive:
             return False
         if self._begun is None:
             here = math.inf if self.clearance is None else self.clearance(state.position)
-            if not self._is_way_clear(state, min(here, _LEAST_CLEARANCE)):
+            if not self._is_path_clear(state, min(here, _MIN_CLEARANCE)):
                 log.warning(
                     "no dive: a hard region is too near within %g m below; the heading may be off",
                     self._depth_left(state),
                 )
                 self._is_done = True
                 return False
-            self._begun, self._place = (now, here), state.position[:2].copy()
+            self._begun, self._start = (now, here), state.position[:2].copy()
         if self.clearance is not None:
             self.outside = max(0.0, min(0.0, self._begun[1]) - self.clearance(state.position))
         return True
@@ -134,22 +137,24 @@ class LevelDive:
 
     def is_stuck(self, state: ReportedState, now: float) -> bool:
         """Return True if the vehicle is less than 5 cm deeper after 3 s: the mode does not follow the stick."""
-        return self.time_diving(now) > _PATIENCE and self._depth_left(state) > self._depth - _NEAR
+        return self.time_diving(now) > _DIVE_TIMEOUT and self._depth_left(state) > self._depth - _DEPTH_TOLERANCE
 
     def speed_down(self, state: ReportedState) -> float:
         """Return the downward speed to command now [m/s]; 0 for a vehicle that is too deep."""
-        return min(max(_GAIN * self._depth_left(state), 0.0), _FASTEST)
+        return min(max(_GAIN * self._depth_left(state), 0.0), _MAX_SPEED)
 
-    def way_back(self, state: ReportedState) -> Array:
+    def vector_back(self, state: ReportedState) -> Array:
         """Return the horizontal vector from the vehicle to where the dive began, shape (2,) [m, NE]."""
-        return self._place - state.position[:2]
+        return self._start - state.position[:2]
 
     def _depth_left(self, state: ReportedState) -> float:
         assert self._armed_depth is not None
         return self._armed_depth + self._depth - float(state.position[2])
 
-    def _is_way_clear(self, state: ReportedState, least: float) -> bool:
+    def _is_path_clear(self, state: ReportedState, min_clearance: float) -> bool:
         if self.clearance is None:
             return True
-        way = np.arange(0.0, max(0.0, self._depth_left(state)) + _SPACING, _SPACING)
-        return all(self.clearance(state.position + np.array([0.0, 0.0, down])) >= least for down in way.tolist())
+        depths = np.arange(0.0, max(0.0, self._depth_left(state)) + _SPACING, _SPACING)
+        return all(
+            self.clearance(state.position + np.array([0.0, 0.0, down])) >= min_clearance for down in depths.tolist()
+        )

@@ -7,8 +7,8 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from cosim.companion.set_points import LevelLead, TurnLead, VelocityLead, attitude_target, velocity_target
-from cosim.companion.sticks import SticksBy, channels_override, channels_released, manual_control, scale_of
+from cosim.companion.set_points import LevelLead, TurnLead, VelocityLead, make_attitude_message, make_velocity_target
+from cosim.companion.sticks import SticksBy, make_manual_control, make_stick_scale, override_channels, release_channels
 from cosim.companion.vehicle_state import ReportedState
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.profile import PROFILES, Profile
@@ -19,19 +19,24 @@ from plant_fmu import Vehicle
 
 SteerBy = Literal["sticks", "wrench", "velocity", "attitude"]
 STEER_BY: tuple[SteerBy, ...] = get_args(SteerBy)
-_STEERED_IN: dict[SteerBy, Mode] = {"sticks": "stabilize", "wrench": "manual", "velocity": "reach", "attitude": "reach"}
+_STEERING_MODES: dict[SteerBy, Mode] = {
+    "sticks": "stabilize",
+    "wrench": "manual",
+    "velocity": "reach",
+    "attitude": "reach",
+}
 
-_PX4_REFUSES: dict[str, str] = {
+_PX4_REJECTIONS: dict[str, str] = {
     "sticks": "its Stabilized takes the forward stick for heave or pitch; expected attitude",
     "wrench": "its sticks have no roll and pitch beside surge and sway; expected attitude",
     "velocity": "its uuv_pos_control keeps the depth and pushes nowhere; expected attitude",
 }
 # An ArduSub integrates the rate of the yaw stick to a heading, and controls that too. With the full rate it oscillates.
-_YAW_PART = 0.75  # fraction of the law's yaw rate that the stick commands
-_CENTERED_FOR = 0.2  # s, during which overridden channels are centered before their release
+_YAW_FRACTION = 0.75  # fraction of the law's yaw rate that the stick commands
+_CENTERING_TIME = 0.2  # s, during which overridden channels are centered before their release
 
 
-def require_taken(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) -> None:
+def require_supported(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) -> None:
     """Raise an error if an autopilot does not accept an output.
 
     Raises
@@ -39,8 +44,8 @@ def require_taken(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) 
     RunError
         If the autopilot does not accept the output; the message gives the reason and the accepted outputs.
     """
-    if profile == "px4" and steer_by in _PX4_REFUSES:
-        raise RunError(f"--steer-by {steer_by}: a PX4 does not take it: {_PX4_REFUSES[steer_by]}")
+    if profile == "px4" and steer_by in _PX4_REJECTIONS:
+        raise RunError(f"--steer-by {steer_by}: not supported by PX4: {_PX4_REJECTIONS[steer_by]}")
     if sticks_by == "rc-override" and not uses_sticks(profile, steer_by):
         raise RunError(f"--sticks-by {sticks_by}: no sticks are sent with --steer-by {steer_by}, expected none")
 
@@ -50,9 +55,9 @@ def uses_sticks(profile: ProfileName, steer_by: SteerBy) -> bool:
     return steer_by in ("sticks", "wrench") or (steer_by == "attitude" and profile == "ardusub")
 
 
-def steered_in(profile: ProfileName, steer_by: SteerBy) -> Mode:
+def steering_mode(profile: ProfileName, steer_by: SteerBy) -> Mode:
     """Return the mode in which an autopilot accepts an output."""
-    return "depth_hold" if steer_by == "attitude" and profile == "ardusub" else _STEERED_IN[steer_by]
+    return "depth_hold" if steer_by == "attitude" and profile == "ardusub" else _STEERING_MODES[steer_by]
 
 
 class Output:
@@ -95,12 +100,12 @@ class Output:
         pilot_gain: float,
         lags: tuple[float, float],
     ) -> None:
-        require_taken(profile, steer_by, sticks_by)
+        require_supported(profile, steer_by, sticks_by)
         self._mavlink, self._steer_by, self._sticks_by = mavlink, steer_by, sticks_by
         self._profile: Profile = PROFILES[profile]
         self._uses_sticks = uses_sticks(profile, steer_by)
-        self._scale = scale_of(vehicle, self._profile, pilot_gain, sticks_by)
-        self._yaw_part = _YAW_PART if profile == "ardusub" else 1.0
+        self._scale = make_stick_scale(vehicle, self._profile, pilot_gain, sticks_by)
+        self._yaw_fraction = _YAW_FRACTION if profile == "ardusub" else 1.0
         self._all_axes = steer_by == "wrench" or (steer_by == "sticks" and profile == "ardusub")
         self._turn, self._lead, self._level_lead = TurnLead(vehicle), VelocityLead(vehicle, *lags), LevelLead(vehicle)
         self._overridden = False  # True while overridden channels are not released
@@ -120,14 +125,14 @@ class Output:
         """Set all commands to zero."""
         self.sticks[:], self.velocity[:], self.attitude[:] = 0.0, 0.0, 0.0
 
-    def messages(self, wrench: Array, state: ReportedState, period: float) -> Sequence[Any]:
+    def make_messages(self, wrench: Array, state: ReportedState, period: float) -> Sequence[Any]:
         """Return the messages that command a wrench, shape (6,) [N, N m], body frame, for a `period` [s]."""
         system = state.system or 0
         match self._steer_by:
             case "velocity":
                 self.velocity[:] = self._lead.velocity(wrench, state, period)
                 turn = self._turn.yaw_rate(wrench, state) if self._profile.name == "ardusub" else None
-                return (velocity_target(self._mavlink, system, self.velocity, turn),)
+                return (make_velocity_target(self._mavlink, system, self.velocity, turn),)
             case "attitude":
                 self.attitude[:] = self._turn.attitude(wrench, state)
                 return self._attitude(wrench, state, period)
@@ -136,21 +141,21 @@ class Output:
                 wrench[3:5] = self._level_lead.moments(state.velocity_body[:3])
                 self.sticks[:] = self._scale.sticks(wrench)
                 self.sticks[3:5] = self._lean(period)
-                self.sticks[5] = self._scale.yaw_rate_stick(self._yaw_part * self._turn.yaw_rate(wrench, state))
+                self.sticks[5] = self._scale.yaw_rate_stick(self._yaw_fraction * self._turn.yaw_rate(wrench, state))
             case "wrench":
                 self.sticks[:] = self._scale.sticks(wrench)
         return (self._sticks(system),)
 
-    def still(self, state: ReportedState) -> Sequence[Any]:
+    def hold_still(self, state: ReportedState) -> Sequence[Any]:
         """Return the messages that command no motion, to be sent until the autopilot is in its mode."""
         self.clear()
         system = state.system or 0
         if self._uses_sticks:
             return (self._sticks(system),)
         if self._steer_by == "attitude":
-            return (attitude_target(self._mavlink, system, state.quaternion, np.zeros(3)),)
+            return (make_attitude_message(self._mavlink, system, state.quaternion, np.zeros(3)),)
         turn = 0.0 if self._profile.name == "ardusub" else None
-        return (velocity_target(self._mavlink, system, self.velocity, turn),)
+        return (make_velocity_target(self._mavlink, system, self.velocity, turn),)
 
     def descend(self, state: ReportedState, speed: float, back: Array, period: float) -> Sequence[Any]:
         """Return the messages of a level descent at a speed [m/s], by velocity or by stick, for a `period` [s].
@@ -161,11 +166,11 @@ class Output:
         self.clear()
         if self._steer_by == "velocity":
             self.velocity[:] = self._lead.hold(back, speed, state, period)
-            return (velocity_target(self._mavlink, state.system or 0, self.velocity, 0.0),)
+            return (make_velocity_target(self._mavlink, state.system or 0, self.velocity, 0.0),)
         self.sticks[2] = self._scale.climb_stick(speed)
         return (self._sticks(state.system or 0),)
 
-    def released(self, state: ReportedState, since: float) -> Sequence[Any]:
+    def release(self, state: ReportedState, since: float) -> Sequence[Any]:
         """Return the messages that release the sticks, `since` [s] after the start of the release.
 
         Overridden channels are centered first, since an ArduSub without a radio keeps their last values; then they are
@@ -173,19 +178,19 @@ class Output:
         """
         self.clear()
         if not self._uses_sticks:
-            return self.still(state) if self._steer_by == "attitude" and since < _CENTERED_FOR else ()
+            return self.hold_still(state) if self._steer_by == "attitude" and since < _CENTERING_TIME else ()
         system = state.system or 0
-        if self._sticks_by == "manual-control" or (self._overridden and since < _CENTERED_FOR):
+        if self._sticks_by == "manual-control" or (self._overridden and since < _CENTERING_TIME):
             return (self._sticks(system),)
         if self._overridden:
             self._overridden = False
-            return (channels_released(self._mavlink, system),)
+            return (release_channels(self._mavlink, system),)
         return ()
 
     @property
-    def releases_for(self) -> float:
+    def release_time(self) -> float:
         """Duration of the release before another controller steers [s]; an ArduSub keeps sticks for seconds."""
-        return 0.0 if self._sticks_by == "manual-control" else 2.0 * _CENTERED_FOR
+        return 0.0 if self._sticks_by == "manual-control" else 2.0 * _CENTERING_TIME
 
     def _attitude(self, wrench: Array, state: ReportedState, period: float) -> Sequence[Any]:
         """Return the messages of an attitude with forces; an ArduSub's are sticks of surge, sway and depth rate."""
@@ -193,12 +198,12 @@ class Output:
         level[3:] = 0.0
         if not self._uses_sticks:
             force = np.clip(self._scale.efforts @ level, -1.0, 1.0)[:3]
-            return (attitude_target(self._mavlink, system, self.attitude, force),)
+            return (make_attitude_message(self._mavlink, system, self.attitude, force),)
         rate_down = float(self._lead.velocity(wrench, state, period)[2])
         level[2] = 0.0
         self.sticks[:] = self._scale.sticks(level)
         self.sticks[2:] = self._scale.climb_stick(rate_down), 0.0, 0.0, 0.0
-        return attitude_target(self._mavlink, system, self.attitude, None), self._sticks(system)
+        return make_attitude_message(self._mavlink, system, self.attitude, None), self._sticks(system)
 
     def _lean(self, period: float) -> Array:
         """Return the sticks of roll and pitch, shape (2,), whose lean angles give the commands now in `sticks`.
@@ -211,6 +216,6 @@ class Output:
 
     def _sticks(self, system: int) -> Any:
         if self._sticks_by == "manual-control":
-            return manual_control(self._mavlink, system, self._profile, self.sticks, self._all_axes)
+            return make_manual_control(self._mavlink, system, self._profile, self.sticks, self._all_axes)
         self._overridden = True
-        return channels_override(self._mavlink, system, self.sticks)
+        return override_channels(self._mavlink, system, self.sticks)

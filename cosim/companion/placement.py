@@ -11,7 +11,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array
 
-FARTHEST = 50.0  # m, horizontal distance from everything in the scene, beyond which nothing is steered
+MAX_DISTANCE = 50.0  # m, horizontal distance from everything in the scene, beyond which nothing is steered
 
 
 class Placement:
@@ -50,21 +50,25 @@ class Placement:
         """Return the least clearance of hard regions [m] at a pose; infinite if there are none."""
         return float(np.min(self._environment.clearances(position, quaternion)[self.hard], initial=math.inf))
 
-    def text(self, position: Array, quaternion: Array) -> str:
+    def describe(self, position: Array, quaternion: Array) -> str:
         """Describe a pose by its position, and its distances to the goal and the nearest hard region."""
         north, east, down = position.tolist()
         clearances = self._environment.clearances(position, quaternion)
         parts = [f"in the scene: {north:.2f} m north, {east:.2f} m east, {down:.2f} m down"]
         if self._has_goal:
-            parts.append("inside the goal" if clearances[0] >= 0.0 else f"goal {meters(-clearances[0])} away")
+            parts.append("inside the goal" if clearances[0] >= 0.0 else f"goal {format_distance(-clearances[0])} away")
         if self.hard.size:
             nearest = self.hard[np.argmin(clearances[self.hard])]
-            left = clearances[nearest]
-            where = f"{meters(left)} left" if left >= 0.0 else f"violated by {meters(-left)}"
-            parts.append(f"nearest hard region {self._names[nearest]!r}, {where}")
+            clearance = clearances[nearest]
+            margin = (
+                f"{format_distance(clearance)} left"
+                if clearance >= 0.0
+                else f"violated by {format_distance(-clearance)}"
+            )
+            parts.append(f"nearest hard region {self._names[nearest]!r}, {margin}")
         return ", ".join(parts)
 
 
-def meters(distance: float) -> str:
+def format_distance(distance: float) -> str:
     """Format a distance [m] with its unit, in km from one on."""
     return f"{distance:.2f} m" if distance < 1e3 else f"{distance / 1e3:.0f} km"

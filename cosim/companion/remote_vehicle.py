@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.companion.safety import CONDITIONS, STATES
 from cosim.companion.session import AutopilotSession
-from cosim.mavlink.vehicle.layout import euler_of
+from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 from cosim.simulation.stepped_plant import vehicle_channels
@@ -17,24 +17,26 @@ from plant_fmu.autopilot import effort_of_pulse
 from plant_fmu.running.channels import Channel, Channels
 
 _NAMES = tuple(condition.name for condition in CONDITIONS)
-_SHIFT = 0.1  # s, delay beyond which the loop shifts its schedule instead of catching up
-_REPORTED = (  # channels that the autopilot reports, at the beginning of a step
-    Channel("autopilot.age", "s", "Of the older one of position and attitude"),
+_MAX_DELAY = 0.1  # s, delay beyond which the loop shifts its schedule instead of catching up
+_REPORTED_CHANNELS = (  # channels that the autopilot reports, at the beginning of a step
+    Channel("autopilot.age", "s", "Age of the older of position and attitude"),
     Channel("autopilot.mode", "", "Custom mode of the autopilot's heartbeat"),
-    Channel("autopilot.armed", "", "The autopilot is armed"),
+    Channel("autopilot.armed", "", "Armed state of the autopilot"),
     *(Channel(f"autopilot.position.{a}", "m", "Position in the autopilot's own frame") for a in "xyz"),
     *(Channel(f"autopilot.velocity.{a}", "m/s", "Velocity in the autopilot's own frame, NED") for a in "xyz"),
-    Channel("autopilot.drift", "m", "By which local position and globe or pressure have come apart"),
-    Channel("autopilot.reckoned", "m", "Horizontal way since the frame is known, without a fix of the position"),
+    Channel("autopilot.drift", "m", "Difference between the local position and global position or pressure"),
+    Channel("autopilot.reckoned", "m", "Horizontal distance without a position fix, since the frame is known"),
 )
-_SENT = (  # channels of the companion's own state and commands, in the step
-    Channel("companion.state", "", f"Of the companion: {', '.join(f'{i} {state}' for i, state in enumerate(STATES))}"),
+_SENT_CHANNELS = (  # channels of the companion's own state and commands, in the step
+    Channel(
+        "companion.state", "", f"State of the companion: {', '.join(f'{i} {state}' for i, state in enumerate(STATES))}"
+    ),
     Channel("companion.reason", "", "Condition that ended steering, from 1 in the order of the table; 0 for none"),
-    Channel("companion.lateness", "s", "By which the step began too late"),
-    Channel("companion.round_trip", "s", "Of the quickest TIMESYNC of late"),
-    *(Channel(f"stick.{f}", "", "Stick that was sent, -1 to 1, along or about a body axis") for f in "XYZKMN"),
-    *(Channel(f"velocity_target.{a}", "m/s", "Velocity that was asked for, NED") for a in "xyz"),
-    *(Channel(f"attitude_target.{a}", "rad", "Attitude that was asked for") for a in ("roll", "pitch", "yaw")),
+    Channel("companion.lateness", "s", "Delay of the start of the step"),
+    Channel("companion.round_trip", "s", "Shortest recent TIMESYNC round trip"),
+    *(Channel(f"stick.{f}", "", "Commanded stick, -1 to 1, along or about a body axis") for f in "XYZKMN"),
+    *(Channel(f"velocity_target.{a}", "m/s", "Commanded velocity, NED") for a in "xyz"),
+    *(Channel(f"attitude_target.{a}", "rad", "Commanded attitude") for a in ("roll", "pitch", "yaw")),
 )
 _FIRST_SENT = "thruster_force[1]"  # outputs before it stand for the beginning of a step, from it on for its end
 
@@ -64,17 +66,17 @@ class RemoteVehicle:
         outputs, flags, inputs = vehicle_channels(scenario.vehicle)
         self.inputs = Channels(inputs, np.zeros(len(inputs)))
         first = [channel.name for channel in outputs].index(_FIRST_SENT)
-        all_outputs = (*outputs[:first], *_REPORTED, *outputs[first:], *_SENT)
+        all_outputs = (*outputs[:first], *_REPORTED_CHANNELS, *outputs[first:], *_SENT_CHANNELS)
         self.outputs = Channels(all_outputs, np.full(len(all_outputs), math.nan))
         self.flags = Channels(flags, np.zeros(len(flags), dtype=bool))
-        self._at = {channel.name: i for i, channel in enumerate(self.outputs.channels)}
+        self._index = {channel.name: i for i, channel in enumerate(self.outputs.channels)}
         # the vehicle's table ``autopilot`` describes an ArduSub's servo outputs, not a PX4's
-        given = scenario.vehicle.autopilot if session.profile.name != "px4" else None
-        self._channels = () if given is None else given.channels
-        signs = () if given is None else np.broadcast_to(given.signs, len(self._channels)).tolist()
-        self._efforts = [] if given is None else [effort_of_pulse(given, sign) for sign in signs]
+        table = scenario.vehicle.autopilot if session.profile.name != "px4" else None
+        self._channels = () if table is None else table.channels
+        signs = () if table is None else np.broadcast_to(table.signs, len(self._channels)).tolist()
+        self._efforts = [] if table is None else [effort_of_pulse(table, sign) for sign in signs]
         self._updates = -1
-        self._place: Array = np.full(3, math.nan)
+        self._position: Array = np.full(3, math.nan)
         self._quaternion: Array = np.array([1.0, 0.0, 0.0, 0.0])
         self._begun: float | None = None
         self._count = 0
@@ -95,7 +97,7 @@ class RemoteVehicle:
             self._begun = now
         due = self._begun + self._count * step
         self._session.exchange(wrench, due, due + step)
-        if now - due > _SHIFT:
+        if now - due > _MAX_DELAY:
             self._begun += now - due
         self._count += 1
         self._read()
@@ -112,31 +114,31 @@ class RemoteVehicle:
         rates = reported.rates
         if reported.updates != self._updates:
             self._updates = reported.updates
-            self._place, self._quaternion = reported.predict(session.clock())
-        position, quaternion = session.alignment.to_scene(self._place), self._quaternion
+            self._position, self._quaternion = reported.predict(session.clock())
+        position, quaternion = session.alignment.to_scene(self._position), self._quaternion
         self._write("position.x", position)
         self._write("quaternion.e0", quaternion)
         self._write("velocity.u", reported.velocity_body)
-        self._write("attitude.roll", euler_of(quaternion.tolist()))
+        self._write("attitude.roll", quaternion_to_euler(quaternion.tolist()))
         self._write("altitude", (reported.altitude,))
         self._write("measured.depth", (position[2],))
         self._write("measured.velocity.u", reported.velocity_body[:3])
         self._write("measured.altitude", (reported.altitude,))
         self._write("measured.angular_velocity.p", rates)
-        self._write("measured.heading", (euler_of(quaternion.tolist())[2],))
+        self._write("measured.heading", (quaternion_to_euler(quaternion.tolist())[2],))
         self._write("measured.position.x", position)
         self._write_forces()
         supervisor = session.supervisor
         reason = _NAMES.index(supervisor.reason) + 1 if supervisor.reason in _NAMES else 0
         state = float(STATES.index(supervisor.state))
-        at = reported.age(session.clock()), reported.mode, reported.is_armed
+        status = reported.age(session.clock()), reported.mode, reported.is_armed
         self._write(
             "autopilot.age",
-            (*at, *reported.position, *reported.velocity, session.alignment.drift, session.alignment.reckoned),
+            (*status, *reported.position, *reported.velocity, session.alignment.drift, session.alignment.reckoned),
         )
         self._write("companion.state", (state, reason, session.lateness, reported.sync.round_trip))
         output = session.output
-        self._write("stick.X", (*output.sticks, *output.velocity, *euler_of(output.attitude.tolist())))
+        self._write("stick.X", (*output.sticks, *output.velocity, *quaternion_to_euler(output.attitude.tolist())))
 
     def _write_forces(self) -> None:
         """Write the thruster forces [N] of the autopilot's servo outputs, and their wrench."""
@@ -145,11 +147,11 @@ class RemoteVehicle:
             return
         forces = np.zeros(vehicle.n_thrusters)
         for i, (channel, effort) in enumerate(zip(self._channels, self._efforts, strict=True)):
-            part = effort(pulses[channel - 1]) if 0 < channel <= len(pulses) else 0.0
-            forces[i] = part * (vehicle.thrust_max[i] if part >= 0.0 else -vehicle.thrust_min[i])
+            fraction = effort(pulses[channel - 1]) if 0 < channel <= len(pulses) else 0.0
+            forces[i] = fraction * (vehicle.thrust_max[i] if fraction >= 0.0 else -vehicle.thrust_min[i])
         self._write("thruster_force[1]", forces)
         self._write("actuation.X", vehicle.thruster_matrix @ forces)
 
     def _write(self, first: str, values: Array | tuple[float, ...]) -> None:
-        at = self._at[first]
-        self.outputs.values[at : at + len(values)] = values
+        index = self._index[first]
+        self.outputs.values[index : index + len(values)] = values

@@ -10,15 +10,15 @@ State = Literal["waiting", "aligning", "disarmed", "engaging", "dry_run", "steer
 STATES: tuple[State, ...] = get_args(State)  # a state's index is its number in the record
 
 MEANINGS: dict[State, str] = {
-    "waiting": "no vehicle, or no position, attitude or failsafe parameters of it yet; nothing is sent but requests",
-    "aligning": "the autopilot's frame is not known in the scene yet; nothing is sent but requests",
-    "disarmed": "all is known; arming is awaited, or asked for where the user said so",
-    "engaging": "armed; the mode that is steered in is asked for",
+    "waiting": "no vehicle, or no position, attitude or failsafe parameters from it; only requests are sent",
+    "aligning": "the autopilot's frame is not aligned with the scene yet; only requests are sent",
+    "disarmed": "all is known; waits for arming, or requests it if the user allows it",
+    "engaging": "armed; the steering mode is requested",
     "dry_run": "the law is computed and recorded, and nothing is sent",
     "steering": "sticks or velocities are sent at each step",
-    "held": "sticks are released and the hold mode is asked for, until somebody resumes",
-    "pilot": "somebody else steers; sticks are released once, and nothing is sent until somebody resumes",
-    "diving": "an ArduSub was armed, and dives level until its heading is aligned; the mode for that is asked for",
+    "held": "sticks are released and the hold mode is requested until steering is resumed",
+    "pilot": "another controller steers; sticks are released once, and nothing is sent until steering is resumed",
+    "diving": "an armed ArduSub dives level until its heading is aligned; the mode for that is requested",
 }
 
 
@@ -36,7 +36,7 @@ class Condition:
         Unit of the limit.
     words : str
         Description of the observed value.
-    then : State
+    next_state : State
         State after the condition has ended steering.
     """
 
@@ -44,30 +44,28 @@ class Condition:
     limit: float
     unit: str
     words: str
-    then: State
+    next_state: State
 
 
-GAIN_OFF = 0.01  # tolerance of the pilot gain
+GAIN_TOLERANCE = 0.01  # of the pilot gain
 
 CONDITIONS: tuple[Condition, ...] = (
-    Condition("pilot's sticks", 0.0, "", "somebody else sends sticks that are deflected", "pilot"),
-    Condition("takeover", 0.0, "", "DO_PAUSE_CONTINUE with 0 came for the companion", "held"),
+    Condition("pilot's sticks", 0.0, "", "another station sends deflected sticks", "pilot"),
+    Condition("takeover", 0.0, "", "the companion received DO_PAUSE_CONTINUE with 0", "held"),
     Condition("disarmed", 0.0, "", "the vehicle is disarmed", "pilot"),
-    Condition("mode taken", 0.0, "", "the mode that is steered in was on, and is not any more", "pilot"),
-    Condition("refused mode", 0.8, "s", "since the mode was asked for, without it", "held"),
-    Condition("pilot gain", GAIN_OFF, "", "the autopilot's pilot gain differs from the user's", "held"),
+    Condition("mode taken", 0.0, "", "the autopilot has left the steering mode", "pilot"),
+    Condition("refused mode", 0.8, "s", "since the mode was requested, without success", "held"),
+    Condition("pilot gain", GAIN_TOLERANCE, "", "the autopilot's pilot gain differs from the user's", "held"),
     Condition("unfinished dive", 20.0, "s", "since the dive began, without its end", "held"),
-    Condition("lost link", 0.4, "s", "since anything came from the autopilot", "held"),
-    Condition("stale estimate", 0.5, "s", "age of the older one of position and attitude", "held"),
-    Condition("late loop", 0.3, "s", "by which a step begins too late", "held"),
+    Condition("lost link", 0.4, "s", "since the last message from the autopilot", "held"),
+    Condition("stale estimate", 0.5, "s", "age of the older of position and attitude", "held"),
+    Condition("late loop", 0.3, "s", "delay of the start of a step", "held"),
     Condition("autopilot failsafe", 0.0, "", "the heartbeat says CRITICAL or EMERGENCY", "held"),
     Condition("frame jump", 0.5, "m", "leap of the position that the velocity does not explain", "held"),
     Condition("heading leap", 0.05, "rad", "leap of the heading that the rates do not explain", "held"),
-    Condition("frame drift", 0.5, "m", "by which local position and globe or pressure have come apart", "held"),
-    Condition(
-        "geofence", 0.1, "m", "inside a hard region that is to be kept out of, or outside one to stay in", "held"
-    ),
-    Condition("battery", 0.0, "", "the battery has less left than the user's limit", "held"),
+    Condition("frame drift", 0.5, "m", "difference between the local position and global position or pressure", "held"),
+    Condition("geofence", 0.1, "m", "depth of the violation of a hard region", "held"),
+    Condition("battery", 0.0, "", "the remaining charge is below the user's limit", "held"),
     Condition("leak", 0.0, "", "the autopilot has reported a leak", "held"),
 )
 
@@ -77,11 +75,11 @@ class Observation(NamedTuple):
 
     now: float  # s, our time
     has_state: bool  # True if position and attitude are known, and the wait for failsafe parameters is over
-    frame_known: bool  # True if the offset of the autopilot's frame in the scene is known
+    is_aligned: bool  # True if the offset of the autopilot's frame in the scene is known
     is_armed: bool
-    in_mode: bool  # True if the autopilot is in the mode for the dive, or without a dive for steering
+    is_in_mode: bool  # True if the autopilot is in the mode for the dive, or without a dive for steering
     values: dict[str, float]  # observed values by condition name; one above its limit ends steering
-    has_to_dive: bool = False  # True while the dive before steering is not finished
+    needs_dive: bool = False  # True while the dive before steering is not finished
 
 
 class Supervisor:
@@ -104,21 +102,21 @@ class Supervisor:
         self.state: State = "waiting"
         self.reason = ""
         self._dry_run = dry_run
-        self._asked_at: float | None = None  # s, our time of the first request of the mode
+        self._requested_at: float | None = None  # s, our time of the first request of the mode
 
     @property
     def is_steering(self) -> bool:
         """True while the law steers."""
         return self.state in ("steering", "dry_run")
 
-    def asked_for_mode(self, now: float) -> None:
+    def record_mode_request(self, now: float) -> None:
         """Store the time `now` [s] of the first request of the mode."""
-        if self._asked_at is None:
-            self._asked_at = now
+        if self._requested_at is None:
+            self._requested_at = now
 
-    def waited_for_mode(self, now: float) -> float:
+    def mode_wait_time(self, now: float) -> float:
         """Return the time since the first request of a mode that is not on yet [s]; 0 without a request."""
-        return 0.0 if self._asked_at is None else now - self._asked_at
+        return 0.0 if self._requested_at is None else now - self._requested_at
 
     def resume(self) -> None:
         """Start again from ``waiting``, after ``held`` or ``pilot``.
@@ -126,46 +124,46 @@ class Supervisor:
         A condition that still applies ends steering again.
         """
         if self.state in ("held", "pilot"):
-            self.state, self.reason, self._asked_at = "waiting", "", None
+            self.state, self.reason, self._requested_at = "waiting", "", None
 
-    def update(self, seen: Observation) -> State:
+    def update(self, observation: Observation) -> State:
         """Return the state of the coming step.
 
         Parameters
         ----------
-        seen : Observation
+        observation : Observation
             Observation at the beginning of the step.
         """
         if self.state in ("diving", "engaging", "steering", "dry_run"):
-            self._judge(seen)
+            self._check_conditions(observation)
         if self.state in ("held", "pilot"):
             return self.state
         if self.state not in ("steering", "dry_run"):
-            self.state = self._progress(seen)
+            self.state = self._next_state(observation)
         return self.state
 
-    def _judge(self, seen: Observation) -> None:
+    def _check_conditions(self, observation: Observation) -> None:
         for condition in CONDITIONS:
-            if seen.values.get(condition.name, 0.0) > condition.limit:
-                self.state, self.reason = condition.then, condition.name
+            if observation.values.get(condition.name, 0.0) > condition.limit:
+                self.state, self.reason = condition.next_state, condition.name
                 return
 
-    def _progress(self, seen: Observation) -> State:
-        if not seen.has_state:
+    def _next_state(self, observation: Observation) -> State:
+        if not observation.has_state:
             return "waiting"
-        if not seen.frame_known:
+        if not observation.is_aligned:
             return "aligning"
         if self._dry_run:
             return "dry_run"
-        if not seen.is_armed:
+        if not observation.is_armed:
             return "disarmed"
-        if seen.has_to_dive:
-            self._asked_at = None if seen.in_mode else self._asked_at
+        if observation.needs_dive:
+            self._requested_at = None if observation.is_in_mode else self._requested_at
             return "diving"
         if self.state == "diving":
-            self._asked_at = None
+            self._requested_at = None
             return "engaging"
-        if not seen.in_mode:
+        if not observation.is_in_mode:
             return "engaging"
-        self._asked_at = None
+        self._requested_at = None
         return "steering"

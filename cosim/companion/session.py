@@ -9,14 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from cosim.companion.clock_sync import timesync
+from cosim.companion.autopilot_link import AutopilotLink
+from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment
 from cosim.companion.heading import HeadingWatch, LevelDive
-from cosim.companion.link import AutopilotLink
-from cosim.companion.options import CompanionOptions
-from cosim.companion.outputs import Output, steered_in, uses_sticks
-from cosim.companion.safety import GAIN_OFF, Observation, State, Supervisor
+from cosim.companion.outputs import Output, steering_mode, uses_sticks
+from cosim.companion.safety import GAIN_TOLERANCE, Observation, State, Supervisor
 from cosim.companion.vehicle_state import RATES, ReportedState
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.wire.dialect import dialect
@@ -26,9 +25,14 @@ from plant_fmu import Vehicle
 
 log = logging.getLogger(__name__)
 
-_HEARTBEAT, _SYNC, _RATES, _REPEAT = 1.0, 0.5, 10.0, 0.25  # s, periods of heartbeats, TIMESYNC, rate and mode requests
-_PILOT_LASTS = 1.0  # s, for which deflected sticks of another station count as a pilot's takeover
-_FALLBACK = 1.0  # s, in ``held`` without the hold mode, after which the depth-hold mode is requested instead
+_HEARTBEAT_PERIOD, _SYNC_PERIOD, _RATES_PERIOD, _MODE_PERIOD = (
+    1.0,
+    0.5,
+    10.0,
+    0.25,
+)  # s, periods of heartbeats, TIMESYNC, rate and mode requests
+_PILOT_TIMEOUT = 1.0  # s, for which deflected sticks of another station count as a pilot's takeover
+_HOLD_TIMEOUT = 1.0  # s, in ``held`` without the hold mode, after which the depth-hold mode is requested instead
 _ROUNDING = 1e-6  # s
 _CUSTOM_MODE_ENABLED = 1  # MAV_MODE_FLAG, parameter 1 of DO_SET_MODE
 
@@ -88,9 +92,9 @@ class AutopilotSession:
             self._mavlink, vehicle, options.profile, options.steer_by, options.sticks_by, options.pilot_gain,
             (options.velocity_lag, options.vertical_lag),
         )  # fmt: skip
-        self._steered_in = steered_in(options.profile, options.steer_by)
-        self._dive_mode: Mode = self._steered_in if options.steer_by == "velocity" else "hold"
-        self._mode = self.profile.numbers[self._steered_in]
+        self._steering_mode = steering_mode(options.profile, options.steer_by)
+        self._dive_mode: Mode = self._steering_mode if options.steer_by == "velocity" else "hold"
+        self._mode = self.profile.custom_modes[self._steering_mode]
         self.reported = ReportedState(link.identity)
         self.alignment = FrameAlignment(options.origin)
         self.heading = HeadingWatch()
@@ -100,10 +104,10 @@ class AutopilotSession:
         self.lateness = self.outside = 0.0  # s; m
         self.is_placed, self.misplaced = False, ""
         self._taken_over = self._was_in_mode = False
-        self._law_works = False  # value of the last `Arm` for the master
+        self._is_law_active = False  # value of the last `Arm` for the master
         self._sent_at: dict[str, float] = {}
-        self._held_at, self._lets_go_until = 0.0, -math.inf
-        self._rivals: set[int] = set()  # components of other stations with our system id
+        self._held_at, self._release_until = 0.0, -math.inf
+        self._shared_ids: set[int] = set()  # components of other stations with our system id
 
     def clock(self) -> float:
         """Return the link's time [s]."""
@@ -116,10 +120,10 @@ class AutopilotSession:
 
     def take(self, k: int) -> Sequence[Command]:
         """Return the command that starts or stops the law, if `supervisor.is_steering` has changed."""
-        if self._law_works == self.supervisor.is_steering:
+        if self._is_law_active == self.supervisor.is_steering:
             return ()
-        self._law_works = self.supervisor.is_steering
-        return (Arm(self._law_works),)
+        self._is_law_active = self.supervisor.is_steering
+        return (Arm(self._is_law_active),)
 
     def exchange(self, wrench: Array, due: float, until: float) -> None:
         """Run one step: update the state, send messages, and receive until the step ends.
@@ -133,7 +137,7 @@ class AutopilotSession:
         """
         now = self._link.clock()
         self.lateness = max(0.0, now - due)
-        self._listen(0.0)
+        self._receive(0.0)
         before = self.supervisor.state
         state = self.supervisor.update(self._observation(now))
         if state != before:
@@ -150,17 +154,17 @@ class AutopilotSession:
                         "no position fix, and EK3_MAG_CAL is not 2: the heading may drift by degrees; set it to 2"
                     )
             if before in ("diving", "engaging", "steering") and state == "pilot":
-                self._lets_go_until = now + self.output.releases_for
-        self._ask(now)
-        self._act(state, now, wrench, until - due)
+                self._release_until = now + self.output.release_time
+        self._send_requests(now)
+        self._send_outputs(state, now, wrench, until - due)
         while True:
-            self._listen(max(0.0, until - self._link.clock()))
+            self._receive(max(0.0, until - self._link.clock()))
             if self._link.clock() >= until - _ROUNDING:
                 return
 
-    def _listen(self, timeout: float) -> None:
-        for one in self._link.receive(timeout):
-            self._take(one.system, one.component, one.message, one.time)
+    def _receive(self, timeout: float) -> None:
+        for received in self._link.receive(timeout):
+            self._handle(received.system, received.component, received.message, received.time)
 
     def release(self, seconds: float) -> None:
         """Release the sticks, and request the hold mode until it is on or `seconds` are over.
@@ -171,13 +175,13 @@ class AutopilotSession:
         if state in ("diving", "engaging", "steering", "held"):
             self.supervisor.state, self.supervisor.reason = "held", self.supervisor.reason or "end"
             self._held_at = begun
-            until, waits = begun + self.output.releases_for, begun + seconds
+            until, waits = begun + self.output.release_time, begun + seconds
         elif state == "pilot":
-            until = waits = self._lets_go_until
+            until = waits = self._release_until
         else:
             return
         while self._link.clock() <= until or (
-            self._link.clock() < waits and self.reported.mode != self.profile.numbers["hold"]
+            self._link.clock() < waits and self.reported.mode != self.profile.custom_modes["hold"]
         ):
             now = self._link.clock()
             self.exchange(np.zeros(6), now, now + 0.05)
@@ -194,12 +198,12 @@ class AutopilotSession:
         if self.alignment.offset is not None and self.misplaced and not self.is_placed:
             return f"a position near the scene, not {self.misplaced}: check sign and digits of its origin"
         return self.alignment.missing(reported) or {
-            "disarmed": "arming", "held": f"somebody to resume after: {self.supervisor.reason}",
-            "pilot": f"somebody to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
-            "diving": "the heading to be aligned",
+            "disarmed": "arming", "held": f"a command to resume after: {self.supervisor.reason}",
+            "pilot": f"a command to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
+            "diving": "the heading alignment",
         }.get(self.supervisor.state, "nothing")  # fmt: skip
 
-    def stick_refusal(self) -> str:
+    def stick_rejection(self) -> str:
         """Return the reason why the autopilot would ignore or misread the sticks; empty if none is known."""
         o = self._options
         if o.dry_run or not uses_sticks(o.profile, o.steer_by):
@@ -207,27 +211,27 @@ class AutopilotSession:
         ignored = self.failsafes.ignored_sticks(self.identity[0])
         if ignored:
             return f"{ignored}; expected the same number, or --steer-by velocity"
-        if self._gain_off() > GAIN_OFF:
+        if self._gain_error() > GAIN_TOLERANCE:
             return f"the autopilot's pilot gain is {self._gain():g}, expected {o.pilot_gain:g} of --pilot-gain"
         return ""
 
     # ---- observation ----
 
-    def _gain_off(self) -> float:
+    def _gain_error(self) -> float:
         """Return the difference between the autopilot's pilot gain and the user's; 0 where it is not known."""
-        off = abs(self._gain() - self._options.pilot_gain)
-        return off if math.isfinite(off) else 0.0
+        error = abs(self._gain() - self._options.pilot_gain)
+        return error if math.isfinite(error) else 0.0
 
     def _gain(self) -> float:
         """Return the autopilot's pilot gain: the reported one, else JS_GAIN_DEFAULT; NaN if neither is known."""
-        now = self.reported.pilot_gain
-        return now if math.isfinite(now) else self.failsafes.values.get("JS_GAIN_DEFAULT", math.nan)
+        reported = self.reported.pilot_gain
+        return reported if math.isfinite(reported) else self.failsafes.values.get("JS_GAIN_DEFAULT", math.nan)
 
     def _observation(self, now: float) -> Observation:
         reported, alignment = self.reported, self.alignment
         has_state = math.isfinite(reported.age(now)) and self.failsafes.is_read(now)
         values = {
-            "lost link": now - reported.heard_at,
+            "lost link": now - reported.received_at,
             "stale estimate": reported.age(now),
             "late loop": self.lateness,
             "autopilot failsafe": float(reported.in_failsafe),
@@ -242,35 +246,35 @@ class AutopilotSession:
         }
         if self._dive_mode == "hold" and self.supervisor.state == "diving" and self.dive.is_stuck(reported, now):
             self._dive_mode, self._was_in_mode = "depth_hold", False
-        has_to_dive = (
+        needs_dive = (
             alignment.offset is not None and self.is_placed and has_state and self.dive.is_needed(reported, now)
         )
-        in_mode = reported.mode == (self.profile.numbers[self._dive_mode] if has_to_dive else self._mode)
-        self._was_in_mode |= in_mode and self.supervisor.state == "diving"
-        is_ours = self.supervisor.state == "steering" or (has_to_dive and self._was_in_mode)
+        is_in_mode = reported.mode == (self.profile.custom_modes[self._dive_mode] if needs_dive else self._mode)
+        self._was_in_mode |= is_in_mode and self.supervisor.state == "diving"
+        is_ours = self.supervisor.state == "steering" or (needs_dive and self._was_in_mode)
         if not self._options.dry_run:
             values |= {
-                "pilot's sticks": float(now - reported.pilot_at < _PILOT_LASTS),
+                "pilot's sticks": float(now - reported.pilot_at < _PILOT_TIMEOUT),
                 "disarmed": float(not reported.is_armed),
-                "mode taken": float(not in_mode and is_ours),
-                "refused mode": self.supervisor.waited_for_mode(now),
-                "pilot gain": self._gain_off() if uses_sticks(self._options.profile, self._options.steer_by) else 0.0,
+                "mode taken": float(not is_in_mode and is_ours),
+                "refused mode": self.supervisor.mode_wait_time(now),
+                "pilot gain": self._gain_error() if uses_sticks(self._options.profile, self._options.steer_by) else 0.0,
             }
         is_known = alignment.offset is not None and self.is_placed
-        return Observation(now, has_state, is_known, reported.is_armed, in_mode, values, has_to_dive)
+        return Observation(now, has_state, is_known, reported.is_armed, is_in_mode, values, needs_dive)
 
     # ---- sending ----
 
-    def _due(self, what: str, period: float, now: float) -> bool:
+    def _is_due(self, what: str, period: float, now: float) -> bool:
         if now - self._sent_at.get(what, -math.inf) < period:
             return False
         self._sent_at[what] = now
         return True
 
-    def _ask(self, now: float) -> None:
+    def _send_requests(self, now: float) -> None:
         """Send the messages of every state: heartbeat, clock, and requests of parameters and message rates."""
         m = self._mavlink
-        if self._due("heartbeat", _HEARTBEAT, now):
+        if self._is_due("heartbeat", _HEARTBEAT_PERIOD, now):
             self._link.send(
                 m.MAVLink_heartbeat_message(
                     m.MAV_TYPE_ONBOARD_CONTROLLER, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3
@@ -278,58 +282,58 @@ class AutopilotSession:
             )
         if self.reported.system is None:
             return
-        if self._due("sync", _SYNC, now):
-            self._link.send(timesync(m, self.reported.sync.request(now)))
+        if self._is_due("sync", _SYNC_PERIOD, now):
+            self._link.send(m.MAVLink_timesync_message(0, self.reported.sync.request(now)))
         is_up = math.isfinite(self.reported.age(now))  # one that starts does not answer parameter requests
-        for name in self.failsafes.wanted(now) if is_up else ():
+        for name in self.failsafes.names_to_request(now) if is_up else ():
             self._link.send(m.MAVLink_param_request_read_message(self.reported.system, 1, name.encode(), -1))
-        if self._due("rates", _RATES, now):
-            for message_id, rate in RATES.items():
-                self._command(m.MAV_CMD_SET_MESSAGE_INTERVAL, message_id, 1e6 / rate)
+        if self._is_due("rates", _RATES_PERIOD, now):
+            for name, rate in RATES.items():
+                self._command(m.MAV_CMD_SET_MESSAGE_INTERVAL, getattr(m, f"MAVLINK_MSG_ID_{name}"), 1e6 / rate)
 
-    def _act(self, state: State, now: float, wrench: Array, period: float) -> None:
+    def _send_outputs(self, state: State, now: float, wrench: Array, period: float) -> None:
         output, messages = self.output, ()  # type: Output, Sequence[Any]
         if state == "steering":
-            messages = output.messages(wrench, self.reported, period)
+            messages = output.make_messages(wrench, self.reported, period)
         elif state == "dry_run":
-            output.messages(wrench, self.reported, period)
+            output.make_messages(wrench, self.reported, period)
         else:
             output.clear()
-        if state == "disarmed" and self._options.arm and self._due("arm", 1.0, now):
+        if state == "disarmed" and self._options.arm and self._is_due("arm", 1.0, now):
             self._command(self._mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         elif state == "diving":
-            self.supervisor.asked_for_mode(now)
-            if self.reported.mode != self.profile.numbers[self._dive_mode]:
+            self.supervisor.record_mode_request(now)
+            if self.reported.mode != self.profile.custom_modes[self._dive_mode]:
                 self._send_mode(self._dive_mode, now)
-                messages = output.still(self.reported)
+                messages = output.hold_still(self.reported)
             else:
-                speed, back = self.dive.speed_down(self.reported), self.dive.way_back(self.reported)
+                speed, back = self.dive.speed_down(self.reported), self.dive.vector_back(self.reported)
                 messages = output.descend(self.reported, speed, back, period)
         elif state == "engaging":
-            self.supervisor.asked_for_mode(now)
-            self._send_mode(self._steered_in, now)
-            messages = output.still(self.reported)
+            self.supervisor.record_mode_request(now)
+            self._send_mode(self._steering_mode, now)
+            messages = output.hold_still(self.reported)
         elif state == "held" and self.reported.system is not None and not self._options.dry_run:
-            messages = self._hold(now)
-        elif state == "pilot" and now <= self._lets_go_until:
-            messages = output.released(self.reported, now - self._held_at)
+            messages = self._request_hold(now)
+        elif state == "pilot" and now <= self._release_until:
+            messages = output.release(self.reported, now - self._held_at)
         for message in messages:
             self._link.send(message)
 
-    def _hold(self, now: float) -> Sequence[Any]:
+    def _request_hold(self, now: float) -> Sequence[Any]:
         """Request the hold mode, or depth hold if that is refused; return the messages that release the sticks."""
-        since, modes = now - self._held_at, self.profile.numbers
-        if self.reported.mode == modes["hold"] and since > self.output.releases_for:
+        since, modes = now - self._held_at, self.profile.custom_modes
+        if self.reported.mode == modes["hold"] and since > self.output.release_time:
             return ()
-        refused = since > _FALLBACK
+        refused = since > _HOLD_TIMEOUT
         if self.reported.mode != modes["depth_hold" if refused else "hold"]:
             self._send_mode("depth_hold" if refused else "hold", now)
-        return self.output.released(self.reported, since)
+        return self.output.release(self.reported, since)
 
     def _send_mode(self, mode: Mode, now: float) -> None:
-        if self._due("mode", _REPEAT, now):
-            number = self.profile.numbers[mode]
-            first, second = (number >> 16 & 0xFF, number >> 24) if self.profile.packed else (number, 0)
+        if self._is_due("mode", _MODE_PERIOD, now):
+            number = self.profile.custom_modes[mode]
+            first, second = (number >> 16 & 0xFF, number >> 24) if self.profile.is_packed else (number, 0)
             self._command(self._mavlink.MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, first, second)
 
     def _command(self, number: int, *parameters: float) -> None:
@@ -347,32 +351,34 @@ class AutopilotSession:
 
     # ---- receiving ----
 
-    def _take(self, system: int, component: int, message: Any, at: float) -> None:
+    def _handle(self, system: int, component: int, message: Any, time: float) -> None:
         if message.get_type() == "COMMAND_LONG":
-            self._commanded(system, component, message)
+            self._handle_command(system, component, message)
             return
         if message.get_type() == "HEARTBEAT" and system == self.identity[0]:
-            self._warn_of_rival(component)
+            self._warn_of_shared_id(component)
         if message.get_type() == "PARAM_VALUE" and (system, component) == (self.reported.system, 1):
-            self.failsafes.take(message)
-        self.reported.take(system, component, message, at)
-        self.alignment.update(self.reported, at)
+            self.failsafes.receive(message)
+        self.reported.receive(system, component, message, time)
+        self.alignment.update(self.reported, time)
         self.heading.update(self.reported)
-        self.dive.update(self.reported, at)
+        self.dive.update(self.reported, time)
 
-    def _warn_of_rival(self, component: int) -> None:
+    def _warn_of_shared_id(self, component: int) -> None:
         """Warn once of another station that shares our system id: an ArduSub accepts its sticks as well as ours."""
         system, ours = self.identity
-        if component != ours and component not in self._rivals:
-            self._rivals.add(component)
+        if component != ours and component not in self._shared_ids:
+            self._shared_ids.add(component)
             log.warning(
-                "component %d has the companion's system id %d: its sticks compete; give it another", component, system
+                "component %d has the companion's system id %d: its sticks compete; change its system id",
+                component,
+                system,
             )
             m = self._mavlink
             text = f"Companion: component {component} shares system id {system}"
             self._link.send(m.MAVLink_statustext_message(m.MAV_SEVERITY_WARNING, text[:50].encode()))
 
-    def _commanded(self, system: int, component: int, message: Any) -> None:
+    def _handle_command(self, system: int, component: int, message: Any) -> None:
         """Apply a DO_PAUSE_CONTINUE that is addressed to the companion: 0 ends steering, 1 resumes it."""
         m = self._mavlink
         if (message.target_system, message.target_component) != self._link.identity:

@@ -10,19 +10,19 @@ import numpy as np
 
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.vehicle_state import ReportedState
-from cosim.mavlink.vehicle.layout import euler_of
-from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, with_thrust_body
+from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
+from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, make_attitude_target
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
-FASTEST = 0.5  # m/s, greatest speed of a law that steers by velocity: a velocity loop brakes later than thrusters
-_FASTEST_ASKED, _FASTEST_TURN = 0.8, 0.6  # m/s, rad/s, greatest set-points of velocity and yaw rate
-_OBSERVED = 1.5  # rad/s, natural frequency of the observer
-_HELD = 0.6  # rad/s, natural frequency of the critically damped position hold
+MAX_LAW_SPEED = 0.5  # m/s, of a law that steers by velocity: a velocity loop brakes later than thrusters
+_MAX_VELOCITY, _MAX_YAW_RATE = 0.8, 0.6  # m/s, rad/s, of set-points
+_OBSERVER_FREQUENCY = 1.5  # rad/s, natural frequency of the observer
+_HOLD_FREQUENCY = 0.6  # rad/s, natural frequency of the critically damped position hold
 _RATE_LAG, _ANGLE_LAG = 0.3, 0.3  # s, lags of an autopilot's rate loop and angle loop
-_FARTHEST, _TILT = 0.35, 0.1  # rad, greatest lead of set-points of angles; greatest roll and pitch
+_MAX_LEAD, _MAX_TILT = 0.35, 0.1  # rad, lead of set-points of angles; roll and pitch
 _ANGLE_P, _RATE_P, _RATE_I = 6.0, 0.135, 0.09  # defaults of ATC_ANG_PIT_P [1/s], ATC_RAT_PIT_P [s], ATC_RAT_PIT_I
-_LEAN = 0.5  # rad, greatest lean angle
+_MAX_LEAN = 0.5  # rad
 _NORTH, _EAST, _DOWN = np.eye(3)
 _VELOCITY_ONLY, _YAW_RATE_IGNORED = 0b010111000111, 1 << 11  # type_mask of positions and velocities
 _RATES_IGNORED, _THRUST_IGNORED = 0b111, 1 << 6  # type_mask of attitudes
@@ -52,7 +52,7 @@ class TurnLead:
 
     def yaw_rate(self, wrench: Array, state: ReportedState) -> float:
         """Return the set-point of the yaw rate [rad/s], at most 0.6 rad/s."""
-        return min(max(float(self.rates(wrench, state)[2]), -_FASTEST_TURN), _FASTEST_TURN)
+        return min(max(float(self.rates(wrench, state)[2]), -_MAX_YAW_RATE), _MAX_YAW_RATE)
 
     def attitude(self, wrench: Array, state: ReportedState) -> Array:
         """Return the set-point of the attitude, a quaternion, shape (4,), within 0.35 rad of the present one by angle.
@@ -60,11 +60,13 @@ class TurnLead:
         Roll and pitch are at most 0.1 rad: the autopilot levels the vehicle itself, and the law's moments against
         weight, drag and eccentric thrusters do not mean a tilt.
         """
-        roll, pitch, yaw = np.clip(_ANGLE_LAG * self.rates(wrench, state), -_FARTHEST, _FARTHEST)
-        now = euler_of(state.quaternion.tolist())
-        asked = [min(max(angle + lead, -_TILT), _TILT) for angle, lead in zip(now[:2], (roll, pitch), strict=True)]
+        roll, pitch, yaw = np.clip(_ANGLE_LAG * self.rates(wrench, state), -_MAX_LEAD, _MAX_LEAD)
+        now = quaternion_to_euler(state.quaternion.tolist())
+        tilt = [
+            min(max(angle + lead, -_MAX_TILT), _MAX_TILT) for angle, lead in zip(now[:2], (roll, pitch), strict=True)
+        ]
         heading = from_axis_angle(_DOWN, now[2] + yaw)
-        result: Array = multiply(heading, multiply(from_axis_angle(_EAST, asked[1]), from_axis_angle(_NORTH, asked[0])))
+        result: Array = multiply(heading, multiply(from_axis_angle(_EAST, tilt[1]), from_axis_angle(_NORTH, tilt[0])))
         return result
 
 
@@ -123,7 +125,7 @@ class LevelLead:
             Time since the last call [s].
         """
         self._settled += min(1.0, period * self._washout) * (command - self._settled)
-        angles: Array = np.clip((command - self._settled) / self._gain, -_LEAN, _LEAN)
+        angles: Array = np.clip((command - self._settled) / self._gain, -_MAX_LEAN, _MAX_LEAN)
         return angles
 
 
@@ -146,13 +148,13 @@ class VelocityLead:
         self._mass: Array = vehicle.mass + np.diag(vehicle.added_mass)[:3]
         self._linear, self._quadratic = vehicle.linear_damping[:3], vehicle.quadratic_damping[:3]
         self._lag: Array = np.array([lag, lag, vertical_lag])
-        self._asked: Array | None = None  # last set-point [m/s, NED]
+        self._last_set_point: Array | None = None  # last set-point [m/s, NED]
         self._expected: Array = np.zeros(3)  # velocity estimate of the observer [m/s, NED]
-        self._beside: Array = np.zeros(3)  # d [m/s2]
+        self._disturbance: Array = np.zeros(3)  # d [m/s2]
 
     def restart(self) -> None:
         """Reset the observer, after another controller has steered."""
-        self._asked, self._beside = None, np.zeros(3)
+        self._last_set_point, self._disturbance = None, np.zeros(3)
 
     def velocity(self, wrench: Array, state: ReportedState, period: float) -> Array:
         """Return the velocity [m/s, NED], shape (3,), of at most 0.8 m/s.
@@ -169,8 +171,8 @@ class VelocityLead:
         speed = state.velocity_body[:3]
         force = np.where(np.isfinite(wrench[:3]), wrench[:3], 0.0)
         drag = (self._linear + self._quadratic * np.abs(speed)) * speed
-        wanted: Array = rotation_matrix(state.quaternion) @ ((force - drag) / self._mass)
-        return self._set_point(wanted, state, period)
+        acceleration: Array = rotation_matrix(state.quaternion) @ ((force - drag) / self._mass)
+        return self._set_point(acceleration, state, period)
 
     def hold(self, back: Array, speed_down: float, state: ReportedState, period: float) -> Array:
         """Return the velocity [m/s, NED], shape (3,), that holds a horizontal position during a descent.
@@ -188,35 +190,35 @@ class VelocityLead:
         period : float
             Time since the last call [s].
         """
-        wanted = np.zeros(3)
-        wanted[:2] = _HELD**2 * back - 2.0 * _HELD * state.velocity[:2]
-        asked = self._set_point(wanted, state, period)
-        asked[2] = speed_down
-        return asked
+        acceleration = np.zeros(3)
+        acceleration[:2] = _HOLD_FREQUENCY**2 * back - 2.0 * _HOLD_FREQUENCY * state.velocity[:2]
+        velocity = self._set_point(acceleration, state, period)
+        velocity[2] = speed_down
+        return velocity
 
-    def _set_point(self, wanted: Array, state: ReportedState, period: float) -> Array:
+    def _set_point(self, acceleration: Array, state: ReportedState, period: float) -> Array:
         """Return the velocity set-point [m/s, NED] that gives an acceleration [m/s2, NED]."""
         self._observe(state.velocity, period)
-        asked: Array = state.velocity + self._lag * (wanted - self._beside)
-        length = float(np.linalg.norm(asked))
-        if not math.isfinite(length):
+        velocity: Array = state.velocity + self._lag * (acceleration - self._disturbance)
+        speed = float(np.linalg.norm(velocity))
+        if not math.isfinite(speed):
             self.restart()
             return np.zeros(3)
-        self._asked = asked * min(1.0, _FASTEST_ASKED / length) if length > 0.0 else asked
-        return self._asked
+        self._last_set_point = velocity * min(1.0, _MAX_VELOCITY / speed) if speed > 0.0 else velocity
+        return self._last_set_point
 
     def _observe(self, velocity: Array, period: float) -> None:
-        if self._asked is None:
+        if self._last_set_point is None:
             self._expected = velocity.copy()
             return
         error = velocity - self._expected
-        acceleration = (self._asked - self._expected) / self._lag + self._beside
-        self._expected = self._expected + period * (acceleration + 2.0 * _OBSERVED * error)
-        most = _FASTEST_ASKED / self._lag
-        self._beside = np.clip(self._beside + period * _OBSERVED**2 * error, -most, most)
+        acceleration = (self._last_set_point - self._expected) / self._lag + self._disturbance
+        self._expected = self._expected + period * (acceleration + 2.0 * _OBSERVER_FREQUENCY * error)
+        limit = _MAX_VELOCITY / self._lag
+        self._disturbance = np.clip(self._disturbance + period * _OBSERVER_FREQUENCY**2 * error, -limit, limit)
 
 
-def velocity_target(mavlink: Any, system: int, velocity: Array, yaw_rate: float | None) -> Any:
+def make_velocity_target(mavlink: Any, system: int, velocity: Array, yaw_rate: float | None) -> Any:
     """Return SET_POSITION_TARGET_LOCAL_NED with a velocity [m/s, NED] and, unless None, a yaw rate [rad/s]."""
     x, y, z = velocity.tolist()
     mask = _VELOCITY_ONLY | (_YAW_RATE_IGNORED if yaw_rate is None else 0)
@@ -226,7 +228,7 @@ def velocity_target(mavlink: Any, system: int, velocity: Array, yaw_rate: float 
     )
 
 
-def attitude_target(mavlink: Any, system: int, attitude: Array, force: Array | None) -> Any:
+def make_attitude_message(mavlink: Any, system: int, attitude: Array, force: Array | None) -> Any:
     """Return SET_ATTITUDE_TARGET.
 
     Parameters
@@ -245,4 +247,4 @@ def attitude_target(mavlink: Any, system: int, attitude: Array, force: Array | N
     if force is None:
         return mavlink.MAVLink_set_attitude_target_message(*fields)
     ahead, right, down = force.tolist()
-    return with_thrust_body(mavlink, *fields, thrust_body=(ahead, right, down))
+    return make_attitude_target(mavlink, *fields, thrust_body=(ahead, right, down))

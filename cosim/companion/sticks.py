@@ -10,15 +10,15 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from cosim.mavlink.vehicle.profile import Profile
-from cosim.mavlink.vehicle.sticks import (
+from cosim.mavlink.vehicle.ardusub_sticks import (
     CLIMB_DEAD_ZONE,
-    LEAN,
     LEAN_DEAD_ZONE,
+    MAX_LEAN,
     YAW_DEAD_ZONE,
     MotorMixer,
-    deflection_of,
+    invert_dead_zone,
 )
+from cosim.mavlink.vehicle.profile import Profile
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.stick_stabilizer import YAW_RATE
 from cosim.simulation.signals import Array
@@ -31,8 +31,8 @@ PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD, if PI
 _FULL_YAW = math.radians(45.0)  # rad/s, yaw rate of a full stick at ACRO_YAW_P 1
 _CENTI = 0.01  # m per cm, deg per hundredth of a degree
 _FULL = 1000.0  # value of a full stick in MANUAL_CONTROL
-_NEWTON, _FLAT = 3, 0.05  # Newton steps; least command of a thruster at which its force is linearized
-_HALVINGS = 8  # bisections of the fraction of the force that leaves room for the whole moments
+_NEWTON_STEPS, _MIN_COMMAND = 3, 0.05  # minimum command of a thruster at which its force is linearized
+_BISECTIONS = 8  # bisections of the fraction of the force that leaves room for the whole moments
 _PITCH, _ROLL = 1, 2  # bits of MANUAL_CONTROL.enabled_extensions
 _CENTER, _SWING, _AXES = 1500, 400, 6  # us, center and amplitude of a channel's pulse; number of channels
 _RELEASED, _LEFT_ALONE = 0, 0xFFFF  # values that release a channel, and leave it unchanged
@@ -61,7 +61,7 @@ class StickScale:
         Factor of the dead zones of rate sticks: the pilot gain; 0 without dead zones.
     yaw_rate, climb_rates : float, (float, float)
         Rates of full sticks: yaw [rad/s]; up, down [m/s].
-    greatest_lean : float
+    max_lean : float
         Angle of a full stick of roll or pitch [rad].
     """
 
@@ -74,7 +74,7 @@ class StickScale:
     dead_zones: float
     yaw_rate: float = YAW_RATE
     climb_rates: tuple[float, float] = (PILOT_SPEED, PILOT_SPEED)
-    greatest_lean: float = LEAN
+    max_lean: float = MAX_LEAN
 
     def sticks(self, wrench: Array) -> Array:
         """Return the sticks that command a wrench, shape (6,), X Y Z K M N from -1 to 1.
@@ -89,42 +89,42 @@ class StickScale:
         wrench : ndarray, shape (6,)
             Wrench [N, N m], body frame; components that are not finite count as 0.
         """
-        asked = np.where(np.isfinite(wrench), wrench, 0.0)
-        sticks = self._sticks_of(asked)
-        if self.quadratic and self._is_beyond(sticks):
-            least, most = 0.0, 1.0
-            for _ in range(_HALVINGS):
-                part = 0.5 * (least + most)
-                sticks = self._sticks_of(np.concatenate([part * asked[:3], asked[3:]]))
-                least, most = (least, part) if self._is_beyond(sticks) else (part, most)
-            sticks = self._sticks_of(np.concatenate([least * asked[:3], asked[3:]]))
+        wrench = np.where(np.isfinite(wrench), wrench, 0.0)
+        sticks = self._unlimited_sticks(wrench)
+        if self.quadratic and self._is_saturated(sticks):
+            low, high = 0.0, 1.0
+            for _ in range(_BISECTIONS):
+                middle = 0.5 * (low + high)
+                sticks = self._unlimited_sticks(np.concatenate([middle * wrench[:3], wrench[3:]]))
+                low, high = (low, middle) if self._is_saturated(sticks) else (middle, high)
+            sticks = self._unlimited_sticks(np.concatenate([low * wrench[:3], wrench[3:]]))
         clipped: Array = np.clip(sticks / self._gains, -1.0, 1.0)
         return clipped
 
-    def _sticks_of(self, wrench: Array) -> Array:
+    def _unlimited_sticks(self, wrench: Array) -> Array:
         """Return the sticks times their gain, shape (6,), that command a wrench without limits.
 
         Fit the thrusters' commands by least squares; for quadratic forces, correct the wrench by Newton's method.
         """
-        share = self.efforts @ wrench
+        efforts = self.efforts @ wrench
         if not self.quadratic:
-            linear: Array = self._by_motor @ share
+            linear: Array = self._mixer_inverse @ efforts
             return linear
-        result: Array = self._by_motor @ np.copysign(np.sqrt(np.abs(share)), share)
-        for _ in range(_NEWTON):
+        result: Array = self._mixer_inverse @ np.copysign(np.sqrt(np.abs(efforts)), efforts)
+        for _ in range(_NEWTON_STEPS):
             command = self.mixer @ result
             size = np.abs(command)
-            slope = (self.forces * (2.0 * np.maximum(size, _FLAT))) @ self.mixer
-            lacking = wrench - self.forces @ (command * size)
-            result += np.linalg.lstsq(slope, lacking, rcond=None)[0]
+            slope = (self.forces * (2.0 * np.maximum(size, _MIN_COMMAND))) @ self.mixer
+            residual = wrench - self.forces @ (command * size)
+            result += np.linalg.lstsq(slope, residual, rcond=None)[0]
         return result
 
-    def _is_beyond(self, sticks: Array) -> bool:
+    def _is_saturated(self, sticks: Array) -> bool:
         """Return True if sticks times their gain exceed a thruster's or a stick's limit."""
         return bool(np.abs(self.mixer @ sticks).max() > 1.0 or np.abs(sticks / self._gains).max() > 1.0)
 
     @cached_property
-    def _by_motor(self) -> Array:
+    def _mixer_inverse(self) -> Array:
         return np.asarray(np.linalg.pinv(self.mixer), dtype=np.float64)
 
     @cached_property
@@ -147,27 +147,22 @@ class StickScale:
         down = abs(parameters.get("PILOT_SPEED_DN", 0.0)) or up
         climb = _CENTI * up or self.climb_rates[0], _CENTI * down or self.climb_rates[1]
         yaw_rate = _FULL_YAW * yaw or self.yaw_rate
-        return replace(
-            self, yaw_rate=yaw_rate, climb_rates=climb, greatest_lean=math.radians(degrees) or self.greatest_lean
-        )
+        return replace(self, yaw_rate=yaw_rate, climb_rates=climb, max_lean=math.radians(degrees) or self.max_lean)
 
     def lean_sticks(self, angles: Array) -> Array:
         """Return the sticks of roll and pitch, shape (2,), that command these angles [rad] in STABILIZE."""
         return np.array(
-            [
-                deflection_of(min(max(angle / self.greatest_lean, -1.0), 1.0), LEAN_DEAD_ZONE)
-                for angle in angles.tolist()
-            ]
+            [invert_dead_zone(min(max(angle / self.max_lean, -1.0), 1.0), LEAN_DEAD_ZONE) for angle in angles.tolist()]
         )
 
     def _rate_stick(self, part: float, dead_zone: float) -> float:
         if not math.isfinite(part):
             return 0.0
-        deflection = deflection_of(part, dead_zone * self.dead_zones)
+        deflection = invert_dead_zone(part, dead_zone * self.dead_zones)
         return min(max(deflection / self.gain, -1.0), 1.0)
 
 
-def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: SticksBy) -> StickScale:
+def make_stick_scale(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: SticksBy) -> StickScale:
     """Return the scale of the sticks of a vehicle.
 
     Parameters
@@ -182,20 +177,20 @@ def scale_of(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: S
         Message that carries the sticks.
     """
     gain = pilot_gain if sticks_by == "manual-control" else 1.0
-    reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+    max_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
     if profile.name != "ardusub":  # the autopilot allocates the axes to the thrusters itself
-        share = np.diag(np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0))
-        return StickScale(share, np.diag(reach), np.eye(6), gain, True, False, 0.0)
+        efforts = np.diag(np.divide(1.0, max_wrench, out=np.zeros(6), where=max_wrench > 0.0))
+        return StickScale(efforts, np.diag(max_wrench), np.eye(6), gain, True, False, 0.0)
     mixer = MotorMixer(vehicle)
-    forces = vehicle.thruster_matrix * mixer.greatest
-    efforts = mixer.asked @ np.linalg.pinv(forces @ mixer.asked)
-    return StickScale(efforts, forces, mixer.asked, gain, False, mixer.is_quadratic, pilot_gain)
+    forces = vehicle.thruster_matrix * mixer.max_forces
+    efforts = mixer.commands @ np.linalg.pinv(forces @ mixer.commands)
+    return StickScale(efforts, forces, mixer.commands, gain, False, mixer.is_quadratic, pilot_gain)
 
 
-def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:
+def make_manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, all_axes: bool) -> Any:
     """Return MANUAL_CONTROL; with `all_axes` it includes roll and pitch."""
     surge, sway, heave, roll, pitch, yaw = sticks.tolist()
-    center = profile.centred_stick
+    center = profile.centered_stick
     x, y, r = (round(_FULL * part) for part in (surge, sway, yaw))
     z = round(center - (_FULL - center) * heave)
     message = mavlink.MAVLink_manual_control_message(system, x, y, z, r, 0)
@@ -206,14 +201,14 @@ def manual_control(mavlink: Any, system: int, profile: Profile, sticks: Array, a
     return message
 
 
-def channels_override(mavlink: Any, system: int, sticks: Array) -> Any:
+def override_channels(mavlink: Any, system: int, sticks: Array) -> Any:
     """Return RC_CHANNELS_OVERRIDE in ArduSub's order: pitch, roll, up, yaw, forward, right."""
     surge, sway, heave, roll, pitch, yaw = sticks.tolist()
     pulses = [round(_CENTER + _SWING * part) for part in (pitch, roll, -heave, yaw, surge, sway)]
     return _override(mavlink, system, pulses)
 
 
-def channels_released(mavlink: Any, system: int) -> Any:
+def release_channels(mavlink: Any, system: int) -> Any:
     """Return RC_CHANNELS_OVERRIDE that releases the channels to the radio."""
     return _override(mavlink, system, [_RELEASED] * _AXES)
 

@@ -13,28 +13,28 @@ from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.clock_sync import ClockSync
 from cosim.simulation.signals import Array
 
-RATES = {  # Hz, requested message rates by message id
-    0: 5.0,  # HEARTBEAT, with mode and arming; a PX4 refuses, and sends one per second
-    436: 10.0,  # CURRENT_MODE, PX4 only
-    31: 50.0,  # ATTITUDE_QUATERNION
-    32: 50.0,  # LOCAL_POSITION_NED
-    33: 5.0,  # GLOBAL_POSITION_INT
-    36: 10.0,  # SERVO_OUTPUT_RAW
-    1: 2.0,  # SYS_STATUS
-    29: 10.0,  # SCALED_PRESSURE
-    137: 10.0,  # SCALED_PRESSURE2
-    132: 5.0,  # DISTANCE_SENSOR
-    193: 2.0,  # EKF_STATUS_REPORT, ArduPilot only
-    230: 2.0,  # ESTIMATOR_STATUS, PX4 only
+RATES = {  # Hz, requested rates of messages
+    "HEARTBEAT": 5.0,  # mode and arming; a PX4 refuses, and sends one per second
+    "CURRENT_MODE": 10.0,  # PX4 only
+    "ATTITUDE_QUATERNION": 50.0,
+    "LOCAL_POSITION_NED": 50.0,
+    "GLOBAL_POSITION_INT": 5.0,
+    "SERVO_OUTPUT_RAW": 10.0,
+    "SYS_STATUS": 2.0,
+    "SCALED_PRESSURE": 10.0,
+    "SCALED_PRESSURE2": 10.0,
+    "DISTANCE_SENSOR": 5.0,
+    "EKF_STATUS_REPORT": 2.0,  # ArduPilot only
+    "ESTIMATOR_STATUS": 2.0,  # PX4 only
 }
 _ARMED, _CRITICAL = 128, 5  # bit of HEARTBEAT.base_mode; MAV_STATE_CRITICAL: from it on a failsafe is active
 _LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
 _RELATIVE, _ABSOLUTE = 8, 16  # estimator flags: horizontal position is relative, absolute
 _DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
 _DEFLECTED, _INVALID = 50, 0x7FFF  # MANUAL_CONTROL: deflection, of 1000, above which a stick counts; unused stick
-_RESTS_IN_THE_MIDDLE = (3, 12)  # MAV_AUTOPILOT: ArduPilot and PX4
+_CENTERED_THROTTLE = (3, 12)  # MAV_AUTOPILOT: ArduPilot and PX4
 _CENTER, _DEFLECTED_PULSE = 1500, 25  # us, center of a channel's pulse; deflection above which it counts
-_PREDICTED = 0.1  # s, longest prediction of the state over its age
+_MAX_PREDICTION = 0.1  # s, of the state over its age
 _MILLI, _MICRO = 1e-3, 1e-6
 
 
@@ -67,7 +67,7 @@ class ReportedState:
         True if the autopilot has no fix of its horizontal position, and dead-reckons it.
     pilot_gain : float
         Present pilot gain of an ArduSub's sticks [-]; NaN if none is reported.
-    heard_at, pilot_at : float
+    received_at, pilot_at : float
         Our times [s] of the autopilot's last processed message, and of the last deflected sticks of another station.
     sync : ClockSync
         Offset between the autopilot's clock and ours.
@@ -87,8 +87,8 @@ class ReportedState:
         self.pulses: tuple[int, ...] = ()
         self.is_leaking = self.is_reckoned = False
         self.resets = 0  # ODOMETRY.reset_counter of the autopilot's estimate
-        self.heard_at = self.pilot_at = -math.inf
-        self.came: Counter[str] = Counter()  # counts of received messages, by name
+        self.received_at = self.pilot_at = -math.inf
+        self.message_counts: Counter[str] = Counter()  # counts of received messages, by name
         self.results: dict[int, int] = {}  # last MAV_RESULT of each command, by MAV_CMD number
         self.texts: list[str] = []
         self.sync = ClockSync()
@@ -111,24 +111,24 @@ class ReportedState:
             "ESTIMATOR_STATUS": self._estimator,
             "STATUSTEXT": self._text,
             "COMMAND_ACK": self._acknowledge,
-            "TIMESYNC": lambda m, now: self.sync.take(m.tc1, m.ts1, now),
+            "TIMESYNC": lambda m, now: self.sync.add_answer(m.tc1, m.ts1, now),
         }
         self._second = False  # True if SCALED_PRESSURE2 is received: the sensor outside the hull
 
-    def take(self, system: int, component: int, message: Any, now: float) -> None:
+    def receive(self, system: int, component: int, message: Any, now: float) -> None:
         """Process a message that arrived at our time `now` [s]."""
-        kind = message.get_type()
-        if kind in ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"):
+        name = message.get_type()
+        if name in ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"):
             if (system, component) != self._identity and _is_deflected(message, self.autopilot):
                 self.pilot_at = now
             return
-        if self.system is None and kind == "HEARTBEAT" and component == 1 and message.autopilot != 8:
+        if self.system is None and name == "HEARTBEAT" and component == 1 and message.autopilot != 8:
             self.system = system
-        if system != self.system or component != 1 or kind not in self._handlers:
+        if system != self.system or component != 1 or name not in self._handlers:
             return
-        self.heard_at = now
-        self.came[kind] += 1
-        self._handlers[kind](message, now)
+        self.received_at = now
+        self.message_counts[name] += 1
+        self._handlers[name](message, now)
 
     def age(self, now: float) -> float:
         """Return the age of the older one of position and attitude [s]; infinite before both were received.
@@ -137,27 +137,27 @@ class ReportedState:
         reception.
         """
         ages = []
-        for boot, heard in ((self._position_boot, self._position_at), (self.attitude_boot, self._attitude_at)):
+        for boot, received in ((self._position_boot, self._position_at), (self.attitude_boot, self._attitude_at)):
             stamped = now - (boot + self.sync.offset)
-            ages.append(max(now - heard, stamped if math.isfinite(stamped) else 0.0))
+            ages.append(max(now - received, stamped if math.isfinite(stamped) else 0.0))
         return max(ages)
 
     @property
     def updates(self) -> int:
         """Count of positions and attitudes so far."""
-        return sum(self.came[kind] for kind in ("LOCAL_POSITION_NED", "ATTITUDE_QUATERNION", "ODOMETRY"))
+        return sum(self.message_counts[name] for name in ("LOCAL_POSITION_NED", "ATTITUDE_QUATERNION", "ODOMETRY"))
 
     def predict(self, now: float) -> tuple[Array, Array]:
         """Return position, shape (3,) [m, NED, local frame], and quaternion, shape (4,), predicted over their age.
 
         Velocity and rates are assumed constant, for at most 0.1 s.
         """
-        lead = min(self.age(now), _PREDICTED)
+        lead = min(self.age(now), _MAX_PREDICTION)
         if not math.isfinite(lead):
             return self.position.copy(), self.quaternion.copy()
-        turned = lead * self.rates
-        angle = float(np.linalg.norm(turned))
-        turn = from_axis_angle(turned / angle, angle) if angle > 0.0 else np.array([1.0, 0.0, 0.0, 0.0])
+        rotation = lead * self.rates
+        angle = float(np.linalg.norm(rotation))
+        turn = from_axis_angle(rotation / angle, angle) if angle > 0.0 else np.array([1.0, 0.0, 0.0, 0.0])
         return self.position + lead * self.velocity, multiply(self.quaternion, turn)
 
     @property
@@ -176,16 +176,18 @@ class ReportedState:
         self.mode = m.custom_mode
 
     def _local_position(self, m: Any, now: float) -> None:
-        self._place((m.x, m.y, m.z), (m.vx, m.vy, m.vz), m.time_boot_ms * _MILLI, now)
+        self._set_position((m.x, m.y, m.z), (m.vx, m.vy, m.vz), m.time_boot_ms * _MILLI, now)
 
-    def _place(self, position: Any, velocity: Any, boot: float, now: float) -> None:
+    def _set_position(self, position: Any, velocity: Any, boot: float, now: float) -> None:
         self.position[:], self.velocity[:] = position, velocity
         self._position_boot, self._position_at = boot, now
 
     def _attitude_quaternion(self, m: Any, now: float) -> None:
-        self._turn((m.q1, m.q2, m.q3, m.q4), (m.rollspeed, m.pitchspeed, m.yawspeed), m.time_boot_ms * _MILLI, now)
+        self._set_attitude(
+            (m.q1, m.q2, m.q3, m.q4), (m.rollspeed, m.pitchspeed, m.yawspeed), m.time_boot_ms * _MILLI, now
+        )
 
-    def _turn(self, quaternion: Any, rates: Any, boot: float, now: float) -> None:
+    def _set_attitude(self, quaternion: Any, rates: Any, boot: float, now: float) -> None:
         length = math.hypot(*quaternion)
         if length > 0.0:
             self.quaternion[:], self.rates[:] = np.divide(quaternion, length), rates
@@ -195,8 +197,8 @@ class ReportedState:
         if (m.frame_id, m.child_frame_id) != (_LOCAL_NED, _BODY_FRD):
             return
         boot = m.time_usec * _MICRO
-        self._turn(m.q, (m.rollspeed, m.pitchspeed, m.yawspeed), boot, now)
-        self._place((m.x, m.y, m.z), rotation_matrix(self.quaternion) @ (m.vx, m.vy, m.vz), boot, now)
+        self._set_attitude(m.q, (m.rollspeed, m.pitchspeed, m.yawspeed), boot, now)
+        self._set_position((m.x, m.y, m.z), rotation_matrix(self.quaternion) @ (m.vx, m.vy, m.vz), boot, now)
         self.resets = m.reset_counter
 
     def _global_position(self, m: Any, now: float) -> None:
@@ -242,5 +244,5 @@ def _is_deflected(message: Any, autopilot: int) -> bool:
         pulses = (getattr(message, f"chan{i}_raw") for i in range(1, 7))
         return any(abs(pulse - _CENTER) > _DEFLECTED_PULSE for pulse in pulses if 0 < pulse < 0xFFFF)
     level = any(abs(v) > _DEFLECTED for v in (message.x, message.y, message.r) if v != _INVALID)
-    rest = 500 if autopilot in _RESTS_IN_THE_MIDDLE else 0
+    rest = 500 if autopilot in _CENTERED_THROTTLE else 0
     return level or (message.z != _INVALID and abs(message.z - rest) > _DEFLECTED)

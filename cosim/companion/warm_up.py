@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from cosim.companion.options import CompanionOptions
+from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.session import AutopilotSession
-from cosim.mavlink.wire.ground_end import Heard
+from cosim.mavlink.wire.ground_end import ReceivedMessage
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import Arm, Command
 from cosim.simulation.master import Master
@@ -29,7 +29,7 @@ class _NoLink:
     def clock(self) -> float:
         return self._now
 
-    def receive(self, timeout: float) -> Sequence[Heard]:
+    def receive(self, timeout: float) -> Sequence[ReceivedMessage]:
         self._now += timeout
         return ()
 

@@ -23,8 +23,8 @@ class LiveAddress:
     host: str = HOST  # host as the user named it
     ip: str = HOST
     port: int = PORT  # 0 for any free one
-    insisted: bool = False  # True: only this port; False: any free port if it is in use
-    loopback: bool = True  # True: other machines do not reach it
+    is_fixed_port: bool = False  # True: only this port; False: any free port if it is in use
+    is_loopback: bool = True  # True: other machines do not reach it
 
 
 def parse_live(text: str, allow_remote: bool = False) -> LiveAddress:
@@ -58,7 +58,7 @@ def parse_live(text: str, allow_remote: bool = False) -> LiveAddress:
     except OSError as error:
         raise TelemetryError(f"--live {text!r}: {host!r} is not known; {_EXPECTED}") from error
     if not (loopback or allow_remote):
-        raise TelemetryError(f"--live {text!r}: leaves this machine; --allow-remote lets it")
+        raise TelemetryError(f"--live {text!r}: is reachable from other machines; --allow-remote allows it")
     return LiveAddress(host, ip, int(number), True, loopback)
 
 
@@ -84,12 +84,12 @@ def foreign_origin(address: LiveAddress, host: str | None, origin: str | None) -
     """
     name = _name(host or "")
     known = name in _LOOPBACK_NAMES or name == address.host.lower()
-    if not address.loopback:
+    if not address.is_loopback:
         known = known or name == socket.gethostname().lower() or _is_ip(name)
     if not known:
         return f"host {host!r} is not this one"
     if origin is not None and origin.lower() not in (f"http://{host}".lower(), f"https://{host}".lower()):
-        return f"a page of {origin!r} has no business here"
+        return f"page of foreign origin {origin!r}"
     return None
 
 
@@ -114,7 +114,7 @@ def open_socket(address: LiveAddress) -> socket.socket:
     TelemetryError
         If the socket cannot be opened.
     """
-    for port in (address.port,) if address.insisted else (address.port, 0):
+    for port in (address.port,) if address.is_fixed_port else (address.port, 0):
         # a port in TIME_WAIT may be taken again; on Windows the option would let others take one that is in use
         try:
             return socket.create_server((address.ip, port))

@@ -60,7 +60,7 @@ class CommandDesk:
         if isinstance(self._queue, str):
             return self._queue
         if isinstance(message, bytes):
-            return "binary messages are no commands, expected a text of JSON"
+            return "binary messages are not commands, expected JSON text"
         try:
             command = _decoder.decode(message)
             self._check(command)

@@ -15,7 +15,7 @@ from controller.regions.shape import Shape
 from cosim.errors import CommandError
 from cosim.live.command_desk import CommandDesk
 from cosim.live.history import History
-from cosim.live.messages import bytes_of, text_of
+from cosim.live.viewer_messages import format_message, write_rows
 from cosim.replay.command_words import command_words
 from cosim.replay.header import header_of, limits_of, shape_of
 from cosim.replay.view_columns import ViewColumns
@@ -29,9 +29,9 @@ from cosim.simulation.signals import Array, Column
 
 log = logging.getLogger(__name__)
 
-_ROWS = 512  # greatest number of rows in a message
-_TEXTS = 50  # number of newest texts that are kept for viewers that connect late
-_CHANGES = 1000  # number of changes of regions that are kept for them
+_MAX_ROWS = 512  # in a message
+_MAX_TEXTS = 50  # latest ones, stored for viewers that connect late
+_MAX_CHANGES = 1000  # of regions, stored for them
 
 
 @dataclass
@@ -83,7 +83,7 @@ class Hub:
         self._changes: list[dict[str, Any]] = []
         self._header["changes"] = self._changes
         self._change_numbers: list[int] = []  # of each kept change, from 1
-        self._changed = 0  # number of changes so far
+        self._change_count = 0  # number of changes so far
         self._limits = limits_of(scenario)
         self._step = scenario.time.step
         self._goal_center, self._target_radius = shape_center(scenario.goal), 0.0
@@ -151,25 +151,25 @@ class Hub:
         gain = self._header["regions"][index]["gain"] if shape or not index else settings[f"regions.{name}.gain"]
         drawn = shape_of(shape or settings.shapes[name], self._limits)
         self._changes.append({"time": time, "region": index, "shape": drawn, "gain": gain})
-        self._changed += 1
-        self._change_numbers.append(self._changed)
-        if len(self._changes) > max(_CHANGES, len(self._regions)):  # drop the oldest one that a later one replaces
+        self._change_count += 1
+        self._change_numbers.append(self._change_count)
+        if len(self._changes) > max(_MAX_CHANGES, len(self._regions)):  # drop the oldest one that a later one replaces
             last = {change["region"]: i for i, change in enumerate(self._changes)}
             oldest = next(i for i, change in enumerate(self._changes) if last[change["region"]] > i)
             del self._changes[oldest], self._change_numbers[oldest]
 
     def say(self, text: str, kind: str = "info", time: float | None = None) -> None:
         """Show a `text` to all viewers; `kind` is info, command or warning, `time` simulated [s]."""
-        self._add_text(text_of("said", kind=kind, text=text, time=time))
+        self._add_text(format_message("said", kind=kind, text=text, time=time))
 
     def end(self, status: str, verdict: str) -> None:
         """Show the `status` and `verdict` of a run that has ended."""
         self._header |= {"status": status, "verdict": verdict}
-        self._add_text(text_of("end", status=status, verdict=verdict))
+        self._add_text(format_message("end", status=status, verdict=verdict))
 
     def _add_text(self, text: str) -> None:
         self._texts.append(text)
-        if len(self._texts) > _TEXTS:
+        if len(self._texts) > _MAX_TEXTS:
             self._texts.pop(0)
             self._dropped += 1
 
@@ -178,7 +178,7 @@ class Hub:
     def is_up_to_date(self, cursor: Cursor) -> bool:
         """Return True if all rows, texts and changes were sent to a viewer."""
         return (cursor.run, cursor.row, cursor.change, cursor.text) == (
-            self.run, self._history.count, self._changed, self._dropped + len(self._texts),
+            self.run, self._history.count, self._change_count, self._dropped + len(self._texts),
         )  # fmt: skip
 
     def next_for(self, cursor: Cursor) -> str | bytes | None:
@@ -187,15 +187,15 @@ class Hub:
             return None
         if cursor.run != self.run:
             cursor.run, cursor.row, cursor.text = self.run, 0, self._dropped
-            cursor.change = self._changed
-            return text_of("header", run=self._header)
-        rows, number = self._history.since(cursor.row, _ROWS)
+            cursor.change = self._change_count
+            return format_message("header", run=self._header)
+        rows, number = self._history.since(cursor.row, _MAX_ROWS)
         if len(rows):
             cursor.row = number
-            return bytes_of(rows)
-        if cursor.change < self._changed:
-            first, cursor.change = bisect_right(self._change_numbers, cursor.change), self._changed
-            return text_of("changes", changes=self._changes[first:])
+            return write_rows(rows)
+        if cursor.change < self._change_count:
+            first, cursor.change = bisect_right(self._change_numbers, cursor.change), self._change_count
+            return format_message("changes", changes=self._changes[first:])
         cursor.text = max(cursor.text, self._dropped)
         if cursor.text < self._dropped + len(self._texts):
             cursor.text += 1

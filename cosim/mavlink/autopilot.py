@@ -6,21 +6,20 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from cosim.mavlink.events import Events
+from cosim.mavlink.event_texts import EventTexts
 from cosim.mavlink.messages import status
 from cosim.mavlink.messages.streams import Streams
-from cosim.mavlink.messages.table import HEARTBEAT
 from cosim.mavlink.services.attitude_targets import AttitudeTargets
-from cosim.mavlink.services.commands import Commands
+from cosim.mavlink.services.command_protocol import CommandProtocol
 from cosim.mavlink.services.ftp import FileServer
 from cosim.mavlink.services.gcs_failsafe import GcsFailsafe
-from cosim.mavlink.services.logs import Logs
-from cosim.mavlink.services.manual import Manual
-from cosim.mavlink.services.mission import Missions
-from cosim.mavlink.services.modes import Modes
-from cosim.mavlink.services.obstacles import Obstacles
+from cosim.mavlink.services.logs import LogProtocol
+from cosim.mavlink.services.manual import ManualControlService
+from cosim.mavlink.services.mission import MissionProtocol
+from cosim.mavlink.services.mode_commands import ModeCommands
 from cosim.mavlink.services.origin import Origin
-from cosim.mavlink.services.parameters import Parameters
+from cosim.mavlink.services.parameter_protocol import ParameterProtocol
+from cosim.mavlink.services.received_obstacles import ReceivedObstacles
 from cosim.mavlink.services.requests import Requests, Timing, banner
 from cosim.mavlink.services.service import Handler, Service
 from cosim.mavlink.services.targets import Targets
@@ -31,8 +30,10 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column
 
-_HEARTBEAT = 1.1  # s of the wall clock without a heartbeat, after which one is sent; longer than the stream's second
-_STILL = 0.5  # s of the wall clock without a snapshot, after which streams go by that clock
+_HEARTBEAT_PERIOD = (
+    1.1  # s of the wall clock without a heartbeat, after which one is sent; longer than the stream's second
+)
+_SNAPSHOT_TIMEOUT = 0.5  # s of the wall clock without a snapshot, after which streams go by that clock
 _SECOND = 1_000_000
 
 
@@ -67,42 +68,42 @@ class Autopilot:
     ) -> None:
         self._context = context = VehicleContext(scenario, columns, options, commands, live)
         self._streams: dict[MessageSink, Streams] = {}
-        self._events = Events(context)
-        parameters = Parameters(context)
+        self._events = EventTexts(context)
+        parameters = ParameterProtocol(context)
         targets = Targets(context, parameters)
         services: list[Service] = [
             Requests(context, self._streams),
-            Modes(context),
+            ModeCommands(context),
             targets,
             AttitudeTargets(context),
-            Obstacles(context),
-            Manual(context),
+            ReceivedObstacles(context),
+            ManualControlService(context),
             parameters,
-            Missions(context, targets, parameters),
+            MissionProtocol(context, targets, parameters),
             FileServer(context, parameters),
-            Logs(context),
+            LogProtocol(context),
             Timing(context),
             Origin(context),
             GcsFailsafe(context),
         ]
-        self._services = [*services, Commands(context, services)]
+        self._services = [*services, CommandProtocol(context, services)]
         self._handlers: dict[str, Handler] = {}
         for service in self._services:
             self._handlers.update(service.messages)
         self._clock_us = 0  # of the streams; never decreases
         self._last_us: int | None = None  # simulated time of the last snapshot
-        self._awaiting = False  # True while the run waits for arming: simulated time is still 0
-        self._moved = False  # True if simulated time has advanced since the last tick
-        self._moved_at = -math.inf
+        self._awaits_arming = False  # True while the run waits for arming: simulated time is still 0
+        self._has_advanced = False  # True if simulated time has advanced since the last tick
+        self._advanced_at = -math.inf
         self._heartbeat_at: dict[MessageSink, float] = {}
-        self._ticked: float | None = None
+        self._last_tick: float | None = None
 
     def attach(self, link: MessageSink) -> None:
         """Start streaming on a link."""
         self._context.links.append(link)
         self._streams[link] = Streams(self._context, link, self._clock_us)
         for line in banner(self._context):
-            for message in self._context.text(line):
+            for message in self._context.make_text(line):
                 link.send(message)
 
     def observe(self, row: Array) -> None:
@@ -120,8 +121,8 @@ class Autopilot:
         if (self._last_us is not None and now < self._last_us) or (now == 0 and context.run_has_ended):
             self._restart()
             context.update(row)
-        self._awaiting = now == self._last_us == 0  # the snapshot of time 0 is repeated
-        self._moved |= now != self._last_us
+        self._awaits_arming = now == self._last_us == 0  # the snapshot of time 0 is repeated
+        self._has_advanced |= now != self._last_us
         self._clock_us += max(0, now - (now if self._last_us is None else self._last_us))
         self._last_us = now
         self._events.watch()
@@ -135,7 +136,7 @@ class Autopilot:
         self._events.restart()
         for service in self._services:
             service.restart()
-        context.say("The run begins again", context.mavlink.MAV_SEVERITY_NOTICE)
+        context.send_text("The run has restarted", context.mavlink.MAV_SEVERITY_NOTICE)
 
     def _advance(self) -> None:
         for streams in list(self._streams.values()):
@@ -177,14 +178,14 @@ class Autopilot:
         """
         context = self._context
         context.now = now
-        since = 0.0 if self._ticked is None else min(max(now - self._ticked, 0.0), 1.0)
-        self._ticked = now
-        if self._moved:
-            self._moved, self._moved_at = False, now
-        elif self._last_us is not None and now - self._moved_at >= _STILL:
-            self._clock_us += round(since * _SECOND)
-            if self._awaiting:
-                context.waited_us += round(since * _SECOND)
+        elapsed = 0.0 if self._last_tick is None else min(max(now - self._last_tick, 0.0), 1.0)
+        self._last_tick = now
+        if self._has_advanced:
+            self._has_advanced, self._advanced_at = False, now
+        elif self._last_us is not None and now - self._advanced_at >= _SNAPSHOT_TIMEOUT:
+            self._clock_us += round(elapsed * _SECOND)
+            if self._awaits_arming:
+                context.waited_us += round(elapsed * _SECOND)
             self._advance()
         for service in self._services:
             service.tick()
@@ -193,12 +194,14 @@ class Autopilot:
             if streams.heartbeat_sent or link not in self._heartbeat_at:
                 streams.heartbeat_sent = False
                 self._heartbeat_at[link] = now
-            elif now - self._heartbeat_at[link] >= _HEARTBEAT:
-                streams.send(HEARTBEAT)
+            elif now - self._heartbeat_at[link] >= _HEARTBEAT_PERIOD:
+                streams.send(context.mavlink.MAVLINK_MSG_ID_HEARTBEAT)
 
     def close(self, now: float) -> None:
         """Send a status text that the run has ended, and a last heartbeat in standby."""
         context = self._context
         context.now = now
-        context.say(f"The {'run' if context.live else 'recording'} has ended", context.mavlink.MAV_SEVERITY_NOTICE)
-        context.send(status.beat(context, context.mavlink.MAV_STATE_STANDBY))
+        context.send_text(
+            f"The {'run' if context.live else 'recording'} has ended", context.mavlink.MAV_SEVERITY_NOTICE
+        )
+        context.send(status.heartbeat_message(context, context.mavlink.MAV_STATE_STANDBY))

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from cosim.errors import RunError
 from cosim.mavlink.autopilot import Autopilot
-from cosim.mavlink.setup import max_lead
-from cosim.mavlink.thread import SNAPSHOT_PERIOD, SNAPSHOTS, LinkThread
+from cosim.mavlink.run_links import max_lead
+from cosim.mavlink.thread import MAX_SNAPSHOTS, SNAPSHOT_PERIOD, LinkThread
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions
@@ -21,21 +21,23 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.columns import column_names
 from cosim.simulation.signals import Array
 
-_LONGEST_SLEEP = 0.5  # s
-_WAITING = 0.002  # s between two looks at the queue while the links send
-_MAX_QUEUED = SNAPSHOTS // 2
+_MAX_SLEEP = 0.5  # s
+_POLL_PERIOD = 0.002  # s between two looks at the queue while the links send
+_MAX_QUEUED = MAX_SNAPSHOTS // 2
 
 
 @dataclass(frozen=True)
-class Replayed:
+class ReplayResult:
     """Result of streaming a record."""
 
     simulated: float  # s
     wall: float  # s
-    troubles: list[str]  # texts about lost or refused frames
+    loss_reports: list[str]  # texts about lost or refused frames
 
 
-def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions, rate: float | None = 1.0) -> Replayed:
+def replay(
+    folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions, rate: float | None = 1.0
+) -> ReplayResult:
     """Stream a recorded run as a running vehicle that accepts no commands.
 
     Parameters
@@ -51,8 +53,8 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
 
     Returns
     -------
-    Replayed
-        Simulated and wall time, and troubles of the links.
+    ReplayResult
+        Simulated and wall time, and loss_reports of the links.
 
     Raises
     ------
@@ -67,8 +69,8 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
         raise RunError(f"{folder}: holds no run ({SCENARIO} is missing)")
     scenario, record = load_scenario(folder / SCENARIO, imported=True), load_record(folder)
     require_columns(scenario, record)
-    known = set(column_names(scenario))  # further columns could separate columns that are read as one slice
-    columns = [column for column in record.columns if column.name in known or column.name.startswith("law.")]
+    expected = set(column_names(scenario))  # further columns could separate columns that are read as one slice
+    columns = [column for column in record.columns if column.name in expected or column.name.startswith("law.")]
     autopilot = Autopilot(scenario, columns, options, commands=None, live=False)
     thread = LinkThread(autopilot, open_links(endpoints, options), scenario.time.step, max_lead(scenario, rate))
     every = max(1, round(SNAPSHOT_PERIOD / scenario.time.step))
@@ -80,13 +82,13 @@ def replay(folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions,
             if rate is not None:
                 _sleep_until(started + simulated / rate)
             while thread.waiting > _MAX_QUEUED:
-                time.sleep(_WAITING)
+                time.sleep(_POLL_PERIOD)
             thread.observe(k, row)
         while thread.waiting:
-            time.sleep(_WAITING)
+            time.sleep(_POLL_PERIOD)
     finally:
         thread.close()
-    return Replayed(simulated, time.perf_counter() - started, thread.troubles())
+    return ReplayResult(simulated, time.perf_counter() - started, thread.loss_reports())
 
 
 def _rows(record: Record, every: int, names: Sequence[str]) -> Iterator[tuple[int, Array]]:
@@ -101,4 +103,4 @@ def _rows(record: Record, every: int, names: Sequence[str]) -> Iterator[tuple[in
 
 def _sleep_until(moment: float) -> None:
     while (left := moment - time.perf_counter()) > 0.0:
-        time.sleep(min(left, _LONGEST_SLEEP))
+        time.sleep(min(left, _MAX_SLEEP))

@@ -15,7 +15,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 
-from cosim.mavlink.channels.tlog import Tlog
+from cosim.mavlink.channels.tlog_file import Tlog
 from cosim.mavlink.wire.link import Link
 from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.simulation.signals import Array
@@ -23,17 +23,17 @@ from cosim.simulation.signals import Array
 log = logging.getLogger(__name__)
 
 SNAPSHOT_PERIOD = 0.01  # s, simulated: the shortest period of a stream
-SNAPSHOTS = 8192  # greatest number in the queue; a full queue drops the oldest
-_PERIOD = 0.02  # s, polling period while idle: each poll delays the stepper by 0.1 ms
-_RUSHING = 0.2  # s, polling period in a run much faster than real time, whose stepper hardly ever pauses
-_MANY = 2500  # snapshots per second of the wall clock that mark such a run: 25 times real time
-_SOON = 0.004  # s, polling period during a conversation, in which a peer may wait for an answer
-_TALKING = 0.1  # s after the last accepted message, during which a conversation lasts
+MAX_SNAPSHOTS = 8192  # in the queue; a full queue drops the oldest
+_IDLE_PERIOD = 0.02  # s, polling period while idle: each poll delays the stepper by 0.1 ms
+_FAST_RUN_PERIOD = 0.2  # s, polling period in a run much faster than real time, whose stepper hardly ever pauses
+_FAST_RUN_RATE = 2500  # snapshots per second of the wall clock that mark such a run: 25 times real time
+_ACTIVE_PERIOD = 0.004  # s, polling period during a conversation, in which a peer may wait for an answer
+_ACTIVE_TIME = 0.1  # s after the last accepted message, during which a conversation lasts
 _RECEIVING = 0.2e-3  # s of a slice for receiving, for all links together
 _SENDING = 0.5e-3  # s of a slice for sending
 _REST_RECEIVING = 19  # ratio of rest to receiving: a flood gets a twentieth of the time
 _REST_SENDING = 3  # ratio of rest to sending
-_LONGEST_REST = 0.05  # s; long slices come from the stepper, which loads libraries before its first step
+_MAX_REST = 0.05  # s; long slices come from the stepper, which loads libraries before its first step
 _DRAINING = 2.0  # s for which closing waits for the queue
 _CLOSING = 4.0  # s for which closing waits in total
 
@@ -73,7 +73,7 @@ class LinkThread:
         Links of the vehicle, which are closed with the thread.
     step : float
         Step of the run [s].
-    ahead : float
+    lead : float
         Longest time by which simulated time can lead the wall clock [s]; logs start earlier by it.
 
     Attributes
@@ -84,21 +84,21 @@ class LinkThread:
         Count of each kind of error in the vehicle's side; the thread continues after them.
     """
 
-    def __init__(self, vehicle: Vehicle, links: Sequence[Link], step: float, ahead: float = 0.0) -> None:
+    def __init__(self, vehicle: Vehicle, links: Sequence[Link], step: float, lead: float = 0.0) -> None:
         self._vehicle, self._links = vehicle, list(links)
         self._logs = [link.channel for link in links if isinstance(link.channel, Tlog)]
         for tlog in self._logs:
-            tlog.begin_earlier(ahead)
+            tlog.advance_start(lead)
         for link in links:
             link.logs = [other for other in links if other is not link and isinstance(other.channel, Tlog)]
-        self._every = max(1, round(SNAPSHOT_PERIOD / step))
-        self._queue: deque[Array] = deque(maxlen=SNAPSHOTS)
+        self._decimation = max(1, round(SNAPSHOT_PERIOD / step))
+        self._queue: deque[Array] = deque(maxlen=MAX_SNAPSHOTS)
         self._closing = threading.Event()
         self._next_tick = 0.0
-        self._first: float | None = None  # s, monotonic, reception of the first snapshot of time 0
+        self._first_at: float | None = None  # s, monotonic, reception of the first snapshot of time 0
         self._waited = 0.0  # s, from then to the last one: time of waiting for arming
-        self._looked = time.perf_counter()  # s, end of the last work
-        self._shown = 0  # snapshots since then
+        self._last_poll = time.perf_counter()  # s, end of the last work
+        self._snapshot_count = 0  # snapshots since then
         self._received_at = -math.inf  # s, monotonic, time of the last accepted message
         self.dropped = 0
         self.failures: dict[str, int] = Counter()
@@ -110,14 +110,14 @@ class LinkThread:
 
     def observe(self, k: int, row: Array) -> None:
         """Queue a copy of the row of step `k`, if a snapshot is due."""
-        if k % self._every:
+        if k % self._decimation:
             return
-        self.dropped += len(self._queue) == SNAPSHOTS
+        self.dropped += len(self._queue) == MAX_SNAPSHOTS
         self._queue.append(row.copy())
 
     @property
     def waiting(self) -> int:
-        """Number of queued snapshots, at most `SNAPSHOTS`."""
+        """Number of queued snapshots, at most `MAX_SNAPSHOTS`."""
         return len(self._queue)
 
     def close(self) -> None:
@@ -132,15 +132,17 @@ class LinkThread:
                 return
         else:
             self._close_links()
-        troubles = self.troubles()
+        troubles = self.loss_reports()
         if troubles:
             log.warning("MAVLink: %s", "; ".join(troubles))
 
-    def troubles(self) -> list[str]:
+    def loss_reports(self) -> list[str]:
         """Return a text for each kind of loss or refusal, with its count."""
-        found = [f"{self.dropped} snapshots dropped"] if self.dropped else []
-        found += [f"{n} times {what}" for what, n in self.failures.items()]
-        return found + [f"{link.name}: {', '.join(link.troubles())}" for link in self._links if link.troubles()]
+        reports = [f"{self.dropped} snapshots dropped"] if self.dropped else []
+        reports += [f"{n} times {what}" for what, n in self.failures.items()]
+        return reports + [
+            f"{link.name}: {', '.join(link.loss_reports())}" for link in self._links if link.loss_reports()
+        ]
 
     # ---- in the thread ----
 
@@ -151,37 +153,37 @@ class LinkThread:
             time.sleep(self._run_slice())  # not an event, which releases the interpreter lock several times
         deadline = time.perf_counter() + _DRAINING
         while self._send_queued(time.perf_counter() + _SENDING) and time.perf_counter() < deadline:
-            self._tend(time.monotonic())
+            self._poll(time.monotonic())
         self.dropped += len(self._queue)
         self._guard("close", self._vehicle.close, time.monotonic())
         self._close_links()
 
     def _run_slice(self) -> float:
         """Run a slice of each kind of work; return the time to rest [s]."""
-        began = time.perf_counter()
+        start = time.perf_counter()
         for link in self._links:
             self._guard("receive", self._receive, link, time.perf_counter() + _RECEIVING / len(self._links))
         received = time.perf_counter()
-        more = self._send_queued(received + _SENDING)
+        has_more = self._send_queued(received + _SENDING)
         now = time.monotonic()
         if now >= self._next_tick:
-            self._next_tick = now + _SOON
+            self._next_tick = now + _ACTIVE_PERIOD
             self._guard("tick", self._vehicle.tick, now)
-        self._tend(now)
+        self._poll(now)
         sent = time.perf_counter()
-        rest = max(_REST_RECEIVING * (received - began), _REST_SENDING * (sent - received))
-        rest = min(rest, _LONGEST_REST)
-        if more:
+        rest = max(_REST_RECEIVING * (received - start), _REST_SENDING * (sent - received))
+        rest = min(rest, _MAX_REST)
+        if has_more:
             return rest
-        if now - self._received_at < _TALKING:
-            return max(rest, _SOON)
-        rushing = self._shown > _MANY * (began - self._looked)
-        self._shown, self._looked = 0, began
-        return max(rest, _RUSHING if rushing else _PERIOD)
+        if now - self._received_at < _ACTIVE_TIME:
+            return max(rest, _ACTIVE_PERIOD)
+        is_fast = self._snapshot_count > _FAST_RUN_RATE * (start - self._last_poll)
+        self._snapshot_count, self._last_poll = 0, start
+        return max(rest, _FAST_RUN_PERIOD if is_fast else _IDLE_PERIOD)
 
-    def _tend(self, now: float) -> None:
+    def _poll(self, now: float) -> None:
         for link in self._links:
-            self._guard("tend", link.channel.tend, now)
+            self._guard("poll", link.channel.poll, now)
 
     def _receive(self, link: Link, until: float) -> None:
         for frame, message in link.receive(until):
@@ -194,11 +196,11 @@ class LinkThread:
         """Pass snapshots to the vehicle until a time of `time.perf_counter`; return True if some are left."""
         while self._queue:
             row = self._queue.popleft()
-            self._shown += 1
+            self._snapshot_count += 1
             if not row[0] > 0.0:  # time 0 repeats while the run waits for arming
                 now = time.monotonic()
-                self._first = now if self._first is None else self._first
-                self._waited = now - self._first
+                self._first_at = now if self._first_at is None else self._first_at
+                self._waited = now - self._first_at
             for tlog in self._logs:
                 tlog.simulated = self._waited + float(row[0])
             self._guard("observe", self._vehicle.observe, row)

@@ -24,8 +24,8 @@ from cosim.simulation.signals import Array
 from plant_fmu import PlantError
 
 if TYPE_CHECKING:  # pymavlink and websockets are imported only for runs that need them
-    from cosim.live.view import LiveView
-    from cosim.mavlink.setup import Mavlink
+    from cosim.live.live_view import LiveView
+    from cosim.mavlink.run_links import Mavlink
     from cosim.mavlink.thread import LinkThread
 
 _PROGRESS_STEPS = 200  # updates of the bar

@@ -12,7 +12,7 @@ from controller.law import Diagnostic, Output
 from controller.regions.region_set import PackedRegions
 from cosim.errors import RunError
 from cosim.simulation.signals import Array
-from cosim.sitl.autopilot_link import ESTIMATE, AutopilotLink
+from cosim.sitl.sitl_link import ESTIMATE, SitlLink
 from plant_fmu import Vehicle
 from plant_fmu.autopilot import Curve, effort_of_pulse
 
@@ -34,14 +34,14 @@ class AutopilotLaw:
         Unit of an output.
     idle : float
         Value, beside 0, of the outputs of a disarmed autopilot.
-    link : AutopilotLink, optional
+    link : SitlLink, optional
         Link that receives the autopilot's estimate, which is reported too.
 
     Attributes
     ----------
     lost : int
         Number of lost frames of the autopilot.
-    link : AutopilotLink or None
+    link : SitlLink or None
         The given link.
     """
 
@@ -55,7 +55,7 @@ class AutopilotLaw:
         output_name: str,
         unit: str,
         idle: float = 0.0,
-        link: AutopilotLink | None = None,
+        link: SitlLink | None = None,
     ) -> None:
         limits = zip(vehicle.thrust_min.tolist(), vehicle.thrust_max.tolist(), strict=True)
         # thruster, its output from 0, effort, and the force of the efforts -1 and 1
@@ -66,10 +66,12 @@ class AutopilotLaw:
         ]
         self.diagnostics = (
             *(
-                Diagnostic(f"{output_name}{at + 1}", unit, f"Output {at + 1} of the autopilot, of thruster {i + 1}")
-                for i, at, *_ in self._driven
+                Diagnostic(
+                    f"{output_name}{index + 1}", unit, f"Output {index + 1} of the autopilot, of thruster {i + 1}"
+                )
+                for i, index, *_ in self._driven
             ),
-            Diagnostic("lost", "", "Frames of the autopilot that have not come, so far"),
+            Diagnostic("lost", "", "Number of lost frames of the autopilot"),
             *(ESTIMATE if link is not None else ()),
         )
         self.lost = 0
@@ -82,11 +84,11 @@ class AutopilotLaw:
     def set_outputs(self, outputs: Sequence[float]) -> None:
         """Set the thruster forces by the autopilot's outputs, shape (channels,); missing channels count as 0."""
         n = len(outputs)
-        for place, (i, at, effort, least, most) in enumerate(self._driven):
-            value = outputs[at] if at < n else 0.0
-            part = effort(value)
-            self._forces[i] = part * most if part >= 0.0 else -part * least
-            self._report[place] = value
+        for j, (i, index, effort, min_force, max_force) in enumerate(self._driven):
+            value = outputs[index] if index < n else 0.0
+            fraction = effort(value)
+            self._forces[i] = fraction * max_force if fraction >= 0.0 else -fraction * min_force
+            self._report[j] = value
         self._has_output = any(value not in (0.0, self._idle) for value in self._report[: len(self._driven)].tolist())
 
     @property
@@ -115,14 +117,14 @@ class AutopilotLaw:
         forces[:] = self._forces
 
 
-def law_of_pwm(vehicle: Vehicle, link: AutopilotLink | None = None) -> AutopilotLaw:
+def make_pwm_law(vehicle: Vehicle, link: SitlLink | None = None) -> AutopilotLaw:
     """Make the law of an autopilot with servo pulses as outputs.
 
     Parameters
     ----------
     vehicle : Vehicle
         Vehicle whose table ``autopilot`` maps pulses to forces.
-    link : AutopilotLink, optional
+    link : SitlLink, optional
         Link to the autopilot.
 
     Returns
@@ -143,7 +145,7 @@ def law_of_pwm(vehicle: Vehicle, link: AutopilotLink | None = None) -> Autopilot
     return AutopilotLaw(table.channels, efforts, vehicle, "pwm", "us", table.pwm_neutral, link)
 
 
-def law_of_controls(vehicle: Vehicle) -> AutopilotLaw:
+def make_control_law(vehicle: Vehicle) -> AutopilotLaw:
     """Make the law of an autopilot with controls from -1 to 1 as outputs, one for each thruster in order.
 
     Parameters
@@ -157,8 +159,8 @@ def law_of_controls(vehicle: Vehicle) -> AutopilotLaw:
         Law with zero forces until controls arrive.
     """
     n = vehicle.n_thrusters
-    return AutopilotLaw(range(1, n + 1), [_clipped] * n, vehicle, "control", "")
+    return AutopilotLaw(range(1, n + 1), [_clip_control] * n, vehicle, "control", "")
 
 
-def _clipped(control: float) -> float:
+def _clip_control(control: float) -> float:
     return min(max(control, -1.0), 1.0) if control == control else 0.0

@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from controller.quaternion import rotation_matrix
+from cosim.scenario.tables import Vector3
 from cosim.simulation.stepped_plant import SteppedPlant
 from cosim.sitl.rangefinder import Rangefinder
-
-Three = tuple[float, float, float]
 
 _MEASURED = ("p", "q", "r")
 _NAMES = (
@@ -23,7 +22,7 @@ _NAMES = (
     *(f"measured.velocity.{name}" for name in "uvw"),
 )
 _GRAVITY = 9.81  # m/s2, close to ArduPilot's and PX4's
-_AT_THE_SURFACE = 4.0  # s, in which an autopilot calibrates its sensors
+_SURFACE_TIME = 4.0  # s, in which an autopilot calibrates its sensors
 _MAX_SPEED, _MAX_DURATION = 1.0, 6.0  # m/s, s: greatest speed of lowering, unless it would take longer
 
 
@@ -31,14 +30,14 @@ class Motion(NamedTuple):
     """The vehicle at one instant."""
 
     time: float  # s, simulated
-    gyro: Three  # rad/s, body frame, as the IMU measures it
-    specific_force: Three  # m/s2, body frame, as the IMU measures it; (0, 0, -9.81) at rest
-    position_ned: Three  # m
-    velocity_ned: Three  # m/s, over ground
-    attitude: Three  # rad, roll, pitch, yaw
+    gyro: Vector3  # rad/s, body frame, as the IMU measures it
+    specific_force: Vector3  # m/s2, body frame, as the IMU measures it; (0, 0, -9.81) at rest
+    position_ned: Vector3  # m
+    velocity_ned: Vector3  # m/s, over ground
+    attitude: Vector3  # rad, roll, pitch, yaw
     quaternion: tuple[float, float, float, float]  # from body to world, scalar first
     altitude: float | None  # m, distance along the body's vertical axis to bottom or region; None without either
-    dvl: Three  # m/s, over ground, body frame, as the DVL measures it
+    dvl: Vector3  # m/s, over ground, body frame, as the DVL measures it
 
 
 class MotionReader:
@@ -47,7 +46,7 @@ class MotionReader:
     Parameters
     ----------
     plant : SteppedPlant
-        The initialised plant.
+        The initialized plant.
     rangefinder : Rangefinder
         Rangefinder along the body's vertical axis.
     """
@@ -57,16 +56,16 @@ class MotionReader:
         self._values, self._rangefinder = plant.outputs.values, rangefinder
         x = names.index("position.x")
         self._position = self._values[x : x + 3]
-        self._at = np.array([names.index(name) for name in _NAMES])
+        self._indices = np.array([names.index(name) for name in _NAMES])
         e0, u = names.index("quaternion.e0"), names.index("velocity.u")
         self._quaternion, self._velocity_body = self._values[e0 : e0 + 4], self._values[u : u + 3]
 
     def read(self, time: float) -> Motion:
         """Return the motion after the plant's last step, which ended at `time` [s]."""
-        p, q, r, fx, fy, fz, x, y, z, roll, pitch, yaw, altitude, u, v, w = self._values[self._at].tolist()
+        p, q, r, fx, fy, fz, x, y, z, roll, pitch, yaw, altitude, u, v, w = self._values[self._indices].tolist()
         e0, e1, e2, e3 = self._quaternion.tolist()
-        below = self._rangefinder
-        distance = below.measure(self._position, self._quaternion, altitude) if below.is_fitted else None
+        sensor = self._rangefinder
+        distance = sensor.measure(self._position, self._quaternion, altitude) if sensor.is_fitted else None
         vx, vy, vz = (rotation_matrix(self._quaternion) @ self._velocity_body).tolist()  # (15)
         return Motion(
             time, (p, q, r), (fx, fy, fz), (x, y, z), (vx, vy, vz), (roll, pitch, yaw), (e0, e1, e2, e3),
@@ -126,14 +125,14 @@ class Lowering:
         self._depth = max(0.0, depth)
         self._duration = min(0.5 * math.pi * self._depth / _MAX_SPEED, _MAX_DURATION)
 
-    def at(self, time: float) -> Three:
+    def at(self, time: float) -> Vector3:
         """Return depth, speed and acceleration [m, m/s, m/s2] at a time [s] after the vehicle was switched on."""
-        if self.is_over(time) or time <= _AT_THE_SURFACE:
+        if self.is_over(time) or time <= _SURFACE_TIME:
             return (self._depth if self.is_over(time) else 0.0), 0.0, 0.0
         rate = math.pi / self._duration
-        phase, half = rate * (time - _AT_THE_SURFACE), 0.5 * self._depth
+        phase, half = rate * (time - _SURFACE_TIME), 0.5 * self._depth
         return half * (1.0 - math.cos(phase)), half * rate * math.sin(phase), half * rate**2 * math.cos(phase)
 
     def is_over(self, time: float) -> bool:
         """Return True if the vehicle has reached its start depth at a time [s]."""
-        return self._depth == 0.0 or time >= _AT_THE_SURFACE + self._duration
+        return self._depth == 0.0 or time >= _SURFACE_TIME + self._duration

@@ -42,12 +42,12 @@ ONE_PLACE = {
     "pymavlink": {"cosim.mavlink.wire.dialect", "cosim.logs.formats.dataflash"},
     "rerun": {"cosim.export.rrd_writer"},
     "rosbags": {"cosim.logs.bag_storage", "cosim.logs.formats.bag", "cosim.logs.message_definitions"},
-    "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.picture"},
+    "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.terminal_view"},
     "shtab": {"cosim.command_line.completion"},
     "skfuzzy": {"fuzzy_arbiter.engines.scikit"},
     "threadpoolctl": {"cosim.identification.fit"},
     "tomli_w": {"cosim.scenario.toml_text"},
-    "websockets": {"cosim.live.server", "cosim.live.watching.sources"},
+    "websockets": {"cosim.live.view_server", "cosim.live.watching.run_views"},
 }
 
 # of these, what the base install does not bring, and the modules that cannot be imported without it

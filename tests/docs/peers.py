@@ -10,7 +10,7 @@ from pathlib import Path
 from benchmarks.sitl_pilot import HEAD, MAGIC, PULSES, RATE
 from cosim.errors import TelemetryError
 from cosim.live.address import parse_live
-from cosim.live.view import LiveView
+from cosim.live.live_view import LiveView
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.run.run import run_scenario

@@ -19,9 +19,9 @@ from cosim.run.run_folder import claim
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.commands import ManualControl, SetTarget
 from cosim.simulation.commands.sources import ScheduledCommands, read_log
-from cosim.sitl.flight import Flight
-from cosim.sitl.law import law_of_pwm
-from cosim.sitl.scenario import scenario_to_fly
+from cosim.sitl.law import make_pwm_law
+from cosim.sitl.sitl_flight import Flight
+from cosim.sitl.sitl_scenario import scenario_to_fly
 from tests.faults import FAIL_ON, FAIL_ONCE, arm, call_with_faults, count, needs_faults
 
 ROOM = 4096  # bytes: for the scenario, and no record
@@ -92,7 +92,7 @@ def test_d9_autopilot_run_on_a_full_disk_leaves_no_folder(tmp_path, monkeypatch,
     own = scenario_to_fly("sitl", [], None, 400, "ardupilot")
 
     def flight():
-        return Flight(own, law_of_pwm(own.vehicle), tmp_path / "run", 400.0)
+        return Flight(own, make_pwm_law(own.vehicle), tmp_path / "run", 400.0)
 
     with a_full_disk(PLACES["the record"], monkeypatch):
         flown = flight()

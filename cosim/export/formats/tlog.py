@@ -22,8 +22,8 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     from cosim.mavlink.wire.options import MavlinkOptions
 
     done = replay(excerpt.run.folder, [Endpoint("tlog", path.name, path=str(path))], MavlinkOptions(), rate=None)
-    if done.troubles:
-        raise ExportError(f"--to tlog: not all was written: {'; '.join(done.troubles)}")
+    if done.loss_reports:
+        raise ExportError(f"--to tlog: not all was written: {'; '.join(done.loss_reports)}")
     return [path]
 
 

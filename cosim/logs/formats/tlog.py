@@ -13,7 +13,7 @@ from cosim.logs.format import LogFormat, Moved
 from cosim.logs.spool import LogContents
 from cosim.logs.vehicle_messages import AUTOPILOT, NO_AUTOPILOT, VehicleMessages
 from cosim.mavlink.wire.dialect import dialect
-from cosim.mavlink.wire.framing import Counts, Gate, Header, header_at
+from cosim.mavlink.wire.framing import FrameFilter, Header, RxStats, parse_header
 
 _CHUNK = 1 << 20  # bytes that are read at once
 _STAMP = struct.Struct(">Q")  # us since 1970
@@ -24,20 +24,20 @@ _HEARTBEAT = 0  # message id
 
 def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
     """Read a telemetry log, as specified by `LogFormat`; raise ImportLogError if it has no vehicle."""
-    counts, clock = Counts(), Clock()
-    gate, vehicle, kinds = Gate(counts), VehicleMessages(contents, *_find_vehicle(path)), dialect().mavlink_map
+    counts, clock = RxStats(), Clock()
+    frames, vehicle, kinds = FrameFilter(counts), VehicleMessages(contents, *_find_vehicle(path)), dialect().mavlink_map
     lost = 0
     for said, frame, header in _frames(path, moved):
         if header is None:
             lost += len(frame)
             continue
         written = clock.time(said)
-        kind = kinds.get(header.message)
+        kind = kinds.get(header.message_id)
         if kind is None or kind.msgname not in vehicle.wanted:
-            if header.message != _HEARTBEAT:
-                contents.unread[kind.msgname if kind else f"message {header.message}"] += 1
+            if header.message_id != _HEARTBEAT:
+                contents.unread[kind.msgname if kind else f"message {header.message_id}"] += 1
             continue
-        for _, message in gate.frame(frame, header):
+        for _, message in frames.accept(frame, header):
             vehicle.take(header.system, header.component, message, written)
     if lost:
         contents.remarks.append(f"{lost} bytes of the log are no MAVLink frames and were passed over.")
@@ -46,10 +46,10 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
 
 def _find_vehicle(path: Path) -> tuple[int, int, int]:
     """Return system id, MAV_AUTOPILOT and MAV_TYPE of the first autopilot's heartbeat."""
-    gate = Gate(Counts())
+    frames = FrameFilter(RxStats())
     for _, frame, header in _frames(path, lambda part: None):
-        if header is not None and (header.message, header.component) == (_HEARTBEAT, AUTOPILOT):
-            for _, message in gate.frame(frame, header):
+        if header is not None and (header.message_id, header.component) == (_HEARTBEAT, AUTOPILOT):
+            for _, message in frames.accept(frame, header):
                 if message.autopilot != NO_AUTOPILOT:
                     return header.system, message.autopilot, message.type
     raise ImportLogError("holds no heartbeat of an autopilot, expected a telemetry log of a vehicle")
@@ -57,7 +57,7 @@ def _find_vehicle(path: Path) -> tuple[int, int, int]:
 
 def _frames(path: Path, moved: Moved) -> Iterator[tuple[float, bytes, Header | None]]:
     """Yield reception time [s since 1970], frame and header of each frame; None as header for invalid bytes."""
-    gate = Gate(Counts())
+    frames = FrameFilter(RxStats())
     total = max(1, path.stat().st_size)
     with path.open("rb") as file:
         data, at, done, ended = b"", 0, 0, False
@@ -71,7 +71,7 @@ def _frames(path: Path, moved: Moved) -> Iterator[tuple[float, bytes, Header | N
                 if at < len(data):
                     yield 0.0, data[at:], None
                 return
-            header = header_at(data, at + _STAMP.size) if data[at + _STAMP.size] in (0xFE, 0xFD) else None
+            header = parse_header(data, at + _STAMP.size) if data[at + _STAMP.size] in (0xFE, 0xFD) else None
             stamp = _STAMP.unpack_from(data, at)[0] * 1e-6
             end = at + _STAMP.size + (header.size if header else 0)
             if header is None or end > len(data) or not _EARLIEST < stamp < _LATEST:
@@ -79,7 +79,7 @@ def _frames(path: Path, moved: Moved) -> Iterator[tuple[float, bytes, Header | N
                 at += 1
                 continue
             frame = data[at + _STAMP.size : end]
-            if header.message in gate.kinds and not gate.is_intact(frame, header):
+            if header.message_id in frames.infos and not frames.is_intact(frame, header):
                 yield 0.0, data[at : at + 1], None
                 at += 1
                 continue

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Hashable
 from typing import Protocol
 
-CHUNK = 512  # bytes of a stream per read: bounds the parsing time of hostile input far below 1 ms
-DATAGRAM = 2048  # bytes read of a datagram; the longest frame has 280
+CHUNK_SIZE = 512  # bytes of a stream per read: bounds the parsing time of hostile input far below 1 ms
+DATAGRAM_SIZE = 2048  # bytes read of a datagram; the longest frame has 280
 
 
 class Channel(Protocol):
@@ -19,12 +19,12 @@ class Channel(Protocol):
     ----------
     datagrams : bool
         True if each `receive` returns a whole packet, False for some bytes of a stream.
-    trouble : dict of str to int
+    losses : dict of str to int
         Count of each kind of failure, by a text for the user.
     """
 
     datagrams: bool
-    trouble: dict[str, int]
+    losses: dict[str, int]
 
     def receive(self) -> tuple[Hashable, bytes] | None:
         """Return a peer and bytes from it, or None if there are none.
@@ -40,17 +40,17 @@ class Channel(Protocol):
         """
         ...
 
-    def send(self, frame: bytes, old: bytes | None = None) -> bool:
-        """Queue a frame for all peers until the next `tend`; return False if a queue was full.
+    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
+        """Queue a frame for all peers until the next `poll`; return False if a queue was full.
 
-        Peers that are answered in MAVLink 1 get `old`, the same message in that version, or nothing if it is None.
+        Peers that are answered in MAVLink 1 get `frame_v1`, the same message in that version, or nothing if it is None.
         """
         ...
 
-    def tend(self, now: float) -> None:
+    def poll(self, now: float) -> None:
         """Send queued frames, accept and drop peers, and reopen, at monotonic time `now` [s].
 
-        Called at the end of each turn of the thread.
+        The thread calls it after each slice of work.
         """
         ...
 

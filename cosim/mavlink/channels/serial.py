@@ -9,15 +9,15 @@ import time
 from functools import partial
 
 from cosim.errors import TelemetryError
-from cosim.mavlink.channels.stream import OneStream, Stream
+from cosim.mavlink.channels.stream import SinglePeer, Stream
 
 log = logging.getLogger(__name__)
 
-_AGAIN = 1.0  # s, between two attempts to open
-_WAITING = 1 << 13  # bytes in the queue; more would be outdated before they are sent
+_RETRY_PERIOD = 1.0  # s, between two attempts to open
+_QUEUE_SIZE = 1 << 13  # bytes in the queue; more would be outdated before they are sent
 
 
-class Serial(OneStream):
+class Serial(SinglePeer):
     """A raw line of 8 bits, no parity, one stop bit, without flow control.
 
     It uses the calls of POSIX systems, so no package is needed; Windows is not supported.
@@ -37,24 +37,24 @@ class Serial(OneStream):
 
     def __init__(self, path: str, baud: int) -> None:
         self._path, self._baud = path, baud
-        self._last = time.monotonic()
+        self._attempted_at = time.monotonic()
         try:
             line = open_line(path, baud)
         except OSError as error:
             raise TelemetryError(f"serial:{path}: {error.strerror or error}") from error
-        super().__init__(line, gone="device", slow="on a slow line")
+        super().__init__(line, peer="device", slow="on a slow line")
 
-    def tend(self, now: float) -> None:
+    def poll(self, now: float) -> None:
         """Write queued frames, or try to reopen the device."""
         line = self._stream
         if line is not None:
             line.flush(now)  # a serial line is not closed for a stall
-            if not line.open:
+            if not line.is_open:
                 log.warning("MAVLink: %s is gone", self._path)
-                self._lose(line)
-                self._last = now
-        elif now - self._last > _AGAIN:
-            self._last = now
+                self._drop(line)
+                self._attempted_at = now
+        elif now - self._attempted_at > _RETRY_PERIOD:
+            self._attempted_at = now
             with contextlib.suppress(OSError):
                 self._stream = open_line(self._path, self._baud)
                 log.warning("MAVLink: %s is back", self._path)
@@ -70,17 +70,17 @@ def open_line(path: str, baud: int) -> Stream:
     TelemetryError
         If the operating system does not have the baud rate, or is Windows.
     """
-    speed = _speed(path, baud)
+    speed = _baud_constant(path, baud)
     file = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     try:
-        _make_raw(file, speed)
+        _configure_raw(file, speed)
     except OSError:
         os.close(file)
         raise
-    return Stream(partial(os.read, file), partial(os.write, file), partial(os.close, file), _WAITING)
+    return Stream(partial(os.read, file), partial(os.write, file), partial(os.close, file), _QUEUE_SIZE)
 
 
-def _speed(path: str, baud: int) -> int:
+def _baud_constant(path: str, baud: int) -> int:
     try:
         import termios
     except ImportError as error:
@@ -93,7 +93,7 @@ def _speed(path: str, baud: int) -> int:
     return speed
 
 
-def _make_raw(file: int, speed: int) -> None:
+def _configure_raw(file: int, speed: int) -> None:
     """Set a terminal to raw mode, for exclusive use of this process."""
     import fcntl
     import termios

@@ -6,11 +6,11 @@ from collections import Counter
 from collections.abc import Callable, Hashable
 from typing import Final
 
-from cosim.mavlink.channels.channel import CHUNK
+from cosim.mavlink.channels.channel import CHUNK_SIZE
 
-WAITING = 1 << 16  # bytes, default limit of a queue
-_MUCH = 1 << 12  # bytes in the queue above which `put` writes at once
-STALL = 5.0  # s without progress, after which `flush` reports a stall
+QUEUE_SIZE = 1 << 16  # bytes, default limit of a queue
+_WRITE_THRESHOLD = 1 << 12  # bytes in the queue above which `put` writes at once
+STALL_TIME = 5.0  # s without progress, after which `flush` reports a stall
 
 
 class Outgoing:
@@ -22,7 +22,7 @@ class Outgoing:
         Function that writes bytes and returns the number written; it raises BlockingIOError if it cannot write now,
         another OSError if the other side has closed.
     limit : int
-        Greatest number of bytes in the queue. A frame beyond the limit is dropped whole, so the other side never gets
+        Maximum number of bytes in the queue. A frame beyond the limit is dropped whole, so the other side never gets
         part of one.
 
     Attributes
@@ -31,11 +31,11 @@ class Outgoing:
         Number of frames dropped because the queue was full.
     """
 
-    def __init__(self, write: Callable[[bytes], int], limit: int = WAITING) -> None:
+    def __init__(self, write: Callable[[bytes], int], limit: int = QUEUE_SIZE) -> None:
         self._write: Final = write
         self._limit: Final = limit
-        self._waiting = bytearray()
-        self._stalled: float | None = None  # time of the first write without progress
+        self._queue = bytearray()
+        self._stalled_at: float | None = None  # time of the first write without progress
         self.dropped = 0
 
     def put(self, frame: bytes) -> bool:
@@ -46,12 +46,12 @@ class Outgoing:
         OSError
             If the other side has closed.
         """
-        if len(self._waiting) > _MUCH and self._stalled is None:
-            self._write_some()
-        if len(self._waiting) + len(frame) > self._limit:
+        if len(self._queue) > _WRITE_THRESHOLD and self._stalled_at is None:
+            self._write_available()
+        if len(self._queue) + len(frame) > self._limit:
             self.dropped += 1
             return False
-        self._waiting += frame
+        self._queue += frame
         return True
 
     def flush(self, now: float) -> bool:
@@ -62,20 +62,20 @@ class Outgoing:
         OSError
             If the other side has closed.
         """
-        if not self._waiting or self._write_some():
-            self._stalled = None
-        elif self._stalled is None:
-            self._stalled = now
-        return self._stalled is None or now - self._stalled < STALL
+        if not self._queue or self._write_available():
+            self._stalled_at = None
+        elif self._stalled_at is None:
+            self._stalled_at = now
+        return self._stalled_at is None or now - self._stalled_at < STALL_TIME
 
-    def _write_some(self) -> bool:
+    def _write_available(self) -> bool:
         """Write as much as the stream accepts; return True if that was anything."""
         try:
-            taken = self._write(bytes(self._waiting))
+            written = self._write(bytes(self._queue))
         except (BlockingIOError, InterruptedError):
             return False
-        del self._waiting[:taken]
-        return taken > 0
+        del self._queue[:written]
+        return written > 0
 
 
 class Stream:
@@ -84,19 +84,19 @@ class Stream:
     Parameters
     ----------
     read, write, close : callable
-        Calls of the operating system; their arguments are the greatest number of bytes to read, the bytes to
+        Calls of the operating system; their arguments are the maximum number of bytes to read, the bytes to
         write, and none.
     limit : int
-        Greatest number of bytes in the queue.
+        Maximum number of bytes in the queue.
 
     Attributes
     ----------
     outgoing : Outgoing
         The queue of frames.
-    open : bool
+    is_open : bool
         False once a read or write has failed.
     version : int
-        Greatest version of MAVLink received from the other side; 0 before any.
+        Highest version of MAVLink received from the other side; 0 before any.
     """
 
     def __init__(
@@ -104,34 +104,31 @@ class Stream:
         read: Callable[[int], bytes],
         write: Callable[[bytes], int],
         close: Callable[[], None],
-        limit: int = WAITING,
+        limit: int = QUEUE_SIZE,
     ) -> None:
         self._read, self._close = read, close
         self.outgoing = Outgoing(write, limit)
-        self.open = True
-        self.version = 0  # the greatest received; 0 for none yet
+        self.is_open = True
+        self.version = 0
 
     def read(self) -> bytes | None:
-        """Return received bytes, or None if there are none; at the end of the stream `open` becomes False."""
+        """Return received bytes, or None if there are none; at the end of the stream `is_open` becomes False."""
         try:
-            data = self._read(CHUNK)
+            data = self._read(CHUNK_SIZE)
         except (BlockingIOError, InterruptedError):
             return None
         except OSError:
             data = b""
-        self.open = bool(data)
+        self.is_open = bool(data)
         return data or None
 
-    def put(self, frame: bytes, old: bytes | None = None) -> bool:
-        """Queue a frame, or `old` if the other side sends MAVLink 1; return False if the queue was full."""
-        if self.version == 1:
-            if old is None:
-                return True
-            frame = old
+    def put(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
+        """Queue a frame, or `frame_v1` if the other side sends MAVLink 1; return False if the queue was full."""
+        queued = frame_v1 if self.version == 1 else frame
         try:
-            return self.outgoing.put(frame)
+            return queued is None or self.outgoing.put(queued)
         except OSError:
-            self.open = False
+            self.is_open = False
             return False
 
     def flush(self, now: float) -> bool:
@@ -139,32 +136,50 @@ class Stream:
         try:
             return self.outgoing.flush(now)
         except OSError:
-            self.open = False
+            self.is_open = False
             return True
 
     def close(self) -> None:
         """Close the stream."""
-        self.open = False
+        self.is_open = False
         self._close()
 
 
-class OneStream:
+class StreamChannel:
+    """Base of the channels that carry streams."""
+
+    datagrams = False
+
+    def __init__(self) -> None:
+        self.losses: dict[str, int] = Counter()
+
+    def record_version(self, peer: Hashable, version: int) -> None:
+        """Record the MAVLink version of a peer; frames are sent to peers even if they never send."""
+        assert isinstance(peer, Stream)
+        peer.version = max(peer.version, version)
+
+    def _close(self, stream: Stream, reason: str) -> None:
+        """Close a stream, and count the frames that it dropped."""
+        if stream.outgoing.dropped:
+            self.losses[f"frames dropped {reason}"] += stream.outgoing.dropped
+        stream.close()
+
+
+class SinglePeer(StreamChannel):
     """A channel to one peer, by a stream that is reopened after a loss.
 
     Parameters
     ----------
     stream : Stream or None
         The first stream, if it is open already.
-    gone, slow : str
-        Words in the texts about frames that were dropped because the peer was absent (`gone`), or too slow (`slow`).
+    peer, slow : str
+        Words in the texts about dropped frames: the name of the absent peer, and that it is too slow.
     """
 
-    datagrams = False
-
-    def __init__(self, stream: Stream | None, gone: str, slow: str) -> None:
-        self.trouble: dict[str, int] = Counter()
+    def __init__(self, stream: Stream | None, peer: str, slow: str) -> None:
+        super().__init__()
         self._stream = stream
-        self._gone, self._slow = gone, slow
+        self._peer_name, self._slow = peer, slow
 
     def receive(self) -> tuple[Hashable, bytes] | None:
         """Return the peer and bytes from it, or None if there are none."""
@@ -172,26 +187,19 @@ class OneStream:
         data = None if stream is None else stream.read()
         return None if data is None else (stream, data)
 
-    def record_version(self, peer: Hashable, version: int) -> None:
-        """Record the MAVLink version of the peer."""
-        assert isinstance(peer, Stream)
-        peer.version = max(peer.version, version)
-
-    def send(self, frame: bytes, old: bytes | None = None) -> bool:
+    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
         """Queue a frame for the peer; return False if it is absent or the queue is full."""
         if self._stream is None:
-            self.trouble[f"frames dropped while there was no {self._gone}"] += 1
+            self.losses[f"frames dropped while there was no {self._peer_name}"] += 1
             return False
-        return self._stream.put(frame, old)
+        return self._stream.put(frame, frame_v1)
 
     def close(self) -> None:
         """Write what can be written without blocking, and close the stream."""
         if self._stream is not None:
             self._stream.flush(0.0)
-            self._lose(self._stream)
+            self._drop(self._stream)
 
-    def _lose(self, stream: Stream) -> None:
-        if stream.outgoing.dropped:
-            self.trouble[f"frames dropped {self._slow}"] += stream.outgoing.dropped
-        stream.close()
+    def _drop(self, stream: Stream) -> None:
+        self._close(stream, self._slow)
         self._stream = None

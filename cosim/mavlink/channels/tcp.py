@@ -7,29 +7,28 @@ import errno
 import logging
 import socket
 import time
-from collections import Counter
 from collections.abc import Hashable
 
 from cosim.errors import TelemetryError
-from cosim.mavlink.channels.stream import WAITING, OneStream, Stream
+from cosim.mavlink.channels.stream import QUEUE_SIZE, SinglePeer, Stream, StreamChannel
 
 log = logging.getLogger(__name__)
 
-CLIENTS = 8
-_CONNECTING = 3.0  # s, timeout of the first connection
-_AGAIN = 2.0  # s, between two attempts later on
-_UNDER_WAY = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
+MAX_CLIENTS = 8
+_CONNECT_TIMEOUT = 3.0  # s, of the first connection
+_RETRY_PERIOD = 2.0  # s, between two later attempts
+_IN_PROGRESS = (errno.EINPROGRESS, errno.EALREADY, errno.EWOULDBLOCK)
 
 
-def stream_of(made: socket.socket) -> Stream:
+def make_stream(connection: socket.socket) -> Stream:
     """Return a stream that owns the connection."""
-    made.setblocking(False)
+    connection.setblocking(False)
     with contextlib.suppress(OSError):  # a client may have gone already
-        made.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-    return Stream(made.recv, made.send, made.close)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+    return Stream(connection.recv, connection.send, connection.close)
 
 
-class TcpIn:
+class TcpIn(StreamChannel):
     """A server. Each client has its own queue of frames; a client that accepts none for 5 s is closed.
 
     Attributes
@@ -43,15 +42,13 @@ class TcpIn:
         If the port is in use.
     """
 
-    datagrams = False
-
     def __init__(self, host: str, port: int) -> None:
-        self.trouble: dict[str, int] = Counter()
+        super().__init__()
         try:
-            self._server = socket.create_server((host, port), backlog=CLIENTS)
+            self._server = socket.create_server((host, port), backlog=MAX_CLIENTS)
         except OSError as error:
             raise TelemetryError(f"tcpin:{host}:{port}: {error.strerror or error}") from error
-        self._server.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, WAITING)  # inherited by the clients' sockets
+        self._server.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, QUEUE_SIZE)  # inherited by the clients' sockets
         self._server.setblocking(False)
         self.port: int = self._server.getsockname()[1]
         self.clients: list[Stream] = []
@@ -67,34 +64,29 @@ class TcpIn:
                 return client, data
         return None
 
-    def record_version(self, peer: Hashable, version: int) -> None:
-        """Record the MAVLink version of a client; all clients are sent to, even if they never send."""
-        assert isinstance(peer, Stream)
-        peer.version = max(peer.version, version)
-
-    def send(self, frame: bytes, old: bytes | None = None) -> bool:
+    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
         """Queue a frame for each client; return False if a queue was full."""
-        taken = [client.put(frame, old) for client in self.clients]
-        return all(taken)
+        results = [client.put(frame, frame_v1) for client in self.clients]
+        return all(results)
 
-    def tend(self, now: float) -> None:
+    def poll(self, now: float) -> None:
         """Write queued frames, close stalled clients, accept new ones."""
         for client in list(self.clients):
-            if not client.open:
+            if not client.is_open:
                 self._drop(client)
             elif not client.flush(now):
-                self.trouble["clients closed that took nothing"] += 1
+                self.losses["clients closed that took nothing"] += 1
                 self._drop(client)
-        for _ in range(CLIENTS):
+        for _ in range(MAX_CLIENTS):
             try:
-                made, _ = self._server.accept()
+                connection, _ = self._server.accept()
             except OSError:  # no client waits, or it has closed again
                 return
-            if len(self.clients) < CLIENTS:
-                self.clients.append(stream_of(made))
+            if len(self.clients) < MAX_CLIENTS:
+                self.clients.append(make_stream(connection))
             else:
-                self.trouble["clients beyond 8 turned away"] += 1
-                made.close()
+                self.losses["clients beyond 8 turned away"] += 1
+                connection.close()
 
     def close(self) -> None:
         """Close all sockets."""
@@ -104,33 +96,31 @@ class TcpIn:
         self._server.close()
 
     def _drop(self, client: Stream) -> None:
-        if client.outgoing.dropped:
-            self.trouble["frames dropped for slow clients"] += client.outgoing.dropped
-        client.close()
+        self._close(client, "for slow clients")
         self.clients.remove(client)
 
 
-class TcpOut(OneStream):
+class TcpOut(SinglePeer):
     """A client; while there is no server, at first or later, it tries to connect every 2 s."""
 
     def __init__(self, host: str, port: int) -> None:
         self._address = (host, port)
         self._attempt: socket.socket | None = None
-        self._last = time.monotonic()
+        self._attempted_at = time.monotonic()
         stream = None
         with contextlib.suppress(OSError):
-            stream = stream_of(socket.create_connection((host, port), _CONNECTING))
+            stream = make_stream(socket.create_connection((host, port), _CONNECT_TIMEOUT))
         if stream is None:
             log.warning("MAVLink: tcp:%s:%s: no server yet; waiting", host, port)
-        super().__init__(stream, gone="server", slow="for a slow server")
+        super().__init__(stream, peer="server", slow="for a slow server")
 
-    def tend(self, now: float) -> None:
+    def poll(self, now: float) -> None:
         """Write queued frames, or reconnect."""
         connection = self._stream
         if connection is None:
             self._connect(now)
-        elif not (connection.flush(now) and connection.open):
-            self._lose(connection)
+        elif not (connection.flush(now) and connection.is_open):
+            self._drop(connection)
 
     def close(self) -> None:
         """Close the connection, and the attempt under way."""
@@ -141,17 +131,17 @@ class TcpOut(OneStream):
     def _connect(self, now: float) -> None:
         """Start a connection attempt, or check the one under way."""
         if self._attempt is None:
-            if now - self._last < _AGAIN:
+            if now - self._attempted_at < _RETRY_PERIOD:
                 return
-            self._last = now
+            self._attempted_at = now
             self._attempt = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
             self._attempt.setblocking(False)
         attempt, code = self._attempt, self._attempt.connect_ex(self._address)
-        if code in _UNDER_WAY:
+        if code in _IN_PROGRESS:
             return
         self._attempt = None
         # a socket can connect to itself on a local port without a listener
         if code in (0, errno.EISCONN) and attempt.getsockname() != self._address:
-            self._stream = stream_of(attempt)
+            self._stream = make_stream(attempt)
         else:
             attempt.close()

@@ -6,7 +6,7 @@ Imports: mavlink.vehicle, mavlink.wire.
 """
 
 from cosim.mavlink.listening.follow import follow
-from cosim.mavlink.listening.picture import picture
-from cosim.mavlink.listening.watch import Watch
+from cosim.mavlink.listening.table_text import format_table
+from cosim.mavlink.listening.telemetry_table import TelemetryTable
 
-__all__ = ["Watch", "follow", "picture"]
+__all__ = ["TelemetryTable", "follow", "format_table"]

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-from cosim.mavlink.listening.watch import printable
+from cosim.mavlink.listening.telemetry_table import printable
 
 _DEG = 180.0 / math.pi
-_LISTED = 8  # fields shown of a message without an entry below
-_OF_ARRAY = 8  # numbers shown of an array
+_MAX_FIELDS = 8  # fields shown of a message without an entry below
+_MAX_NUMBERS = 8  # numbers shown of an array
 
 
 class _Group(NamedTuple):
@@ -26,7 +26,7 @@ def _group(names: str, factor: float = 1.0, digits: int = 2, unit: str = "", unk
     return _Group(tuple(names.split()), factor, digits, unit, unknown)
 
 
-_SHOWN = {
+_FORMATS = {
     "ATTITUDE": (_group("roll pitch yaw", _DEG, 1, "deg"), _group("rollspeed pitchspeed yawspeed", _DEG, 1, "deg/s")),
     "ATTITUDE_QUATERNION": (_group("q1 q2 q3 q4", digits=3),),
     "LOCAL_POSITION_NED": (_group("x y z", unit="m"), _group("vx vy vz", unit="m/s")),
@@ -65,7 +65,7 @@ _SHOWN = {
 _CLOCKS = ("time_boot_ms", "time_usec", "time_unix_usec")
 
 
-def values(message: Any) -> str:
+def format_values(message: Any) -> str:
     """Format the main values of a message.
 
     Parameters
@@ -78,27 +78,27 @@ def values(message: Any) -> str:
     str
         Values in usual units, without control characters.
     """
-    shown = _SHOWN.get(message.get_type())
-    if shown is not None:
-        return "  ".join(_in_unit(message, group) for group in shown)
+    groups = _FORMATS.get(message.get_type())
+    if groups is not None:
+        return "  ".join(_format_group(message, group) for group in groups)
     if message.get_type() == "STATUSTEXT":
         return printable(message.text)
     names = [name for name in message.get_fieldnames() if name not in _CLOCKS]
-    return "  ".join(f"{name} {_plain(getattr(message, name))}" for name in names[:_LISTED])
+    return "  ".join(f"{name} {_format_plain(getattr(message, name))}" for name in names[:_MAX_FIELDS])
 
 
-def _in_unit(message: Any, group: _Group) -> str:
-    found = [getattr(message, name) for name in group.names]
-    numbers = " ".join("-" if x == group.unknown else f"{x * group.factor:z.{group.digits}f}" for x in found)
+def _format_group(message: Any, group: _Group) -> str:
+    values = [getattr(message, name) for name in group.names]
+    numbers = " ".join("-" if x == group.unknown else f"{x * group.factor:z.{group.digits}f}" for x in values)
     if len(group.names) == 1:
         numbers = f"{group.names[0]} {numbers}"
     return f"{numbers} {group.unit}".rstrip()
 
 
-def _plain(value: Any) -> str:
+def _format_plain(value: Any) -> str:
     if isinstance(value, float):
         return f"{value:z.4g}"
     if isinstance(value, list | tuple):
-        more = " ..." if len(value) > _OF_ARRAY else ""
-        return f"[{' '.join(_plain(x) for x in value[:_OF_ARRAY])}{more}]"
+        more = " ..." if len(value) > _MAX_NUMBERS else ""
+        return f"[{' '.join(_format_plain(x) for x in value[:_MAX_NUMBERS])}{more}]"
     return printable(value)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 
-from cosim.mavlink.listening.watch import Watch
+from cosim.mavlink.listening.telemetry_table import TelemetryTable
 from cosim.mavlink.wire.ground_end import GroundLink
 
-_BEAT = 1.0  # s between two heartbeats
-_SLICE = 0.1  # s, longest wait for a message
+_HEARTBEAT_PERIOD = 1.0  # s between two heartbeats
+_MAX_WAIT = 0.1  # s, longest wait for a message
 
 
 def follow(
-    link: GroundLink, watch: Watch, period: float, seconds: float | None = None, count: int | None = None
+    link: GroundLink, table: TelemetryTable, period: float, seconds: float | None = None, count: int | None = None
 ) -> Iterator[float]:
     """Receive messages, and yield whenever the table is due to be shown.
 
@@ -21,8 +21,8 @@ def follow(
     ----------
     link : GroundLink
         Link to listen on. A link that speaks first also sends a heartbeat once a second.
-    watch : Watch
-        Watch that records the messages.
+    table : TelemetryTable
+        TelemetryTable that records the messages.
     period : float
         Time between two yields [s].
     seconds : float, optional
@@ -36,18 +36,18 @@ def follow(
         Monotonic time [s], once per period, and at the end.
     """
     started = now = time.monotonic()
-    due, beat = started + period, started
-    while (seconds is None or now - started < seconds) and (count is None or watch.total < count):
-        if now >= beat and link.speaks_first:
-            link.beat()
-            beat = now + _BEAT
+    due, next_heartbeat = started + period, started
+    while (seconds is None or now - started < seconds) and (count is None or table.total < count):
+        if now >= next_heartbeat and link.sends_first:
+            link.send_heartbeat()
+            next_heartbeat = now + _HEARTBEAT_PERIOD
         end = due if seconds is None else min(due, started + seconds)
-        for heard in link.receive(min(_SLICE, max(0.0, end - now))):
-            watch.add(heard)
-            if watch.total == count:
+        for received in link.receive(min(_MAX_WAIT, max(0.0, end - now))):
+            table.add(received)
+            if table.total == count:
                 break
         now = time.monotonic()
-        watch.sample(now)
+        table.sample(now)
         if now >= due:
             yield now
             due = max(due + period, now)

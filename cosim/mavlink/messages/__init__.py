@@ -4,7 +4,3 @@ One table of messages with their builders, rates and groups, and the streams tha
 
 Imports: mavlink.vehicle, mavlink.wire, scenario, simulation.commands.
 """
-
-from cosim.mavlink.messages.table import MESSAGES, Spec
-
-__all__ = ["MESSAGES", "Spec"]

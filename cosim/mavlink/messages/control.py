@@ -11,12 +11,12 @@ from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import wrap_time
 
 _CENTER, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
-_SERVOS, _OUTPUTS = 16, 32
-_LONGEST_NAME = 10  # characters of a named value
+_MAX_SERVOS, _MAX_OUTPUTS = 16, 32
+_MAX_NAME = 10  # characters of a named value
 _POSITION_AND_VELOCITY = 0b110111000000  # type_mask: all but these is ignored
 
 # reports of laws that are sent as named values
-_WATCHED = {
+_NAMED_REPORTS = {
     "law.constraint_slack": "qp_slack",
     "law.barriers": "barriers",
     "law.desired_speed": "des_speed",
@@ -41,14 +41,14 @@ def nav_controller_output(context: VehicleContext) -> list[Any]:
 
 def servo_output_raw(context: VehicleContext) -> list[Any]:
     """SERVO_OUTPUT_RAW: thruster commands as pulses [µs], 0 for unused outputs; its time wraps."""
-    pulses = (context.servo_pulses() + [0] * _SERVOS)[:_SERVOS]
+    pulses = (context.servo_pulses() + [0] * _MAX_SERVOS)[:_MAX_SERVOS]
     return [context.make("SERVO_OUTPUT_RAW", wrap_time(context.view.boot_us, 1), 0, *pulses)]
 
 
 def actuator_output_status(context: VehicleContext) -> list[Any]:
     """ACTUATOR_OUTPUT_STATUS: force of each thruster as a fraction of its limit, from -1 to 1."""
-    parts = context.thrust_parts()[:_OUTPUTS]
-    return [context.make("ACTUATOR_OUTPUT_STATUS", context.view.boot_us, (1 << len(parts)) - 1, parts)]
+    fractions = context.thrust_fractions()[:_MAX_OUTPUTS]
+    return [context.make("ACTUATOR_OUTPUT_STATUS", context.view.boot_us, (1 << len(fractions)) - 1, fractions)]
 
 
 def rc_channels(context: VehicleContext) -> list[Any]:
@@ -80,11 +80,11 @@ def named_values(context: VehicleContext) -> list[tuple[str, float]]:
     values.append(("g_goal", view.region_values[0]))
     values.append(("goal_clear", clearances[0]))
     nearest = min((c for c in clearances[1:] if not math.isnan(c)), default=math.nan)
-    values.append(("clearance", nearest))  # the least of all regions
-    values.append(("thrust", max(map(abs, context.thrust_parts()), default=0.0)))
+    values.append(("clearance", nearest))  # the minimum of all regions
+    values.append(("thrust", max(map(abs, context.thrust_fractions()), default=0.0)))
     values.append(("force", math.hypot(*view.wrench[:3])))
     values.append(("saturated", float(view.saturated)))
-    values += [(_WATCHED[name], value) for name, value in view.reports() if name in _WATCHED]
+    values += [(_NAMED_REPORTS[name], value) for name, value in view.reports() if name in _NAMED_REPORTS]
     return values
 
 
@@ -95,9 +95,9 @@ def weight_names(criteria: Sequence[str]) -> list[str]:
     """
     names: list[str] = []
     for criterion in criteria:
-        name, number = f"w_{criterion}"[:_LONGEST_NAME], 2
+        name, number = f"w_{criterion}"[:_MAX_NAME], 2
         while name in names:
-            name, number = f"w_{criterion}"[: _LONGEST_NAME - len(str(number))] + str(number), number + 1
+            name, number = f"w_{criterion}"[: _MAX_NAME - len(str(number))] + str(number), number + 1
         names.append(name)
     return names
 

@@ -15,7 +15,7 @@ _CM = 1e2
 _COVARIANCE_UNKNOWN = (math.nan,) + (0.0,) * 20
 
 
-def globe(context: VehicleContext, position: Vector3) -> Vector3:
+def to_lat_lon_alt(context: VehicleContext, position: Vector3) -> Vector3:
     """Return latitude and longitude [1e-7 deg] and altitude [mm]."""
     latitude, longitude, altitude = context.frame.to_global(position)
     return latitude * _E7, longitude * _E7, altitude * _MM
@@ -47,7 +47,7 @@ def local_position_ned(context: VehicleContext) -> list[Any]:
 def global_position_int(context: VehicleContext) -> list[Any]:
     """GLOBAL_POSITION_INT: its relative altitude is the negative depth."""
     view = context.view
-    latitude, longitude, altitude = globe(context, view.position_ned)
+    latitude, longitude, altitude = to_lat_lon_alt(context, view.position_ned)
     speeds = [v * _CM for v in view.velocity_ned]
     heading = round(degrees(view.heading) * _CM) % 36000 if math.isfinite(view.heading) else math.nan
     values = latitude, longitude, altitude, -view.position_ned[2] * _MM, *speeds, heading
@@ -60,7 +60,7 @@ def vfr_hud(context: VehicleContext) -> list[Any]:
     north, east, down = view.velocity_ned
     speed = math.hypot(*view.velocity_body)
     heading = round(degrees(view.heading)) % 360 if math.isfinite(view.heading) else math.nan
-    throttle = max(map(abs, context.thrust_parts()), default=0.0)
+    throttle = max(map(abs, context.thrust_fractions()), default=0.0)
     values = speed, math.hypot(north, east), heading, 100.0 * throttle, -view.position_ned[2], -down
     return [context.make("VFR_HUD", *values)]
 
@@ -68,7 +68,7 @@ def vfr_hud(context: VehicleContext) -> list[Any]:
 def gps_raw_int(context: VehicleContext) -> list[Any]:
     """GPS_RAW_INT: the position as a fix, for stations that read no other message; accuracy unknown."""
     view = context.view
-    latitude, longitude, altitude = globe(context, view.position_ned)
+    latitude, longitude, altitude = to_lat_lon_alt(context, view.position_ned)
     north, east, _ = view.velocity_ned
     course = degrees(math.atan2(east, north)) % 360.0
     fix = context.mavlink.GPS_FIX_TYPE_3D_FIX if all(map(math.isfinite, view.position_ned)) else 1
@@ -82,12 +82,16 @@ def home_position(context: VehicleContext) -> list[Any]:
     """HOME_POSITION: at the surface."""
     home = context.home_ned()
     level = (1.0, 0.0, 0.0, 0.0)
-    return [context.make("HOME_POSITION", *globe(context, home), *home, level, 0.0, 0.0, -1.0, context.view.boot_us)]
+    return [
+        context.make(
+            "HOME_POSITION", *to_lat_lon_alt(context, home), *home, level, 0.0, 0.0, -1.0, context.view.boot_us
+        )
+    ]
 
 
 def gps_global_origin(context: VehicleContext) -> list[Any]:
     """GPS_GLOBAL_ORIGIN: global position of the local origin."""
-    return [context.make("GPS_GLOBAL_ORIGIN", *globe(context, (0.0, 0.0, 0.0)), context.view.boot_us)]
+    return [context.make("GPS_GLOBAL_ORIGIN", *to_lat_lon_alt(context, (0.0, 0.0, 0.0)), context.view.boot_us)]
 
 
 def odometry(context: VehicleContext) -> list[Any]:
@@ -114,5 +118,5 @@ def altitude(context: VehicleContext) -> list[Any]:
 def ahrs2(context: VehicleContext) -> list[Any]:
     """AHRS2: Cockpit reads the altitude from it."""
     view = context.view
-    latitude, longitude, millimetres = globe(context, view.position_ned)
-    return [context.make("AHRS2", *view.euler, millimetres / _MM, latitude, longitude)]
+    latitude, longitude, altitude_mm = to_lat_lon_alt(context, view.position_ned)
+    return [context.make("AHRS2", *view.euler, altitude_mm / _MM, latitude, longitude)]

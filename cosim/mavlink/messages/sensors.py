@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cosim.mavlink.messages.pose import globe
+from cosim.mavlink.messages.pose import to_lat_lon_alt
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import wrap_time
 
@@ -77,8 +77,8 @@ def water_depth(context: VehicleContext) -> list[Any]:
     if not has_bottom(context):
         return []
     view = context.view
-    latitude, longitude, millimetres = globe(context, view.position_ned)
-    values = 0, 1, latitude, longitude, millimetres / 1e3, *view.euler, view.altitude, 0.0
+    latitude, longitude, altitude_mm = to_lat_lon_alt(context, view.position_ned)
+    values = 0, 1, latitude, longitude, altitude_mm / 1e3, *view.euler, view.altitude, 0.0
     return [context.make("WATER_DEPTH", wrap_time(view.boot_us), *values)]
 
 

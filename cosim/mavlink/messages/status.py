@@ -9,7 +9,7 @@ from typing import Any
 from packaging.version import Version
 
 from cosim.mavlink.messages.sensors import has_bottom
-from cosim.mavlink.vehicle.profile import MODE_NAMES, STANDARD_MODES, SUBMARINE
+from cosim.mavlink.vehicle.profile import MODE_TABLE, SUBMARINE
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import wrap_time
 from cosim.simulation.commands.commands import MODES
@@ -22,32 +22,22 @@ def heartbeat(context: VehicleContext) -> list[Any]:
     """HEARTBEAT."""
     m = context.mavlink
     state = m.MAV_STATE_ACTIVE if context.armed else m.MAV_STATE_STANDBY
-    return [beat(context, m.MAV_STATE_CRITICAL if context.failsafe else state)]
+    return [heartbeat_message(context, m.MAV_STATE_CRITICAL if context.failsafe else state)]
 
 
-def beat(context: VehicleContext, state: int) -> Any:
+def heartbeat_message(context: VehicleContext, state: int) -> Any:
     """Return a HEARTBEAT with a MAV_STATE."""
     profile, mode = context.profile, context.mode
     base = profile.base_mode(mode, context.armed)
-    return context.make("HEARTBEAT", SUBMARINE, profile.autopilot, base, profile.numbers[mode], state, _PROTOCOL)
+    return context.make("HEARTBEAT", SUBMARINE, profile.autopilot, base, profile.custom_modes[mode], state, _PROTOCOL)
 
 
 def sys_status(context: VehicleContext) -> list[Any]:
     """SYS_STATUS: the fence and all present sensors are healthy; the battery is unknown."""
     m = context.mavlink
-    present = (
-        m.MAV_SYS_STATUS_SENSOR_3D_GYRO
-        | m.MAV_SYS_STATUS_SENSOR_3D_ACCEL
-        | m.MAV_SYS_STATUS_SENSOR_3D_MAG
-        | m.MAV_SYS_STATUS_SENSOR_ABSOLUTE_PRESSURE
-        | m.MAV_SYS_STATUS_SENSOR_GPS
-        | m.MAV_SYS_STATUS_SENSOR_ATTITUDE_STABILIZATION
-        | m.MAV_SYS_STATUS_SENSOR_YAW_POSITION
-        | m.MAV_SYS_STATUS_SENSOR_Z_ALTITUDE_CONTROL
-        | m.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
-        | m.MAV_SYS_STATUS_AHRS
-        | m.MAV_SYS_STATUS_PREARM_CHECK
-    )
+    sensors = "3D_GYRO 3D_ACCEL 3D_MAG ABSOLUTE_PRESSURE GPS ATTITUDE_STABILIZATION YAW_POSITION Z_ALTITUDE_CONTROL"
+    present = combine_flags(m, "MAV_SYS_STATUS_SENSOR_", f"{sensors} XY_POSITION_CONTROL")
+    present |= m.MAV_SYS_STATUS_AHRS | m.MAV_SYS_STATUS_PREARM_CHECK
     if has_bottom(context):
         present |= m.MAV_SYS_STATUS_SENSOR_LASER_POSITION
     motors = m.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
@@ -75,8 +65,8 @@ def extended_sys_state(context: VehicleContext) -> list[Any]:
 
 def current_mode(context: VehicleContext) -> list[Any]:
     """CURRENT_MODE: the current mode and the commanded one."""
-    numbers, mode = context.profile.numbers, context.mode
-    return [context.make("CURRENT_MODE", STANDARD_MODES[mode], numbers[mode], numbers[context.mode_ahead])]
+    numbers, mode = context.profile.custom_modes, context.mode
+    return [context.make("CURRENT_MODE", MODE_TABLE[mode].standard, numbers[mode], numbers[context.mode_ahead])]
 
 
 def available_modes(context: VehicleContext, index: int = 0) -> list[Any]:
@@ -85,7 +75,7 @@ def available_modes(context: VehicleContext, index: int = 0) -> list[Any]:
     messages = []
     for i in chosen:
         mode = MODES[i - 1]
-        values = STANDARD_MODES[mode], context.profile.numbers[mode], 0, MODE_NAMES[mode]
+        values = MODE_TABLE[mode].standard, context.profile.custom_modes[mode], 0, MODE_TABLE[mode].name
         messages.append(context.make("AVAILABLE_MODES", len(MODES), i, *values))
     return messages
 
@@ -97,17 +87,14 @@ def available_modes_monitor(context: VehicleContext) -> list[Any]:
 
 def capabilities(context: VehicleContext) -> int:
     """Return the MAV_PROTOCOL_CAPABILITY bits of the implemented protocols."""
-    m = context.mavlink
-    return int(
-        m.MAV_PROTOCOL_CAPABILITY_MISSION_FLOAT
-        | m.MAV_PROTOCOL_CAPABILITY_PARAM_FLOAT
-        | m.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-        | m.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
-        | m.MAV_PROTOCOL_CAPABILITY_FTP
-        | m.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_LOCAL_NED
-        | m.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
-        | m.MAV_PROTOCOL_CAPABILITY_MAVLINK2
-    )
+    names = "MISSION_FLOAT PARAM_FLOAT MISSION_INT COMMAND_INT FTP SET_POSITION_TARGET_LOCAL_NED"
+    names += " SET_POSITION_TARGET_GLOBAL_INT MAVLINK2"
+    return combine_flags(context.mavlink, "MAV_PROTOCOL_CAPABILITY_", names)
+
+
+def combine_flags(mavlink: Any, prefix: str, names: str) -> int:
+    """Combine flags of an enumeration, whose names are given without their prefix."""
+    return sum(getattr(mavlink, prefix + name) for name in names.split())
 
 
 def autopilot_version(context: VehicleContext) -> list[Any]:
@@ -119,8 +106,8 @@ def autopilot_version(context: VehicleContext) -> list[Any]:
     """
     version, profile = Version(metadata.version("subreach")), context.profile
     own = version.major, version.minor, version.micro
-    kind = _DEVELOPMENT if profile.stands_for or version.is_prerelease else _OFFICIAL
-    flight = _version_number(profile.stands_for or own, kind)
+    kind = _DEVELOPMENT if profile.imitated_release or version.is_prerelease else _OFFICIAL
+    flight = _version_number(profile.imitated_release or own, kind)
     middleware = _version_number(own, _DEVELOPMENT if version.is_prerelease else _OFFICIAL)
     custom = [*reversed(own), *[0] * 5] if profile.name == "px4" else list(b"subreach")
     identity = f"subreach {context.scenario.vehicle.name} {context.options.system_id}".encode()
@@ -139,7 +126,7 @@ def _version_number(version: tuple[int, int, int], kind: int) -> int:
 def mission_current(context: VehicleContext) -> list[Any]:
     """MISSION_CURRENT."""
     m, view, total = context.mavlink, context.view, len(context.plan)
-    first = int(context.profile.home_is_first)
+    first = int(context.profile.has_home_item)
     if not total:
         state = m.MISSION_STATE_NO_MISSION
     elif view.item < 0:

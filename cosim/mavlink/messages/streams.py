@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from cosim.mavlink.messages import MESSAGES, Spec
-from cosim.mavlink.messages.table import HEARTBEAT
+from cosim.mavlink.messages.message_table import Spec, message_specs
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.message_sink import MessageSink
 
-SHORTEST_US = 10_000  # least interval of a message
-_LONGEST_US = 3_600_000_000
-GREATEST_LOAD = 250_000.0  # bytes per simulated second, of all streams of a link
-_FRAME = 12  # bytes of header and checksum
+MIN_INTERVAL_US = 10_000
+_MAX_INTERVAL_US = 3_600_000_000
+MAX_LOAD = 250_000.0  # bytes per simulated second, of all streams of a link
+_FRAME_OVERHEAD = 12  # bytes of header and checksum
 _SECOND = 1_000_000
 
 
@@ -36,18 +35,19 @@ class Streams:
 
     def __init__(self, context: VehicleContext, link: MessageSink, clock_us: int) -> None:
         self._context, self._link, self._clock = context, link, clock_us
+        self._specs = message_specs()
         self._intervals: dict[int, int] = {}
         self._due: dict[int, int] = {}
         self._earliest = clock_us
         self.heartbeat_sent = False
-        for spec in MESSAGES.values():
-            self._put(spec.id, self._default(spec))
+        for spec in self._specs.values():
+            self._set_interval(spec.id, self._default_interval(spec))
 
-    def _default(self, spec: Spec) -> int:
+    def _default_interval(self, spec: Spec) -> int:
         rate = spec.default_rate(self._context.options.profile)
         return round(_SECOND / rate) if rate > 0.0 else -1
 
-    def _put(self, message_id: int, interval_us: int) -> None:
+    def _set_interval(self, message_id: int, interval_us: int) -> None:
         if interval_us < 0:
             self._intervals.pop(message_id, None)
             self._due.pop(message_id, None)
@@ -57,19 +57,19 @@ class Streams:
         self._earliest = min(self._earliest, self._due[message_id])
 
     def _load(self, spec: Spec, interval_us: int) -> float:
-        size: int = (self._context.make.size_of[spec.id] + _FRAME) * spec.several
+        size: int = (self._context.make.payload_sizes[spec.id] + _FRAME_OVERHEAD) * spec.count
         return size * _SECOND / interval_us
 
     @property
     def load(self) -> float:
         """Bytes sent per simulated second."""
-        return sum(self._load(MESSAGES[i], interval) for i, interval in self._intervals.items())
+        return sum(self._load(self._specs[i], interval) for i, interval in self._intervals.items())
 
     def interval(self, message_id: int) -> int:
         """Return the interval of a message [µs]: -1 if it is not streamed, 0 if there is no such message."""
-        return self._intervals.get(message_id, -1) if message_id in MESSAGES else 0
+        return self._intervals.get(message_id, -1) if message_id in self._specs else 0
 
-    def set(self, changes: Iterable[tuple[int, int]]) -> bool:
+    def set_intervals(self, changes: Iterable[tuple[int, int]]) -> bool:
         """Change intervals, all or none.
 
         Parameters
@@ -80,23 +80,23 @@ class Streams:
         Returns
         -------
         bool
-            True if the intervals were changed; False if a message is unknown, or the load would exceed `GREATEST_LOAD`.
+            True if the intervals were changed; False if a message is unknown, or the load would exceed `MAX_LOAD`.
         """
         new: dict[int, int] = {}
         for message_id, interval_us in changes:
-            spec = MESSAGES.get(message_id)
+            spec = self._specs.get(message_id)
             if spec is None:
                 return False
             if interval_us == 0:
-                new[message_id] = self._default(spec)
+                new[message_id] = self._default_interval(spec)
             else:
-                new[message_id] = -1 if interval_us < 0 else min(max(interval_us, SHORTEST_US), _LONGEST_US)
+                new[message_id] = -1 if interval_us < 0 else min(max(interval_us, MIN_INTERVAL_US), _MAX_INTERVAL_US)
         after = {**self._intervals, **new}
-        load = sum(self._load(MESSAGES[i], interval) for i, interval in after.items() if interval > 0)
-        if load > max(GREATEST_LOAD, self.load):
+        load = sum(self._load(self._specs[i], interval) for i, interval in after.items() if interval > 0)
+        if load > max(MAX_LOAD, self.load):
             return False
         for message_id, interval_us in new.items():
-            self._put(message_id, interval_us)
+            self._set_interval(message_id, interval_us)
         return True
 
     def advance(self, clock_us: int) -> None:
@@ -119,6 +119,6 @@ class Streams:
 
     def send(self, message_id: int) -> None:
         """Send a message now."""
-        for message in MESSAGES[message_id].build(self._context):
+        for message in self._specs[message_id].build(self._context):
             self._link.send(message)
-        self.heartbeat_sent |= message_id == HEARTBEAT
+        self.heartbeat_sent |= self._specs[message_id].name == "HEARTBEAT"

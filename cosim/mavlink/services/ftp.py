@@ -8,18 +8,18 @@ from collections import OrderedDict
 from dataclasses import dataclass, field
 from typing import Any
 
-from cosim.mavlink.services.packed_parameters import bare_crc32, pack_parameters
-from cosim.mavlink.services.parameters import Parameters
+from cosim.mavlink.services.packed_parameters import compute_crc32, pack_parameters
+from cosim.mavlink.services.parameter_protocol import ParameterProtocol
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 
 _HEADER = struct.Struct("<HBBBBBBI")  # seq, session, opcode, size, req_opcode, burst_complete, padding, offset
-_ROOM = 239  # bytes of data in a payload
+_MAX_DATA = 239  # bytes in a payload
 _PAYLOAD = 251
 _FOLDER, _FILE = "@PARAM", "param.pck"
-_CLIENTS = 8  # each with one open file; a further client replaces the one unused for longest
+_MAX_CLIENTS = 8  # each with one open file; a further client replaces the one unused for longest
 _BURST = 16  # packets
-_LONGEST_PATH = 100
+_MAX_PATH = 100
 
 _NONE, _TERMINATE, _RESET, _LIST, _OPEN, _READ, _CRC, _BURST_READ = 0, 1, 2, 3, 4, 5, 14, 15
 _WRITING = (6, 7, 8, 9, 10, 11, 12, 13)  # create, write, remove, make and remove folders, open, truncate, rename
@@ -49,26 +49,26 @@ class _Client:
     last_replies: list[bytes] = field(default_factory=list)
 
 
-class RefusedError(Exception):
-    """Raised for a refused request; `error` is its MAV_FTP_ERR."""
+class FtpError(Exception):
+    """Raised for a refused request; `code` is its MAV_FTP_ERR."""
 
     def __init__(self, error: int) -> None:
         super().__init__(error)
-        self.error = error
+        self.code = error
 
 
 class FileServer(Service):
     """FILE_TRANSFER_PROTOCOL.
 
-    Parameters
+    ParameterProtocol
     ----------
     context : VehicleContext
         The vehicle.
-    parameters : Parameters
+    parameters : ParameterProtocol
         Service with the parameters that the file contains.
     """
 
-    def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
+    def __init__(self, context: VehicleContext, parameters: ParameterProtocol) -> None:
         super().__init__(context)
         self._parameters = parameters
         self._clients: OrderedDict[tuple[str, int, int], _Client] = OrderedDict()
@@ -93,7 +93,7 @@ class FileServer(Service):
     def _client_of(self, sender: Sender) -> _Client:
         key = sender.link.name, sender.system, sender.component
         if key not in self._clients:
-            if len(self._clients) >= _CLIENTS:
+            if len(self._clients) >= _MAX_CLIENTS:
                 self._clients.popitem(last=False)
             self._clients[key] = _Client()
         self._clients.move_to_end(key)
@@ -104,8 +104,8 @@ class FileServer(Service):
             if request.opcode == _BURST_READ:
                 return self._burst(client, request)
             data = self._answer(client, request)
-        except RefusedError as refused:
-            return [_packet(request, 1, _NAK, bytes([refused.error]), request.offset)]
+        except FtpError as error:
+            return [_packet(request, 1, _NAK, bytes([error.code]), request.offset)]
         return [_packet(request, 1, _ACK, data, request.offset)]
 
     def _answer(self, client: _Client, request: _Request) -> bytes:
@@ -121,20 +121,20 @@ class FileServer(Service):
                 client.session, client.content = request.session, self._content(_path(request))
                 return struct.pack("<I", len(client.content))
             case opcode if opcode == _READ:
-                return _part(_opened(client, request), request.offset, request.size)
+                return _read_part(_get_content(client, request), request.offset, request.size)
             case opcode if opcode == _CRC:
-                return struct.pack("<I", bare_crc32(self._content(_path(request))))
-        raise RefusedError(_PROTECTED if request.opcode in _WRITING else _UNKNOWN)
+                return struct.pack("<I", compute_crc32(self._content(_path(request))))
+        raise FtpError(_PROTECTED if request.opcode in _WRITING else _UNKNOWN)
 
     def _burst(self, client: _Client, request: _Request) -> list[bytes]:
         try:
-            content = _opened(client, request)
-            parts = [(request.offset, _part(content, request.offset, request.size))]
-        except RefusedError as refused:
-            return [_packet(request, 1, _NAK, bytes([refused.error]), request.offset)]
+            content = _get_content(client, request)
+            parts = [(request.offset, _read_part(content, request.offset, request.size))]
+        except FtpError as error:
+            return [_packet(request, 1, _NAK, bytes([error.code]), request.offset)]
         while len(parts) < _BURST and parts[-1][0] + len(parts[-1][1]) < len(content):
             offset = parts[-1][0] + len(parts[-1][1])
-            parts.append((offset, _part(content, offset, request.size)))
+            parts.append((offset, _read_part(content, offset, request.size)))
         last = len(parts)
         return [
             _packet(request, i, _ACK, data, offset, complete=i == last) for i, (offset, data) in enumerate(parts, 1)
@@ -145,10 +145,10 @@ class FileServer(Service):
     def _content(self, path: str) -> bytes:
         name, _, query = path.lstrip("/").partition("?")
         if name != f"{_FOLDER}/{_FILE}":
-            raise RefusedError(_NOT_FOUND)
-        everything = self._parameters.all()
-        start, count = _number(query, "start", 0), _number(query, "count", len(everything))
-        return pack_parameters(everything[start : start + count], len(everything))
+            raise FtpError(_NOT_FOUND)
+        parameters = self._parameters.list_values()
+        start, count = _number(query, "start", 0), _number(query, "count", len(parameters))
+        return pack_parameters(parameters[start : start + count], len(parameters))
 
     def _listing(self, path: str, offset: int) -> bytes:
         folder = path.strip("/")
@@ -157,36 +157,36 @@ class FileServer(Service):
         elif folder == _FOLDER:
             entries = [f"F{_FILE}\t{len(self._content(f'{_FOLDER}/{_FILE}'))}"]
         else:
-            raise RefusedError(_NOT_FOUND)
+            raise FtpError(_NOT_FOUND)
         if offset >= len(entries):
-            raise RefusedError(_EOF)
+            raise FtpError(_EOF)
         return b"".join(entry.encode() + b"\0" for entry in entries[offset:])
 
 
 def _path(request: _Request) -> str:
     path = request.data.split(b"\0", 1)[0]
-    if len(path) > _LONGEST_PATH:
-        raise RefusedError(_NOT_FOUND)
+    if len(path) > _MAX_PATH:
+        raise FtpError(_NOT_FOUND)
     return path.decode("ascii", "replace")
 
 
-def _number(query: str, key: str, otherwise: int) -> int:
-    found = re.search(rf"(?:^|[?&]){key}=([0-9]{{1,5}})(?:&|$)", query)
-    return int(found[1]) if found else otherwise
+def _number(query: str, key: str, default: int) -> int:
+    match = re.search(rf"(?:^|[?&]){key}=([0-9]{{1,5}})(?:&|$)", query)
+    return int(match[1]) if match else default
 
 
-def _opened(client: _Client, request: _Request) -> bytes:
+def _get_content(client: _Client, request: _Request) -> bytes:
     if client.content is None or request.session != client.session:
-        raise RefusedError(_INVALID_SESSION)
+        raise FtpError(_INVALID_SESSION)
     return client.content
 
 
-def _part(content: bytes, offset: int, size: int) -> bytes:
-    if size > _ROOM:
-        raise RefusedError(_INVALID_SIZE)
+def _read_part(content: bytes, offset: int, size: int) -> bytes:
+    if size > _MAX_DATA:
+        raise FtpError(_INVALID_SIZE)
     if offset >= len(content):
-        raise RefusedError(_EOF)
-    return content[offset : offset + (size or _ROOM)]
+        raise FtpError(_EOF)
+    return content[offset : offset + (size or _MAX_DATA)]
 
 
 def _packet(request: _Request, after: int, opcode: int, data: bytes, offset: int, complete: bool = False) -> bytes:

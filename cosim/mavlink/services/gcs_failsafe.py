@@ -8,7 +8,7 @@ from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.simulation.commands.commands import Arm, Command, SetMode
 
-_REMINDER = 30.0  # s
+_REPORT_PERIOD = 30.0  # s
 
 
 class GcsFailsafe(Service):
@@ -16,8 +16,8 @@ class GcsFailsafe(Service):
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
-        self._reminded = 0.0
-        self._acted = True
+        self._reported_at = 0.0
+        self._is_applied = True
         self.messages = {"HEARTBEAT": self._heartbeat}
 
     def _heartbeat(self, sender: Sender, message: Any) -> None:
@@ -27,29 +27,31 @@ class GcsFailsafe(Service):
         """Check the silence of the station, report it, and apply the loss action."""
         context = self.context
         silence = context.active_gcs.silence(context.now)
-        lost = context.loss_action != "none" and silence > context.loss_timeout
-        if lost and not context.failsafe:
-            context.failsafe, self._reminded = True, context.now
-            self._say(silence)
-            self._acted = False
-        elif lost and context.now - self._reminded >= _REMINDER:
-            self._reminded = context.now
-            self._say(silence)
-        elif context.failsafe and not lost:
+        is_lost = context.loss_action != "none" and silence > context.loss_timeout
+        if is_lost and not context.failsafe:
+            context.failsafe, self._reported_at = True, context.now
+            self._report(silence)
+            self._is_applied = False
+        elif is_lost and context.now - self._reported_at >= _REPORT_PERIOD:
+            self._reported_at = context.now
+            self._report(silence)
+        elif context.failsafe and not is_lost:
             context.failsafe = False
-            self._acted = True
-            context.say(f"Link to station {context.active_gcs.commander} regained", context.mavlink.MAV_SEVERITY_NOTICE)
-        if not self._acted:
-            self._acted = self._act()
+            self._is_applied = True
+            context.send_text(
+                f"Link to station {context.active_gcs.commander} regained", context.mavlink.MAV_SEVERITY_NOTICE
+            )
+        if not self._is_applied:
+            self._is_applied = self._apply_action()
 
-    def _say(self, silence: float) -> None:
+    def _report(self, silence: float) -> None:
         context = self.context
         action = context.loss_action
         then = "" if action == "warn" else f": {action}"
         text = f"Link to station {context.active_gcs.commander} lost for {silence:.0f} s{then}"
-        context.say(text, context.mavlink.MAV_SEVERITY_CRITICAL)
+        context.send_text(text, context.mavlink.MAV_SEVERITY_CRITICAL)
 
-    def _act(self) -> bool:
+    def _apply_action(self) -> bool:
         """Submit the command of the loss action; return False if the queue was full."""
         context = self.context
         command: Command

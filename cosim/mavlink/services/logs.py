@@ -8,7 +8,7 @@ from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 
 
-class Logs(Service):
+class LogProtocol(Service):
     """LOG_REQUEST_LIST, LOG_REQUEST_DATA and LOG_ERASE: an empty list, without which MAVSDK waits for 7.5 s."""
 
     def __init__(self, context: VehicleContext) -> None:

@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.sticks import (
+from cosim.mavlink.vehicle.ardusub_sticks import (
     CLIMB_DEAD_ZONE,
-    LEAN,
     LEAN_DEAD_ZONE,
+    MAX_LEAN,
     YAW_DEAD_ZONE,
     MotorMixer,
-    beyond_dead_zone,
+    apply_dead_zone,
 )
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector6
@@ -33,16 +33,16 @@ _FORCE_AXES: dict[Mode, int] = {"manual": 6, "stabilize": 3, "depth_hold": 2}
 _NEUTRAL: Vector6 = (0.0,) * 6
 
 
-class Manual(Service):
+class ManualControlService(Service):
     """Convert sticks to fractions of the greatest wrench, in the modes of manual control."""
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
         self.messages = {"MANUAL_CONTROL": self._manual_control, "RC_CHANNELS_OVERRIDE": self._override}
         vehicle = context.scenario.vehicle
-        reach = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+        max_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._mixer = None if vehicle.autopilot is None else MotorMixer(vehicle)
-        self._reciprocal = np.divide(1.0, reach, out=np.zeros(6), where=reach > 0.0)
+        self._reciprocal = np.divide(1.0, max_wrench, out=np.zeros(6), where=max_wrench > 0.0)
         self._received_at: float | None = None
         self._state = (context.armed, context.mode)
 
@@ -64,7 +64,7 @@ class Manual(Service):
         self._received_at = None
         if context.mode_ahead in STICK_MODES:
             self._submit(_NEUTRAL, by_gain=True)
-            context.say("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
+            context.send_text("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
 
     def _manual_control(self, sender: Sender, message: Any) -> None:
         if message.target == self.context.options.system_id:
@@ -75,7 +75,7 @@ class Manual(Service):
         surge, sway, heave, roll, pitch, yaw = self.context.sticks
         before = pitch, roll, -heave, yaw, surge, sway
         pitch, roll, up, yaw, surge, sway = (
-            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _part((pulse - _CENTER) / _SWING)
+            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _clip((pulse - _CENTER) / _SWING)
             for pulse, old in zip(pulses, before, strict=True)
         )
         self._apply(sender, (surge, sway, -up + 0.0, roll, pitch, yaw), by_gain=False)
@@ -84,7 +84,7 @@ class Manual(Service):
         context = self.context
         if context.accepts_commands and context.mode_ahead not in STICK_MODES:
             return
-        if not self.may_steer(sender):
+        if not self.accept_control(sender):
             return
         self._received_at = context.now
         self._submit(sticks, by_gain)
@@ -93,11 +93,11 @@ class Manual(Service):
         context = self.context
         if sticks == context.sticks:
             return
-        command = ManualControl(self._parts(sticks, by_gain), by_gain)
+        command = ManualControl(self._wrench_fractions(sticks, by_gain), by_gain)
         if context.submit(command) == context.mavlink.MAV_RESULT_ACCEPTED:
             context.sticks = sticks
 
-    def _parts(self, sticks: Vector6, by_gain: bool) -> Vector6:
+    def _wrench_fractions(self, sticks: Vector6, by_gain: bool) -> Vector6:
         """Return the fractions of the greatest wrench that the sticks command, before the pilot gain.
 
         ArduSub commands its thrusters by gain times stick, and their force is proportional to the square of the sum.
@@ -114,17 +114,19 @@ class Manual(Service):
             mixed = np.clip(self._mixer.wrench(np.where(is_force, scaled, 0.0)) * self._reciprocal, -1.0, 1.0) / scale
             parts[is_force] = mixed[is_force]
         if mode != "manual":  # beyond a dead zone, a rate of turn and angles
-            parts[5] = beyond_dead_zone(scaled[5], gain * YAW_DEAD_ZONE) / scale
-            parts[3:5] = [beyond_dead_zone(part, LEAN_DEAD_ZONE) * LEAN / GREATEST_TILT for part in parts[3:5].tolist()]
+            parts[5] = apply_dead_zone(scaled[5], gain * YAW_DEAD_ZONE) / scale
+            parts[3:5] = [
+                apply_dead_zone(part, LEAN_DEAD_ZONE) * MAX_LEAN / GREATEST_TILT for part in parts[3:5].tolist()
+            ]
         if mode == "depth_hold":  # likewise of the depth
-            parts[2] = beyond_dead_zone(scaled[2], gain * CLIMB_DEAD_ZONE)
+            parts[2] = apply_dead_zone(scaled[2], gain * CLIMB_DEAD_ZONE)
         x, y, z, k, m, n = np.clip(parts, -1.0, 1.0).tolist()
         return x, y, z, k, m, n
 
     def _wrench(self, message: Any) -> Vector6:
         """Return X Y Z K M N from -1 to 1; the vertical stick is positive up, Z is positive down."""
-        center = self.context.profile.centred_stick
-        up = 0.0 if message.z == _INVALID else _part((message.z - center) / (_FULL - center))
+        center = self.context.profile.centered_stick
+        up = 0.0 if message.z == _INVALID else _clip((message.z - center) / (_FULL - center))
         full = self.context.profile.full_tilt_stick
         roll = _axis(message.t, full) if message.enabled_extensions & _ROLL else 0.0
         pitch = _axis(message.s, full) if message.enabled_extensions & _PITCH else 0.0
@@ -132,8 +134,8 @@ class Manual(Service):
 
 
 def _axis(value: int, full: float = _FULL) -> float:
-    return 0.0 if value == _INVALID else _part(value / full)
+    return 0.0 if value == _INVALID else _clip(value / full)
 
 
-def _part(value: float) -> float:
+def _clip(value: float) -> float:
     return max(-1.0, min(1.0, value))

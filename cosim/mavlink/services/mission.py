@@ -6,21 +6,21 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from cosim.mavlink.services.mission_items import ItemError, decode_mission_item, home_item
-from cosim.mavlink.services.parameters import Parameters
-from cosim.mavlink.services.service import Call, Service, place_of, unscaled
+from cosim.mavlink.services.parameter_protocol import ParameterProtocol
+from cosim.mavlink.services.service import CommandRequest, Service, to_local_position, unscale_position
 from cosim.mavlink.services.targets import Targets
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
-from cosim.mavlink.wire.encode import whole
+from cosim.mavlink.wire.encode import round_finite
 from cosim.simulation.commands.commands import ChangeSetting, Command, MissionItem, SetCurrentItem, SetMission, SetMode
 from cosim.simulation.commands.mission_executor import passed_items
 
 _MAX_ITEMS = 500
 _RETRY = 1.0  # s of the wall clock
 _RETRIES = 5
-_OF_REGIONS, _ALL = 0, 255  # MAV_MISSION_TYPE
-_GO_THERE, _CHANGE_DEPTH = 2, 3  # MISSION_ITEM.current of guided items, which are not part of a mission
-_KNOWN_TYPES = (0, 1, 2)
+_MISSION, _ALL = 0, 255  # MAV_MISSION_TYPE
+_GO_TO, _CHANGE_DEPTH = 2, 3  # MISSION_ITEM.current of guided items, which are not part of a mission
+_SUPPORTED_TYPES = (0, 1, 2)
 
 
 @dataclass
@@ -35,36 +35,36 @@ class _Upload:
     retries: int = 0
 
 
-class Missions(Service):
+class MissionProtocol(Service):
     """MISSION_*: one mission of regions; fences and rally points are always empty.
 
     In ArduPilot's profile item 0 is home: it is added to downloads, and ignored in uploads.
 
-    Parameters
+    ParameterProtocol
     ----------
     context : VehicleContext
         The vehicle.
     targets : Targets
         Service that executes guided items at once.
-    parameters : Parameters
+    parameters : ParameterProtocol
         Service that is updated with the settings that a mission changes.
     """
 
-    def __init__(self, context: VehicleContext, targets: Targets, parameters: Parameters) -> None:
+    def __init__(self, context: VehicleContext, targets: Targets, parameters: ParameterProtocol) -> None:
         super().__init__(context)
         m = context.mavlink
         self._targets, self._parameters = targets, parameters
-        self._under_way = -1  # item of the last snapshot
+        self._current_item = -1  # item of the last snapshot
         self._upload: _Upload | None = None
-        self._first = int(context.profile.home_is_first)
+        self._first = int(context.profile.has_home_item)
         self.messages = {
             "MISSION_REQUEST_LIST": self._count,
             "MISSION_REQUEST": self._item,
             "MISSION_REQUEST_INT": self._item,
             "MISSION_COUNT": self._begin_upload,
-            "MISSION_ITEM_INT": self._take_item,
-            "MISSION_ITEM": self._take_item,
-            "MISSION_ACK": self._acknowledged,
+            "MISSION_ITEM_INT": self._receive_item,
+            "MISSION_ITEM": self._receive_item,
+            "MISSION_ACK": self._end_transfer,
             "MISSION_CLEAR_ALL": self._clear,
             "MISSION_SET_CURRENT": self._set_current,
         }
@@ -72,12 +72,12 @@ class Missions(Service):
 
     def restart(self) -> None:
         """Cancel an upload under way."""
-        self._upload, self._under_way = None, -1
+        self._upload, self._current_item = None, -1
 
     def on_snapshot(self) -> None:
         """Update the parameters with settings changed by items passed since the last snapshot."""
-        context, before = self.context, self._under_way
-        now = self._under_way = context.view.item if context.mode == "mission" else -1
+        context, before = self.context, self._current_item
+        now = self._current_item = context.view.item if context.mode == "mission" else -1
         if now == before or not 0 <= now < len(context.mission_items):
             return
         for item in passed_items(context.mission_items, before, now) or [now]:
@@ -92,48 +92,48 @@ class Missions(Service):
         return (home_item(self.context), *plan) if plan and self._first else plan
 
     def _count(self, sender: Sender, message: Any) -> None:
-        kind = message.mission_type
-        if kind not in _KNOWN_TYPES:
-            self._ack(sender, self.context.mavlink.MAV_MISSION_UNSUPPORTED, kind)
+        mission_type = message.mission_type
+        if mission_type not in _SUPPORTED_TYPES:
+            self._ack(sender, self.context.mavlink.MAV_MISSION_UNSUPPORTED, mission_type)
             return
-        count = len(self._all_items()) if kind == _OF_REGIONS else 0
-        sender.link.send(self.context.make("MISSION_COUNT", sender.system, sender.component, count, kind))
+        count = len(self._all_items()) if mission_type == _MISSION else 0
+        sender.link.send(self.context.make("MISSION_COUNT", sender.system, sender.component, count, mission_type))
 
     def _item(self, sender: Sender, message: Any) -> None:
         context, m = self.context, self.context.mavlink
-        seq, kind = message.seq, message.mission_type
-        items = self._all_items() if kind == _OF_REGIONS else ()
+        seq, mission_type = message.seq, message.mission_type
+        items = self._all_items() if mission_type == _MISSION else ()
         if seq >= len(items):
-            self._ack(sender, m.MAV_MISSION_INVALID_SEQUENCE, kind)
+            self._ack(sender, m.MAV_MISSION_INVALID_SEQUENCE, mission_type)
             return
         item = items[seq]
         current = int(context.mode == "mission" and context.view.item + self._first == seq)
         head = sender.system, sender.component, seq, item.frame, item.command, current, item.autocontinue
         numbers = item.param1, item.param2, item.param3, item.param4
         if message.get_type() == "MISSION_REQUEST_INT":
-            reply = context.make("MISSION_ITEM_INT", *head, *numbers, item.x, item.y, item.z, kind)
+            reply = context.make("MISSION_ITEM_INT", *head, *numbers, item.x, item.y, item.z, mission_type)
         else:
             scale = _scale(item.frame, m)
-            reply = context.make("MISSION_ITEM", *head, *numbers, item.x / scale, item.y / scale, item.z, kind)
+            reply = context.make("MISSION_ITEM", *head, *numbers, item.x / scale, item.y / scale, item.z, mission_type)
         sender.link.send(reply)
 
-    def _ack(self, sender: Sender, result: int, kind: int) -> None:
-        sender.link.send(self.context.make("MISSION_ACK", sender.system, sender.component, result, kind))
+    def _ack(self, sender: Sender, result: int, mission_type: int) -> None:
+        sender.link.send(self.context.make("MISSION_ACK", sender.system, sender.component, result, mission_type))
 
     # ---- upload ----
 
     def _begin_upload(self, sender: Sender, message: Any) -> None:
-        context, m, kind = self.context, self.context.mavlink, message.mission_type
-        under_way = self._upload
+        context, m, mission_type = self.context, self.context.mavlink, message.mission_type
+        upload = self._upload
         if not context.accepts_commands:
             context.submit()
-            self._ack(sender, m.MAV_MISSION_DENIED, kind)
-        elif kind != _OF_REGIONS:
-            self._ack(sender, m.MAV_MISSION_UNSUPPORTED if message.count else m.MAV_MISSION_ACCEPTED, kind)
-        elif under_way is not None and under_way.sender != sender:
-            self._ack(sender, m.MAV_MISSION_DENIED, kind)
+            self._ack(sender, m.MAV_MISSION_DENIED, mission_type)
+        elif mission_type != _MISSION:
+            self._ack(sender, m.MAV_MISSION_UNSUPPORTED if message.count else m.MAV_MISSION_ACCEPTED, mission_type)
+        elif upload is not None and upload.sender != sender:
+            self._ack(sender, m.MAV_MISSION_DENIED, mission_type)
         elif message.count > _MAX_ITEMS:
-            self._ack(sender, m.MAV_MISSION_NO_SPACE, kind)
+            self._ack(sender, m.MAV_MISSION_NO_SPACE, mission_type)
         else:
             self._upload = _Upload(sender, message.count, context.now)
             self._request_next(self._upload)
@@ -144,25 +144,27 @@ class Missions(Service):
         upload.requested = context.now
         if len(upload.items) < upload.count:
             to = sender.system, sender.component
-            sender.link.send(context.make("MISSION_REQUEST_INT", *to, len(upload.items), _OF_REGIONS))
+            sender.link.send(context.make("MISSION_REQUEST_INT", *to, len(upload.items), _MISSION))
             return
         self._upload = None
-        self._ack(sender, self._submit_mission(sender, upload.items[self._first :], upload.decoded), _OF_REGIONS)
+        self._ack(sender, self._submit_mission(sender, upload.items[self._first :], upload.decoded), _MISSION)
 
-    def _take_item(self, sender: Sender, message: Any) -> None:
-        m, upload, kind = self.context.mavlink, self._upload, message.mission_type
-        if message.current in (_GO_THERE, _CHANGE_DEPTH) and kind == _OF_REGIONS:
-            self._ack(sender, self._execute_guided(sender, message), kind)
+    def _receive_item(self, sender: Sender, message: Any) -> None:
+        m, upload, mission_type = self.context.mavlink, self._upload, message.mission_type
+        if message.current in (_GO_TO, _CHANGE_DEPTH) and mission_type == _MISSION:
+            self._ack(sender, self._execute_guided(sender, message), mission_type)
             return
-        if upload is None or upload.sender != sender or kind != _OF_REGIONS:
-            self._ack(sender, m.MAV_MISSION_DENIED if not self.context.accepts_commands else m.MAV_MISSION_ERROR, kind)
+        if upload is None or upload.sender != sender or mission_type != _MISSION:
+            self._ack(
+                sender, m.MAV_MISSION_DENIED if not self.context.accepts_commands else m.MAV_MISSION_ERROR, mission_type
+            )
             return
         if message.seq != len(upload.items):  # a repeated item, or one out of order
             return
         result = self._add(upload, message)
         if result != m.MAV_MISSION_ACCEPTED:  # at once: stations relate the ack to the last item sent
             self._upload = None
-            self._ack(sender, result, kind)
+            self._ack(sender, result, mission_type)
             return
         upload.retries = 0
         self._request_next(upload)
@@ -188,13 +190,13 @@ class Missions(Service):
         if message.command != m.MAV_CMD_NAV_WAYPOINT:
             return int(m.MAV_MISSION_UNSUPPORTED)
         item = _received_item(message, m)
-        x, y = (0.0, 0.0) if item is None else unscaled(item.frame, item.x, item.y)
-        place = None if item is None else place_of(context, item.frame, x, y, item.z)
-        if place is None:
+        x, y = (0.0, 0.0) if item is None else unscale_position(item.frame, item.x, item.y)
+        position = None if item is None else to_local_position(context, item.frame, x, y, item.z)
+        if position is None:
             return int(m.MAV_MISSION_INVALID if item is None else m.MAV_MISSION_UNSUPPORTED_FRAME)
         if message.current == _CHANGE_DEPTH:
-            place = *context.view.target[:2], place[2]
-        accepted = self._targets.go(sender, place) == m.MAV_RESULT_ACCEPTED
+            position = *context.view.target[:2], position[2]
+        accepted = self._targets.go(sender, position) == m.MAV_RESULT_ACCEPTED
         return int(m.MAV_MISSION_ACCEPTED if accepted else m.MAV_MISSION_DENIED)
 
     def _submit_mission(self, sender: Sender, items: list[ReceivedMissionItem], decoded: list[MissionItem]) -> int:
@@ -210,7 +212,7 @@ class Missions(Service):
             return int(m.MAV_MISSION_ACCEPTED)
         return int(m.MAV_MISSION_DENIED if result == m.MAV_RESULT_DENIED else m.MAV_MISSION_ERROR)
 
-    def _acknowledged(self, sender: Sender, message: Any) -> None:
+    def _end_transfer(self, sender: Sender, message: Any) -> None:
         """MISSION_ACK: the end of a download, or of an upload that its sender cancels."""
         if self._upload is not None and self._upload.sender == sender:
             self._upload = None
@@ -225,20 +227,20 @@ class Missions(Service):
             self._request_next(upload)
         else:
             self._upload = None
-            self._ack(upload.sender, context.mavlink.MAV_MISSION_OPERATION_CANCELLED, _OF_REGIONS)
+            self._ack(upload.sender, context.mavlink.MAV_MISSION_OPERATION_CANCELLED, _MISSION)
 
     def _clear(self, sender: Sender, message: Any) -> None:
-        m, kind = self.context.mavlink, message.mission_type
-        if kind not in (*_KNOWN_TYPES, _ALL):
-            self._ack(sender, m.MAV_MISSION_UNSUPPORTED, kind)
+        m, mission_type = self.context.mavlink, message.mission_type
+        if mission_type not in (*_SUPPORTED_TYPES, _ALL):
+            self._ack(sender, m.MAV_MISSION_UNSUPPORTED, mission_type)
         elif not self.context.accepts_commands:
             self.context.submit()
-            self._ack(sender, m.MAV_MISSION_DENIED, kind)
-        elif kind in (_OF_REGIONS, _ALL):
+            self._ack(sender, m.MAV_MISSION_DENIED, mission_type)
+        elif mission_type in (_MISSION, _ALL):
             self._upload = None
-            self._ack(sender, self._submit_mission(sender, [], []), kind)
+            self._ack(sender, self._submit_mission(sender, [], []), mission_type)
         else:
-            self._ack(sender, m.MAV_MISSION_ACCEPTED, kind)
+            self._ack(sender, m.MAV_MISSION_ACCEPTED, mission_type)
 
     # ---- current item ----
 
@@ -258,16 +260,16 @@ class Missions(Service):
     def _set_current(self, sender: Sender, message: Any) -> None:
         self._begin(sender, message.seq)
 
-    def _command_current(self, call: Call) -> int:
-        seq = call.whole(1)
-        return self._begin(call.sender, seq if seq is None or seq >= 0 else self.context.view.item + self._first)
+    def _command_current(self, request: CommandRequest) -> int:
+        seq = request.int_param(1)
+        return self._begin(request.sender, seq if seq is None or seq >= 0 else self.context.view.item + self._first)
 
-    def _start(self, call: Call) -> int:
-        return self._begin(call.sender, max(call.whole(1) or 0, 0), SetMode("mission"))
+    def _start(self, request: CommandRequest) -> int:
+        return self._begin(request.sender, max(request.int_param(1) or 0, 0), SetMode("mission"))
 
 
 def _scale(frame: int, mavlink: Any) -> float:
-    """Return the integer scale of an item's position in a frame: 1e7 per degree, 1e4 per metre, or 1."""
+    """Return the integer scale of an item's position in a frame: 1e7 per degree, 1e4 per meter, or 1."""
     return {mavlink.MAV_FRAME_LOCAL_NED: 1e4, mavlink.MAV_FRAME_MISSION: 1.0}.get(frame, 1e7)
 
 
@@ -275,7 +277,7 @@ def _received_item(message: Any, mavlink: Any) -> ReceivedMissionItem | None:
     """Return a received item, or None if its position is not finite or exceeds the integer fields."""
     x, y = message.x, message.y
     if message.get_type() == "MISSION_ITEM":
-        x, y = (whole(v * _scale(message.frame, mavlink)) for v in (x, y))
+        x, y = (round_finite(v * _scale(message.frame, mavlink)) for v in (x, y))
         if x is None or y is None or max(abs(x), abs(y)) > 0x7FFFFFFF:
             return None
     numbers = message.param1, message.param2, message.param3, message.param4

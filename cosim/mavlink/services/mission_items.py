@@ -6,17 +6,17 @@ import math
 from collections.abc import Sequence
 
 from cosim.errors import CommandError
-from cosim.mavlink.services.parameters import shortest
-from cosim.mavlink.services.service import place_of, unscaled
+from cosim.mavlink.services.parameter_protocol import shorten_float32
+from cosim.mavlink.services.service import to_local_position, unscale_position
 from cosim.mavlink.services.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import whole
+from cosim.mavlink.wire.encode import round_finite
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import ChangeSetting, MissionItem, SetHeading
 
-_LONGEST_STAY = 1e9  # s
-_LARGEST = 1e5  # m
+_MAX_STAY = 1e9  # s
+_MAX_POSITION = 1e5  # m
 
 
 class ItemError(Exception):
@@ -67,15 +67,15 @@ def decode_mission_item(
     radius, surface = settings["commands.hold_radius"], settings["commands.surface_depth"]
     match item.command:
         case m.MAV_CMD_NAV_WAYPOINT:
-            return MissionItem(_place(context, item), _acceptance(context, item), _stay(context, item))
+            return MissionItem(_position(context, item), _acceptance(context, item), _stay(context, item))
         case m.MAV_CMD_NAV_SPLINE_WAYPOINT | m.MAV_CMD_NAV_LOITER_TIME:
-            return MissionItem(_place(context, item), None, _stay(context, item))
+            return MissionItem(_position(context, item), None, _stay(context, item))
         case m.MAV_CMD_NAV_LOITER_UNLIM:
-            return MissionItem(_place(context, item), None, None)
+            return MissionItem(_position(context, item), None, None)
         case m.MAV_CMD_NAV_LAND:
-            above = (other.position for other in reversed(before) if other.position is not None)
+            positions = (other.position for other in reversed(before) if other.position is not None)
             here = item.x == item.y == 0
-            north, east, _ = next(above, context.view.position_ned) if here else _place(context, item)
+            north, east, _ = next(positions, context.view.position_ned) if here else _position(context, item)
             return MissionItem((north, east, surface), radius, None)
         case m.MAV_CMD_NAV_RETURN_TO_LAUNCH:
             north, east, _ = context.home_ned()
@@ -99,7 +99,7 @@ def _change_speed(context: VehicleContext, item: ReceivedMissionItem) -> Mission
     if math.isnan(before) and item.param2 != -1.0:
         raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"law {context.scenario.law.name} has no speed")
     try:
-        speed = resolve_speed(context, shortest(item.param2))
+        speed = resolve_speed(context, shorten_float32(item.param2))
         if speed is None:
             return MissionItem(None)
         context.settings.change(SPEED, speed)
@@ -121,8 +121,8 @@ def _change_heading(context: VehicleContext, item: ReceivedMissionItem) -> Missi
 
 
 def _jump(context: VehicleContext, item: ReceivedMissionItem, count: int) -> MissionItem:
-    m, first = context.mavlink, int(context.profile.home_is_first)
-    to, times = whole(item.param1), whole(item.param2)
+    m, first = context.mavlink, int(context.profile.has_home_item)
+    to, times = round_finite(item.param1), round_finite(item.param2)
     if to is None or not 0 <= to - first < count:
         raise ItemError(
             m.MAV_MISSION_INVALID_PARAM1, f"a jump to item {item.param1:g} of {first} to {count - 1 + first}"
@@ -132,23 +132,23 @@ def _jump(context: VehicleContext, item: ReceivedMissionItem, count: int) -> Mis
     return MissionItem(None, jump=to - first, times=None if times < 0 else times)
 
 
-def _place(context: VehicleContext, item: ReceivedMissionItem) -> Vector3:
+def _position(context: VehicleContext, item: ReceivedMissionItem) -> Vector3:
     m = context.mavlink
-    x, y = unscaled(item.frame, item.x, item.y)
-    place = place_of(context, item.frame, x, y, item.z)
-    if place is None:
+    x, y = unscale_position(item.frame, item.x, item.y)
+    position = to_local_position(context, item.frame, x, y, item.z)
+    if position is None:
         raise ItemError(m.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame}; it may be 0, 1, 3, 5 or 6")
     results = m.MAV_MISSION_INVALID_PARAM5_X, m.MAV_MISSION_INVALID_PARAM6_Y, m.MAV_MISSION_INVALID_PARAM7
-    for value, result in zip(place, results, strict=True):
-        if not abs(value) <= _LARGEST:
-            raise ItemError(result, f"it is {value:.4g} m from the origin, at most {_LARGEST:g} m can be")
-    return place
+    for value, result in zip(position, results, strict=True):
+        if not abs(value) <= _MAX_POSITION:
+            raise ItemError(result, f"it is {value:.4g} m from the origin, expected at most {_MAX_POSITION:g} m")
+    return position
 
 
 def _stay(context: VehicleContext, item: ReceivedMissionItem) -> float:
     if math.isnan(item.param1):
         return 0.0
-    if not 0.0 <= item.param1 <= _LONGEST_STAY:
+    if not 0.0 <= item.param1 <= _MAX_STAY:
         raise ItemError(context.mavlink.MAV_MISSION_INVALID_PARAM1, f"a stay of {item.param1:g} s")
     return item.param1
 
@@ -156,7 +156,7 @@ def _stay(context: VehicleContext, item: ReceivedMissionItem) -> float:
 def _acceptance(context: VehicleContext, item: ReceivedMissionItem) -> float | None:
     if math.isnan(item.param2) or item.param2 == 0.0:
         return None
-    if not 0.0 < item.param2 <= _LARGEST:
+    if not 0.0 < item.param2 <= _MAX_POSITION:
         raise ItemError(context.mavlink.MAV_MISSION_INVALID_PARAM2, f"an acceptance radius of {item.param2:g} m")
     return item.param2
 

@@ -6,13 +6,13 @@ import math
 from typing import Any
 
 from cosim.mavlink.messages import pose
-from cosim.mavlink.services.service import Call, Service, place_of
+from cosim.mavlink.services.service import CommandRequest, Service, to_local_position
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 
 _E7 = 1e-7
 _MM = 1e-3
-_FARTHEST_HOME = 1e5  # m
+_MAX_HOME_DISTANCE = 1e5  # m
 
 
 class Origin(Service):
@@ -37,21 +37,25 @@ class Origin(Service):
         for reply in (*pose.gps_global_origin(context), *pose.home_position(context)):
             context.send(reply)
 
-    def _get_home(self, call: Call) -> int:
+    def _get_home(self, request: CommandRequest) -> int:
         for message in pose.home_position(self.context):
-            call.sender.link.send(message)
+            request.sender.link.send(message)
         return int(self.context.mavlink.MAV_RESULT_ACCEPTED)
 
-    def _set_home(self, call: Call) -> int:
+    def _set_home(self, request: CommandRequest) -> int:
         """DO_SET_HOME: move home to another position at the surface."""
         m, context = self.context.mavlink, self.context
         if not context.accepts_commands:
             return context.submit()
-        place = context.view.position_ned if call[1] == 1.0 else place_of(context, call.frame, call[5], call[6], 0.0)
-        if place is None or not math.hypot(place[0], place[1]) <= _FARTHEST_HOME:
+        position = (
+            context.view.position_ned
+            if request[1] == 1.0
+            else to_local_position(context, request.frame, request[5], request[6], 0.0)
+        )
+        if position is None or not math.hypot(position[0], position[1]) <= _MAX_HOME_DISTANCE:
             return int(m.MAV_RESULT_DENIED)
-        context.home = place[0], place[1]
-        context.active_gcs.record_command(call.sender.system)
+        context.home = position[0], position[1]
+        context.active_gcs.record_command(request.sender.system)
         for message in pose.home_position(context):
             context.send(message)
         return int(m.MAV_RESULT_ACCEPTED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
-LONGEST = 16  # characters
+MAX_LENGTH = 16  # characters
 
 _PREFIXES = (
     ("law.gains.", "LAW."),
@@ -56,43 +56,43 @@ def parameter_names(keys: Iterable[str]) -> dict[str, str]:
     dict of str to str
         Names by key. The same keys in the same order give the same names.
     """
-    known = list(keys)
+    all_keys = list(keys)
     names: dict[str, str] = {}
-    taken: set[str] = set()
-    for key in known:
-        name = _fitted(_words(key, known))
+    used: set[str] = set()
+    for key in all_keys:
+        name = _shorten(_split_words(key, all_keys))
         number = 2
-        while name in taken:
+        while name in used:
             tail = f"_{number}"
-            name = _fitted(_words(key, known), LONGEST - len(tail)) + tail
+            name = _shorten(_split_words(key, all_keys), MAX_LENGTH - len(tail)) + tail
             number += 1
-        taken.add(name)
+        used.add(name)
         names[key] = name
     return names
 
 
-def _words(key: str, known: list[str]) -> list[str]:
+def _split_words(key: str, all_keys: list[str]) -> list[str]:
     text = re.sub(r"\.shape\.", ".", key) if key.startswith("regions.") else key
     for prefix, short in _PREFIXES:
         if text.startswith(prefix):
             text = short + text.removeprefix(prefix)
             break
     stem, _, last = key.rpartition(".")
-    if last in _AXES and f"{stem}.2" in known and f"{stem}.3" not in known:  # component of a vector in space
+    if last in _AXES and f"{stem}.2" in all_keys and f"{stem}.3" not in all_keys:  # component of a vector in space
         text = text.rpartition(".")[0] + "." + _AXES[last]
     return [word for word in re.split(r"[^A-Z0-9]+", text.upper()) if word] or ["P"]
 
 
-def _fitted(words: list[str], longest: int = LONGEST) -> str:
+def _shorten(words: list[str], max_length: int = MAX_LENGTH) -> str:
     parts = list(words)
-    while len("_".join(parts)) > longest:
-        at = max(range(len(parts)), key=lambda i: (not parts[i].isdecimal(), len(parts[i])))
-        word = parts[at]
+    while len("_".join(parts)) > max_length:
+        index = max(range(len(parts)), key=lambda i: (not parts[i].isdecimal(), len(parts[i])))
+        word = parts[index]
         bare = _SHORT.get(word) or word[0] + re.sub("[AEIOU]", "", word[1:])
         if bare != word:
-            parts[at] = bare
+            parts[index] = bare
         elif len(word) > 1 and not word.isdecimal():
-            parts[at] = word[:-1]
+            parts[index] = word[:-1]
         else:  # too many words
-            return "_".join(parts)[:longest]
+            return "_".join(parts)[:max_length]
     return "_".join(parts)

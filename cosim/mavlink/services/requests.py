@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from cosim.mavlink.messages import MESSAGES, status
+from cosim.mavlink.messages import status
+from cosim.mavlink.messages.message_table import message_specs
 from cosim.mavlink.messages.streams import Streams
-from cosim.mavlink.services.service import Call, Service
+from cosim.mavlink.services.service import CommandRequest, Service
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.mavlink.wire.message_sink import MessageSink
 
 _SECOND = 1_000_000
 _ALL = 0
-_GREATEST_RATE = 100  # Hz
+_MAX_RATE = 100  # Hz
 _NANO = 1000  # ns in a µs
 
 
@@ -41,58 +42,60 @@ class Requests(Service):
             m.MAV_CMD_DO_SEND_BANNER: self._banner,
         }
 
-    def _set_interval(self, call: Call) -> int:
+    def _set_interval(self, request: CommandRequest) -> int:
         m, context = self.context.mavlink, self.context
-        message_id, interval = call.whole(1), call.whole(2)
+        message_id, interval = request.int_param(1), request.int_param(2)
         if message_id is None or interval is None:
             return int(m.MAV_RESULT_DENIED)
-        if message_id not in MESSAGES:
+        if message_id not in message_specs():
             return int(m.MAV_RESULT_FAILED)
-        if not self._streams[call.sender.link].set([(message_id, interval)]):
+        if not self._streams[request.sender.link].set_intervals([(message_id, interval)]):
             context.reject("the link would carry too much", "load")
             return int(m.MAV_RESULT_DENIED)
         return int(m.MAV_RESULT_ACCEPTED)
 
-    def _get_interval(self, call: Call) -> int:
-        m, context, link = self.context.mavlink, self.context, call.sender.link
-        message_id = call.whole(1)
+    def _get_interval(self, request: CommandRequest) -> int:
+        m, context, link = self.context.mavlink, self.context, request.sender.link
+        message_id = request.int_param(1)
         interval = 0 if message_id is None else self._streams[link].interval(message_id)
         link.send(context.make("MESSAGE_INTERVAL", message_id or 0, interval))
         return int(m.MAV_RESULT_ACCEPTED if interval else m.MAV_RESULT_FAILED)
 
-    def _message(self, call: Call) -> int:
+    def _message(self, request: CommandRequest) -> int:
         """REQUEST_MESSAGE: any message of the table; parameter 2 is a mode's index. Others fail, as in ArduPilot."""
-        m, context, link = self.context.mavlink, self.context, call.sender.link
-        message_id = call.whole(1)
-        spec = None if message_id is None else MESSAGES.get(message_id)
+        m, context, link = self.context.mavlink, self.context, request.sender.link
+        message_id = request.int_param(1)
+        spec = None if message_id is None else message_specs().get(message_id)
         if spec is None and message_id != m.MAVLINK_MSG_ID_MESSAGE_INTERVAL:
             return int(m.MAV_RESULT_FAILED)
-        which = call.whole(2) or 0
+        index = request.int_param(2) or 0
         if spec is None:
-            link.send(context.make("MESSAGE_INTERVAL", which, self._streams[link].interval(which)))
+            link.send(context.make("MESSAGE_INTERVAL", index, self._streams[link].interval(index)))
             return int(m.MAV_RESULT_ACCEPTED)
-        several = spec.build is status.available_modes
-        messages = status.available_modes(context, which) if several else spec.build(context)
+        is_modes = spec.name == "AVAILABLE_MODES"
+        messages = status.available_modes(context, index) if is_modes else spec.build(context)
         for message in messages:
             link.send(message)
         return int(m.MAV_RESULT_ACCEPTED if messages else m.MAV_RESULT_FAILED)
 
-    def _version(self, call: Call) -> int:
+    def _version(self, request: CommandRequest) -> int:
         for message in status.autopilot_version(self.context):
-            call.sender.link.send(message)
+            request.sender.link.send(message)
         return int(self.context.mavlink.MAV_RESULT_ACCEPTED)
 
-    def _banner(self, call: Call) -> int:
+    def _banner(self, request: CommandRequest) -> int:
         for line in banner(self.context):
-            for message in self.context.text(line):
-                call.sender.link.send(message)
+            for message in self.context.make_text(line):
+                request.sender.link.send(message)
         return int(self.context.mavlink.MAV_RESULT_ACCEPTED)
 
     def _group(self, sender: Sender, message: Any) -> None:
-        group, rate = message.req_stream_id, min(message.req_message_rate, _GREATEST_RATE)
+        group, rate = message.req_stream_id, min(message.req_message_rate, _MAX_RATE)
         interval = _SECOND // rate if message.start_stop and rate else -1
-        changes = [(spec.id, interval) for spec in MESSAGES.values() if spec.group and group in (_ALL, spec.group)]
-        if not self._streams[sender.link].set(changes):
+        changes = [
+            (spec.id, interval) for spec in message_specs().values() if spec.group and group in (_ALL, spec.group)
+        ]
+        if not self._streams[sender.link].set_intervals(changes):
             self.context.reject("the link would carry too much", "load")
 
 

@@ -8,44 +8,44 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
-from cosim.mavlink.wire.encode import whole
+from cosim.mavlink.wire.encode import round_finite
 from cosim.scenario.tables import Vector3
 
 Handler = Callable[[Sender, Any], None]
 
 _E7, _E4 = 1e-7, 1e-4
-_GLOBAL = (0, 5)  # MAV_FRAME_GLOBAL, GLOBAL_INT
-_RELATIVE = (3, 6)  # MAV_FRAME_GLOBAL_RELATIVE_ALT, and its INT
+_GLOBAL_FRAMES = (0, 5)  # MAV_FRAME_GLOBAL, GLOBAL_INT
+_RELATIVE_FRAMES = (3, 6)  # MAV_FRAME_GLOBAL_RELATIVE_ALT, and its INT
 _LOCAL_NED = 1
 
 
 @dataclass(frozen=True)
-class Call:
+class CommandRequest:
     """A command of a COMMAND_LONG or COMMAND_INT.
 
     Attributes
     ----------
-    numbers : tuple of float
+    params : tuple of float
         Parameters 1 to 7; clients fill unused ones with NaN or 0.
     frame : int
         MAV_FRAME of parameters 5 to 7; global for COMMAND_LONG.
     """
 
     sender: Sender
-    number: int
-    numbers: tuple[float, ...]
+    command: int
+    params: tuple[float, ...]
     frame: int
 
     def __getitem__(self, i: int) -> float:
         """Return parameter `i`, from 1."""
-        return self.numbers[i - 1]
+        return self.params[i - 1]
 
-    def whole(self, i: int) -> int | None:
+    def int_param(self, i: int) -> int | None:
         """Return parameter `i`, from 1, as an integer, or None if it is not finite."""
-        return whole(self.numbers[i - 1])
+        return round_finite(self.params[i - 1])
 
 
-Command = Callable[[Call], int]  # returns MAV_RESULT
+CommandHandler = Callable[[CommandRequest], int]  # returns MAV_RESULT
 
 
 class Service:
@@ -65,7 +65,7 @@ class Service:
     """
 
     messages: Mapping[str, Handler]
-    commands: Mapping[int, Command]
+    commands: Mapping[int, CommandHandler]
 
     def __init__(self, context: VehicleContext) -> None:
         self.context = context
@@ -75,14 +75,14 @@ class Service:
     def tick(self) -> None:
         """Run periodic work at wall clock `context.now`."""
 
-    def may_steer(self, sender: Sender) -> bool:
+    def accept_control(self, sender: Sender) -> bool:
         """Return True if the vehicle accepts set-points and sticks of a sender; report a refusal."""
         context = self.context
         if not context.accepts_commands:
             context.submit()
             return False
-        if not context.active_gcs.may_steer(sender.system, context.now):
-            context.reject("another station has the vehicle in hand", "active gcs")
+        if not context.active_gcs.request_control(sender.system, context.now):
+            context.reject("another station controls the vehicle", "active gcs")
             return False
         return True
 
@@ -93,7 +93,7 @@ class Service:
         """Reset the state that belongs to a run."""
 
 
-def place_of(context: VehicleContext, frame: int, x: float, y: float, z: float) -> Vector3 | None:
+def to_local_position(context: VehicleContext, frame: int, x: float, y: float, z: float) -> Vector3 | None:
     """Convert a received position to the local frame [m, NED]; NaN where it is not finite.
 
     Parameters
@@ -112,9 +112,9 @@ def place_of(context: VehicleContext, frame: int, x: float, y: float, z: float) 
     """
     if frame == _LOCAL_NED:
         position = x, y, z
-    elif frame in _GLOBAL:
+    elif frame in _GLOBAL_FRAMES:
         position = context.frame.to_local(x, y, z)
-    elif frame in _RELATIVE:
+    elif frame in _RELATIVE_FRAMES:
         north, east, _ = context.frame.to_local(x, y, 0.0)
         position = north, east, -z  # home is at the surface
     else:
@@ -123,7 +123,7 @@ def place_of(context: VehicleContext, frame: int, x: float, y: float, z: float) 
     return north, east, down
 
 
-def unscaled(frame: int, x: int, y: int) -> tuple[float, float]:
-    """Convert the integers of a position to degrees, or to metres in a local frame."""
+def unscale_position(frame: int, x: int, y: int) -> tuple[float, float]:
+    """Convert the integers of a position to degrees, or to meters in a local frame."""
     scale = _E4 if frame == _LOCAL_NED else _E7
     return x * scale, y * scale

@@ -7,11 +7,11 @@ from collections.abc import Callable
 from typing import Any
 
 from cosim.errors import CommandError
-from cosim.mavlink.services.parameters import Parameters, shortest
-from cosim.mavlink.services.service import Call, Service, place_of, unscaled
+from cosim.mavlink.services.parameter_protocol import ParameterProtocol, shorten_float32
+from cosim.mavlink.services.service import CommandRequest, Service, to_local_position, unscale_position
 from cosim.mavlink.services.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.keep_in_regions import KeepInRegions
-from cosim.mavlink.vehicle.profile import MODE_NAMES
+from cosim.mavlink.vehicle.profile import MODE_TABLE
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import Command, SetHeading, SetMode, SetTarget
@@ -19,12 +19,12 @@ from cosim.simulation.commands.commands import Command, SetHeading, SetMode, Set
 _X_Y, _Z = 0b011, 0b100  # type_mask: bits of ignored fields
 _VELOCITY, _ACCELERATION, _FORCE, _YAW, _YAW_RATE = 0b111000, 0b111 << 6, 1 << 9, 1 << 10, 1 << 11
 _LOCAL, _OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD = 1, 7, 8, 9, 12
-_FROM_HERE = (_OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD)
-_TURNED = (_BODY, _BODY_OFFSET, _BODY_FRD)
+_RELATIVE_FRAMES = (_OFFSET, _BODY, _BODY_OFFSET, _BODY_FRD)
+_BODY_FRAMES = (_BODY, _BODY_OFFSET, _BODY_FRD)
 _REPEAT_TIMEOUT = 1.0  # s without set-points, after which an equal relative set-point is a new one
 _EARLY = 1.0  # s, for which a set-point received before its mode is kept
-_PATIENCE = 3.0  # s of set-points in another mode, after which a status text is sent
-_VELOCITY_LASTS = 3.0  # s without another set-point, after which a velocity ends, as in ArduSub
+_REPORT_DELAY = 3.0  # s of set-points in another mode, after which a status text is sent
+_VELOCITY_TIMEOUT = 3.0  # s without another set-point, after which a velocity ends, as in ArduSub
 _SAME_SPEED = 0.01  # m/s
 _WARNING_PERIOD = 2.0  # s
 
@@ -37,21 +37,21 @@ class Targets(Service):
     1 s of silence: QGroundControl's change of depth, made twice. A velocity without a position moves a sphere about
     the vehicle; it ends after 3 s without a set-point.
 
-    Parameters
+    ParameterProtocol
     ----------
     context : VehicleContext
         The vehicle.
-    parameters : Parameters
+    parameters : ParameterProtocol
         Service that sets the speed.
     """
 
-    def __init__(self, context: VehicleContext, parameters: Parameters) -> None:
+    def __init__(self, context: VehicleContext, parameters: ParameterProtocol) -> None:
         super().__init__(context)
         self._parameters, self._keep_in = parameters, KeepInRegions(context.scenario)
         m = context.mavlink
         self._last: tuple[object, ...] = ()
         self._last_at = -math.inf
-        self._drifting: Vector3 | None = None  # velocity [m/s, NED] of a set-point without a position
+        self._drift_velocity: Vector3 | None = None  # velocity [m/s, NED] of a set-point without a position
         self._early: tuple[float, float, Callable[[], None]] | None = None  # times of first and last, action
         self.messages = {
             "SET_POSITION_TARGET_LOCAL_NED": self._local,
@@ -67,7 +67,7 @@ class Targets(Service):
         """Clear the last set-point in another mode; apply one that was received before its mode."""
         context, early = self.context, self._early
         if context.mode_ahead != "reach":
-            self._last, self._drifting = (), None
+            self._last, self._drift_velocity = (), None
         elif early is not None:
             self._early = None
             if context.now - early[1] < _EARLY:
@@ -76,43 +76,43 @@ class Targets(Service):
     def tick(self) -> None:
         """End a velocity after 3 s without set-points; report set-points that wait for their mode."""
         context, early = self.context, self._early
-        if self._drifting is not None and context.now - self._last_at >= _VELOCITY_LASTS:
-            moving, self._drifting, self._last = any(self._drifting), None, ()
+        if self._drift_velocity is not None and context.now - self._last_at >= _VELOCITY_TIMEOUT:
+            moving, self._drift_velocity, self._last = any(self._drift_velocity), None, ()
             if moving and context.mode_ahead == "reach":
                 context.submit(SetTarget(context.view.position_ned, context.settings["commands.hold_radius"]))
-                context.say(
-                    f"No velocity for {_VELOCITY_LASTS:g} s: the vehicle stays", context.mavlink.MAV_SEVERITY_WARNING
+                context.send_text(
+                    f"No velocity for {_VELOCITY_TIMEOUT:g} s: the vehicle stays", context.mavlink.MAV_SEVERITY_WARNING
                 )
-        if early is not None and context.now - early[0] >= _PATIENCE:
+        if early is not None and context.now - early[0] >= _REPORT_DELAY:
             self._early = None
-            now, then = (MODE_NAMES[mode].lower() for mode in (context.mode_ahead, "reach"))
-            text = f"Set-points wait: the mode is {now}, they count in {then}"
-            context.say(text, context.mavlink.MAV_SEVERITY_NOTICE, "early", 10.0)
+            now, then = (MODE_TABLE[mode].name.lower() for mode in (context.mode_ahead, "reach"))
+            text = f"Set-points wait: the mode is {now}, they apply in {then}"
+            context.send_text(text, context.mavlink.MAV_SEVERITY_NOTICE, "early", 10.0)
 
     def restart(self) -> None:
         """Clear the last set-point."""
-        self._last, self._drifting, self._early = (), None, None
+        self._last, self._drift_velocity, self._early = (), None, None
 
     # ---- set-points ----
 
     def _local(self, sender: Sender, message: Any) -> None:
         frame = message.coordinate_frame
-        if frame not in (_LOCAL, *_FROM_HERE):
-            self.context.reject(f"set-point in frame {frame}; it may be 1, 7, 8, 9 or 12", "frame")
+        if frame not in (_LOCAL, *_RELATIVE_FRAMES):
+            self.context.reject(f"set-point in frame {frame}; expected 1, 7, 8, 9 or 12", "frame")
             return
         raw = message.x, message.y, message.z
         self._set_point(sender, message, frame, self._from_local(frame, raw), raw)
 
     def _global(self, sender: Sender, message: Any) -> None:
         frame = message.coordinate_frame
-        place = None
+        position = None
         if frame != _LOCAL:
-            latitude, longitude = unscaled(frame, message.lat_int, message.lon_int)
-            place = place_of(self.context, frame, latitude, longitude, message.alt)
-        if place is None:
-            self.context.reject(f"set-point in frame {frame}; it may be 0, 3, 5 or 6", "frame")
+            latitude, longitude = unscale_position(frame, message.lat_int, message.lon_int)
+            position = to_local_position(self.context, frame, latitude, longitude, message.alt)
+        if position is None:
+            self.context.reject(f"set-point in frame {frame}; expected 0, 3, 5 or 6", "frame")
             return
-        self._set_point(sender, message, frame, place, (message.lat_int, message.lon_int, message.alt))
+        self._set_point(sender, message, frame, position, (message.lat_int, message.lon_int, message.alt))
 
     def _from_local(self, frame: int, raw: Vector3) -> Vector3:
         """Return a position [m, NED]; body frames are level, rotated only by yaw, as in ArduPilot."""
@@ -123,7 +123,7 @@ class Targets(Service):
         return x + north, y + east, z + down
 
     def _rotate_by_heading(self, frame: int, vector: Vector3) -> Vector3:
-        if frame not in (_BODY, _BODY_OFFSET, _BODY_FRD):
+        if frame not in _BODY_FRAMES:
             return vector
         yaw = self.context.view.heading
         if math.isnan(yaw):
@@ -132,83 +132,87 @@ class Targets(Service):
         sine, cosine = math.sin(yaw), math.cos(yaw)
         return ahead * cosine - right * sine, ahead * sine + right * cosine, down
 
-    def _set_point(self, sender: Sender, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
+    def _set_point(self, sender: Sender, message: Any, frame: int, position: Vector3, raw: Vector3) -> None:
         context, mask = self.context, message.type_mask
-        if not self.may_steer(sender):
+        if not self.accept_control(sender):
             return
-        fault = _fault(message)
-        if fault:
-            context.reject(f"set-point with mask {mask}: {fault}", "mask")
+        reason = _unsupported_reason(message)
+        if reason:
+            context.reject(f"set-point with mask {mask}: {reason}", "mask")
             return
         if context.mode_ahead != "reach":
             first, last, _ = self._early or (context.now, context.now, None)
             first = first if context.now - last < _EARLY else context.now
-            self._early = first, context.now, lambda: self._apply(message, frame, place, raw)
+            self._early = first, context.now, lambda: self._apply(message, frame, position, raw)
             return
-        self._apply(message, frame, place, raw)
+        self._apply(message, frame, position, raw)
 
-    def _apply(self, message: Any, frame: int, place: Vector3, raw: Vector3) -> None:
+    def _apply(self, message: Any, frame: int, position: Vector3, raw: Vector3) -> None:
         """Apply a set-point, unless it equals the last one."""
         context, mask = self.context, message.type_mask
-        going = (0.0, 0.0, 0.0) if mask & _VELOCITY else (message.vx, message.vy, message.vz)
+        vector = (0.0, 0.0, 0.0) if mask & _VELOCITY else (message.vx, message.vy, message.vz)
         yaw = None if mask & _YAW or not math.isfinite(message.yaw) else message.yaw
         since, self._last_at = context.now - self._last_at, context.now
-        velocity = self._rotate_by_heading(frame, going)
+        velocity = self._rotate_by_heading(frame, vector)
         commands: list[Command] = []
         if mask & _X_Y and mask & _Z:
-            said: tuple[object, ...] = ("velocity", yaw)
-            if self._drifting is None or not math.dist(self._drifting, velocity) < _SAME_SPEED or said != self._last:
+            set_point: tuple[object, ...] = ("velocity", yaw)
+            if (
+                self._drift_velocity is None
+                or not math.dist(self._drift_velocity, velocity) < _SAME_SPEED
+                or set_point != self._last
+            ):
                 radius = context.settings["commands.hold_radius"]
                 commands.append(SetTarget(context.view.position_ned, radius, velocity))
         else:
-            said = (frame, mask, raw, going, yaw)
-            if said != self._last or (frame in _FROM_HERE and since >= _REPEAT_TIMEOUT):
-                place = (*context.view.target[:2], place[2]) if mask & _X_Y else place
-                commands.append(SetTarget(place, None, velocity))
+            set_point = (frame, mask, raw, vector, yaw)
+            if set_point != self._last or (frame in _RELATIVE_FRAMES and since >= _REPEAT_TIMEOUT):
+                position = (*context.view.target[:2], position[2]) if mask & _X_Y else position
+                commands.append(SetTarget(position, None, velocity))
         if not commands:
             return
         if yaw is not None and self._last[-1:] != (yaw,):
-            commands.append(SetHeading(yaw + (context.view.euler[2] if frame in _TURNED else 0.0)))
+            commands.append(SetHeading(yaw + (context.view.euler[2] if frame in _BODY_FRAMES else 0.0)))
         if context.submit(*commands) == context.mavlink.MAV_RESULT_ACCEPTED:
-            self._last = said
-            self._drifting = velocity if said[0] == "velocity" else None
-            if self._drifting is None:
-                self.warn_about(place)
+            self._last = set_point
+            self._drift_velocity = velocity if set_point[0] == "velocity" else None
+            if self._drift_velocity is None:
+                self.warn_about(position)
 
-    def warn_about(self, place: Vector3, of: str = "target") -> None:
+    def warn_about(self, position: Vector3, target: str = "target") -> None:
         """Send a warning for each objection to a target, which is accepted nevertheless.
 
-        Parameters
+        ParameterProtocol
         ----------
-        place : tuple of float
+        position : tuple of float
             Center of the target [m, NED].
-        of : str
+        target : str
             Name of the target in the text.
         """
         context = self.context
-        for words in self._keep_in.objections(place, context.view, context.settings):
-            context.say(
-                f"Warning: {of} {words}", context.mavlink.MAV_SEVERITY_WARNING, f"{of} {words}", _WARNING_PERIOD
+        for words in self._keep_in.objections(position, context.view, context.settings):
+            context.send_text(
+                f"Warning: {target} {words}", context.mavlink.MAV_SEVERITY_WARNING, f"{target} {words}", _WARNING_PERIOD
             )
 
     # ---- commands ----
 
-    def _reposition(self, call: Call) -> int:
+    def _reposition(self, request: CommandRequest) -> int:
         m, context = self.context.mavlink, self.context
-        place = place_of(context, call.frame, call[5], call[6], call[7])
-        if place is None:
-            context.reject(f"frame {call.frame} of a position", "frame")
+        position = to_local_position(context, request.frame, request[5], request[6], request[7])
+        if position is None:
+            context.reject(f"frame {request.frame} of a position", "frame")
             return int(m.MAV_RESULT_UNSUPPORTED)
-        return self.go(call.sender, place, call[4])
+        return self.go(request.sender, position, request[4])
 
-    def go(self, sender: Sender, place: Vector3, yaw: float = math.nan) -> int:
+    def go(self, sender: Sender, position: Vector3, yaw: float = math.nan) -> int:
         """Move the target region, and reach it; without a finite coordinate, hold, as QGroundControl pauses PX4.
 
-        Parameters
+        ParameterProtocol
         ----------
         sender : Sender
             Sender of the command.
-        place : tuple of float
+        position : tuple of float
             Center of the target [m, NED]; a coordinate that is not finite stays at the vehicle's.
         yaw : float
             Heading [rad]; NaN for none.
@@ -219,53 +223,53 @@ class Targets(Service):
             MAV_RESULT.
         """
         context = self.context
-        if not self.may_steer(sender):
+        if not self.accept_control(sender):
             return int(context.mavlink.MAV_RESULT_DENIED)
-        x, y, z = (a if math.isfinite(a) else b for a, b in zip(place, context.view.position_ned, strict=True))
-        commands: list[Command] = [SetTarget((x, y, z)) if any(map(math.isfinite, place)) else SetMode("hold")]
+        x, y, z = (a if math.isfinite(a) else b for a, b in zip(position, context.view.position_ned, strict=True))
+        commands: list[Command] = [SetTarget((x, y, z)) if any(map(math.isfinite, position)) else SetMode("hold")]
         if math.isfinite(yaw):
             commands.append(SetHeading(yaw))
-        self._last, self._drifting = (), None
+        self._last, self._drift_velocity = (), None
         result = context.submit(*commands)
         if result == context.mavlink.MAV_RESULT_ACCEPTED and isinstance(commands[0], SetTarget):
             self.warn_about((x, y, z))
         return result
 
-    def _turn(self, call: Call) -> int:
+    def _turn(self, request: CommandRequest) -> int:
         context = self.context
-        angle = math.radians(call[1])
-        if not math.isfinite(angle) or not math.isfinite(call[4]):
+        angle = math.radians(request[1])
+        if not math.isfinite(angle) or not math.isfinite(request[4]):
             return int(context.mavlink.MAV_RESULT_DENIED)
-        if call[4] == 1.0:
-            angle = context.view.euler[2] + math.copysign(1.0, -1.0 if call[3] < 0.0 else 1.0) * angle
-        if not self.may_steer(call.sender):
+        if request[4] == 1.0:
+            angle = context.view.euler[2] + math.copysign(1.0, -1.0 if request[3] < 0.0 else 1.0) * angle
+        if not self.accept_control(request.sender):
             return int(context.mavlink.MAV_RESULT_DENIED)
         return context.submit(SetHeading(angle))
 
-    def _speed(self, call: Call) -> int:
+    def _speed(self, request: CommandRequest) -> int:
         m, context = self.context.mavlink, self.context
-        if not self._parameters.has(SPEED):
+        if not self._parameters.has_setting(SPEED):
             return int(m.MAV_RESULT_UNSUPPORTED)
         try:
-            speed = resolve_speed(context, shortest(call[2]) if math.isfinite(call[2]) else call[2])
+            speed = resolve_speed(context, shorten_float32(request[2]) if math.isfinite(request[2]) else request[2])
         except CommandError as error:
             context.reject(str(error), "speed")
             return int(m.MAV_RESULT_DENIED)
         if speed is None:
             return int(m.MAV_RESULT_ACCEPTED)
-        if not self.may_steer(call.sender):
+        if not self.accept_control(request.sender):
             return int(m.MAV_RESULT_DENIED)
         return self._parameters.change(SPEED, speed)
 
 
-def _fault(message: Any) -> str:
+def _unsupported_reason(message: Any) -> str:
     """Return the reason why a set-point is unsupported, in words; empty if it is supported."""
     mask = message.type_mask
     position, velocity, acceleration = mask & (_X_Y | _Z), mask & _VELOCITY, mask & _ACCELERATION
     if mask & _FORCE and acceleration != _ACCELERATION:  # QGroundControl sets all bits but those
         return "forces are not followed"
-    asked = (a for i, a in enumerate((message.afx, message.afy, message.afz), 6) if not mask & 1 << i)
-    if any(asked):
+    values = (a for i, a in enumerate((message.afx, message.afy, message.afz), 6) if not mask & 1 << i)
+    if any(values):
         return "accelerations are not followed"
     if not mask & _YAW_RATE and message.yaw_rate:
         return "yaw rates are not followed; a yaw is"
@@ -274,5 +278,5 @@ def _fault(message: Any) -> str:
     if position == _X_Y | _Z:
         return "a position or a velocity is needed"
     if position not in (0, _X_Y) or velocity not in (0, _VELOCITY):
-        return "position and velocity are needed whole, or depth alone"
+        return "position and velocity need all components, or depth alone"
     return ""

@@ -3,55 +3,47 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from cosim.mavlink.wire.options import ProfileName
 from cosim.simulation.commands.commands import MODES, Mode
 
 SUBMARINE = 12  # MAV_TYPE_SUBMARINE
-
-MODE_NAMES: dict[Mode, str] = {
-    "manual": "Manual",
-    "hold": "Position hold",
-    "reach": "Region reaching",
-    "mission": "Mission of regions",
-    "surface": "Surface",
-    "stabilize": "Stabilize",
-    "depth_hold": "Depth hold",
-}
-
-# MAV_STANDARD_MODE of the modes; 0 for none
-STANDARD_MODES: dict[Mode, int] = {
-    "manual": 0,
-    "hold": 1,
-    "reach": 0,
-    "mission": 6,
-    "surface": 5,
-    "stabilize": 0,
-    "depth_hold": 4,
-}
-
-# MAV_MODE_FLAG: custom mode 1, auto 4, guided 8, stabilised 16, manual input 64
-_BASE_MODES: dict[Mode, int] = {
-    "manual": 65,
-    "hold": 25,
-    "reach": 25,
-    "mission": 29,
-    "surface": 29,
-    "stabilize": 81,
-    "depth_hold": 81,
-}
-# ArduSub's: each mode has the stabilized and manual input bits
-_BASE_MODES_OF_ARDUSUB: dict[Mode, int] = {
-    "manual": 81,
-    "hold": 89,
-    "reach": 89,
-    "mission": 89,
-    "surface": 81,
-    "stabilize": 81,
-    "depth_hold": 81,
-}
 _ARMED = 128
 _CUSTOM = 1
+
+
+def _px4(main: int, sub: int = 0) -> int:
+    return main << 16 | sub << 24
+
+
+_RETURN = _px4(4, 5)
+
+
+class ModeEntry(NamedTuple):
+    """A mode as ground stations know it.
+
+    MAV_MODE_FLAG has the bits custom mode 1, auto 4, guided 8, stabilized 16, manual input 64; ArduSub sets the
+    stabilized and manual input bits in each mode.
+    """
+
+    name: str
+    standard: int  # MAV_STANDARD_MODE; 0 for none
+    flags: int  # MAV_MODE_FLAG
+    ardusub_flags: int
+    ardusub_mode: int  # custom_mode
+    px4_mode: int
+
+
+MODE_TABLE: dict[Mode, ModeEntry] = {
+    "manual": ModeEntry("Manual", 0, 65, 81, 19, _px4(1)),
+    "hold": ModeEntry("Position hold", 1, 25, 89, 16, _px4(4, 3)),
+    "reach": ModeEntry("Region reaching", 0, 25, 89, 4, _px4(6)),
+    "mission": ModeEntry("Mission of regions", 6, 29, 89, 3, _px4(4, 4)),
+    "surface": ModeEntry("Surface", 5, 29, 81, 9, _px4(4, 6)),
+    "stabilize": ModeEntry("Stabilize", 0, 81, 81, 0, _px4(7)),
+    "depth_hold": ModeEntry("Depth hold", 4, 81, 81, 2, _px4(2)),
+}
 
 
 @dataclass(frozen=True)
@@ -62,34 +54,43 @@ class Profile:
     ----------
     autopilot : int
         MAV_AUTOPILOT.
-    numbers : dict of str to int
+    custom_modes : dict of str to int
         ``custom_mode`` of each mode.
-    packed : bool
+    is_packed : bool
         True if a mode's number is PX4's: main mode shifted by 16 bits, sub-mode by 24.
-    centred_stick : int
+    centered_stick : int
         Value of MANUAL_CONTROL's vertical stick at rest.
     full_tilt_stick : int
         Value of MANUAL_CONTROL's roll and pitch extensions at full deflection.
-    home_is_first : bool
+    has_home_item : bool
         True if item 0 of a mission is home, as in ArduPilot.
-    stands_for : tuple of int or None
+    has_parameter_hash : bool
+        True if the list of parameters begins with its hash.
+    casts_parameters : bool
+        True if stations send parameters of any type, as ArduPilot's do; otherwise only REAL32 is accepted.
+    system_id_parameter : str
+        Name of the parameter of the system id.
+    imitated_release : tuple of int or None
         Release of the imitated autopilot; None if none is imitated.
     """
 
     name: ProfileName
     autopilot: int
-    numbers: dict[Mode, int]
-    packed: bool
-    centred_stick: int
+    custom_modes: dict[Mode, int]
+    is_packed: bool
+    centered_stick: int
     full_tilt_stick: int
-    home_is_first: bool
-    stands_for: tuple[int, int, int] | None = None
+    has_home_item: bool
+    has_parameter_hash: bool
+    casts_parameters: bool
+    system_id_parameter: str
+    imitated_release: tuple[int, int, int] | None
 
-    def mode_of(self, number: int) -> Mode | None:
+    def find_mode(self, number: int) -> Mode | None:
         """Return the mode with a ``custom_mode``, or None if there is none."""
-        return next((mode for mode in MODES if self.numbers[mode] == number), None)
+        return next((mode for mode in MODES if self.custom_modes[mode] == number), None)
 
-    def mode_of_command(self, first: int, second: int) -> Mode | None:
+    def find_commanded_mode(self, first: int, second: int) -> Mode | None:
         """Return the mode that MAV_CMD_DO_SET_MODE selects, or None if there is none.
 
         Parameters
@@ -99,20 +100,20 @@ class Profile:
             number of ArduSub is no other mode of PX4 here, except 1 and 7: ACRO and CIRCLE in ArduSub, MANUAL and
             STABILIZED in PX4.
         """
-        if not self.packed:
-            return self.mode_of(first)
+        if not self.is_packed:
+            return self.find_mode(first)
         if not (0 <= first <= 0xFF and 0 <= second <= 0xFF):
-            return self.mode_of(first) if second == 0 else None
-        return self.mode_of(_px4(first, second))
+            return self.find_mode(first) if second == 0 else None
+        return self.find_mode(_px4(first, second))
 
     def is_return(self, number: int) -> bool:
         """Return True if a ``custom_mode`` is PX4's return, which is no mode here but a command to surface at home."""
-        return self.packed and number == _RETURN
+        return self.is_packed and number == _RETURN
 
     def base_mode(self, mode: Mode, armed: bool) -> int:
         """Return MAV_MODE_FLAG bits: custom mode, the bits of the mode, and armed."""
-        modes = _BASE_MODES_OF_ARDUSUB if self.name == "ardusub" else _BASE_MODES
-        return modes[mode] | (_ARMED if armed else 0)
+        entry = MODE_TABLE[mode]
+        return (entry.ardusub_flags if self.name == "ardusub" else entry.flags) | (_ARMED if armed else 0)
 
 
 def is_custom(base_mode: int) -> bool:
@@ -120,50 +121,11 @@ def is_custom(base_mode: int) -> bool:
     return bool(base_mode & _CUSTOM)
 
 
-def _px4(main: int, sub: int = 0) -> int:
-    return main << 16 | sub << 24
-
-
-_RETURN = _px4(4, 5)
-_ARDUSUB: dict[Mode, int] = {
-    "manual": 19,
-    "hold": 16,
-    "reach": 4,
-    "mission": 3,
-    "surface": 9,
-    "stabilize": 0,
-    "depth_hold": 2,
-}
-_PX4: dict[Mode, int] = {
-    "manual": _px4(1),
-    "hold": _px4(4, 3),
-    "reach": _px4(6),
-    "mission": _px4(4, 4),
-    "surface": _px4(4, 6),
-    "stabilize": _px4(7),
-    "depth_hold": _px4(2),
-}
+_ARDUSUB = {mode: entry.ardusub_mode for mode, entry in MODE_TABLE.items()}
+_PX4 = {mode: entry.px4_mode for mode, entry in MODE_TABLE.items()}
 
 PROFILES: dict[ProfileName, Profile] = {
-    "ardusub": Profile(
-        "ardusub",
-        3,
-        _ARDUSUB,
-        packed=False,
-        centred_stick=500,
-        full_tilt_stick=400,
-        home_is_first=True,
-        stands_for=(4, 5, 0),
-    ),
-    "px4": Profile(
-        "px4",
-        12,
-        _PX4,
-        packed=True,
-        centred_stick=500,
-        full_tilt_stick=1000,
-        home_is_first=False,
-        stands_for=(1, 15, 0),
-    ),
-    "generic": Profile("generic", 0, _PX4, packed=True, centred_stick=0, full_tilt_stick=1000, home_is_first=False),
+    "ardusub": Profile("ardusub", 3, _ARDUSUB, False, 500, 400, True, False, True, "SYSID_THISMAV", (4, 5, 0)),
+    "px4": Profile("px4", 12, _PX4, True, 500, 1000, False, True, False, "MAV_SYS_ID", (1, 15, 0)),
+    "generic": Profile("generic", 0, _PX4, True, 0, 1000, False, False, False, "SYSID_THISMAV", None),
 }

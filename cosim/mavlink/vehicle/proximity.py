@@ -17,9 +17,9 @@ from cosim.scenario.tables import PARKED_POSITION, SecondaryRegion, Vector3
 from cosim.simulation.commands.settings import LiveSettings
 
 SECTORS = 72  # number of sectors of a scan
-REACH = 20.0  # m, range of a scan
+MAX_RANGE = 20.0  # m, range of a scan
 _RAYS = 3  # number of rays in a sector: at full range the scan detects anything wider than 0.6 m
-_AT_REST = (0.0, 0.0, 0.0)
+_NO_SHIFT = (0.0, 0.0, 0.0)
 
 
 class Proximity:
@@ -39,22 +39,22 @@ class Proximity:
     """
 
     def __init__(self, scenario: Scenario) -> None:
-        every = [(i, secondary) for i, secondary in enumerate(scenario.regions, 1) if _is_obstacle(secondary)]
-        self.ids = tuple(i for i, _ in every)
-        self._dynamic = tuple(secondary.is_dynamic for _, secondary in every)
-        self._names = tuple(secondary.region.name for _, secondary in every)
-        self._shapes: list[Shape] = [secondary.region.shape for _, secondary in every]
-        self._shifts: list[Vector3] = [_AT_REST] * len(every)
-        self._regions = pack([secondary.region for _, secondary in every])
-        n = len(every)
+        obstacles = [(i, secondary) for i, secondary in enumerate(scenario.regions, 1) if _is_obstacle(secondary)]
+        self.ids = tuple(i for i, _ in obstacles)
+        self._dynamic = tuple(secondary.is_dynamic for _, secondary in obstacles)
+        self._names = tuple(secondary.region.name for _, secondary in obstacles)
+        self._shapes: list[Shape] = [secondary.region.shape for _, secondary in obstacles]
+        self._shifts: list[Vector3] = [_NO_SHIFT] * len(obstacles)
+        self._regions = pack([secondary.region for _, secondary in obstacles])
+        n = len(obstacles)
         self._values, self._clearances = np.zeros(n), np.zeros(n)
         self._gradients, self._rotation_gradients = np.zeros((n, 3)), np.zeros((n, 3))
         self._angles = (np.arange(SECTORS * _RAYS) - _RAYS // 2) * (2.0 * math.pi / (SECTORS * _RAYS))
         self._directions, self._distances = np.zeros((SECTORS * _RAYS, 3)), np.zeros(SECTORS * _RAYS)
         self._position, self._level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
         self._ray_distances = CompiledFunction(ray_distances)
-        self.inwards(_AT_REST)
-        self.scan(_AT_REST, 0.0)
+        self.inward_directions(_NO_SHIFT)
+        self.scan(_NO_SHIFT, 0.0)
 
     def update(self, view: View, settings: LiveSettings) -> None:
         """Update positions of the obstacles from a snapshot, and their shapes from the settings.
@@ -73,14 +73,14 @@ class Proximity:
                 self._shifts[k] = shift
                 regions.shifts[k] = shift
             if self._dynamic[k]:
-                if shift != _AT_REST:  # present: its radius follows from its clearance
+                if shift != _NO_SHIFT:  # present: its radius follows from its clearance
                     center = [a + b for a, b in zip(PARKED_POSITION, shift, strict=True)]
                     regions.numbers[first + 3] = math.dist(center, view.position_ned) - clearances[self.ids[k]]
             elif (shape := settings.shapes[name]) is not self._shapes[k]:
                 self._shapes[k] = shape
                 regions.numbers[first : regions.offsets[k + 1]] = shape.packed()
 
-    def inwards(self, position_ned: Vector3) -> list[list[float]]:
+    def inward_directions(self, position_ned: Vector3) -> list[list[float]]:
         """Return the direction in which the clearance of each obstacle decreases.
 
         Parameters
@@ -114,12 +114,12 @@ class Proximity:
         -------
         list of float
             Distance to the nearest obstacle in each sector [m], from the sector about the heading clockwise; infinite
-            beyond `REACH`, 0 everywhere for a vehicle inside an obstacle, NaN where unknown.
+            beyond `MAX_RANGE`, 0 everywhere for a vehicle inside an obstacle, NaN where unknown.
         """
         self._position[:] = position_ned
         np.cos(self._angles + heading, out=self._directions[:, 0])
         np.sin(self._angles + heading, out=self._directions[:, 1])
-        self._ray_distances(self._regions, self._position, self._directions, REACH, self._distances)
+        self._ray_distances(self._regions, self._position, self._directions, MAX_RANGE, self._distances)
         nearest: list[float] = self._distances.reshape(SECTORS, _RAYS).min(axis=1).tolist()
         return nearest
 

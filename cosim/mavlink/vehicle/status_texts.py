@@ -1,4 +1,4 @@
-"""STATUSTEXT messages of the vehicle, limited in rate; repeated refusals are counted."""
+"""STATUSTEXT messages of the vehicle, limited in rate; repeated rejections are counted."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from cosim.mavlink.wire.encode import Encoder
 from cosim.mavlink.wire.message_sink import MessageSink
 
 _CHUNK = 50  # characters of a STATUSTEXT
-_LONGEST_TEXT = 200  # characters
-_TEXTS = 12  # greatest number of texts in each _PERIOD
+_MAX_TEXT = 200  # characters
+_MAX_TEXTS = 12  # in each _PERIOD
 _PERIOD = 1.0  # s
-_WAITING = 48  # texts that wait for the next period
-_REFUSALS_PERIOD = 2.0  # s, between two reports of refusals of a kind
-_REASONS = 8  # different reasons of a kind that are kept; further ones are only counted
+_MAX_PENDING = 48  # texts for the next period
+_REJECTION_PERIOD = 2.0  # s, between two reports of rejections of a kind
+_MAX_REASONS = 8  # different reasons of a kind that are stored; further ones are only counted
 
 
 class StatusTexts:
@@ -36,12 +36,12 @@ class StatusTexts:
     def __init__(self, mavlink: Any, make: Encoder, links: Sequence[MessageSink], clock: Callable[[], float]) -> None:
         self._mavlink, self._make, self._links, self._clock = mavlink, make, links, clock
         self._last_sent: dict[str, float] = {}  # time of the last text, by key
-        self._sent_at: deque[float] = deque(maxlen=_TEXTS)
-        self._waiting: deque[list[Any]] = deque(maxlen=_WAITING)
-        self._refusals: dict[str, dict[str, int]] = {}  # count of each unreported reason, by kind
+        self._sent_at: deque[float] = deque(maxlen=_MAX_TEXTS)
+        self._pending: deque[list[Any]] = deque(maxlen=_MAX_PENDING)
+        self._rejections: dict[str, dict[str, int]] = {}  # count of each unreported reason, by kind
         self._text_id = 0
 
-    def say(self, text: str, severity: int | None = None, key: str = "", every: float = 0.0) -> None:
+    def send_text(self, text: str, severity: int | None = None, key: str = "", every: float = 0.0) -> None:
         """Send a text on every link, in parts if it is long; at once, or later if the rate is at its limit.
 
         Parameters
@@ -53,59 +53,59 @@ class StatusTexts:
         key : str
             Kind of text: of each kind one is sent in `every` seconds, and the others are dropped.
         every : float
-            Least time between two texts of a key [s, wall clock].
+            Minimum time between two texts of a key [s, wall clock].
         """
         now = self._clock()
         if every and now - self._last_sent.get(key, -every) < every:
             return
         if every:
             self._last_sent[key] = now
-        self._waiting.append(self.text(text, severity))
-        self._send_waiting()
+        self._pending.append(self.make_text(text, severity))
+        self._send_pending()
 
     def reject(self, reason: str, key: str) -> None:
-        """Report a refusal: at once, or up to 2 s later if one of that kind was reported in the last 2 s.
+        """Report a rejection: at once, or up to 2 s later if one of that kind was reported in the last 2 s.
 
         Parameters
         ----------
         reason : str
             Reason in a few words.
         key : str
-            Kind of refusal. Equal reasons are reported once, with their count.
+            Kind of rejection. Equal reasons are reported once, with their count.
         """
-        if self._clock() - self._last_sent.get(f"reject {key}", -_REFUSALS_PERIOD) >= _REFUSALS_PERIOD:
+        if self._clock() - self._last_sent.get(f"reject {key}", -_REJECTION_PERIOD) >= _REJECTION_PERIOD:
             self._last_sent[f"reject {key}"] = self._clock()
-            self._refuse(reason)
+            self._send_rejection(reason)
             return
-        reasons = self._refusals.setdefault(key, {})
-        if reason not in reasons and len(reasons) >= _REASONS:
+        reasons = self._rejections.setdefault(key, {})
+        if reason not in reasons and len(reasons) >= _MAX_REASONS:
             reason = "others, of the same kind"
         reasons[reason] = reasons.get(reason, 0) + 1
 
     def send_due(self) -> None:
-        """Send the refusals and texts that are due."""
+        """Send the rejections and texts that are due."""
         now = self._clock()
-        for key in [key for key in self._refusals if now - self._last_sent[f"reject {key}"] >= _REFUSALS_PERIOD]:
+        for key in [key for key in self._rejections if now - self._last_sent[f"reject {key}"] >= _REJECTION_PERIOD]:
             self._last_sent[f"reject {key}"] = now
-            for reason, times in self._refusals.pop(key).items():
-                self._refuse(reason if times == 1 else f"{reason} ({times} times)")
-        self._send_waiting()
+            for reason, times in self._rejections.pop(key).items():
+                self._send_rejection(reason if times == 1 else f"{reason} ({times} times)")
+        self._send_pending()
 
-    def _refuse(self, reason: str) -> None:
-        self.say(f"Refused: {reason}", self._mavlink.MAV_SEVERITY_WARNING)
+    def _send_rejection(self, reason: str) -> None:
+        self.send_text(f"Refused: {reason}", self._mavlink.MAV_SEVERITY_WARNING)
 
-    def _send_waiting(self) -> None:
+    def _send_pending(self) -> None:
         now = self._clock()
-        while self._waiting and not (len(self._sent_at) == _TEXTS and now - self._sent_at[0] < _PERIOD):
+        while self._pending and not (len(self._sent_at) == _MAX_TEXTS and now - self._sent_at[0] < _PERIOD):
             self._sent_at.append(now)
-            for message in self._waiting.popleft():
+            for message in self._pending.popleft():
                 for link in self._links:
                     link.send(message)
 
-    def text(self, text: str, severity: int | None = None) -> list[Any]:
+    def make_text(self, text: str, severity: int | None = None) -> list[Any]:
         """Return the STATUSTEXT messages of a text."""
         level = self._mavlink.MAV_SEVERITY_INFO if severity is None else severity
-        text = text[:_LONGEST_TEXT]
+        text = text[:_MAX_TEXT]
         if len(text) <= _CHUNK:
             return [self._make("STATUSTEXT", level, text, 0, 0)]
         self._text_id = self._text_id % 0xFFFF + 1

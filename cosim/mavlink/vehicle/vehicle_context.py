@@ -10,10 +10,10 @@ from typing import Any
 from cosim.errors import CommandError
 from cosim.mavlink.vehicle.active_gcs import ActiveGcs
 from cosim.mavlink.vehicle.geodesy import LocalFrame
-from cosim.mavlink.vehicle.layout import Layout
 from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.vehicle.proximity import Proximity
+from cosim.mavlink.vehicle.row_layout import RowLayout
 from cosim.mavlink.vehicle.status_texts import StatusTexts
 from cosim.mavlink.vehicle.view import View
 from cosim.mavlink.wire.dialect import dialect
@@ -28,7 +28,7 @@ from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column
 from plant_fmu.autopilot import Autopilot, pulse_of_effort
 
-_PREDICTION_LASTS = 0.5  # s, within which a snapshot shows the effect of a command
+_PREDICTION_TIME = 0.5  # s, within which a snapshot shows the effect of a command
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class VehicleContext:
     home : tuple of float
         North and east of home [m]; home is at the surface.
     status_texts : StatusTexts
-        Sender of texts; `say`, `reject` and `text` are its methods.
+        Sender of texts; `send_text`, `reject` and `make_text` are its methods.
     now : float
         Wall clock at the last call of the autopilot [s].
     failsafe : bool
@@ -106,7 +106,7 @@ class VehicleContext:
         self.mavlink: Any = dialect()
         self.make = Encoder(self.mavlink)
         self.profile = PROFILES[options.profile]
-        self.layout = Layout(scenario, columns)
+        self.layout = RowLayout(scenario, columns)
         self.active_gcs = ActiveGcs()
         self.links: list[MessageSink] = []
         self.now = 0.0
@@ -123,13 +123,14 @@ class VehicleContext:
         self._outputs, self._curves = table.channels, [pulse_of_effort(table, sign) for sign in signs]
         self._commands = commands if options.commands and live and scenario.commands.enabled else None
         self.status_texts = StatusTexts(self.mavlink, self.make, self.links, lambda: self.now)
-        self.say, self.reject, self.text = self.status_texts.say, self.status_texts.reject, self.status_texts.text
+        self.send_text, self.reject = self.status_texts.send_text, self.status_texts.reject
+        self.make_text = self.status_texts.make_text
         self.restart()
 
     def restart(self) -> None:
         """Reset the state that belongs to a run."""
         self.waited_us = 0
-        self.view = View(self.layout, self.layout.first_row(self.scenario))
+        self.view = View(self.layout, self.layout.make_first_row(self.scenario))
         self.has_view = False
         self.settings = LiveSettings(self.scenario)
         self.home = (0.0, 0.0)
@@ -166,7 +167,7 @@ class VehicleContext:
     @property
     def mode_ahead(self) -> Mode:
         """Mode after the submitted commands are applied."""
-        if self._predicted is not None and self.now - self._predicted[0] <= _PREDICTION_LASTS:
+        if self._predicted is not None and self.now - self._predicted[0] <= _PREDICTION_TIME:
             return self._predicted[1]
         return self.mode
 
@@ -180,9 +181,9 @@ class VehicleContext:
         """Return the position of home [m, NED]."""
         return self.home[0], self.home[1], 0.0
 
-    def thrust_parts(self) -> list[float]:
+    def thrust_fractions(self) -> list[float]:
         """Return the force of each thruster as a fraction [-] of its limit in that direction, from -1 to 1."""
-        return self._parts(self.view.thruster_forces)
+        return self._thrust_fractions(self.view.thruster_forces)
 
     def servo_pulses(self) -> list[float]:
         """Return the pulse of each servo output [us], by the vehicle's table ``autopilot``; 0 for unused outputs.
@@ -190,19 +191,19 @@ class VehicleContext:
         Without that table, and as PX4, a thruster's output has its number, and pulses are linear in the force.
         """
         pulses = [0.0] * max(self._outputs, default=0)
-        for part, output, pulse in zip(
-            self._parts(self.view.thruster_commands), self._outputs, self._curves, strict=True
+        for fraction, output, pulse in zip(
+            self._thrust_fractions(self.view.thruster_commands), self._outputs, self._curves, strict=True
         ):
             if output:
-                pulses[output - 1] = pulse(part)
+                pulses[output - 1] = pulse(fraction)
         return pulses
 
-    def _parts(self, forces: Sequence[float]) -> list[float]:
-        parts = []
+    def _thrust_fractions(self, forces: Sequence[float]) -> list[float]:
+        fractions = []
         for force, (backwards, forwards) in zip(forces, self._limits, strict=True):
             limit = forwards if force > 0.0 else backwards
-            parts.append(max(-1.0, min(1.0, force / limit)) if limit > 0.0 else 0.0)
-        return parts
+            fractions.append(max(-1.0, min(1.0, force / limit)) if limit > 0.0 else 0.0)
+        return fractions
 
     # ---- commands ----
 

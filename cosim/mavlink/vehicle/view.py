@@ -6,14 +6,24 @@ import math
 from functools import cached_property
 
 from controller.quaternion import rotation_rows
-from cosim.mavlink.vehicle.layout import Layout
+from cosim.mavlink.vehicle.row_layout import RowLayout
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import MODES, Mode
 from cosim.simulation.signals import Array
 
 _MICRO = 1e6
-_LONGEST = 1e12  # s; later times are invalid
+_MAX_TIME = 1e12  # s; later times are invalid
 _HALF_TURN = 2.0 * math.pi
+
+
+class _Vector:
+    """Property of three values from a column on."""
+
+    def __init__(self, first: str) -> None:
+        self._first = first
+
+    def __get__(self, view: View, owner: type[View]) -> Vector3:
+        return view.vector(self._first)
 
 
 class View:
@@ -21,7 +31,7 @@ class View:
 
     Parameters
     ----------
-    layout : Layout
+    layout : RowLayout
         Column indices of the row.
     row : ndarray, shape (n,)
         Row of a step; copied.
@@ -29,20 +39,22 @@ class View:
         Wall time spent waiting for arming before simulated time started [µs].
     """
 
-    def __init__(self, layout: Layout, row: Array, waited_us: int = 0) -> None:
+    def __init__(self, layout: RowLayout, row: Array, waited_us: int = 0) -> None:
         self._layout, self._row, self._waited_us = layout, row.tolist(), waited_us
 
-    def number(self, name: str, otherwise: float = 0.0) -> float:
-        """Return a column's value, or `otherwise` if the row has no such column."""
-        at = self._layout.at.get(name)
-        return otherwise if at is None else self._row[at]
+    def number(self, name: str, default: float = 0.0) -> float:
+        """Return a column's value, or `default` if the row has no such column."""
+        index = self._layout.index.get(name)
+        return default if index is None else self._row[index]
 
-    def _several(self, first: str, n: int) -> list[float]:
-        at = self._layout.at.get(first)
-        return [0.0] * n if at is None else self._row[at : at + n]
+    def numbers(self, first: str, n: int) -> list[float]:
+        """Return n values from a column on; zeros if the row has no such column."""
+        index = self._layout.index.get(first)
+        return [0.0] * n if index is None else self._row[index : index + n]
 
-    def _three(self, first: str) -> Vector3:
-        x, y, z = self._several(first, 3)
+    def vector(self, first: str) -> Vector3:
+        """Return three values from a column on."""
+        x, y, z = self.numbers(first, 3)
         return x, y, z
 
     @cached_property
@@ -54,34 +66,26 @@ class View:
     def simulated_us(self) -> int:
         """Simulated time [µs]; 0 if it is NaN, negative or above 1e12 s."""
         time = self._row[0]
-        return round(time * _MICRO) if 0.0 <= time <= _LONGEST else 0
+        return round(time * _MICRO) if 0.0 <= time <= _MAX_TIME else 0
 
     # ---- pose and motion ----
 
-    @property
-    def position_ned(self) -> Vector3:
-        """Position of the body origin [m]."""
-        return self._three("position.x")
+    position_ned = _Vector("position.x")
+    """Position of the body origin [m]."""
 
     @property
     def quaternion(self) -> list[float]:
         """Unit quaternion from body to world, scalar first."""
-        return self._several("quaternion.e0", 4)
+        return self.numbers("quaternion.e0", 4)
 
-    @property
-    def euler(self) -> Vector3:
-        """Roll, pitch and yaw [rad]."""
-        return self._three("attitude.roll")
+    euler = _Vector("attitude.roll")
+    """Roll, pitch and yaw [rad]."""
 
-    @property
-    def velocity_body(self) -> Vector3:
-        """Velocity over ground, body frame [m/s]."""
-        return self._three("velocity.u")
+    velocity_body = _Vector("velocity.u")
+    """Velocity over ground, body frame [m/s]."""
 
-    @property
-    def rates(self) -> Vector3:
-        """Angular velocity, body frame [rad/s]."""
-        return self._three("velocity.p")
+    rates = _Vector("velocity.p")
+    """Angular velocity, body frame [rad/s]."""
 
     @cached_property
     def _rotation(self) -> tuple[Vector3, Vector3, Vector3]:
@@ -118,15 +122,11 @@ class View:
         """Depth from the pressure sensor [m]."""
         return self.number("measured.depth", self.position_ned[2])
 
-    @property
-    def acceleration(self) -> Vector3:
-        """Specific force from the IMU, body frame [m/s2]."""
-        return self._three("measured.acceleration.x")
+    acceleration = _Vector("measured.acceleration.x")
+    """Specific force from the IMU, body frame [m/s2]."""
 
-    @property
-    def measured_rates(self) -> Vector3:
-        """Angular velocity from the IMU, body frame [rad/s]."""
-        return self._three("measured.angular_velocity.p")
+    measured_rates = _Vector("measured.angular_velocity.p")
+    """Angular velocity from the IMU, body frame [rad/s]."""
 
     @property
     def altitude(self) -> float:
@@ -143,17 +143,17 @@ class View:
     @property
     def thruster_forces(self) -> list[float]:
         """Force of each thruster [N]."""
-        return self._several("thruster_force[1]", self._layout.thrusters)
+        return self.numbers("thruster_force[1]", self._layout.thrusters)
 
     @property
     def thruster_commands(self) -> list[float]:
         """Commanded force of each thruster [N]."""
-        return self._several("thrust[1]", self._layout.thrusters)
+        return self.numbers("thrust[1]", self._layout.thrusters)
 
     @property
     def wrench(self) -> list[float]:
         """Commanded wrench of the law, body frame [N, N m], shape (6,)."""
-        return self._several("command.X", 6)
+        return self.numbers("command.X", 6)
 
     @property
     def saturated(self) -> bool:
@@ -165,12 +165,12 @@ class View:
     @property
     def region_values(self) -> list[float]:
         """Region function g of the goal, then of each region: above 0 where violated."""
-        return self._several("goal.value", 1 + len(self._layout.regions))
+        return self.numbers("goal.value", 1 + len(self._layout.regions))
 
     @property
     def clearances(self) -> list[float]:
         """Clearance of the goal, then of each region: 0 or above where satisfied [m or rad]."""
-        return self._several("goal.clearance", 1 + len(self._layout.regions))
+        return self.numbers("goal.clearance", 1 + len(self._layout.regions))
 
     @property
     def criteria(self) -> tuple[str, ...]:
@@ -180,17 +180,17 @@ class View:
     @property
     def memberships(self) -> list[float]:
         """Memberships of the criteria, in order of priority."""
-        return self._several(f"membership.{self.criteria[0]}", len(self.criteria))
+        return self.numbers(f"membership.{self.criteria[0]}", len(self.criteria))
 
     @property
     def weights(self) -> list[float]:
         """Weights of the criteria, in order of priority."""
-        return self._several(f"weight.{self.criteria[0]}", len(self.criteria))
+        return self.numbers(f"weight.{self.criteria[0]}", len(self.criteria))
 
     @property
     def estimate(self) -> list[float]:
         """Estimate of phi in (12) [N, N m], shape (4,)."""
-        return self._several("estimate.phi1", 4)
+        return self.numbers("estimate.phi1", 4)
 
     def reports(self) -> list[tuple[str, float]]:
         """Return the law's reports as pairs of column name and value."""
@@ -198,7 +198,7 @@ class View:
 
     def shift(self, region: str) -> Vector3:
         """Return the displacement of a region, or ``"goal"``, from its position in the scenario [m, NED]."""
-        return self._three(f"{region}.shift.x")
+        return self.vector(f"{region}.shift.x")
 
     # ---- the command handler ----
 
@@ -222,8 +222,8 @@ class View:
     @property
     def target(self) -> Vector3:
         """Center of the target region [m, NED]."""
-        if "target.x" in self._layout.at:
-            return self._three("target.x")
+        if "target.x" in self._layout.index:
+            return self.vector("target.x")
         x, y, z = self._layout.goal_center
         dx, dy, dz = self.shift("goal")
         return x + dx, y + dy, z + dz

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Any
 
-_GREATEST_FLOAT = 3.4028234e38  # greatest float32
+_MAX_FLOAT32 = 3.4028234e38
 _BITS = {"int8_t": 8, "int16_t": 16, "int32_t": 32, "int64_t": 64}
 
 # value of "unknown" where it is not 0, by message and field
@@ -25,14 +25,14 @@ _UNKNOWN: dict[tuple[str, str], int] = {
 Encode = Callable[[Any], Any]
 
 
-def float32(x: float) -> float:
+def clip_to_float32(x: float) -> float:
     """Limit a number to the range of float32; NaN stays."""
-    if -_GREATEST_FLOAT <= x <= _GREATEST_FLOAT or x != x:
+    if -_MAX_FLOAT32 <= x <= _MAX_FLOAT32 or x != x:
         return x
-    return math.copysign(_GREATEST_FLOAT, x)
+    return math.copysign(_MAX_FLOAT32, x)
 
 
-def whole(x: float) -> int | None:
+def round_finite(x: float) -> int | None:
     """Round a received number to an integer; None if it is not finite, as clients fill unused ones with NaN."""
     return round(x) if math.isfinite(x) else None
 
@@ -54,58 +54,52 @@ class Encoder:
     def __init__(self, mavlink: Any) -> None:
         self._classes: dict[str, Any] = {}
         self._fields: dict[str, tuple[Encode, ...]] = {}
-        for kind in mavlink.mavlink_map.values():
-            self._classes[kind.msgname] = kind
-        self.size_of = {kind.id: kind.unpacker.size for kind in self._classes.values()}  # bytes of payload
+        for message in mavlink.mavlink_map.values():
+            self._classes[message.msgname] = message
+        self.payload_sizes = {message.id: message.unpacker.size for message in self._classes.values()}  # bytes
 
     def __call__(self, name: str, *values: Any) -> Any:
         """Return the message of a name with these fields, in the dialect's order; extensions may be left out."""
-        kind = self._classes[name]
-        fields = self._fields.get(name) or self._field_encoders(name, kind)
-        return kind(*[encode(value) for encode, value in zip(fields, values, strict=False)])
+        message_class = self._classes[name]
+        fields = self._fields.get(name) or self._make_encoders(name, message_class)
+        return message_class(*[encode(value) for encode, value in zip(fields, values, strict=False)])
 
-    def _field_encoders(self, name: str, kind: Any) -> tuple[Encode, ...]:
+    def _make_encoders(self, name: str, message_class: Any) -> tuple[Encode, ...]:
         fields = []
-        for field, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True):
-            length = kind.array_lengths[kind.ordered_fieldnames.index(field)]
-            one = _field(type_name, _UNKNOWN.get((name, field), 0))
+        for field, type_name in zip(message_class.fieldnames, message_class.fieldtypes, strict=True):
+            length = message_class.array_lengths[message_class.ordered_fieldnames.index(field)]
+            encode = _number_encoder(type_name, _UNKNOWN.get((name, field), 0))
             if type_name == "char":
-                fields.append(_text(length))
-            else:
-                fields.append(_array(one, length) if length else one)
+                encode = _text_encoder(length)
+            elif length:
+                encode = _array_encoder(encode, length)
+            fields.append(encode)
         self._fields[name] = tuple(fields)
         return self._fields[name]
 
 
-def _field(type_name: str, unknown: int) -> Encode:
+def _number_encoder(type_name: str, unknown: int) -> Encode:
     if type_name in ("float", "double"):
-        return float32
+        return clip_to_float32
     unsigned = type_name.startswith("u")
     bits = _BITS.get(type_name.removeprefix("u"), 8)
-    least, greatest = (0, 2**bits - 1) if unsigned else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    low, high = (0, 2**bits - 1) if unsigned else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
 
-    def integer(x: Any) -> int:
-        if least <= x <= greatest:
-            whole_number: int = round(x)
-            return whole_number
-        if x != x:
-            return unknown
-        return least if x < least else greatest
+    def encode(x: Any) -> int:
+        if low <= x <= high:
+            return round(x)  # type: ignore[no-any-return]
+        return unknown if x != x else low if x < low else high
 
-    return integer
+    return encode
 
 
-def _text(length: int) -> Encode:
-    def text(x: Any) -> bytes:
-        written: bytes = x if isinstance(x, bytes) else x.encode("ascii", "replace")
-        return written[:length]
-
-    return text
+def _text_encoder(length: int) -> Encode:
+    return lambda x: (x if isinstance(x, bytes) else x.encode("ascii", "replace"))[:length]
 
 
-def _array(one: Encode, length: int) -> Encode:
-    def array(values: Sequence[Any]) -> list[Any]:
-        numbers = [one(x) for x in values[:length]]
-        return numbers + [one(0)] * (length - len(numbers))
+def _array_encoder(encode: Encode, length: int) -> Encode:
+    def encode_array(values: Sequence[Any]) -> list[Any]:
+        numbers = [encode(x) for x in values[:length]]
+        return numbers + [encode(0)] * (length - len(numbers))
 
-    return array
+    return encode_array

@@ -11,9 +11,9 @@ from cosim.io.network_address import resolve_host
 
 Kind = Literal["udpout", "udpin", "tcpin", "tcp", "serial", "tlog"]
 
-_FORMS = "udpout:, udpin:, tcpin: or tcp:HOST:PORT, serial:DEVICE[:BAUD], or a file ending in .tlog"
+_SYNTAX = "udpout:, udpin:, tcpin: or tcp:HOST:PORT, serial:DEVICE[:BAUD], or a file ending in .tlog"
 _NETWORK: dict[str, Kind] = {"udpout": "udpout", "udpin": "udpin", "tcpin": "tcpin", "tcp": "tcp", "tcpout": "tcp"}
-_BAUD = 57600  # default of telemetry radios
+_DEFAULT_BAUD = 57600  # of telemetry radios
 _MAX_BAUD = 4_000_000
 
 
@@ -63,21 +63,21 @@ def parse_endpoint(text: str, allow_remote: bool = False) -> Endpoint:
     14550
     """
     if text.endswith(".tlog"):
-        return Endpoint("tlog", text, path=_new_file(text))
+        return Endpoint("tlog", text, path=_require_new_file(text))
     kind, _, rest = text.partition(":")
     rest = rest.removeprefix("//")
     if kind == "serial":
-        device, baud = _serial(text, rest)
+        device, baud = _parse_serial(text, rest)
         return Endpoint("serial", text, path=device, baud=baud)
     if kind not in _NETWORK:
-        raise TelemetryError(f"endpoint {text!r}: expected {_FORMS}")
+        raise TelemetryError(f"endpoint {text!r}: expected {_SYNTAX}")
     host, _, port = rest.rpartition(":")
     if not host or not (port.isascii() and port.isdecimal() and 0 < int(port[:6]) < 65536):
         raise TelemetryError(f"endpoint {text!r}: expected {kind}:HOST:PORT, such as {kind}:127.0.0.1:14550")
-    return Endpoint(_NETWORK[kind], text, host=_address(text, host, allow_remote), port=int(port))
+    return Endpoint(_NETWORK[kind], text, host=_resolve(text, host, allow_remote), port=int(port))
 
 
-def _address(text: str, host: str, allow_remote: bool) -> str:
+def _resolve(text: str, host: str, allow_remote: bool) -> str:
     """Return the IPv4 address of a host; raise for other machines unless they are allowed."""
     try:
         address, is_loopback = resolve_host(host)
@@ -88,16 +88,16 @@ def _address(text: str, host: str, allow_remote: bool) -> str:
     return address
 
 
-def _serial(text: str, rest: str) -> tuple[str, int]:
+def _parse_serial(text: str, rest: str) -> tuple[str, int]:
     device, colon, baud = rest.rpartition(":")
     if not colon:
-        device, baud = rest, str(_BAUD)
+        device, baud = rest, str(_DEFAULT_BAUD)
     if not device or not (baud.isascii() and baud.isdecimal() and 0 < int(baud[:8]) <= _MAX_BAUD):
         raise TelemetryError(f"endpoint {text!r}: expected serial:DEVICE[:BAUD], such as serial:/dev/ttyUSB0:57600")
     return device, int(baud)
 
 
-def _new_file(text: str) -> str:
+def _require_new_file(text: str) -> str:
     path = Path(text)
     try:
         path.stat()  # Path.exists is False from Python 3.14 on, whatever the error

@@ -8,26 +8,26 @@ from typing import Any, NamedTuple
 
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
-from cosim.mavlink.wire.framing import V2, Counts, Gate
+from cosim.mavlink.wire.framing import V2, FrameFilter, RxStats
 from cosim.mavlink.wire.link import Link, Signer, open_channel
 from cosim.mavlink.wire.signing import SigningClock, Verifier, timestamp_file
 
-_AT_ONCE = 512  # greatest number of messages of one call
-_PAUSE = 0.001  # s, polling period of an idle link
-_LONGEST = 0.05  # s, of reading without a pause
+_MAX_MESSAGES = 512  # of one call
+_POLL_PERIOD = 0.001  # s, of an idle link
+_MAX_READ_TIME = 0.05  # s, of reading without a pause
 
 Identity = tuple[int, int]
 GROUND_STATION: Identity = (255, 190)  # QGroundControl's system and component
 
 
-class Heard(NamedTuple):
+class ReceivedMessage(NamedTuple):
     """A received message with its time and sender."""
 
     time: float  # s, time.monotonic()
     system: int
     component: int
     sequence: int
-    kind: str  # such as HEARTBEAT
+    name: str  # such as HEARTBEAT
     message: Any
 
 
@@ -47,9 +47,9 @@ class GroundLink:
     ----------
     channel : Channel
         Channel that carries the frames.
-    old : int
+    v1_frames : int
         Number of accepted frames of MAVLink 1.
-    counts : Counts
+    stats : RxStats
         Counts of received frames by outcome.
 
     Raises
@@ -60,17 +60,19 @@ class GroundLink:
 
     def __init__(self, endpoint: Endpoint, key: bytes | None = None, identity: Identity = GROUND_STATION) -> None:
         self.name, self.identity = endpoint.text, identity
-        self.counts, self.old = Counts(), 0
+        self.stats, self.v1_frames = RxStats(), 0
         clock = SigningClock(None if key is None else timestamp_file(key, identity))
-        gate = Gate(self.counts, verifier=None if key is None else Verifier(key, clock))
+        frames = FrameFilter(self.stats, verifier=None if key is None else Verifier(key, clock))
         self.channel, _ = open_channel(endpoint)
         signer = None if key is None else Signer(key, clock, link=0)
-        self._link = Link(endpoint.text, self.channel, gate, identity, signer=signer)
-        self.speaks_first = endpoint.kind in ("udpout", "tcp", "serial")  # else the vehicle may not know this address
+        self._link = Link(endpoint.text, self.channel, frames, identity, signer=signer)
+        self.sends_first = endpoint.kind in ("udpout", "tcp", "serial")  # else the vehicle may not know this address
         m = dialect()
-        self._beat = m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3)
+        self._heartbeat = m.MAVLink_heartbeat_message(
+            m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3
+        )
 
-    def receive(self, timeout: float) -> list[Heard]:
+    def receive(self, timeout: float) -> list[ReceivedMessage]:
         """Return received messages, waiting for the first.
 
         Parameters
@@ -80,35 +82,37 @@ class GroundLink:
 
         Returns
         -------
-        list of Heard
+        list of ReceivedMessage
             Messages in the order of reception; empty if there are none.
         """
         deadline = time.monotonic() + timeout
         while True:
             now = time.monotonic()
-            self.channel.tend(now)
-            found: list[Heard] = []
-            for frame, message in self._link.receive(time.perf_counter() + _LONGEST):
-                self.old += frame[0] != V2
+            self.channel.poll(now)
+            received: list[ReceivedMessage] = []
+            for frame, message in self._link.receive(time.perf_counter() + _MAX_READ_TIME):
+                self.v1_frames += frame[0] != V2
                 sender = message.get_srcSystem(), message.get_srcComponent()
-                found.append(Heard(time.monotonic(), *sender, message.get_seq(), message.get_type(), message))
-                if len(found) == _AT_ONCE:
+                received.append(
+                    ReceivedMessage(time.monotonic(), *sender, message.get_seq(), message.get_type(), message)
+                )
+                if len(received) == _MAX_MESSAGES:
                     break
-            if found or now >= deadline:
-                return found
-            time.sleep(min(_PAUSE, max(0.0, deadline - now)))
+            if received or now >= deadline:
+                return received
+            time.sleep(min(_POLL_PERIOD, max(0.0, deadline - now)))
 
     def send(self, message: Any) -> bool:
         """Send a message; return False if it could not be sent."""
         return self._link.send(message)
 
-    def beat(self) -> None:
+    def send_heartbeat(self) -> None:
         """Send a ground station's heartbeat."""
-        self._link.send(self._beat)
+        self._link.send(self._heartbeat)
 
-    def troubles(self) -> list[str]:
-        """Return a text for each kind of frame lost or refused, with its count."""
-        return self._link.troubles()
+    def loss_reports(self) -> list[str]:
+        """Return a text for each kind of frame lost or rejected, with its count."""
+        return self._link.loss_reports()
 
     def close(self) -> None:
         """Close the link. May be called twice."""

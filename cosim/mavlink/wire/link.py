@@ -6,17 +6,17 @@ import logging
 import struct
 import time
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 from weakref import WeakKeyDictionary
 
 from cosim.mavlink.channels.channel import Channel
 from cosim.mavlink.channels.serial import Serial
 from cosim.mavlink.channels.tcp import TcpIn, TcpOut
-from cosim.mavlink.channels.tlog import Tlog
+from cosim.mavlink.channels.tlog_file import Tlog
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
-from cosim.mavlink.wire.framing import V1, Counts, Framer, Gate, StreamReader
+from cosim.mavlink.wire.framing import V1, FrameFilter, Framer, RxStats, StreamReader
 from cosim.mavlink.wire.options import COMPONENT_ID, MavlinkOptions
 from cosim.mavlink.wire.signing import SigningClock, Verifier, timestamp_file
 
@@ -25,18 +25,24 @@ log = logging.getLogger(__name__)
 BUDGET = 200_000.0  # bytes/s, of the wall clock, into a network
 _BURST = 0.5  # s of the budget, that can be sent at once
 _RESERVED = 0.25  # fraction of the burst that is reserved for answers
-_ANSWERS = frozenset(  # sent only on the link of the request
-    ("AUTOPILOT_VERSION", "AVAILABLE_MODES", "COMMAND_ACK", "FILE_TRANSFER_PROTOCOL", "LOG_DATA", "LOG_ENTRY",
-     "MESSAGE_INTERVAL", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "PARAM_ERROR",
-     "PARAM_VALUE", "PING", "TIMESYNC")
-)  # fmt: skip
-_PRIORITY = frozenset(  # messages that may use the reserved part of the budget
-    {
-        "HEARTBEAT", "STATUSTEXT", "COMMAND_ACK", "PARAM_VALUE", "PARAM_ERROR", "FILE_TRANSFER_PROTOCOL", "TIMESYNC",
-        "MISSION_COUNT", "MISSION_ITEM_INT", "MISSION_REQUEST_INT", "MISSION_REQUEST", "MISSION_ACK",
-    }
-)  # fmt: skip
-_UNENCODABLE = (struct.error, OverflowError, IndexError, TypeError, ValueError)  # a field that cannot hold its value
+_ENCODING_ERRORS = (struct.error, OverflowError, IndexError, TypeError, ValueError)  # a field cannot hold its value
+
+
+class SendRule(NamedTuple):
+    """How messages of one name are sent."""
+
+    is_answer: bool = False  # sent only on the link of the request
+    has_priority: bool = False  # may use the reserved part of the budget
+
+
+_SEND_RULES = {
+    **dict.fromkeys(("HEARTBEAT", "STATUSTEXT", "MISSION_REQUEST"), SendRule(has_priority=True)),
+    **dict.fromkeys(
+        ("COMMAND_ACK", "FILE_TRANSFER_PROTOCOL", "MISSION_ACK", "MISSION_COUNT", "MISSION_ITEM_INT",
+         "MISSION_REQUEST_INT", "PARAM_ERROR", "PARAM_VALUE", "TIMESYNC"), SendRule(True, True)),
+    **dict.fromkeys(
+        ("AUTOPILOT_VERSION", "AVAILABLE_MODES", "LOG_DATA", "LOG_ENTRY", "MESSAGE_INTERVAL", "PING"), SendRule(True)),
+}  # fmt: skip
 
 
 class Budget:
@@ -49,27 +55,27 @@ class Budget:
     """
 
     def __init__(self, rate: float) -> None:
-        self._rate, self._most = rate, rate * _BURST
-        self._left = self._most
+        self._rate, self._capacity = rate, rate * _BURST
+        self._available = self._capacity
         self._last = time.monotonic()
 
     @property
-    def plenty(self) -> bool:
+    def exceeds_reserve(self) -> bool:
         """True if more is left than the part reserved for answers."""
         self._refill()
-        return self._left >= _RESERVED * self._most
+        return self._available >= _RESERVED * self._capacity
 
     def _refill(self) -> None:
         now = time.monotonic()
-        self._left = min(self._most, self._left + (now - self._last) * self._rate)
+        self._available = min(self._capacity, self._available + (now - self._last) * self._rate)
         self._last = now
 
-    def take(self, size: int, priority: bool) -> bool:
-        """Take `size` bytes, and return True, if they are left; without `priority` the reserved quarter must remain."""
+    def spend(self, size: int, has_priority: bool) -> bool:
+        """Spend `size` bytes if available; return True if so. Without priority the reserved quarter must remain."""
         self._refill()
-        if self._left - size < (0.0 if priority else _RESERVED * self._most):
+        if self._available - size < (0.0 if has_priority else _RESERVED * self._capacity):
             return False
-        self._left -= size
+        self._available -= size
         return True
 
 
@@ -90,7 +96,7 @@ class Signer:
         self._clock = clock
         self._key, self._link = key, link % 256
 
-    def set_up(self, signing: Any) -> None:
+    def enable(self, signing: Any) -> None:
         """Enable signing in a codec of pymavlink."""
         signing.secret_key, signing.link_id, signing.sign_outgoing = self._key, self._link, True
 
@@ -108,8 +114,8 @@ class Link:
         Name such as ``udpout:127.0.0.1:14550``.
     channel : Channel
         Channel of the frames.
-    gate : Gate
-        Gate that accepts received frames.
+    frame_filter : FrameFilter
+        Filter that accepts received frames.
     source : (int, int)
         Own system and component id.
     budget : float, optional
@@ -129,58 +135,60 @@ class Link:
         self,
         name: str,
         channel: Channel,
-        gate: Gate,
+        frame_filter: FrameFilter,
         source: tuple[int, int],
         budget: float | None = None,
         signer: Signer | None = None,
     ) -> None:
         self.name: str = name
         self.channel: Final = channel
-        self.counts: Final = gate.counts
+        self.stats: Final = frame_filter.stats
         self.logs: list[Link] = []
         self.sent = self.dropped = self.unencodable = 0
-        self._gate, self._signer = gate, signer
+        self._filter, self._signer = frame_filter, signer
         self._budget = None if budget is None else Budget(budget)
         self._framer = Framer(source)
         self._codec = dialect().MAVLink(None, *source)
         if signer is not None:
-            signer.set_up(self._codec.signing)
+            signer.enable(self._codec.signing)
         self._readers: WeakKeyDictionary[Any, StreamReader] = WeakKeyDictionary()
         self._frames: Iterator[tuple[bytes, Any]] = iter(())  # of the last received bytes
         self._peer: Any = None  # their sender
-        self._old_peers = False  # True once a peer has sent MAVLink 1
+        self._has_v1_peers = False  # True once a peer has sent MAVLink 1
         self._reported: set[str] = set()  # kinds of messages that could not be encoded
 
     def has_room(self) -> bool:
         """Return True if messages of low priority may be sent now."""
-        return self._budget is None or self._budget.plenty
+        return self._budget is None or self._budget.exceeds_reserve
 
     def send(self, message: Any) -> bool:
         """Encode, sign if there is a signer, and send a message; return False if it was not sent to all peers."""
+        name = message.get_type()
         try:
-            if self._signer is not None:  # frames of MAVLink 1 are unsigned, so such peers are refused
-                frame, old = self._signed(message, self._signer), None
+            if self._signer is not None:  # frames of MAVLink 1 are unsigned, so such peers are rejected
+                frame, frame_v1 = self._sign(message, self._signer), None
             else:
-                frame = self._framer.frame(message)
-                old = self._framer.old_frame(message) if self._old_peers else None
-        except _UNENCODABLE as error:
+                frame = self._framer.encode(message)
+                frame_v1 = self._framer.encode_v1(message) if self._has_v1_peers else None
+        except _ENCODING_ERRORS as error:
             self.unencodable += 1
-            if message.get_type() not in self._reported:
-                self._reported.add(message.get_type())
-                log.warning("MAVLink: %s cannot be encoded: %s", message.get_type(), error)
+            if name not in self._reported:
+                self._reported.add(name)
+                log.warning("MAVLink: %s cannot be encoded: %s", name, error)
             return False
-        if self._budget is not None and not self._budget.take(len(frame), message.get_type() in _PRIORITY):
+        rule = _SEND_RULES.get(name, SendRule())
+        if self._budget is not None and not self._budget.spend(len(frame), rule.has_priority):
             self.dropped += 1
             return False
-        self._framer.count(old)
+        self._framer.advance(frame_v1)
         self.sent += 1
-        sent = self.channel.send(frame, old)
-        if message.get_type() in _ANSWERS:
+        was_sent = self.channel.send(frame, frame_v1)
+        if rule.is_answer:
             for tlog in self.logs:
                 tlog.send(message)
-        return sent
+        return was_sent
 
-    def _signed(self, message: Any, signer: Signer) -> bytes:
+    def _sign(self, message: Any, signer: Signer) -> bytes:
         signer.stamp(self._codec.signing)
         self._codec.seq = self._framer.seq
         frame: bytes = message.pack(self._codec)
@@ -192,31 +200,31 @@ class Link:
         The rest follows at the next call.
         """
         while time.perf_counter() < until:
-            found = next(self._frames, None)
-            if found is not None:
-                version = 1 if found[0][0] == V1 else 2
-                self._old_peers |= version == 1
+            received = next(self._frames, None)
+            if received is not None:
+                version = 1 if received[0][0] == V1 else 2
+                self._has_v1_peers |= version == 1
                 self.channel.record_version(self._peer, version)
-                yield found
+                yield received
                 continue
-            received = self.channel.receive()
-            if received is None:
+            chunk = self.channel.receive()
+            if chunk is None:
                 return
-            self._peer, data = received
-            self._frames = self._gate.datagram(data) if self.channel.datagrams else self._reader().read(data)
+            self._peer, data = chunk
+            self._frames = self._filter.read_datagram(data) if self.channel.datagrams else self._reader().read(data)
 
     def _reader(self) -> StreamReader:
         """Return the reader of the peer of the last received bytes."""
         reader = self._readers.get(self._peer)
         if reader is None:
-            reader = self._readers[self._peer] = StreamReader(self._gate)
+            reader = self._readers[self._peer] = StreamReader(self._filter)
         return reader
 
-    def troubles(self) -> list[str]:
-        """Return a text for each kind of frame lost or refused, with its count."""
+    def loss_reports(self) -> list[str]:
+        """Return a text for each kind of frame lost or rejected, with its count."""
         lost = {"messages over the budget": self.dropped, "messages that could not be encoded": self.unencodable}
-        refused = {f"frames {reason}": n for reason, n in self.counts.refused().items()}
-        return [f"{n} {what}" for what, n in (lost | refused | self.channel.trouble).items() if n]
+        rejected = {f"frames {reason}": n for reason, n in self.stats.rejected().items()}
+        return [f"{n} {what}" for what, n in (lost | rejected | self.channel.losses).items() if n]
 
 
 def open_links(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> list[Link]:
@@ -245,10 +253,10 @@ def open_links(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> list[L
     links: list[Link] = []
     try:
         for i, endpoint in enumerate(endpoints):
-            gate = Gate(Counts(), source, options.allowed_systems, verifier)
+            frames = FrameFilter(RxStats(), source, options.allowed_systems, verifier)
             channel, budget = open_channel(endpoint)
             signer = None if key is None or endpoint.kind == "tlog" else Signer(key, clock, i)
-            links.append(Link(endpoint.text, channel, gate, source, budget, signer))
+            links.append(Link(endpoint.text, channel, frames, source, budget, signer))
     except BaseException:
         for link in links:
             link.channel.close()
@@ -268,6 +276,10 @@ def open_channel(endpoint: Endpoint) -> tuple[Channel, float | None]:
         return Tlog(endpoint.path), None
     if endpoint.kind == "serial":
         return Serial(endpoint.path, endpoint.baud), endpoint.baud / 10  # start and stop bit go along
-    networks: dict[str, Callable[[str, int], Channel]]
-    networks = {"udpout": UdpOut, "udpin": UdpIn, "tcpin": TcpIn, "tcp": TcpOut}
+    networks: dict[str, Callable[[str, int], Channel]] = {
+        "udpout": UdpOut,
+        "udpin": UdpIn,
+        "tcpin": TcpIn,
+        "tcp": TcpOut,
+    }
     return networks[endpoint.kind](endpoint.host, endpoint.port), BUDGET

@@ -1,4 +1,4 @@
-"""Signatures of frames: frames without a valid signature, and repeated ones, are refused."""
+"""Signatures of frames: frames without a valid signature, and repeated ones, are rejected."""
 
 from __future__ import annotations
 
@@ -19,20 +19,22 @@ from cosim.io.atomic_file import write_atomic
 log = logging.getLogger(__name__)
 
 KEY_BYTES = 32
-_LONGEST_KEY = 4096  # bytes of a key file
-STREAMS = 64  # number of senders whose last timestamps are kept
+_MAX_KEY_FILE = 4096  # bytes
+MAX_STREAMS = 64  # number of senders whose last timestamps are kept
 _EPOCH = 1_420_070_400  # s, 2015-01-01 in Unix time, the epoch of MAVLink's timestamps
 _PER_SECOND = 100_000  # timestamps count 10 us
 _MINUTE = 60 * _PER_SECOND
-_AHEAD = 2 * _PER_SECOND  # by which the kept timestamp is ahead of the clock, so that it is seldom written
-_STEP = _PER_SECOND // 4  # by which it is ahead of the last one at least: a peer's clock may be ahead of ours
-_REMOVE = "remove the file, after which frames of before are accepted again"
-_LAST = (1 << 48) - 1
-_SIGNATURE, _STAMP, _HASH = 13, 6, 6  # bytes of a signature, its timestamp, its hash
+_WRITE_AHEAD = 2 * _PER_SECOND  # by which the saved timestamp is ahead of the clock, so that it is seldom written
+_MIN_WRITE_AHEAD = (
+    _PER_SECOND // 4
+)  # by which it is ahead of the last one at least: a peer's clock may be ahead of ours
+_REMEDY = "remove the file, after which earlier frames are accepted again"
+_MAX_TIMESTAMP = (1 << 48) - 1
+_SIGNATURE_SIZE, _STAMP_SIZE, _HASH_SIZE = 13, 6, 6  # bytes of a signature, its timestamp, its hash
 
 
-class Refusal(Enum):
-    """Reasons to refuse a frame; the values are names in `Counts`."""
+class Rejection(Enum):
+    """Reasons to reject a frame; the values are names in `RxStats`."""
 
     UNSIGNED = "unsigned"
     FORGED = "forged"
@@ -42,8 +44,8 @@ class Refusal(Enum):
     CROWDED = "crowded"
 
 
-def read_key(path: Path) -> bytes:
-    """Read the signing key from a file.
+def load_key(path: Path) -> bytes:
+    """Load the signing key from a file.
 
     32 bytes that are not text, or 64 hexadecimal digits, are the key itself. Any other text is a passphrase, and its
     SHA-256 is the key, as in MAVProxy, QGroundControl and Mission Planner; white space around it is ignored.
@@ -66,13 +68,13 @@ def read_key(path: Path) -> bytes:
     try:
         with path.open("rb") as file:
             mode = os.fstat(file.fileno()).st_mode
-            content = file.read(_LONGEST_KEY + 1)
+            content = file.read(_MAX_KEY_FILE + 1)
     except OSError as error:
         raise TelemetryError(f"{path}: the key cannot be read: {error.strerror or error}") from error
     if os.name == "posix" and mode & 0o077:
         raise TelemetryError(f"{path}: mode is {mode & 0o777:o}, expected 600: its readers can command the vehicle")
-    if len(content) > _LONGEST_KEY:
-        raise TelemetryError(f"{path}: more than {_LONGEST_KEY} bytes, expected a key or a passphrase")
+    if len(content) > _MAX_KEY_FILE:
+        raise TelemetryError(f"{path}: more than {_MAX_KEY_FILE} bytes, expected a key or a passphrase")
     try:
         text = content.decode().strip()
     except UnicodeDecodeError:
@@ -82,7 +84,7 @@ def read_key(path: Path) -> bytes:
     if len(content) == KEY_BYTES:
         return content
     raise TelemetryError(
-        f"{path}: {len(content)} bytes that are no text, "
+        f"{path}: {len(content)} bytes that are not text, "
         f"expected {KEY_BYTES} bytes, {2 * KEY_BYTES} hexadecimal digits or a passphrase"
     )
 
@@ -125,18 +127,18 @@ class SigningClock:
     def __init__(self, file: Path | None = None) -> None:
         self._file = file
         self._offset = time.time() - time.monotonic()  # s: guards against a wall clock that is set back
-        self.floor = self._last = self._kept = 0
+        self.floor = self._last = self._saved = 0
         if file is None:
             return
         try:
             file.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-            self.floor = self._last = _read_timestamp(file)
-            if self.floor > self.latest_accepted + _AHEAD:
+            self.floor = self._last = _load_timestamp(file)
+            if self.floor > self.latest_accepted + _WRITE_AHEAD:
                 ahead = (self.floor - self.latest_accepted + _MINUTE) / _PER_SECOND
-                raise TelemetryError(f"{file}: is {ahead:.0f} s ahead of the clock; set the clock, or {_REMOVE}")
-            self._keep(file)
+                raise TelemetryError(f"{file}: is {ahead:.0f} s ahead of the clock; set the clock, or {_REMEDY}")
+            self._save(file)
         except OSError as error:
-            raise TelemetryError(f"{file}: timestamps cannot be kept: {error.strerror or error}") from error
+            raise TelemetryError(f"{file}: timestamps cannot be saved: {error.strerror or error}") from error
 
     @property
     def latest_accepted(self) -> int:
@@ -151,34 +153,36 @@ class SigningClock:
 
     def next(self) -> int:
         """Return the timestamp of the next frame."""
-        self.advance_to(min(max(self._last + 1, self.now), _LAST))
+        self.advance_to(min(max(self._last + 1, self.now), _MAX_TIMESTAMP))
         return self._last
 
     def advance_to(self, stamp: int) -> None:
         """Advance to a timestamp with a valid signature, or of a frame to be sent."""
         self._last = max(self._last, stamp)
-        if self._file is not None and self._last > self._kept:
+        if self._file is not None and self._last > self._saved:
             try:
-                self._keep(self._file)
+                self._save(self._file)
             except (OSError, TelemetryError) as error:  # the link goes on
-                log.warning("%s: after a restart, frames of now can be replayed: %s", self._file, error)
+                log.warning("%s: after a restart, today's frames can be replayed: %s", self._file, error)
                 self._file = None
 
-    def _keep(self, file: Path) -> None:
+    def _save(self, file: Path) -> None:
         """Write a timestamp ahead of the last one and the clock, unless another process has written a later one."""
-        self._kept = min(max(self._last + _STEP, self.latest_accepted - _MINUTE + _AHEAD), _LAST)
-        write_atomic(file, f"{max(self._kept, _read_timestamp(file))}\n")
+        self._saved = min(
+            max(self._last + _MIN_WRITE_AHEAD, self.latest_accepted - _MINUTE + _WRITE_AHEAD), _MAX_TIMESTAMP
+        )
+        write_atomic(file, f"{max(self._saved, _load_timestamp(file))}\n")
 
 
-def _read_timestamp(file: Path) -> int:
+def _load_timestamp(file: Path) -> int:
     """Return the timestamp of a file, 0 if there is no file."""
     try:
         with file.open("rb") as content:
             text = content.read(20).strip()
     except FileNotFoundError:
         return 0
-    if not text.isdigit() or int(text) > _LAST:
-        raise TelemetryError(f"{file}: holds no timestamp; {_REMOVE}")
+    if not text.isdigit() or int(text) > _MAX_TIMESTAMP:
+        raise TelemetryError(f"{file}: holds no timestamp; {_REMEDY}")
     return int(text)
 
 
@@ -198,35 +202,35 @@ class Verifier:
         self._clock: Final = clock
         self._latest: dict[tuple[int, int, int], int] = {}  # timestamps, by system, component and link
 
-    def check(self, frame: bytes, system: int, component: int, signed: bool) -> Refusal | None:
-        """Return the reason to refuse a frame, or None to accept it.
+    def check(self, frame: bytes, system: int, component: int, is_signed: bool) -> Rejection | None:
+        """Return the reason to reject a frame, or None to accept it.
 
         Only a frame with a valid signature updates the sender's last timestamp.
         """
-        if not signed:
-            return Refusal.UNSIGNED
-        digest = hashlib.sha256(self._key + frame[:-_HASH]).digest()
-        if not hmac.compare_digest(digest[:_HASH], frame[-_HASH:]):
-            return Refusal.FORGED
-        link = frame[-_SIGNATURE]
-        stamp = int.from_bytes(frame[-_HASH - _STAMP : -_HASH], "little")
+        if not is_signed:
+            return Rejection.UNSIGNED
+        digest = hashlib.sha256(self._key + frame[:-_HASH_SIZE]).digest()
+        if not hmac.compare_digest(digest[:_HASH_SIZE], frame[-_HASH_SIZE:]):
+            return Rejection.FORGED
+        link = frame[-_SIGNATURE_SIZE]
+        stamp = int.from_bytes(frame[-_HASH_SIZE - _STAMP_SIZE : -_HASH_SIZE], "little")
         sender = (system, component, link)
         latest = self._latest.get(sender)
         if latest is not None and stamp <= latest:
-            return Refusal.REPLAYED
+            return Rejection.REPLAYED
         if stamp > self._clock.latest_accepted:  # it would make later valid frames look old
-            return Refusal.AHEAD
+            return Rejection.AHEAD
         oldest = self._clock.now - _MINUTE
         if latest is None and (stamp < oldest or stamp <= self._clock.floor):
-            return Refusal.OLD
-        if latest is None and len(self._latest) >= STREAMS and not self._forget(oldest):
-            return Refusal.CROWDED
+            return Rejection.OLD
+        if latest is None and len(self._latest) >= MAX_STREAMS and not self._drop_stale_sender(oldest):
+            return Rejection.CROWDED
         self._latest[sender] = stamp
         self._clock.advance_to(stamp)
         return None
 
-    def _forget(self, oldest: int) -> bool:
-        """Remove the sender silent for longest, if its frames would be refused as too old; return True if removed."""
+    def _drop_stale_sender(self, oldest: int) -> bool:
+        """Remove the sender silent for longest, if its frames would be rejected as too old; return True if removed."""
         sender = min(self._latest, key=self._latest.__getitem__)
         if self._latest[sender] >= oldest:
             return False

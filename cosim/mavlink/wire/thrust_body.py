@@ -8,11 +8,11 @@ from typing import Any
 THRUST_BODY_SET = 1 << 5  # type_mask
 
 _FIELD = struct.Struct("<3f")
-_AT = 39  # offset of the field in the payload
-_HEADER = 10  # bytes of a header of MAVLink 2
+_OFFSET = 39  #  offset of the field in the payload
+_HEADER_SIZE = 10  # bytes of a header of MAVLink 2
 
 
-def with_thrust_body(mavlink: Any, *fields: Any, thrust_body: tuple[float, float, float]) -> Any:
+def make_attitude_target(mavlink: Any, *fields: Any, thrust_body: tuple[float, float, float]) -> Any:
     """Return SET_ATTITUDE_TARGET with a thrust along each body axis [-].
 
     Parameters
@@ -22,7 +22,7 @@ def with_thrust_body(mavlink: Any, *fields: Any, thrust_body: tuple[float, float
     fields
         Fields of the message before the extension, in pymavlink's order.
     thrust_body : tuple of float
-        Fractions of the greatest thrust ahead, right and down [-], -1 to 1.
+        Fractions of the maximum thrust ahead, right and down [-], -1 to 1.
 
     Returns
     -------
@@ -30,23 +30,23 @@ def with_thrust_body(mavlink: Any, *fields: Any, thrust_body: tuple[float, float
         The message, whose frame in MAVLink 2 ends with the extension.
     """
     message = mavlink.MAVLink_set_attitude_target_message(*fields)
-    whole = message.pack
+    pack_message = message.pack
 
     def pack(mav: Any, force_mavlink1: bool = False) -> Any:
-        framed, extension = message._pack, b"" if force_mavlink1 else _FIELD.pack(*thrust_body)
-        message._pack = lambda mav, crc, payload, **more: framed(mav, crc, payload + extension, **more)
+        frame, extension = message._pack, b"" if force_mavlink1 else _FIELD.pack(*thrust_body)
+        message._pack = lambda mav, crc, payload, **options: frame(mav, crc, payload + extension, **options)
         try:
-            return whole(mav, force_mavlink1)
+            return pack_message(mav, force_mavlink1)
         finally:
-            message._pack = framed
+            message._pack = frame
 
     message.pack = pack
     return message
 
 
-def thrust_body_of(message: Any) -> tuple[float, float, float]:
+def get_thrust_body(message: Any) -> tuple[float, float, float]:
     """Return the thrust along each body axis [-] of a received SET_ATTITUDE_TARGET; 0 where the field is missing."""
     frame = bytes(message.get_msgbuf() or b"")
-    payload = frame[_HEADER : _HEADER + frame[1]] if len(frame) > _HEADER else b""
-    ahead, right, down = _FIELD.unpack(payload[_AT : _AT + _FIELD.size].ljust(_FIELD.size, b"\0"))
+    payload = frame[_HEADER_SIZE : _HEADER_SIZE + frame[1]] if len(frame) > _HEADER_SIZE else b""
+    ahead, right, down = _FIELD.unpack(payload[_OFFSET : _OFFSET + _FIELD.size].ljust(_FIELD.size, b"\0"))
     return ahead, right, down

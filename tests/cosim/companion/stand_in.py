@@ -12,7 +12,7 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.vehicle.profile import PROFILES
-from cosim.mavlink.wire.ground_end import Heard
+from cosim.mavlink.wire.ground_end import ReceivedMessage
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import CommandQueue
@@ -93,7 +93,7 @@ class StandIn:
         while self._down and self._down[0][0] <= self.clock():
             _, message = self._down.popleft()
             sender = message.get_srcSystem(), message.get_srcComponent()
-            heard.append(Heard(self.clock(), *sender, 0, message.get_type(), message))
+            heard.append(ReceivedMessage(self.clock(), *sender, 0, message.get_type(), message))
         return heard
 
     def send(self, message):

@@ -8,15 +8,15 @@ from pymavlink.dialects.v20 import all as mavlink
 from scipy.spatial.transform import Rotation
 
 from controller.laws.deployable.gains import SPREADS
-from cosim.companion.companion import Companion, scenario_to_steer
+from cosim.companion.companion_options import CompanionOptions
+from cosim.companion.companion_run import Companion, scenario_to_steer
 from cosim.companion.frame_alignment import SceneOrigin
-from cosim.companion.options import CompanionOptions
 from cosim.companion.safety import CONDITIONS, MEANINGS, STATES
 from cosim.errors import RunError
 from cosim.live.address import parse_live
-from cosim.live.view import LiveView
+from cosim.live.live_view import LiveView
 from cosim.mavlink.wire.options import ORIGIN
-from cosim.mavlink.wire.thrust_body import thrust_body_of
+from cosim.mavlink.wire.thrust_body import get_thrust_body
 from cosim.results.run_result import load_run
 from cosim.run.run_folder import report_again
 from cosim.scenario.scenario import load_scenario
@@ -308,8 +308,8 @@ def test_a_px4_that_refuses_hold_gets_no_forces_any_more(tmp_path):
     assert flight.status == "held: stale estimate"
     since = flight.time_of("held")
     targets = flight.sent_after(since - 0.01, "SET_ATTITUDE_TARGET")
-    assert targets and all(thrust_body_of(target) == (0.0, 0.0, 0.0) for target in targets)
-    assert any(any(thrust_body_of(m)) for m in flight.sent_after(0.0, "SET_ATTITUDE_TARGET"))
+    assert targets and all(get_thrust_body(target) == (0.0, 0.0, 0.0) for target in targets)
+    assert any(any(get_thrust_body(m)) for m in flight.sent_after(0.0, "SET_ATTITUDE_TARGET"))
 
 
 @pytest.mark.medium
@@ -449,7 +449,7 @@ def test_conflicting_system_id_is_reported_once(tmp_path, caplog):
     flight = Flight(tmp_path, 4.0, link=link, events=told)
     assert flight.status == "completed"
     assert [r.getMessage() for r in caplog.records if "compete" in r.getMessage()] == [
-        "component 190 has the companion's system id 255: its sticks compete; give it another"
+        "component 190 has the companion's system id 255: its sticks compete; change its system id"
     ]
 
 
@@ -472,7 +472,7 @@ def test_documented_tables_match_the_code():
     page = (ROOT / "docs" / "howto" / "companion.md").read_text()
     for condition in CONDITIONS:
         limit = f"{condition.limit:g} {condition.unit}" if condition.unit else "any"
-        assert f"| {condition.name} | {limit} | {condition.words} | {condition.then} |" in page
+        assert f"| {condition.name} | {limit} | {condition.words} | {condition.next_state} |" in page
     for number, state in enumerate(STATES):
         assert f"| {number} | {state.replace('_', ' ')} | {MEANINGS[state]} |" in page
 

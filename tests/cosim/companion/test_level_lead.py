@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.companion.companion import scenario_to_steer
+from cosim.companion.companion_run import scenario_to_steer
 from cosim.companion.outputs import Output
 from cosim.companion.set_points import LevelLead
 from tests.cosim.companion.test_parts import HEAVY, VECTORED_6DOF, decoded, reported
@@ -32,7 +32,7 @@ def greatest_tilt(forces, leaning=True):
     inertia = (np.diag(HEAVY.inertia) + np.diag(HEAVY.added_mass)[3:])[:2]
     angle, rate, integral = np.zeros(2), np.zeros(2), np.zeros(2)
     for force in forces:
-        (message,) = output.messages(np.array([*force, 0.0, 0.0, 0.0]), state, period)
+        (message,) = output.make_messages(np.array([*force, 0.0, 0.0, 0.0]), state, period)
         m = decoded(message)
         asked = np.array([angle_of(m.t), angle_of(m.s)]) if leaning else np.zeros(2)
         for _ in range(4):
@@ -63,11 +63,11 @@ def test_leans_keep_an_ardusub_level_while_it_is_pushed(force):
 def test_leans_depend_on_neither_the_attitude_nor_the_law_s_moments(moment):
     wrench = np.array([20.0, -10.0, 5.0, *moment, 0.0])
     level, tilted = reported((0.0, 0.0, 0.0)), reported((0.0, 0.0, 0.0))
-    tilted.take(1, 1, mavlink.MAVLink_attitude_quaternion_message(0, 0.98, 0.2, 0.0, 0.0, 0.5, -0.4, 0.0), 0.0)
+    tilted.receive(1, 1, mavlink.MAVLink_attitude_quaternion_message(0, 0.98, 0.2, 0.0, 0.0, 0.5, -0.4, 0.0), 0.0)
     leans = []
     for state, given in ((level, np.array([20.0, -10.0, 5.0, 0.0, 0.0, 0.0])), (tilted, wrench)):
         output = Output(mavlink, HEAVY, "ardusub", "sticks", "rc-override", 1.0, (2.0, 0.5))
-        output.messages(given, state, 0.02)
+        output.make_messages(given, state, 0.02)
         leans.append(output.sticks[3:5].copy())
     assert leans[0] == pytest.approx(leans[1]) and np.abs(leans[0]).min() > 0.1
 

@@ -8,24 +8,24 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from cosim.companion.autopilot_link import NetworkLink
 from cosim.companion.clock_sync import ClockSync
-from cosim.companion.companion import Companion
+from cosim.companion.companion_options import CompanionOptions
+from cosim.companion.companion_run import Companion
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
 from cosim.companion.heading import HeadingWatch, LevelDive
-from cosim.companion.link import NetworkLink
-from cosim.companion.options import CompanionOptions
-from cosim.companion.outputs import require_taken
+from cosim.companion.outputs import require_supported
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
-from cosim.companion.set_points import TurnLead, VelocityLead, attitude_target, velocity_target
-from cosim.companion.sticks import channels_override, channels_released, manual_control, scale_of
+from cosim.companion.set_points import TurnLead, VelocityLead, make_attitude_message, make_velocity_target
+from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels, release_channels
 from cosim.companion.vehicle_state import RATES, ReportedState
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.geodesy import LocalFrame
-from cosim.mavlink.vehicle.layout import euler_of
 from cosim.mavlink.vehicle.profile import PROFILES
+from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
 from cosim.mavlink.wire.endpoint import parse_endpoint
-from cosim.mavlink.wire.thrust_body import thrust_body_of
+from cosim.mavlink.wire.thrust_body import get_thrust_body
 from cosim.simulation.commands.commands import ManualControl
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station, scenario
@@ -43,16 +43,16 @@ def test_clock_offset_uses_the_fastest_answer():
     assert math.isnan(sync.offset)
     for sent, took, skew in ((10.0, 0.100, 0.03), (11.0, 0.004, 0.0), (12.0, 0.060, -0.02)):
         stamp = sync.request(sent)
-        sync.take(round((sent + took / 2 + skew - 3.0) * 1e9), stamp, sent + took)
+        sync.add_answer(round((sent + took / 2 + skew - 3.0) * 1e9), stamp, sent + took)
     assert sync.offset == pytest.approx(3.0, abs=1e-6) and sync.round_trip == pytest.approx(0.004)
-    sync.take(5_000_000_000, 123, 13.0)  # nobody asked for it
+    sync.add_answer(5_000_000_000, 123, 13.0)  # nobody asked for it
     assert sync.offset == pytest.approx(3.0, abs=1e-6)
 
 
 def test_autopilot_restart_resets_the_clock_offset():
     sync = ClockSync()
     for sent, boot in ((10.0, 500.0), (11.0, 501.0), (12.0, 0.5)):
-        sync.take(round(boot * 1e9), sync.request(sent - 0.005), sent + 0.005)
+        sync.add_answer(round(boot * 1e9), sync.request(sent - 0.005), sent + 0.005)
     assert sync.offset == pytest.approx(11.5, abs=1e-6)
 
 
@@ -62,15 +62,15 @@ def test_autopilot_restart_resets_the_clock_offset():
 def reported(position, geodetic=None, depth=None, heard=0.0, state=None):
     state = state or ReportedState((255, 191))
     beat = mavlink.MAVLink_heartbeat_message(12, 3, 1, 0, 4, 3)
-    state.take(1, 1, beat, heard)
+    state.receive(1, 1, beat, heard)
     x, y, z = map(float, position)
-    state.take(1, 1, mavlink.MAVLink_local_position_ned_message(round(heard * 1e3), x, y, z, 0, 0, 0), heard)
+    state.receive(1, 1, mavlink.MAVLink_local_position_ned_message(round(heard * 1e3), x, y, z, 0, 0, 0), heard)
     if depth is not None:
         pressure = 1013.25 + 1000.0 * 9.80665 * depth / 100.0
-        state.take(1, 1, mavlink.MAVLink_scaled_pressure2_message(0, pressure, 0, 0), heard)
+        state.receive(1, 1, mavlink.MAVLink_scaled_pressure2_message(0, pressure, 0, 0), heard)
     if geodetic is not None:
         latitude, longitude, _ = geodetic
-        state.take(1, 1, mavlink.MAVLink_global_position_int_message(
+        state.receive(1, 1, mavlink.MAVLink_global_position_int_message(
             0, round(latitude * 1e7), round(longitude * 1e7), 0, 0, 0, 0, 0, 0), heard)  # fmt: skip
     return state
 
@@ -111,7 +111,7 @@ def test_inconsistent_positions_give_no_frame_offset():
 
 def test_full_surge_of_a_bluerov2_at_half_gain_is_28_newtons():
     """As a real ArduSub was measured to give; and no stick asks for more."""
-    scale = scale_of(HEAVY, ARDUSUB, 0.5, "manual-control")
+    scale = make_stick_scale(HEAVY, ARDUSUB, 0.5, "manual-control")
     sticks = scale.sticks(np.array([28.28, 0.0, 0.0, 0.0, 0.0, 0.0]))
     assert sticks[0] == pytest.approx(1.0, abs=0.01)
     assert np.abs(scale.sticks(np.full(6, -1e3))).max() <= 1.0
@@ -132,7 +132,7 @@ VECTORED_6DOF = np.array(
 )
 def test_ardusub_motor_mix_realizes_the_desired_wrench(wrench):
     """It adds the sticks in each motor, and its force goes with the square; our thrusters push the other way."""
-    scale = scale_of(HEAVY, ARDUSUB, 0.5, "manual-control")
+    scale = make_stick_scale(HEAVY, ARDUSUB, 0.5, "manual-control")
     sticks = scale.sticks(0.25 * np.array(wrench, dtype=float))
     pilot = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 0.5])  # the gain leaves roll and pitch alone
     motors = VECTORED_6DOF @ (pilot * sticks)
@@ -143,7 +143,7 @@ def test_ardusub_motor_mix_realizes_the_desired_wrench(wrench):
 @pytest.mark.parametrize("force", [(30.0, 60.0, 110.0), (100.0, 0.0, -150.0), (0.0, 90.0, 30.0)])
 def test_a_force_beyond_the_thrusters_leaves_the_moments_whole(force):
     """AP_Motors6DOF divides all that vertical, and all that horizontal motors are asked for by the greatest above 1."""
-    scale, moment = scale_of(HEAVY, ARDUSUB, 1.0, "manual-control"), np.array([5.0, -3.0, 1.0])
+    scale, moment = make_stick_scale(HEAVY, ARDUSUB, 1.0, "manual-control"), np.array([5.0, -3.0, 1.0])
     motors = VECTORED_6DOF @ scale.sticks(np.concatenate([force, moment]))
     for group in (slice(0, 4), slice(4, 8)):
         motors[group] /= max(1.0, np.abs(motors[group]).max())
@@ -157,9 +157,9 @@ def test_manual_control_realizes_the_desired_wrench(profile):
     """Through the vehicle's own service for sticks, whose parts of the greatest wrench the pilot's gain scales."""
     station = Station(profile, of=scenario("vehicle='bluerov2_heavy'", name="pipe-inspection"))
     station.look(1.0, **{"commands.mode": 0.0})
-    scale = scale_of(HEAVY, PROFILES[profile], 0.5, "manual-control")
+    scale = make_stick_scale(HEAVY, PROFILES[profile], 0.5, "manual-control")
     wrench = np.array([10.0, -5.0, 8.0, 0.5, -0.8, 1.2])
-    station.send(manual_control(mavlink, 1, PROFILES[profile], scale.sticks(wrench), all_axes=True))
+    station.send(make_manual_control(mavlink, 1, PROFILES[profile], scale.sticks(wrench), all_axes=True))
     (command,) = station.commanded()
     assert isinstance(command, ManualControl)
     assert 0.5 * np.array(command.wrench) / np.diag(scale.efforts) == pytest.approx(wrench, rel=0.02)
@@ -168,7 +168,7 @@ def test_manual_control_realizes_the_desired_wrench(profile):
 @pytest.mark.parametrize("sticks_by", ["manual-control", "rc-override"])
 def test_rate_sticks_realize_the_desired_rates_in_ardusub(sticks_by):
     """As its Sub::get_pilot_desired_climb_rate and pwm_to_angle_dz have it, at a pilot gain of 0.5."""
-    scale, gain = scale_of(HEAVY, ARDUSUB, 0.5, sticks_by), 0.5
+    scale, gain = make_stick_scale(HEAVY, ARDUSUB, 0.5, sticks_by), 0.5
     scaled = gain if sticks_by == "manual-control" else 1.0
     for rate in (0.02, -0.1, 0.2):
         throttle = 500.0 - 500.0 * scaled * scale.climb_stick(rate)
@@ -183,7 +183,7 @@ def test_rate_sticks_realize_the_desired_rates_in_ardusub(sticks_by):
 
 def test_rate_sticks_follow_the_parameters_of_the_autopilot():
     """As the same functions of ArduSub have it: by ACRO_YAW_P of 4.7, and by speeds of 2 m/s up and 1 m/s down."""
-    scale = scale_of(HEAVY, ARDUSUB, 1.0, "manual-control")
+    scale = make_stick_scale(HEAVY, ARDUSUB, 1.0, "manual-control")
     scale = scale.with_rates({"ACRO_YAW_P": 3.375, "PILOT_SPEED_UP": 200.0, "PILOT_SPEED_DN": 100.0})
     for rate, most in ((0.3, 1.0), (-0.3, 2.0)):
         throttle = 500.0 - 500.0 * scale.climb_stick(rate)
@@ -200,17 +200,17 @@ def test_rate_sticks_follow_the_parameters_of_the_autopilot():
 
 
 def test_rc_override_follows_the_ardusub_order_and_zero_releases():
-    message = decoded(channels_override(mavlink, 1, np.array([1.0, -1.0, 0.5, 0.25, -0.25, 0.1])))
+    message = decoded(override_channels(mavlink, 1, np.array([1.0, -1.0, 0.5, 0.25, -0.25, 0.1])))
     pulses = [getattr(message, f"chan{i}_raw") for i in range(1, 9)]
     assert pulses == [1400, 1600, 1300, 1540, 1900, 1100, 0xFFFF, 0xFFFF]  # pitch roll up yaw ahead right
-    message = decoded(channels_released(mavlink, 1))
+    message = decoded(release_channels(mavlink, 1))
     assert [getattr(message, f"chan{i}_raw") for i in range(1, 9)] == [0] * 6 + [0xFFFF] * 2
 
 
 @pytest.mark.parametrize("wrench", [(20, 0, 0, 0, 0, 0), (28, -20, 10, 0, 0, 1)])
 def test_rc_override_realizes_the_desired_wrench(wrench):
     """As sticks do, but for the pilot's gain, which does not scale them."""
-    sticks = scale_of(HEAVY, ARDUSUB, 0.5, "rc-override").sticks(np.array(wrench, dtype=float))
+    sticks = make_stick_scale(HEAVY, ARDUSUB, 0.5, "rc-override").sticks(np.array(wrench, dtype=float))
     motors = VECTORED_6DOF @ sticks
     made = HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
     assert made == pytest.approx(np.array(wrench), rel=0.01, abs=0.05)
@@ -220,10 +220,10 @@ def test_state_is_predicted_over_its_age():
     """A steady motion, 40 ms after its messages came, and with a stamp no older than that; no further than 0.1 s."""
     state = reported((1.0, 2.0, 3.0), heard=10.0)
     state.velocity[:], state.rates[:] = (0.5, 0.0, -0.25), (0.0, 0.0, 0.3)
-    state.take(1, 1, mavlink.MAVLink_attitude_quaternion_message(0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3), 10.0)
+    state.receive(1, 1, mavlink.MAVLink_attitude_quaternion_message(0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3), 10.0)
     position, quaternion = state.predict(10.04)
     assert position == pytest.approx([1.02, 2.0, 2.99])
-    assert euler_of(quaternion.tolist()) == pytest.approx((0.0, 0.0, 0.012))
+    assert quaternion_to_euler(quaternion.tolist()) == pytest.approx((0.0, 0.0, 0.012))
     assert state.predict(20.0)[0] == pytest.approx([1.05, 2.0, 2.975])
     never = ReportedState((255, 191))
     assert np.isnan(never.predict(0.0)[0]).all()
@@ -242,7 +242,7 @@ def test_state_is_predicted_over_its_age():
 )
 def test_unsupported_setpoints_are_rejected_by_name(profile, steer_by, sticks_by, word):
     with pytest.raises(RunError, match=word):
-        require_taken(profile, steer_by, sticks_by)
+        require_supported(profile, steer_by, sticks_by)
     with pytest.raises(RunError, match=word):
         Companion(scenario(name="pipe-inspection"), None, CompanionOptions(profile, steer_by, sticks_by))
 
@@ -257,22 +257,22 @@ def test_attitude_setpoint_leads_by_the_desired_moment():
     acceleration = (angle / 0.3 - state.rates) / 0.3
     assert acceleration * inertia == pytest.approx([0.1, 0.0, -0.2], abs=0.01)
     far = lead.attitude(np.array([0, 0, 0, 1e3, 0.0, 0.0]), state)
-    assert euler_of(far.tolist())[0] == pytest.approx(0.1)  # the autopilot keeps it level but for so much
+    assert quaternion_to_euler(far.tolist())[0] == pytest.approx(0.1)  # the autopilot keeps it level but for so much
     still = reported((0.0, 0.0, 0.0))
     assert lead.attitude(np.full(6, math.nan), still) == pytest.approx([1.0, 0.0, 0.0, 0.0])
-    assert euler_of(lead.attitude(np.array([0, 0, 0, 0, 0, 1e3]), still).tolist())[2] == pytest.approx(0.35)
+    assert quaternion_to_euler(lead.attitude(np.array([0, 0, 0, 0, 0, 1e3]), still).tolist())[2] == pytest.approx(0.35)
 
 
 def test_three_axis_thrust_uses_the_published_attitude_target_extension():
     """MAVLink's common.xml: three floats behind type_mask, which leave the checksum as it is."""
-    message = attitude_target(mavlink, 1, np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.25, -0.5, 0.125]))
+    message = make_attitude_message(mavlink, 1, np.array([1.0, 0.0, 0.0, 0.0]), np.array([0.25, -0.5, 0.125]))
     frame = message.pack(mavlink.MAVLink(None, 255, 191))
     assert frame[1] == 51 and struct.unpack("<3f", frame[10 + 39 : 10 + 51]) == (0.25, -0.5, 0.125)
     (found,) = mavlink.MAVLink(None).parse_buffer(frame)
-    assert found.type_mask == 0b100111 and thrust_body_of(found) == (0.25, -0.5, 0.125)
+    assert found.type_mask == 0b100111 and get_thrust_body(found) == (0.25, -0.5, 0.125)
     assert frame == message.pack(mavlink.MAVLink(None, 255, 191))  # it can be sent again
-    without = attitude_target(mavlink, 1, np.array([1.0, 0.0, 0.0, 0.0]), None)
-    assert decoded(without).type_mask == 0b1000111 and thrust_body_of(decoded(without)) == (0.0, 0.0, 0.0)
+    without = make_attitude_message(mavlink, 1, np.array([1.0, 0.0, 0.0, 0.0]), None)
+    assert decoded(without).type_mask == 0b1000111 and get_thrust_body(decoded(without)) == (0.0, 0.0, 0.0)
 
 
 def test_velocity_setpoint_leads_by_the_desired_acceleration():
@@ -285,9 +285,9 @@ def test_velocity_setpoint_leads_by_the_desired_acceleration():
     assert asked == pytest.approx([0.5 * 10.0 / (13.5 + 6.36), 0.0, 0.0])  # mass and added mass of the source
     assert asked_for(13.7 * 0.3 + 141.0 * 0.3**2, 0.3) == pytest.approx([0.3, 0.0, 0.0])
     assert asked_for(1e5, 0.0) == pytest.approx([0.8, 0.0, 0.0])
-    message = velocity_target(mavlink, 1, asked, 0.25)
+    message = make_velocity_target(mavlink, 1, asked, 0.25)
     assert message.type_mask == 0b010111000111 and message.yaw_rate == 0.25
-    assert velocity_target(mavlink, 1, asked, None).type_mask == 0b110111000111
+    assert make_velocity_target(mavlink, 1, asked, None).type_mask == 0b110111000111
     assert message.coordinate_frame == mavlink.MAV_FRAME_LOCAL_NED
 
 
@@ -324,10 +324,10 @@ def test_distance_without_a_fix_is_accumulated():
         [(0.0, absolute), (1.0, absolute), (2.0, relative), (4.0, relative), (9.0, absolute)]
     ):
         reported((north, 0.0, 4.0 * north / 3.0), heard=k * 0.02, state=state)
-        state.take(1, 1, mavlink.MAVLink_ekf_status_report_message(flags, *[0.0] * 5), k * 0.02)
+        state.receive(1, 1, mavlink.MAVLink_ekf_status_report_message(flags, *[0.0] * 5), k * 0.02)
         alignment.update(state, k * 0.02)
     assert alignment.reckoned == pytest.approx(3.0)
-    state.take(1, 1, mavlink.MAVLink_estimator_status_message(0, relative, *[0.0] * 8), 1.0)
+    state.receive(1, 1, mavlink.MAVLink_estimator_status_message(0, relative, *[0.0] * 8), 1.0)
     assert state.is_reckoned
 
 
@@ -337,12 +337,12 @@ def test_distance_without_a_fix_is_accumulated():
 def attitude(state, at, yaw, rate):
     """Report a yaw and its rate at a time since boot [s]."""
     turn = [math.cos(yaw / 2.0), 0.0, 0.0, math.sin(yaw / 2.0)]
-    state.take(1, 1, mavlink.MAVLink_attitude_quaternion_message(round(1000.0 * at), *turn, 0.0, 0.0, rate), at)
+    state.receive(1, 1, mavlink.MAVLink_attitude_quaternion_message(round(1000.0 * at), *turn, 0.0, 0.0, rate), at)
 
 
 def test_a_heading_leaps_where_the_rates_do_not_explain_its_turn():
     state, watch = ReportedState((255, 191)), HeadingWatch()
-    state.take(1, 1, mavlink.MAVLink_heartbeat_message(12, 3, 0, 0, 4, 3), 0.0)
+    state.receive(1, 1, mavlink.MAVLink_heartbeat_message(12, 3, 0, 0, 4, 3), 0.0)
     for k in range(100):  # a turn of 50 deg/s across 180 deg
         attitude(state, 0.02 * k, 3.0 + math.radians(k), math.radians(50.0))
         watch.update(state)
@@ -407,8 +407,8 @@ def test_steering_ends_only_beyond_a_condition_limit(condition):
     at_limit = Observation(0.0, True, True, True, True, {condition.name: condition.limit})
     assert supervisor.update(at_limit) == "steering"
     beyond = at_limit._replace(values={condition.name: condition.limit + 0.01})
-    assert supervisor.update(beyond) == condition.then and supervisor.reason == condition.name
-    assert supervisor.update(seen()) == condition.then  # until somebody resumes
+    assert supervisor.update(beyond) == condition.next_state and supervisor.reason == condition.name
+    assert supervisor.update(seen()) == condition.next_state  # until somebody resumes
     supervisor.resume()
     assert supervisor.update(seen()) == "steering" and supervisor.reason == ""
 
@@ -417,14 +417,14 @@ def test_supervisor_states_advance_in_order():
     supervisor, nothing = Supervisor(), Observation(0.0, False, False, False, False, {})
     known = {"has_state": True}
     expected = [
-        ({}, "waiting"), (known, "aligning"), (known | {"frame_known": True}, "disarmed"),
-        (known | {"frame_known": True, "is_armed": True}, "engaging"),
-        (known | {"frame_known": True, "is_armed": True, "in_mode": True}, "steering"),
+        ({}, "waiting"), (known, "aligning"), (known | {"is_aligned": True}, "disarmed"),
+        (known | {"is_aligned": True, "is_armed": True}, "engaging"),
+        (known | {"is_aligned": True, "is_armed": True, "is_in_mode": True}, "steering"),
     ]  # fmt: skip
     for changes, state in expected:
         assert supervisor.update(nothing._replace(**changes)) == state
-    all_known = nothing._replace(has_state=True, frame_known=True, is_armed=True)
-    dives = [all_known._replace(has_to_dive=True), all_known, all_known._replace(in_mode=True)]
+    all_known = nothing._replace(has_state=True, is_aligned=True, is_armed=True)
+    dives = [all_known._replace(needs_dive=True), all_known, all_known._replace(is_in_mode=True)]
     supervisor = Supervisor()
     assert [supervisor.update(seen) for seen in dives] == ["diving", "engaging", "steering"]
 
@@ -441,22 +441,22 @@ def test_supervisor_states_advance_in_order():
 )
 def test_deflected_foreign_sticks_count_as_a_pilot(system, component, x, z, counts):
     state = reported((0.0, 0.0, 0.0))
-    state.take(system, component, mavlink.MAVLink_manual_control_message(1, x, 0, z, 0, 0), 5.0)
+    state.receive(system, component, mavlink.MAVLink_manual_control_message(1, x, 0, z, 0, 0), 5.0)
     assert (state.pilot_at == 5.0) == counts
 
 
 def test_a_px4_mode_is_known_before_its_next_heartbeat():
     """It sends a heartbeat a second, and refuses an interval for them; a mode is waited for 0.8 s."""
-    state, offboard = reported((0.0, 0.0, 0.0)), PROFILES["px4"].numbers["reach"]
-    state.take(1, 1, mavlink.MAVLink_current_mode_message(0, offboard, offboard), 5.0)
+    state, offboard = reported((0.0, 0.0, 0.0)), PROFILES["px4"].custom_modes["reach"]
+    state.receive(1, 1, mavlink.MAVLink_current_mode_message(0, offboard, offboard), 5.0)
     assert state.mode == offboard
-    assert RATES[mavlink.MAVLINK_MSG_ID_CURRENT_MODE] >= 5.0
+    assert RATES["CURRENT_MODE"] >= 5.0
 
 
 def test_rc_override_counts_as_a_pilot():
     state = reported((0.0, 0.0, 0.0))
     pulses = [0, 0xFFFF, 1500, 1500, 1700, 0, 0, 0]
-    state.take(255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, *pulses), 6.0)
+    state.receive(255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, *pulses), 6.0)
     assert state.pilot_at == 6.0
 
 
@@ -475,13 +475,13 @@ def decoded(message):
 def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     failsafes = Failsafes("ardusub")
     assert not failsafes.is_read(0.0)
-    asked = [len(failsafes.wanted(0.25 * k)) for k in range(9)]
+    asked = [len(failsafes.names_to_request(0.25 * k)) for k in range(9)]
     assert asked == [22, 0, 22, 0, 22, 0, 22, 0, 22]
     values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": float("nan")}
     for name, value in values.items():
-        failsafes.take(decoded(value_of(name, value)))
-    assert "FS_GCS_ENABLE" not in failsafes.wanted(2.5)
-    assert not failsafes.is_read(3.0) and failsafes.is_read(3.1) and not failsafes.wanted(4.0)
+        failsafes.receive(decoded(value_of(name, value)))
+    assert "FS_GCS_ENABLE" not in failsafes.names_to_request(2.5)
+    assert not failsafes.is_read(3.0) and failsafes.is_read(3.1) and not failsafes.names_to_request(4.0)
     first, second, silent = failsafes.text()
     assert first == "FS_GCS_ENABLE 2: on a ground station that falls silent it disarms"
     assert second == "FS_GCS_TIMEOUT 5: s until then"
@@ -491,10 +491,10 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
 def test_missing_failsafe_and_ignored_station_are_reported():
     failsafes = Failsafes("ardusub")
     for name in ("FS_PILOT_INPUT", "FS_GCS_ENABLE"):
-        failsafes.take(decoded(value_of(name, 0.0)))
-    assert failsafes.text()[-1].startswith("WARNING: nothing is known to follow if the companion dies")
+        failsafes.receive(decoded(value_of(name, 0.0)))
+    assert failsafes.text()[-1].startswith("WARNING: no reaction is known if the companion fails")
     assert failsafes.ignored_sticks(255) == ""
-    failsafes.take(decoded(value_of("SYSID_MYGCS", 250.0)))
+    failsafes.receive(decoded(value_of("SYSID_MYGCS", 250.0)))
     assert failsafes.ignored_sticks(250) == "" and "SYSID_MYGCS is 250" in failsafes.ignored_sticks(255)
 
 
@@ -504,7 +504,7 @@ def test_missing_failsafe_and_ignored_station_are_reported():
 def test_sticks_that_outlast_a_cut_link_by_more_than_a_second_are_warned_of(override, pilot, warns):
     failsafes = Failsafes("ardusub")
     for name, value in (("FS_GCS_ENABLE", 2.0), ("RC_OVERRIDE_TIME", override), ("FS_PILOT_TIMEOUT", pilot)):
-        failsafes.take(decoded(value_of(name, value)))
+        failsafes.receive(decoded(value_of(name, value)))
     said = f"RC_OVERRIDE_TIME is {override:g}, FS_PILOT_TIMEOUT is {pilot:g}; expected 1 s or less"
     assert any(line.startswith("WARNING") and line.endswith(said) for line in failsafes.text()) == warns
 
@@ -513,14 +513,14 @@ def test_an_ardusub_that_learns_the_magnetic_field_is_known():
     failsafes = Failsafes("ardusub")
     assert not failsafes.learns_magnetic_field()  # nobody knows
     for value, learns in ((3.0, True), (2.0, False)):
-        failsafes.take(decoded(value_of("EK3_MAG_CAL", value)))
+        failsafes.receive(decoded(value_of("EK3_MAG_CAL", value)))
         assert failsafes.learns_magnetic_field() == learns
 
 
 def test_px4_integer_parameters_are_decoded_from_bits():
     failsafes = Failsafes("px4")
     (bits,) = struct.unpack("<f", struct.pack("<i", 3))
-    failsafes.take(decoded(value_of("NAV_RCL_ACT", bits, kind=6)))
+    failsafes.receive(decoded(value_of("NAV_RCL_ACT", bits, kind=6)))
     assert failsafes.values == {"NAV_RCL_ACT": 3.0}
 
 
@@ -528,23 +528,23 @@ def test_px4_integer_parameters_are_decoded_from_bits():
 def test_a_px4_without_sticks_that_keeps_its_last_forces_for_ever_is_warned_of(lost, sticks, warns):
     """As a PX4 did: NAV_RCL_ACT counts where COM_OBL_RC_ACT names a mode that needs sticks."""
     failsafes = Failsafes("px4")
-    failsafes.take(decoded(value_of("COM_OF_LOSS_T", 1.0)))
+    failsafes.receive(decoded(value_of("COM_OF_LOSS_T", 1.0)))
     for name, value in (("COM_OBL_RC_ACT", lost), ("NAV_RCL_ACT", sticks)):
         (bits,) = struct.unpack("<f", struct.pack("<i", value))
-        failsafes.take(decoded(value_of(name, bits, kind=6)))
+        failsafes.receive(decoded(value_of(name, bits, kind=6)))
     assert any("the last forces act for ever" in line for line in failsafes.text()) == warns
 
 
 def test_a_px4_that_does_not_give_the_full_force_is_warned_of():
     """And no value of COM_OBL_RC_ACT means that nothing follows: PX4's 0 is its mode Position."""
     failsafes = Failsafes("px4")
-    assert failsafes.text()[-1].startswith("WARNING: nothing is known to follow if the companion dies: COM_OF_LOSS_T")
+    assert failsafes.text()[-1].startswith("WARNING: no reaction is known if the companion fails: COM_OF_LOSS_T")
     (none,) = struct.unpack("<f", struct.pack("<i", 0))
-    failsafes.take(decoded(value_of("COM_OF_LOSS_T", 1.0)))
-    failsafes.take(decoded(value_of("COM_OBL_RC_ACT", none, kind=6)))
+    failsafes.receive(decoded(value_of("COM_OF_LOSS_T", 1.0)))
+    failsafes.receive(decoded(value_of("COM_OBL_RC_ACT", none, kind=6)))
     assert "COM_OBL_RC_ACT 0: on lost set-points it changes to Position" in failsafes.text()
     for part, warned in ((0.1, True), (1.0, False)):
-        failsafes.take(decoded(value_of("UUV_THRUST_SAT", part)))
+        failsafes.receive(decoded(value_of("UUV_THRUST_SAT", part)))
         assert any("WARNING" in line for line in failsafes.text()) == warned
 
 

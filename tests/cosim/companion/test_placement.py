@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.companion.companion import Companion
+from cosim.companion.companion_options import CompanionOptions
+from cosim.companion.companion_run import Companion
 from cosim.companion.frame_alignment import SceneOrigin
-from cosim.companion.options import CompanionOptions
-from cosim.companion.placement import FARTHEST, Placement
+from cosim.companion.placement import MAX_DISTANCE, Placement
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.wire.options import ORIGIN
@@ -52,7 +52,7 @@ def wrong_origins():
 def test_wrong_sign_or_digit_leaves_the_vehicle_far_from_the_scene(origin):
     north, east, _ = LocalFrame(*origin).to_local(*ORIGIN, 0.0)
     here = np.add(SCENE.initial.position, (north, east, 0.0))
-    assert Placement(SCENE).distance(here) > FARTHEST
+    assert Placement(SCENE).distance(here) > MAX_DISTANCE
 
 
 @pytest.mark.parametrize("name", list_scenarios())

@@ -184,7 +184,7 @@ def test_full_disk_is_reported_and_leaves_no_file(run, tmp_path, monkeypatch, to
 
 
 def test_incomplete_tlog_is_discarded(run, tmp_path, monkeypatch):
-    monkeypatch.setattr("cosim.mavlink.channels.tlog.Tlog.send", lambda channel, _: channel.trouble.update(lost=1))
+    monkeypatch.setattr("cosim.mavlink.channels.tlog_file.Tlog.send", lambda channel, _: channel.trouble.update(lost=1))
     with pytest.raises(ExportError, match="not all was written"):
         export_run(run, "tlog", tmp_path / "out.tlog")
     assert not list(tmp_path.iterdir())

@@ -9,7 +9,7 @@ import pytest
 from websockets.sync.client import connect
 
 from cosim.live.address import parse_live
-from cosim.live.view import LiveView
+from cosim.live.live_view import LiveView
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
 from tests.threads import ended

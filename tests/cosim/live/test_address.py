@@ -9,10 +9,10 @@ from cosim.live.address import LiveAddress, foreign_origin, open_socket, parse_l
 
 
 def test_an_address_is_a_port_or_a_host_with_one():
-    assert parse_live("") == LiveAddress("127.0.0.1", "127.0.0.1", 8765, insisted=False, loopback=True)
-    assert parse_live("9000").port == 9000 and parse_live("9000").insisted
+    assert parse_live("") == LiveAddress("127.0.0.1", "127.0.0.1", 8765, is_fixed_port=False, is_loopback=True)
+    assert parse_live("9000").port == 9000 and parse_live("9000").is_fixed_port
     assert parse_live("localhost:0").ip == "127.0.0.1"
-    assert not parse_live("0.0.0.0:9000", allow_remote=True).loopback
+    assert not parse_live("0.0.0.0:9000", allow_remote=True).is_loopback
 
 
 @pytest.mark.parametrize(
@@ -63,7 +63,7 @@ def test_foreign_origins_are_rejected(host, origin):
 
 
 def test_remote_host_header_must_be_an_address_or_own_name():
-    there = LiveAddress("0.0.0.0", "0.0.0.0", 8765, loopback=False)
+    there = LiveAddress("0.0.0.0", "0.0.0.0", 8765, is_loopback=False)
     assert foreign_origin(there, "192.0.2.7:8765", "http://192.0.2.7:8765") is None
     assert foreign_origin(there, f"{socket.gethostname()}:8765", None) is None
     assert foreign_origin(there, "evil.example:8765", None)
@@ -73,6 +73,6 @@ def test_occupied_port_is_an_error_only_if_requested():
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         with pytest.raises(TelemetryError, match=f"127.0.0.1:{port} cannot be opened"):
-            open_socket(LiveAddress(port=port, insisted=True))
+            open_socket(LiveAddress(port=port, is_fixed_port=True))
         with open_socket(LiveAddress(port=port)) as other:
             assert other.getsockname()[1] != port

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cosim.live.history import _NEW, History
+from cosim.live.history import _MAX_NEW, History
 
 
 def all_since(history, number, most):
@@ -29,7 +29,7 @@ def filled(count, most):
 def test_old_rows_are_thinned_evenly_and_new_rows_are_kept(count, most, at_once, part):
     history = filled(count, most)
     rows = all_since(history, 0, at_once)
-    new = max(0, count - _NEW)
+    new = max(0, count - _MAX_NEW)
     old = rows[rows <= new]
     assert rows[rows > new].tolist() == list(range(new + 1, count + 1))
     assert len(old) <= most and (not new or old[0] == 1)

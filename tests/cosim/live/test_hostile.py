@@ -14,7 +14,7 @@ from websockets.sync.client import connect
 
 from cosim.live.command_desk import MAX_LENGTH
 from cosim.live.hub import Cursor, Hub
-from cosim.live.server import CONNECTIONS
+from cosim.live.view_server import MAX_CONNECTIONS
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
@@ -156,12 +156,12 @@ def test_excess_connections_are_closed_to_preserve_file_descriptors(live):
     with contextlib.ExitStack() as stack:
         idle = [
             stack.enter_context(socket.create_connection((host, int(port)), timeout=WAIT))
-            for _ in range(2 * CONNECTIONS)
+            for _ in range(2 * MAX_CONNECTIONS)
         ]
-        for late in idle[CONNECTIONS:]:
+        for late in idle[MAX_CONNECTIONS:]:
             with contextlib.suppress(ConnectionResetError):
                 assert late.recv(1) == b""
-        for early in idle[:CONNECTIONS]:
+        for early in idle[:MAX_CONNECTIONS]:
             early.setblocking(False)
             with pytest.raises(BlockingIOError):
                 early.recv(1)
@@ -200,7 +200,7 @@ def test_changes_of_regions_for_late_viewers_are_bounded_and_end_in_the_present_
         return texts
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("cosim.live.hub._CHANGES", 8)
+        patch.setattr("cosim.live.hub._MAX_CHANGES", 8)
         read(early)
         for k, (region, looks) in enumerate(changes):
             everything.append((names[region], k + 1.0))

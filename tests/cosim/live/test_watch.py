@@ -155,7 +155,7 @@ def test_missing_run_or_server_is_reported():
 
 
 def test_run_killed_before_its_first_rows_does_not_block_watch(paper, tmp_path, monkeypatch):
-    monkeypatch.setattr("cosim.live.watching.sources._FRESH", 0.0)
+    monkeypatch.setattr("cosim.live.watching.run_views._FRESH", 0.0)
     (tmp_path / PARTS).mkdir()
     shutil.copy(paper.folder / SCENARIO, tmp_path)
     (look,) = looks(str(tmp_path), once=True)

@@ -7,7 +7,7 @@ import time
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.channels.udp import UdpOut
-from cosim.mavlink.wire.framing import Counts, Gate
+from cosim.mavlink.wire.framing import FrameFilter, RxStats
 from cosim.mavlink.wire.link import Link
 
 SOURCE = (1, 1)
@@ -79,22 +79,22 @@ class Station:
         return self.codec.parse_buffer(data) or []
 
 
-def open_gate(verifier=None, own=SOURCE, allowed=None):
-    return Gate(Counts(), own, allowed, verifier)
+def open_filter(verifier=None, own=SOURCE, allowed=None):
+    return FrameFilter(RxStats(), own, allowed, verifier)
 
 
 def link_of(channel, **options):
-    return Link("test", channel, open_gate(), SOURCE, **options)
+    return Link("test", channel, open_filter(), SOURCE, **options)
 
 
 def udp_link(port, **options):
     return link_of(UdpOut("127.0.0.1", port), **options)
 
 
-def tended(link, message):
+def send_now(link, message):
     """Send a message at once; return whether there was room for it."""
     sent = link.send(message)
-    link.channel.tend(time.monotonic())
+    link.channel.poll(time.monotonic())
     return sent
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.companion.set_points import attitude_target
+from cosim.companion.set_points import make_attitude_message
 from cosim.simulation.commands.commands import SetAttitude, SetTarget
 from tests.cosim.mavlink.station import NAN, Station
 
@@ -41,14 +41,14 @@ def test_thrust_is_a_climb_rate_in_ardusub_guided(thrust, rate):
 
 def test_attitude_target_without_thrust_leaves_force_to_sticks_in_alt_hold():
     made = station("ardusub", DEPTH_HOLD)
-    made.send(attitude_target(mavlink, 1, np.array(TURNED), None))
+    made.send(make_attitude_message(mavlink, 1, np.array(TURNED), None))
     assert commands_of(made) == [(TURNED, None, None)]
 
 
 @pytest.mark.parametrize("profile", ["px4", "generic"])
 def test_three_axis_thrust_acts_in_px4_offboard(profile):
     made = station(profile, REACH)
-    made.send(attitude_target(mavlink, 1, np.array(TURNED), np.array([0.25, -0.5, 0.0])))
+    made.send(make_attitude_message(mavlink, 1, np.array(TURNED), np.array([0.25, -0.5, 0.0])))
     made.send(target(thrust=0.125))  # which an underwater vehicle's PX4 takes for one ahead
     assert [force for _, force, _ in commands_of(made)] == [(0.25, -0.5, 0.0), (0.125, 0.0, 0.0)]
 

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.mavlink.messages import MESSAGES
+from cosim.mavlink.messages.message_table import message_specs
 from cosim.mavlink.wire.options import PROFILES
 from tests.cosim.mavlink.station import AT, COLUMNS, Station, Wire, row
 from tests.examples import examples
@@ -140,7 +140,7 @@ def test_no_row_value_raises_an_exception(stations, bits, spoiled, often):
     for station in stations:
         for given_row in (whole, some):
             station.autopilot.observe(given_row)
-            for message_id in MESSAGES:
+            for message_id in message_specs():
                 station.send(mavlink.MAVLink_command_long_message(1, 1, 512, 0, message_id, 0, 0, 0, 0, 0, 0))
         station.wire.clear()
 
@@ -279,7 +279,7 @@ def test_run_restart_is_announced():
     station = Station()
     station.look(5.0)
     station.look(0.0)
-    assert "The run begins again" in station.wire.texts
+    assert "The run has restarted" in station.wire.texts
     station.wire.clear()
     for k in range(1, 101):
         station.look(0.01 * k)
@@ -301,7 +301,7 @@ def test_commands_between_runs_are_rejected(last):
     assert station.send(radius)[-1].param_value == before.param_value
     assert station.commanded() == []
     station.look(0.0)
-    assert "The run begins again" in station.wire.texts
+    assert "The run has restarted" in station.wire.texts
     assert station.command(400, 1.0) == accepted
     assert station.send(radius)[-1].param_value == 0.75
     assert len(station.commanded()) == 2

@@ -14,14 +14,14 @@ from cosim.mavlink.channels import stream, tcp, udp
 from cosim.mavlink.channels.serial import Serial
 from cosim.mavlink.channels.stream import Outgoing
 from cosim.mavlink.channels.tcp import TcpIn, TcpOut
-from cosim.mavlink.channels.tlog import Tlog
+from cosim.mavlink.channels.tlog_file import Tlog
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
-from cosim.mavlink.setup import max_lead
+from cosim.mavlink.run_links import max_lead
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import load_scenario
-from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, link_of, mavlink, odometry, tended, until
+from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, link_of, mavlink, odometry, send_now, until
 
 HERE = "127.0.0.1"
 
@@ -48,7 +48,7 @@ def closed_port():
 def test_udpout_accepts_only_its_configured_peer():
     with udp_socket() as peer, udp_socket() as foreign:
         link = link_of(UdpOut(*peer.getsockname()))
-        tended(link, heartbeat())
+        send_now(link, heartbeat())
         data, address = peer.recvfrom(1000)
         assert Station().parse(data)[0].get_type() == "HEARTBEAT"
         foreign.sendto(Station().pack(attitude(1)), address)
@@ -61,15 +61,15 @@ def test_udpout_survives_absent_peer_and_late_peer_receives_frames():
     port = closed_port()
     link = link_of(UdpOut(HERE, port))
     for _ in range(50):
-        assert tended(link, heartbeat())
+        assert send_now(link, heartbeat())
         assert not received(link)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as late:
         late.bind((HERE, port))
         late.settimeout(60.0)
-        tended(link, attitude(7))
+        send_now(link, attitude(7))
         assert Station().parse(late.recv(1000))[0].time_boot_ms == 7
     link.channel.close()
-    assert not link.troubles()
+    assert not link.loss_reports()
 
 
 def test_udpin_sends_to_peers_with_accepted_frames():
@@ -82,7 +82,7 @@ def test_udpin_sends_to_peers_with_accepted_frames():
         bad.sendto(b"\xfd\xff\x00", to)
         bad.sendto(Station(1, 1).pack(heartbeat()), to)  # as if it were we
         assert until(lambda: not received(link) and len(link.channel.peers) == 2)
-        tended(link, attitude(1))
+        send_now(link, attitude(1))
         assert good.recv(1000) == other.recv(1000)
         bad.setblocking(False)
         with pytest.raises(BlockingIOError):
@@ -101,7 +101,7 @@ def test_udp_peers_are_answered_in_their_mavlink_version():
         rates = mavlink.MAVLink_scaled_imu2_message(5, 1, 2, 3, 4, 5, 6, 7, 8, 9, temperature=1234)
         for message in (attitude(1), mavlink.MAVLink_current_mode_message(0, 4, 4), rates):
             link.send(message)
-        link.channel.tend(time.monotonic())
+        link.channel.poll(time.monotonic())
         data = old.recv(1000)
         assert data[0] == 0xFE
         decoded = v10.MAVLink(None).parse_buffer(data)
@@ -111,7 +111,7 @@ def test_udp_peers_are_answered_in_their_mavlink_version():
         assert packet[0] == 0xFD and [m.get_seq() for m in Station().parse(packet)] == [0, 1, 2]
         old.sendto(old_side.pack(heartbeat()), to)  # it can speak the newer one after all
         received(link)
-        tended(link, heartbeat())
+        send_now(link, heartbeat())
         assert old.recv(1000)[0] == 0xFD
     link.channel.close()
 
@@ -122,23 +122,23 @@ def test_tcp_client_is_answered_in_its_mavlink_version():
     side.settimeout(60.0)
     side.sendall(Station().pack(heartbeat(), v1=True))
     assert until(lambda: received(link))
-    tended(link, attitude(3))
+    send_now(link, attitude(3))
     assert v10.MAVLink(None).parse_buffer(side.recv(1000))[0].time_boot_ms == 3
     side.close()
     link.channel.close()
 
 
 def test_peer_count_is_bounded_and_silent_peers_expire():
-    link, sockets = link_of(UdpIn(HERE, 0)), [udp_socket() for _ in range(udp.PEERS + 2)]
+    link, sockets = link_of(UdpIn(HERE, 0)), [udp_socket() for _ in range(udp.MAX_PEERS + 2)]
     for one in sockets:
         one.sendto(Station().pack(heartbeat()), (HERE, link.channel.port))
     assert len(received(link)) == len(sockets)  # all are accepted, though not all can be answered
-    assert len(link.channel.peers) == udp.PEERS
-    assert link.troubles() == ["2 frames of peers beyond 8"]
+    assert len(link.channel.peers) == udp.MAX_PEERS
+    assert link.loss_reports() == ["2 frames of peers beyond 8"]
     now = time.monotonic()
-    link.channel.tend(now)
-    assert len(link.channel.peers) == udp.PEERS
-    link.channel.tend(now + udp.SILENCE + 1.0)
+    link.channel.poll(now)
+    assert len(link.channel.peers) == udp.MAX_PEERS
+    link.channel.poll(now + udp.PEER_TIMEOUT + 1.0)
     assert not link.channel.peers
     for one in sockets:
         one.close()
@@ -163,7 +163,7 @@ def test_occupied_ports_give_one_line_error():
 
 def connected(channel, clients=1):
     found = [socket.create_connection((HERE, channel.port), 2.0) for _ in range(clients)]
-    assert until(lambda: channel.tend(time.monotonic()) or len(channel.clients) == clients)
+    assert until(lambda: channel.poll(time.monotonic()) or len(channel.clients) == clients)
     return found
 
 
@@ -188,7 +188,7 @@ def drained(client):
 def test_server_receives_from_all_clients():
     link = link_of(TcpIn(HERE, 0))
     a, b = connected(link.channel, 2)
-    tended(link, attitude(1))
+    send_now(link, attitude(1))
     assert a.recv(1000) == b.recv(1000)
     pieces = Station().pack(attitude(5)), Station(254).pack(attitude(6))
     a.sendall(pieces[0][:20])
@@ -207,7 +207,7 @@ def test_disconnected_client_is_removed():
     for _ in range(3):
         (client,) = connected(link.channel)
         client.close()
-        assert until(lambda: not (received(link) or link.channel.tend(time.monotonic()) or link.channel.clients))
+        assert until(lambda: not (received(link) or link.channel.poll(time.monotonic()) or link.channel.clients))
     assert link.send(heartbeat())
     link.channel.close()
 
@@ -218,23 +218,25 @@ def test_client_reset_during_send_is_removed():
     client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\x00\x00\x00\x00\x00\x00\x00")
     client.close()
     for i in range(20):
-        tended(link, attitude(i))
-    link.channel.tend(time.monotonic())
-    link.channel.tend(time.monotonic())
+        send_now(link, attitude(i))
+    link.channel.poll(time.monotonic())
+    link.channel.poll(time.monotonic())
     assert not link.channel.clients
     link.channel.close()
 
 
 def test_excess_clients_are_rejected():
     link = link_of(TcpIn(HERE, 0))
-    clients = connected(link.channel, tcp.CLIENTS)
+    clients = connected(link.channel, tcp.MAX_CLIENTS)
     with socket.create_connection((HERE, link.channel.port), 2.0) as extra:
-        assert until(lambda: link.channel.tend(time.monotonic()) or link.troubles())
+        assert until(lambda: link.channel.poll(time.monotonic()) or link.loss_reports())
         assert extra.recv(100) == b""
-    assert link.troubles() == ["1 clients beyond 8 turned away"]
+    assert link.loss_reports() == ["1 clients beyond 8 turned away"]
     clients[0].close()
     assert until(
-        lambda: received(link) or link.channel.tend(time.monotonic()) or len(link.channel.clients) == tcp.CLIENTS - 1
+        lambda: (
+            received(link) or link.channel.poll(time.monotonic()) or len(link.channel.clients) == tcp.MAX_CLIENTS - 1
+        )
     )
     for client in clients:
         client.close()
@@ -251,11 +253,11 @@ def test_slow_reader_loses_whole_frames_and_other_clients_none():
         for _ in range(50):
             link.send(odometry(sent + 1))
             sent += 1
-        link.channel.tend(time.monotonic())
+        link.channel.poll(time.monotonic())
         read += drained(quick)
     late = drained(slow)
     for _ in range(1000):
-        link.channel.tend(time.monotonic())
+        link.channel.poll(time.monotonic())
         late += drained(slow)
         read += drained(quick)
     assert [m.time_usec for m in frames_of(read)] == list(range(1, sent + 1))
@@ -264,7 +266,7 @@ def test_slow_reader_loses_whole_frames_and_other_clients_none():
     assert len(got) == sent - max(dropped) and sum(dropped) > 1000
     assert got == sorted(set(got))
     link.channel.close()
-    assert link.troubles() == [f"{sum(dropped)} frames dropped for slow clients"]
+    assert link.loss_reports() == [f"{sum(dropped)} frames dropped for slow clients"]
     for client in (slow, quick):
         client.close()
 
@@ -276,9 +278,9 @@ def test_stalled_client_is_closed_after_a_timeout():
         pass
     now = time.monotonic()
     for i in range(100):  # s: the kernel may yet take a little, now and then
-        link.channel.tend(now + i)
+        link.channel.poll(now + i)
     assert not link.channel.clients
-    assert "1 clients closed that took nothing" in link.troubles()
+    assert "1 clients closed that took nothing" in link.loss_reports()
     client.close()
     link.channel.close()
 
@@ -287,12 +289,12 @@ def test_send_timeout_restarts_with_progress():
     out = Outgoing(Taker([None, None, None, 2, None, None, None]))
     out.put(b"frame")
     assert out.flush(10.0)
-    assert out.flush(10.0 + stream.STALL - 0.1)
-    assert not out.flush(10.0 + stream.STALL + 0.1)
+    assert out.flush(10.0 + stream.STALL_TIME - 0.1)
+    assert not out.flush(10.0 + stream.STALL_TIME + 0.1)
     assert out.flush(20.0)  # two bytes are taken
     assert out.flush(21.0)
-    assert out.flush(21.0 + stream.STALL - 0.1)
-    assert not out.flush(21.0 + stream.STALL)
+    assert out.flush(21.0 + stream.STALL_TIME - 0.1)
+    assert not out.flush(21.0 + stream.STALL_TIME)
 
 
 class Taker:
@@ -321,29 +323,29 @@ def test_partially_sent_frames_arrive_complete():
 
 
 def test_tcp_client_waits_for_its_server(monkeypatch):
-    monkeypatch.setattr(tcp, "_AGAIN", 0.0)
+    monkeypatch.setattr(tcp, "_RETRY_PERIOD", 0.0)
     with socket.create_server((HERE, 0)) as probe:
         port = probe.getsockname()[1]
     link = link_of(TcpOut(HERE, port))
-    assert not tended(link, attitude(1))  # nobody is there
+    assert not send_now(link, attitude(1))  # nobody is there
     with socket.create_server((HERE, port)) as server:
-        assert until(lambda: link.channel.tend(time.monotonic()) or link.channel._stream is not None)
+        assert until(lambda: link.channel.poll(time.monotonic()) or link.channel._stream is not None)
         side, _ = server.accept()
         side.settimeout(60.0)
-        tended(link, attitude(2))
+        send_now(link, attitude(2))
         assert frames_of(side.recv(1000))[0].time_boot_ms == 2
         side.close()
     link.channel.close()
 
 
 def test_tcp_client_reconnects_after_server_restart(monkeypatch):
-    monkeypatch.setattr(tcp, "_AGAIN", 0.0)
+    monkeypatch.setattr(tcp, "_RETRY_PERIOD", 0.0)
     server = socket.create_server((HERE, 0))
     port = server.getsockname()[1]
     link = link_of(TcpOut(HERE, port))
     side, _ = server.accept()
     side.settimeout(60.0)
-    tended(link, attitude(1))
+    send_now(link, attitude(1))
     assert frames_of(side.recv(1000))[0].time_boot_ms == 1
     side.sendall(Station().pack(heartbeat()))
     assert until(lambda: received(link))
@@ -352,7 +354,7 @@ def test_tcp_client_reconnects_after_server_restart(monkeypatch):
 
     def lost():
         received(link)
-        link.channel.tend(time.monotonic())
+        link.channel.poll(time.monotonic())
         return link.channel._stream is None
 
     assert until(lost)
@@ -363,11 +365,11 @@ def test_tcp_client_reconnects_after_server_restart(monkeypatch):
         assert until(lambda: not lost())
         side, _ = server.accept()
         side.settimeout(60.0)
-        tended(link, attitude(3))
+        send_now(link, attitude(3))
         assert frames_of(side.recv(1000))[0].time_boot_ms == 3
         side.close()
     link.channel.close()
-    assert link.troubles() == ["1 frames dropped while there was no server"]
+    assert link.loss_reports() == ["1 frames dropped while there was no server"]
 
 
 # ---- serial ----
@@ -396,7 +398,7 @@ def test_serial_line_is_bidirectional_and_8_bit_clean():
     ours, theirs = os.openpty()
     link = link_of(Serial(os.ttyname(theirs), 57600))
     for message in (odometry(0x0D0A1113), attitude(0x03040D1A)):  # bytes that terminals like to eat
-        tended(link, message)
+        send_now(link, message)
     assert [m.get_type() for m in come_to(ours, 2)] == ["ODOMETRY", "ATTITUDE"]
     every = mavlink.MAVLink_encapsulated_data_message(1, list(range(253)))
     frame = Station().pack(every)
@@ -419,7 +421,7 @@ def test_blocked_serial_line_drops_whole_frames():
     station, found = Station(), []
 
     def more():
-        link.channel.tend(time.monotonic())
+        link.channel.poll(time.monotonic())
         found.extend(come_to(ours, 1, station))
         return len(found) == sent.count(True)
 
@@ -427,7 +429,7 @@ def test_blocked_serial_line_drops_whole_frames():
     assert [m.time_boot_ms for m in found] == [i for i, went in enumerate(sent) if went]
     assert 0 < sent.count(True) < len(sent)
     link.channel.close()
-    assert link.troubles() == [f"{sent.count(False)} frames dropped on a slow line"]
+    assert link.loss_reports() == [f"{sent.count(False)} frames dropped on a slow line"]
     os.close(ours)
     os.close(theirs)
 
@@ -442,14 +444,14 @@ def test_serial_device_is_reopened_after_disconnection(tmp_path, caplog):
     os.close(ours)
     path.unlink()
     now = time.monotonic()
-    assert until(lambda: received(link) or link.channel.tend(now) or link.channel._stream is None)
+    assert until(lambda: received(link) or link.channel.poll(now) or link.channel._stream is None)
     assert not link.send(heartbeat())
-    link.channel.tend(now + 2.0)
+    link.channel.poll(now + 2.0)
     assert link.channel._stream is None
     ours, theirs = os.openpty()
     path.symlink_to(os.ttyname(theirs))
-    link.channel.tend(now + 4.0)
-    assert tended(link, attitude(9))
+    link.channel.poll(now + 4.0)
+    assert send_now(link, attitude(9))
     assert come_to(ours, 1)[0].time_boot_ms == 9
     assert [record.message.split(" ", 2)[2] for record in caplog.records] == ["is gone", "is back"]
     link.channel.close()
@@ -496,13 +498,13 @@ def test_tlog_timestamps_follow_simulation_time(tmp_path):
     assert [s - stamps[0] for s in stamps] == pytest.approx([0.0, 0.5, 1.0, 1.0, 1.0, 1.0, 2.0], abs=1e-5)
     assert before - 0.01 <= stamps[0] <= time.time()
     assert path.stat().st_size % 1 == 0 and path.read_bytes()[8] == 0xFD
-    assert not link.troubles()
+    assert not link.loss_reports()
 
 
 def test_tlog_of_a_fast_run_has_no_future_timestamps(tmp_path):
     path = tmp_path / "fast.tlog"
     link = link_of(Tlog(str(path)))
-    link.channel.begin_earlier(600.0)
+    link.channel.advance_start(600.0)
     for link.channel.simulated in (0.0, 600.0):
         link.send(attitude(1))
     link.channel.close()
@@ -557,4 +559,4 @@ def test_full_disk_is_reported_once_and_truncates_no_frame(tmp_path, caplog):
     link.channel.close()
     assert [m.time_usec for m in logged(path)] == [i + 1 for i, went in enumerate(sent) if went]
     assert len(caplog.records) == 1 and "No space left" in caplog.text
-    assert any("frames not logged" in trouble for trouble in link.troubles())
+    assert any("frames not logged" in trouble for trouble in link.loss_reports())

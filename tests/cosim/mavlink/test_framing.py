@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v10 import all as v10
 
-from cosim.mavlink.wire.framing import Framer, StreamReader, kinds
-from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, mavlink, odometry, open_gate, request_list
+from cosim.mavlink.wire.framing import Framer, StreamReader, message_infos
+from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, mavlink, odometry, open_filter, request_list
 
 
 def any_message(kind):
@@ -34,7 +34,7 @@ def test_frames_are_those_of_pymavlink(value):
         if not value:
             message = kind(*[nothing_like(getattr(message, name)) for name in message.fieldnames])
         framer.seq = codec.seq = i % 256
-        framed = framer.frame(message)
+        framed = framer.encode(message)
         assert framed == bytes(message.pack(codec)), kind.msgname
         codec.signing.secret_key, codec.signing.sign_outgoing = bytes(32), True
         assert message.pack(codec)[2] == 1  # what was framed can still be signed
@@ -62,55 +62,55 @@ def test_every_message_passes_only_if_addressed_to_the_vehicle(v1):
         if v1 and number > 255:
             continue
         frame = station.pack(any_message(kind), v1)
-        ours, theirs = open_gate(own=(3, 1)), open_gate(own=(4, 1))
-        found = list(ours.datagram(frame))
+        ours, theirs = open_filter(own=(3, 1)), open_filter(own=(4, 1))
+        found = list(ours.read_datagram(frame))
         if kind.msgname == "SETUP_SIGNING":
-            assert not found and ours.counts.setup_signing == 1
+            assert not found and ours.stats.setup_signing == 1
             continue
         assert names(found) == [kind.msgname]
         assert found[0][0] == frame
         assert found[0][1].to_dict() == station.parse(frame)[0].to_dict()
         meant = any(name in kind.fieldnames for name in ("target_system", "target"))
-        assert len(list(theirs.datagram(frame))) == (not meant)
-        assert theirs.counts.foreign == meant
+        assert len(list(theirs.read_datagram(frame))) == (not meant)
+        assert theirs.stats.foreign == meant
 
 
 def test_broadcast_and_any_component_targets_are_accepted():
-    gate, station = open_gate(), Station()
-    assert names(gate.datagram(station.pack(request_list(0)))) == ["PARAM_REQUEST_LIST"]  # zeros are cut off
-    assert names(gate.datagram(station.pack(mavlink.MAVLink_param_request_list_message(1, 77))))
-    assert names(gate.datagram(station.pack(mavlink.MAVLink_manual_control_message(1, 1, 2, 3, 4, 0))))
-    assert not names(gate.datagram(station.pack(mavlink.MAVLink_manual_control_message(2, 1, 2, 3, 4, 0))))
-    assert refusals(gate.counts) == {"foreign": 1}
+    rx, station = open_filter(), Station()
+    assert names(rx.read_datagram(station.pack(request_list(0)))) == ["PARAM_REQUEST_LIST"]  # zeros are cut off
+    assert names(rx.read_datagram(station.pack(mavlink.MAVLink_param_request_list_message(1, 77))))
+    assert names(rx.read_datagram(station.pack(mavlink.MAVLink_manual_control_message(1, 1, 2, 3, 4, 0))))
+    assert not names(rx.read_datagram(station.pack(mavlink.MAVLink_manual_control_message(2, 1, 2, 3, 4, 0))))
+    assert refusals(rx.stats) == {"foreign": 1}
 
 
 def test_own_frames_and_disallowed_systems_are_rejected():
-    gate = open_gate(allowed=frozenset({1, 255}))
-    assert not list(gate.datagram(Station(1, 1).pack(heartbeat())))
-    assert not list(gate.datagram(Station(245, 190).pack(heartbeat())))
-    assert len(list(gate.datagram(Station(1, 191).pack(heartbeat())))) == 1  # a companion of ours
-    assert len(list(gate.datagram(Station(255, 190).pack(heartbeat())))) == 1
-    assert refusals(gate.counts) == {"own": 1, "system": 1}
+    rx = open_filter(allowed=frozenset({1, 255}))
+    assert not list(rx.read_datagram(Station(1, 1).pack(heartbeat())))
+    assert not list(rx.read_datagram(Station(245, 190).pack(heartbeat())))
+    assert len(list(rx.read_datagram(Station(1, 191).pack(heartbeat())))) == 1  # a companion of ours
+    assert len(list(rx.read_datagram(Station(255, 190).pack(heartbeat())))) == 1
+    assert refusals(rx.stats) == {"own": 1, "system": 1}
 
 
 def test_setup_signing_message_is_ignored():
-    gate = open_gate()
-    assert not list(gate.datagram(Station().pack(mavlink.MAVLink_setup_signing_message(1, 1, [1] * 32, 5))))
-    assert refusals(gate.counts) == {"setup_signing": 1}
+    rx = open_filter()
+    assert not list(rx.read_datagram(Station().pack(mavlink.MAVLink_setup_signing_message(1, 1, [1] * 32, 5))))
+    assert refusals(rx.stats) == {"setup_signing": 1}
 
 
 def test_unknown_message_is_dropped_without_its_neighbors():
     station = Station()
     unknown = bytearray(station.pack(attitude(1)))
     unknown[7:10] = (0xABCDEF).to_bytes(3, "little")
-    gate = open_gate()
+    rx = open_filter()
     data = station.pack(heartbeat()) + unknown + station.pack(attitude(2))
-    assert names(gate.datagram(data)) == ["HEARTBEAT", "ATTITUDE"]
-    assert refusals(gate.counts) == {"unknown": 1}
-    assert gate.counts.refused() == {}  # nothing that a user need hear of
-    gate = open_gate()
-    assert names(StreamReader(gate).read(data)) == ["HEARTBEAT", "ATTITUDE"]
-    assert refusals(gate.counts) == {"unknown": 1}
+    assert names(rx.read_datagram(data)) == ["HEARTBEAT", "ATTITUDE"]
+    assert refusals(rx.stats) == {"unknown": 1}
+    assert rx.stats.rejected() == {}  # nothing that a user need hear of
+    rx = open_filter()
+    assert names(StreamReader(rx).read(data)) == ["HEARTBEAT", "ATTITUDE"]
+    assert refusals(rx.stats) == {"unknown": 1}
 
 
 @pytest.mark.parametrize("bad", [b"\xfd\xff\x00", b"\xfe", b"\xfd" * 300, b"\xfe" * 300, b"junk", b"", None])
@@ -118,10 +118,10 @@ def test_malformed_datagram_loses_no_following_frame(bad):
     station = Station()
     bad = station.pack(odometry())[:100] if bad is None else bad
     frames = [station.pack(attitude(i)) for i in range(50)]
-    gate = open_gate()
-    assert not list(gate.datagram(bad))
-    assert [m.time_boot_ms for frame in frames for _, m in gate.datagram(frame)] == list(range(50))
-    reader = StreamReader(open_gate())  # and in one stream, however it is cut
+    rx = open_filter()
+    assert not list(rx.read_datagram(bad))
+    assert [m.time_boot_ms for frame in frames for _, m in rx.read_datagram(frame)] == list(range(50))
+    reader = StreamReader(open_filter())  # and in one stream, however it is cut
     data = bad + b"".join(frames)
     found = [m.time_boot_ms for i in range(0, len(data), 7) for _, m in reader.read(data[i : i + 7])]
     assert found == list(range(50))
@@ -134,10 +134,10 @@ def test_corrupted_frame_is_rejected_and_the_stream_continues():
     for i in range(len(good) * 8):
         bad = bytearray(good)
         bad[i // 8] ^= 1 << i % 8
-        gate = open_gate()
-        assert not list(gate.datagram(bytes(bad)))
-        assert sum(refusals(gate.counts).values()) >= 1
-        reader = StreamReader(open_gate())
+        rx = open_filter()
+        assert not list(rx.read_datagram(bytes(bad)))
+        assert sum(refusals(rx.stats).values()) >= 1
+        reader = StreamReader(open_filter())
         after = b"".join(station.pack(attitude(t)) for t in range(8))
         assert names(reader.read(bytes(bad) + after)) == ["ATTITUDE"] * 8
 
@@ -148,22 +148,22 @@ def test_decoder_error_counts_as_malformed():
     frame[2] = 2
     crc = mavlink.x25crc(bytes(frame[1:-2]) + bytes([mavlink.MAVLink_heartbeat_message.crc_extra])).crc
     frame[-2:] = struct.pack("<H", crc)
-    gate = open_gate()
-    assert not list(gate.datagram(bytes(frame)))
-    assert refusals(gate.counts) == {"malformed": 1}
+    rx = open_filter()
+    assert not list(rx.read_datagram(bytes(frame)))
+    assert refusals(rx.stats) == {"malformed": 1}
 
 
 def test_longer_payload_of_a_newer_dialect_is_truncated():
     payload = struct.pack("<IBBBBB", 7, 12, 0, 0, 4, 3) + b"new"
     head = bytes([0xFD, len(payload), 0, 0, 0, 255, 190, 0, 0, 0]) + payload
     crc = mavlink.x25crc(head[1:] + bytes([mavlink.MAVLink_heartbeat_message.crc_extra])).crc
-    ((_, message),) = open_gate().datagram(head + struct.pack("<H", crc))
+    ((_, message),) = open_filter().read_datagram(head + struct.pack("<H", crc))
     assert message.custom_mode == 7 and message.mavlink_version == 3
 
 
 def test_stream_buffer_holds_at_most_one_frame():
     rng = random.Random(1)
-    reader = StreamReader(open_gate())
+    reader = StreamReader(open_filter())
     for data in (b"\xfd" * 5000, b"\xfe\xff" * 5000, rng.randbytes(20000), bytes(20000)):
         for i in range(0, len(data), 97):
             list(reader.read(data[i : i + 97]))
@@ -174,7 +174,7 @@ def test_stream_reader_matches_pymavlink():
     station, rng = Station(), random.Random(0)
     sent = [station.pack(any_message(kind)) for kind in mavlink.mavlink_map.values() if kind.msgname != "SETUP_SIGNING"]
     data = b"".join(sent)
-    reader, found = StreamReader(open_gate(own=None)), []
+    reader, found = StreamReader(open_filter(own=None)), []
     at = 0
     while at < len(data):
         size = rng.randrange(1, 400)
@@ -194,15 +194,15 @@ pieces = st.lists(st.binary(max_size=300) | frames | frames.map(lambda f: f[:-3]
 @given(pieces, st.integers(1, 600))
 def test_arbitrary_bytes_raise_nothing_and_invent_no_frame(parts, chunk):
     data = b"".join(parts)
-    gate = open_gate()
-    list(gate.datagram(data))
-    reader = StreamReader(open_gate())
+    rx = open_filter()
+    list(rx.read_datagram(data))
+    reader = StreamReader(open_filter())
     for i in range(0, len(data), chunk):
         for frame, _ in reader.read(data[i : i + chunk]):
             assert frame in data
 
 
-@given(st.sampled_from(sorted(kinds())), st.binary(max_size=255), st.booleans(), st.integers(0, 255))
+@given(st.sampled_from(sorted(message_infos())), st.binary(max_size=255), st.booleans(), st.integers(0, 255))
 def test_valid_checksum_with_any_payload_raises_nothing(number, payload, v1, flags):
     if v1 and number < 256:
         head = bytes([0xFE, len(payload), 0, 255, 190, number])
@@ -211,13 +211,13 @@ def test_valid_checksum_with_any_payload_raises_nothing(number, payload, v1, fla
     body = head + payload
     crc = mavlink.x25crc(body[1:] + bytes([mavlink.mavlink_map[number].crc_extra])).crc
     frame = body + struct.pack("<H", crc) + bytes(13 * (flags & 1))
-    list(open_gate().datagram(frame))
-    list(StreamReader(open_gate()).read(frame))
+    list(open_filter().read_datagram(frame))
+    list(StreamReader(open_filter()).read(frame))
 
 
 def test_offsets_of_targets_are_those_of_the_packed_message():
     for number, kind in mavlink.mavlink_map.items():
-        at = kinds()[number].target
+        at = message_infos()[number].target_offset
         if at is None:
             continue
         name = "target" if kind.msgname == "MANUAL_CONTROL" else "target_system"
@@ -228,7 +228,7 @@ def test_offsets_of_targets_are_those_of_the_packed_message():
 
 
 def test_mavlink_1_payload_sizes_match_its_dialect():
-    both = [number for number in v10.mavlink_map if number in kinds()]
+    both = [number for number in v10.mavlink_map if number in message_infos()]
     assert len(both) > 150
     for number in both:
-        assert kinds()[number].old_size == v10.mavlink_map[number].unpacker.size, v10.mavlink_map[number].msgname
+        assert message_infos()[number].v1_size == v10.mavlink_map[number].unpacker.size, v10.mavlink_map[number].msgname

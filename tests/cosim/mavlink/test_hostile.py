@@ -11,12 +11,12 @@ import pytest
 
 from benchmarks.hostile import hostile_datagrams
 from cosim.mavlink import thread
-from cosim.mavlink.channels.udp import PEERS, SILENCE, UdpIn
+from cosim.mavlink.channels.udp import MAX_PEERS, PEER_TIMEOUT, UdpIn
 from cosim.mavlink.thread import LinkThread
 from cosim.mavlink.wire.framing import StreamReader
 from cosim.mavlink.wire.link import Link
 from cosim.mavlink.wire.signing import SigningClock, Verifier
-from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, StubVehicle, attitude, link_of, open_gate, until
+from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, StubVehicle, attitude, link_of, open_filter, until
 
 HERE = "127.0.0.1"
 
@@ -27,7 +27,7 @@ class Script:
     datagrams = True
 
     def __init__(self, datagrams):
-        self.coming, self.trouble, self.looked = iter(datagrams), {}, 0
+        self.coming, self.losses, self.looked = iter(datagrams), {}, 0
 
     def receive(self):
         data = next(self.coming, None)
@@ -36,10 +36,10 @@ class Script:
 
     def record_version(self, peer, version): ...
 
-    def send(self, frame, old=None):
+    def send(self, frame, frame_v1=None):
         return True
 
-    def tend(self, now): ...
+    def poll(self, now): ...
 
     def close(self): ...
 
@@ -52,12 +52,12 @@ def interspersed(count, every, station):
 
 
 def attack(count, verifier=None, station=None):
-    gate, station = open_gate(verifier), station or Station()
-    link = Link("test", Script(interspersed(count, 100, station)), gate, SOURCE)
+    rx, station = open_filter(verifier), station or Station()
+    link = Link("test", Script(interspersed(count, 100, station)), rx, SOURCE)
     good = [m.time_boot_ms for _, m in link.receive(time.perf_counter() + 600) if m.get_type() == "ATTITUDE"]
     assert good == list(range(0, count, 100))
     assert link.channel.looked == count + count // 100
-    return gate.counts
+    return rx.stats
 
 
 def test_all_valid_datagrams_among_hostile_ones_are_accepted():
@@ -75,17 +75,17 @@ def test_all_valid_frames_in_a_hostile_stream_are_accepted():
     """Also frames after half a frame, which may be taken for its other half until the checksum fails."""
     station = Station()
     data = b"".join(interspersed(5000, 20, station)) + bytes(300)
-    reader = StreamReader(open_gate())
+    reader = StreamReader(open_filter())
     found = [m for i in range(0, len(data), 512) for _, m in reader.read(data[i : i + 512])]
     assert [m.time_boot_ms for m in found if m.get_type() == "ATTITUDE"] == list(range(0, 5000, 20))
 
 
 @pytest.mark.slow
 def test_hostile_datagrams_leak_no_memory():
-    gate = open_gate()
+    rx = open_filter()
 
     def receive(count):
-        link = Link("test", Script(hostile_datagrams(count, seed=count)), gate, SOURCE)
+        link = Link("test", Script(hostile_datagrams(count, seed=count)), rx, SOURCE)
         for _ in link.receive(time.perf_counter() + 600):
             pass
         assert link.channel.looked == count
@@ -96,7 +96,7 @@ def test_hostile_datagrams_leak_no_memory():
     receive(20_000)
     after = tracemalloc.get_traced_memory()[0]
     tracemalloc.stop()
-    assert gate.counts.accepted > 38_000
+    assert rx.stats.accepted > 38_000
     assert after - before < 100_000
 
 
@@ -135,7 +135,7 @@ def test_flood_consumes_a_bounded_share_of_each_cycle(monkeypatch):
     monkeypatch.setattr("cosim.mavlink.thread.time", clock)
     monkeypatch.setattr("cosim.mavlink.wire.link.time", clock)
     channel, vehicle = Script(hostile_datagrams(10**9, seed=3)), Answering(clock)
-    links = LinkThread(vehicle, [Link("test", channel, open_gate(), SOURCE)], step=0.01)
+    links = LinkThread(vehicle, [Link("test", channel, open_filter(), SOURCE)], step=0.01)
     slice_ = thread._RECEIVING
     for _ in range(500):
         began, before = clock.now, channel.looked
@@ -165,7 +165,7 @@ def test_a_flooded_port_neither_starves_the_stream_nor_another_link():
         assert until(lambda: len(vehicle.rows) == 200)
     links.close()
     assert not links.failures
-    assert len(flooded.peers) <= PEERS
+    assert len(flooded.peers) <= MAX_PEERS
 
 
 @pytest.mark.parametrize("before", [0, 3, 200])  # addresses that sent one frame each before the station came
@@ -185,16 +185,16 @@ def test_flood_of_new_addresses_does_not_displace_a_station_that_was_heard(befor
                 channel.record_version(station, 2)
             for _ in range(rng.randrange(8) if floods else 0):
                 channel.record_version((HERE, next(ports)), 2)
-            channel.tend(clock.now)
-            assert len(channel._known) <= PEERS
+            channel.poll(clock.now)
+            assert len(channel._peers) <= MAX_PEERS
 
     for _ in range(before):
         channel.record_version((HERE, next(ports)), 2)
-        clock.now += 0.5 * SILENCE
+        clock.now += 0.5 * PEER_TIMEOUT
     passes(60.0, speaks=True, floods=True)
     assert station in channel.peers
     passes(silence, floods=True)
-    assert (station in channel.peers) == (silence < SILENCE)
+    assert (station in channel.peers) == (silence < PEER_TIMEOUT)
     passes(1.0, speaks=True, floods=True)
     assert station in channel.peers
     channel.close()
@@ -211,9 +211,9 @@ def test_flood_from_many_ports_leaves_the_station_its_answers():
             sockets[-1].sendto(Station(200, 1).pack(attitude(i)), to)
             list(link.receive(time.perf_counter() + 60.0))
         link.send(attitude(7))
-        link.channel.tend(time.monotonic())
+        link.channel.poll(time.monotonic())
         assert Station().parse(station.recv(1000))[0].time_boot_ms == 7
-    assert len(link.channel.peers) == PEERS
+    assert len(link.channel.peers) == MAX_PEERS
     for one in sockets:
         one.close()
     link.channel.close()

@@ -14,12 +14,12 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.command_line.cli import main
-from cosim.mavlink.listening import Watch, follow, picture
-from cosim.mavlink.listening.fields import values
-from cosim.mavlink.listening.watch import ROWS, TEXTS
-from cosim.mavlink.vehicle.modes import mode_name
+from cosim.mavlink.listening import TelemetryTable, follow, format_table
+from cosim.mavlink.listening.fields import format_values
+from cosim.mavlink.listening.telemetry_table import MAX_ROWS, MAX_TEXTS
+from cosim.mavlink.vehicle.mode_names import mode_name
 from cosim.mavlink.wire.endpoint import parse_endpoint
-from cosim.mavlink.wire.ground_end import GroundLink, Heard
+from cosim.mavlink.wire.ground_end import GroundLink, ReceivedMessage
 
 ESCAPE = "\x1b[31mred\x07"
 
@@ -35,7 +35,7 @@ def heartbeat(autopilot=12, base_mode=0x81, custom_mode=6 << 16, kind=12):
 
 
 def received(message, at=0.0, system=1, component=1):
-    return Heard(at, system, component, 0, message.get_type(), message)
+    return ReceivedMessage(at, system, component, 0, message.get_type(), message)
 
 
 @pytest.fixture
@@ -64,14 +64,14 @@ class Vehicle:
 
 
 def test_display_shows_vehicle_position_texts_and_messages(link):
-    watch = Watch()
+    watch = TelemetryTable()
     for i in range(11):
         watch.add(received(mavlink.MAVLink_attitude_message(100 * i, 0.1, -0.2, 0.3, 0, 0, 0), 0.1 * i))
     watch.add(received(heartbeat(), 1.0))
     watch.add(received(mavlink.MAVLink_local_position_ned_message(0, 1.5, -2.25, 3.0, 0, 0, 0), 1.0))
     watch.add(received(mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, -3000, 0, 0, 0, 0), 1.0))
     watch.add(received(mavlink.MAVLink_statustext_message(4, b"region SR1 entered"), 1.0))
-    text = "\n".join(picture(link, watch, 1.0))
+    text = "\n".join(format_table(link, watch, 1.0))
     assert "vehicle 1:1 PX4 SUBMARINE, mode OFFBOARD, ARMED, ACTIVE" in text
     assert "north 1.50 east -2.25 down 3.00 m, roll 5.7 pitch -11.5 yaw 17.2 deg, depth 3.00 m" in text
     assert "WARNING: region SR1 entered" in text
@@ -79,7 +79,7 @@ def test_display_shows_vehicle_position_texts_and_messages(link):
 
 
 def test_message_rates_track_arrivals_and_decay():
-    watch = Watch()
+    watch = TelemetryTable()
     for i in range(400):
         watch.add(received(mavlink.MAVLink_system_time_message(0, 0), 0.05 * i))
         watch.sample(0.05 * i)
@@ -91,28 +91,28 @@ def test_message_rates_track_arrivals_and_decay():
 
 
 def test_silent_vehicle_is_marked_silent(link):
-    watch = Watch()
+    watch = TelemetryTable()
     watch.add(received(heartbeat(), 1.0))
-    assert "SILENT" not in picture(link, watch, 3.0)[1]
-    assert "SILENT for 9 s" in picture(link, watch, 10.0)[1]
+    assert "SILENT" not in format_table(link, watch, 3.0)[1]
+    assert "SILENT for 9 s" in format_table(link, watch, 10.0)[1]
 
 
 def test_ground_stations_are_no_vehicle(link):
-    watch = Watch()
+    watch = TelemetryTable()
     watch.add(received(heartbeat(autopilot=8, kind=6), 1.0, system=255))
     assert watch.vehicle is None
-    assert "no vehicle was heard" in picture(link, watch, 1.0)
+    assert "no vehicle found" in format_table(link, watch, 1.0)
 
 
 def test_memory_is_bounded_under_a_flood_of_names_and_texts(link):
-    watch = Watch()
-    for i in range(20 * ROWS):
+    watch = TelemetryTable()
+    for i in range(20 * MAX_ROWS):
         watch.add(received(mavlink.MAVLink_named_value_float_message(0, f"n{i}".encode(), 1.0), 1e-4 * i))
         watch.add(received(mavlink.MAVLink_statustext_message(6, b"x"), 1e-4 * i, system=1 + i % 200))
         watch.sample(1e-4 * i)
-    assert len(watch.rows) == ROWS and len(watch.texts) == TEXTS
-    assert watch.total == 40 * ROWS and watch.beyond > 0
-    lines = picture(link, watch, 1.0, width=80, height=24)
+    assert len(watch.rows) == MAX_ROWS and len(watch.texts) == MAX_TEXTS
+    assert watch.total == 40 * MAX_ROWS and watch.omitted > 0
+    lines = format_table(link, watch, 1.0, width=80, height=24)
     assert len(lines) == 24 and max(map(len, lines)) <= 80
     assert lines[-1].endswith("more rows")
 
@@ -128,42 +128,42 @@ def test_memory_is_bounded_under_a_flood_of_names_and_texts(link):
 )
 def test_received_text_cannot_inject_terminal_codes(link, message):
     decoded = mavlink.MAVLink(None).decode(bytearray(message.pack(mavlink.MAVLink(None, 1, 1))))
-    watch = Watch()
+    watch = TelemetryTable()
     watch.add(received(heartbeat()))
     watch.add(received(decoded))
-    assert all(line.isprintable() for line in picture(link, watch, 1.0, width=200))
+    assert all(line.isprintable() for line in format_table(link, watch, 1.0, width=200))
 
 
 def test_every_message_of_the_dialect_is_displayed(link):
-    watch, codec = Watch(), mavlink.MAVLink(None)
+    watch, codec = TelemetryTable(), mavlink.MAVLink(None)
     for number, kind in mavlink.mavlink_map.items():
         head = bytes([0xFD, 1, 0, 0, 0, 1, 1, *number.to_bytes(3, "little")])
         crc = mavlink.x25crc(head[1:] + b"\1" + bytes([kind.crc_extra])).crc
         watch.add(received(codec.decode(bytearray(head + b"\1" + crc.to_bytes(2, "little")))))
-    shown = {line.split()[0] for line in picture(link, watch, 1.0) if "1:1" in line}
-    assert len(watch.rows) == min(ROWS, len(mavlink.mavlink_map)) and len(shown) >= ROWS - 5
+    shown = {line.split()[0] for line in format_table(link, watch, 1.0) if "1:1" in line}
+    assert len(watch.rows) == min(MAX_ROWS, len(mavlink.mavlink_map)) and len(shown) >= MAX_ROWS - 5
 
 
 def test_unknown_values_are_shown_as_dashes():
     status = mavlink.MAVLink_sys_status_message(0, 0, 0, 500, 65535, -1, -1, *[0] * 6)
-    assert values(status) == "load 50.0 %  voltage_battery - V  current_battery - A  battery_remaining - %"
+    assert format_values(status) == "load 50.0 %  voltage_battery - V  current_battery - A  battery_remaining - %"
 
 
 def test_values_rounded_to_zero_have_no_sign(link):
-    watch = Watch()
+    watch = TelemetryTable()
     attitude = mavlink.MAVLink_attitude_message(0, -1e-5, 0.0, -1e-5, -1e-5, -0.0, 0.0)
     place = mavlink.MAVLink_local_position_ned_message(0, -1e-3, -0.0, -1e-3, 0.0, 0.0, -1e-9)
     world = mavlink.MAVLink_global_position_int_message(0, 0, 0, 0, 1, 0, 0, 0, 0)
     for message in (heartbeat(), attitude, place, world):
         watch.add(received(message))
-    shown = "\n".join(picture(link, watch, 1.0))
+    shown = "\n".join(format_table(link, watch, 1.0))
     assert "roll 0.0 pitch 0.0 yaw 0.0 deg" in shown and "depth 0.00 m" in shown
     assert not re.search(r"-0\.0+\b", shown)
 
 
 def test_nan_and_infinity_are_displayed():
-    assert "nan" in values(mavlink.MAVLink_attitude_message(0, float("nan"), 0, 0, 0, 0, 0))
-    assert "inf" in values(mavlink.MAVLink_named_value_float_message(0, b"x", float("inf")))
+    assert "nan" in format_values(mavlink.MAVLink_attitude_message(0, float("nan"), 0, 0, 0, 0, 0))
+    assert "inf" in format_values(mavlink.MAVLink_named_value_float_message(0, b"x", float("inf")))
 
 
 @pytest.mark.parametrize(
@@ -192,8 +192,8 @@ def test_broken_frames_are_ignored_and_mavlink_1_is_received(link):
         found = []
         while len(found) < 2:
             found += link.receive(2.0)
-    assert [h.kind for h in found] == ["HEARTBEAT", "ATTITUDE"]
-    assert link.old == 1 and link.counts.malformed == 2
+    assert [h.name for h in found] == ["HEARTBEAT", "ATTITUDE"]
+    assert link.v1_frames == 1 and link.stats.malformed == 2
 
 
 def test_with_a_key_only_signed_frames_are_received():
@@ -202,11 +202,11 @@ def test_with_a_key_only_signed_frames_are_received():
     with GroundLink(endpoint, key=bytes(32)) as link:
         for key in (None, b"\1" * 32, bytes(32)):
             with GroundLink(speaker, key, identity=(1, 1)) as vehicle:
-                vehicle.beat()
+                vehicle.send_heartbeat()
         found = link.receive(2.0) + link.receive(0.1)
-    assert [h.kind for h in found] == ["HEARTBEAT"]
-    assert (link.counts.unsigned, link.counts.forged, link.counts.accepted) == (1, 1, 1)
-    assert "1 frames forged" in picture(link, Watch(), 0.0)[0]
+    assert [h.name for h in found] == ["HEARTBEAT"]
+    assert (link.stats.unsigned, link.stats.forged, link.stats.accepted) == (1, 1, 1)
+    assert "1 frames forged" in format_table(link, TelemetryTable(), 0.0)[0]
 
 
 def test_follow_ends_after_the_given_messages_or_seconds(link):
@@ -214,7 +214,7 @@ def test_follow_ends_after_the_given_messages_or_seconds(link):
     with Vehicle(port) as vehicle:
         for _ in range(9):
             vehicle.send(heartbeat())
-        watch = Watch()
+        watch = TelemetryTable()
         assert len(list(follow(link, watch, period=60.0, count=5))) == 1
         assert watch.total == 5
     assert len(list(follow(link, watch, period=0.05, seconds=0.2))) >= 2
@@ -239,7 +239,7 @@ def test_listen_command_prints_the_display():
 
 def test_receiving_no_vehicle_exits_with_1(capsys):
     assert main(["listen", f"udpin:127.0.0.1:{free_port()}", "--seconds", "0.2"]) == 1
-    assert "no vehicle was heard" in capsys.readouterr().out
+    assert "no vehicle found" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.mavlink.messages.control import weight_names
 from cosim.mavlink.vehicle.geodesy import LocalFrame
-from cosim.mavlink.vehicle.layout import Layout, euler_of
+from cosim.mavlink.vehicle.row_layout import RowLayout, quaternion_to_euler
 from cosim.mavlink.vehicle.view import View
-from cosim.mavlink.wire.encode import Encoder, float32, whole, wrap_time
+from cosim.mavlink.wire.encode import Encoder, clip_to_float32, round_finite, wrap_time
 from cosim.simulation.columns import column_names
 from cosim.simulation.signals import Column
 from plant_fmu import load_vehicle
@@ -266,8 +266,11 @@ def test_out_of_range_values_are_clamped_to_the_field():
 
 
 def test_link_numbers_are_rounded_clamped_and_wrapped():
-    assert [whole(x) for x in (1.4, math.nan, math.inf, -2.0, 3)] == [1, None, None, -2, 3]
-    assert float32(math.inf) == float32(1e300) == pytest.approx(3.4028234e38) and float32(-0.5) == -0.5
+    assert [round_finite(x) for x in (1.4, math.nan, math.inf, -2.0, 3)] == [1, None, None, -2, 3]
+    assert (
+        clip_to_float32(math.inf) == clip_to_float32(1e300) == pytest.approx(3.4028234e38)
+        and clip_to_float32(-0.5) == -0.5
+    )
     assert wrap_time(2**32 * 1000 + 5000) == 5 and wrap_time(2**32 + 7, 1) == 7
 
 
@@ -275,7 +278,7 @@ def test_euler_angles_are_those_of_the_plant():
     for roll, pitch, yaw in ((0.1, 0.2, 0.3), (-2.0, -1.5, 3.0), (0.0, 0.0, -3.1)):
         parts = [from_axis_angle(np.eye(3)[i], angle) for i, angle in enumerate((roll, pitch, yaw))]
         whole_turn = multiply(parts[2], multiply(parts[1], parts[0]))
-        assert euler_of(whole_turn.tolist()) == pytest.approx((roll, pitch, yaw), abs=1e-9)
+        assert quaternion_to_euler(whole_turn.tolist()) == pytest.approx((roll, pitch, yaw), abs=1e-9)
 
 
 def test_weight_names_of_custom_criteria_are_unique():
@@ -291,6 +294,6 @@ def test_the_weights_and_memberships_of_four_criteria_are_sent():
     for of, values in (("weight", weights), ("membership", memberships)):
         at = [column.name for column in columns].index(f"{of}.obstacle")
         row[at : at + 4] = values
-    view = View(Layout(four, columns), row)
+    view = View(RowLayout(four, columns), row)
     assert (view.weights, view.memberships) == (list(weights), list(memberships))
     assert dict(zip(weight_names(view.criteria), view.weights, strict=True))["w_visibili"] == 0.75

@@ -109,7 +109,7 @@ def test_available_modes_list_settable_modes(station):
         if message.mode_name != "Mission of regions":
             station.send(mavlink.MAVLink_set_mode_message(1, 1, message.custom_mode))
             (command,) = station.commanded()
-            assert profile.numbers[command.mode] == message.custom_mode
+            assert profile.custom_modes[command.mode] == message.custom_mode
     assert station.command(512, 435, 8) == FAILED
     station.wire.clear()
     station.command(512, 435, 3)
@@ -122,7 +122,7 @@ def test_base_mode_equals_that_of_ardusub(armed):
     """ArduSub's base_mode(): stabilised and manual input in all modes, guided where it finds its own way."""
     station = Station("ardusub")
     for number, guided in ((0, 0), (2, 0), (3, 8), (4, 8), (9, 0), (16, 8), (19, 0)):
-        mode = PROFILES["ardusub"].mode_of(number)
+        mode = PROFILES["ardusub"].find_mode(number)
         station.look(1.0, **{"commands.mode": float(MODES.index(mode)), "commands.armed": armed})
         station.command(512, 0)
         beat = station.wire.of("HEARTBEAT")[-1]
@@ -130,7 +130,7 @@ def test_base_mode_equals_that_of_ardusub(armed):
 
 
 def test_the_mode_shown_is_that_of_the_snapshot(station):
-    numbers = PROFILES[station.autopilot._context.options.profile].numbers
+    numbers = PROFILES[station.autopilot._context.options.profile].custom_modes
     station.command(262, 1)  # hold
     station.command(512, 436)
     mode = station.wire.of("CURRENT_MODE")[-1]
@@ -205,7 +205,7 @@ def test_read_only_rejects_modes():
 
 
 def upload(station):
-    home = int(station.autopilot._context.profile.home_is_first)
+    home = int(station.autopilot._context.profile.has_home_item)
     station.send(mavlink.MAVLink_mission_count_message(1, 1, 1 + home, 0))
     for seq in range(1 + home):
         station.send(mavlink.MAVLink_mission_item_int_message(1, 1, seq, 1, 16, 0, 1, 0, 0, 0, 0, 10_000, 0, 2.0, 0))

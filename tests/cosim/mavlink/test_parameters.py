@@ -8,9 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.mavlink.services.packed_parameters import bare_crc32, hash_check
+from cosim.mavlink.services.packed_parameters import compute_crc32, hash_parameters
 from cosim.mavlink.services.parameter_names import parameter_names
-from cosim.mavlink.services.parameters import shortest
+from cosim.mavlink.services.parameter_protocol import shorten_float32
 from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios
@@ -246,8 +246,8 @@ def crc_by_bits(data):
 
 @given(st.binary(max_size=60))
 def test_crc32_matches_bitwise_reference(data):
-    assert bare_crc32(data) == crc_by_bits(data)
-    assert bare_crc32(data[3:], bare_crc32(data[:3])) == crc_by_bits(data)
+    assert compute_crc32(data) == crc_by_bits(data)
+    assert compute_crc32(data[3:], compute_crc32(data[:3])) == crc_by_bits(data)
 
 
 def test_px4_parameter_hash_identifies_the_list():
@@ -270,13 +270,13 @@ def test_px4_parameter_hash_identifies_the_list():
     station.wire.clear()
     station.wait(0.1)
     assert station.wire.of("PARAM_VALUE") == []
-    assert hash_check({}) == 0
+    assert hash_parameters({}) == 0
 
 
 @settings(max_examples=examples(200))
 @given(st.floats(width=32, allow_nan=False, allow_infinity=False))
 def test_shortest_decimal_round_trips_as_float32(value):
-    short = shortest(value)
+    short = shorten_float32(value)
     assert struct.pack("<f", short) == struct.pack("<f", value)
     assert significant(short) <= significant(value)
 

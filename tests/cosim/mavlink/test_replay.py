@@ -49,7 +49,7 @@ def logged(recorded, tmp_path_factory):
 @pytest.mark.medium
 def test_unlimited_rate_drops_no_message(logged):
     done, messages = logged
-    assert done.simulated == pytest.approx(4.0) and done.troubles == []
+    assert done.simulated == pytest.approx(4.0) and done.loss_reports == []
     stamps = [m.time_boot_ms for _, m in messages if m.get_type() == "ATTITUDE"]
     assert stamps == list(range(0, 4001, 100))
     sequence = [m.get_seq() for _, m in messages]
@@ -77,7 +77,7 @@ def test_commanded_run_is_streamed(shipped_run, tmp_path):
     log = tmp_path / "run.tlog"
     folder = shipped_run("paper-limited", *COMMANDED).folder
     done = replay(folder, [parse_endpoint(str(log))], MavlinkOptions(profile="px4"), rate=None)
-    assert done.troubles == []
+    assert done.loss_reports == []
     beats = [m for _, m in frames(log) if m.get_type() == "HEARTBEAT"]
     assert {b.autopilot for b in beats} == {mavlink.MAV_AUTOPILOT_PX4}
     assert beats[0].base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED

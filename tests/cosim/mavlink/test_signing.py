@@ -16,8 +16,8 @@ from cosim.mavlink.wire import signing
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import Link, Signer, open_links
 from cosim.mavlink.wire.options import MavlinkOptions
-from cosim.mavlink.wire.signing import STREAMS, SigningClock, Verifier, read_key, timestamp_file
-from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, attitude, heartbeat, mavlink, open_gate
+from cosim.mavlink.wire.signing import MAX_STREAMS, SigningClock, Verifier, load_key, timestamp_file
+from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, attitude, heartbeat, mavlink, open_filter
 
 MINUTE = 60 * 100_000
 
@@ -26,17 +26,17 @@ def now():
     return int((time.time() - 1420070400) * 1e5)  # seconds from 1970 to 2015
 
 
-def gate_and_clock():
+def filter_and_clock():
     clock = SigningClock()
-    return open_gate(Verifier(KEY, clock)), clock
+    return open_filter(Verifier(KEY, clock)), clock
 
 
-def accepts(gate, frame):
-    return len(list(gate.datagram(frame))) == 1
+def accepts(rx, frame):
+    return len(list(rx.read_datagram(frame))) == 1
 
 
-def refused(gate):
-    c = gate.counts
+def rejected(rx):
+    c = rx.stats
     names = ("unsigned", "forged", "replayed", "old", "ahead", "crowded", "checksum", "malformed")
     return {name: getattr(c, name) for name in names if getattr(c, name)}
 
@@ -44,18 +44,18 @@ def refused(gate):
 class Captured:
     """A channel that keeps what is sent."""
 
-    datagrams, trouble = True, {}
+    datagrams, losses = True, {}
 
     def __init__(self):
         self.frames = []
 
-    def send(self, frame, old=None):
+    def send(self, frame, frame_v1=None):
         self.frames.append(frame)
         return True
 
 
 def signed_link(clock, link=3):
-    return Link("test", Captured(), open_gate(), SOURCE, signer=Signer(KEY, clock, link))
+    return Link("test", Captured(), open_filter(), SOURCE, signer=Signer(KEY, clock, link))
 
 
 def test_pymavlink_accepts_own_signatures_and_rejects_altered_frames():
@@ -90,95 +90,95 @@ def test_timestamps_rise_on_all_links_and_over_a_restart(monkeypatch):
 
 
 def test_frame_signed_by_pymavlink_is_accepted_once():
-    gate, _ = gate_and_clock()
+    rx, _ = filter_and_clock()
     station = Station(key=KEY)
     frames = [station.pack(attitude(i)) for i in range(10)]
-    assert all(accepts(gate, frame) for frame in frames)
-    assert not any(accepts(gate, frame) for frame in frames)
-    assert refused(gate) == {"replayed": 10}
+    assert all(accepts(rx, frame) for frame in frames)
+    assert not any(accepts(rx, frame) for frame in frames)
+    assert rejected(rx) == {"replayed": 10}
 
 
 def test_forged_unsigned_and_version_1_frames_are_refused_and_counted():
-    gate, _ = gate_and_clock()
-    assert not accepts(gate, Station(key=bytes(32)).pack(heartbeat()))
+    rx, _ = filter_and_clock()
+    assert not accepts(rx, Station(key=bytes(32)).pack(heartbeat()))
     good = bytearray(Station(key=KEY).pack(heartbeat()))
     for i in range(len(good) - 13, len(good)):  # link, timestamp and hash
         bad = bytearray(good)
         bad[i] ^= 1
-        assert not accepts(gate, bytes(bad))
-    assert refused(gate) == {"forged": 14}
-    assert not accepts(gate, Station().pack(heartbeat()))
-    assert not accepts(gate, Station().pack(heartbeat(), v1=True))
-    assert refused(gate) == {"forged": 14, "unsigned": 2}
-    assert accepts(gate, bytes(good))
+        assert not accepts(rx, bytes(bad))
+    assert rejected(rx) == {"forged": 14}
+    assert not accepts(rx, Station().pack(heartbeat()))
+    assert not accepts(rx, Station().pack(heartbeat(), v1=True))
+    assert rejected(rx) == {"forged": 14, "unsigned": 2}
+    assert accepts(rx, bytes(good))
 
 
 def test_forged_timestamp_does_not_block_the_real_sender():
     """A timestamp of the far future counts only with a good signature."""
-    gate, clock = gate_and_clock()
+    rx, clock = filter_and_clock()
     station = Station(key=KEY)
-    assert accepts(gate, station.pack(heartbeat()))
-    assert not accepts(gate, Station(key=bytes(32), stamp=(1 << 48) - 2).pack(heartbeat()))
-    assert accepts(gate, station.pack(heartbeat()))
+    assert accepts(rx, station.pack(heartbeat()))
+    assert not accepts(rx, Station(key=bytes(32), stamp=(1 << 48) - 2).pack(heartbeat()))
+    assert accepts(rx, station.pack(heartbeat()))
     assert clock.now < now() + MINUTE
 
 
 def test_new_stream_may_lag_at_most_one_minute():
-    gate, _ = gate_and_clock()
-    assert accepts(gate, Station(key=KEY, link=1, stamp=now() - MINUTE + 100_000).pack(heartbeat()))
+    rx, _ = filter_and_clock()
+    assert accepts(rx, Station(key=KEY, link=1, stamp=now() - MINUTE + 100_000).pack(heartbeat()))
     late = Station(key=KEY, link=2, stamp=now() - MINUTE - 100_000)
-    assert not accepts(gate, late.pack(heartbeat()))
-    assert refused(gate) == {"old": 1}
+    assert not accepts(rx, late.pack(heartbeat()))
+    assert rejected(rx) == {"old": 1}
 
 
 def test_sender_with_fast_clock_accepts_own_frames():
     clock = SigningClock()
-    gate, link = open_gate(Verifier(KEY, clock)), signed_link(clock)
+    rx, link = open_filter(Verifier(KEY, clock)), signed_link(clock)
     station = Station(key=KEY, stamp=now() + MINUTE - 200_000)
     station.codec.signing.timestamp += 6_100_000  # so far that ours look old to it
     link.send(heartbeat())
     assert [m.get_type() for m in station.parse(link.channel.frames[-1])] == ["BAD_DATA"]
     station.codec.signing.timestamp -= 6_100_000
-    assert accepts(gate, station.pack(heartbeat()))
+    assert accepts(rx, station.pack(heartbeat()))
     link.send(heartbeat())
     assert [m.get_type() for m in station.parse(link.channel.frames[-1])] == ["HEARTBEAT"]
 
 
 def test_clock_one_hour_ahead_is_rejected_without_lockout():
-    gate, clock = gate_and_clock()
+    rx, clock = filter_and_clock()
     for k in range(5):  # nor does one that creeps ahead, a minute at a time
-        accepts(gate, Station(key=KEY, link=k, stamp=now() + (k + 1) * MINUTE - 100_000).pack(heartbeat()))
-    assert refused(gate) == {"ahead": 4}
-    assert not accepts(gate, Station(key=KEY, link=9, stamp=now() + 60 * MINUTE).pack(heartbeat()))
-    assert refused(gate) == {"ahead": 5} and clock.now < now() + MINUTE
-    assert accepts(gate, Station(key=KEY, link=10, stamp=now()).pack(heartbeat()))
+        accepts(rx, Station(key=KEY, link=k, stamp=now() + (k + 1) * MINUTE - 100_000).pack(heartbeat()))
+    assert rejected(rx) == {"ahead": 4}
+    assert not accepts(rx, Station(key=KEY, link=9, stamp=now() + 60 * MINUTE).pack(heartbeat()))
+    assert rejected(rx) == {"ahead": 5} and clock.now < now() + MINUTE
+    assert accepts(rx, Station(key=KEY, link=10, stamp=now()).pack(heartbeat()))
 
 
 def test_frame_received_on_two_links_counts_as_replay():
     verifier = Verifier(KEY, SigningClock())
     frame = Station(key=KEY).pack(heartbeat())
-    assert accepts(open_gate(verifier), frame)
-    assert not accepts(open_gate(verifier), frame)
+    assert accepts(open_filter(verifier), frame)
+    assert not accepts(open_filter(verifier), frame)
 
 
 def test_streams_are_bounded_and_forgotten_only_when_a_repeat_would_be_too_old():
-    gate, clock = gate_and_clock()
+    rx, clock = filter_and_clock()
     begin = now()
     first = Station(key=KEY, link=0, stamp=begin).pack(heartbeat())
-    assert accepts(gate, first)
-    for link in range(1, STREAMS):
-        assert accepts(gate, Station(key=KEY, link=link, stamp=begin + 10 * link).pack(heartbeat()))
+    assert accepts(rx, first)
+    for link in range(1, MAX_STREAMS):
+        assert accepts(rx, Station(key=KEY, link=link, stamp=begin + 10 * link).pack(heartbeat()))
     extra = Station(key=KEY, link=200, stamp=begin + MINUTE - 100_000).pack(heartbeat())
-    assert not accepts(gate, extra)
-    assert refused(gate) == {"crowded": 1}
+    assert not accepts(rx, extra)
+    assert rejected(rx) == {"crowded": 1}
     clock.advance_to(begin + MINUTE + 100_000)  # time goes by
-    assert accepts(gate, extra)
-    assert not accepts(gate, first)
-    assert refused(gate) == {"crowded": 1, "old": 1}
+    assert accepts(rx, extra)
+    assert not accepts(rx, first)
+    assert rejected(rx) == {"crowded": 1, "old": 1}
 
 
 def test_without_a_key_signed_frames_are_read_as_any():
-    assert accepts(open_gate(), Station(key=KEY).pack(heartbeat()))
+    assert accepts(open_filter(), Station(key=KEY).pack(heartbeat()))
 
 
 def key_file(tmp_path, content, mode=0o600):
@@ -204,27 +204,27 @@ RAW = bytes(range(128, 160))
     ],
 )
 def test_key_files_are_read(tmp_path, content, key):
-    assert read_key(key_file(tmp_path, content)) == key
+    assert load_key(key_file(tmp_path, content)) == key
 
 
 @pytest.mark.parametrize("content", [b"", b" \n", b"\xff" * 31, b"\xff" * 33, b"two\nlines"])
 def test_files_without_a_key_are_rejected(tmp_path, content):
     with pytest.raises(TelemetryError, match="expected 32 bytes, 64 hexadecimal digits or a passphrase"):
-        read_key(key_file(tmp_path, content))
+        load_key(key_file(tmp_path, content))
 
 
 def test_a_key_file_that_is_too_long_is_refused_rather_than_cut(tmp_path):
-    assert read_key(key_file(tmp_path, b"a" * 4096)) == hashlib.sha256(b"a" * 4096).digest()
+    assert load_key(key_file(tmp_path, b"a" * 4096)) == hashlib.sha256(b"a" * 4096).digest()
     with pytest.raises(TelemetryError, match="more than 4096 bytes"):
-        read_key(key_file(tmp_path, b"a" * 4097))
+        load_key(key_file(tmp_path, b"a" * 4097))
 
 
 def test_world_readable_key_files_are_rejected(tmp_path):
     with pytest.raises(TelemetryError, match=r"none: the key cannot be read: No such file"):
-        read_key(tmp_path / "none")
+        load_key(tmp_path / "none")
     if os.name == "posix":
         with pytest.raises(TelemetryError, match="mode is 644, expected 600"):
-            read_key(key_file(tmp_path, KEY, 0o644))
+            load_key(key_file(tmp_path, KEY, 0o644))
 
 
 def test_signature_matches_published_example():
@@ -238,14 +238,14 @@ def test_signature_matches_published_example():
         crc &= 0xFFFF
     body = b"\xfd" + head + crc.to_bytes(2, "little") + b"\x05" + now().to_bytes(6, "little")
     frame = body + hashlib.sha256(b"*" * 32 + body).digest()[:6]
-    gate = open_gate(Verifier(b"*" * 32, SigningClock()))
-    ((_, message),) = gate.datagram(frame)
+    rx = open_filter(Verifier(b"*" * 32, SigningClock()))
+    ((_, message),) = rx.read_datagram(frame)
     assert (message.custom_mode, message.type, message.autopilot) == (7, 6, 8)
 
 
 def test_signed_udp_link_sends_to_an_absent_peer():
     assert mavlink.MAVLink_heartbeat_message.crc_extra == 50
-    link = Link("test", UdpOut("127.0.0.1", 9), open_gate(), SOURCE, signer=Signer(KEY, SigningClock(), 0))
+    link = Link("test", UdpOut("127.0.0.1", 9), open_filter(), SOURCE, signer=Signer(KEY, SigningClock(), 0))
     assert link.send(heartbeat())
     link.channel.close()
 
@@ -264,7 +264,7 @@ class Restarts:
     def start(self, after=0.0):
         self.wall += after
         self.clock = SigningClock(self.file)
-        self.gate, self.link = open_gate(Verifier(KEY, self.clock)), signed_link(self.clock)
+        self.rx, self.link = open_filter(Verifier(KEY, self.clock)), signed_link(self.clock)
         return self
 
     def stamp(self, ahead=0.0):
@@ -303,20 +303,20 @@ def test_no_frame_is_accepted_twice_and_no_timestamp_used_twice_over_any_restart
                 sent.append(vehicle.sends())
             else:
                 frame = Station(key=KEY, link=link, stamp=vehicle.stamp(ahead)).pack(heartbeat())
-                if accepts(vehicle.gate, frame):
+                if accepts(vehicle.rx, frame):
                     captured.append(frame)
-            assert not any(accepts(vehicle.gate, frame) for frame in captured)
+            assert not any(accepts(vehicle.rx, frame) for frame in captured)
         assert sent == sorted(set(sent))
 
 
 def test_station_goes_on_within_two_seconds_of_a_restart_and_at_once_if_it_hears_the_vehicle(vehicle):
-    assert accepts(vehicle.gate, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
+    assert accepts(vehicle.rx, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
     vehicle.start(after=0.3)
-    assert not accepts(vehicle.gate, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
-    assert refused(vehicle.gate) == {"old": 1}
-    assert accepts(vehicle.gate, Station(key=KEY, stamp=vehicle.sends() + 1).pack(heartbeat()))
+    assert not accepts(vehicle.rx, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
+    assert rejected(vehicle.rx) == {"old": 1}
+    assert accepts(vehicle.rx, Station(key=KEY, stamp=vehicle.sends() + 1).pack(heartbeat()))
     vehicle.start(after=2.5)
-    assert accepts(vehicle.gate, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
+    assert accepts(vehicle.rx, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
 
 
 def test_many_restarts_in_a_row_do_not_run_ahead_of_the_clock(vehicle):
@@ -332,7 +332,7 @@ def test_file_is_written_seldom(vehicle, monkeypatch):
     for _ in range(1000):
         vehicle.wall += 0.01
         vehicle.sends()
-        accepts(vehicle.gate, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
+        accepts(vehicle.rx, Station(key=KEY, stamp=vehicle.stamp()).pack(heartbeat()))
     assert 4 <= len(writes) <= 6  # in 10 s
 
 
@@ -357,10 +357,10 @@ def test_folder_that_cannot_be_written_is_refused_at_the_start_and_warned_of_lat
     vehicle.wall += 10.0
     assert vehicle.sends() and "can be replayed" in caplog.text
     assert vehicle.sends() and len(caplog.records) == 1
-    with pytest.raises(TelemetryError, match="name: timestamps cannot be kept: "):
+    with pytest.raises(TelemetryError, match="name: timestamps cannot be saved: "):
         vehicle.start()
     (tmp_path / "file").touch()
-    with pytest.raises(TelemetryError, match="timestamps cannot be kept: "):
+    with pytest.raises(TelemetryError, match="timestamps cannot be saved: "):
         SigningClock(tmp_path / "file" / "name")
 
 
@@ -378,7 +378,7 @@ def test_frame_captured_from_a_link_is_refused_by_the_next_one(tmp_path, monkeyp
         (link,) = open_links([endpoint], MavlinkOptions(key=KEY))
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
             station.sendto(frame, ("127.0.0.1", link.channel.port))
-            while not (link.counts.accepted or link.counts.old):
+            while not (link.stats.accepted or link.stats.old):
                 heard += link.receive(time.perf_counter() + 60.0)
         link.channel.close()
     assert len(heard) == 1

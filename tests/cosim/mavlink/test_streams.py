@@ -5,8 +5,8 @@ import math
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.mavlink.messages import MESSAGES
-from cosim.mavlink.messages.streams import GREATEST_LOAD
+from cosim.mavlink.messages.message_table import message_specs
+from cosim.mavlink.messages.streams import MAX_LOAD
 from tests.cosim.mavlink.station import NAN
 
 ACCEPTED, _, DENIED, _, FAILED = range(5)
@@ -73,15 +73,15 @@ def test_interval_of_an_unknown_message_is_rejected(station, numbers):
 
 @pytest.mark.medium
 def test_stream_load_per_link_is_bounded(station):
-    results = [station.command(SET, message_id, 1) for message_id in MESSAGES]
+    results = [station.command(SET, message_id, 1) for message_id in message_specs()]
     assert DENIED in results and results[0] == ACCEPTED
-    assert station.autopilot._streams[station.wire].load <= GREATEST_LOAD
+    assert station.autopilot._streams[station.wire].load <= MAX_LOAD
     run(station, 1.0)
-    assert sum(12 + len(m.get_payload()) for m in station.wire.got) <= GREATEST_LOAD
+    assert sum(12 + len(m.get_payload()) for m in station.wire.got) <= MAX_LOAD
 
 
 @pytest.mark.medium(fast=9)
-@pytest.mark.parametrize("message_id", MESSAGES)
+@pytest.mark.parametrize("message_id", message_specs())
 def test_every_listed_message_can_be_requested(station, message_id):
     station.look(1.0, altitude=3.0, measured__altitude=3.0, **{"goal.clearance": (-3.0, 2.0, 2.0, 2.0, 3.0, 3.0)})
     station.wire.clear()

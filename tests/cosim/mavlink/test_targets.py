@@ -144,7 +144,7 @@ def test_ignored_setpoints_are_announced(station):
         station.send(local())
         station.wait(0.1)
     (text,) = texts(station)
-    assert text == "Set-points wait: the mode is position hold, they count in region reaching"
+    assert text == "Set-points wait: the mode is position hold, they apply in region reaching"
     assert {m.severity for m in station.wire.of("STATUSTEXT")} == {mavlink.MAV_SEVERITY_NOTICE}
 
 
@@ -171,7 +171,7 @@ def test_every_rejection_reason_is_eventually_reported(station):
 
 def test_excess_status_texts_are_queued(station):
     for k in range(30):
-        station.autopilot._context.say(f"text {k}")
+        station.autopilot._context.send_text(f"text {k}")
     assert len(station.wire.texts) == 12
     station.wait(3.0)
     assert station.wire.texts == [f"text {k}" for k in range(30)]

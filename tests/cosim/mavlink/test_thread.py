@@ -10,7 +10,7 @@ from pymavlink import mavutil
 
 from cosim.mavlink import thread
 from cosim.mavlink.channels.tcp import TcpIn
-from cosim.mavlink.channels.tlog import Tlog
+from cosim.mavlink.channels.tlog_file import Tlog
 from cosim.mavlink.channels.udp import UdpIn
 from cosim.mavlink.thread import LinkThread
 from cosim.mavlink.wire import link as link_module
@@ -221,7 +221,7 @@ def test_unencodable_messages_are_counted_without_sequence_gap(caplog):
         link.channel.close()
         assert [m.get_seq() for m in ground.receive()] == list(range(7))
     assert link.unencodable == 7
-    assert link.troubles() == ["7 messages that could not be encoded"]
+    assert link.loss_reports() == ["7 messages that could not be encoded"]
     assert len(caplog.records) == 3  # one a kind of message
 
 
@@ -238,7 +238,7 @@ def test_a_budget_thins_streams_before_answers(monkeypatch):
         clock[0] += 0.25
         assert link.has_room() and link.send(odometry(1))
         link.channel.close()
-        assert link.troubles() == [f"{link.dropped} messages over the budget"]
+        assert link.loss_reports() == [f"{link.dropped} messages over the budget"]
         sequence = [m.get_seq() for m in ground.receive()]
     assert sequence == list(range(len(sequence)))
 
@@ -246,12 +246,12 @@ def test_a_budget_thins_streams_before_answers(monkeypatch):
 def test_stalled_thread_drops_oldest_snapshots_and_reports_the_count(caplog):
     vehicle = StubVehicle()
     links = LinkThread(vehicle, [], step=0.01)
-    for k in range(thread.SNAPSHOTS + 904):
+    for k in range(thread.MAX_SNAPSHOTS + 904):
         links.observe(k, row(k * 0.01))
     assert links.dropped == 904
     links.start()
     links.close()
-    assert vehicle.rows[0][0] == pytest.approx(9.04) and len(vehicle.rows) == thread.SNAPSHOTS
+    assert vehicle.rows[0][0] == pytest.approx(9.04) and len(vehicle.rows) == thread.MAX_SNAPSHOTS
     assert "904 snapshots dropped" in caplog.text
 
 
@@ -291,9 +291,9 @@ def test_endpoints_become_links_of_one_signed_vehicle(tmp_path):
         assert ground.station.codec.signing.goodsig_count > 0
         ground.send(heartbeat())
         ground.socket.sendto(Station().pack(heartbeat()), ground.address)
-        assert until(lambda: links[0].counts.unsigned and vehicle.received)
+        assert until(lambda: links[0].stats.unsigned and vehicle.received)
         running.close()
-    assert links[0].troubles() == ["1 frames unsigned"]
+    assert links[0].loss_reports() == ["1 frames unsigned"]
     reader = mavutil.mavlink_connection(texts[1], dialect="all")
     assert reader.recv_msg().get_type() == "ATTITUDE"
     reader.close()
@@ -329,4 +329,4 @@ def test_a_client_that_never_reads_costs_no_other_client_a_frame():
         closing.join()
     assert links.dropped == 0
     assert [m.time_usec for m in messages if m.get_type() == "ODOMETRY"] == list(range(1, 4001))
-    assert any("frames dropped for slow clients" in trouble for trouble in link.troubles())
+    assert any("frames dropped for slow clients" in trouble for trouble in link.loss_reports())

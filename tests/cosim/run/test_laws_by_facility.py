@@ -10,8 +10,8 @@ from controller.law import Diagnostic
 from cosim.command_line.cli import main
 from cosim.errors import CosimError, RunError
 from cosim.live.address import parse_live
-from cosim.live.view import LiveView
-from cosim.mavlink.setup import Mavlink
+from cosim.live.live_view import LiveView
+from cosim.mavlink.run_links import Mavlink
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
 from cosim.results.record import load_record

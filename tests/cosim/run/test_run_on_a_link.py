@@ -10,7 +10,7 @@ from pymavlink import mavutil
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.errors import RunError, TelemetryError
-from cosim.mavlink.setup import Mavlink
+from cosim.mavlink.run_links import Mavlink
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.results.record import load_record

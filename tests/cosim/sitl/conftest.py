@@ -4,9 +4,9 @@ import threading
 
 import pytest
 
-from cosim.sitl.flights import FlightOptions, Flights
-from cosim.sitl.law import law_of_pwm
-from cosim.sitl.server import JsonServer
+from cosim.sitl.json_server import JsonServer
+from cosim.sitl.law import make_pwm_law
+from cosim.sitl.sitl_session import FlightOptions, SitlSession
 
 
 class Served(threading.Thread):
@@ -36,11 +36,11 @@ def serve(tmp_path):
     """Return a function that begins to serve; each server has a folder of its own."""
     begun = []
 
-    def begin(*overrides, kind=JsonServer, of=("ardupilot", law_of_pwm), vehicle="bluerov2_heavy", timeout=30.0,
+    def begin(*overrides, kind=JsonServer, of=("ardupilot", make_pwm_law), vehicle="bluerov2_heavy", timeout=30.0,
               record_rate=2000.0, **more):  # fmt: skip
         out = tmp_path / f"run{len(begun)}"
         options = FlightOptions("sitl", overrides, vehicle, out, record_rate, report=False, **more)
-        served = Served(kind(Flights(options, *of), ("127.0.0.1", 0), timeout))
+        served = Served(kind(SitlSession(options, *of), ("127.0.0.1", 0), timeout))
         begun.append(served)
         served.start()
         return served

@@ -8,7 +8,7 @@ import pytest
 
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
-from cosim.sitl.law import law_of_controls, law_of_pwm
+from cosim.sitl.law import make_control_law, make_pwm_law
 from plant_fmu import load_vehicle
 from plant_fmu.errors import TableError, VehicleError
 
@@ -42,7 +42,7 @@ def test_motor_effects_match_ardusub_factors(name, motor):
     vehicle = load_vehicle(name)
     pulses = [1500] * 16
     pulses[motor] = 1900
-    wrench = vehicle.thruster_matrix @ forces(law_of_pwm(vehicle), pulses)
+    wrench = vehicle.thruster_matrix @ forces(make_pwm_law(vehicle), pulses)
     for axis, factor in enumerate(VECTORED_6DOF[motor]):
         if factor:
             assert np.sign(wrench[axis]) == factor
@@ -60,7 +60,7 @@ def test_motor_effects_match_ardusub_factors(name, motor):
 )  # fmt: skip
 def test_thrust_curve_is_applied(pulse, part):
     """u|u| of 40 N with u = (pulse - 1500)/400, and a sign of -1."""
-    given = forces(law_of_pwm(load_vehicle("bluerov2_heavy")), [pulse] * 16)
+    given = forces(make_pwm_law(load_vehicle("bluerov2_heavy")), [pulse] * 16)
     assert given == pytest.approx([-40.0 * part] * 8, abs=1e-12)
 
 
@@ -74,7 +74,7 @@ def own(tmp_path, table):
 def test_custom_channels_signs_and_curve_are_applied(tmp_path):
     table = '[autopilot]\nframe = "mine"\nchannels = [9, 0, 3, 32, 5, 6, 7, 8]\nsigns = [1, 1, -1, 1, 1, 1, 1, 1]\n'
     vehicle = load_vehicle(own(tmp_path, table + 'curve = "linear"\npwm_dead_band = 0\n'))
-    law = law_of_pwm(vehicle)
+    law = make_pwm_law(vehicle)
     assert [d.name for d in law.diagnostics] == ["pwm9", "pwm3", "pwm32", "pwm5", "pwm6", "pwm7", "pwm8", "lost"]
     pulses = [1500] * 32
     pulses[8], pulses[2], pulses[31], pulses[1] = 1600, 1600, 1400, 1900
@@ -117,11 +117,11 @@ def test_invalid_autopilot_keys_are_rejected(tmp_path, table, words):
 
 def test_vehicle_without_autopilot_table_is_rejected():
     with pytest.raises(RunError, match=r"vehicle 'odin' has no table \[autopilot\]"):
-        law_of_pwm(load_vehicle("odin"))
+        make_pwm_law(load_vehicle("odin"))
 
 
 def test_controls_map_linearly_to_force_limits():
-    law = law_of_controls(load_vehicle("rexrov"))
+    law = make_control_law(load_vehicle("rexrov"))
     vehicle = load_vehicle("rexrov")
     n = vehicle.n_thrusters
     given = np.zeros(n)

@@ -21,7 +21,7 @@ from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.logs import import_log
 from cosim.logs.column_map import read_map
-from cosim.mavlink.wire.signing import read_key
+from cosim.mavlink.wire.signing import load_key
 from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter import formats as arbiters
@@ -107,9 +107,9 @@ def scenes(seeds: Seeds) -> Case:
     return seeds.file("it.jsonl", read, b"".join(SCENES))
 
 
-@reader("signing key", "bytes", "cosim.mavlink.wire.signing:read_key")
+@reader("signing key", "bytes", "cosim.mavlink.wire.signing:load_key")
 def key(seeds: Seeds) -> Case:
-    case = seeds.file("key", read_key, bytes(range(32)), b"0f" * 32 + b"\n", b"a passphrase\n")
+    case = seeds.file("key", load_key, bytes(range(32)), b"0f" * 32 + b"\n", b"a passphrase\n")
     Path(case.named).touch(0o600)
     Path(case.named).chmod(0o600)
     return case
@@ -222,7 +222,7 @@ def parquet_of_a_log(seeds: Seeds) -> Case:
     return _log(seeds, "it.parquet", made.getvalue(), columns=MAP)
 
 
-@reader("telemetry log", "bytes", "cosim.logs.formats.tlog:_frames", "cosim.mavlink.wire.framing:header_at")
+@reader("telemetry log", "bytes", "cosim.logs.formats.tlog:_frames", "cosim.mavlink.wire.framing:parse_header")
 def telemetry_log(seeds: Seeds) -> Case:
     return _log(seeds, "it.tlog", (LOGS / "small.tlog").read_bytes()[:40_000])
 

@@ -16,21 +16,21 @@ from cosim.campaigns import vary_from
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.live.address import foreign_origin, parse_live
 from cosim.live.command_desk import MAX_LENGTH, CommandDesk
-from cosim.live.messages import bytes_of, text_of
+from cosim.live.viewer_messages import format_message, write_rows
 from cosim.live.watching import looks, picture
-from cosim.mavlink.listening import Watch
-from cosim.mavlink.listening import picture as table
+from cosim.mavlink.listening import TelemetryTable
+from cosim.mavlink.listening import format_table as table
 from cosim.mavlink.wire.endpoint import parse_endpoint
-from cosim.mavlink.wire.framing import Counts, Gate, StreamReader
-from cosim.mavlink.wire.ground_end import Heard
+from cosim.mavlink.wire.framing import FrameFilter, RxStats, StreamReader
+from cosim.mavlink.wire.ground_end import ReceivedMessage
 from cosim.replay.header import header_of
 from cosim.replay.view_columns import ViewColumns
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import CommandQueue
-from cosim.sitl import wire
-from cosim.sitl.flights import Counts as HilCounts
-from cosim.sitl.hil import HilServer
-from cosim.sitl.law import law_of_controls, law_of_pwm
+from cosim.sitl import json_protocol
+from cosim.sitl.hil_server import HilServer
+from cosim.sitl.law import make_control_law, make_pwm_law
+from cosim.sitl.sitl_session import FrameCounts as HilCounts
 from fuzzy_arbiter.rule_text import parse_rule
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station
@@ -73,17 +73,17 @@ class _Connection:
         return iter(self._messages)
 
 
-@reader("live view", "jsonl", "cosim.live.watching.sources:_live", "cosim.live.messages:rows_of")
+@reader("live view", "jsonl", "cosim.live.watching.run_views:_live", "cosim.live.viewer_messages:read_rows")
 def live_view(seeds: Seeds) -> Case:
     scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
     columns = load_columns(seeds)
     viewing = ViewColumns(scenario, columns)
     header = header_of(scenario, viewing.columns, commands=True)
-    rows = bytes_of(np.zeros((2, len(viewing.columns))))
+    rows = write_rows(np.zeros((2, len(viewing.columns))))
     texts = [
-        text_of("header", run=header),
-        text_of("said", kind="info", text="a word", time=None),
-        text_of("end", status="completed", verdict="It came to its end."),
+        format_message("header", run=header),
+        format_message("said", kind="info", text="a word", time=None),
+        format_message("end", status="completed", verdict="It came to its end."),
     ]
     console = Console(width=100, quiet=True)
 
@@ -130,7 +130,7 @@ def _frames() -> bytes:
     return b"".join(message.pack(codec) for message in messages)
 
 
-_FRAMING = ("cosim.mavlink.wire.framing:Gate._verified", "cosim.mavlink.wire.framing:header_at")
+_FRAMING = ("cosim.mavlink.wire.framing:FrameFilter._decode", "cosim.mavlink.wire.framing:parse_header")
 
 
 @reader("MAVLink frames, to a vehicle", "bytes", *_FRAMING, "cosim.mavlink.services.ftp:FileServer._request")
@@ -139,7 +139,7 @@ def to_vehicle(seeds: Seeds) -> Case:
     station.look()
 
     def read(content: bytes) -> None:
-        for _, message in StreamReader(Gate(Counts(), (1, 1))).read(content):
+        for _, message in StreamReader(FrameFilter(RxStats(), (1, 1))).read(content):
             station.autopilot.receive(station.wire, message, station.now)
         station.wait(0.04)
         station.commanded()
@@ -153,24 +153,24 @@ def to_ground(seeds: Seeds) -> Case:
     class Link:
         name = "udpin:127.0.0.1:14550"
 
-        def troubles(self) -> list[str]:
+        def loss_reports(self) -> list[str]:
             return []
 
     def read(content: bytes) -> None:
-        watch = Watch()
-        for _, m in Gate(Counts()).datagram(content):
-            watch.add(Heard(1.0, m.get_srcSystem(), m.get_srcComponent(), m.get_seq(), m.get_type(), m))
+        watch = TelemetryTable()
+        for _, m in FrameFilter(RxStats()).read_datagram(content):
+            watch.add(ReceivedMessage(1.0, m.get_srcSystem(), m.get_srcComponent(), m.get_seq(), m.get_type(), m))
         watch.sample(2.0)
         assert all(line.isprintable() for line in table(Link(), watch, 2.0))  # type: ignore[arg-type]
 
     return Case((_frames(),), read)
 
 
-@reader("MAVLink frames, to a simulator", "bytes", "cosim.sitl.hil:HilServer._controls")
+@reader("MAVLink frames, to a simulator", "bytes", "cosim.sitl.hil_server:HilServer._controls")
 def to_simulator(seeds: Seeds) -> Case:
     server: Any = HilServer.__new__(HilServer)
     server.counts, server._mavlink = HilCounts(), mavlink
-    law = law_of_controls(load_vehicle("bluerov2_heavy"))
+    law = make_control_law(load_vehicle("bluerov2_heavy"))
     codec = mavlink.MAVLink(None, 1, 1)
     frames = b"".join(
         mavlink.MAVLink_hil_actuator_controls_message(1, [0.1] * 16, 128, 0).pack(codec) for _ in range(3)
@@ -184,16 +184,18 @@ def to_simulator(seeds: Seeds) -> Case:
     return Case((frames,), read)
 
 
-@reader("servo packet", "bytes", "cosim.sitl.wire:decode")
+@reader("servo packet", "bytes", "cosim.sitl.json_protocol:parse_packet")
 def servos(seeds: Seeds) -> Case:
-    law = law_of_pwm(load_vehicle("bluerov2_heavy"))
+    law = make_pwm_law(load_vehicle("bluerov2_heavy"))
 
     def read(content: bytes) -> None:
-        packet = wire.decode(content)
+        packet = json_protocol.parse_packet(content)
         if packet is not None:
             law.set_outputs(packet.pwm)
 
-    packets = [wire._MAGICS[magic].pack(magic, 400, 7, *[1500] * n) for magic, n in ((18458, 16), (29569, 32))]
+    packets = [
+        json_protocol._PACKINGS[magic].pack(magic, 400, 7, *[1500] * n) for magic, n in ((18458, 16), (29569, 32))
+    ]
     return Case(tuple(packets), read)
 
 

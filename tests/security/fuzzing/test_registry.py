@@ -24,13 +24,13 @@ METHODS = {
 }  # fmt: skip
 ITS_OWN = {  # what parses nothing that comes from outside: why
     "controller.laws.deployable.braking:_least_forces": "an array in memory",
-    "cosim.companion.failsafes:Failsafes.take": "the four bytes of a number of a message",
+    "cosim.companion.failsafes:Failsafes.receive": "the four bytes of a number of a message",
     "cosim.campaigns.reruns.repeat:_of_sweep": "a copy of the plan, which was read",
     "cosim.campaigns.store.folder:CampaignFolder._claim": "a copy of its own plan",
     "cosim.campaigns.sweeps.rows:_for_json": "a copy of its own plan",
-    "cosim.mavlink.services.parameters:Parameters._send_hash": "its own hash",
-    "cosim.mavlink.services.parameters:_as_float32": "its own number",
-    "cosim.mavlink.wire.thrust_body:thrust_body_of": "twelve bytes of a message whose checksum fits, made up to length",
+    "cosim.mavlink.services.parameter_protocol:ParameterProtocol._send_hash": "its own hash",
+    "cosim.mavlink.services.parameter_protocol:_as_float32": "its own number",
+    "cosim.mavlink.wire.thrust_body:get_thrust_body": "twelve bytes of a message with a valid checksum, padded",
     "cosim.results.recorder:Recorder._append_parts": "the parts that it has just written",
     "cosim.scenario.membership_terms:_read": "text made of a scenario's table, which is fuzzed",
     "cosim.scenario.scenario:Scenario.replace": "its own text",

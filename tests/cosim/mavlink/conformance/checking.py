@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 from cosim.errors import TelemetryError
-from cosim.mavlink.wire.ground_end import GroundLink, Heard
+from cosim.mavlink.wire.ground_end import GroundLink, ReceivedMessage
 from tests.cosim.mavlink.conformance import commands, identity, missions, parameters, streams
 from tests.cosim.mavlink.conformance.client import Client
 from tests.cosim.mavlink.conformance.connect import qgc_connect
@@ -91,10 +91,10 @@ def check_vehicle(link: GroundLink) -> Iterator[Result]:
     _restore_rates(subject)
 
 
-def _listen(client: Client) -> tuple[tuple[Heard, ...], float]:
+def _listen(client: Client) -> tuple[tuple[ReceivedMessage, ...], float]:
     """Return the messages that the vehicle streams unasked, and the time of recording [s of the wall clock]."""
     started, passed = time.monotonic(), 0.0
-    heard: tuple[Heard, ...] = ()
+    heard: tuple[ReceivedMessage, ...] = ()
     while passed < _LONGEST and (left := LISTENING - passed * speed_of(heard)) > 0.0:
         heard += tuple(client.collect(left))
         passed = time.monotonic() - started

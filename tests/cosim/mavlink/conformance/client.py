@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from cosim.mavlink.wire.dialect import dialect
-from cosim.mavlink.wire.ground_end import GroundLink, Heard
+from cosim.mavlink.wire.ground_end import GroundLink, ReceivedMessage
 
 _KEPT = 20_000  # messages that are kept
 _BEAT = 1.0  # s, between our heartbeats
@@ -54,8 +54,8 @@ class Client:
         self.link, self.mavlink = link, dialect()
         self.vehicle: Vehicle | None = None
         self.lost = self.total = 0
-        self._heard: deque[Heard] = deque(maxlen=_KEPT)
-        self._new: deque[Heard] = deque(maxlen=_KEPT)  # not examined by a wait
+        self._heard: deque[ReceivedMessage] = deque(maxlen=_KEPT)
+        self._new: deque[ReceivedMessage] = deque(maxlen=_KEPT)  # not examined by a wait
         self._sequence: int | None = None
         self._next_beat = 0.0
         self.last_heard = time.monotonic()
@@ -67,7 +67,7 @@ class Client:
         now = time.monotonic()
         if now >= self._next_beat:
             self._next_beat = now + _BEAT
-            self.link.beat()
+            self.link.send_heartbeat()
         for heard in self.link.receive(min(timeout, _SLICE)):
             if self._is_of_vehicle(heard):
                 if self._sequence is not None:
@@ -78,15 +78,15 @@ class Client:
                 self.total += 1
                 self.last_heard = heard.time
 
-    def _is_of_vehicle(self, heard: Heard) -> bool:
+    def _is_of_vehicle(self, heard: ReceivedMessage) -> bool:
         m = self.mavlink
-        if self.vehicle is None and heard.kind == "HEARTBEAT" and heard.component == _VEHICLE_COMPONENT:
+        if self.vehicle is None and heard.name == "HEARTBEAT" and heard.component == _VEHICLE_COMPONENT:
             beat = heard.message
             if beat.type not in (m.MAV_TYPE_GCS, m.MAV_TYPE_ONBOARD_CONTROLLER, m.MAV_TYPE_GIMBAL, m.MAV_TYPE_ADSB):
                 self.vehicle = Vehicle(heard.system, heard.component, beat.autopilot, beat.type)
         return self.vehicle is not None and (heard.system, heard.component) == self.vehicle[:2]
 
-    def collect(self, seconds: float) -> list[Heard]:
+    def collect(self, seconds: float) -> list[ReceivedMessage]:
         """Return the messages not yet examined by a wait, and those of the next `seconds` of the wall clock."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0.0:
@@ -120,13 +120,13 @@ class Client:
             self.pump(left)
         return self.vehicle
 
-    def recent(self, kind: str) -> list[Heard]:
+    def recent(self, kind: str) -> list[ReceivedMessage]:
         """Return the kept messages of a kind, oldest first."""
-        return [heard for heard in self._heard if heard.kind == kind]
+        return [heard for heard in self._heard if heard.name == kind]
 
     def last(self, kind: str) -> Any:
         """Return the newest message of a kind, or None."""
-        return next((heard.message for heard in reversed(self._heard) if heard.kind == kind), None)
+        return next((heard.message for heard in reversed(self._heard) if heard.name == kind), None)
 
     # ---- sending ----
 

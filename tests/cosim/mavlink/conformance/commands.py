@@ -24,7 +24,7 @@ def one_ack(subject: Subject) -> Outcome:
     started = time.monotonic()
     client.discard_unread()
     client.send_command(command, [m.MAVLINK_MSG_ID_SYS_STATUS])
-    acks = [h for h in client.collect(0.8) if h.kind == "COMMAND_ACK" and h.message.command == command]
+    acks = [h for h in client.collect(0.8) if h.name == "COMMAND_ACK" and h.message.command == command]
     if len(acks) != 1:
         return failed(f"{len(acks)} acks", "one")
     took, ack = acks[0].time - started, acks[0].message
@@ -46,8 +46,8 @@ def command_int(subject: Subject) -> Outcome:
         )
     )  # fmt: skip
     heard = client.collect(0.8)
-    acks = [h.message.result for h in heard if h.kind == "COMMAND_ACK" and h.message.command == command]
-    versions = sum(h.kind == "AUTOPILOT_VERSION" for h in heard)
+    acks = [h.message.result for h in heard if h.name == "COMMAND_ACK" and h.message.command == command]
+    versions = sum(h.name == "AUTOPILOT_VERSION" for h in heard)
     return judged(acks == [m.MAV_RESULT_ACCEPTED] and versions == 1, f"acks {acks}, {versions} messages", "one of each")
 
 
@@ -66,7 +66,7 @@ def wrong_target(subject: Subject) -> Outcome:
     client.send(m.MAVLink_param_request_read_message(_NO_SYSTEM, 1, b"", 0))
     client.send(m.MAVLink_mission_request_list_message(_NO_SYSTEM, 1, 0))
     answers = {"COMMAND_ACK", "AUTOPILOT_VERSION", "PARAM_VALUE", "PARAM_ERROR", "MISSION_COUNT", "MISSION_ACK"}
-    heard = sorted({h.kind for h in client.collect(0.8)} & answers)
+    heard = sorted({h.name for h in client.collect(0.8)} & answers)
     return judged(not heard, ", ".join(heard) or "silence", "silence")
 
 

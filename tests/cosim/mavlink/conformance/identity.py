@@ -41,7 +41,7 @@ def heartbeat_custom_mode(subject: Subject) -> Outcome:
 
 def heartbeat_rate(subject: Subject) -> Outcome:
     """Check that heartbeats come once a second, and not too many messages between two of them."""
-    beats = [i for i, heard in enumerate(subject.unasked) if heard.kind == "HEARTBEAT"]
+    beats = [i for i, heard in enumerate(subject.unasked) if heard.name == "HEARTBEAT"]
     times = [subject.unasked[i].time for i in beats]
     if len(beats) < 2:
         return failed(f"{len(beats)} in {subject.seconds:.1f} s", "one a second")
@@ -55,9 +55,11 @@ def heartbeat_rate(subject: Subject) -> Outcome:
 def mavlink_2(subject: Subject) -> Outcome:
     """Check that all frames are of MAVLink 2: QGroundControl accepts no other."""
     link = subject.client.link
-    unknown, troubles = link.counts.unknown, link.troubles()
-    received = [f"{subject.client.total} messages", f"{link.old} of MAVLink 1", f"{unknown} unknown", *troubles]
-    return judged(link.old == unknown == 0 and not troubles, ", ".join(received), "only whole, known ones of MAVLink 2")
+    unknown, troubles = link.stats.unknown, link.loss_reports()
+    received = [f"{subject.client.total} messages", f"{link.v1_frames} of MAVLink 1", f"{unknown} unknown", *troubles]
+    return judged(
+        link.v1_frames == unknown == 0 and not troubles, ", ".join(received), "only whole, known ones of MAVLink 2"
+    )
 
 
 def autopilot_version(subject: Subject) -> Outcome:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from cosim.mavlink.wire.ground_end import Heard
+from cosim.mavlink.wire.ground_end import ReceivedMessage
 from tests.cosim.mavlink.conformance.client import Client
 
 Status = Literal["pass", "fail", "skip"]
@@ -47,7 +47,7 @@ class Subject:
     """The checked vehicle, and the messages that it streams unasked."""
 
     client: Client
-    unasked: tuple[Heard, ...]  # messages before the first request
+    unasked: tuple[ReceivedMessage, ...]  # messages before the first request
     seconds: float  # s of the wall clock, in which these were received
 
     @property
@@ -68,16 +68,16 @@ class Subject:
 
     def rates(self) -> dict[str, float]:
         """Return the rate of each unasked message by the vehicle's clock [Hz]."""
-        counts = Counter(heard.kind for heard in self.unasked)
+        counts = Counter(heard.name for heard in self.unasked)
         return {kind: n / (self.seconds * self.speed) for kind, n in counts.items()}
 
 
-def speed_of(heard: tuple[Heard, ...]) -> float:
+def speed_of(heard: tuple[ReceivedMessage, ...]) -> float:
     """Return the seconds of the vehicle's clock per second of the wall clock; 1 if it sends no time.
 
     Parameters
     ----------
-    heard : tuple of Heard
+    heard : tuple of ReceivedMessage
         Messages in the order of reception.
 
     Returns

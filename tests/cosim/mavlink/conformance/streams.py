@@ -34,7 +34,7 @@ def stream_rates(subject: Subject) -> Outcome:
 
 def boot_clock(subject: Subject) -> Outcome:
     """Check that the vehicle's clock never goes back."""
-    stamps = [h.message.time_boot_ms for h in subject.unasked if h.kind == "ATTITUDE"]
+    stamps = [h.message.time_boot_ms for h in subject.unasked if h.name == "ATTITUDE"]
     if len(stamps) < 2:
         return failed(f"{len(stamps)} ATTITUDE", "a clock in them")
     return judged(all(b > a for a, b in pairwise(stamps)), f"{stamps[0]} to {stamps[-1]} ms", "growing boot times")
@@ -153,7 +153,7 @@ def _attitude_rate(subject: Subject) -> float:
     """Return the present rate of ATTITUDE by the vehicle's clock [Hz]."""
     subject.client.collect(0.2)  # messages under way
     heard = tuple(subject.client.collect(_WINDOW))
-    return sum(h.kind == "ATTITUDE" for h in heard) / (_WINDOW * speed_of(heard))
+    return sum(h.name == "ATTITUDE" for h in heard) / (_WINDOW * speed_of(heard))
 
 
 CHECKS = (

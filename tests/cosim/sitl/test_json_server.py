@@ -13,11 +13,11 @@ from cosim.errors import RunError
 from cosim.results.record import load_record
 from cosim.simulation.master import Master
 from cosim.sitl import motion
-from cosim.sitl.flights import RESTARTED, FlightOptions, Flights
-from cosim.sitl.law import law_of_pwm
+from cosim.sitl.json_server import JsonServer
+from cosim.sitl.law import make_pwm_law
 from cosim.sitl.lockstep import Lockstep
-from cosim.sitl.scenario import scenario_to_fly
-from cosim.sitl.server import JsonServer
+from cosim.sitl.sitl_scenario import scenario_to_fly
+from cosim.sitl.sitl_session import RESTARTED, FlightOptions, SitlSession
 from plant_fmu import load_vehicle
 from tests.cosim.sitl.stand_in import DISARMED, NEUTRAL, StandIn, frame, heave, newest_line, parse
 
@@ -98,7 +98,7 @@ def test_vehicle_is_held_until_a_thruster_is_driven(serve):
 
 def test_an_idle_autopilot_is_lowered_from_the_surface_and_starts_where_the_scenario_does(serve, monkeypatch):
     """Here within 0.06 s; what drives a thruster before the vehicle is there waits for it."""
-    monkeypatch.setattr(motion, "_AT_THE_SURFACE", 0.02)
+    monkeypatch.setattr(motion, "_SURFACE_TIME", 0.02)
     monkeypatch.setattr(motion, "_MAX_DURATION", 0.04)
     served = serve("time.duration=0.02", "initial.position=[1,2,3]")
     with StandIn(served.address) as pilot:
@@ -148,7 +148,7 @@ def test_without_a_bottom_there_is_no_rangefinder(serve, tmp_path):
         'goal = { type = "sphere", centre = [0.0, 0.0, 2.0], radius = 1.0 }\n'
     )
     options = FlightOptions(path, out=tmp_path / "deep", report=False)
-    server = JsonServer(Flights(options, "ardupilot", law_of_pwm), ("127.0.0.1", 0), 0.2)
+    server = JsonServer(SitlSession(options, "ardupilot", make_pwm_law), ("127.0.0.1", 0), 0.2)
     with StandIn(server.address) as pilot:
         pilot.send(frame(0, NEUTRAL))
         server.serve()
@@ -166,7 +166,7 @@ def test_run_equals_a_master_with_the_autopilot_as_law(serve):
         for k in range(600):
             pilot.fly(pulses(k))
     (run,) = served.outcome().runs
-    law = law_of_pwm(load_vehicle("bluerov2_heavy"))
+    law = make_pwm_law(load_vehicle("bluerov2_heavy"))
     with Master(scenario_to_fly("sitl", overrides, None, 1200, "ardupilot"), law) as master:
         expected = []
         for k in range(601):
@@ -205,7 +205,7 @@ def test_lost_frames_are_counted_and_advance_one_step(serve, caplog):
     assert (outcome.counts.steps, outcome.counts.lost) == (120, 6)
     record = load_record(outcome.runs[0].folder)
     assert record["law.lost"].tolist() == [0.0, 4.0, *[6.0] * 119]
-    assert [r.message for r in caplog.records] == ["4 frames of the autopilot have not come: one step is made for all"]
+    assert [r.message for r in caplog.records] == ["4 frames of the autopilot lost: one step is made for all"]
 
 
 def test_restart_starts_a_new_run_from_the_initial_state(serve):
@@ -263,14 +263,14 @@ def test_second_sender_is_rejected_while_the_first_is_active(serve):
         with pytest.raises(BlockingIOError):
             other.socket.recv(100)
     assert outcome.counts.steps == 120
-    assert outcome.counts.refused >= 119  # the last may have come too late
+    assert outcome.counts.rejected >= 119  # the last may have come too late
     assert set(load_record(outcome.runs[0].folder)["law.pwm5"]) == {1501.0}
 
 
 @pytest.mark.medium
 def test_autopilot_on_another_port_replaces_a_silent_one(serve, monkeypatch):
     """With the next count the run continues, as behind a relay; any other count starts a new run."""
-    monkeypatch.setattr("cosim.sitl.server._SENDER_TIMEOUT", 0.05)
+    monkeypatch.setattr("cosim.sitl.json_server._SENDER_TIMEOUT", 0.05)
     served = serve("time.duration=0.1")
     for first, steps in ((0, 10), (10, 10), (15, 120)):
         time.sleep(0.1)
@@ -365,7 +365,7 @@ def test_a_plant_that_fails_leaves_its_record(serve):
 
 
 def test_occupied_port_is_reported():
-    flights = Flights(FlightOptions(), "ardupilot", law_of_pwm)
+    flights = SitlSession(FlightOptions(), "ardupilot", make_pwm_law)
     with closing(JsonServer(flights, ("127.0.0.1", 0))) as server:
         with pytest.raises(RunError, match=rf"UDP 127.0.0.1:{server.address[1]}: Address already in use"):
             JsonServer(flights, server.address)
@@ -376,20 +376,20 @@ def test_occupied_port_is_reported():
     [
         ((), "odin", "has no table"),
         ((), "ordin", "is unknown"),
-        (("commands.enabled=true",), None, "commands.enabled is true, expected false: here an autopilot steers"),
+        (("commands.enabled=true",), None, "commands.enabled is true, expected false: the autopilot steers"),
         (("time.duratoin=3",), None, "duratoin"),
         (("record.lyapunov=true",), None, "record.lyapunov"),
     ],
 )
 def test_invalid_scenario_is_rejected_before_waiting(overrides, vehicle, words):
     with pytest.raises(Exception, match=words):
-        Flights(FlightOptions("sitl", overrides, vehicle), "ardupilot", law_of_pwm)
+        SitlSession(FlightOptions("sitl", overrides, vehicle), "ardupilot", make_pwm_law)
 
 
 def test_nonempty_folder_is_rejected_before_waiting(tmp_path):
     (tmp_path / "here").touch()
     with pytest.raises(RunError, match="exists and is not empty"):
-        Flights(FlightOptions(out=tmp_path), "ardupilot", law_of_pwm)
+        SitlSession(FlightOptions(out=tmp_path), "ardupilot", make_pwm_law)
 
 
 @pytest.mark.slow

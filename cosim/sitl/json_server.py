@@ -8,10 +8,10 @@ import time
 from collections.abc import Callable
 
 from cosim.errors import RunError
-from cosim.sitl import wire
-from cosim.sitl.flights import RESTARTED, Counts, Flights, Outcome
+from cosim.sitl import json_protocol
 from cosim.sitl.lockstep import Lockstep
-from cosim.sitl.scenario import LOWEST_RATE
+from cosim.sitl.sitl_scenario import MIN_RATE
+from cosim.sitl.sitl_session import RESTARTED, FrameCounts, Outcome, SitlSession
 
 log = logging.getLogger(__name__)
 
@@ -27,7 +27,7 @@ class JsonServer:
 
     Parameters
     ----------
-    flights : Flights
+    flights : SitlSession
         The runs of the session.
     address : (str, int)
         Address to bind; port 0 for any free one.
@@ -51,13 +51,13 @@ class JsonServer:
 
     def __init__(
         self,
-        flights: Flights,
+        flights: SitlSession,
         address: tuple[str, int],
         timeout: float | None = None,
         report: Callable[[str], None] | None = None,
     ) -> None:
         self._flights, self._timeout, self._report = flights, timeout, report or log.info
-        self.counts = Counts()
+        self.counts = FrameCounts()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
             self._socket.bind(address)
@@ -104,7 +104,7 @@ class JsonServer:
     def poll(self) -> str:
         """Answer the next frame, or wait for one for at most 0.25 s; return the run's status once it has ended."""
         try:
-            data, sender = self._receive(wire.LARGEST + 1)
+            data, sender = self._receive(json_protocol.MAX_SIZE + 1)
         except OSError:  # timeout; or the report of an earlier answer that was refused
             data, sender = b"", None
         now = time.monotonic()
@@ -122,13 +122,13 @@ class JsonServer:
 
     def _accept(self, data: bytes, sender: Sender, now: float) -> bool:
         """Process a datagram; return True if it is a valid one of the autopilot."""
-        packet = wire.decode(data)
-        if packet is None or packet.frame_rate < LOWEST_RATE:
+        packet = json_protocol.parse_packet(data)
+        if packet is None or packet.frame_rate < MIN_RATE:
             self.counts.malformed += 1
-            what = "no servo packet" if packet is None else f"a servo packet of {packet.frame_rate} frames a second"
+            what = "not a servo packet" if packet is None else f"a servo packet of {packet.frame_rate} frames a second"
             self._warn("malformed", f"{len(data)} bytes from {sender[0]}:{sender[1]}, {what}: ignored")
             return False
-        if sender != self._sender and not self._admit(packet, sender, now):
+        if sender != self._sender and not self._accept_sender(packet, sender, now):
             return False
         frame = self._lockstep.classify(packet.frame_count)
         if frame == "resent":
@@ -146,13 +146,13 @@ class JsonServer:
             self._warn("sending", f"UDP to {sender[0]}:{sender[1]}: {error.strerror or error}")
         return True
 
-    def _admit(self, packet: wire.ServoPacket, sender: Sender, now: float) -> bool:
+    def _accept_sender(self, packet: json_protocol.ServoPacket, sender: Sender, now: float) -> bool:
         """Accept a new sender unless the one before is still active; return True if accepted."""
         if self._sender is not None:
             present = f"{self._sender[0]}:{self._sender[1]}"
             if now - self._received < _SENDER_TIMEOUT:
-                self.counts.refused += 1
-                self._warn("refused", f"{sender[0]}:{sender[1]} sends too, beside {present}: refused")
+                self.counts.rejected += 1
+                self._warn("rejected", f"{sender[0]}:{sender[1]} also sends, beside {present}: rejected")
                 return False
             if self._lockstep.count is None or packet.frame_count != self._lockstep.count + 1:
                 self._lockstep = Lockstep()  # another autopilot, not the same from another port: restart for any count
@@ -169,9 +169,9 @@ class JsonServer:
     def _count_lost(self, missed: int) -> None:
         self.counts.lost += missed
         self._flights.law.lost += missed
-        self._warn("lost", f"{missed} frames of the autopilot have not come: one step is made for all")
+        self._warn("lost", f"{missed} frames of the autopilot lost: one step is made for all")
 
-    def _step(self, packet: wire.ServoPacket) -> None:
+    def _step(self, packet: json_protocol.ServoPacket) -> None:
         flight = self._flights.flight
         assert flight is not None
         law = self._flights.law
@@ -184,7 +184,7 @@ class JsonServer:
             self.counts.waited += 1
         if law.link is not None:
             law.link.exchange(motion)
-        self._answer = wire.encode(motion)
+        self._answer = json_protocol.format_motion(motion)
 
     def _warn(self, kind: str, text: str) -> None:
         """Log a warning, with a limited rate for each kind."""

@@ -16,7 +16,7 @@ import msgspec
 import numpy as np
 
 from cosim.errors import RunError, TelemetryError
-from cosim.live.messages import rows_of
+from cosim.live.viewer_messages import read_rows
 from cosim.replay.header import header_of
 from cosim.replay.view_columns import ViewColumns
 from cosim.results.record import PARTS, RECORD, Record
@@ -229,7 +229,7 @@ def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
             for message in connection:
                 if isinstance(message, bytes):
                     if header is not None:
-                        row = rows_of(message, len(header["signals"]))[-1]
+                        row = read_rows(message, len(header["signals"]))[-1]
                 else:
                     content = json.loads(message)
                     if content["type"] == "header":

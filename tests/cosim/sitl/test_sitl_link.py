@@ -9,11 +9,11 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.results.record import load_record
-from cosim.sitl.autopilot_link import AutopilotLink, Dvl, DvlOptions
-from cosim.sitl.flights import FlightOptions, Flights
-from cosim.sitl.law import law_of_pwm
+from cosim.sitl.json_server import JsonServer
+from cosim.sitl.law import make_pwm_law
 from cosim.sitl.motion import Motion
-from cosim.sitl.server import JsonServer
+from cosim.sitl.sitl_link import Dvl, DvlOptions, SitlLink
+from cosim.sitl.sitl_session import FlightOptions, SitlSession
 from tests.cosim.sitl.conftest import Served
 from tests.cosim.sitl.stand_in import DISARMED, StandIn, frame
 from tests.cosim.sitl.test_command import free_port
@@ -55,12 +55,12 @@ def test_dvl_has_its_configured_latency_and_dropout():
 
 def test_estimate_is_recorded_and_arming_releases_the_vehicle(tmp_path):
     m, port = dialect(), free_port()
-    link = AutopilotLink(parse_endpoint(f"udpin:127.0.0.1:{port}"), DvlOptions(rate=100.0, latency=0.0))
+    link = SitlLink(parse_endpoint(f"udpin:127.0.0.1:{port}"), DvlOptions(rate=100.0, latency=0.0))
     options = FlightOptions(
         "sitl", (f"time.duration={STEPS / 1200}", "initial.position=[0,0,0]"), "bluerov2_heavy", tmp_path / "run",
         2000.0, report=False,
     )  # fmt: skip
-    flights = Flights(options, "ardupilot", lambda vehicle: law_of_pwm(vehicle, link))
+    flights = SitlSession(options, "ardupilot", lambda vehicle: make_pwm_law(vehicle, link))
     served = Served(JsonServer(flights, ("127.0.0.1", 0), 60.0))
     served.start()
     heard = []

@@ -14,7 +14,7 @@ from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array, Column
 
 
-class Layout:
+class RowLayout:
     """Column indices of the quantities in a row.
 
     Parameters
@@ -26,7 +26,7 @@ class Layout:
     """
 
     def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
-        self.at = {column.name: i for i, column in enumerate(columns)}
+        self.index = {column.name: i for i, column in enumerate(columns)}
         self.length = len(columns)
         self.thrusters = scenario.vehicle.n_thrusters
         self.criteria = scenario.criterion_names
@@ -34,10 +34,10 @@ class Layout:
         self.reports = tuple(column.name for column in columns if column.name.startswith("law."))
         self.goal_center = shape_center(scenario.goal)
         self.saturations = tuple(
-            i for name, i in self.at.items() if name.endswith("saturated") or name.startswith("thrust_saturated[")
+            i for name, i in self.index.items() if name.endswith("saturated") or name.startswith("thrust_saturated[")
         )
 
-    def first_row(self, scenario: Scenario) -> Array:
+    def make_first_row(self, scenario: Scenario) -> Array:
         """Return the row before the first step: the vehicle's initial state, 0 in other columns.
 
         Returns
@@ -47,9 +47,9 @@ class Layout:
         """
         row = np.zeros(self.length)
         initial, commands = scenario.initial, scenario.commands
-        roll, pitch, yaw = euler_of(initial.quaternion)
+        roll, pitch, yaw = quaternion_to_euler(initial.quaternion)
         depth = initial.position[2]
-        known = {
+        values_by_name = {
             "attitude.roll": roll,
             "attitude.pitch": pitch,
             "attitude.yaw": yaw,
@@ -68,15 +68,15 @@ class Layout:
             ("velocity.u", initial.velocity),
             ("target.x", self.goal_center),
         ):
-            if first in self.at:
-                row[self.at[first] : self.at[first] + len(values)] = values
-        for name, value in known.items():
-            if name in self.at:
-                row[self.at[name]] = value
+            if first in self.index:
+                row[self.index[first] : self.index[first] + len(values)] = values
+        for name, value in values_by_name.items():
+            if name in self.index:
+                row[self.index[name]] = value
         return row
 
 
-def euler_of(quaternion: Sequence[float]) -> Vector3:
+def quaternion_to_euler(quaternion: Sequence[float]) -> Vector3:
     """Return roll, pitch and yaw [rad] of a unit quaternion from body to world, scalar first."""
     w, x, y, z = quaternion
     sine = max(-1.0, min(1.0, 2.0 * (w * y - z * x)))

@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cosim.mavlink.services.service import Call, Service
-from cosim.mavlink.vehicle.profile import MODE_NAMES, STANDARD_MODES, is_custom
+from cosim.mavlink.services.service import CommandRequest, Service
+from cosim.mavlink.vehicle.profile import MODE_TABLE, is_custom
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.simulation.commands.commands import Arm, Command, Mode, Reset, SetMode, SetTarget
 
 _FORCE = 20190226  # PREFLIGHT_REBOOT_SHUTDOWN, parameter 6
-_MODES_BY_STANDARD: dict[int, Mode] = {number: mode for mode, number in STANDARD_MODES.items() if number}
+_MODES_BY_STANDARD: dict[int, Mode] = {entry.standard: mode for mode, entry in MODE_TABLE.items() if entry.standard}
 
 
-class Modes(Service):
+class ModeCommands(Service):
     """Commands that arm, disarm, restart, or change the mode."""
 
     def __init__(self, context: VehicleContext) -> None:
@@ -27,9 +27,9 @@ class Modes(Service):
             m.MAV_CMD_DO_SET_MODE: self._command_mode,
             m.MAV_CMD_DO_SET_STANDARD_MODE: self._standard_mode,
             m.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
-            m.MAV_CMD_NAV_LOITER_UNLIM: lambda call: self._steer(call.sender, "hold"),
-            m.MAV_CMD_NAV_LAND: lambda call: self._steer(call.sender, "surface"),
-            m.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda call: self._return_home(call.sender),
+            m.MAV_CMD_NAV_LOITER_UNLIM: lambda request: self._steer(request.sender, "hold"),
+            m.MAV_CMD_NAV_LAND: lambda request: self._steer(request.sender, "surface"),
+            m.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda request: self._return_home(request.sender),
             m.MAV_CMD_OVERRIDE_GOTO: self._goto,
             m.MAV_CMD_DO_PAUSE_CONTINUE: self._pause,
         }
@@ -40,38 +40,40 @@ class Modes(Service):
             self.context.active_gcs.record_command(sender.system)
         return result
 
-    def _arm(self, call: Call) -> int:
-        wanted = call[1]
+    def _arm(self, request: CommandRequest) -> int:
+        wanted = request[1]
         if wanted not in (0.0, 1.0):
             return int(self.context.mavlink.MAV_RESULT_DENIED)
-        return self._submit(call.sender, Arm(wanted == 1.0))
+        return self._submit(request.sender, Arm(wanted == 1.0))
 
     def _set_mode(self, sender: Sender, message: Any) -> None:
         if is_custom(message.base_mode) and self.context.profile.is_return(message.custom_mode):
             self._return_home(sender)
         elif is_custom(message.base_mode):
-            self._mode(sender, self.context.profile.mode_of(message.custom_mode), f"{message.custom_mode}")
+            self._mode(sender, self.context.profile.find_mode(message.custom_mode), f"{message.custom_mode}")
         else:
             self._mode(sender, None, f"of base mode {message.base_mode}")
 
-    def _command_mode(self, call: Call) -> int:
-        base, first, second = call.whole(1), call.whole(2), call.whole(3) or 0
+    def _command_mode(self, request: CommandRequest) -> int:
+        base, first, second = request.int_param(1), request.int_param(2), request.int_param(3) or 0
         if base is None or first is None or not is_custom(base):
-            return self._mode(call.sender, None, "without a number")
+            return self._mode(request.sender, None, "without a number")
         if self.context.profile.is_return(first << 16 | second << 24):  # MAVSDK's return to launch
-            return self._return_home(call.sender)
+            return self._return_home(request.sender)
         named = f"{first}" if not second else f"{first}, {second}"
-        return self._mode(call.sender, self.context.profile.mode_of_command(first, second), named)
+        return self._mode(request.sender, self.context.profile.find_commanded_mode(first, second), named)
 
-    def _standard_mode(self, call: Call) -> int:
-        number = call.whole(1)
-        return self._mode(call.sender, None if number is None else _MODES_BY_STANDARD.get(number), f"standard {number}")
+    def _standard_mode(self, request: CommandRequest) -> int:
+        number = request.int_param(1)
+        return self._mode(
+            request.sender, None if number is None else _MODES_BY_STANDARD.get(number), f"standard {number}"
+        )
 
     def _mode(self, sender: Sender, mode: Mode | None, named: str) -> int:
         context = self.context
         if mode is None:
-            numbers = context.profile.numbers
-            known = ", ".join(f"{MODE_NAMES[mode].lower()} {number}" for mode, number in numbers.items())
+            numbers = context.profile.custom_modes
+            known = ", ".join(f"{MODE_TABLE[mode].name.lower()} {number}" for mode, number in numbers.items())
             context.reject(f"no such mode: {named}; profile {context.profile.name} has {known}", "mode")
             return int(context.mavlink.MAV_RESULT_FAILED)
         return self._steer(sender, mode)
@@ -93,20 +95,20 @@ class Modes(Service):
 
     # ---- pause ----
 
-    def _goto(self, call: Call) -> int:
+    def _goto(self, request: CommandRequest) -> int:
         m = self.context.mavlink
-        here = call.whole(2) in (None, 0, m.MAV_GOTO_HOLD_AT_CURRENT_POSITION)
-        if call.whole(1) == m.MAV_GOTO_DO_HOLD and here:
-            return self._hold(call.sender)
-        if call.whole(1) == m.MAV_GOTO_DO_CONTINUE:
-            return self._steer(call.sender, self._paused_from)
+        here = request.int_param(2) in (None, 0, m.MAV_GOTO_HOLD_AT_CURRENT_POSITION)
+        if request.int_param(1) == m.MAV_GOTO_DO_HOLD and here:
+            return self._hold(request.sender)
+        if request.int_param(1) == m.MAV_GOTO_DO_CONTINUE:
+            return self._steer(request.sender, self._paused_from)
         return int(m.MAV_RESULT_UNSUPPORTED)
 
-    def _pause(self, call: Call) -> int:
-        if call[1] == 0.0:
-            return self._hold(call.sender)
-        if call[1] == 1.0:
-            return self._steer(call.sender, self._paused_from)
+    def _pause(self, request: CommandRequest) -> int:
+        if request[1] == 0.0:
+            return self._hold(request.sender)
+        if request[1] == 1.0:
+            return self._steer(request.sender, self._paused_from)
         return int(self.context.mavlink.MAV_RESULT_DENIED)
 
     def _hold(self, sender: Sender) -> int:
@@ -117,11 +119,11 @@ class Modes(Service):
 
     # ---- restart ----
 
-    def _reboot(self, call: Call) -> int:
+    def _reboot(self, request: CommandRequest) -> int:
         m, context = self.context.mavlink, self.context
-        if call[1] != 1.0:
-            return int(m.MAV_RESULT_UNSUPPORTED if math.isfinite(call[1]) else m.MAV_RESULT_DENIED)
-        if context.armed and call[6] != _FORCE and context.accepts_commands:
+        if request[1] != 1.0:
+            return int(m.MAV_RESULT_UNSUPPORTED if math.isfinite(request[1]) else m.MAV_RESULT_DENIED)
+        if context.armed and request[6] != _FORCE and context.accepts_commands:
             context.reject("armed: disarm before a restart", "restart")
             return int(m.MAV_RESULT_DENIED)
-        return self._submit(call.sender, Reset())
+        return self._submit(request.sender, Reset())

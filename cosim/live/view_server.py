@@ -20,14 +20,14 @@ from websockets.http11 import Request, Response
 from cosim.live.address import LiveAddress, foreign_origin
 from cosim.live.command_desk import MAX_LENGTH
 from cosim.live.hub import Cursor, Hub
-from cosim.live.messages import text_of
+from cosim.live.viewer_messages import format_message
 from cosim.replay.page import replay_page
 
 log = logging.getLogger(__name__)
 
 PATH = "/ws"
-VIEWERS = 16  # greatest number at once
-CONNECTIONS = 4 * VIEWERS  # greatest number at once; more could use up the file descriptors that the run needs
+MAX_VIEWERS = 16  # at once
+MAX_CONNECTIONS = 4 * MAX_VIEWERS  # at once; more could use up the file descriptors that the run needs
 _PERIOD = 1.0 / 30.0  # s between polls for new rows while there are viewers
 _IDLE_PERIOD = 0.25  # s, the same without viewers
 _COMMAND_RATE = 20  # 1/s, sustained rate of commands of a viewer
@@ -72,7 +72,7 @@ async def serve(
     async with serve_websockets(
         viewers.show, sock=listening, process_request=viewers.answer, compression=None, max_size=MAX_LENGTH,
         max_queue=4, open_timeout=5.0, ping_interval=_PING_PERIOD, ping_timeout=_PING_PERIOD, close_timeout=1.0,
-        server_header=None, logger=quiet, create_connection=_limited_connections(CONNECTIONS),
+        server_header=None, logger=quiet, create_connection=_limited_connections(MAX_CONNECTIONS),
     ):  # fmt: skip
         while not closing.is_set():
             take_rows()
@@ -80,7 +80,7 @@ async def serve(
             await asyncio.sleep(_PERIOD if viewers.cursors else _IDLE_PERIOD)
         take_rows()
         until = time.monotonic() + _FLUSH_TIME
-        while viewers.behind and time.monotonic() < until:
+        while viewers.has_unsent_messages and time.monotonic() < until:
             viewers.wake()
             await asyncio.sleep(_PERIOD)
 
@@ -118,7 +118,7 @@ class _Viewers:
         self._news = asyncio.Event()
 
     @property
-    def behind(self) -> bool:
+    def has_unsent_messages(self) -> bool:
         """True if messages for some viewer are not sent yet."""
         return any(not self._hub.is_up_to_date(cursor) for cursor in self.cursors)
 
@@ -126,17 +126,19 @@ class _Viewers:
         """Answer an HTTP request with the page or an error; return None to open a WebSocket."""
         hosts, origins = request.headers.get_all("Host"), request.headers.get_all("Origin")
         if len(hosts) != 1 or len(origins) > 1:
-            return connection.respond(HTTPStatus.BAD_REQUEST, "one header Host is expected\n")
+            return connection.respond(HTTPStatus.BAD_REQUEST, "expected one header Host\n")
         reason = foreign_origin(self._address, hosts[0], origins[0] if origins else None)
         if reason is not None:
             return connection.respond(HTTPStatus.FORBIDDEN, f"{reason}\n")
         path = request.path.split("?")[0]
         if path == PATH:
-            if len(self.cursors) >= VIEWERS:
-                return connection.respond(HTTPStatus.SERVICE_UNAVAILABLE, f"{VIEWERS} viewers are here already\n")
+            if len(self.cursors) >= MAX_VIEWERS:
+                return connection.respond(
+                    HTTPStatus.SERVICE_UNAVAILABLE, f"{MAX_VIEWERS} viewers are connected already\n"
+                )
             return None
         if path != "/":
-            return connection.respond(HTTPStatus.NOT_FOUND, f"nothing is here but / and {PATH}\n")
+            return connection.respond(HTTPStatus.NOT_FOUND, f"not found: expected / or {PATH}\n")
         headers = Headers(_HEADERS | {"Content-Length": str(len(self._page)), "Connection": "close"})
         return Response(HTTPStatus.OK, HTTPStatus.OK.phrase, headers, self._page)
 
@@ -186,7 +188,7 @@ class _Viewers:
             allowance -= 1.0
             reason = "the run has not begun" if self._hub.desk is None else self._hub.desk.submit(message)
             if reason is not None:
-                await connection.send(text_of("said", kind="refused", text=reason, time=None))
+                await connection.send(format_message("said", kind="refused", text=reason, time=None))
 
     def _is_new(self, error: Exception) -> bool:
         """Return True for the first error of its type; later ones are not logged."""

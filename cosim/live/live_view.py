@@ -49,7 +49,7 @@ class LiveView:
     """
 
     def __init__(self, address: LiveAddress) -> None:
-        from cosim.live.server import serve
+        from cosim.live.view_server import serve
 
         self._socket = open_socket(address)
         port = self._socket.getsockname()[1]

@@ -9,27 +9,27 @@ from pathlib import Path
 from cosim.errors import CosimError, RunError
 from cosim.results.run_result import Run
 from cosim.simulation.commands.sources import RUNS
-from cosim.sitl.flight import Flight
 from cosim.sitl.law import AutopilotLaw
-from cosim.sitl.scenario import SCENARIO, scenario_to_fly
+from cosim.sitl.sitl_flight import Flight
+from cosim.sitl.sitl_scenario import SCENARIO, scenario_to_fly
 from plant_fmu import PlantFmuError, Vehicle
 from plant_fmu.build import cached_fmu
 
-RESTARTED = "ended: the autopilot started again"
+RESTARTED = "ended: the autopilot restarted"
 
-_CHECKED_RATE = 1000  # Hz, frame rate for the validation of a scenario before an autopilot connects
+_VALIDATION_RATE = 1000  # Hz, frame rate for the validation of a scenario before an autopilot connects
 
 
 @dataclass
-class Counts:
+class FrameCounts:
     """Counts of the autopilot's frames, by treatment."""
 
     steps: int = 0
     waited: int = 0  # before the first one, with the vehicle held
-    resent: int = 0  # answered again, without a step
+    resent: int = 0  # repeated frames, answered without a step
     lost: int = 0  # never received
     malformed: int = 0
-    refused: int = 0  # frames of a second sender
+    rejected: int = 0  # frames of a second sender
     unsent: int = 0  # answers that could not be sent
 
 
@@ -38,7 +38,7 @@ class Outcome:
     """Runs of a SITL session, and counts of its frames."""
 
     runs: list[Run]
-    counts: Counts
+    counts: FrameCounts
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class FlightOptions:
     report: bool = True
 
 
-class Flights:
+class SitlSession:
     """The runs of one SITL session: the present one and those before it.
 
     Parameters
@@ -62,8 +62,8 @@ class Flights:
         Options of the session.
     autopilot : str
         Name of the autopilot, used as the law's name in summary and report.
-    law_of : callable
-        Function that makes the law for a vehicle.
+    make_law : callable
+        Function that makes the law of a vehicle.
 
     Attributes
     ----------
@@ -78,14 +78,14 @@ class Flights:
         If the scenario cannot be flown, which is checked before waiting for an autopilot.
     """
 
-    def __init__(self, options: FlightOptions, autopilot: str, law_of: Callable[[Vehicle], AutopilotLaw]) -> None:
-        self._options, self._autopilot, self._law_of = options, autopilot, law_of
+    def __init__(self, options: FlightOptions, autopilot: str, make_law: Callable[[Vehicle], AutopilotLaw]) -> None:
+        self._options, self._autopilot, self._make_law = options, autopilot, make_law
         out = options.out
         if out and out.exists() and not (out.is_dir() and not any(out.iterdir())):
             raise RunError(f"{out}: exists and is not empty; expected a new folder")
-        scenario = scenario_to_fly(options.scenario, options.overrides, options.vehicle, _CHECKED_RATE, autopilot)
+        scenario = scenario_to_fly(options.scenario, options.overrides, options.vehicle, _VALIDATION_RATE, autopilot)
         self._vehicle = scenario.vehicle
-        self.law = law_of(self._vehicle)
+        self.law = make_law(self._vehicle)
         cached_fmu(self._vehicle, scenario.plant.fmi)
         self.flight: Flight | None = None
         self._ended: list[tuple[Flight, str]] = []
@@ -100,10 +100,10 @@ class Flights:
             if the session has had `RUNS` runs.
         """
         if len(self._ended) >= RUNS:
-            raise RunError(f"the autopilot begins again: expected {RUNS} runs of a session at most")
+            raise RunError(f"the autopilot has restarted too often: expected at most {RUNS} runs of a session")
         o = self._options
         scenario = scenario_to_fly(o.scenario, o.overrides, o.vehicle, frame_rate, self._autopilot)
-        self.law = self._law_of(scenario.vehicle)
+        self.law = self._make_law(scenario.vehicle)
         out = o.out and (o.out.with_name(f"{o.out.name}-{len(self._ended) + 1}") if self._ended else o.out)
         self.flight = Flight(scenario, self.law, out, o.record_rate)
         return self.flight
@@ -117,7 +117,7 @@ class Flights:
                 self._ended.append((flight, status))
                 flight.conclude(status, report=False)
 
-    def fly(self, serve: Callable[[], str], counts: Counts) -> Outcome:
+    def fly(self, serve: Callable[[], str], counts: FrameCounts) -> Outcome:
         """Run a server until it ends, and conclude its runs.
 
         Parameters

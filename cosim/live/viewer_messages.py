@@ -10,17 +10,17 @@ import numpy as np
 from cosim.simulation.signals import Array
 
 
-def text_of(kind: str, /, **fields: Any) -> str:
+def format_message(kind: str, /, **fields: Any) -> str:
     """Format a JSON message; its first key ``type`` is `kind`."""
     return json.dumps({"type": kind, **fields}, separators=(",", ":"), allow_nan=False, ensure_ascii=False)
 
 
-def bytes_of(rows: Array) -> bytes:
+def write_rows(rows: Array) -> bytes:
     """Serialize rows in order as little-endian float64."""
     return np.ascontiguousarray(rows, dtype="<f8").tobytes()
 
 
-def rows_of(message: bytes, columns: int) -> Array:
+def read_rows(message: bytes, columns: int) -> Array:
     """Parse the rows of a message, shape (rows, columns).
 
     Raises

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from controller.laws.deployable.gains import SPREADS
-from cosim.companion.link import AutopilotLink
-from cosim.companion.options import CompanionOptions
+from cosim.companion.autopilot_link import AutopilotLink
+from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.outputs import SteerBy
-from cosim.companion.placement import FARTHEST, Placement, meters
+from cosim.companion.placement import MAX_DISTANCE, Placement, format_distance
 from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.safety import State
 from cosim.companion.session import AutopilotSession
-from cosim.companion.set_points import FASTEST
+from cosim.companion.set_points import MAX_LAW_SPEED
 from cosim.companion.warm_up import warm_up
 from cosim.errors import RunError
 from cosim.mavlink.wire.options import ProfileName
@@ -34,31 +34,31 @@ from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
 if TYPE_CHECKING:  # websockets wait until a flight is shown
-    from cosim.live.view import LiveView
+    from cosim.live.live_view import LiveView
 
-_RELEASE = 2.0  # s, longest time to release the sticks and change to the hold mode at the end
-_NO_COMMANDS = "a companion's page shows alone: take over at the autopilot's ground station"
-_STEADY = 0.1  # m, drift between two position sources that still counts as noise
+_RELEASE_TIME = 2.0  # s, maximum time to release the sticks and change to the hold mode at the end
+_NO_COMMANDS = "the page of a companion accepts no commands: take over at the autopilot's ground station"
+_DRIFT_NOISE = 0.1  # m, drift between two position sources that still counts as noise
 _RESERVE = 0.3  # fraction of the thrusters' force that stays free for the autopilot's moments
-_UNDETECTED = 0.05  # m, position error of an autopilot that no measurement reveals
+_MIN_UNCERTAINTY = 0.05  # m, position error of an autopilot that no measurement reveals
 
 
 # Errors of an autopilot's estimate are slow: its velocity may be off by some cm/s for a minute, its position has no
 # white noise. With a smaller velocity noise, the law's position would shift by (velocity error) / (rate of its filter).
-_FILTERED = {"law.gains.position_noise": 0.01, "law.gains.velocity_noise": 0.05}
+_NOISE_GAINS = {"law.gains.position_noise": 0.01, "law.gains.velocity_noise": 0.05}
 # the autopilot allocates the forces: a thruster's force is not the one that the law commanded
-_NOT_ISOLATED = {"law.gains.failure_threshold": 0.0}
+_WITHOUT_ISOLATION = {"law.gains.failure_threshold": 0.0}
 # the autopilot's attitude loop makes the moments: a law that estimates restoring moments, or the effectiveness of each
 # thruster, from the effect of its own moments would estimate the stiffness of that loop, and work against it
-_NOT_TURNED = _NOT_ISOLATED | {
+_WITHOUT_MOMENTS = _WITHOUT_ISOLATION | {
     "law.gains.adaptation": 0.0,
     "law.gains.moment_bound": 1e-3,
     "law.gains.effectiveness_estimation": 0.0,
 }
 # the depth loop compensates the weight
-_NOT_LIFTED = {"law.gains.restoring_drift": 0.0, "law.gains.restoring_bound": 1e-3}
+_WITHOUT_WEIGHT = {"law.gains.restoring_drift": 0.0, "law.gains.restoring_bound": 1e-3}
 # the velocity loop compensates weight, moments, current and lag: estimates of them by the law would be wrong
-_NOT_ESTIMATED = _NOT_LIFTED | {"law.gains.lag_bound": 0.0, "law.gains.current_bound": 1e-3}
+_WITHOUT_ESTIMATES = _WITHOUT_WEIGHT | {"law.gains.lag_bound": 0.0, "law.gains.current_bound": 1e-3}
 
 
 def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile: ProfileName = "ardusub") -> Scenario:
@@ -81,22 +81,22 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile:
         If the converted scenario is invalid.
     """
     require_builtin_law(scenario)
-    for key, asked in (("failures", scenario.failures), ("record.lyapunov", scenario.record.lyapunov)):
-        if asked:
-            raise RunError(f"{scenario.name}: {key} is set, expected none: the vehicle is a real one")
+    for key, value in (("failures", scenario.failures), ("record.lyapunov", scenario.record.lyapunov)):
+        if value:
+            raise RunError(f"{scenario.name}: {key} is set, expected none with a real vehicle")
     period = scenario.time.control
     arbiter = max(1, round(scenario.time.arbiter / period)) * period
     duration = max(1, round(scenario.time.duration / period)) * period
-    gains: dict[str, float] = _NOT_ISOLATED
+    gains: dict[str, float] = _WITHOUT_ISOLATION
     if steer_by != "wrench":
-        fastest = FASTEST if steer_by == "velocity" else _speed_with_reserve(scenario.vehicle)
-        gains = _NOT_TURNED | {"law.gains.speed": min(getattr(scenario.law.gains, "speed", fastest), fastest)}
+        fastest = MAX_LAW_SPEED if steer_by == "velocity" else _speed_with_reserve(scenario.vehicle)
+        gains = _WITHOUT_MOMENTS | {"law.gains.speed": min(getattr(scenario.law.gains, "speed", fastest), fastest)}
     if steer_by == "attitude" and profile == "ardusub":
-        gains |= _NOT_LIFTED
+        gains |= _WITHOUT_WEIGHT
     if steer_by == "velocity":
-        gains |= _NOT_ESTIMATED
+        gains |= _WITHOUT_ESTIMATES
     return scenario.replace(
-        (_FILTERED | gains if scenario.law.name == "deployable" else {})
+        (_NOISE_GAINS | gains if scenario.law.name == "deployable" else {})
         | {
             "time.step": period,
             "time.arbiter": arbiter,
@@ -224,10 +224,10 @@ class Companion:
                 try:
                     status = self._steer(master, [recorder] if live is None else [recorder, live], show_state)
                 finally:
-                    self.session.release(_RELEASE)
+                    self.session.release(_RELEASE_TIME)
                     wall_time = time.perf_counter() - started
-                    kept = folder.keep(recorder)
-                if not kept:
+                    has_rows = folder.keep(recorder)
+                if not has_rows:
                     raise RunError(f"{folder.path}: ended before the first step")
                 run = conclude(folder.path, self.scenario, status, wall_time, report)
             if live is not None:
@@ -240,20 +240,20 @@ class Companion:
         `on_state` is the function that `run` accepts.
         """
         session, period = self.session, self.scenario.time.step
-        begun = session.clock()
+        start = session.clock()
         while not session.supervisor.is_steering:
             now = session.clock()
             session.exchange(np.zeros(6), now, now + period)
             self._report(on_state)
             self._require_accepted_sticks()
-            if self._options.timeout is not None and now - begun > self._options.timeout:
-                raise RunError(f"{self._options.timeout:g} s have gone by, waiting for {session.missing()}")
+            if self._options.timeout is not None and now - start > self._options.timeout:
+                raise RunError(f"{self._options.timeout:g} s have passed while waiting for {session.missing()}")
 
     def _require_accepted_sticks(self) -> None:
         """Raise `RunError` if the autopilot would ignore or misread the sticks."""
-        refused = self.session.stick_refusal()
-        if refused:
-            raise RunError(refused)
+        reason = self.session.stick_rejection()
+        if reason:
+            raise RunError(reason)
 
     def _steer(self, master: Master, observers: Sequence[Observer], on_state: Callable[[State, str], None]) -> str:
         session = self.session
@@ -280,18 +280,18 @@ class Companion:
     def _position_uncertainty(self) -> float:
         """Return the greatest expected position error [m]: undetected error, drift, and dead reckoning."""
         alignment = self.session.alignment
-        drift = alignment.drift if alignment.drift > _STEADY else 0.0
-        return _UNDETECTED + drift + self._options.reckoning_error * alignment.reckoned
+        drift = alignment.drift if alignment.drift > _DRIFT_NOISE else 0.0
+        return _MIN_UNCERTAINTY + drift + self._options.reckoning_error * alignment.reckoned
 
     def _report(self, on_state: Callable[[State, str], None] | None) -> None:
         """Call `on_state` if the state, or the text of the conditions it waits for, has changed."""
-        self._place()
-        now = self.session.supervisor.state, self.session.missing()
-        if on_state is not None and now != self._reported:
-            on_state(*now)
-        self._reported = now
+        self._update_placement()
+        state = self.session.supervisor.state, self.session.missing()
+        if on_state is not None and state != self._reported:
+            on_state(*state)
+        self._reported = state
 
-    def _place(self) -> None:
+    def _update_placement(self) -> None:
         """Describe where the vehicle is once its frame is known; let it be armed and steered near the scene alone."""
         session, offset = self.session, self.session.alignment.offset
         if session.supervisor.is_steering and session.is_placed:
@@ -301,10 +301,10 @@ class Companion:
             session.is_placed, self._placed_by = False, (None, False)
             return
         distance = self._scene.distance(position)
-        is_near = distance <= FARTHEST
+        is_near = distance <= MAX_DISTANCE
         if self._placed_by[0] is not offset or self._placed_by[1] != is_near:
-            self.placement = self._scene.text(position, session.reported.quaternion)
-            session.misplaced = "" if is_near else f"{meters(distance)} from everything in it"
+            self.placement = self._scene.describe(position, session.reported.quaternion)
+            session.misplaced = "" if is_near else f"{format_distance(distance)} from everything in it"
             self.placement += f"; {session.misplaced}" if session.misplaced else ""
         self._placed_by = offset, is_near
         session.is_placed = is_near or self._options.dry_run

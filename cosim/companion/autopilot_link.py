@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Protocol
 
 from cosim.mavlink.wire.endpoint import Endpoint
-from cosim.mavlink.wire.ground_end import GroundLink, Heard, Identity
+from cosim.mavlink.wire.ground_end import GroundLink, Identity, ReceivedMessage
 
 COMPANION: Identity = (255, 191)  # MAV_COMP_ID_ONBOARD_COMPUTER of the ground station's system
 
@@ -22,7 +22,7 @@ class AutopilotLink(Protocol):
         """Return the time [s] of a monotonic clock."""
         ...
 
-    def receive(self, timeout: float) -> Sequence[Heard]:
+    def receive(self, timeout: float) -> Sequence[ReceivedMessage]:
         """Return the received messages; wait at most `timeout` [s] for the first one."""
         ...
 
@@ -71,7 +71,7 @@ class NetworkLink(GroundLink):
         """Return `time.monotonic()` times the speedup [s]."""
         return self._speedup * time.monotonic()
 
-    def receive(self, timeout: float) -> list[Heard]:
+    def receive(self, timeout: float) -> list[ReceivedMessage]:
         """Return the received messages, stamped with times of this clock; wait at most `timeout` [s] of it."""
         heard = super().receive(timeout / self._speedup)
         return [one._replace(time=self._speedup * one.time) for one in heard]

@@ -11,7 +11,7 @@ from cosim.scenario.scenario import Scenario, load_scenario
 from cosim.scenario.validation import MAX_STEPS
 
 SCENARIO = "sitl"  # default scenario
-LOWEST_RATE, HIGHEST_RATE = 11, 65535  # Hz: an autopilot's frame is shorter than 0.1 s, and a packet holds 16 bits
+MIN_RATE, MAX_RATE = 11, 65535  # Hz: an autopilot's frame is shorter than 0.1 s, and a packet holds 16 bits
 
 
 def scenario_to_fly(
@@ -28,7 +28,7 @@ def scenario_to_fly(
     vehicle : str or None
         Name of a shipped vehicle, or a TOML file; None for the scenario's.
     frame_rate : int
-        Frame rate of the autopilot [Hz], `LOWEST_RATE` to `HIGHEST_RATE`.
+        Frame rate of the autopilot [Hz], `MIN_RATE` to `MAX_RATE`.
     autopilot : str
         Name of the autopilot, used as the law's name in summary and report, such as ``ardupilot``.
 
@@ -48,13 +48,13 @@ def scenario_to_fly(
     changes = [*overrides, "actuation.through=thrusters"]
     if vehicle is not None:
         changes.append(f"vehicle='{vehicle}'")
-    given = load_scenario(name_or_file, changes)
-    for key, asked in (("commands.enabled", given.commands.enabled), ("record.lyapunov", given.record.lyapunov)):
-        if asked:
-            raise RunError(f"{name_or_file}: {key} is true, expected false: here an autopilot steers")
+    base = load_scenario(name_or_file, changes)
+    for key, value in (("commands.enabled", base.commands.enabled), ("record.lyapunov", base.record.lyapunov)):
+        if value:
+            raise RunError(f"{name_or_file}: {key} is true, expected false: the autopilot steers")
     step = 1.0 / frame_rate
-    for key, period in (("duration", given.time.duration), ("arbiter", given.time.arbiter), ("control", step)):
+    for key, period in (("duration", base.time.duration), ("arbiter", base.time.arbiter), ("control", step)):
         changes.append(f"time.{key}={min(max(1, round(period * frame_rate)), MAX_STEPS) * step!r}")
     scenario = load_scenario(name_or_file, [*changes, f"time.step={step!r}"])
-    table = scenario.table | {"changed": given.table["changed"]}  # its steps are the autopilot's, which the title names
+    table = scenario.table | {"changed": base.table["changed"]}  # its steps are the autopilot's, which the title names
     return dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, name=autopilot), table=table)

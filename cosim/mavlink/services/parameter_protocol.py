@@ -10,32 +10,32 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.errors import CommandError
-from cosim.mavlink.services.packed_parameters import hash_check
+from cosim.mavlink.services.packed_parameters import hash_parameters
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
-from cosim.mavlink.wire.encode import float32
+from cosim.mavlink.wire.encode import clip_to_float32
 from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.mavlink.wire.options import LossAction
 from cosim.simulation.commands.commands import ChangeSetting
 
 _HASH = "_HASH_CHECK"
 _NO_INDEX = 0xFFFF
-_SLICE = 50  # values in each tick
+_VALUES_PER_TICK = 50
 _ACTIONS: tuple[LossAction, ...] = ("none", "warn", "disarm", "hold", "surface")  # order of ArduSub's FS_GCS_ENABLE
 _TIMEOUTS = (1.0, 120.0)  # s, range of FS_GCS_TIMEOUT
 
 
 @dataclass(frozen=True)
-class _Own:
+class _LinkParameter:
     """A parameter that is not a setting of the scenario."""
 
     read: Callable[[], float]
     write: Callable[[float], str | None] | None = None  # returns the expected range for an invalid value
 
 
-class Parameters(Service):
+class ParameterProtocol(Service):
     """PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET; all parameters are REAL32.
 
     The list is sent in slices, one per tick, and at most once at a time on a link: a request while it is under way
@@ -50,26 +50,26 @@ class Parameters(Service):
             "PARAM_REQUEST_READ": self._read,
             "PARAM_SET": self._set,
         }
-        self._key_of = {name: key for key, name in parameter_names(s.key for s in context.settings).items()}
-        self._own = self._make_own()
-        self.names = sorted({*self._key_of, *self._own})
+        self._keys = {name: key for key, name in parameter_names(s.key for s in context.settings).items()}
+        self._link_parameters = self._make_link_parameters()
+        self.names = sorted({*self._keys, *self._link_parameters})
         self._index = {name: i for i, name in enumerate(self.names)}
         self._bursts: dict[MessageSink, tuple[int, int]] = {}  # next index, and number left, by link
         self.restart()
 
-    def _make_own(self) -> dict[str, _Own]:
-        context, profile = self.context, self.context.profile.name
-        own = {name: _Own(read) for name, read in station_parameters(context).items()}
+    def _make_link_parameters(self) -> dict[str, _LinkParameter]:
+        context = self.context
+        own = {name: _LinkParameter(read) for name, read in station_parameters(context).items()}
         return own | {
-            "MAV_SYS_ID" if profile == "px4" else "SYSID_THISMAV": _Own(lambda: float(context.options.system_id)),
-            "FS_GCS_TIMEOUT": _Own(lambda: context.loss_timeout, self._write_timeout),
-            "FS_GCS_ENABLE": _Own(lambda: float(_ACTIONS.index(context.loss_action)), self._write_action),
+            context.profile.system_id_parameter: _LinkParameter(lambda: float(context.options.system_id)),
+            "FS_GCS_TIMEOUT": _LinkParameter(lambda: context.loss_timeout, self._write_timeout),
+            "FS_GCS_ENABLE": _LinkParameter(lambda: float(_ACTIONS.index(context.loss_action)), self._write_action),
         }
 
     def _write_timeout(self, value: float) -> str | None:
-        least, greatest = _TIMEOUTS
-        if not least <= value <= greatest:
-            return f"{least:g} to {greatest:g}"
+        low, high = _TIMEOUTS
+        if not low <= value <= high:
+            return f"{low:g} to {high:g}"
         self.context.loss_timeout = value
         return None
 
@@ -87,15 +87,14 @@ class Parameters(Service):
 
     def value(self, name: str) -> float:
         """Return a parameter's value, limited to the range of float32."""
-        own = self._own.get(name)
-        value = self._values[self._key_of[name]] if own is None else own.read()
-        return float32(value)
+        parameter = self._link_parameters.get(name)
+        return clip_to_float32(self._values[self._keys[name]] if parameter is None else parameter.read())
 
-    def all(self) -> list[tuple[str, float]]:
+    def list_values(self) -> list[tuple[str, float]]:
         """Return names and values of all parameters, in the order of the list."""
         return [(name, self.value(name)) for name in self.names]
 
-    def has(self, key: str) -> bool:
+    def has_setting(self, key: str) -> bool:
         """Return True if there is a setting with a key."""
         return key in self._values
 
@@ -125,10 +124,10 @@ class Parameters(Service):
     # ---- the list ----
 
     def _list(self, sender: Sender, message: Any) -> None:
-        at, left = self._bursts.get(sender.link, (0, 0))
-        if not left and self.context.profile.name == "px4":
+        index, left = self._bursts.get(sender.link, (0, 0))
+        if not left and self.context.profile.has_parameter_hash:
             self._send_hash(sender.link)
-        self._bursts[sender.link] = at, len(self.names)
+        self._bursts[sender.link] = index, len(self.names)
         if not left:
             self._send_slice(sender.link)
 
@@ -138,14 +137,14 @@ class Parameters(Service):
             self._send_slice(link)
 
     def _send_slice(self, link: MessageSink) -> None:
-        at, left = self._bursts[link]
-        for _ in range(min(left, _SLICE)):
+        index, left = self._bursts[link]
+        for _ in range(min(left, _VALUES_PER_TICK)):
             if not link.has_room():
                 break
-            self._send_value(link, self.names[at])
-            at, left = (at + 1) % len(self.names), left - 1
+            self._send_value(link, self.names[index])
+            index, left = (index + 1) % len(self.names), left - 1
         if left:
-            self._bursts[link] = at, left
+            self._bursts[link] = index, left
         else:
             del self._bursts[link]
 
@@ -156,7 +155,7 @@ class Parameters(Service):
 
     def _send_hash(self, link: MessageSink) -> None:
         m = self.context.mavlink
-        (bits,) = struct.unpack("<f", struct.pack("<I", hash_check(dict(self.all()))))
+        (bits,) = struct.unpack("<f", struct.pack("<I", hash_parameters(dict(self.list_values()))))
         link.send(
             m.MAVLink_param_value_message(_HASH.encode(), bits, m.MAV_PARAM_TYPE_UINT32, len(self.names), _NO_INDEX)
         )
@@ -167,15 +166,15 @@ class Parameters(Service):
         m, index, name = self.context.mavlink, message.param_index, message.param_id
         if index >= 0:
             name = self.names[index] if index < len(self.names) else ""
-        elif name == _HASH and self.context.profile.name == "px4":
+        elif name == _HASH and self.context.profile.has_parameter_hash:
             self._send_hash(sender.link)
             return
         if name in self._index:
             self._send_value(sender.link, name)
         else:
-            self._refuse(sender, message.param_id, index, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            self._send_error(sender, message.param_id, index, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
-    def _refuse(self, sender: Sender, name: str, index: int, error: int) -> None:
+    def _send_error(self, sender: Sender, name: str, index: int, error: int) -> None:
         to = sender.system, sender.component
         sender.link.send(self.context.make("PARAM_ERROR", *to, name, index, error))
 
@@ -185,38 +184,38 @@ class Parameters(Service):
             self._bursts.pop(sender.link, None)
             return
         if name not in self._index:
-            self._refuse(sender, name, -1, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            self._send_error(sender, name, -1, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
         error = self._write(name, value, message.param_type)
         if error != m.MAV_PARAM_ERROR_NO_ERROR:
-            self._refuse(sender, name, self._index[name], error)
+            self._send_error(sender, name, self._index[name], error)
         self._send_value(sender.link, name)
 
     def _write(self, name: str, value: float, kind: int) -> int:
         """Write a value, and return MAV_PARAM_ERROR."""
         m, context = self.context.mavlink, self.context
-        own = self._own.get(name)
-        if own is not None and own.write is None:
+        parameter = self._link_parameters.get(name)
+        if parameter is not None and parameter.write is None:
             return int(m.MAV_PARAM_ERROR_READ_ONLY)
         if not context.accepts_commands:
             context.submit()
             return int(m.MAV_PARAM_ERROR_PERMISSION_DENIED)
-        if kind != m.MAV_PARAM_TYPE_REAL32 and context.profile.name != "ardusub":  # ArduPilot's stations cast
-            context.reject(f"{name} came as type {kind}, expected REAL32 ({m.MAV_PARAM_TYPE_REAL32})", "value")
+        if kind != m.MAV_PARAM_TYPE_REAL32 and not context.profile.casts_parameters:
+            context.reject(f"{name} has type {kind}, expected REAL32 ({m.MAV_PARAM_TYPE_REAL32})", "value")
             return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
         if not math.isfinite(value):
             context.reject(f"{name} is {value}, expected a finite number", "value")
             return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
         if _as_float32(self.value(name)) == value:
             return int(m.MAV_PARAM_ERROR_NO_ERROR)
-        value = shortest(value)
-        if own is not None and own.write is not None:
-            expected = own.write(value)
+        value = shorten_float32(value)
+        if parameter is not None and parameter.write is not None:
+            expected = parameter.write(value)
             if expected is not None:
                 context.reject(f"{name} is {value:g}, expected {expected}", "value")
                 return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
             return int(m.MAV_PARAM_ERROR_NO_ERROR)
-        result = self.change(self._key_of[name], value)
+        result = self.change(self._keys[name], value)
         if result == m.MAV_RESULT_ACCEPTED:
             return int(m.MAV_PARAM_ERROR_NO_ERROR)
         if result == m.MAV_RESULT_DENIED:
@@ -228,11 +227,11 @@ def _as_float32(value: float) -> float:
     return float(struct.unpack("<f", struct.pack("<f", value))[0])
 
 
-def shortest(value: float) -> float:
+def shorten_float32(value: float) -> float:
     """Return the number with the fewest digits that is the same float32: 0.3 for what arrives as 0.30000001192."""
     same = _as_float32(value)
     for digits in range(6, 10):
         candidate = float(f"{value:.{digits}g}")
-        if _as_float32(float32(candidate)) == same:
+        if _as_float32(clip_to_float32(candidate)) == same:
             return candidate
     return value

@@ -13,7 +13,7 @@ import numpy as np
 from controller.law import Diagnostic
 from cosim.companion.vehicle_state import ReportedState
 from cosim.errors import TelemetryError
-from cosim.mavlink.vehicle.layout import euler_of
+from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.ground_end import GroundLink, Identity
@@ -22,14 +22,14 @@ from cosim.sitl.motion import Motion
 
 IDENTITY: Identity = (1, 197)  # MAV_COMP_ID_VISUAL_INERTIAL_ODOMETRY of the vehicle: no ground station
 ESTIMATE = (
-    *(Diagnostic(f"estimate.{a}", "m", "Position as the autopilot estimates it, in its own frame") for a in "xyz"),
-    *(Diagnostic(f"estimate.v{a}", "m/s", "Velocity as the autopilot estimates it, NED") for a in "xyz"),
-    *(Diagnostic(f"estimate.{a}", "rad", "Attitude as the autopilot estimates it") for a in ("roll", "pitch", "yaw")),
+    *(Diagnostic(f"estimate.{a}", "m", "Position estimate of the autopilot, in its own frame") for a in "xyz"),
+    *(Diagnostic(f"estimate.v{a}", "m/s", "Velocity estimate of the autopilot, NED") for a in "xyz"),
+    *(Diagnostic(f"estimate.{a}", "rad", "Attitude estimate of the autopilot") for a in ("roll", "pitch", "yaw")),
     Diagnostic("mode", "", "Custom mode of the autopilot's heartbeat"),
-    Diagnostic("armed", "", "The autopilot says that it is armed"),
+    Diagnostic("armed", "", "Armed state of the autopilot"),
 )
 
-_RATES = {0: 5.0, 31: 50.0, 32: 50.0}  # Hz, by message id: HEARTBEAT, ATTITUDE_QUATERNION, LOCAL_POSITION_NED
+_RATES = {"HEARTBEAT": 5.0, "ATTITUDE_QUATERNION": 50.0, "LOCAL_POSITION_NED": 50.0}  # Hz
 _RECEIVE_PERIOD = 0.005  # s of simulated time between two readings of the link
 _REQUEST_PERIOD, _HEARTBEAT_PERIOD = 10.0, 1.0  # s of the link's clock
 _MICRO = 1e6
@@ -57,7 +57,7 @@ class Dvl:
     --------
     Each delta has the autopilot's time [us], the interval [us], the rotation [rad] and the displacement [m] in it:
 
-    >>> from cosim.sitl.autopilot_link import Dvl, DvlOptions
+    >>> from cosim.sitl.sitl_link import Dvl, DvlOptions
     >>> from cosim.sitl.motion import Motion
     >>> still, ahead = (0.0, 0.0, 0.0), (0.25, 0.0, 0.0)
     >>> motion = Motion(0.0, still, still, still, ahead, still, (1.0, 0.0, 0.0, 0.0), None, ahead)
@@ -71,29 +71,29 @@ class Dvl:
         self._random = np.random.default_rng(options.seed)
         self._rotation: Array = np.zeros(3)
         self._displacement: Array = np.zeros(3)
-        self._begun = self._last = math.nan
+        self._start = self._last = math.nan
         self._due: deque[tuple[float, Any]] = deque()
 
     def integrate(self, motion: Motion) -> list[Any]:
         """Integrate the motion; return the deltas due now: time and interval [us], rotation [rad], displacement [m]."""
         now = motion.time
         if not self._last <= now:
-            self._begun = self._last = now
+            self._start = self._last = now
         self._rotation += (now - self._last) * np.array(motion.gyro)
         self._displacement += (now - self._last) * np.array(motion.dvl)
         self._last = now
-        interval = now - self._begun
+        interval = now - self._start
         if interval >= 1.0 / self._options.rate - 1e-9:
             rotation, displacement = tuple(self._rotation.tolist()), tuple(self._displacement.tolist())
             if self._random.random() >= self._options.dropout:
                 delta = round(now * _MICRO), round(interval * _MICRO), rotation, displacement
                 self._due.append((now + self._options.latency, delta))
             self._rotation[:] = self._displacement[:] = 0.0
-            self._begun = now
-        return [self._due.popleft()[1] for _ in range(sum(at <= now for at, _ in self._due))]
+            self._start = now
+        return [self._due.popleft()[1] for _ in range(sum(time <= now for time, _ in self._due))]
 
 
-class AutopilotLink:
+class SitlLink:
     """MAVLink link to the autopilot that flies the plant.
 
     Parameters
@@ -121,7 +121,7 @@ class AutopilotLink:
         self._reported = ReportedState(IDENTITY)
         self._dvl = None if dvl is None else Dvl(dvl)
         self.estimate: Array = np.full(len(ESTIMATE), math.nan)
-        self._received = self._requested = self._beat = -math.inf
+        self._received_at = self._requested_at = self._heartbeat_at = -math.inf
 
     @property
     def is_armed(self) -> bool:
@@ -138,26 +138,27 @@ class AutopilotLink:
         if self._dvl is not None:
             for stamp, interval, rotation, displacement in self._dvl.integrate(motion):
                 self._link.send(m.MAVLink_vision_position_delta_message(stamp, interval, rotation, displacement, 100.0))
-        if 0.0 <= motion.time - self._received < _RECEIVE_PERIOD:
+        if 0.0 <= motion.time - self._received_at < _RECEIVE_PERIOD:
             return
-        self._received = motion.time
+        self._received_at = motion.time
         now, reported = time.monotonic(), self._reported
-        for one in self._link.receive(0.0):
-            reported.take(one.system, one.component, one.message, now)
+        for received in self._link.receive(0.0):
+            reported.receive(received.system, received.component, received.message, now)
         self._request_streams(now)
         self.estimate[:3], self.estimate[3:6] = reported.position, reported.velocity
         if math.isfinite(reported.age(now)):
-            self.estimate[6:9] = euler_of(reported.quaternion.tolist())
+            self.estimate[6:9] = quaternion_to_euler(reported.quaternion.tolist())
         self.estimate[9:] = reported.mode, reported.is_armed
 
     def _request_streams(self, now: float) -> None:
         m, system = self._mavlink, self._reported.system
-        if now - self._beat >= _HEARTBEAT_PERIOD:
-            self._beat = now
+        if now - self._heartbeat_at >= _HEARTBEAT_PERIOD:
+            self._heartbeat_at = now
             self._link.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, m.MAV_STATE_ACTIVE, 3))
-        if system is not None and now - self._requested >= _REQUEST_PERIOD:
-            self._requested = now
-            for message_id, rate in _RATES.items():
+        if system is not None and now - self._requested_at >= _REQUEST_PERIOD:
+            self._requested_at = now
+            for name, rate in _RATES.items():
+                message_id = getattr(m, f"MAVLINK_MSG_ID_{name}")
                 self._link.send(
                     m.MAVLink_command_long_message(
                         system, 1, m.MAV_CMD_SET_MESSAGE_INTERVAL, 0, message_id, 1e6 / rate, 0, 0, 0, 0, 0

@@ -7,19 +7,19 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.layout import euler_of
+from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import AddObstacle, RemoveObstacle
 
-_UNMOVED = 0.05  # m, displacement below which no command is submitted
-_REPLACEABLE = 5.0  # s of the wall clock without a message, after which another obstacle may replace it
+_MIN_MOVE = 0.05  # m, displacement below which no command is submitted
+_REPLACE_TIMEOUT = 5.0  # s of the wall clock without a message, after which another obstacle may replace it
 _LOCAL_NED, _BODY_FRD, _LOCAL_FRD = 1, 12, 20
 _RADIUS = "commands.obstacle_radius"
 
 
 @dataclass
-class _Known:
+class _AddedObstacle:
     """An obstacle that was added by a command."""
 
     position: Vector3  # m, NED
@@ -27,7 +27,7 @@ class _Known:
     received: float  # s, wall clock at the last message about it
 
 
-class Obstacles(Service):
+class ReceivedObstacles(Service):
     """Add each obstacle as a sphere to keep out of, about the received point.
 
     In LOCAL_FRD forward is the vehicle's heading at time 0.
@@ -36,12 +36,12 @@ class Obstacles(Service):
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
         self.messages = {"OBSTACLE_DISTANCE_3D": self._obstacle}
-        self._first_yaw = euler_of(context.scenario.initial.quaternion)[2]
+        self._first_yaw = quaternion_to_euler(context.scenario.initial.quaternion)[2]
         self.restart()
 
     def restart(self) -> None:
         """Forget all obstacles."""
-        self._known: dict[int, _Known] = {}
+        self._added: dict[int, _AddedObstacle] = {}
 
     def _obstacle(self, sender: Sender, message: Any) -> None:
         context = self.context
@@ -50,20 +50,20 @@ class Obstacles(Service):
             return
         position = self._position(message.frame, (message.x, message.y, message.z))
         if position is None:
-            context.reject(f"obstacle in frame {message.frame}; it may be 1, 12 or 20", "frame")
+            context.reject(f"obstacle in frame {message.frame}; expected 1, 12 or 20", "frame")
             return
         if not all(map(math.isfinite, position)):
             return
         number, radius = message.obstacle_id, context.settings[_RADIUS]
-        known = self._known.get(number)
-        if known is not None and known.radius == radius and math.dist(known.position, position) < _UNMOVED:
-            known.received = context.now
+        added = self._added.get(number)
+        if added is not None and added.radius == radius and math.dist(added.position, position) < _MIN_MOVE:
+            added.received = context.now
             return
-        if known is None and not self._has_room():
-            context.reject(f"no room for obstacle {number}: {len(self._known)} have come already", "obstacle")
+        if added is None and not self._has_room():
+            context.reject(f"no room for obstacle {number}: there are {len(self._added)} already", "obstacle")
             return
         if context.submit(AddObstacle(number, position, radius)) == context.mavlink.MAV_RESULT_ACCEPTED:
-            self._known[number] = _Known(position, radius, context.now)
+            self._added[number] = _AddedObstacle(position, radius, context.now)
 
     def _position(self, frame: int, point: Vector3) -> Vector3 | None:
         view = self.context.view
@@ -81,14 +81,14 @@ class Obstacles(Service):
     def _has_room(self) -> bool:
         """Return True if one more fits; to make room, remove the obstacle silent for longest, if for over 5 s."""
         context = self.context
-        if len(self._known) < context.scenario.commands.obstacles:
+        if len(self._added) < context.scenario.commands.obstacles:
             return True
-        if not self._known:
+        if not self._added:
             return False
-        oldest = min(self._known, key=lambda number: self._known[number].received)
-        if context.now - self._known[oldest].received < _REPLACEABLE:
+        oldest = min(self._added, key=lambda number: self._added[number].received)
+        if context.now - self._added[oldest].received < _REPLACE_TIMEOUT:
             return False
         if context.submit(RemoveObstacle(oldest)) != context.mavlink.MAV_RESULT_ACCEPTED:
             return False
-        del self._known[oldest]
+        del self._added[oldest]
         return True

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from cosim.live.watching.bars import Bars
-from cosim.live.watching.sources import Look
+from cosim.live.watching.run_views import Look
 from cosim.simulation.commands.commands import MODES
 
 _STYLES = {"#D55E00": "red", "#E69F00": "yellow", "#56B4E9": "blue"}  # terminal colours of the criteria's colours

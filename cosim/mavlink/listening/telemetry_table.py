@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from cosim.mavlink.wire.dialect import dialect
-from cosim.mavlink.wire.ground_end import Heard
+from cosim.mavlink.wire.ground_end import ReceivedMessage
 
-ROWS = 300  # kinds of messages that have a row
-TEXTS = 5  # status texts that are kept
-_SAMPLES = 40  # samples of the count, for the rate
-_SAMPLING = 0.25  # s between two samples
+MAX_ROWS = 300  # kinds of messages that have a row
+MAX_TEXTS = 5  # status texts
+_MAX_SAMPLES = 40  # samples of the count, for the rate
+_SAMPLE_PERIOD = 0.25  # s between two samples
 _NAMED = ("NAMED_VALUE_FLOAT", "NAMED_VALUE_INT", "DEBUG_VECT", "DEBUG_FLOAT_ARRAY")
 
 
@@ -31,7 +31,7 @@ class Row:
     message: Any  # newest message
     last: float  # s, time of its reception
     count: int = 0
-    samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_SAMPLES))
+    samples: deque[tuple[float, int]] = field(default_factory=lambda: deque(maxlen=_MAX_SAMPLES))
 
     def rate(self, now: float) -> float:
         """Return the rate over the last 10 s, or since the first message [Hz]."""
@@ -39,7 +39,7 @@ class Row:
         return (self.count - count) / (now - then) if now > then else 0.0
 
 
-class Watch:
+class TelemetryTable:
     """Rows of messages, recent texts, and the vehicle's identity.
 
     Attributes
@@ -52,47 +52,47 @@ class Watch:
         System and component id of the first autopilot received.
     modes : dict of int to str
         Names of the vehicle's modes by custom mode, from AVAILABLE_MODES.
-    total, beyond : int
+    total, omitted : int
         Numbers of received messages, and of those without a row because there were 300.
     """
 
     def __init__(self) -> None:
         self.rows: dict[Key, Row] = {}
-        self.texts: deque[tuple[float, Any]] = deque(maxlen=TEXTS)
+        self.texts: deque[tuple[float, Any]] = deque(maxlen=MAX_TEXTS)
         self.vehicle: tuple[int, int] | None = None
         self.modes: dict[int, str] = {}
-        self.total = self.beyond = 0
+        self.total = self.omitted = 0
         self._mavlink = dialect()
-        self._sampled = 0.0
+        self._sampled_at = 0.0
 
-    def add(self, heard: Heard) -> None:
+    def add(self, received: ReceivedMessage) -> None:
         """Add a received message."""
         self.total += 1
-        label, message = heard.kind, heard.message
+        label, message = received.name, received.message
         if label in _NAMED:
             label = f"{label}:{printable(message.name)}"
-        key = Key(heard.system, heard.component, label)
+        key = Key(received.system, received.component, label)
         row = self.rows.get(key)
         if row is None:
-            if len(self.rows) >= ROWS:
-                self.beyond += 1
+            if len(self.rows) >= MAX_ROWS:
+                self.omitted += 1
                 return
-            row = self.rows[key] = Row(message, heard.time)
-            row.samples.append((heard.time, 0 if heard.kind == "STATUSTEXT" else 1))
-        row.message, row.last = message, heard.time
+            row = self.rows[key] = Row(message, received.time)
+            row.samples.append((received.time, 0 if received.name == "STATUSTEXT" else 1))
+        row.message, row.last = message, received.time
         row.count += 1
-        if heard.kind == "STATUSTEXT":
-            self.texts.append((heard.time, message))
-        elif heard.kind == "HEARTBEAT" and self.vehicle is None and self._is_autopilot(message):
-            self.vehicle = (heard.system, heard.component)
-        elif heard.kind == "AVAILABLE_MODES" and len(self.modes) < ROWS:
+        if received.name == "STATUSTEXT":
+            self.texts.append((received.time, message))
+        elif received.name == "HEARTBEAT" and self.vehicle is None and self._is_autopilot(message):
+            self.vehicle = (received.system, received.component)
+        elif received.name == "AVAILABLE_MODES" and len(self.modes) < MAX_ROWS:
             self.modes[message.custom_mode] = printable(message.mode_name)
 
     def sample(self, now: float) -> None:
         """Sample the counts for the rates at time `now` [s], at most every 0.25 s."""
-        if now - self._sampled < _SAMPLING:
+        if now - self._sampled_at < _SAMPLE_PERIOD:
             return
-        self._sampled = now
+        self._sampled_at = now
         for row in self.rows.values():
             row.samples.append((now, row.count))
 
@@ -106,9 +106,9 @@ class Watch:
         row = self.rows.get(Key(*self.vehicle, "HEARTBEAT")) if self.vehicle else None
         return None if row is None else now - row.last
 
-    def _is_autopilot(self, beat: Any) -> bool:
+    def _is_autopilot(self, heartbeat: Any) -> bool:
         m = self._mavlink
-        return bool(beat.type != m.MAV_TYPE_GCS and beat.autopilot != m.MAV_AUTOPILOT_INVALID)
+        return bool(heartbeat.type != m.MAV_TYPE_GCS and heartbeat.autopilot != m.MAV_AUTOPILOT_INVALID)
 
 
 def printable(text: object) -> str:

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.errors import RunError
+from cosim.sitl.json_protocol import format_motion, parse_packet
 from cosim.sitl.motion import Motion
-from cosim.sitl.wire import decode, encode
 from tests.cosim.sitl.stand_in import newest_line, parse
 
 AT_REST = Motion(
@@ -28,14 +28,14 @@ AT_REST = Motion(
 
 def test_sixteen_channel_packet_is_decoded():
     data = bytes.fromhex("1a48 b004 39300000" + "dc05" * 15 + "6c07")
-    packet = decode(data)
+    packet = parse_packet(data)
     assert (packet.frame_rate, packet.frame_count) == (1200, 12345)
     assert packet.pwm == (1500,) * 15 + (1900,)
 
 
 def test_thirty_two_channel_packet_is_decoded():
     data = bytes.fromhex("8173 9001 ffffffff" + "0000" * 31 + "4c04")
-    packet = decode(data)
+    packet = parse_packet(data)
     assert (packet.frame_rate, packet.frame_count) == (400, 2**32 - 1)
     assert packet.pwm == (0,) * 31 + (1100,)
 
@@ -54,17 +54,17 @@ def test_thirty_two_channel_packet_is_decoded():
     ],
 )
 def test_invalid_servo_packets_are_rejected(data):
-    assert decode(data) is None
+    assert parse_packet(data) is None
 
 
 @given(st.binary(max_size=80))
 def test_arbitrary_bytes_raise_nothing(data):
-    packet = decode(data)
+    packet = parse_packet(data)
     assert packet is None or len(packet.pwm) in (16, 32)
 
 
 def test_json_line_is_compact_and_delimited_by_newlines():
-    data = encode(AT_REST)
+    data = format_motion(AT_REST)
     assert data == (
         b'\n{"timestamp":0.25,"imu":{"gyro":[0.0,0.0,0.0],"accel_body":[0.0,0.0,-9.81]},"position":[1.0,2.0,3.0],'
         b'"velocity":[0.1,0.2,0.3],"attitude":[0.0,0.0,0.5],"quaternion":[1.0,0.0,0.0,0.0]}\n'
@@ -74,14 +74,14 @@ def test_json_line_is_compact_and_delimited_by_newlines():
 
 def test_the_naive_reader_refuses_blanks_behind_colons():
     """As the autopilot does, so that the test above tests something."""
-    line = json.dumps(json.loads(encode(AT_REST)))
+    line = json.dumps(json.loads(format_motion(AT_REST)))
     with pytest.raises(ValueError, match="imu/gyro"):
         parse(line)
 
 
 def test_naive_reader_matches_the_first_key_substring():
     with pytest.raises(ValueError, match="/position"):
-        parse('{"position_of_home":0,' + newest_line(encode(AT_REST))[1:])
+        parse('{"position_of_home":0,' + newest_line(format_motion(AT_REST))[1:])
 
 
 finite = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e300, max_value=1e300)
@@ -102,7 +102,7 @@ motions = st.builds(
 
 @given(motions)
 def test_every_number_is_read_back_to_the_last_bit(motion):
-    line = newest_line(encode(motion))
+    line = newest_line(format_motion(motion))
     said, table = parse(line), json.loads(line)
     names = ("timestamp", "gyro", "accel_body", "position", "velocity", "attitude", "quaternion", "rng_1")
     for name, value in zip(names, motion[:-1], strict=True):
@@ -121,4 +121,4 @@ def test_every_number_is_read_back_to_the_last_bit(motion):
 def test_non_finite_state_is_never_sent(field, bad):
     value = bad if field == "altitude" else (0.0, bad, 0.0)
     with pytest.raises(RunError, match=r"t = 0.25 s: the vehicle's state is not finite"):
-        encode(AT_REST._replace(**{field: value}))
+        format_motion(AT_REST._replace(**{field: value}))

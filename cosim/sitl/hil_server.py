@@ -12,10 +12,10 @@ from cosim.errors import RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.simulation.pace import Pace
-from cosim.sitl.flight import Flight
-from cosim.sitl.flights import Counts, Flights, Outcome
 from cosim.sitl.hil_messages import RATE, hil_messages
 from cosim.sitl.motion import Motion, at_rest
+from cosim.sitl.sitl_flight import Flight
+from cosim.sitl.sitl_session import FrameCounts, Outcome, SitlSession
 
 log = logging.getLogger(__name__)
 
@@ -45,7 +45,7 @@ class HilServer:
 
     Parameters
     ----------
-    flights : Flights
+    flights : SitlSession
         The runs of the session.
     address : (str, int)
         Address to bind; port 0 for any free one.
@@ -71,7 +71,7 @@ class HilServer:
 
     def __init__(
         self,
-        flights: Flights,
+        flights: SitlSession,
         address: tuple[str, int],
         timeout: float | None = None,
         report: Callable[[str], None] | None = None,
@@ -79,7 +79,7 @@ class HilServer:
     ) -> None:
         self._mavlink, self._speedup = dialect(), speedup
         self._flights, self._timeout, self._report = flights, timeout, report or log.info
-        self.counts = Counts()
+        self.counts = FrameCounts()
         self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
         try:
             self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -93,7 +93,7 @@ class HilServer:
         self._received = time.monotonic()
 
     def serve(self) -> Outcome:
-        """Fly until the scenario's end, a timeout, or Ctrl-C, as `Flights.fly`."""
+        """Fly until the scenario's end, a timeout, or Ctrl-C, as `SitlSession.fly`."""
         try:
             return self._flights.fly(self._serve_connections, self.counts)
         finally:
@@ -122,12 +122,12 @@ class HilServer:
     def _accept(self) -> tuple[socket.socket, tuple[str, int]]:
         while True:
             try:
-                found = self._listener.accept()
+                accepted = self._listener.accept()
             except TimeoutError:
                 self._check_timeout()
             else:
                 self._received = time.monotonic()
-                return found
+                return accepted
 
     def _fly(self, flight: Flight, connection: socket.socket) -> None:
         """Fly with one connection until the scenario's end."""
@@ -194,15 +194,15 @@ class HilServer:
 
     def _controls(self, codec: Any, data: bytes) -> list[tuple[bool, list[float]]]:
         """Parse the actuator controls in received bytes: whether armed, and outputs, which are 0 while disarmed."""
-        found = []
+        controls = []
         for message in codec.parse_buffer(data) or ():
             kind = message.get_type()
             if kind == "BAD_DATA":
                 self.counts.malformed += 1
             elif kind == "HIL_ACTUATOR_CONTROLS":
                 is_armed = bool(message.mode & _ARMED)
-                found.append((is_armed, list(message.controls) if is_armed else [0.0] * _CHANNELS))
-        return found
+                controls.append((is_armed, list(message.controls) if is_armed else [0.0] * _CHANNELS))
+        return controls
 
     def _check_timeout(self) -> None:
         if self._timeout is not None and time.monotonic() - self._received > self._timeout:

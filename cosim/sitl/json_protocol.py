@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from cosim.errors import RunError
 from cosim.sitl.motion import Motion
 
-LARGEST = 72  # bytes of a servo packet
+MAX_SIZE = 72  # bytes of a servo packet
 
-_MAGICS = {18458: struct.Struct("<HHI16H"), 29569: struct.Struct("<HHI32H")}
-_MAGIC_OF_LENGTH = {packing.size: (magic, packing) for magic, packing in _MAGICS.items()}
+_PACKINGS = {18458: struct.Struct("<HHI16H"), 29569: struct.Struct("<HHI32H")}
+_PACKINGS_BY_SIZE = {packing.size: (magic, packing) for magic, packing in _PACKINGS.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,8 +28,8 @@ class ServoPacket:
     pwm: tuple[int, ...]  # us, 16 or 32 servo outputs, 0 without a pulse
 
 
-def decode(data: bytes) -> ServoPacket | None:
-    """Decode a servo packet.
+def parse_packet(data: bytes) -> ServoPacket | None:
+    """Parse a servo packet.
 
     Parameters
     ----------
@@ -41,14 +41,14 @@ def decode(data: bytes) -> ServoPacket | None:
     ServoPacket or None
         The packet; None if the datagram is not a servo packet.
     """
-    magic, packing = _MAGIC_OF_LENGTH.get(len(data), (0, None))
+    magic, packing = _PACKINGS_BY_SIZE.get(len(data), (0, None))
     if packing is None:
         return None
     received, frame_rate, frame_count, *pwm = packing.unpack(data)
     return ServoPacket(frame_rate, frame_count, tuple(pwm)) if received == magic else None
 
 
-def encode(motion: Motion) -> bytes:
+def format_motion(motion: Motion) -> bytes:
     """Format the plant's state for the autopilot.
 
     Returns

@@ -9,12 +9,12 @@ import numpy as np
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
-LEAN = math.radians(45.0)  # tilt that a full stick of roll or pitch commands: ANGLE_MAX
+MAX_LEAN = math.radians(45.0)  # tilt that a full stick of roll or pitch commands: ANGLE_MAX
 # deflections of a stick at a pilot gain of 1 up to which it commands nothing
 YAW_DEAD_ZONE = 0.1  # 40 of 400 us
 LEAN_DEAD_ZONE = 0.075  # 30 of 400 us
 CLIMB_DEAD_ZONE = 0.2  # THR_DZ: 100 of 500
-_MIN_SHARE = 0.6  # part of a thruster's greatest matrix element above which it is mixed into an axis
+_MIN_FRACTION = 0.6  # of a thruster's maximum matrix element above which it is mixed into an axis
 
 
 class MotorMixer:
@@ -27,10 +27,10 @@ class MotorMixer:
 
     Attributes
     ----------
-    asked : ndarray, shape (n, 6)
+    commands : ndarray, shape (n, 6)
         Command of each thruster by a full stick of each axis.
-    greatest : ndarray, shape (n,)
-        Greatest force of each thruster [N], the mean of both directions.
+    max_forces : ndarray, shape (n,)
+        Maximum force of each thruster [N], the mean of both directions.
     is_quadratic : bool
         True if the force is proportional to the square of the command.
     """
@@ -38,18 +38,20 @@ class MotorMixer:
     def __init__(self, vehicle: Vehicle) -> None:
         self._matrix, table = vehicle.thruster_matrix, vehicle.autopilot
         size = np.abs(self._matrix)
-        self.asked: Array = np.where(size > _MIN_SHARE * size.max(axis=1, keepdims=True), np.sign(self._matrix), 0.0).T
-        self.greatest: Array = 0.5 * (vehicle.thrust_max - vehicle.thrust_min)
+        self.commands: Array = np.where(
+            size > _MIN_FRACTION * size.max(axis=1, keepdims=True), np.sign(self._matrix), 0.0
+        ).T
+        self.max_forces: Array = 0.5 * (vehicle.thrust_max - vehicle.thrust_min)
         self.is_quadratic = table is not None and table.curve == "quadratic"
 
     def wrench(self, sticks: Array) -> Array:
         """Return the wrench, shape (6,) [N, N m], of sticks of X Y Z K M N that include the gain."""
-        sums = np.clip(self.asked @ sticks, -1.0, 1.0)
-        result: Array = self._matrix @ (self.greatest * (sums * np.abs(sums) if self.is_quadratic else sums))
+        sums = np.clip(self.commands @ sticks, -1.0, 1.0)
+        result: Array = self._matrix @ (self.max_forces * (sums * np.abs(sums) if self.is_quadratic else sums))
         return result
 
 
-def beyond_dead_zone(deflection: float, dead_zone: float) -> float:
+def apply_dead_zone(deflection: float, dead_zone: float) -> float:
     """Return the fraction of a full rate that a stick commands.
 
     Parameters
@@ -66,14 +68,14 @@ def beyond_dead_zone(deflection: float, dead_zone: float) -> float:
 
     Examples
     --------
-    >>> from cosim.mavlink.vehicle.sticks import beyond_dead_zone, deflection_of
-    >>> beyond_dead_zone(0.1, 0.2), round(beyond_dead_zone(deflection_of(-0.3, 0.2), 0.2), 6)
+    >>> from cosim.mavlink.vehicle.ardusub_sticks import apply_dead_zone, invert_dead_zone
+    >>> apply_dead_zone(0.1, 0.2), round(apply_dead_zone(invert_dead_zone(-0.3, 0.2), 0.2), 6)
     (0.0, -0.3)
     """
     beyond = abs(deflection) - dead_zone
     return math.copysign(beyond / (1.0 - dead_zone), deflection) if beyond > 0.0 else 0.0
 
 
-def deflection_of(part: float, dead_zone: float) -> float:
-    """Return the deflection that commands a fraction of a full rate: the inverse of `beyond_dead_zone`; 0 for 0."""
+def invert_dead_zone(part: float, dead_zone: float) -> float:
+    """Return the deflection that commands a fraction of a full rate: the inverse of `apply_dead_zone`; 0 for 0."""
     return math.copysign(dead_zone + (1.0 - dead_zone) * abs(part), part) if part else 0.0

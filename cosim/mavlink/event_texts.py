@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from controller.regions.region_set import of_attitude
 from cosim.mavlink.messages import status
-from cosim.mavlink.vehicle.profile import MODE_NAMES
+from cosim.mavlink.vehicle.profile import MODE_TABLE
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.vehicle.view import View
 from cosim.simulation.commands.mission_executor import passed_items
@@ -14,7 +14,7 @@ _RELEASED = 1_000_000  # µs of simulated time without saturation, before its en
 _EVERY = 2.0  # s of the wall clock, between two texts of a kind
 
 
-class Events:
+class EventTexts:
     """Compare snapshots, and send status texts of the changes.
 
     Parameters
@@ -46,14 +46,14 @@ class Events:
         self._watch_regions(view)
         self._watch_limits(view)
         if view.touches_bottom and not before.touches_bottom:
-            context.say("Bottom touched", context.mavlink.MAV_SEVERITY_WARNING, "bottom", _EVERY)
+            context.send_text("Bottom touched", context.mavlink.MAV_SEVERITY_WARNING, "bottom", _EVERY)
 
     def _watch_commands(self, before: View, view: View) -> None:
         context, m = self._context, self._context.mavlink
         if view.armed != before.armed:
-            context.say("Armed" if view.armed else "Disarmed", m.MAV_SEVERITY_NOTICE)
+            context.send_text("Armed" if view.armed else "Disarmed", m.MAV_SEVERITY_NOTICE)
         if view.mode != before.mode:
-            context.say(f"Mode: {MODE_NAMES[view.mode]}", m.MAV_SEVERITY_NOTICE)
+            context.send_text(f"Mode: {MODE_TABLE[view.mode].name}", m.MAV_SEVERITY_NOTICE)
         if (view.armed, view.mode) != (before.armed, before.mode):
             for message in (*status.heartbeat(context), *status.current_mode(context)):
                 context.send(message)
@@ -70,9 +70,9 @@ class Events:
         context = self._context
         if not 0 <= item < len(context.mission_items) or context.mission_items[item].position is None:
             return
-        number = item + int(context.profile.home_is_first)
+        number = item + int(context.profile.has_home_item)
         context.send(context.make("MISSION_ITEM_REACHED", number))
-        context.say(f"Reached mission item {number}")
+        context.send_text(f"Reached mission item {number}")
 
     def _watch_regions(self, view: View) -> None:
         m = self._context.mavlink
@@ -91,12 +91,12 @@ class Events:
             inside = now_satisfied == (region.keep == "in")
             text = f"{what} {region.name} {'entered' if inside else 'left'}"
             severity = m.MAV_SEVERITY_INFO if now_satisfied else m.MAV_SEVERITY_WARNING
-            self._context.say(text if now_satisfied else f"{text}: keep {region.keep}", severity, text, _EVERY)
+            self._context.send_text(text if now_satisfied else f"{text}: keep {region.keep}", severity, text, _EVERY)
 
     def _report_target(self, view: View, inside: bool) -> None:
         context = self._context
         last = view.item == len(context.plan) - 1 and view.mode == "mission"
-        context.say("Target reached" if inside else "Target left", None, f"target {inside}", _EVERY)
+        context.send_text("Target reached" if inside else "Target left", None, f"target {inside}", _EVERY)
         if inside and last:
             self._reached_item(view.item)
 
@@ -105,8 +105,8 @@ class Events:
         if view.saturated:
             self._saturated_us = view.boot_us
             if not self._saturated:
-                context.say("Thrust saturated", context.mavlink.MAV_SEVERITY_WARNING, "saturated", _EVERY)
+                context.send_text("Thrust saturated", context.mavlink.MAV_SEVERITY_WARNING, "saturated", _EVERY)
             self._saturated = True
         elif self._saturated and view.boot_us - self._saturated_us >= _RELEASED:
             self._saturated = False
-            context.say("Thrust no longer saturated", None, "released", _EVERY)
+            context.send_text("Thrust no longer saturated", None, "released", _EVERY)

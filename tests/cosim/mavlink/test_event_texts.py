@@ -61,7 +61,7 @@ def test_long_text_is_split_into_chunks(station):
         station.now += 10.0
         station.autopilot.tick(station.now)
         station.wire.clear()
-        context.say("x" * length)
+        context.send_text("x" * length)
         parts = station.wire.of("STATUSTEXT")
         assert "".join(part.text for part in parts) == "x" * min(length, 200)
         if length > 50:
@@ -74,7 +74,7 @@ def test_long_text_is_split_into_chunks(station):
 
 def test_status_text_rate_is_limited(station):
     for i in range(100):
-        station.autopilot._context.say(f"line {i}")
+        station.autopilot._context.send_text(f"line {i}")
     assert len(station.wire.texts) == 12
 
 

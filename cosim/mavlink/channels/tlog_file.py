@@ -14,9 +14,9 @@ from cosim.errors import TelemetryError
 
 log = logging.getLogger(__name__)
 
-_FLUSHED = 1 << 16  # bytes in the buffer above which they are written
-_PERIOD = 1.0  # s of the wall clock between writes of a shorter buffer
-_WAITING = 1 << 20  # bytes buffered at most, while the disk is full
+_WRITE_THRESHOLD = 1 << 16  # bytes in the buffer above which they are written
+_WRITE_PERIOD = 1.0  # s of the wall clock between writes of a shorter buffer
+_BUFFER_SIZE = 1 << 20  # bytes, limit while the disk is full
 
 
 class Tlog:
@@ -25,7 +25,7 @@ class Tlog:
     Without any frame, as for a run that could not start, the file is removed.
 
     The time is the wall clock at the start plus simulated time, so a run of any speed replays in real time.
-    QGroundControl reads a time in the future with the other byte order; hence `begin_earlier`.
+    QGroundControl reads a time in the future with the other byte order; hence `advance_start`.
 
     Attributes
     ----------
@@ -41,20 +41,20 @@ class Tlog:
     datagrams = True
 
     def __init__(self, path: str) -> None:
-        self.trouble: dict[str, int] = Counter()
+        self.losses: dict[str, int] = Counter()
         self.simulated = 0.0
         self._path = path
         self._start = time.time_ns() // 1000
         self._stamp = self._start & ~3
-        self._waiting = bytearray()
-        self._sent = False
-        self._written = time.monotonic()
+        self._buffer = bytearray()
+        self._has_frames = False
+        self._written_at = time.monotonic()
         try:
             self._file = open(path, "xb", buffering=0)  # noqa: SIM115 - open as long as the link is
         except OSError as error:
             raise TelemetryError(f"{path}: {error.strerror or error}") from error
 
-    def begin_earlier(self, seconds: float) -> None:
+    def advance_start(self, seconds: float) -> None:
         """Set the start time earlier by `seconds`; call it before the first frame."""
         self._start -= int(seconds * 1e6)
         self._stamp = self._start & ~3
@@ -66,42 +66,42 @@ class Tlog:
     def record_version(self, peer: Hashable, version: int) -> None:
         """Do nothing: a log has no peers."""
 
-    def send(self, frame: bytes, old: bytes | None = None) -> bool:
+    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
         """Append a frame; return False if the buffer is full."""
-        if len(self._waiting) > _WAITING:
-            self.trouble["frames not logged"] += 1
+        if len(self._buffer) > _BUFFER_SIZE:
+            self.losses["frames not logged"] += 1
             return False
         elapsed = self.simulated * 1e6
         stamp = self._start + int(elapsed) if abs(elapsed) < 1e18 else self._stamp  # the last one if it is NaN
         self._stamp = max(stamp & ~3, self._stamp)  # the lowest bits name a link
-        self._waiting += struct.pack(">Q", self._stamp) + frame
-        self._sent = True
-        if len(self._waiting) > _FLUSHED:
+        self._buffer += struct.pack(">Q", self._stamp) + frame
+        self._has_frames = True
+        if len(self._buffer) > _WRITE_THRESHOLD:
             self._write()
         return True
 
-    def tend(self, now: float) -> None:
+    def poll(self, now: float) -> None:
         """Write the buffer once a second."""
-        if now - self._written > _PERIOD:
-            self._written = now
+        if now - self._written_at > _WRITE_PERIOD:
+            self._written_at = now
             self._write()
 
     def close(self) -> None:
         """Write the buffer, and close the file."""
         self._write()
-        if self._waiting:
-            self.trouble["bytes not logged"] += len(self._waiting)
+        if self._buffer:
+            self.losses["bytes not logged"] += len(self._buffer)
         self._file.close()
-        if not self._sent:
+        if not self._has_frames:
             with contextlib.suppress(OSError):  # it was removed already
                 os.unlink(self._path)
 
     def _write(self) -> None:
         """Write as much as the disk accepts; keep the rest, so that no frame is lost in part."""
         try:
-            while self._waiting:
-                del self._waiting[: self._file.write(self._waiting)]
+            while self._buffer:
+                del self._buffer[: self._file.write(self._buffer)]
         except OSError as error:
-            if not self.trouble["failed writes"]:
+            if not self.losses["failed writes"]:
                 log.warning("MAVLink: %s: %s", self._path, error.strerror or error)
-            self.trouble["failed writes"] += 1
+            self.losses["failed writes"] += 1

@@ -12,9 +12,9 @@ import pytest
 from cosim.errors import RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.results.record import load_record
-from cosim.sitl.hil import LEFT, HilServer
 from cosim.sitl.hil_messages import FIELD_NED, RATE, hil_messages, pressure_at
-from cosim.sitl.law import law_of_controls
+from cosim.sitl.hil_server import LEFT, HilServer
+from cosim.sitl.law import make_control_law
 from cosim.sitl.motion import Motion
 
 # id: extra byte of the checksum, and the payload's fields as they go over the wire
@@ -98,7 +98,7 @@ class Px4:
 
 @pytest.fixture
 def serve_px4(serve):
-    return functools.partial(serve, kind=HilServer, of=("px4", law_of_controls), record_rate=1000.0)
+    return functools.partial(serve, kind=HilServer, of=("px4", make_control_law), record_rate=1000.0)
 
 
 def down(u):

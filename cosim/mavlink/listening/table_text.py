@@ -1,0 +1,109 @@
+"""The table of messages and its header, as lines of text."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+from cosim.mavlink.listening.fields import format_values
+from cosim.mavlink.listening.telemetry_table import TelemetryTable, printable
+from cosim.mavlink.vehicle.mode_names import mode_name
+from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.ground_end import GroundLink
+
+_DEG = 180.0 / math.pi
+_LOST_TIME = 3.5  # s without a heartbeat, after which QGroundControl reports a lost vehicle
+_MIN_WIDTH = 40
+
+
+def format_table(
+    link: GroundLink, table: TelemetryTable, now: float, width: int = 120, height: int | None = None
+) -> list[str]:
+    """Format the received messages as lines of text.
+
+    Parameters
+    ----------
+    link : GroundLink
+        Link whose name and bad frames are shown.
+    table : TelemetryTable
+        The received messages.
+    now : float
+        Present time of the monotonic clock [s].
+    width : int
+        Greatest number of characters of a line.
+    height : int, optional
+        Greatest number of lines, of which the last one counts omitted rows; default: no limit.
+
+    Returns
+    -------
+    list of str
+        Lines without control characters.
+    """
+    width = max(width, _MIN_WIDTH)
+    lines = [_link_line(link, table, now), *_vehicle_lines(table, now), *_text_lines(table, now)]
+    rows = [f"{'message':<34} {'from':>7} {'Hz':>7} {'count':>8}  last values"]
+    for key, row in sorted(table.rows.items()):
+        sender = f"{key.system}:{key.component}"
+        rows.append(
+            f"{key.label:<34.34} {sender:>7} {row.rate(now):>7.1f} {row.count:>8}  {format_values(row.message)}"
+        )
+    if table.omitted:
+        rows.append(f"{table.omitted} messages of further kinds")
+    lines += ["", *rows]
+    if height is not None and len(lines) > height:
+        hidden = len(lines) - height + 1
+        lines = [*lines[: max(0, height - 1)], f"{hidden} more rows"]
+    return [line[:width] for line in lines]
+
+
+def _link_line(link: GroundLink, table: TelemetryTable, now: float) -> str:
+    rate = sum(row.rate(now) for row in table.rows.values())
+    return ", ".join([f"{link.name}: {table.total} messages", f"{rate:.1f} a second", *link.loss_reports()])
+
+
+def _vehicle_lines(table: TelemetryTable, now: float) -> list[str]:
+    heartbeat, silence = table.last("HEARTBEAT"), table.silence(now)
+    if table.vehicle is None or heartbeat is None or silence is None:
+        return ["no vehicle found"]
+    m = dialect()
+    armed = "ARMED" if heartbeat.base_mode & m.MAV_MODE_FLAG_SAFETY_ARMED else "disarmed"
+    kind = f"{_enum('MAV_AUTOPILOT', heartbeat.autopilot)} {_enum('MAV_TYPE', heartbeat.type)}"
+    state = _enum("MAV_STATE", heartbeat.system_status)
+    vehicle = f"vehicle {table.vehicle[0]}:{table.vehicle[1]} {kind}"
+    lines = [f"{vehicle}, mode {mode_name(heartbeat, table.modes)}, {armed}, {state}"]
+    if silence > _LOST_TIME:
+        lines[0] += f", SILENT for {silence:.0f} s"
+    pose = [part for part in (_position(table), _attitude(table), _depth(table)) if part]
+    return [*lines, ", ".join(pose)] if pose else lines
+
+
+def _position(table: TelemetryTable) -> str:
+    local, world = table.last("LOCAL_POSITION_NED"), table.last("GLOBAL_POSITION_INT")
+    if local is not None:
+        return f"north {local.x:z.2f} east {local.y:z.2f} down {local.z:z.2f} m"
+    return f"latitude {world.lat * 1e-7:z.6f} longitude {world.lon * 1e-7:z.6f} deg" if world is not None else ""
+
+
+def _attitude(table: TelemetryTable) -> str:
+    a = table.last("ATTITUDE")
+    return f"roll {a.roll * _DEG:z.1f} pitch {a.pitch * _DEG:z.1f} yaw {a.yaw * _DEG:z.1f} deg" if a is not None else ""
+
+
+def _depth(table: TelemetryTable) -> str:
+    world = table.last("GLOBAL_POSITION_INT")
+    return f"depth {-1e-3 * world.relative_alt:z.2f} m" if world is not None else ""
+
+
+def _text_lines(table: TelemetryTable, now: float) -> list[str]:
+    return [
+        f"{time.strftime('%H:%M:%S', time.localtime(time.time() - (now - then)))} "
+        f"{_enum('MAV_SEVERITY', text.severity)}: {printable(text.text)}"
+        for then, text in table.texts
+    ]
+
+
+def _enum(name: str, value: int) -> str:
+    """Return the name of a value of an enumeration without its prefix; the number if unknown."""
+    entries: dict[int, Any] = dialect().enums[name]
+    return entries[value].name.removeprefix(f"{name}_") if value in entries else str(value)
