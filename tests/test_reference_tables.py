@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from cosim.mavlink.messages.table import MESSAGES
 from pymavlink.dialects.v20 import all as dialect
 
 from controller.regions.shapes import ENTRIES
@@ -15,6 +14,7 @@ from cosim.companion.outputs import SteerBy
 from cosim.export.formats import FORMATS
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.quantities import QUANTITIES
+from cosim.mavlink.messages.message_table import MESSAGES
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.scenario.arbiter_rules import Kind
 from cosim.scenario.criteria import Quantity
