@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import get_args
 
 import pytest
-from pymavlink.dialects.v20 import all as dialect
 
 from controller.regions.shapes import ENTRIES
 from cosim.campaigns.ablation import VARIANTS
@@ -14,7 +13,7 @@ from cosim.companion.outputs import SteerBy
 from cosim.export.formats import FORMATS
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.quantities import QUANTITIES
-from cosim.mavlink.messages.message_table import MESSAGES
+from cosim.mavlink.messages.message_table import message_specs
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.scenario.arbiter_rules import Kind
 from cosim.scenario.criteria import Quantity
@@ -37,11 +36,10 @@ def rows(page, name, head=False):
 
 def test_streamed_messages_are_documented_at_their_rates():
     documented = {}
-    for rate, messages in rows("mavlink.md", "rates of cosim/mavlink/messages/table.py"):
+    for rate, messages in rows("mavlink.md", "rates of cosim/mavlink/messages/message_table.py"):
         for name, own_rate in re.findall(r"\b([A-Z][A-Z0-9_]{3,})(?: (0\.\d))?", messages):
             documented[name] = 0.0 if rate == "on request" else float(own_rate or rate)
-    names = {spec.id: dialect.mavlink_map[spec.id].msgname for spec in MESSAGES.values()}
-    assert documented == {names[spec.id]: spec.rate for spec in MESSAGES.values()}
+    assert documented == {spec.name: spec.rate for spec in message_specs().values()}
 
 
 def test_keys_of_the_autopilot_table_are_documented_with_their_defaults():
@@ -69,10 +67,10 @@ def test_modes_and_sticks_of_each_profile_are_documented():
     for column, name in enumerate(names[1:], 1):
         profile = PROFILES[re.findall(r"`(\w+)`", name)[0]]
         assert autopilots[column].split()[-1] == str(profile.autopilot)
-        assert sticks[column] == str(profile.centred_stick)
-        for number, row in zip(profile.numbers.values(), modes, strict=True):
+        assert sticks[column] == str(profile.centered_stick)
+        for number, row in zip(profile.custom_modes.values(), modes, strict=True):
             main, sub = number >> 16 & 0xFF, number >> 24
-            expected = ([main, sub] if sub else [main]) if profile.packed else [number]
+            expected = ([main, sub] if sub else [main]) if profile.is_packed else [number]
             assert [int(digits) for digits in re.findall(r"\d+", row[column].partition("(")[0])] == expected, row
 
 

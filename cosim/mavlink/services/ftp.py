@@ -60,7 +60,7 @@ class FtpError(Exception):
 class FileServer(Service):
     """FILE_TRANSFER_PROTOCOL.
 
-    ParameterProtocol
+    Parameters
     ----------
     context : VehicleContext
         The vehicle.

@@ -40,7 +40,7 @@ class MissionProtocol(Service):
 
     In ArduPilot's profile item 0 is home: it is added to downloads, and ignored in uploads.
 
-    ParameterProtocol
+    Parameters
     ----------
     context : VehicleContext
         The vehicle.

@@ -37,7 +37,7 @@ class Targets(Service):
     1 s of silence: QGroundControl's change of depth, made twice. A velocity without a position moves a sphere about
     the vehicle; it ends after 3 s without a set-point.
 
-    ParameterProtocol
+    Parameters
     ----------
     context : VehicleContext
         The vehicle.
@@ -182,7 +182,7 @@ class Targets(Service):
     def warn_about(self, position: Vector3, target: str = "target") -> None:
         """Send a warning for each objection to a target, which is accepted nevertheless.
 
-        ParameterProtocol
+        Parameters
         ----------
         position : tuple of float
             Center of the target [m, NED].
@@ -208,7 +208,7 @@ class Targets(Service):
     def go(self, sender: Sender, position: Vector3, yaw: float = math.nan) -> int:
         """Move the target region, and reach it; without a finite coordinate, hold, as QGroundControl pauses PX4.
 
-        ParameterProtocol
+        Parameters
         ----------
         sender : Sender
             Sender of the command.
