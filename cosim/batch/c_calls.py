@@ -33,24 +33,16 @@ def fmi_get(native: Native) -> bool:
 
 
 def fmi_do_step(native: Native, now: float, step: float) -> bool:
-    """Step from `now` [s] by `step` [s]; return True unless the FMU fails or ends the simulation.
-
-    The results by pointer, three of them Booleans of one byte, are stored in elements of eight bytes. The FMU may
-    discard its state before the step.
-    """
+    """Step from `now` [s] by `step` [s]; return True unless the FMU fails or ends the simulation."""
+    # The results by pointer, three of them Booleans of one byte, are stored in elements of eight bytes. The FMU may
+    # discard its state before the step.
     out = native.results
     status = call_c(native.do_step, _DO_STEP, native.instance, now, step, True, out, out[1:], out[2:], out[3:])
     return status <= _WARNING and out[_ENDED] == 0
 
 
 class Clock:
-    """A monotonic clock that C can read.
-
-    Attributes
-    ----------
-    numbers : ndarray of int64, shape (3,)
-        Address of the C function, its first argument (negative: none), ticks per second.
-    """
+    """A monotonic clock that C can read."""
 
     def __init__(self) -> None:
         if sys.platform == "win32":

@@ -101,20 +101,7 @@ class Workspace(NamedTuple):
 
 
 def make_workspace(setup: FlightConfig, criteria: int, inputs: int, thrusters: int) -> Workspace:
-    """Make the workspace of a flight.
-
-    Parameters
-    ----------
-    setup : FlightConfig
-        Configuration of the flight.
-    criteria, inputs, thrusters : int
-        Number of criteria, plant inputs and thrusters.
-
-    Returns
-    -------
-    Workspace
-        Workspace of zeros, with all thrusters healthy.
-    """
+    """Make the workspace of a flight."""
     n = setup.criteria.size
     return Workspace(
         state=VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(thrusters), np.zeros(12)),

@@ -45,21 +45,7 @@ _NO_ALLOCATION = Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0
 
 
 class FusedFlyer:
-    """Flies variations of a scenario one after the other, with one plant that is reset before each.
-
-    Parameters
-    ----------
-    variation : Variation
-        The variation, with any built-in law, shape, actuation, noise and failures.
-
-    Raises
-    ------
-    RunError
-        If the scenario has features that the loop lacks: commands, a sampling engine of the arbiter, Jacobi order, FMI
-        2.0, or a custom law.
-    BuildError, PlantError
-        If there is no FMU of the vehicle.
-    """
+    """Flies variations of a scenario one after the other, with one plant that is reset before each."""
 
     def __init__(self, variation: Variation) -> None:
         self.variation = variation
@@ -72,20 +58,7 @@ class FusedFlyer:
         self._plant = Plant(base.vehicle)
 
     def fly(self, values: Array, seeds: NDArray[np.int64]) -> BatchResult:
-        """Fly a batch.
-
-        Parameters
-        ----------
-        values : ndarray, shape (rows, keys)
-            Values of the keys that vary, in their units.
-        seeds : ndarray of int, shape (rows,)
-            Seed of each row.
-
-        Returns
-        -------
-        BatchResult
-            Outcome of each row, or the reason why it was refused.
-        """
+        """Fly a batch; values (rows, keys), seeds (rows,)."""
         outcomes, refused = empty_outcomes(len(seeds)), {}
         for row, (row_values, seed) in enumerate(zip(values, seeds, strict=True)):
             try:
@@ -96,25 +69,7 @@ class FusedFlyer:
         return BatchResult(outcomes, refused)
 
     def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Array]:
-        """Fly one scenario of the variation.
-
-        Parameters
-        ----------
-        scenario : Scenario
-            Scenario from `Variation.scenario`.
-        trace : bool
-            Return a trace, as in `FlightOutputs`.
-
-        Returns
-        -------
-        ndarray of OUTCOME, shape (), and ndarray
-            The outcome, and the trace, shape (0, 0) without one.
-
-        Raises
-        ------
-        PlantError
-            If the plant refuses the scenario. The flyer can then fly another one.
-        """
+        """Fly one scenario of the variation; returns ()."""
         metrics, setup, native, estimate, rows = fly_scenario(self._plant, scenario, trace)
         return _outcome(metrics, setup, native, estimate), rows
 
@@ -152,30 +107,7 @@ def _fixed_keys(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
 def fly_scenario(
     plant: Plant, scenario: Scenario, trace: bool = False, clock: NDArray[np.int64] = _NO_CLOCK
 ) -> tuple[FlightMetrics, FlightConfig, Native, Array, Array]:
-    """Reset a plant, and fly a scenario with it.
-
-    Parameters
-    ----------
-    plant : Plant
-        Plant of the scenario's vehicle.
-    scenario : Scenario
-        Scenario without features that `FusedFlyer` refuses.
-    trace : bool
-        Return a trace.
-    clock : ndarray of int
-        Numbers of a `Clock`, to time the law; empty for no timing.
-
-    Returns
-    -------
-    FlightMetrics, FlightConfig, Native, ndarray, ndarray
-        Metrics, configuration, the plant at the end, the last estimate, shape (4,), and the trace, shape (0, 0) without
-        one.
-
-    Raises
-    ------
-    PlantError
-        If the plant refuses the scenario.
-    """
+    """Reset a plant, and fly a scenario with it; returns (4,)."""
     law = law_of(scenario)
     n, through = scenario.vehicle.n_thrusters, scenario.actuation.through == "thrusters"
     plant.reset()
@@ -199,18 +131,7 @@ def fly_scenario(
 
 
 def exchanged_variables(scenario: Scenario) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the plant's variables that the loop exchanges with it in each step.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-
-    Returns
-    -------
-    tuple of str, tuple of str
-        Inputs and outputs, in the order of the buffers of the loop's plant.
-    """
+    """Return the names of the plant's variables that the loop exchanges with it in each step."""
     if scenario.actuation.through == "thrusters":
         n = scenario.vehicle.n_thrusters
         inputs = tuple(f"thrust[{i + 1}]" for i in range(n))
@@ -223,22 +144,7 @@ def exchanged_variables(scenario: Scenario) -> tuple[tuple[str, ...], tuple[str,
 
 
 def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64] = _NO_CLOCK) -> FlightConfig:
-    """Make the configuration of a flight from a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario.
-    thrusters : int
-        Number of thrusters that give the wrench; 0 if it acts on the body directly.
-    clock : ndarray of int, optional
-        Numbers of a `Clock`, to time the law.
-
-    Returns
-    -------
-    FlightConfig
-        Configuration with the regions at time 0.
-    """
+    """Make the configuration of a flight from a scenario."""
     sensing, step = scenario.sensing, scenario.time.step
     decisions = -(-scenario.steps // scenario.control_every)
     noise = np.zeros((0, 6))
@@ -285,20 +191,7 @@ def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64
 
 
 def failure_stages(scenario: Scenario, setup: FlightConfig) -> Allocator:
-    """Return the arguments of the allocation for each number of reported failures.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with the vehicle and its limits.
-    setup : FlightConfig
-        Configuration with the scenario's failures.
-
-    Returns
-    -------
-    Allocator
-        Arguments by stage; the first is without failures.
-    """
+    """Return the arguments of the allocation for each number of reported failures."""
     vehicle, limits = scenario.vehicle, scenario.actuation.limits
     health, stages = np.ones(vehicle.n_thrusters), []
     total = setup.failed[~(setup.remaining > 0.0)]

@@ -1,8 +1,7 @@
-"""The fused loop: a whole flight in C, which steps the FMU through its functions.
+"""The fused loop: a whole flight in C, which steps the FMU through its functions."""
 
-The stages are those of `cosim.simulation.master`, with the same functions: measure, regions, arbiter, law, allocation,
-FMU. The metrics of the flight are computed from the true motion at every plant step.
-"""
+# The stages are those of `cosim.simulation.master`, with the same functions: measure, regions, arbiter, law,
+# allocation, FMU. The metrics of the flight are computed from the true motion at every plant step.
 
 from __future__ import annotations
 
@@ -52,31 +51,7 @@ def fly(  # noqa: C901 - one loop, as a whole
     workspace: Workspace,
     out: FlightOutputs,
 ) -> None:
-    """Fly from start to end.
-
-    Parameters
-    ----------
-    setup : FlightConfig
-        Configuration of the flight.
-    native : Native
-        The plant: inputs are the thrust commands, or the wrench; outputs `PLANT_OUTPUTS`, then the thrusters'
-        forces if they are used, then the three components of the force on the body; through sensors, `SENSOR_OUTPUTS`.
-    effectiveness : Native
-        The same plant: inputs are the thrusters' effectivenesses before any failure.
-    losses : Native
-        The same plant: inputs are the sensors' loss probabilities `LOSSES` before any outage.
-    allocator : Allocator
-        Allocation of a wrench that thrusters give.
-    law : BoundLaw
-        Law bound to the workspace's state and weights, to goal and regions of the setup, and to its output: the plant's
-        inputs, or the workspace's wrench if thrusters give it.
-    arbiter : BoundArbiter
-        Arbiter bound to the workspace's inputs of the rules and weights of the criteria.
-    workspace : Workspace
-        Workspace from `make_workspace`, a new one for each flight.
-    out : FlightOutputs
-        Receives the results of the flight, up to a failure of the FMU.
-    """
+    """Fly from start to end."""
     m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
     state, weights, by_criterion = workspace.state, workspace.weights, workspace.by_criterion
     clearances, goal_clearance, seen = workspace.clearances, workspace.goal_clearance, workspace.arbiter_clearances
@@ -317,29 +292,7 @@ def fly_law(
     workspace: Workspace,
     trace: Array,
 ) -> tuple[FlightMetrics, Array]:
-    """Compile `fly`, and fly with a law.
-
-    Parameters
-    ----------
-    setup, native, effectiveness, losses, allocator, workspace
-        Arguments of `fly`.
-    law : CompiledLaw
-        Law, a new one for each flight.
-    rules : System
-        Rules of the arbiter, for the workspace's inputs.
-    trace : ndarray
-        Array that becomes `FlightOutputs.trace`.
-
-    Returns
-    -------
-    FlightMetrics, ndarray, shape (4,)
-        Metrics of the flight, and the law's last estimate of phi [N, N m] (12).
-
-    Raises
-    ------
-    CompilationError
-        If the loop or the law has to be compiled, and there is no compiler.
-    """
+    """Compile `fly`, and fly with a law; returns (4,) [N, N m]."""
     is_wrench = law.output == "wrench"
     forces = workspace.wrench if setup.thrusters and is_wrench else native.inputs
     decide = law.bound(workspace.state, setup.goal, setup.regions, workspace.weights, forces)

@@ -49,18 +49,7 @@ class BatchResult:
 
 
 def empty_outcomes(rows: int) -> Outcomes:
-    """Make empty outcomes: false and NaN.
-
-    Parameters
-    ----------
-    rows : int
-        Number of rows.
-
-    Returns
-    -------
-    ndarray of OUTCOME, shape (rows,)
-        Outcomes to be filled.
-    """
+    """Make empty outcomes: false and NaN; returns (rows,)."""
     outcomes = np.zeros(rows, OUTCOME)
     for name, (kind, _, _) in FIELDS.items():
         if kind is np.float64:

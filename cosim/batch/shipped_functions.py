@@ -103,20 +103,7 @@ def shipped_texts() -> dict[str, str]:
 
 
 def write_libraries(platforms: str, folder: Path) -> None:
-    """Compile all functions.
-
-    Parameters
-    ----------
-    platforms : str
-        Platforms: ``all``, by the compiler of the ziglang package, or ``native``, by any compiler.
-    folder : Path
-        Output folder, with a subfolder for each platform.
-
-    Raises
-    ------
-    BuildError, CompilationError
-        If there is no such compiler, or it fails.
-    """
+    """Compile all functions."""
     if platforms == NATIVE:
         compilers = [(native_platform(), find_compiler())]
     else:

@@ -17,28 +17,7 @@ _SEEDS = ("sensing.seed", "plant.parameters.seed")  # keys that get the seed of 
 
 
 class Variation:
-    """A scenario of which some numbers vary. It is picklable.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The base scenario.
-    keys : sequence of str
-        Keys of numbers, with dots as in ``--set``: items of lists by index, regions also by name; such as
-        ``"initial.position.0"``, ``"regions.SR1.gain"``, ``"law.gains.k_p1"``, ``"plant.parameters.weight"``.
-
-    Attributes
-    ----------
-    base : Scenario
-        The base scenario.
-    keys : tuple of str
-        Keys in the order of their values.
-
-    Raises
-    ------
-    ScenarioError
-        If a key is unknown, given twice, or not one of a number.
-    """
+    """A scenario of which some numbers vary. It is picklable."""
 
     def __init__(self, scenario: Scenario, keys: Sequence[str]) -> None:
         self.base, self.keys = scenario, tuple(map(plain_key, keys))
@@ -51,45 +30,11 @@ class Variation:
         self._seeds = tuple(seed for seed in _SEEDS if seed not in self.keys and self._has(seed))
 
     def number(self, key: str) -> Any:
-        """Return the base's value of a key, defaults included.
-
-        Parameters
-        ----------
-        key : str
-            Key, as in `keys`.
-
-        Returns
-        -------
-        float, text, list or table
-            Value in the key's unit.
-
-        Raises
-        ------
-        ScenarioError
-            If there is no such key.
-        """
+        """Return the base's value of a key, defaults included."""
         return value_at(self.base.table, key, self.base.vehicle)
 
     def scenario(self, values: Sequence[float], seed: int) -> Scenario:
-        """Make the scenario for values and a seed.
-
-        Parameters
-        ----------
-        values : sequence of float
-            One for each key, in its unit.
-        seed : int
-            Seed of the measurement noise and the plant's random parts.
-
-        Returns
-        -------
-        Scenario
-            The checked scenario.
-
-        Raises
-        ------
-        ScenarioError
-            If a value is invalid; it names the key.
-        """
+        """Make the scenario for values and a seed."""
         changes = dict(self._changes(values, seed))
         table = with_values(self.base.table, changes)
         table["changed"] = join_keys(table["changed"], (k for k, value in changes.items() if value != self.number(k)))
@@ -99,20 +44,7 @@ class Variation:
             raise ScenarioError(str(error)) from error
 
     def overrides(self, values: Sequence[float], seed: int) -> list[str]:
-        """Return the overrides for ``--set`` that make the same scenario from the base.
-
-        Parameters
-        ----------
-        values : sequence of float
-            One for each key.
-        seed : int
-            Seed, as for `scenario`.
-
-        Returns
-        -------
-        list of str
-            Overrides ``key=value`` that keep each value to the last bit.
-        """
+        """Return the overrides for ``--set`` that make the same scenario from the base."""
         return [f"{key}={value!r}" for key, value in self._changes(values, seed)]
 
     def _changes(self, values: Sequence[float], seed: int) -> Iterator[tuple[str, float | int]]:

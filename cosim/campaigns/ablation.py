@@ -71,47 +71,7 @@ def ablate(
     workers: int = 1,
     progress: bool = False,
 ) -> Ablation:
-    r"""Fly the same scenes with the deployable law, and without one of its parts each.
-
-    Parameters
-    ----------
-    scenes : Path
-        File of the scenes with one JSON object per line; ``-`` for standard input.
-    out : Path
-        A folder that does not exist, is empty, or holds an ablation of the same scenes, which is continued.
-    variants : sequence of str
-        Names of the variants to fly, from `VARIANTS`.
-    conditions : Conditions, optional
-        Conditions of the flights; the arbiter is the variant's.
-    settings : sequence of str
-        ``key=value`` for gains of all variants.
-    workers : int
-        Number of processes.
-    progress : bool
-        True to show a bar for each variant, if there is a terminal.
-
-    Returns
-    -------
-    Ablation
-        Folder and numbers, with a campaign for each variant.
-
-    Raises
-    ------
-    RunError
-        If there is no such variant, or the folder holds other files or cannot be written.
-    Exception
-        All errors of `run_campaign`.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> import cosim
-    >>> from cosim.campaigns.ablation import ablate
-    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(1)))
-    >>> done = ablate(Path("scenes.jsonl"), Path("parts"), ["net-weight"])
-    >>> sorted(done.campaigns)
-    ['net-weight', 'whole']
-    """
+    """Fly the same scenes with the deployable law, and without one of its parts each."""
     for name in variants:
         if name not in VARIANTS:
             raise RunError(f"variant {name!r} is unknown; {hint(name, VARIANTS)}")

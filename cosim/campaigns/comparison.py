@@ -130,21 +130,7 @@ def compare(
 
 
 def medians_where_completed(one: str, results: Results, other: str, others: Results) -> dict[str, Any]:
-    """Compare two laws on the scenes that one of them completes without a violation.
-
-    Parameters
-    ----------
-    one, other : str
-        Names of the laws.
-    results, others : Results
-        Rows of the two laws, of the same scenes in the same order.
-
-    Returns
-    -------
-    dict
-        Number of these scenes, how many of them the other law completes too, and for both laws the medians over these
-        scenes of reach time [s], infinite where the goal is not reached, and of effort [N s].
-    """
+    """Compare two laws on the scenes that one of them completes without a violation; returns [s]."""
     at = completed(results)
     return {
         "completed_by": one,
@@ -159,21 +145,7 @@ def medians_where_completed(one: str, results: Results, other: str, others: Resu
 
 
 def paired_differences(one: str, results: Results, other: str, others: Results) -> dict[str, Any]:
-    """Compare two laws scene by scene.
-
-    Parameters
-    ----------
-    one, other : str
-        Names of the laws.
-    results, others : Results
-        Rows of the two laws, of the same scenes in the same order.
-
-    Returns
-    -------
-    dict
-        Result of `paired` for the completed scenes. Over the scenes that both laws complete, also the medians of the
-        differences, first law less second, of reach time [s] and effort [N s].
-    """
+    """Compare two laws scene by scene; returns [s]."""
     mine, theirs = completed(results), completed(others)
     both = mine & theirs
     return {

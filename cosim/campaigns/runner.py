@@ -45,38 +45,7 @@ def carry_out(
     progress: bool = False,
     conclude: Callable[[Results], None] = lambda results: None,
 ) -> Done:
-    """Fly the rows of a campaign that are left, and join them all to one file.
-
-    Parameters
-    ----------
-    work : Work
-        Rows of the campaign, and the task that flies them.
-    out : Path
-        A folder that does not exist, is empty, or holds the same campaign, complete or partial.
-    workers : int
-        Number of processes, 1 for this one only; or number of batches that the executor flies at the same time.
-    executor : concurrent.futures.Executor, optional
-        Executor that flies the rows, instead of processes started here.
-    progress : bool
-        True to show a bar, if there is a terminal.
-    conclude : callable
-        Function that writes further results, given all rows, while the folder is locked.
-
-    Returns
-    -------
-    Done
-        All rows, and the number of rows flown by this call.
-
-    Raises
-    ------
-    RunError
-        If the folder holds something else or cannot be written, processes crash with any row, or a script calls this
-        without a guard, so that each process would call it again.
-    Exception
-        Errors of the task that prevent all flights.
-    KeyboardInterrupt
-        After Ctrl-C; finished rows are kept.
-    """
+    """Fly the rows of a campaign that are left, and join them all to one file."""
     if getattr(multiprocessing.current_process(), "_inheriting", False):  # as multiprocessing itself checks
         raise RunError(
             "a worker process runs the script again, and reached this call; "

@@ -181,18 +181,5 @@ def ablate(options: argparse.Namespace) -> int:
 
 
 def resumable(run: Callable[[], None], out: Path) -> int:
-    """Run a campaign; after Ctrl-C or a kill, print that finished rows are kept.
-
-    Parameters
-    ----------
-    run : callable
-        Function that runs the campaign, or continues it.
-    out : Path
-        Folder of the campaign.
-
-    Returns
-    -------
-    int
-        Exit code.
-    """
+    """Run a campaign; after Ctrl-C or a kill, print that finished rows are kept."""
     return say_if_interrupted(run, f"what is flown is kept in {out}, and the same command goes on")

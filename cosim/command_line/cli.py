@@ -1,7 +1,6 @@
-"""The ``cosim`` command.
+"""The ``cosim`` command."""
 
-Slow imports are delayed until a verb needs them, so that help is fast and Ctrl-C works from the start.
-"""
+# Slow imports are delayed until a verb needs them, so that help is fast and Ctrl-C works from the start.
 
 from __future__ import annotations
 
@@ -141,19 +140,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Arguments of the command; default: those of the process.
-
-    Returns
-    -------
-    int
-        Exit status: 0; 1 if a check fails; 2 after an error of the user; 130 after Ctrl-C, SIGTERM or SIGHUP; 141 if
-        the reader of the output has closed it.
-    """
+    """Run the command line."""
     return run_guarded(lambda: _run(sys.argv[1:] if arguments is None else arguments))
 
 

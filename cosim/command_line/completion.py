@@ -32,15 +32,7 @@ end""",
 
 
 def add_verb(verbs: Any, parser: argparse.ArgumentParser) -> None:
-    """Add the verb to the parser.
-
-    Parameters
-    ----------
-    verbs : argparse subparsers
-        Subparsers of the command.
-    parser : argparse.ArgumentParser
-        Parser of the command, whose verbs are completed.
-    """
+    """Add the verb to the parser."""
     completion = verbs.add_parser(
         "completion", help="print a script that lets a shell complete this command",
         epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -23,17 +23,7 @@ _SYSTEM = whole(1, 255)
 
 
 def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, required: bool = False) -> None:
-    """Add the flags to a verb.
-
-    Parameters
-    ----------
-    parser : argparse.ArgumentParser
-        Parser of the verb.
-    commands : bool
-        Add the flags for commands.
-    required : bool
-        Require an endpoint.
-    """
+    """Add the flags to a verb."""
     usual = MavlinkOptions()
     parser.add_argument(
         "--mavlink", action="append", default=[], metavar="ENDPOINT", required=required,
@@ -83,26 +73,7 @@ def _add_command_flags(parser: argparse.ArgumentParser, usual: MavlinkOptions) -
 
 
 def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOptions]:
-    """Return endpoints and options from the flags.
-
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Parsed arguments of a verb with these flags.
-
-    Returns
-    -------
-    list of Endpoint
-        Endpoints of the links, not opened yet.
-    MavlinkOptions
-        Profile, keys, accepted senders and failsafe.
-
-    Raises
-    ------
-    TelemetryError
-        If an endpoint is invalid, or reaches other machines without --allow-remote, the key cannot be read, or a flag
-        is given without another one that it requires.
-    """
+    """Return endpoints and options from the flags."""
     from cosim.mavlink.wire.endpoint import parse_endpoint
     from cosim.mavlink.wire.signing import load_key
 
@@ -148,13 +119,7 @@ def add_live_flag(parser: argparse.ArgumentParser, what: str) -> None:
 
 
 def open_live(options: argparse.Namespace, stack: contextlib.ExitStack) -> LiveView | None:
-    """Open the live page until the stack ends, and print its address; return None without the flag.
-
-    Raises
-    ------
-    TelemetryError
-        If the address is invalid, reaches other machines without --allow-remote, or cannot be opened.
-    """
+    """Open the live page until the stack ends, and print its address; return None without the flag."""
     if options.live is None:
         return None
     from cosim.live.live_view import LiveView

@@ -10,18 +10,7 @@ _SHOWN = 40  # greatest number of characters of a refused text in the message
 
 
 def whole(low: int, high: int) -> Callable[[str], int]:
-    """Make the type of a flag that takes a whole number.
-
-    Parameters
-    ----------
-    low, high : int
-        Least and greatest allowed value, at least 0.
-
-    Returns
-    -------
-    callable
-        Parser of a text, for `argparse`.
-    """
+    """Make the type of a flag that takes a whole number."""
 
     def parse(text: str) -> int:
         digits = text.isascii() and text.isdecimal() and len(text) <= len(str(high))
@@ -33,18 +22,7 @@ def whole(low: int, high: int) -> Callable[[str], int]:
 
 
 def number(low: float, high: float) -> Callable[[str], float]:
-    """Make the type of a flag that takes a number.
-
-    Parameters
-    ----------
-    low, high : float
-        Least and greatest allowed value.
-
-    Returns
-    -------
-    callable
-        Parser of a text, for `argparse`.
-    """
+    """Make the type of a flag that takes a number."""
 
     def parse(text: str) -> float:
         try:

@@ -20,19 +20,7 @@ _KILLS = ("SIGTERM", "SIGHUP")  # the second when the terminal closes; Windows d
 
 
 def run_guarded(run: Callable[[], int]) -> int:
-    """Run a command, and convert signals and output errors to one line and an exit status.
-
-    Parameters
-    ----------
-    run : callable
-        The command; it returns its own exit status.
-
-    Returns
-    -------
-    int
-        The command's status; 2 after an error of output or a file, 130 after Ctrl-C, SIGTERM or SIGHUP, 141 if the
-        reader of the output has closed it.
-    """
+    """Run a command, and convert signals and output errors to one line and an exit status."""
     if sys.stdout is None:  # closed by the parent: the next file that is opened would get its descriptor
         print_status("standard output is closed; expected it open, such as on /dev/null")
         return FAULT
@@ -74,10 +62,8 @@ def print_status(what: str) -> None:
 
 @contextlib.contextmanager
 def kills_interrupt() -> Iterator[None]:
-    """Raise KeyboardInterrupt at SIGTERM and SIGHUP as at Ctrl-C, so that a killed run stays readable.
-
-    Only the first signal raises it, since a closed terminal sends several. Under ``nohup`` SIGHUP stays ignored.
-    """
+    """Raise KeyboardInterrupt at SIGTERM and SIGHUP as at Ctrl-C, so that a killed run stays readable."""
+    # Only the first signal raises it, since a closed terminal sends several. Under `nohup` SIGHUP stays ignored.
     with contextlib.ExitStack() as stack:
         numbers = _catchable(_KILLS)
 

@@ -17,17 +17,7 @@ def say(options: argparse.Namespace, *lines: str) -> None:
 
 
 def print_run(options: argparse.Namespace, run: Run, report: bool = True) -> None:
-    """Print the outcome of a run, and the paths of its report and replay.
-
-    Parameters
-    ----------
-    options : argparse.Namespace
-        Parsed arguments of the verb.
-    run : Run
-        A completed or interrupted run.
-    report : bool
-        True if the run has a report and a replay.
-    """
+    """Print the outcome of a run, and the paths of its report and replay."""
     from cosim.results.wording import verdict
 
     say(options, verdict(run.summary))

@@ -12,17 +12,7 @@ _MAX_REQUESTS = 8  # latest ones, whose answers are accepted
 
 
 class ClockSync:
-    """Estimates the offset to add to the autopilot's time since boot to obtain our time.
-
-    Examples
-    --------
-    >>> from cosim.companion.clock_sync import ClockSync
-    >>> sync = ClockSync()
-    >>> sent = sync.request(100.0)
-    >>> sync.add_answer(7_005_000_000, sent, 100.01)  # 7.005 s since boot in the middle of the round trip
-    >>> round(sync.offset, 6)
-    93.0
-    """
+    """Estimates the offset to add to the autopilot's time since boot to obtain our time."""
 
     def __init__(self) -> None:
         self._requests: deque[int] = deque(maxlen=_MAX_REQUESTS)
@@ -35,12 +25,10 @@ class ClockSync:
         return stamp
 
     def add_answer(self, tc1: int, ts1: int, now: float) -> None:
-        """Process an answer, with its fields in ns, that arrived at our time `now` [s].
-
-        An answer without an open request is ignored. If the offset differs from that of the fastest kept answer by more
-        than their round trips explain, the answer replaces all earlier ones: the autopilot's clock has restarted, or
-        runs at another rate.
-        """
+        """Process an answer, with its fields in ns, that arrived at our time `now` [s]."""
+        # An answer without an open request is ignored. If the offset differs from that of the fastest kept answer by
+        # more than their round trips explain, the answer replaces all earlier ones: the autopilot's clock has
+        # restarted, or runs at another rate.
         if tc1 <= 0 or ts1 not in self._requests:
             return
         self._requests.remove(ts1)

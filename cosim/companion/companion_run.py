@@ -62,24 +62,7 @@ _WITHOUT_ESTIMATES = _WITHOUT_WEIGHT | {"law.gains.lag_bound": 0.0, "law.gains.c
 
 
 def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile: ProfileName = "ardusub") -> Scenario:
-    """Return a scenario as the companion flies it: a step is a control period, and the autopilot reports the state.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario as written for simulation.
-    steer_by : str
-        Output to the autopilot: ``sticks``, ``wrench``, ``velocity`` or ``attitude``.
-    profile : str
-        Profile of the autopilot: ``ardusub``, ``px4`` or ``generic``.
-
-    Raises
-    ------
-    RunError
-        If it has a custom law, thruster failures, or records the Lyapunov function: a real vehicle offers none of them.
-    ScenarioError
-        If the converted scenario is invalid.
-    """
+    """Return a scenario as the companion flies it: a step is a control period, and the autopilot reports the state."""
     require_builtin_law(scenario)
     for key, value in (("failures", scenario.failures), ("record.lyapunov", scenario.record.lyapunov)):
         if value:

@@ -82,25 +82,7 @@ _SATURATION = "UUV_THRUST_SAT"
 
 
 class Failsafes:
-    """Requests and collects the failsafe parameters of one autopilot.
-
-    Parameters
-    ----------
-    profile : str
-        Profile of the autopilot: ``ardusub``, ``px4`` or ``generic``.
-
-    Attributes
-    ----------
-    values : dict of str to float
-        Received values by parameter name.
-
-    Examples
-    --------
-    >>> from cosim.companion.failsafes import Failsafes
-    >>> failsafes = Failsafes("ardusub")
-    >>> failsafes.names_to_request(100.0)[:2]
-    ['FS_PILOT_INPUT', 'FS_PILOT_TIMEOUT']
-    """
+    """Requests and collects the failsafe parameters of one autopilot."""
 
     def __init__(self, profile: ProfileName) -> None:
         self._profile: ProfileName = profile

@@ -1,7 +1,6 @@
-"""Offset of the autopilot's local frame in the scene. Nothing is steered before it is known.
+"""Offset of the autopilot's local frame in the scene. Nothing is steered before it is known."""
 
-An EKF has its origin where the vehicle was when the filter set it, not at the scene's origin.
-"""
+# An EKF has its origin where the vehicle was when the filter set it, not at the scene's origin.
 
 from __future__ import annotations
 
@@ -44,28 +43,15 @@ class SceneOrigin:
 
 
 class FrameAlignment:
-    """Estimates the offset between the autopilot's local frame and the scene, and monitors it for jumps and drift.
-
-    Parameters
-    ----------
-    origin : SceneOrigin
-        The user's definition of the scene's origin.
-
-    Attributes
-    ----------
-    offset : ndarray, shape (3,) or None
-        Position of the autopilot's local origin in the scene [m, NED]; None until it is known.
-    jump : float
-        Greatest jump of the position since the frame is known [m], without the motion that the velocity explains.
-    reckoned : float
-        Horizontal distance traveled without a position fix since the frame is known [m].
-    """
+    """Estimates the offset between the autopilot's local frame and the scene, and monitors it for jumps and drift."""
 
     def __init__(self, origin: SceneOrigin) -> None:
         self._origin = origin
         self._frame = None if origin.geodetic is None else LocalFrame(*origin.geodetic)
         self._samples: deque[Array] = deque(maxlen=_SAMPLES)
+        # position of the autopilot's local origin in the scene [m, NED]; None until it is known
         self.offset: Array | None = None if origin.surveyed is None else np.array(origin.surveyed, dtype=float)
+        # greatest jump of the position since the frame is known [m], without the motion that the velocity explains
         self.jump = self.reckoned = 0.0
         self._reference: Array | None = None  # first mean offset, which later samples are compared with
         self._drift: Array = np.zeros(3)
@@ -131,11 +117,9 @@ class FrameAlignment:
         self.jump, self.reckoned, self._drift, self._before = 0.0, 0.0, np.zeros(3), None
 
     def _sample(self, state: ReportedState) -> Array | None:
-        """Return the offset by the second sources, global position and pressure, shape (3,) [m, NED].
-
-        A surveyed frame needs its depth alone; north and east are NaN without a global position. None if a needed
-        coordinate is missing.
-        """
+        """Return the offset by the second sources, global position and pressure, shape (3,) [m, NED]."""
+        # A surveyed frame needs its depth alone; north and east are NaN without a global position. None if a needed
+        # coordinate is missing.
         depth = (state.pressure - self._origin.surface_pressure) * 100.0 / (self._origin.density * _GRAVITY)
         north = east = math.nan
         if self._frame is not None and state.global_position is not None:

@@ -28,16 +28,10 @@ _MIN_CLEARANCE, _SPACING = 0.3, 0.1  # m, required on the path down; m, between 
 
 
 class HeadingWatch:
-    """Finds leaps of the reported heading: turns about the vertical that the reported rates do not explain.
-
-    Attributes
-    ----------
-    leap : float
-        Greatest leap since the last `restart` [rad].
-    """
+    """Finds leaps of the reported heading: turns about the vertical that the reported rates do not explain."""
 
     def __init__(self) -> None:
-        self.leap = 0.0
+        self.leap = 0.0  # greatest leap since the last `restart` [rad]
         self._before: tuple[float, Array, Array] | None = None
 
     def restart(self) -> None:
@@ -60,30 +54,18 @@ class HeadingWatch:
 
 
 class LevelDive:
-    """The dive of an ArduSub that has just been armed.
+    """The dive of an ArduSub that has just been armed; depth [m]."""
 
-    Once it is 0.5 m deeper than where it was armed, an ArduSub aligns its heading with each sample of its magnetometer,
-    until 5 s after arming. If it moves or tilts during the last alignment, its heading is off by some degrees from then
-    on. So it first dives level, slowly and on the spot, until no alignment follows. A vehicle that was armed before its
-    first message does not dive.
-
-    Parameters
-    ----------
-    depth : float
-        Depth of the dive [m], below where the vehicle was armed; 0 for no dive.
-
-    Attributes
-    ----------
-    clearance : callable, optional
-        Returns the minimum clearance of hard regions [m] at a position in the autopilot's local frame.
-    outside : float
-        Violation of hard regions now, less that at the start of the dive [m]; 0 or more.
-    """
+    # Once it is 0.5 m deeper than where it was armed, an ArduSub aligns its heading with each sample of its
+    # magnetometer, until 5 s after arming. If it moves or tilts during the last alignment, its heading is off by some
+    # degrees from then on. So it first dives level, slowly and on the spot, until no alignment follows. A vehicle that
+    # was armed before its first message does not dive.
 
     def __init__(self, depth: float) -> None:
         self._depth = depth
+        # returns the minimum clearance of hard regions [m] at a position in the autopilot's local frame
         self.clearance: Callable[[Array], float] | None = None
-        self.outside = 0.0
+        self.outside = 0.0  # violation of hard regions now, less that at the start of the dive [m]; 0 or more
         self._was_disarmed = False
         self._armed_depth: float | None = None  # m, depth at arming
         self._armed_at = self._aligned_at = math.inf  # our time [s] of arming, and of the last alignment

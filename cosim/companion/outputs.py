@@ -37,13 +37,7 @@ _CENTERING_TIME = 0.2  # s, during which overridden channels are centered before
 
 
 def require_supported(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) -> None:
-    """Raise an error if an autopilot does not accept an output.
-
-    Raises
-    ------
-    RunError
-        If the autopilot does not accept the output; the message gives the reason and the accepted outputs.
-    """
+    """Raise an error if an autopilot does not accept an output."""
     if profile == "px4" and steer_by in _PX4_REJECTIONS:
         raise RunError(f"--steer-by {steer_by}: not supported by PX4: {_PX4_REJECTIONS[steer_by]}")
     if sticks_by == "rc-override" and not uses_sticks(profile, steer_by):
@@ -61,34 +55,7 @@ def steering_mode(profile: ProfileName, steer_by: SteerBy) -> Mode:
 
 
 class Output:
-    """Make the messages that command a wrench, and keep their values for the record.
-
-    Parameters
-    ----------
-    mavlink : module
-        The MAVLink dialect.
-    vehicle : Vehicle
-        Vehicle, for its model and limits.
-    profile : str
-        Name of the autopilot's profile.
-    steer_by, sticks_by : str
-        Output (``sticks``, ``wrench``, ``velocity``, ``attitude``), and message that carries the sticks.
-    pilot_gain : float
-        Fraction of the greatest wrench that a full stick commands.
-    lags : (float, float)
-        Lags of the autopilot's velocity loop [s], horizontal and vertical.
-
-    Attributes
-    ----------
-    sticks, velocity, attitude : ndarray, shape (6,), (3,), (4,)
-        Last commands: sticks X Y Z K M N, -1 to 1; velocity [m/s, NED]; quaternion from body to world, scalar first.
-        Unused ones are zero.
-
-    Raises
-    ------
-    RunError
-        If the autopilot does not accept the output.
-    """
+    """Make the messages that command a wrench, and keep their values for the record; lags [s]."""
 
     def __init__(
         self,
@@ -109,6 +76,12 @@ class Output:
         self._all_axes = steer_by == "wrench" or (steer_by == "sticks" and profile == "ardusub")
         self._turn, self._lead, self._level_lead = TurnLead(vehicle), VelocityLead(vehicle, *lags), LevelLead(vehicle)
         self._overridden = False  # True while overridden channels are not released
+        # attitude: last commands: sticks X Y Z K M N, -1 to 1; velocity [m/s, NED]; quaternion from body to world,
+        # scalar first. Unused ones are zero
+        # velocity: last commands: sticks X Y Z K M N, -1 to 1; velocity [m/s, NED]; quaternion from body to world,
+        # scalar first. Unused ones are zero
+        # sticks: last commands: sticks X Y Z K M N, -1 to 1; velocity [m/s, NED]; quaternion from body to world,
+        # scalar first. Unused ones are zero
         self.sticks, self.velocity, self.attitude = np.zeros(6), np.zeros(3), np.zeros(4)
 
     def restart(self) -> None:
@@ -158,11 +131,9 @@ class Output:
         return (make_velocity_target(self._mavlink, system, self.velocity, turn),)
 
     def descend(self, state: ReportedState, speed: float, back: Array, period: float) -> Sequence[Any]:
-        """Return the messages of a level descent at a speed [m/s], by velocity or by stick, for a `period` [s].
-
-        With velocities, the descent holds a horizontal position; `back`, shape (2,) [m, NE], is the vector to it. With
-        a stick, the autopilot holds the position by itself.
-        """
+        """Return the messages of a level descent at a speed [m/s], by velocity or by stick, for a `period` [s]."""
+        # With velocities, the descent holds a horizontal position; `back`, shape (2,) [m, NE], is the vector to it.
+        # With a stick, the autopilot holds the position by itself.
         self.clear()
         if self._steer_by == "velocity":
             self.velocity[:] = self._lead.hold(back, speed, state, period)
@@ -171,11 +142,9 @@ class Output:
         return (self._sticks(state.system or 0),)
 
     def release(self, state: ReportedState, since: float) -> Sequence[Any]:
-        """Return the messages that release the sticks, `since` [s] after the start of the release.
-
-        Overridden channels are centered first, since an ArduSub without a radio keeps their last values; then they are
-        released, once. A PX4 keeps the last forces until its own failsafe, so zero forces are sent first.
-        """
+        """Return the messages that release the sticks, `since` [s] after the start of the release."""
+        # Overridden channels are centered first, since an ArduSub without a radio keeps their last values; then they
+        # are released, once. A PX4 keeps the last forces until its own failsafe, so zero forces are sent first.
         self.clear()
         if not self._uses_sticks:
             return self.hold_still(state) if self._steer_by == "attitude" and since < _CENTERING_TIME else ()
@@ -206,10 +175,8 @@ class Output:
         return make_attitude_message(self._mavlink, system, self.attitude, None), self._sticks(system)
 
     def _lean(self, period: float) -> Array:
-        """Return the sticks of roll and pitch, shape (2,), whose lean angles give the commands now in `sticks`.
-
-        They are zero for autopilots other than ArduSub.
-        """
+        """Return the sticks of roll and pitch, shape (2,), whose lean angles give the commands now in `sticks`."""
+        # They are zero for autopilots other than ArduSub.
         if self._profile.name != "ardusub":
             return np.zeros(2)
         return self._scale.lean_sticks(self._level_lead.angles(self.sticks[3:5], period))

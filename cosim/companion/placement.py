@@ -15,18 +15,7 @@ MAX_DISTANCE = 50.0  # m, horizontal distance from everything in the scene, beyo
 
 
 class Placement:
-    """Distances between a vehicle and the scene.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with goal and regions.
-
-    Attributes
-    ----------
-    hard : ndarray of int
-        Indices of the hard regions in space; 0 is the goal.
-    """
+    """Distances between a vehicle and the scene."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._environment = RegionEnvironment(scenario)

@@ -42,23 +42,10 @@ _FIRST_SENT = "thruster_force[1]"  # outputs before it stand for the beginning o
 
 
 class RemoteVehicle:
-    """Plant of a run whose vehicle is behind a link.
+    """Plant of a run whose vehicle is behind a link."""
 
-    The outputs are the values that the autopilot reports, in the scene's frame, and NaN where it reports none. A step
-    sends the law's wrench if the session allows it, and lasts until its period is over.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario as it is flown, with its vehicle.
-    session : AutopilotSession
-        Message exchange with the autopilot.
-
-    Attributes
-    ----------
-    inputs, outputs, flags : Channels
-        Channels of the vehicle's FMU; the outputs also contain those of the link.
-    """
+    # The outputs are the values that the autopilot reports, in the scene's frame, and NaN where it reports none. A step
+    # sends the law's wrench if the session allows it, and lasts until its period is over.
 
     def __init__(self, scenario: Scenario, session: AutopilotSession) -> None:
         self._session, self._vehicle = session, scenario.vehicle

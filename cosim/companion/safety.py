@@ -24,27 +24,13 @@ MEANINGS: dict[State, str] = {
 
 @dataclass(frozen=True)
 class Condition:
-    """A reason to end steering.
+    """A reason to end steering."""
 
-    Attributes
-    ----------
-    name : str
-        Name in statuses, texts and `Observation.values`.
-    limit : float
-        Limit above which the observed value ends steering [unit]; 0 for conditions that are true or false.
-    unit : str
-        Unit of the limit.
-    words : str
-        Description of the observed value.
-    next_state : State
-        State after the condition has ended steering.
-    """
-
-    name: str
-    limit: float
-    unit: str
-    words: str
-    next_state: State
+    name: str  # name in statuses, texts and `Observation.values`
+    limit: float  # limit above which the observed value ends steering [unit]; 0 for conditions that are true or false
+    unit: str  # unit of the limit
+    words: str  # description of the observed value
+    next_state: State  # state after the condition has ended steering
 
 
 GAIN_TOLERANCE = 0.01  # of the pilot gain
@@ -83,20 +69,7 @@ class Observation(NamedTuple):
 
 
 class Supervisor:
-    """Decides the companion's state at each step.
-
-    Parameters
-    ----------
-    dry_run : bool
-        True to compute the law without steering.
-
-    Attributes
-    ----------
-    state : State
-        Present state.
-    reason : str
-        Name of the condition that ended steering last; empty if none did.
-    """
+    """Decides the companion's state at each step."""
 
     def __init__(self, dry_run: bool = False) -> None:
         self.state: State = "waiting"
@@ -119,21 +92,13 @@ class Supervisor:
         return 0.0 if self._requested_at is None else now - self._requested_at
 
     def resume(self) -> None:
-        """Start again from ``waiting``, after ``held`` or ``pilot``.
-
-        A condition that still applies ends steering again.
-        """
+        """Start again from ``waiting``, after ``held`` or ``pilot``."""
+        # A condition that still applies ends steering again.
         if self.state in ("held", "pilot"):
             self.state, self.reason, self._requested_at = "waiting", "", None
 
     def update(self, observation: Observation) -> State:
-        """Return the state of the coming step.
-
-        Parameters
-        ----------
-        observation : Observation
-            Observation at the beginning of the step.
-        """
+        """Return the state of the coming step."""
         if self.state in ("diving", "engaging", "steering", "dry_run"):
             self._check_conditions(observation)
         if self.state in ("held", "pilot"):

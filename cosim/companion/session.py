@@ -38,49 +38,7 @@ _CUSTOM_MODE_ENABLED = 1  # MAV_MODE_FLAG, parameter 1 of DO_SET_MODE
 
 
 class AutopilotSession:
-    """Steers one autopilot as its supervisor allows; a source of commands for the master that computes the law.
-
-    Parameters
-    ----------
-    link : AutopilotLink
-        Link to the autopilot.
-    vehicle : Vehicle
-        Vehicle that the autopilot controls.
-    options : CompanionOptions
-        The user's options.
-
-    Attributes
-    ----------
-    reported : ReportedState
-        State that the autopilot reports.
-    alignment : FrameAlignment
-        Alignment of the autopilot's local frame with the scene.
-    heading : HeadingWatch
-        Detector of leaps of the heading.
-    dive : LevelDive
-        Dive of an ArduSub before it is steered.
-    supervisor : Supervisor
-        Decides whether the law steers.
-    profile : Profile
-        Profile of the autopilot.
-    failsafes : Failsafes
-        The autopilot's failsafe parameters.
-    output : Output
-        Converter of wrenches to messages; it keeps the last commands, in a dry run too.
-    lateness : float
-        Delay of the start of the last step [s].
-    outside : float
-        Depth by which the vehicle violates hard regions [m]; the caller sets it.
-    is_placed : bool
-        True once the caller has found the vehicle near the scene; before, it is neither armed nor steered.
-    misplaced : str
-        How far off it is if it is not near; the caller sets it.
-
-    Raises
-    ------
-    RunError
-        If the autopilot does not accept the output.
-    """
+    """Steers one autopilot as its supervisor allows; a source of commands for the master that computes the law."""
 
     exhausted = False
 
@@ -126,15 +84,8 @@ class AutopilotSession:
         return (Arm(self._is_law_active),)
 
     def exchange(self, wrench: Array, due: float, until: float) -> None:
-        """Run one step: update the state, send messages, and receive until the step ends.
-
-        Parameters
-        ----------
-        wrench : ndarray, shape (6,)
-            The law's wrench [N, N m], body frame.
-        due, until : float
-            Times of the link's clock [s]: scheduled start and end of the step.
-        """
+        """Run one step: update the state, send messages, and receive until the step ends; wrench [N, N m]."""
+        # with due, until [s]
         now = self._link.clock()
         self.lateness = max(0.0, now - due)
         self._receive(0.0)
@@ -167,10 +118,8 @@ class AutopilotSession:
             self._handle(received.system, received.component, received.message, received.time)
 
     def release(self, seconds: float) -> None:
-        """Release the sticks, and request the hold mode until it is on or `seconds` are over.
-
-        In the state ``pilot``, only finish the release; without steering, do nothing.
-        """
+        """Release the sticks, and request the hold mode until it is on or `seconds` are over."""
+        # In the state `pilot`, only finish the release; without steering, do nothing.
         state, begun = self.supervisor.state, self._link.clock()
         if state in ("diving", "engaging", "steering", "held"):
             self.supervisor.state, self.supervisor.reason = "held", self.supervisor.reason or "end"

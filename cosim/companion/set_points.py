@@ -30,16 +30,10 @@ _LOCAL_NED = 1  # MAV_FRAME_LOCAL_NED
 
 
 class TurnLead:
-    """Convert a moment to a set-point of yaw rate or attitude.
+    """Convert a moment to a set-point of yaw rate or attitude."""
 
-    An angle loop around a rate loop commands the rate (set-point - angle) / lag, and accelerates by (commanded rate -
-    rate) / rate lag. So a set-point that leads the angle by lag (rate + rate lag a) gives the acceleration a.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle, for its inertia with added inertia.
-    """
+    # An angle loop around a rate loop commands the rate (set-point - angle) / lag, and accelerates by (commanded rate -
+    # rate) / rate lag. So a set-point that leads the angle by lag (rate + rate lag a) gives the acceleration a.
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._inertia: Array = np.diag(vehicle.inertia) + np.diag(vehicle.added_mass)[3:]
@@ -55,11 +49,9 @@ class TurnLead:
         return min(max(float(self.rates(wrench, state)[2]), -_MAX_YAW_RATE), _MAX_YAW_RATE)
 
     def attitude(self, wrench: Array, state: ReportedState) -> Array:
-        """Return the set-point of the attitude, a quaternion, shape (4,), within 0.35 rad of the present one by angle.
-
-        Roll and pitch are at most 0.1 rad: the autopilot levels the vehicle itself, and the law's moments against
-        weight, drag and eccentric thrusters do not mean a tilt.
-        """
+        """Return the set-point of the attitude, a quaternion (4,), within 0.35 rad of the present one."""
+        # Roll and pitch are at most 0.1 rad: the autopilot levels the vehicle itself, and the law's moments against
+        # weight, drag and eccentric thrusters do not mean a tilt.
         roll, pitch, yaw = np.clip(_ANGLE_LAG * self.rates(wrench, state), -_MAX_LEAD, _MAX_LEAD)
         now = quaternion_to_euler(state.quaternion.tolist())
         tilt = [
@@ -71,21 +63,15 @@ class TurnLead:
 
 
 class LevelLead:
-    """Convert the moments that tilt a vehicle to lean angles of an ArduSub's attitude loop.
+    """Convert the moments that tilt a vehicle to lean angles of an ArduSub's attitude loop."""
 
-    Surge and sway tilt a vehicle whose horizontal thrusters are eccentric, and so does Munk's moment. Both are known
-    before the tilt. The loop commands the rate P_a (lean - angle), and the thrusters u = P e + I integral(e) of its
-    error e. So a lean u/(P_a P), which washes out in P/I seconds, gives the command u while the angle is zero.
-
-    The leans are feed-forward alone: they depend on neither angles nor rates, and not on a law's moments. A law's
-    attitude loop around the autopilot's, delayed by the link, would only take margin. A law that adapts its restoring
-    moments would even find the stiffness of the autopilot's loop in place of the vehicle's, and cancel it.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle, for its added mass.
-    """
+    # Surge and sway tilt a vehicle whose horizontal thrusters are eccentric, and so does Munk's moment. Both are known
+    # before the tilt. The loop commands the rate P_a (lean - angle), and the thrusters u = P e + I integral(e) of its
+    # error e. So a lean u/(P_a P), which washes out in P/I seconds, gives the command u while the angle is zero.
+    #
+    # The leans are feed-forward alone: they depend on neither angles nor rates, and not on a law's moments. A law's
+    # attitude loop around the autopilot's, delayed by the link, would only take margin. A law that adapts its restoring
+    # moments would even find the stiffness of the autopilot's loop in place of the vehicle's, and cancel it.
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._added: Array = vehicle.added_mass[:3, :3]
@@ -93,13 +79,8 @@ class LevelLead:
         self.set_gains({})
 
     def moments(self, velocity: Array) -> Array:
-        """Return the moments about roll and pitch, shape (2,) [N m], that cancel Munk's, v x (M_A v).
-
-        Parameters
-        ----------
-        velocity : ndarray, shape (3,)
-            Linear velocity [m/s], body frame; components that are not finite count as 0.
-        """
+        """Return the moments about roll and pitch, shape (2,) [N m], that cancel Munk's, v x (M_A v)."""
+        # with velocity [m/s]
         speed = np.where(np.isfinite(velocity), velocity, 0.0)
         result: Array = np.cross(speed, self._added @ speed)[:2]
         return result
@@ -115,34 +96,18 @@ class LevelLead:
         self._settled[:] = 0.0
 
     def angles(self, command: Array, period: float) -> Array:
-        """Return roll and pitch, shape (2,) [rad], of at most 0.5 rad.
-
-        Parameters
-        ----------
-        command : ndarray, shape (2,)
-            Commands of roll and pitch to the thrusters, -1 to 1.
-        period : float
-            Time since the last call [s].
-        """
+        """Return roll and pitch, shape (2,) [rad], of at most 0.5 rad; period [s]."""
         self._settled += min(1.0, period * self._washout) * (command - self._settled)
         angles: Array = np.clip((command - self._settled) / self._gain, -_MAX_LEAN, _MAX_LEAN)
         return angles
 
 
 class VelocityLead:
-    """Convert a wrench to a set-point of velocity.
+    """Convert a wrench to a set-point of velocity; lag, vertical_lag [s]."""
 
-    A first-order loop accelerates by (set-point - v) / lag + d. So the set-point v + lag (a - d) gives the acceleration
-    a of the wrench, by mass, added mass and damping. A Luenberger observer estimates d, which includes current, drag
-    and the missing integral action of a loop, from set-points and measured velocities.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle, for its model.
-    lag, vertical_lag : float
-        Lags of the autopilot's velocity loop [s], horizontal and vertical.
-    """
+    # A first-order loop accelerates by (set-point - v) / lag + d. So the set-point v + lag (a - d) gives the
+    # acceleration a of the wrench, by mass, added mass and damping. A Luenberger observer estimates d, which includes
+    # current, drag and the missing integral action of a loop, from set-points and measured velocities.
 
     def __init__(self, vehicle: Vehicle, lag: float, vertical_lag: float) -> None:
         self._mass: Array = vehicle.mass + np.diag(vehicle.added_mass)[:3]
@@ -157,17 +122,7 @@ class VelocityLead:
         self._last_set_point, self._disturbance = None, np.zeros(3)
 
     def velocity(self, wrench: Array, state: ReportedState, period: float) -> Array:
-        """Return the velocity [m/s, NED], shape (3,), of at most 0.8 m/s.
-
-        Parameters
-        ----------
-        wrench : ndarray, shape (6,)
-            Wrench [N, N m], body frame; components that are not finite count as 0.
-        state : ReportedState
-            Present state.
-        period : float
-            Time since the last call [s].
-        """
+        """Return the velocity [m/s, NED], shape (3,), of at most 0.8 m/s; wrench (6,) [N, N m], period [s]."""
         speed = state.velocity_body[:3]
         force = np.where(np.isfinite(wrench[:3]), wrench[:3], 0.0)
         drag = (self._linear + self._quadratic * np.abs(speed)) * speed
@@ -175,21 +130,9 @@ class VelocityLead:
         return self._set_point(acceleration, state, period)
 
     def hold(self, back: Array, speed_down: float, state: ReportedState, period: float) -> Array:
-        """Return the velocity [m/s, NED], shape (3,), that holds a horizontal position during a descent.
-
-        The observer makes up for a current.
-
-        Parameters
-        ----------
-        back : ndarray, shape (2,)
-            Horizontal vector from the vehicle to the position [m, NE].
-        speed_down : float
-            Downward speed of the descent [m/s]; commanded as it is.
-        state : ReportedState
-            Present state.
-        period : float
-            Time since the last call [s].
-        """
+        """Return the velocity [m/s, NED], shape (3,), that holds a horizontal position during a descent."""
+        # with back [m, NE], speed_down [m/s], period [s]
+        # The observer makes up for a current.
         acceleration = np.zeros(3)
         acceleration[:2] = _HOLD_FREQUENCY**2 * back - 2.0 * _HOLD_FREQUENCY * state.velocity[:2]
         velocity = self._set_point(acceleration, state, period)
@@ -229,19 +172,7 @@ def make_velocity_target(mavlink: Any, system: int, velocity: Array, yaw_rate: f
 
 
 def make_attitude_message(mavlink: Any, system: int, attitude: Array, force: Array | None) -> Any:
-    """Return SET_ATTITUDE_TARGET.
-
-    Parameters
-    ----------
-    mavlink : module
-        The MAVLink dialect.
-    system : int
-        System id of the autopilot.
-    attitude : ndarray, shape (4,)
-        Quaternion from body to world, scalar first.
-    force : ndarray, shape (3,), optional
-        Fractions of the greatest force along each body axis [-], for PX4; None: the sticks command the force.
-    """
+    """Return SET_ATTITUDE_TARGET; attitude (4,), force (3,) [-]."""
     mask = _RATES_IGNORED | (_THRUST_IGNORED if force is None else THRUST_BODY_SET)
     fields = 0, system, 1, mask, attitude.tolist(), 0.0, 0.0, 0.0, 0.0
     if force is None:

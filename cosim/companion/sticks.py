@@ -40,55 +40,29 @@ _RELEASED, _LEFT_ALONE = 0, 0xFFFF  # values that release a channel, and leave i
 
 @dataclass(frozen=True)
 class StickScale:
-    """Relation between sticks and wrench of a vehicle.
+    """Relation between sticks and wrench of a vehicle."""
 
-    Attributes
-    ----------
-    efforts : ndarray, shape (n, 6)
-        Fraction of each thruster's greatest force, for a unit wrench along or about each body axis [1/N, 1/(N m)].
-    forces : ndarray, shape (6, n)
-        Wrench of each thruster's greatest force [N, N m], body frame.
-    mixer : ndarray, shape (n, 6)
-        Command of each thruster, 1, 0 or -1, by a full stick of each axis at a gain of 1. For an autopilot that
-        allocates forces itself, both have a row for each axis in place of each thruster.
-    gain : float
-        Gain of the sticks of surge, sway, heave and yaw: the pilot gain; 1 for overridden channels.
-    scales_all : bool
-        True if the gain applies to roll and pitch as well.
-    quadratic : bool
-        True if a thruster's force is proportional to the square of its command.
-    dead_zones : float
-        Factor of the dead zones of rate sticks: the pilot gain; 0 without dead zones.
-    yaw_rate, climb_rates : float, (float, float)
-        Rates of full sticks: yaw [rad/s]; up, down [m/s].
-    max_lean : float
-        Angle of a full stick of roll or pitch [rad].
-    """
-
+    # (n, 6) Fraction of each thruster's greatest force, for a unit wrench along or about each body axis [1/N, 1/(N
+    # m)]
     efforts: Array
-    forces: Array
+    forces: Array  # (6, n) Wrench of each thruster's greatest force [N, N m], body frame
+    # (n, 6) Command of each thruster, 1, 0 or -1, by a full stick of each axis at a gain of 1. For an autopilot that
+    # allocates forces itself, both have a row for each axis in place of each thruster
     mixer: Array
-    gain: float
-    scales_all: bool
-    quadratic: bool
-    dead_zones: float
-    yaw_rate: float = YAW_RATE
-    climb_rates: tuple[float, float] = (PILOT_SPEED, PILOT_SPEED)
-    max_lean: float = MAX_LEAN
+    gain: float  # gain of the sticks of surge, sway, heave and yaw: the pilot gain; 1 for overridden channels
+    scales_all: bool  # true if the gain applies to roll and pitch as well
+    quadratic: bool  # true if a thruster's force is proportional to the square of its command
+    dead_zones: float  # factor of the dead zones of rate sticks: the pilot gain; 0 without dead zones
+    yaw_rate: float = YAW_RATE  # rates of full sticks: yaw [rad/s]; up, down [m/s]
+    climb_rates: tuple[float, float] = (PILOT_SPEED, PILOT_SPEED)  # rates of full sticks: yaw [rad/s]; up, down [m/s]
+    max_lean: float = MAX_LEAN  # angle of a full stick of roll or pitch [rad]
 
     def sticks(self, wrench: Array) -> Array:
-        """Return the sticks that command a wrench, shape (6,), X Y Z K M N from -1 to 1.
-
-        An autopilot adds the commands of all sticks to a thruster; a quadratic force is that of the sum. So each
-        thruster's force is converted to its command, and the commands to sticks. Where a thruster or a stick saturates,
-        surge, sway and heave are scaled down by one factor until the moments are whole: an ArduSub scales forces and
-        moments down together, and the vehicle would tilt.
-
-        Parameters
-        ----------
-        wrench : ndarray, shape (6,)
-            Wrench [N, N m], body frame; components that are not finite count as 0.
-        """
+        """Return the sticks that command a wrench, shape (6,), X Y Z K M N from -1 to 1; wrench (6,) [N, N m]."""
+        # An autopilot adds the commands of all sticks to a thruster; a quadratic force is that of the sum. So each
+        # thruster's force is converted to its command, and the commands to sticks. Where a thruster or a stick
+        # saturates, surge, sway and heave are scaled down by one factor until the moments are whole: an ArduSub scales
+        # forces and moments down together, and the vehicle would tilt.
         wrench = np.where(np.isfinite(wrench), wrench, 0.0)
         sticks = self._unlimited_sticks(wrench)
         if self.quadratic and self._is_saturated(sticks):
@@ -102,10 +76,8 @@ class StickScale:
         return clipped
 
     def _unlimited_sticks(self, wrench: Array) -> Array:
-        """Return the sticks times their gain, shape (6,), that command a wrench without limits.
-
-        Fit the thrusters' commands by least squares; for quadratic forces, correct the wrench by Newton's method.
-        """
+        """Return the sticks times their gain, shape (6,), that command a wrench without limits."""
+        # Fit the thrusters' commands by least squares; for quadratic forces, correct the wrench by Newton's method.
         efforts = self.efforts @ wrench
         if not self.quadratic:
             linear: Array = self._mixer_inverse @ efforts
@@ -163,19 +135,7 @@ class StickScale:
 
 
 def make_stick_scale(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: SticksBy) -> StickScale:
-    """Return the scale of the sticks of a vehicle.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle with its thrusters' limits and, for an ArduSub, the curve of its table ``autopilot``.
-    profile : Profile
-        Profile of the autopilot.
-    pilot_gain : float
-        Pilot gain, above 0 to 1.
-    sticks_by : str
-        Message that carries the sticks.
-    """
+    """Return the scale of the sticks of a vehicle."""
     gain = pilot_gain if sticks_by == "manual-control" else 1.0
     max_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
     if profile.name != "ardusub":  # the autopilot allocates the axes to the thrusters itself

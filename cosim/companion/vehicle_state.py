@@ -39,54 +39,28 @@ _MILLI, _MICRO = 1e-3, 1e-6
 
 
 class ReportedState:
-    """The state of one autopilot, as its messages report it. Nothing is estimated here.
-
-    Parameters
-    ----------
-    identity : (int, int)
-        The companion's own system id and component id; sticks from any other station are a pilot's.
-
-    Attributes
-    ----------
-    system : int or None
-        System id of the vehicle: of the first autopilot whose heartbeat was received; None before.
-    position, velocity : ndarray, shape (3,)
-        Position [m] and velocity [m/s], NED, in the autopilot's own local frame.
-    quaternion, rates : ndarray, shape (4,), (3,)
-        Attitude from body to world, scalar first; body rates [rad/s].
-    attitude_boot : float
-        Time of this attitude since the autopilot's boot [s]; NaN before the first.
-    mode, is_armed, in_failsafe : int, bool, bool
-        Custom mode, also from CURRENT_MODE; True if armed; True if the state is MAV_STATE_CRITICAL or beyond. From the
-        last heartbeat.
-    global_position : tuple of float or None
-        Latitude and longitude [deg] and altitude above home [m].
-    pressure : float
-        Absolute pressure [hPa], of the second sensor if there is one; NaN if none is reported.
-    is_reckoned : bool
-        True if the autopilot has no fix of its horizontal position, and dead-reckons it.
-    pilot_gain : float
-        Present pilot gain of an ArduSub's sticks [-]; NaN if none is reported.
-    received_at, pilot_at : float
-        Our times [s] of the autopilot's last processed message, and of the last deflected sticks of another station.
-    sync : ClockSync
-        Offset between the autopilot's clock and ours.
-    """
+    """The state of one autopilot, as its messages report it. Nothing is estimated here."""
 
     def __init__(self, identity: tuple[int, int]) -> None:
         self._identity = identity
         self.system: int | None = None
         self.autopilot = 0
+        # position [m] and velocity [m/s], NED, in the autopilot's own local frame
         self.position: Array = np.full(3, math.nan)
+        # position [m] and velocity [m/s], NED, in the autopilot's own local frame
         self.velocity: Array = np.full(3, math.nan)
+        # attitude from body to world, scalar first; body rates [rad/s]
         self.quaternion: Array = np.array([1.0, 0.0, 0.0, 0.0])
-        self.rates: Array = np.zeros(3)
+        self.rates: Array = np.zeros(3)  # attitude from body to world, scalar first; body rates [rad/s]
         self.mode, self.is_armed, self.in_failsafe = -1, False, False
+        # latitude and longitude [deg] and altitude above home [m]
         self.global_position: tuple[float, float, float] | None = None
+        # absolute pressure [hPa], of the second sensor if there is one; NaN if none is reported
         self.pressure = self.altitude = self.battery = self.pilot_gain = math.nan
         self.pulses: tuple[int, ...] = ()
         self.is_leaking = self.is_reckoned = False
         self.resets = 0  # ODOMETRY.reset_counter of the autopilot's estimate
+        # our times [s] of the autopilot's last processed message, and of the last deflected sticks of another station
         self.received_at = self.pilot_at = -math.inf
         self.message_counts: Counter[str] = Counter()  # counts of received messages, by name
         self.results: dict[int, int] = {}  # last MAV_RESULT of each command, by MAV_CMD number
@@ -131,11 +105,9 @@ class ReportedState:
         self._handlers[name](message, now)
 
     def age(self, now: float) -> float:
-        """Return the age of the older one of position and attitude [s]; infinite before both were received.
-
-        It is computed from the autopilot's time stamps if the clocks are aligned, and is at least the time since
-        reception.
-        """
+        """Return the age of the older one of position and attitude [s]; infinite before both were received."""
+        # It is computed from the autopilot's time stamps if the clocks are aligned, and is at least the time since
+        # reception.
         ages = []
         for boot, received in ((self._position_boot, self._position_at), (self.attitude_boot, self._attitude_at)):
             stamped = now - (boot + self.sync.offset)
@@ -148,10 +120,8 @@ class ReportedState:
         return sum(self.message_counts[name] for name in ("LOCAL_POSITION_NED", "ATTITUDE_QUATERNION", "ODOMETRY"))
 
     def predict(self, now: float) -> tuple[Array, Array]:
-        """Return position, shape (3,) [m, NED, local frame], and quaternion, shape (4,), predicted over their age.
-
-        Velocity and rates are assumed constant, for at most 0.1 s.
-        """
+        """Return position, shape (3,) [m, NED, local frame], and quaternion, shape (4,), predicted over their age."""
+        # Velocity and rates are assumed constant, for at most 0.1 s.
         lead = min(self.age(now), _MAX_PREDICTION)
         if not math.isfinite(lead):
             return self.position.copy(), self.quaternion.copy()

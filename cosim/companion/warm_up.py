@@ -47,20 +47,7 @@ class _ArmAtFirst:
 
 
 def warm_up(scenario: Scenario, options: CompanionOptions) -> None:
-    """Run three steps of a scenario with a vehicle that rests at its initial position.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario as it will be flown, from `scenario_to_steer`.
-    options : CompanionOptions
-        The user's options of the flight.
-
-    Raises
-    ------
-    BuildError, LawError, DefinitionError
-        If law or arbiter cannot be set up.
-    """
+    """Run three steps of a scenario with a vehicle that rests at its initial position."""
     session = AutopilotSession(_NoLink(), scenario.vehicle, options)
     session.reported.position[:] = scenario.initial.position
     session.reported.velocity[:] = 0.0

@@ -80,31 +80,7 @@ class Excerpt:
 
 
 def excerpt_of(folder: Path, signals: Sequence[str] = (), every: int = 1, rate: float | None = None) -> Excerpt:
-    """Select signals and steps of a run for export.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of a run that was completed, interrupted or killed.
-    signals : sequence of str
-        Names or patterns such as ``*.clearance``; none for all.
-    every : int
-        Export every n-th step.
-    rate : float, optional
-        Steps per simulated second [Hz] instead of `every`; all steps if the record has fewer.
-
-    Returns
-    -------
-    Excerpt
-        The selection, which includes the time in any case.
-
-    Raises
-    ------
-    RunError
-        If the folder holds no run that can be read.
-    ExportError
-        If a pattern matches no signal.
-    """
+    """Select signals and steps of a run for export; rate [Hz]."""
     run = load_run(folder)
     names = [column.name for column in run.record.columns]
     wanted = {name for pattern in signals for name in _match_names(pattern, names)} | {"time"} if signals else {*names}

@@ -11,22 +11,11 @@ from cosim.export.excerpt import Excerpt
 
 @dataclass(frozen=True)
 class Format:
-    """An export format; each module of `cosim.export.formats` defines one as ``FORMAT``.
+    """An export format; each module of `cosim.export.formats` defines one as ``FORMAT``."""
 
-    Parameters
-    ----------
-    write : callable
-        Function that writes an excerpt of a run into a file, and returns the paths of the written files, that file
-        first. It may import the packages of `needs`.
-    needs : tuple of str
-        Packages beyond the base installation, as pip requirements.
-    beside : str
-        Suffix of a second file; empty for none.
-    whole : bool
-        True if the format defines its own signals and rates, which cannot be selected.
-    """
-
+    # function that writes an excerpt of a run into a file, and returns the paths of the written files, that file
+    # first. It may import the packages of `needs`
     write: Callable[[Excerpt, Path], list[Path]]
-    needs: tuple[str, ...] = ()
-    beside: str = ""
-    whole: bool = False
+    needs: tuple[str, ...] = ()  # packages beyond the base installation, as pip requirements
+    beside: str = ""  # suffix of a second file; empty for none
+    whole: bool = False  # true if the format defines its own signals and rates, which cannot be selected

@@ -49,22 +49,7 @@ def frame_of(solid: Solid) -> str:
 def frame_transforms(
     time: Timestamp, position: Sequence[float], quaternion: Sequence[float], moved: dict[str, Sequence[float]]
 ) -> FrameTransforms:
-    """Return the transforms of the vehicle and of the moving regions.
-
-    Parameters
-    ----------
-    time : Timestamp
-        Simulated time.
-    position, quaternion : sequence of float
-        Position [m, NED] and attitude, body to NED, of the vehicle.
-    moved : dict
-        Shift of each moving region [m, NED], by the name of its frame.
-
-    Returns
-    -------
-    FrameTransforms
-        Transforms of all frames, since after a jump in time a viewer reads the last message only.
-    """
+    """Return the transforms of the vehicle and of the moving regions; position, quaternion [m, NED], moved [m, NED]."""
     message = FrameTransforms()
     _add_transform(message, time, NED, PLACE, position, (1.0, 0.0, 0.0, 0.0))
     _add_transform(message, time, PLACE, BODY, (0.0, 0.0, 0.0), quaternion)
@@ -81,22 +66,7 @@ def pose(time: Timestamp, position: Sequence[float], quaternion: Sequence[float]
 
 
 def regions(solids: Sequence[Solid], time: Timestamp, active: int) -> SceneUpdate:
-    """Return all regions, the active one less transparent.
-
-    Parameters
-    ----------
-    solids : sequence of Solid
-        Regions at that time.
-    time : Timestamp
-        Simulated time.
-    active : int
-        Index of the active region, to which the arbiter gives priority.
-
-    Returns
-    -------
-    SceneUpdate
-        Entities of all regions, since after a jump in time a viewer reads the last message only.
-    """
+    """Return all regions, the active one less transparent."""
     message = SceneUpdate()
     for i, solid in enumerate(solids):
         entity = message.entities.add(timestamp=time, frame_id=frame_of(solid), id=solid.name, frame_locked=True)

@@ -1,7 +1,6 @@
-"""MCAP with Protobuf: every signal for PlotJuggler and Foxglove, and the scene in Foxglove's messages.
+"""MCAP with Protobuf: every signal for PlotJuggler and Foxglove, and the scene in Foxglove's messages."""
 
-Times are simulated ones, in nanoseconds from 0, so that runs can be compared.
-"""
+# Times are simulated ones, in nanoseconds from 0, so that runs can be compared.
 
 from __future__ import annotations
 
@@ -33,20 +32,7 @@ _CHUNK = 4 * 2**20  # bytes
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
-    """Write the file.
-
-    Parameters
-    ----------
-    excerpt : Excerpt
-        The run with the selected signals; the scene is always written.
-    path : Path
-        The file.
-
-    Returns
-    -------
-    list of Path
-        The file.
-    """
+    """Write the file."""
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=_CHUNK)
         writer.start(library="subreach")

@@ -13,18 +13,7 @@ _ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 
 
 def valid_names(names: Iterable[str]) -> list[str]:
-    """Convert names to unique ones of ASCII letters, digits and underscores that begin with a letter.
-
-    Parameters
-    ----------
-    names : iterable of str
-        Names such as ``thrust[1]``.
-
-    Returns
-    -------
-    list of str
-        Converted names in the same order, such as ``thrust_1``.
-    """
+    """Convert names to unique ones of ASCII letters, digits and underscores that begin with a letter."""
     made: dict[str, None] = {}
     for name in names:
         plain = re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_")[:_MAX_LENGTH]
@@ -38,21 +27,9 @@ def valid_names(names: Iterable[str]) -> list[str]:
 
 
 def group_columns(columns: Sequence[Column]) -> dict[str, dict[str, int]]:
-    """Group signals that belong together.
-
-    ``position.x`` is ``x`` of the group ``position``, ``thrust[1]`` is ``1`` of ``thrust``, and the clearance of the
-    region A is ``A`` of ``clearance``; single signals are in the group ``step``.
-
-    Parameters
-    ----------
-    columns : sequence of Column
-        Columns of the signals, in any order.
-
-    Returns
-    -------
-    dict
-        Index of each column, by group and by name in the group.
-    """
+    """Group signals that belong together."""
+    # `position.x` is `x` of the group `position`, `thrust[1]` is `1` of `thrust`, and the clearance of the region A is
+    # `A` of `clearance`; single signals are in the group `step`.
     groups: dict[str, dict[str, int]] = {}
     for i, column in enumerate(columns):
         group, name = _group(column.name)

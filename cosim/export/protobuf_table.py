@@ -13,20 +13,7 @@ _FIXED_64 = 1  # wire type of a double
 
 
 def numbers_schema(package: str, message: str, fields: Sequence[str]) -> bytes:
-    """Make the schema of a message of doubles, a serialised ``FileDescriptorSet``.
-
-    Parameters
-    ----------
-    package, message : str
-        Package and name of the message.
-    fields : sequence of str
-        Names of the fields, which are numbered from 1 in this order.
-
-    Returns
-    -------
-    bytes
-        Schema in the form that MCAP requires for Protobuf.
-    """
+    """Make the schema of a message of doubles, a serialised ``FileDescriptorSet``."""
     file = FileDescriptorProto(name=f"{package}/{message}.proto", package=package, syntax="proto3")
     described = file.message_type.add(name=message)
     for i, name in enumerate(fields):
@@ -40,15 +27,9 @@ def numbers_schema(package: str, message: str, fields: Sequence[str]) -> bytes:
 
 
 def numbers_messages(rows: Array) -> Iterator[bytes]:
-    """Yield each row as a message of `numbers_schema`.
-
-    A field consists of its key and the eight bytes of its number, so all messages have one layout, a structured array.
-
-    Parameters
-    ----------
-    rows : ndarray, shape (n, fields)
-        Numbers, NaN included.
-    """
+    """Yield each row as a message of `numbers_schema`; rows (n, fields)."""
+    # A field consists of its key and the eight bytes of its number, so all messages have one layout, a structured
+    # array.
     parts: list[tuple[str, object]] = []
     keys = [_varint((i + 1) << 3 | _FIXED_64) for i in range(rows.shape[1])]
     for i, key in enumerate(keys):

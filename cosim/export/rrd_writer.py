@@ -1,7 +1,6 @@
-"""RRD, Rerun's recordings: every signal as a series over simulated time, and the scene in three dimensions.
+"""RRD, Rerun's recordings: every signal as a series over simulated time, and the scene in three dimensions."""
 
-Series are of doubles; the scene is of single precision, the only one that Rerun has for it.
-"""
+# Series are of doubles; the scene is of single precision, the only one that Rerun has for it.
 
 from __future__ import annotations
 
@@ -46,25 +45,7 @@ _ARROW = 4.0  # hull radii, length of the arrow of the greatest thrust
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
-    """Write the file.
-
-    Parameters
-    ----------
-    excerpt : Excerpt
-        The run with the selected signals; the scene is always written.
-    path : Path
-        The file.
-
-    Returns
-    -------
-    list of Path
-        The file.
-
-    Raises
-    ------
-    ExportError
-        If the file cannot be written.
-    """
+    """Write the file."""
     recording = rr.RecordingStream("subreach")
     try:
         recording.save(path, default_blueprint=_layout(excerpt))

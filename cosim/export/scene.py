@@ -57,32 +57,13 @@ class Thruster:
 
 
 class Scene:
-    """The scene of a run.
-
-    Parameters
-    ----------
-    excerpt : Excerpt
-        Excerpt of the run.
-
-    Attributes
-    ----------
-    solids : tuple of Solid
-        The goal and the regions in the order of the scenario, as they are at the start.
-    changes : tuple of (float, int, Solid)
-        Changes of these solids: time [s], index, and new solid.
-    log : sequence of (int, Command)
-        The run's log of commands: each with the step at which it was applied.
-    hull_radius : float
-        Radius of the drawn hull [m].
-    thrusters : tuple of Thruster
-        Thrusters in the order of the vehicle's file.
-    """
+    """The scene of a run."""
 
     def __init__(self, excerpt: Excerpt) -> None:
         self._excerpt = excerpt
         scenario = excerpt.run.scenario
         vehicle = header_of(scenario, excerpt.run.record.columns)["vehicle"]
-        self.hull_radius: float = vehicle["radius"]
+        self.hull_radius: float = vehicle["radius"]  # radius of the drawn hull [m]
         self.thrusters = tuple(
             Thruster(np.array(t["position"]), np.array(t["direction"]), max(abs(t["min"]), abs(t["max"])))
             for t in vehicle["thrusters"]
@@ -96,6 +77,7 @@ class Scene:
         all_shapes = [*enumerate(at_start), *((i, shape) for _, i, shape in later)]
         limits = self._limits([shape for i, shape in all_shapes if i not in waiting])
         self.solids = tuple(self._solid(i, shape, limits) for i, shape in enumerate(at_start))
+        # changes of these solids: time [s], index, and new solid
         self.changes = tuple((time, i, self._solid(i, shape, limits)) for time, i, shape in later)
 
     def trail(self) -> Array:

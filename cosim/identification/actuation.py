@@ -38,22 +38,7 @@ class Actuation:
 
 
 class CommandedForces:
-    """The forces that the commands of a run ask for, after limits, dead band and curve.
-
-    Parameters
-    ----------
-    log : Log
-        Log of the run.
-    vehicle : Vehicle
-        Vehicle with the limits, dead bands and curves of the commands.
-    step : float
-        Step of the grid, which begins with the first command [s].
-
-    Raises
-    ------
-    IdentificationError
-        If a thruster has a rate limit, which is not a lag.
-    """
+    """The forces that the commands of a run ask for, after limits, dead band and curve; step [s]."""
 
     def __init__(self, log: Log, vehicle: Vehicle, step: float) -> None:
         if vehicle.thrust_rate_limit.any():
@@ -99,27 +84,7 @@ class CommandedForces:
     def actuation(
         self, lag: float, scales: Array, losses: Array | None = None, changes: Array | None = None
     ) -> Actuation:
-        """Return the wrench of each step.
-
-        Parameters
-        ----------
-        lag : float
-            Time constant of all thrusters [s].
-        scales : ndarray, shape (thrusters,)
-            Factor of each thruster's force.
-        losses : ndarray, shape (thrusters,), optional
-            Part of its force that each thruster lacks backward; default: none.
-        changes : ndarray, shape (13,), optional
-            Values of `CHANGES`, for commands that are samples; default: 0, straight lines. Lateness is the delay of an
-            axis' change behind the middle between two samples [periods]. Spread is the first moment, about the middle,
-            of what changes later than a straight line [change times period squared]. Smoothness is the variance of a
-            filter that all axes pass [period squared by 12].
-
-        Returns
-        -------
-        Actuation
-            With its derivatives.
-        """
+        """Return the wrench of each step; lag [s], scales (thrusters,), losses (thrusters,), changes (13,)."""
         n = self._matrix.shape[1]
         lost = np.zeros(n) if losses is None else losses
         force, by_lag = _lagged(self._mean[:, :n] - lost * self._mean_backward, lag, self.step)
@@ -144,20 +109,7 @@ class CommandedForces:
 
 
 def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
-    """Return the steady-state forces of commands, with the plant's limits and curve.
-
-    Parameters
-    ----------
-    commands : ndarray, shape (rows, thrusters)
-        [N].
-    vehicle : Vehicle
-        Limits, dead bands and curves.
-
-    Returns
-    -------
-    ndarray, shape (rows, thrusters)
-        [N].
-    """
+    """Return the steady-state forces of commands, with the plant's limits and curve; commands [N], returns [N]."""
     limited = np.clip(commands, vehicle.thrust_min, vehicle.thrust_max)
     dead, curve = vehicle.thrust_dead_band, vehicle.thrust_curve
     limit = np.where(limited < 0.0, vehicle.thrust_min, vehicle.thrust_max)
@@ -168,26 +120,8 @@ def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
 
 
 def error_wrenches(impulses: Impulses, lag: float, step: float, begin: float, steps: int) -> Array:
-    """Return the wrench of each error behind the lag, over each step of a window, shape (errors, steps, 2, 6).
-
-    Parameters
-    ----------
-    impulses : Impulses
-        Errors of the run's commands. Each bin has twelve: six of its impulse, and six that move impulse within it.
-    lag : float
-        Time constant of the thrusters [s].
-    step : float
-        Step of the window's grid [s].
-    begin : float
-        Begin of the window, since the first command [s].
-    steps : int
-        Number of steps of the window.
-
-    Returns
-    -------
-    ndarray
-        Mean over each step, and change from its start to its end [N, N m], of one standard deviation.
-    """
+    """Return the wrench of each error behind the lag, over each step of a window, shape (errors, steps, 2, 6)."""
+    # with lag [s], step [s], begin [s], returns [N, N m]
     before = int(np.ceil((_TAIL * lag + 2.0 * BIN) / step))  # steps before the window
     grid: Any = begin + step * np.arange(-before, steps + 1)
     used = (impulses.ends > begin - _TAIL * lag - BIN) & (impulses.begins < grid[-1])
@@ -212,24 +146,8 @@ def _shares(grid: Any, begin: float, end: float) -> Array:
 
 
 def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
-    """Return forces behind a lag as they are over each step of a grid, and the same by the lag.
-
-    Parameters
-    ----------
-    forces : ndarray, shape (steps, n)
-        Commanded forces of each step [N]. Before the first step the thrusters give its forces.
-    lag : float
-        Time constant [s].
-    step : float
-        Step of the grid [s].
-
-    Returns
-    -------
-    forces : ndarray, shape (steps, 2, n)
-        Mean of each step, and change from its start to its end [N].
-    by_lag : ndarray, shape (steps, 2, n)
-        Derivatives of these by the lag [N/s].
-    """
+    """Return forces behind a lag as they are over each step of a grid, and the same by the lag; forces [N], lag [s]."""
+    # with step [s], returns [N]
     zero = np.zeros((1, forces.shape[1]))
     if lag < _LEAST_LAG:
         behind = np.diff(forces, axis=0, prepend=forces[:1]) / step

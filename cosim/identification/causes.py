@@ -26,26 +26,7 @@ class Cause:
 
 
 def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values: Array, step: float) -> list[Cause]:
-    """Find the causes of a poor fit, by a score test of each group of fixed numbers (Rao 1948).
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        The runs.
-    vehicle : Vehicle
-        Vehicle with the start values of the search.
-    fitted : Residuals
-        Residuals of the fit, with its free parameters, windows and weights.
-    values : ndarray, shape (p,)
-        Fitted values of the free parameters, in their units.
-    step : float
-        Integration step [s].
-
-    Returns
-    -------
-    list of Cause
-        Causes in descending order of their shares; empty if a prediction fails, or the sum of squares is that of noise.
-    """
+    """Find the causes of a poor fit, by a score test of each group of fixed numbers (Rao 1948); step [s]."""
     parameters, windows = fitted.parameters, fitted.windows
     kinds = {p.kind for p in parameters}
     groups = {f"--nuisance {name}": nuisances((name,), logs) for name in NUISANCES if name not in kinds}

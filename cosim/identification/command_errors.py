@@ -1,10 +1,9 @@
-"""What sampled commands leave open: impulses between samples, as process noise that residuals are weighed by.
+"""What sampled commands leave open: impulses between samples, as process noise that residuals are weighed by."""
 
-A log that samples servo outputs does not say when within a period a thrust changed. The error of the impulse is of mean
-zero, independent between periods, and as large as the change times the period by the square root of 12, where a step
-may be at any time. It moves the vehicle through its lag and its equations, so that residuals of neighboring samples
-are correlated: they are weighed by the inverse root of that covariance (generalized least squares).
-"""
+# A log that samples servo outputs does not say when within a period a thrust changed. The error of the impulse is of
+# mean zero, independent between periods, and as large as the change times the period by the square root of 12, where a
+# step may be at any time. It moves the vehicle through its lag and its equations, so that residuals of neighboring
+# samples are correlated: they are weighed by the inverse root of that covariance (generalized least squares).
 
 from __future__ import annotations
 
@@ -52,17 +51,7 @@ class Whitener:
 
 
 def open_impulses(times: Array, forces: Array, matrix: Array) -> Impulses:
-    """Return the errors of the impulse between samples of forces.
-
-    Parameters
-    ----------
-    times : ndarray, shape (n,)
-        Times of the samples [s].
-    forces : ndarray, shape (n, m)
-        Sampled forces [N, N m].
-    matrix : ndarray, shape (6, m)
-        Wrench of each force of 1.
-    """
+    """Return the errors of the impulse between samples of forces; times [s], forces [N, N m]."""
     periods = np.diff(times)
     changes = np.diff(forces @ matrix.T, axis=0)
     squares = changes[:, :, None] * changes[:, None, :]
@@ -88,15 +77,7 @@ def _mean_about(values: Array, count: int) -> Array:
 
 
 def whitener(by_impulse: Array, size: float) -> Whitener:
-    """Return the inverse root of the covariance of residuals under impulses of a size.
-
-    Parameters
-    ----------
-    by_impulse : ndarray, shape (rows, n)
-        Residuals by each impulse, in standard deviations.
-    size : float
-        Factor of all impulses.
-    """
+    """Return the inverse root of the covariance of residuals under impulses of a size; by_impulse (rows, n)."""
     variances, axes = np.linalg.eigh(size**2 * (by_impulse.T @ by_impulse))
     kept = variances > _LEAST
     directions = size * (by_impulse @ axes[:, kept]) / np.sqrt(variances[kept])
@@ -104,15 +85,7 @@ def whitener(by_impulse: Array, size: float) -> Whitener:
 
 
 def most_likely_size(residuals: Sequence[Array], by_impulses: Sequence[Array]) -> float:
-    """Return the factor of all impulses that explains residuals best; both without what the starts explain.
-
-    Parameters
-    ----------
-    residuals : sequence of ndarray, shape (rows,)
-        Residuals of each window, in standard deviations.
-    by_impulses : sequence of ndarray, shape (rows, n)
-        Derivatives of these by the impulses.
-    """
+    """Return the factor of all impulses that explains residuals best; both without what the starts explain."""
     lost = np.zeros(len(_SIZES))
     for residual, by in zip(residuals, by_impulses, strict=True):
         variances, axes = np.linalg.eigh(by.T @ by)
@@ -126,17 +99,7 @@ def most_likely_size(residuals: Sequence[Array], by_impulses: Sequence[Array]) -
 def noise_parts(
     residuals: Sequence[Array], whiteners: Sequence[Whitener], topics: Sequence[NDArray[np.str_]]
 ) -> dict[str, float]:
-    """Return the factor of each topic's noise, in one step towards the greatest likelihood (Harville 1977).
-
-    Parameters
-    ----------
-    residuals : sequence of ndarray, shape (rows,)
-        Residuals of each window, in standard deviations, without what its start explains.
-    whiteners : sequence of Whitener
-        Inverse root of the covariance of each window.
-    topics : sequence of ndarray, shape (rows,)
-        Name of each row's topic.
-    """
+    """Return the factor of each topic's noise, in one step towards the greatest likelihood (Harville 1977)."""
     squares, freedom = dict[str, float](), dict[str, float]()
     for residual, white, own in zip(residuals, whiteners, topics, strict=True):
         share = white.variances / (1.0 + white.variances)
@@ -152,24 +115,7 @@ def most_likely_errors(
     residuals: Sequence[Array], by_impulses: Sequence[Array], topics: Sequence[NDArray[np.str_]],
     known: Mapping[str, float],
 ) -> tuple[float, dict[str, float]]:  # fmt: skip
-    """Return the factor of all impulses and the noise of each topic that explain residuals best.
-
-    Parameters
-    ----------
-    residuals, by_impulses : sequence of ndarray, shape (rows,) and (rows, n)
-        Arguments of `most_likely_size`, in standard deviations of the noise that `known` says.
-    topics : sequence of ndarray, shape (rows,)
-        Name of each row's topic.
-    known : mapping of str to float
-        Part of the noise from its samples' differences that each topic has, by name; 1 for topics without one.
-
-    Returns
-    -------
-    float
-        The factor.
-    dict of str to float
-        Part of that noise that each topic has, at most 1.
-    """
+    """Return the factor of all impulses and the noise of each topic that explain residuals best."""
     parts = {str(name): known.get(str(name), 1.0) for own in topics for name in np.unique(own)}
     residuals, by_impulses = [x.copy() for x in residuals], [x.copy() for x in by_impulses]
     for _ in range(_UPDATES):

@@ -25,26 +25,10 @@ _SLOW = ("depth", "position")  # topics whose second differences are noise: they
 
 
 def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str, float]:
-    """Find the delay of each topic behind the commands, to some hundredths of a second.
-
-    Changes of a velocity over 0.3 s are regressed on the impulse of the commanded wrench over the same time, shifted by
-    a delay and filtered by a lag, and on the velocity itself. All topics get the delay with the least residual; a topic
-    whose own delay fits clearly better gets that. Of the vehicle only its thrusters' directions are used.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        The runs.
-    vehicle : Vehicle
-        Vehicle, for the directions of its thrusters.
-    step : float
-        Period of the grid of the commanded wrench [s].
-
-    Returns
-    -------
-    dict of str to float
-        Delays by topic [s]; empty if no topic determines one.
-    """
+    """Find the delay of each topic behind the commands, to some hundredths of a second; step [s], returns [s]."""
+    # Changes of a velocity over 0.3 s are regressed on the impulse of the commanded wrench over the same time, shifted
+    # by a delay and filtered by a lag, and on the velocity itself. All topics get the delay with the least residual; a
+    # topic whose own delay fits clearly better gets that. Of the vehicle only its thrusters' directions are used.
     evidence: dict[str, Array] = {}
     for log in logs:
         forces = CommandedForces(log, vehicle, step)
@@ -71,15 +55,7 @@ def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str,
 
 
 def move_back(log: Log, delays: dict[str, float]) -> Log:
-    """Return a log whose sample times are corrected by the delays.
-
-    Parameters
-    ----------
-    log : Log
-        The run.
-    delays : dict of str to float
-        Delays by topic [s]; missing ones are 0.
-    """
+    """Return a log whose sample times are corrected by the delays; delays [s]."""
     return replace(log, topics=tuple(
         replace(t, times=t.times - delays.get(t.name, 0.0), shift=delays.get(t.name, 0.0)) for t in log.topics
     ))  # fmt: skip

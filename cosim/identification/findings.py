@@ -45,15 +45,7 @@ def verdict(fit: Fit) -> str:
 
 
 def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
-    """Yield the warnings that a user must read before using the numbers.
-
-    Parameters
-    ----------
-    fit : Fit
-        Result of the identification.
-    logs : sequence of Log
-        The runs.
-    """
+    """Yield the warnings that a user must read before using the numbers."""
     if fit.intervals.chi2 > _LOST:
         yield (
             f"Do not use these numbers: chi² is {fit.intervals.chi2:.0f} by degrees of freedom, and no better were "
@@ -177,18 +169,7 @@ _CAUSES = {
 
 
 def require_apart(fit: Fit) -> None:
-    """Refuse a fit of a delay and the thrusters' lag that the runs do not separate.
-
-    Parameters
-    ----------
-    fit : Fit
-        Result of the identification.
-
-    Raises
-    ------
-    IdentificationError
-        If the magnitude of the correlation of the lag with a delay is above 0.9.
-    """
+    """Refuse a fit of a delay and the thrusters' lag that the runs do not separate."""
     of_kind = {kind: [i for i, p in enumerate(fit.parameters) if p.kind == kind] for kind in ("lag", "delay")}
     for lag in of_kind["lag"]:
         for delay in of_kind["delay"]:

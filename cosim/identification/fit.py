@@ -92,32 +92,7 @@ def fit(
     progress: Callable[[float], None] = lambda part: None,
     random_force: bool = False,
 ) -> Fit:
-    """Fit the free parameters so that windows of runs are predicted best.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        The runs.
-    vehicle : Vehicle
-        Vehicle with the start values of the search.
-    parameters : sequence of Parameter
-        Free parameters with their priors.
-    progress : callable
-        Receives the fraction of the work done so far, 0 to 1.
-    random_force : bool
-        True to estimate a constant force of each window as well. Windows then stay short, since the force is not
-        constant over long ones.
-
-    Returns
-    -------
-    Fit
-        Fitted values with their intervals.
-
-    Raises
-    ------
-    IdentificationError
-        If all windows are rejected, or the start values predict no finite motion.
-    """
+    """Fit the free parameters so that windows of runs are predicted best."""
     with single_thread():
         return _fit(logs, vehicle, tuple(parameters), progress, random_force)
 
@@ -200,13 +175,7 @@ def _result(problem: Problem, values: Array, rejected: Counter[str], step: float
 
 
 class Problem:
-    """Least-squares problem for `scipy.optimize.least_squares`, with each window's rows reduced by QR to p + 1 at most.
-
-    Parameters
-    ----------
-    residuals : Residuals
-        Residuals of all windows.
-    """
+    """Problem for `scipy.optimize.least_squares`, with each window's rows reduced by QR to at most p + 1."""
 
     def __init__(self, residuals: Residuals) -> None:
         self.residuals = residuals
@@ -267,18 +236,7 @@ class Problem:
 
 
 def integration_step(logs: Sequence[Log]) -> float:
-    """Return an integration step that divides the usual time between changes of the commands, or is a multiple of it.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        The runs.
-
-    Returns
-    -------
-    float
-        Step of 15 to 30 ms [s]: the usual time between changes, divided or multiplied by a whole number.
-    """
+    """Return an integration step that fits the usual time between changes of the commands, 15 to 30 ms [s]."""
     spans = []
     for log in logs:
         commands = np.concatenate([log.thrust, log.wrench], axis=1)

@@ -43,43 +43,7 @@ def identify(
     held_out: Sequence[Path] = (),
     progress: Callable[[float], None] = lambda part: None,
 ) -> Identification:
-    """Identify parameters of a vehicle from recorded runs.
-
-    Parameters
-    ----------
-    runs : sequence of Path
-        Run folders.
-    start : str
-        Name of a shipped vehicle, or path of a vehicle's file: it gives the start values and the fixed numbers.
-    free : sequence of str
-        Keys of the vehicle's file to identify, as for `free_parameters`.
-    nuisance : sequence of str
-        Names of nuisances to estimate, as for `nuisances`.
-    held_out : sequence of Path
-        Run folders for validation: predicted, not fitted.
-    progress : callable
-        Receives the fraction of the work done so far, 0 to 1.
-
-    Returns
-    -------
-    Identification
-        Runs, fit and validation.
-
-    Raises
-    ------
-    RunError, VehicleError, TableError
-        If a run or the vehicle cannot be read.
-    IdentificationError
-        If the runs lack commands or measurements, or do not separate a delay from the thrusters' lag.
-
-    Examples
-    --------
-    >>> from cosim.identification.identify import identify
-    >>> identify([], "odin")
-    Traceback (most recent call last):
-        ...
-    cosim.errors.IdentificationError: no run is given, expected one at the least
-    """
+    """Identify parameters of a vehicle from recorded runs."""
     if not runs:
         raise IdentificationError("no run is given, expected one at the least")
     vehicle = load_vehicle(start)

@@ -48,32 +48,7 @@ def estimate_intervals(
     parameters: Sequence[Parameter], values: Array, reduced: Sequence[Reduced], windows: Sequence[Window],
     eliminated: int, correlated: bool,
 ) -> Intervals:  # fmt: skip
-    """Return the uncertainty of a fit.
-
-    Parameters
-    ----------
-    parameters : sequence of Parameter
-        Free parameters with their priors.
-    values : ndarray, shape (p,)
-        Fitted values of the parameters, in their units.
-    reduced : sequence of Reduced
-        Residuals and derivatives of each window at the fitted values.
-    windows : sequence of Window
-        The windows.
-    eliminated : int
-        Number of unknowns of each window that are not parameters, such as its start.
-    correlated : bool
-        True if errors of neighboring windows are correlated: those of a random force, and of sampled commands, which an
-        autopilot changes between samples by the vehicle's motion.
-
-    Returns
-    -------
-    Intervals
-        Jackknife and nominal uncertainty. The jackknife leaves out each piece in turn, in one Gauss-Newton step. Pieces
-        are whole runs if there are eight or more; else 5 s long, or 20 s if the model is wrong or errors are
-        correlated. If one of these two holds, each number has degrees of freedom by the pieces that determine it (Bell
-        and McCaffrey 2002, CR3). Nominal deviations hold for white noise and a right model alone.
-    """
+    """Return the uncertainty of a fit; values (p,)."""
     prior = np.array([1.0 / p.deviation**2 for p in parameters])
     information = np.diag(prior) + sum(r.jacobian.T @ r.jacobian for r in reduced)
     rows = sum(len(r.residual) for r in reduced)
@@ -99,11 +74,9 @@ def estimate_intervals(
 
 
 def _jackknife(information: Array, inverse: Array, pieces: Sequence[tuple[Array, Array]]) -> tuple[Array, Array]:
-    """Return the standard deviations of the numbers by leaving out each piece, (p,), and degrees of freedom, (p,).
-
-    A number that few pieces determine has few degrees of freedom. They are those of the chi² distribution that has the
-    mean and the variance of the squared deviation for white noise (Satterthwaite 1946).
-    """
+    """Return the standard deviations of the numbers by leaving out each piece, (p,), and degrees of freedom, (p,)."""
+    # A number that few pieces determine has few degrees of freedom. They are those of the chi² distribution that has
+    # the mean and the variance of the squared deviation for white noise (Satterthwaite 1946).
     own = [jacobian.T @ jacobian for jacobian, _ in pieces]
     left_out = [np.linalg.inv(information - part) for part in own]  # (p, p) each, symmetric
     scores = [jacobian.T @ residual for jacobian, residual in pieces]

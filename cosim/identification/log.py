@@ -96,25 +96,7 @@ class Log:
 
 
 def make_topic(name: str, times: Array, values: Array, noise: float | None = None) -> Topic:
-    """Return a topic from samples; estimate its noise from them if it is not given.
-
-    Parameters
-    ----------
-    name : str
-        One of `TOPICS`.
-    times : ndarray, shape (n,)
-        Rising times of the samples [s].
-    values : ndarray, shape (n, m)
-        Finite samples in the unit of `UNITS`; attitudes are quaternions from body to world, scalar first.
-    noise : float, optional
-        Standard deviation of each component. Default: estimated from the median of fourth differences, but at least
-        1 mm/s, 1 mrad/s, 1 mm, 5 mm for positions, and 10 mrad for attitudes, which filters smooth.
-
-    Returns
-    -------
-    Topic
-        Topic, averaged over blocks to at most 50 Hz.
-    """
+    """Return a topic from samples; estimate its noise from them if it is not given; times (n,) [s], values (n, m)."""
     if name == "attitude":
         values = _continuous(values)
     components = values if name != "attitude" else _rotation_vectors(values)
@@ -145,30 +127,7 @@ def command_period(log: Log) -> float:
 
 
 def load_log(folder: Path, vehicle: Vehicle) -> Log:
-    """Load commands and measurements of a run.
-
-    Parameters
-    ----------
-    folder : Path
-        The run folder.
-    vehicle : Vehicle
-        Vehicle, for the number of its thrusters.
-
-    Returns
-    -------
-    Log
-        Commands and recorded topics; positions only if there are no velocities.
-
-    Raises
-    ------
-    RunError
-        If the run cannot be read.
-    TableError
-        If its scenario cannot be read.
-    IdentificationError
-        If the run has no commands, no attitude, or neither velocities nor positions; if its scenario has failures of
-        thrusters, or a limit or lag of the commanded wrench.
-    """
+    """Load commands and measurements of a run."""
     record = load_record(folder)
     thrusters = [f"thrust[{i + 1}]" for i in range(vehicle.n_thrusters)]
     wrench = [f"wrench.{name}" for name in "XYZKMN"]

@@ -24,17 +24,7 @@ class Errors:
 
 
 def residual(topic: Topic, states: Array, errors: Errors) -> Array:
-    """Return prediction less sample, shape (n, c), in standard deviations of the noise.
-
-    Parameters
-    ----------
-    topic : Topic
-        Topic with n samples of c components.
-    states : ndarray, shape (n, 13)
-        Predicted states at the times of the samples.
-    errors : Errors
-        Constant errors of the sensors.
-    """
+    """Return prediction less sample, shape (n, c), in standard deviations of the noise; states (n, 13)."""
     if topic.name == "velocity":
         found = (1.0 + errors.scale) * (states[:, _LINEAR] + np.cross(states[:, _ANGULAR], errors.lever)) - topic.values
     elif topic.name == "angular_velocity":
@@ -51,19 +41,7 @@ def residual(topic: Topic, states: Array, errors: Errors) -> Array:
 
 
 def derivative(topic: Topic, states: Array, tangents: Array, errors: Errors) -> Array:
-    """Return the derivatives of the residual along d directions, shape (n, c, d).
-
-    Parameters
-    ----------
-    topic : Topic
-        Topic with n samples of c components.
-    states : ndarray, shape (n, 13)
-        Predicted states at the times of the samples.
-    tangents : ndarray, shape (n, d, 13)
-        Derivatives of the states along the directions.
-    errors : Errors
-        Constant errors of the sensors.
-    """
+    """Return the derivatives of the residual along d directions, shape (n, c, d)."""
     if topic.name == "velocity":
         turned = np.cross(tangents[:, :, _ANGULAR], errors.lever)
         found = (1.0 + errors.scale) * (tangents[:, :, _LINEAR] + turned)
@@ -81,21 +59,7 @@ def derivative(topic: Topic, states: Array, tangents: Array, errors: Errors) -> 
 
 
 def derivative_by_errors(topic: Topic, states: Array, errors: Errors, kind: str, axis: int) -> Array | None:
-    """Return the derivative of the residual by one constant error, shape (n, c); None if it does not depend on it.
-
-    Parameters
-    ----------
-    topic : Topic
-        Topic with n samples of c components.
-    states : ndarray, shape (n, 13)
-        Predicted states at the times of the samples.
-    errors : Errors
-        Constant errors of the sensors.
-    kind : str
-        Error: ``lever``, ``scale`` or ``bias``.
-    axis : int
-        Body axis of lever or bias, from 0.
-    """
+    """Return the derivative of the residual by one constant error, shape (n, c); None if it does not depend on it."""
     unit = np.eye(3)[axis]
     if topic.name == "velocity" and kind == "lever":
         found = (1.0 + errors.scale) * np.cross(states[:, _ANGULAR], unit)
@@ -110,10 +74,8 @@ def derivative_by_errors(topic: Topic, states: Array, errors: Errors, kind: str,
 
 
 def _attitude_matrix(measured: Array, states: Array) -> tuple[Array, Array]:
-    """Return matrices, (n, 3, 4), from q to the vector part of conj(measured) q, and signs of its scalar part, (n, 1).
-
-    Twice that vector part is the rotation from the sample to the prediction [rad, body frame], if it is small.
-    """
+    """Return matrices (n, 3, 4) from q to the vector part of conj(measured) q, and signs (n, 1) of its scalar part."""
+    # Twice that vector part is the rotation from the sample to the prediction [rad, body frame], if it is small.
     e0, e1, e2, e3 = measured.T
     matrix = np.stack([
         np.stack([-e1, e0, e3, -e2], axis=1),

@@ -18,26 +18,7 @@ from plant_fmu.vehicle import load_vehicle
 
 
 def write_results(done: Identification, out: Path) -> tuple[Path, Path]:
-    """Write the vehicle's file, the drawn vehicles and the page; at no time does one stand beside an older other.
-
-    Parameters
-    ----------
-    done : Identification
-        Result of the identification.
-    out : Path
-        Path of the vehicle's file, which ends in ``.toml``.
-
-    Returns
-    -------
-    Path, Path
-        Paths of the drawn vehicles, with ``.posterior.jsonl``, and of the page, with ``.html``.
-
-    Raises
-    ------
-    IdentificationError
-        If a file cannot be written, the name is not valid for a vehicle, or hardly any draw has a positive definite
-        mass matrix.
-    """
+    """Write the vehicle's file, the drawn vehicles and the page; at no time does one stand beside an older other."""
     posterior, page = out.with_suffix(".posterior.jsonl"), out.with_suffix(".html")
     contents = {
         out: vehicle_contents(done, out),

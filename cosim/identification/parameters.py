@@ -61,27 +61,7 @@ class Parameter:
 
 
 def free_parameters(vehicle: Vehicle, keys: Sequence[str]) -> list[Parameter]:
-    """Return the free numbers of a vehicle.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle at which the search starts, with the means of the priors.
-    keys : sequence of str
-        Keys of the vehicle's file, such as ``hydrodynamics.added_mass``; one element by its place, from 1, such as
-        ``hydrodynamics.added_mass.2.6``; the ``diagonal`` of a matrix. ``thrusters.matrix`` is a factor for each
-        thruster.
-
-    Returns
-    -------
-    list of Parameter
-        In the order of the keys, each once.
-
-    Raises
-    ------
-    IdentificationError
-        If a key is none that can be free.
-    """
+    """Return the free numbers of a vehicle."""
     found: dict[str, Parameter] = {}
     for key in keys:
         match = _ELEMENT.fullmatch(key.strip())
@@ -96,28 +76,7 @@ def free_parameters(vehicle: Vehicle, keys: Sequence[str]) -> list[Parameter]:
 
 
 def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
-    """Return the free numbers that are not of the vehicle.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names from `NUISANCES`: a current and a constant force of each run, north and east; the delay of each topic
-        behind the commands; the lever arm and the scale error of the DVL; the gyro's biases of each run; the part of
-        its force that each thruster lacks backward; for runs whose commands are samples, when each axis of the wrench
-        changes between two samples. `RANDOM_FORCE` makes no parameter.
-    logs : sequence of Log
-        The runs.
-
-    Returns
-    -------
-    list of Parameter
-        Each about 0.
-
-    Raises
-    ------
-    IdentificationError
-        If a name is unknown.
-    """
+    """Return the free numbers that are not of the vehicle."""
     places = {
         "delay": [name for name in TOPICS if any(log.topic(name) for log in logs)],
         "asymmetry": [f"{i + 1}" for i in range(logs[0].thrust.shape[1])],
@@ -143,22 +102,7 @@ def nuisances(names: Sequence[str], logs: Sequence[Log]) -> list[Parameter]:
 
 
 def with_values(vehicle: Vehicle, parameters: Sequence[Parameter], values: Array) -> Vehicle:
-    """Return a vehicle with the identified numbers in it.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle whose other numbers stay.
-    parameters : sequence of Parameter
-        Free numbers; nuisances among them are ignored.
-    values : ndarray, shape (p,)
-        Values of the free numbers.
-
-    Returns
-    -------
-    Vehicle
-        Not checked.
-    """
+    """Return a vehicle with the identified numbers in it; values (p,)."""
     changed: dict[str, Any] = {name: np.array(getattr(vehicle, name)) for name in (
         "added_mass", "linear_damping", "quadratic_damping", "r_B", "r_G", "inertia", "thruster_matrix",
         "thrust_time_constant", "mass", "weight", "buoyancy",
@@ -193,21 +137,7 @@ class Setting:
 def setting_of(
     parameters: Sequence[Parameter], values: Array, run: int, forces: CommandedForces, lag: float
 ) -> Setting:
-    """Return the setting of a run.
-
-    Parameters
-    ----------
-    parameters : sequence of Parameter
-        Free numbers.
-    values : ndarray, shape (p,)
-        Values of the free numbers.
-    run : int
-        Index of the run, to which some nuisances belong.
-    forces : CommandedForces
-        Forces that the run's commands ask for.
-    lag : float
-        Time constant of the thrusters where it is not free [s].
-    """
+    """Return the setting of a run; values (p,), lag [s]."""
     plant: dict[str, float] = {}
     scales, losses, changes = np.ones(forces.thrusters), np.zeros(forces.thrusters), np.zeros(len(CHANGES))
     delays = dict[str, float]()
@@ -241,25 +171,9 @@ def setting_of(
 
 
 def with_mean_nuisances(parameters: Sequence[Parameter], values: Array) -> tuple[list[Parameter], Array]:
-    """Return parameters and values for runs that were not fitted.
-
-    The nuisances of single runs, such as the current, are unknown there: their mean over the fitted runs takes the
-    place of them.
-
-    Parameters
-    ----------
-    parameters : sequence of Parameter
-        Free parameters of a fit.
-    values : ndarray, shape (p,)
-        Fitted values of the parameters, in their units.
-
-    Returns
-    -------
-    list of Parameter
-        Parameters of all runs: those of the fit, and one for the nuisances of single runs that share a name.
-    ndarray, shape (k,)
-        Values of these parameters.
-    """
+    """Return parameters and values for runs that were not fitted; values (p,), returns (k,)."""
+    # The nuisances of single runs, such as the current, are unknown there: their mean over the fitted runs takes the
+    # place of them.
     groups: dict[Parameter, list[float]] = {}
     for p, x in zip(parameters, values, strict=True):
         shared = p if p.run is None else replace(p, name=p.name.partition(" of run ")[0], run=None)

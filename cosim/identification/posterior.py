@@ -24,30 +24,7 @@ def posterior_lines(fit: Fit, vehicle: Vehicle) -> list[str]:
 
 
 def draw_plants(fit: Fit, vehicle: Vehicle, seed: int, count: int = DRAWS) -> list[dict[str, float]]:
-    """Draw parameters of the FMU from the normal distribution of the identified numbers.
-
-    Parameters
-    ----------
-    fit : Fit
-        Fit, for its values and covariance. 95 % of the draws lie within a number's 95 % interval; those beyond a bound
-        are clipped to it.
-    vehicle : Vehicle
-        Vehicle with the start values of the search.
-    seed : int
-        Seed of the draws.
-    count : int
-        Number of draws.
-
-    Returns
-    -------
-    list of dict of str to float
-        Values of each draw by the names of the FMU's parameters, in SI units.
-
-    Raises
-    ------
-    IdentificationError
-        If hardly any draw has a positive definite mass matrix.
-    """
+    """Draw parameters of the FMU from the normal distribution of the identified numbers."""
     places = fit.vehicle_part()
     parameters = [fit.parameters[i] for i in places]
     least, most = (np.array([getattr(p, name) for p in parameters]) for name in ("least", "most"))

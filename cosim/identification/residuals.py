@@ -1,9 +1,8 @@
-"""Residuals of all windows, from which each window's own start is eliminated.
+"""Residuals of all windows, from which each window's own start is eliminated."""
 
-The start of a window is known from its samples alone. At each value of the free numbers it is solved for, and the
-residuals are projected onto what it cannot explain (variable projection; Golub and Pereyra 1973). What is left depends
-on the free numbers only, and keeps cost and gradient.
-"""
+# The start of a window is known from its samples alone. At each value of the free numbers it is solved for, and the
+# residuals are projected onto what it cannot explain (variable projection; Golub and Pereyra 1973). What is left
+# depends on the free numbers only, and keeps cost and gradient.
 
 from __future__ import annotations
 
@@ -54,23 +53,7 @@ class _Start:
 
 
 class Residuals:
-    """The residuals of windows as a function of the free numbers.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        The runs.
-    vehicle : Vehicle
-        Where the search starts.
-    parameters : sequence of Parameter
-        What is free.
-    windows : sequence of Window
-        What is predicted.
-    step : float
-        Step of the integration and of the windows' grid [s].
-    random_force : bool
-        True to eliminate a constant force of each window, normal and of mean zero, beside its start.
-    """
+    """The residuals of windows as a function of the free numbers; step [s]."""
 
     def __init__(
         self,
@@ -105,33 +88,8 @@ class Residuals:
         return [setting_of(self.parameters, values, run, forces, self._lag) for run, forces in enumerate(self._forces)]
 
     def raw(self, i: int, settings: Sequence[Setting], start: Array, full: bool) -> tuple[Array, Array, Array]:
-        """Return residuals of a window from a start, with derivatives by the start and, if `full`, the free numbers.
-
-        Parameters
-        ----------
-        i : int
-            The window.
-        settings : sequence of Setting
-            Settings of each run.
-        start : ndarray, shape (13,)
-            Where it begins; with a random force (16,), that force last [N, NED].
-        full : bool
-            True to compute the derivatives by the free numbers.
-
-        Returns
-        -------
-        residual : ndarray, shape (rows,)
-            In standard deviations.
-        by_start : ndarray, shape (rows, starts)
-            Derivatives.
-        jacobian : ndarray, shape (rows, parameters)
-            Derivatives, zero unless asked for.
-
-        Raises
-        ------
-        IdentificationError
-            If the motion grows beyond numbers, or the parameters are of no body.
-        """
+        """Return residuals of a window from a start, with derivatives by the start and, if `full`, the free numbers."""
+        # with start [N, NED]
         window = self.windows[i]
         setting = settings[window.run]
         inside = slice(window.first, window.first + window.steps)
@@ -188,16 +146,10 @@ class Residuals:
         self.weights, self.whiteners, self._noise_parts = other.weights, other.whiteners, other._noise_parts
 
     def update_command_errors(self, values: Array) -> None:
-        """Weigh the residuals from now on by what sampled commands leave open, of the size that explains them best.
-
-        Where commands are not known, the noise of a topic is not known from its samples' differences, which contain the
-        motion: that is its upper bound. The likelihood gives both, the noise of each topic and the size of the errors.
-
-        Parameters
-        ----------
-        values : ndarray
-            The free numbers.
-        """
+        """Weigh the residuals from now on by what sampled commands leave open, of the size that explains them best."""
+        # Where commands are not known, the noise of a topic is not known from its samples' differences, which contain
+        # the motion: that is its upper bound. The likelihood gives both, the noise of each topic and the size of the
+        # errors.
         if not any(forces.impulses for forces in self._forces):
             return
         settings = self.settings(values)

@@ -72,30 +72,7 @@ class Motion:
 
 
 class Shooter:
-    """Predicts the motion of a vehicle from a start, by the FMU's equations and exact derivatives.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle with the default values of the parameters.
-
-    Raises
-    ------
-    BuildError
-        If there is no C compiler, or it fails.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from cosim.identification.shooting import Shooter
-    >>> from plant_fmu import load_vehicle
-    >>> start = np.zeros(13)
-    >>> start[3] = 1.0
-    >>> shooter = Shooter(load_vehicle("bluerov2_heavy"))
-    >>> motion = shooter.predict({}, start, np.zeros((50, 2, 6)), 0.02, np.array([1.0]))
-    >>> bool(motion.states[0, 2] > 0.0)  # it is heavier than the water that it displaces
-    True
-    """
+    """Predicts the motion of a vehicle from a start, by the FMU's equations and exact derivatives."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._references = {v.name: i for i, v in enumerate(variables(vehicle)) if v.role == "parameter"}
@@ -112,35 +89,8 @@ class Shooter:
         directions: Directions | None = None,
         force: Array | None = None,
     ) -> Motion:
-        """Predict the motion under a wrench that is linear over each step.
-
-        Parameters
-        ----------
-        parameters : mapping of str to float
-            Values by names of the FMU's parameters, in SI units; the others are the vehicle's.
-        start : ndarray, shape (13,)
-            Position [m, NED], quaternion, velocity [m/s, rad/s, body frame].
-        wrench : ndarray, shape (steps, 2, 6)
-            Wrench of the actuators [N, N m, body frame]: its mean over each step, and its change from start to end.
-        step : float
-            Integration step [s].
-        times : ndarray, shape (n,)
-            Rising times of the samples since the start [s].
-        directions : Directions, optional
-            Directions of the sensitivities; default: none.
-        force : ndarray, shape (3,), optional
-            Constant force on the body's origin [N, NED].
-
-        Returns
-        -------
-        Motion
-            States and sensitivities at the sample times.
-
-        Raises
-        ------
-        IdentificationError
-            If the parameters are not those of a body, or the motion does not stay finite.
-        """
+        """Predict the motion under a wrench that is linear over each step; start [m, NED]."""
+        # with wrench [N, N m, body frame], step [s], times [s], force [N, NED]
         along = directions or NO_DIRECTIONS
         d, n = len(along.parameters), len(times)
         references = [self._references[name] for name in parameters]

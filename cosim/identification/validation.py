@@ -35,27 +35,7 @@ class Prediction:
 def validate(
     logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Parameter], values: Array, step: float
 ) -> list[Prediction]:
-    """Predict windows of runs from their sampled start states alone, and compare with the samples.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        Runs to predict, preferably ones that were not fitted.
-    vehicle : Vehicle
-        Vehicle with the start values of the search.
-    parameters : sequence of Parameter
-        Free parameters of the fit. Nuisances of single runs belong to the runs of `logs` by their index; for other runs
-        `with_mean_nuisances` gives parameters and values.
-    values : ndarray, shape (p,)
-        Fitted values of the parameters, in their units.
-    step : float
-        Integration step [s].
-
-    Returns
-    -------
-    list of Prediction
-        Errors for each horizon and topic.
-    """
+    """Predict windows of runs from their sampled start states alone, and compare with the samples; step [s]."""
     found = []
     starts = np.array([p.start if not p.is_nuisance else x for p, x in zip(parameters, values, strict=True)])
     for horizon in HORIZONS:

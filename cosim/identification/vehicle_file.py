@@ -21,26 +21,7 @@ _WIDTH = 118  # most characters of a comment's line
 
 
 def vehicle_text(start: str, vehicle: Vehicle, fit: Fit, name: str, provenance: Sequence[str]) -> str:
-    """Return the text of the identified vehicle's file.
-
-    Parameters
-    ----------
-    start : str
-        Name of the shipped vehicle, or path of the file, with the start values; it gives the fixed numbers.
-    vehicle : Vehicle
-        Vehicle of `start`, loaded.
-    fit : Fit
-        Result of the identification.
-    name : str
-        Name of the new vehicle.
-    provenance : sequence of str
-        Sentences for the comment at the top of the file.
-
-    Returns
-    -------
-    str
-        TOML text.
-    """
+    """Return the text of the identified vehicle's file."""
     found = with_values(vehicle, fit.parameters, fit.values)
     tables = _tables_of(start)
     tables["name"], tables["title"] = name, f"{tables['title']}, identified"

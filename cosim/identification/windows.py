@@ -42,28 +42,7 @@ class Window:
 def cut_windows(
     logs: Sequence[Log], vehicle: Vehicle, step: float, length: float, margins: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[list[Window], Counter[str]]:
-    """Cut runs into windows, and reject those that cannot be predicted.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        The runs.
-    vehicle : Vehicle
-        Vehicle, for its thrusters' limits and the radius of its hull.
-    step : float
-        Period of the grid [s].
-    length : float
-        Length of a window [s]; the last one of a run may be shorter by two fifths.
-    margins : tuple of float
-        Times without samples at start and end of a window [s].
-
-    Returns
-    -------
-    list of Window
-        Accepted windows in the order of the runs and of time.
-    Counter of str
-        Counts of rejected windows, by the rule that rejected them.
-    """
+    """Cut runs into windows, and reject those that cannot be predicted; step [s], length [s], margins [s]."""
     kept: list[Window] = []
     rejected: Counter[str] = Counter()
     for run, log in enumerate(logs):

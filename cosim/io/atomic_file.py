@@ -11,45 +11,15 @@ from plant_fmu.archive import atomic_file
 
 
 def write_atomic(path: Path, content: bytes | str) -> Path:
-    """Write a file atomically: an error leaves the old one.
-
-    Parameters
-    ----------
-    path : Path
-        The file; an existing one is replaced.
-    content : bytes or str
-        The content; text is encoded as UTF-8.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written, as for `plant_fmu.archive.atomic_file`.
-    """
+    """Write a file atomically: an error leaves the old one."""
     with atomic_file(path) as file:
         file.write(content.encode() if isinstance(content, str) else content)
     return path
 
 
 def write_together(contents: Mapping[Path, str]) -> None:
-    """Write files that belong together: whenever an error or a kill comes, those that exist are of one call.
-
-    All are written to temporary files first. Then the old ones are removed, except the first, and each is renamed.
-
-    Parameters
-    ----------
-    contents : mapping of Path to str
-        Content of each file. The first is the one that the others belong to: it is replaced, never missing.
-
-    Raises
-    ------
-    OSError
-        If a file cannot be written.
-    """
+    """Write files that belong together: whenever an error or a kill comes, those that exist are of one call."""
+    # All are written to temporary files first. Then the old ones are removed, except the first, and each is renamed.
     _, *others = contents
     with contextlib.ExitStack() as renames:
         for path in reversed([*contents]):  # the first is the last that is opened, and so the first that is renamed

@@ -10,20 +10,7 @@ FORMAT = 2  # in format 1, columns, commands and the paper's law had other names
 
 
 def require_format(where: Path, found: object) -> None:
-    """Raise a RunError if a file has another format number than `FORMAT`.
-
-    Parameters
-    ----------
-    where : Path
-        Path of the file, which the message names.
-    found : object
-        Format number of the file; None for a file without one, which is format 1.
-
-    Raises
-    ------
-    RunError
-        If the number is not `FORMAT`.
-    """
+    """Raise a RunError if a file has another format number than `FORMAT`."""
     if found == FORMAT:
         return
     if found is None:

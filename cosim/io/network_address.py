@@ -7,20 +7,7 @@ import socket
 
 
 def resolve_host(host: str) -> tuple[str, bool]:
-    """Resolve a host to its IPv4 address.
-
-    Returns
-    -------
-    str
-        The IPv4 address.
-    bool
-        True if it is a loopback address, which other machines do not reach.
-
-    Raises
-    ------
-    OSError
-        If the host is not known.
-    """
+    """Resolve a host to its IPv4 address."""
     try:
         address = str(socket.getaddrinfo(host, None, socket.AF_INET)[0][4][0])
     except UnicodeError as error:  # a name that no DNS query can hold

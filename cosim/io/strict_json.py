@@ -13,18 +13,7 @@ from cosim.errors import RunError
 
 
 def nan_to_none(value: Any) -> Any:
-    """Replace NaN and infinity by None.
-
-    Parameters
-    ----------
-    value : Any
-        Text, number, boolean, None, or list, tuple or dict of these.
-
-    Returns
-    -------
-    Any
-        The value with the replacements, tuples as lists.
-    """
+    """Replace NaN and infinity by None."""
     if isinstance(value, dict):
         return {key: nan_to_none(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
@@ -33,35 +22,13 @@ def nan_to_none(value: Any) -> Any:
 
 
 def json_text(value: Any) -> str:
-    """Format a value as indented JSON.
-
-    Parameters
-    ----------
-    value : Any
-        Text, number, boolean, None, or list, tuple or dict of these.
-
-    Returns
-    -------
-    str
-        JSON text with null for NaN and infinity, and a newline at its end.
-    """
+    """Format a value as indented JSON."""
     return json.dumps(nan_to_none(value), indent=2, allow_nan=False) + "\n"
 
 
 @contextlib.contextmanager
 def understood(file: Path) -> Iterator[None]:
-    """Convert errors of the block that missing keys or wrong types in a JSON file cause to a RunError.
-
-    Parameters
-    ----------
-    file : Path
-        Path of the JSON file, which the message names.
-
-    Raises
-    ------
-    RunError
-        For a key that is missing, or a value of a wrong type or out of range.
-    """
+    """Convert errors of the block that missing keys or wrong types in a JSON file cause to a RunError."""
     try:
         yield
     except (KeyError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
@@ -69,13 +36,7 @@ def understood(file: Path) -> Iterator[None]:
 
 
 def read_json(path: Path) -> dict[str, Any]:
-    """Read a JSON file that holds an object.
-
-    Raises
-    ------
-    RunError
-        If the file cannot be read, or holds no object.
-    """
+    """Read a JSON file that holds an object."""
     try:
         table = json.loads(path.read_text(encoding="utf-8"))
     except OSError as error:

@@ -28,25 +28,7 @@ class LiveAddress:
 
 
 def parse_live(text: str, allow_remote: bool = False) -> LiveAddress:
-    """Parse the address of a live view.
-
-    Parameters
-    ----------
-    text : str
-        ``HOST:PORT`` or ``PORT``; empty for the default.
-    allow_remote : bool
-        Allow an address that other machines reach.
-
-    Returns
-    -------
-    LiveAddress
-        The address; its socket is not opened yet.
-
-    Raises
-    ------
-    TelemetryError
-        If the text is not an address, or other machines reach it and `allow_remote` is False.
-    """
+    """Parse the address of a live view."""
     if not text:
         return LiveAddress()
     host, colon, number = text.rpartition(":")
@@ -63,25 +45,9 @@ def parse_live(text: str, allow_remote: bool = False) -> LiveAddress:
 
 
 def foreign_origin(address: LiveAddress, host: str | None, origin: str | None) -> str | None:
-    """Return the reason why a request is of foreign origin, None if it comes from the view's own page.
-
-    A page of another site can make a browser connect to this machine, directly or by DNS rebinding. The browser sends
-    the requested name in ``Host``, and the site of the page in ``Origin``.
-
-    Parameters
-    ----------
-    address : LiveAddress
-        Address that received the request.
-    host : str or None
-        Header ``Host`` of the request.
-    origin : str or None
-        Header ``Origin`` of the request, which only browsers send.
-
-    Returns
-    -------
-    str or None
-        The reason, one line for the response.
-    """
+    """Return the reason why a request is of foreign origin, None if it comes from the view's own page."""
+    # A page of another site can make a browser connect to this machine, directly or by DNS rebinding. The browser sends
+    # the requested name in `Host`, and the site of the page in `Origin`.
     name = _name(host or "")
     known = name in _LOOPBACK_NAMES or name == address.host.lower()
     if not address.is_loopback:
@@ -107,13 +73,7 @@ def _is_ip(name: str) -> bool:
 
 
 def open_socket(address: LiveAddress) -> socket.socket:
-    """Open a socket at an address; at a free port if the default one is in use.
-
-    Raises
-    ------
-    TelemetryError
-        If the socket cannot be opened.
-    """
+    """Open a socket at an address; at a free port if the default one is in use."""
     for port in (address.port,) if address.is_fixed_port else (address.port, 0):
         # a port in TIME_WAIT may be taken again; on Windows the option would let others take one that is in use
         try:

@@ -20,22 +20,7 @@ _decoder = msgspec.json.Decoder(Command)
 
 
 class CommandDesk:
-    """Submits the commands of all viewers to one run.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-    queue : CommandQueue or str
-        Queue of the run, or the reason why commands are rejected.
-    is_occupied : callable
-        Function that returns True if the obstacle slot of that name holds an obstacle.
-
-    Attributes
-    ----------
-    settings : LiveSettings
-        Settings with all queued commands applied.
-    """
+    """Submits the commands of all viewers to one run."""
 
     def __init__(self, scenario: Scenario, queue: CommandQueue | str, is_occupied: Callable[[str], bool]) -> None:
         self.settings = LiveSettings(scenario)
@@ -45,18 +30,7 @@ class CommandDesk:
         self._slots = {secondary.region.name for secondary in scenario.regions if secondary.is_dynamic}
 
     def submit(self, message: str | bytes) -> str | None:
-        """Submit a viewer's message to the run.
-
-        Parameters
-        ----------
-        message : str or bytes
-            A command as JSON, as in the log of commands.
-
-        Returns
-        -------
-        str or None
-            Reason for rejecting the command; None if the next step applies it.
-        """
+        """Submit a viewer's message to the run."""
         if isinstance(self._queue, str):
             return self._queue
         if isinstance(message, bytes):
@@ -74,13 +48,7 @@ class CommandDesk:
         return None
 
     def update_settings(self, command: Command) -> None:
-        """Update the settings by a command that the run applies, from any source.
-
-        Raises
-        ------
-        CommandError
-            If the command changes an unknown setting, or to a value out of range.
-        """
+        """Update the settings by a command that the run applies, from any source."""
         if isinstance(command, ChangeSetting):
             self.settings.change(command.key, command.value)
 

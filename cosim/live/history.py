@@ -13,20 +13,7 @@ _MAX_NEW = 256  # number of recent rows, which are all kept
 
 
 class History:
-    """Rows of a run, of which the old ones are thinned to bound the memory.
-
-    Parameters
-    ----------
-    columns : int
-        Number of columns of a row.
-    max_old : int, optional
-        Bound of the number of old rows; default: as many as fit into 8 MB.
-
-    Attributes
-    ----------
-    count : int
-        Number of rows added so far; a row's number is the count after adding it.
-    """
+    """Rows of a run, of which the old ones are thinned to bound the memory."""
 
     def __init__(self, columns: int, max_old: int | None = None) -> None:
         max_old = max_old or max(2, _MAX_BYTES // (8 * columns))
@@ -59,22 +46,7 @@ class History:
         self._old_count += 1
 
     def since(self, number: int, max_rows: int) -> tuple[Array, int]:
-        """Return the rows after that of a number.
-
-        Parameters
-        ----------
-        number : int
-            Number of the last row that is left out; 0 for all rows.
-        max_rows : int
-            Greatest number of rows to return; further calls return the following ones.
-
-        Returns
-        -------
-        ndarray, shape (rows, columns)
-            Rows in the order in which they were added.
-        int
-            Number of the last returned row, or `number` if there is none.
-        """
+        """Return the rows after that of a number; returns (rows, columns)."""
         first_new = self.count - len(self._new)  # rows up to this number are old
         if number < first_new:
             first = int(np.searchsorted(self._numbers[: self._old_count], number, side="right"))

@@ -45,15 +45,7 @@ class Cursor:
 
 
 class Hub:
-    """State of the run that is shown, and messages about it for viewers.
-
-    Attributes
-    ----------
-    run : int
-        Number of the run, from 0; -1 before the first.
-    desk : CommandDesk
-        Desk that submits the commands of viewers to the run.
-    """
+    """State of the run that is shown, and messages about it for viewers."""
 
     def __init__(self) -> None:
         self.run = -1
@@ -63,19 +55,7 @@ class Hub:
         self._last: Array | None = None
 
     def begin(self, run: int, scenario: Scenario, columns: Sequence[Column], queue: CommandQueue | str) -> None:
-        """Begin showing another run.
-
-        Parameters
-        ----------
-        run : int
-            Number of the run.
-        scenario : Scenario
-            The scenario of the run.
-        columns : sequence of Column
-            Columns of the run's rows.
-        queue : CommandQueue or str
-            Queue for commands, or the reason why they are rejected.
-        """
+        """Begin showing another run."""
         self.run = run
         self._view_columns = ViewColumns(scenario, columns)
         self._names = {column.name: i for i, column in enumerate(self._view_columns.columns)}

@@ -28,25 +28,9 @@ _CLOSE_TIMEOUT = 3.0  # s, for which closing or a new run waits for the thread
 
 
 class LiveView:
-    """Observer that copies some rows for viewers, which another thread serves.
+    """Observer that copies some rows for viewers, which another thread serves."""
 
-    The view passes only commands to the run, through its queue. Errors of the view do not affect the run.
-
-    Parameters
-    ----------
-    address : LiveAddress
-        Address of the server.
-
-    Attributes
-    ----------
-    url : str
-        URL of the page.
-
-    Raises
-    ------
-    TelemetryError
-        If the address cannot be opened.
-    """
+    # The view passes only commands to the run, through its queue. Errors of the view do not affect the run.
 
     def __init__(self, address: LiveAddress) -> None:
         from cosim.live.view_server import serve
@@ -67,17 +51,7 @@ class LiveView:
     # ---- called in the thread of the run ----
 
     def begin(self, scenario: Scenario, columns: Sequence[Column], queue: CommandQueue | str) -> None:
-        """Begin showing another run.
-
-        Parameters
-        ----------
-        scenario : Scenario
-            The scenario of the run.
-        columns : sequence of Column
-            Columns of the run's rows.
-        queue : CommandQueue or str
-            Queue for commands, or the reason why they are rejected.
-        """
+        """Begin showing another run."""
         self._run += 1
         hub = self._hub
         if not self._started:

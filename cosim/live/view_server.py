@@ -51,21 +51,7 @@ _HEADERS = {
 async def serve(
     listening: socket.socket, address: LiveAddress, hub: Hub, take_rows: Callable[[], None], closing: threading.Event
 ) -> None:
-    """Serve viewers until `closing` is set.
-
-    Parameters
-    ----------
-    listening : socket
-        Bound and listening socket.
-    address : LiveAddress
-        Address of the socket.
-    hub : Hub
-        State of the run that is shown.
-    take_rows : callable
-        Function that passes new rows to the hub.
-    closing : threading.Event
-        Event that ends the server.
-    """
+    """Serve viewers until `closing` is set."""
     viewers = _Viewers(address, hub, replay_page([], "Live run").encode())
     quiet = logging.getLogger(f"{__name__}.connections")
     quiet.setLevel(logging.CRITICAL + 1)  # invalid requests to the port are not logged

@@ -21,12 +21,6 @@ def write_rows(rows: Array) -> bytes:
 
 
 def read_rows(message: bytes, columns: int) -> Array:
-    """Parse the rows of a message, shape (rows, columns).
-
-    Raises
-    ------
-    ValueError
-        If the last row is incomplete.
-    """
+    """Parse the rows of a message, shape (rows, columns)."""
     rows: Array = np.frombuffer(message, dtype="<f8").reshape(-1, columns)
     return rows

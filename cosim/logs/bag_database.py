@@ -33,13 +33,7 @@ _ROW_SIZE = 8  # bytes, least size of a row in a file
 
 
 class BagDatabase:
-    """A database that is read row by row; see `open_database`.
-
-    Attributes
-    ----------
-    tables : set of str
-        Names of its tables.
-    """
+    """A database that is read row by row; see `open_database`."""
 
     def __init__(self, database: sqlite3.Connection, size: int) -> None:
         self._database, self._size, self._read = database, size, 0
@@ -67,13 +61,7 @@ class BagDatabase:
         return self._calls < 0
 
     def rows(self, query: str, *types: type) -> Iterator[tuple[Any, ...]]:
-        """Yield the rows of a query, whose values have the given types.
-
-        Raises
-        ------
-        ImportLogError
-            If the rows are larger than the file, which is the case if they share pages.
-        """
+        """Yield the rows of a query, whose values have the given types."""
         for row in self._database.execute(query):
             for value, kind in zip(row, types, strict=True):
                 if not isinstance(value, kind):
@@ -86,13 +74,7 @@ class BagDatabase:
 
 @contextlib.contextmanager
 def open_database(path: Path) -> Iterator[BagDatabase]:
-    """Open a database for reading.
-
-    Raises
-    ------
-    ImportLogError
-        If it has views, triggers, virtual tables or generated columns.
-    """
+    """Open a database for reading."""
     # a recorder that was killed leaves a journal, which a file opened as immutable would not show
     journal = path.with_name(f"{path.name}-wal")
     address = f"{path.resolve().as_uri()}?mode=ro" + ("" if journal.exists() else "&immutable=1")

@@ -48,13 +48,7 @@ class StoredMessage(NamedTuple):
 
 
 def bag_files(path: Path) -> list[Path]:
-    """Return the files of a bag: the file itself, or the files of a recorder's folder in the order of their numbers.
-
-    Raises
-    ------
-    ImportLogError
-        If the folder holds no bag, or files of two kinds.
-    """
+    """Return the files of a bag: the file itself, or the files of a recorder's folder in the order of their numbers."""
     if not path.is_dir():
         return [path]
     files = [file for file in path.iterdir() if file.suffix.lower() in SUFFIXES and file.is_file()]
@@ -74,22 +68,7 @@ def _sort_key(file: Path) -> tuple[list[int], str]:
 
 
 def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[StoredMessage]:
-    """Yield the messages of a bag in the order of its files and their storage.
-
-    Parameters
-    ----------
-    path : Path
-        Path of a bag's file, or of a folder of such files.
-    remarks : list of str
-        Receives a remark on each file that ends early or has damaged parts.
-    moved : callable
-        Receives the fraction read so far.
-
-    Raises
-    ------
-    ImportLogError
-        If the first file cannot be read at all, or a file is larger than any recorder's when it is decompressed.
-    """
+    """Yield the messages of a bag in the order of its files and their storage."""
     failures = _failures()
     files, readers = bag_files(path), {".mcap": _of_mcap, ".db3": _of_sqlite, ".bag": _of_ros1}
     topics: set[str] = set()

@@ -26,22 +26,7 @@ _ONE_KIND = re.compile(r"mavlink/\d+/\d+/[A-Z0-9_]+")
 
 
 def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
-    """Read a recording, or the folder with the recordings of a dive.
-
-    Parameters
-    ----------
-    path : Path
-        Path of an MCAP file, or of a folder of them.
-    contents : LogContents
-        Receives the samples.
-    moved : callable
-        Receives the fraction read so far.
-
-    Raises
-    ------
-    ImportLogError
-        If the recording has no MAVLink messages, or no heartbeat of an autopilot.
-    """
+    """Read a recording, or the folder with the recordings of a dive."""
     by_kind, vehicle = _find_vehicle(path)
     clock, messages = Clock(), VehicleMessages(contents, *vehicle)
     kinds = {kind.msgname: kind for kind in dialect().mavlink_map.values()}
@@ -65,10 +50,8 @@ def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
 
 
 def _find_vehicle(path: Path) -> tuple[bool, tuple[int, int, int]]:
-    """Find the autopilot: return True if each kind of message has a topic, and the autopilot's identity.
-
-    The identity is system id, MAV_AUTOPILOT and MAV_TYPE.
-    """
+    """Find the autopilot: return True if each kind of message has a topic, and the autopilot's identity."""
+    # The identity is system id, MAV_AUTOPILOT and MAV_TYPE.
     found, any_mavlink = None, False
     for stored in stored_messages(path, [], lambda part: None):
         by_kind = _ONE_KIND.fullmatch(stored.topic) is not None

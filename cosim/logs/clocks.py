@@ -16,16 +16,10 @@ _MOST_DRIFT = 5e-4  # relative drift above which a fit is discarded
 
 
 class Clock:
-    """Convert readings of a clock that jumps to rising times; each jump becomes a pause of one second.
-
-    Attributes
-    ----------
-    jumps : list of (float, float)
-        Converted time [s] and size [s] of each jump.
-    """
+    """Convert readings of a clock that jumps to rising times; each jump becomes a pause of one second."""
 
     def __init__(self) -> None:
-        self.jumps: list[tuple[float, float]] = []
+        self.jumps: list[tuple[float, float]] = []  # converted time [s] and size [s] of each jump
         self._shift, self._last = 0.0, math.nan
 
     def time(self, said: float) -> float:
@@ -71,11 +65,10 @@ class Clock:
 
 
 class VehicleClock:
-    """Convert stamps of the vehicle's own clock to the clock of the log's writer.
+    """Convert stamps of the vehicle's own clock to the clock of the log's writer."""
 
-    A message is late, never early: in each minute, the message of least delay gives the offset of the clocks. A line
-    through these gives the drift. A stamp that steps back is a restart of the vehicle.
-    """
+    # A message is late, never early: in each minute, the message of least delay gives the offset of the clocks. A line
+    # through these gives the drift. A stamp that steps back is a restart of the vehicle.
 
     def __init__(self) -> None:
         self._last = -math.inf

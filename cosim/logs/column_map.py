@@ -88,19 +88,8 @@ class ColumnMap:
         return mapped.time or self.time
 
     def put(self, contents: LogContents, name: str, times: Array, values: Array) -> None:
-        """Convert samples of a quantity from the map's unit and frame, and add them to the contents of a log.
-
-        Parameters
-        ----------
-        contents : LogContents
-            Receives the samples in SI units, NED and FRD.
-        name : str
-            Name of the quantity.
-        times : ndarray, shape (n,)
-            Times of the samples [s].
-        values : ndarray, shape (n, columns)
-            Samples in the map's unit and frame.
-        """
+        """Convert samples of a quantity from the map's unit and frame, and add them to the contents of a log."""
+        # with times [s]
         mapped = self.quantities[name]
         source = contents.source(name, source_name(mapped), QUANTITIES[name].size or len(mapped.columns))
         source.put_many(times, self._converted(name, mapped, values))
@@ -166,23 +155,7 @@ def _require_angles(mapped: MappedQuantity, angles: Array) -> None:
 
 
 def read_map(path: Path) -> ColumnMap:
-    """Read a column map.
-
-    Parameters
-    ----------
-    path : Path
-        A TOML file.
-
-    Returns
-    -------
-    ColumnMap
-        The validated map.
-
-    Raises
-    ------
-    ImportLogError
-        If it cannot be read, or a key is unknown, missing or invalid.
-    """
+    """Read a column map."""
     try:
         columns = decode(read_toml(path), ColumnMap)
         for name, mapped in columns.quantities.items():

@@ -14,31 +14,14 @@ _MAX_RATIO = 100  # greatest total size of the parts beyond that, in sizes of th
 
 
 class Decompressor:
-    """Decompress the parts of a file.
-
-    Parameters
-    ----------
-    path : Path
-        The file, whose size bounds the total size of its parts.
-
-    Attributes
-    ----------
-    total : int
-        Total size of the parts so far [bytes].
-    """
+    """Decompress the parts of a file."""
 
     def __init__(self, path: Path) -> None:
         self._max_total = max(_MIN_TOTAL, _MAX_RATIO * path.stat().st_size)
-        self.total = 0
+        self.total = 0  # total size of the parts so far [bytes]
 
     def decompress(self, compression: str, data: bytes) -> bytes:
-        """Decompress a part; `compression` is bz2, lz4, zstd, none or empty.
-
-        Raises
-        ------
-        ImportLogError
-            If the part or all parts are too large, or the compression is unknown.
-        """
+        """Decompress a part; `compression` is bz2, lz4, zstd, none or empty."""
         limit = min(MAX_PART, self._max_total - self.total)
         if compression not in ("", "none"):
             with _open(compression, BytesIO(data)) as file:

@@ -25,50 +25,20 @@ _NEUTRAL = 1500.0  # us, pulse at which a T200 rests
 
 @dataclass(frozen=True)
 class Commands:
-    """Conversion of a log's commands to forces.
+    """Conversion of a log's commands to forces."""
 
-    Attributes
-    ----------
-    quantity : str
-        Quantity of the commands.
-    through : str
-        ``thrusters`` or ``wrench``.
-    forces : callable
-        Function from the log's commands and voltages [V], shapes (n, size) and (n,), to forces of the thrusters [N],
-        shape (n, thrusters), or wrenches [N, N m], shape (n, 6).
-    words : str
-        Description in a sentence.
-    """
-
-    quantity: str
-    through: Literal["thrusters", "wrench"]
+    quantity: str  # quantity of the commands
+    through: Literal["thrusters", "wrench"]  # ``thrusters`` or ``wrench``
+    # function from the log's commands and voltages [V], shapes (n, size) and (n,), to forces of the thrusters [N],
+    # shape (n, thrusters), or wrenches [N, N m], shape (n, 6)
     forces: Callable[[Array, Array], Array]
-    words: str
+    words: str  # description in a sentence
 
 
 def commands_of(
     topic: Topic, vehicle: Vehicle, curve: str | None, voltage: str, parameters: Mapping[str, float]
 ) -> Commands:
-    """Return the conversion of a topic's commands to forces.
-
-    Parameters
-    ----------
-    topic : Topic
-        Topic of one of `cosim.logs.quantities.COMMANDS`.
-    vehicle : Vehicle
-        Vehicle with the thrusters.
-    curve : str or None
-        One of `CURVES`, from pulse to force; None for that of the vehicle's table ``autopilot``.
-    voltage : str
-        Source of the voltage in words; empty without one.
-    parameters : mapping of str to float
-        Parameters of the autopilot, with the motors of outputs and their directions.
-
-    Raises
-    ------
-    ImportLogError
-        If the vehicle does not fit the log, or its table ``autopilot`` or the voltage is missing.
-    """
+    """Return the conversion of a topic's commands to forces."""
     n = vehicle.n_thrusters
     if topic.quantity == "wrench":
         return Commands(topic.quantity, "wrench", lambda values, _: values, f"body wrench of {topic.name}")
@@ -140,15 +110,8 @@ def _of_pulses(
 
 
 def channels_of(table: Autopilot, vehicle: Vehicle, parameters: Mapping[str, float]) -> tuple[int, ...]:
-    """Return the servo output of each thruster, from 1; 0 for none.
-
-    The autopilot's own parameters take precedence over the vehicle's file.
-
-    Raises
-    ------
-    ImportLogError
-        If the autopilot drives another number of motors than the vehicle has.
-    """
+    """Return the servo output of each thruster, from 1; 0 for none."""
+    # The autopilot's own parameters take precedence over the vehicle's file.
     motors = {
         int(function) - _MOTORS + 1: n
         for n in range(1, 33)

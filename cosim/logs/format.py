@@ -14,26 +14,13 @@ Moved = Callable[[float], None]  # receives the fraction of the log read so far,
 
 @dataclass(frozen=True)
 class LogFormat:
-    """A format of logs; each module of `cosim.logs.formats` has one as ``FORMAT``.
+    """A format of logs; each module of `cosim.logs.formats` has one as ``FORMAT``."""
 
-    Parameters
-    ----------
-    suffixes : tuple of str
-        Suffixes of its files, in small letters.
-    read : callable
-        ``read(path, columns, contents, moved)`` reads a log into `contents`; `columns` is None for self-describing
-        messages, and `moved` receives the fraction read so far. It imports optional packages itself, and raises
-        ImportLogError if the file is no such log.
-    mapped : bool
-        True if it takes a column map.
-    folder : bool
-        True if a log may be a folder of such files.
-    needs : tuple of str
-        Packages beyond the base installation, as requirements of pip.
-    """
-
-    suffixes: tuple[str, ...]
+    suffixes: tuple[str, ...]  # suffixes of its files, in small letters
+    # ``read(path, columns, contents, moved)`` reads a log into `contents`; `columns` is None for self-describing
+    # messages, and `moved` receives the fraction read so far. It imports optional packages itself, and raises
+    # ImportLogError if the file is no such log
     read: Callable[[Path, ColumnMap | None, LogContents, Moved], None]
-    mapped: bool = False
-    folder: bool = False
-    needs: tuple[str, ...] = ()
+    mapped: bool = False  # true if it takes a column map
+    folder: bool = False  # true if a log may be a folder of such files
+    needs: tuple[str, ...] = ()  # packages beyond the base installation, as requirements of pip

@@ -37,40 +37,13 @@ UNITS = {  # factors to SI units, by the SI unit
 
 
 def quaternions_of_angles(angles: Array, order: str) -> Array:
-    """Return unit quaternions of Euler angles.
-
-    Parameters
-    ----------
-    angles : ndarray, shape (n, 3)
-        Angles [rad], in the order of the axes.
-    order : str
-        Three axes. Capital letters: rotations about body axes (intrinsic), such as ``ZYX`` for yaw, pitch, roll.
-        Small letters: rotations about world axes (extrinsic).
-
-    Returns
-    -------
-    ndarray, shape (n, 4)
-        Quaternions from body to world, scalar first.
-    """
+    """Return unit quaternions of Euler angles; angles (n, 3) [rad], returns (n, 4)."""
     x, y, z, w = Rotation.from_euler(order, angles).as_quat().T
     return np.column_stack([w, x, y, z])
 
 
 def turn_quaternions(quaternions: Array, world: str, body: str) -> Array:
-    """Convert attitudes between other frames to attitudes from FRD to NED.
-
-    Parameters
-    ----------
-    quaternions : ndarray, shape (n, 4)
-        Quaternions from the body frame `body` to the world frame `world`, scalar first.
-    world, body : str
-        Names in `WORLDS` and `BODIES`.
-
-    Returns
-    -------
-    ndarray, shape (n, 4)
-        Quaternions from FRD to NED, scalar first.
-    """
+    """Convert attitudes between other frames to attitudes from FRD to NED; quaternions (n, 4), returns (n, 4)."""
     e0, e1, e2, e3 = quaternions.T
     R = Rotation.from_quat(np.column_stack([e1, e2, e3, e0]))
     turned = Rotation.from_matrix(WORLDS[world]) * R * Rotation.from_matrix(BODIES[body].T)

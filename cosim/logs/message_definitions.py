@@ -55,14 +55,7 @@ def _plain_idl(text: str) -> str:
 
 
 def reachable_types(types: Types, name: str, empty_size: int) -> dict[str, Any]:
-    """Return a type and all types that it nests; `empty_size` is the size of one without fields [bytes].
-
-    Raises
-    ------
-    ImportLogError
-        If one is missing, contains itself, has a name that is no identifier, or is too large; or if elements of a
-        sequence have no size, so that a short message may have any number of them.
-    """
+    """Return a type and all types that it nests; `empty_size` is the size of one without fields [bytes]."""
     return _Walk(types, empty_size).visit(name, ()).found
 
 

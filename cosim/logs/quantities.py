@@ -11,33 +11,16 @@ Kind = Literal["state", "command", "sensor", "voltage"]
 
 @dataclass(frozen=True)
 class Quantity:
-    """A quantity of a log, in SI units, world frame NED, body frame FRD.
+    """A quantity of a log, in SI units, world frame NED, body frame FRD."""
 
-    Attributes
-    ----------
-    name : str
-        Name in a column map.
-    size : int
-        Number of components; 0 for one per thruster.
-    unit : str
-        Unit of each component.
-    kind : str
-        ``state``: interpolated between samples; ``command``, ``sensor`` or ``voltage``: held until the next sample.
-    most : float
-        Greatest plausible magnitude of a component; a greater one indicates wrong units.
-    frame : str
-        ``world``, ``body`` or empty: frame that a column map converts.
-    what : str
-        Description in words.
-    """
-
-    name: str
-    size: int
-    unit: str
+    name: str  # name in a column map
+    size: int  # number of components; 0 for one per thruster
+    unit: str  # unit of each component
+    # ``state``: interpolated between samples; ``command``, ``sensor`` or ``voltage``: held until the next sample
     kind: Kind
-    most: float
-    frame: str
-    what: str
+    most: float  # greatest plausible magnitude of a component; a greater one indicates wrong units
+    frame: str  # ``world``, ``body`` or empty: frame that a column map converts
+    what: str  # description in words
 
 
 QUANTITIES = {

@@ -15,13 +15,7 @@ _EXACT = 1e-6  # s, tolerance of equal times; for seconds since 1970, float64 re
 
 
 class TopicReader:
-    """Read a topic forward, and keep only the present window in memory.
-
-    Parameters
-    ----------
-    topic : Topic
-        Topic to read.
-    """
+    """Read a topic forward, and keep only the present window in memory."""
 
     def __init__(self, topic: Topic) -> None:
         self.topic = topic
@@ -37,10 +31,8 @@ class TopicReader:
         self._file.close()
 
     def window(self, start: float, end: float) -> tuple[Array, Array]:
-        """Return times [s] and components from the last sample before `start` to the first one after `end`.
-
-        The `start` must not decrease between calls.
-        """
+        """Return times [s] and components from the last sample before `start` to the first one after `end`."""
+        # The `start` must not decrease between calls.
         while self._more and not (len(self._rows) and self._rows[-1, 0] > end):
             block = np.fromfile(self._file, count=BLOCK * self._width).reshape(-1, self._width)
             self._more = len(block) > 0

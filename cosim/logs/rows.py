@@ -33,23 +33,7 @@ _SENSORS = {  # quantity: columns, and name of the sensor's time column
 
 
 class RowMaker:
-    """Make the rows of a record from topics.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the run, with its vehicle and regions.
-    columns : list of Column
-        Columns of the record.
-    topics : mapping of str to Topic
-        Topics by quantity.
-    commands : Commands or None
-        Conversion of the log's commands to forces.
-    voltage : float
-        Supply voltage [V]; NaN for that of the topic ``voltage``, if there is one.
-    start : float
-        Time [s] of the first row, on the clock of the topics.
-    """
+    """Make the rows of a record from topics; voltage [V], start [s]."""
 
     def __init__(
         self,

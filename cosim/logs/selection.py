@@ -25,25 +25,7 @@ _EDGE = 5.0  # s, duration at start and end below which rows with partly unknown
 
 
 def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic], VehicleClock]:
-    """Select the best source of each quantity, and convert it to a topic.
-
-    Parameters
-    ----------
-    contents : LogContents
-        Contents of the log. Receives further sources of a quantity as unread, and remarks.
-    scratch : Path
-        Folder for the topics' files.
-
-    Returns
-    -------
-    dict of str to Topic, VehicleClock
-        Topics by quantity; and the vehicle's clock, which gave their times.
-
-    Raises
-    ------
-    ImportLogError
-        If the log has no motion.
-    """
+    """Select the best source of each quantity, and convert it to a topic."""
     clock = _vehicle_clock(contents)
     topics: dict[str, Topic] = {}
     for quantity in QUANTITIES:

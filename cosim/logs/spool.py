@@ -22,10 +22,9 @@ _WAITING = 2**14  # numbers of a source in memory before they go to disk
 
 @dataclass
 class Source:
-    """Samples of one quantity from one message or column, in a file: two times, then the components.
+    """Samples of one quantity from one message or column, in a file: two times, then the components."""
 
-    The first time [s] is the stamp of the sender, NaN without one. The second one is the time of writing.
-    """
+    # The first time [s] is the stamp of the sender, NaN without one. The second one is the time of writing.
 
     quantity: str
     name: str  # name of the message, topic or columns
@@ -75,32 +74,7 @@ class Source:
 
 
 class LogContents:
-    """Contents of a log, filled by a reader.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder for the files of samples.
-
-    Attributes
-    ----------
-    sources : dict
-        Sources by quantity and name.
-    parameters : dict of str to float
-        Parameters of the autopilot, if the log has them.
-    frame : str
-        Name of the thruster arrangement in the log; empty if unknown.
-    autopilot : str
-        Name of the autopilot, such as ``ardupilot``; empty if unknown.
-    kind : str
-        Kind of vehicle, if it is not an underwater vehicle; else empty.
-    unread : Counter
-        Counts of unused messages, topics or columns.
-    remarks : list of str
-        Remarks for the reader of the run.
-    preferences : dict
-        Names of sources in order of preference, by quantity.
-    """
+    """Contents of a log, filled by a reader."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
@@ -114,22 +88,7 @@ class LogContents:
         self.preferences: dict[str, tuple[str, ...]] = {}
 
     def source(self, quantity: str, name: str, size: int | None = None) -> Source:
-        """Return the source of a name for a quantity; create it if there is none.
-
-        Parameters
-        ----------
-        quantity : str
-            One of `QUANTITIES`.
-        name : str
-            Name of the message, topic or columns.
-        size : int, optional
-            Number of components; default: the quantity's.
-
-        Raises
-        ------
-        ImportLogError
-            If it had another size before.
-        """
+        """Return the source of a name for a quantity; create it if there is none."""
         found = self.sources.get((quantity, name))
         wanted = size or QUANTITIES[quantity].size
         if found is None:

@@ -57,29 +57,7 @@ class Topic:
 
 
 def clean(source: Source, times: Callable[[Array, Array], Array], convert: Convert | None, folder: Path) -> Topic:
-    """Clean a source's samples, and write them as a topic.
-
-    Parameters
-    ----------
-    source : Source
-        Source of the samples.
-    times : callable
-        Function from stamps and times of writing, each of shape (n,), to times [s].
-    convert : callable, optional
-        Function from components of the source to those of the topic, shape (n, size) both.
-    folder : Path
-        Folder for the topic's file.
-
-    Returns
-    -------
-    Topic
-        Topic with at least one sample.
-
-    Raises
-    ------
-    ImportLogError
-        If a component exceeds its greatest plausible value.
-    """
+    """Clean a source's samples, and write them as a topic; times (n,) [s], convert (n, size)."""
     topic = Topic(source.quantity, source.name, folder / f"{source.quantity}.topic", 0, broken=source.broken)
     stretch, bursts = _survey(source, times)
     spread = _spread(_timed(source, times), bursts, topic) if bursts else _timed(source, times)
@@ -195,10 +173,8 @@ def _held_for(runs: NDArray[np.int64]) -> int:
 
 
 def _fresh(values: Array, previous: Array, repeats: int, stretch: int) -> tuple[NDArray[np.bool_], int]:
-    """Return a mask of new samples, (n,), and the number of repeats of the last value so far.
-
-    A sample is new if its value changes, and at every `stretch`-th repeat.
-    """
+    """Return a mask of new samples, (n,), and the number of repeats of the last value so far."""
+    # A sample is new if its value changes, and at every `stretch`-th repeat.
     if stretch <= 1:
         return np.ones(len(values), bool), 0
     same = (values == np.vstack([previous, values[:-1]])).all(axis=1)

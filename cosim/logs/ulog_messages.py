@@ -50,31 +50,12 @@ class _Topic:
 
 
 class ULogMessages:
-    """Read a ULog file from start to end.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the file.
-    wanted : frozenset of str
-        Names of the topics whose samples are yielded.
-
-    Attributes
-    ----------
-    parameters : dict of str to float
-        Parameters of the autopilot at the start of the log, by name.
-    formats : set of str
-        Types of messages that the file defines.
-    dropouts : list of float
-        Durations in which the logger lost data [s].
-    is_damaged : bool
-        True if some bytes are not valid messages.
-    """
+    """Read a ULog file from start to end."""
 
     def __init__(self, path: Path, wanted: frozenset[str]) -> None:
         self._path, self._wanted = path, wanted
         self.parameters: dict[str, float] = {}
-        self.dropouts: list[float] = []
+        self.dropouts: list[float] = []  # durations in which the logger lost data [s]
         self.is_damaged = False
         self._formats: dict[str, list[tuple[str, int, str]]] = {}
         self._dtypes: dict[str, tuple[np.dtype[Any], int]] = {}
@@ -88,18 +69,7 @@ class ULogMessages:
         return set(self._formats)
 
     def blocks(self, moved: Moved) -> Iterator[tuple[str, NDArray[Any]]]:
-        """Yield blocks of samples: the topic with its instance, and a structured array in the order of the file.
-
-        Parameters
-        ----------
-        moved : callable
-            Receives the fraction of the file read so far, 0 to 1.
-
-        Raises
-        ------
-        ImportLogError
-            If the file is not a ULog file, or needs a newer reader.
-        """
+        """Yield blocks of samples: the topic with its instance, and a structured array in the order of the file."""
         for kind, body in self._messages(moved):
             try:
                 topic = self._take(kind, body)

@@ -31,17 +31,7 @@ _PREFERENCES = {
 
 
 class VehicleMessages:
-    """Add messages of a vehicle and its pilot to the contents of a log.
-
-    Parameters
-    ----------
-    contents : LogContents
-        Receives the samples.
-    system : int
-        MAVLink system id of the vehicle.
-    autopilot, kind : int
-        MAV_AUTOPILOT and MAV_TYPE of the vehicle.
-    """
+    """Add messages of a vehicle and its pilot to the contents of a log."""
 
     def __init__(self, contents: LogContents, system: int, autopilot: int, kind: int) -> None:
         self._contents = contents

@@ -38,25 +38,11 @@ _SECOND = 1_000_000
 
 
 class Autopilot:
-    """The running co-simulation as a MAVLink vehicle.
+    """The running co-simulation as a MAVLink vehicle."""
 
-    Streams follow simulated time. So does the time since boot, plus the wall time spent waiting for arming. Timeouts of
-    ground stations follow the wall clock, and so do the streams while simulated time stands still.
-    No received message raises. All methods are called from one thread.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-    columns : sequence of Column
-        Columns of the observed rows.
-    options : MavlinkOptions
-        Identity, profile, and accepted systems.
-    commands : CommandQueue or None
-        Queue that receives the commands; with None, or commands off, the vehicle is read-only.
-    live : bool
-        False for a recorded run, which takes no commands.
-    """
+    # Streams follow simulated time. So does the time since boot, plus the wall time spent waiting for arming. Timeouts
+    # of ground stations follow the wall clock, and so do the streams while simulated time stands still. No received
+    # message raises. All methods are called from one thread.
 
     def __init__(
         self,
@@ -107,14 +93,7 @@ class Autopilot:
                 link.send(message)
 
     def observe(self, row: Array) -> None:
-        """Update from the next snapshot, and send the messages that are due by simulated time.
-
-        Parameters
-        ----------
-        row : ndarray, shape (n,)
-            Row of a step, in the order of the columns; its first number is simulated time [s]. A time earlier than
-            the last one starts a new run.
-        """
+        """Update from the next snapshot, and send the messages that are due by simulated time; row (n,) [s]."""
         context = self._context
         context.update(row)
         now = context.view.simulated_us
@@ -143,17 +122,7 @@ class Autopilot:
             streams.advance(self._clock_us)
 
     def receive(self, link: MessageSink, message: Any, now: float) -> None:
-        """Pass a message to its handler, if it comes from an allowed system and targets this vehicle.
-
-        Parameters
-        ----------
-        link : MessageSink
-            Link of the message.
-        message : MAVLink_message
-            Decoded message whose checksum, and signature where required, are valid.
-        now : float
-            The wall clock, ``time.monotonic()`` [s].
-        """
+        """Pass a message to its handler, if it comes from an allowed system and targets this vehicle; now [s]."""
         context = self._context
         context.now = now
         handler = self._handlers.get(message.get_type())
@@ -169,13 +138,7 @@ class Autopilot:
             handler(sender, message)
 
     def tick(self, now: float) -> None:
-        """Run timeouts and streams of the wall clock; call it at least every 20 ms.
-
-        Parameters
-        ----------
-        now : float
-            ``time.monotonic()`` [s].
-        """
+        """Run timeouts and streams of the wall clock; call it at least every 20 ms; now [s]."""
         context = self._context
         context.now = now
         elapsed = 0.0 if self._last_tick is None else min(max(now - self._last_tick, 0.0), 1.0)

@@ -15,13 +15,7 @@ _EVERY = 2.0  # s of the wall clock, between two texts of a kind
 
 
 class EventTexts:
-    """Compare snapshots, and send status texts of the changes.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle, which sends the texts.
-    """
+    """Compare snapshots, and send status texts of the changes."""
 
     def __init__(self, context: VehicleContext) -> None:
         self._context = context

@@ -38,33 +38,7 @@ class ReplayResult:
 def replay(
     folder: Path, endpoints: Sequence[Endpoint], options: MavlinkOptions, rate: float | None = 1.0
 ) -> ReplayResult:
-    """Stream a recorded run as a running vehicle that accepts no commands.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of a finished, interrupted or killed run.
-    endpoints : sequence of Endpoint
-        Endpoints of the links.
-    options : MavlinkOptions
-        Identity and profile.
-    rate : float, optional
-        Simulated seconds per second of the wall clock; None: as fast as the links send, without omissions.
-
-    Returns
-    -------
-    ReplayResult
-        Simulated and wall time, and loss_reports of the links.
-
-    Raises
-    ------
-    RunError
-        If the folder holds no readable run.
-    ScenarioError
-        If its scenario is invalid.
-    TelemetryError
-        If a link cannot be opened.
-    """
+    """Stream a recorded run as a running vehicle that accepts no commands."""
     if not (folder / SCENARIO).is_file():
         raise RunError(f"{folder}: holds no run ({SCENARIO} is missing)")
     scenario, record = load_scenario(folder / SCENARIO, imported=True), load_record(folder)

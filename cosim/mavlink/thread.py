@@ -1,9 +1,8 @@
-"""The thread of all links, and the observer that passes snapshots to it.
+"""The thread of all links, and the observer that passes snapshots to it."""
 
-The stepper and this thread share one interpreter lock. So the thread works in slices of well under a millisecond,
-between which it sleeps: the stepper never waits for longer than a slice. Input beyond the capacity of the slices is
-lost in the kernel. The thread polls; no event wakes it.
-"""
+# The stepper and this thread share one interpreter lock. So the thread works in slices of well under a millisecond,
+# between which it sleeps: the stepper never waits for longer than a slice. Input beyond the capacity of the slices is
+# lost in the kernel. The thread polls; no event wakes it.
 
 from __future__ import annotations
 
@@ -63,26 +62,7 @@ class Vehicle(Protocol):
 
 
 class LinkThread:
-    """Observer that streams the run on links, from its own thread, started by `start`.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The vehicle; its methods are called only in the thread.
-    links : sequence of Link
-        Links of the vehicle, which are closed with the thread.
-    step : float
-        Step of the run [s].
-    lead : float
-        Longest time by which simulated time can lead the wall clock [s]; logs start earlier by it.
-
-    Attributes
-    ----------
-    dropped : int
-        Number of snapshots dropped from a full queue.
-    failures : dict of str to int
-        Count of each kind of error in the vehicle's side; the thread continues after them.
-    """
+    """Observer that streams the run on links, from its own thread, started by `start`; step [s], lead [s]."""
 
     def __init__(self, vehicle: Vehicle, links: Sequence[Link], step: float, lead: float = 0.0) -> None:
         self._vehicle, self._links = vehicle, list(links)

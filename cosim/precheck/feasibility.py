@@ -26,18 +26,7 @@ _MAX_MARGIN = 1e5  # m, greatest margin that is tried
 
 
 def region_findings(scenario: Scenario) -> Iterator[Finding]:
-    """Yield the findings on whether start, goal and regions are in the water, and can be satisfied, at time 0.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario to check.
-
-    Yields
-    ------
-    Finding
-        Findings on the start, the goal with all regions, the regions together, overlaps to keep out of, and the path.
-    """
+    """Yield the findings on whether start, goal and regions are in the water, and can be satisfied, at time 0."""
     goal, start = scenario.goal_region, scenario.initial.position
     regions = [secondary.region for secondary in scenario.regions]
     placed = [region for region in regions if not of_attitude(region.shape)]  # attitude limits exclude no position

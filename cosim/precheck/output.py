@@ -19,13 +19,7 @@ _WIDTH = 110
 
 
 def check_text(check: Check) -> str:
-    """Format a check as text: findings by topic, then the verdict.
-
-    Returns
-    -------
-    str
-        Text of several lines.
-    """
+    """Format a check as text: findings by topic, then the verdict."""
     lines = [f"{check.title} ({check.scenario}; {check.vehicle}, {check.law} law)"]
     for topic, heading in _TOPICS.items():
         lines += ["", heading]
@@ -48,13 +42,7 @@ def _verdict(check: Check) -> list[str]:
 
 
 def check_json(check: Check) -> str:
-    """Format a check as JSON, with null for NaN and infinity.
-
-    Returns
-    -------
-    str
-        JSON object with ``holds`` and the findings, each with its numbers.
-    """
+    """Format a check as JSON, with null for NaN and infinity."""
     findings = [
         {
             "topic": finding.topic,

@@ -52,26 +52,8 @@ def path_limits(gains: DeployableGains) -> PathLimits:
 def find_path(
     regions: Sequence[Region], goal: Region, start: Vector3, gains: DeployableGains, duration: float
 ) -> SearchedPath:
-    """Search a path from a start into the goal that satisfies regions throughout, at their positions at time 0.
-
-    Parameters
-    ----------
-    regions : sequence of Region
-        Regions, all treated as hard ones.
-    goal : Region
-        Region in which the path ends.
-    start : tuple of float
-        Position of the start [m, NED].
-    gains : DeployableGains
-        Gains of the law, with the clearance of paths.
-    duration : float
-        Bound of the search in flight time [s].
-
-    Returns
-    -------
-    SearchedPath
-        Result, with the path if one was found.
-    """
+    """Search a path from a start into the goal that satisfies regions throughout, at their positions at time 0."""
+    # with start [m, NED], duration [s]
     at_rest = [dataclasses.replace(region, hard=True, velocity=(0.0, 0.0, 0.0)) for region in regions]
     plan, place = empty_plan(len(at_rest), _SEED), np.array(start, dtype=float)
     limits = path_limits(gains)

@@ -1,8 +1,7 @@
-"""Intersection of regions: a common point, or the certificate that there is none.
+"""Intersection of regions: a common point, or the certificate that there is none."""
 
-Signed distances are Lipschitz with constant 1, and so is their maximum. A box holds no common point if the distance at
-its centre exceeds its half diagonal. Boxes are halved until a common point is found, or no box is left.
-"""
+# Signed distances are Lipschitz with constant 1, and so is their maximum. A box holds no common point if the distance
+# at its centre exceeds its half diagonal. Boxes are halved until a common point is found, or no box is left.
 
 from __future__ import annotations
 
@@ -44,36 +43,13 @@ class Overlap:
 
 
 def common_depth(points: Array, regions: Sequence[Region]) -> Array:
-    """Return the least clearance over regions, shape (m,) [m]: above 0 where all are satisfied.
-
-    Parameters
-    ----------
-    points : ndarray, shape (m, 3)
-        Points [m, NED].
-    regions : sequence of Region
-        Regions, at least one.
-    """
+    """Return the least clearance over regions, shape (m,) [m]: above 0 where all are satisfied; points [m, NED]."""
     depths: Array = np.min([clearances_at(points, region) for region in regions], axis=0)
     return depths
 
 
 def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float = TOLERANCE) -> Overlap:
-    """Find the point of a box with the greatest common depth of regions.
-
-    Parameters
-    ----------
-    regions : sequence of Region
-        Regions, at least one.
-    low, high : ndarray, shape (3,)
-        Corners of the box [m, NED], finite.
-    tolerance : float
-        Accuracy of the depth [m]; the search ends before if it needs too many boxes.
-
-    Returns
-    -------
-    Overlap
-        Best point, with `at_most` - `depth` at most `tolerance` unless the search ended before.
-    """
+    """Find the point of a box with the greatest common depth of regions; low, high (3,) [m, NED], tolerance [m]."""
     half = 0.5 * (np.asarray(high, dtype=float) - low)
     centres = (np.asarray(low, dtype=float) + half)[None, :]
     best_point, best = centres[0], -math.inf
@@ -108,22 +84,8 @@ def _refine(regions: Sequence[Region], point: Array, depth: float, low: Array, h
 
 
 def box_about(regions: Sequence[Region], points: Sequence[Vector3], margin: float) -> tuple[Array, Array]:
-    """Return the corners of a box that holds points and the finite bounds of regions, with a margin.
-
-    Parameters
-    ----------
-    regions : sequence of Region
-        Regions, none or more; infinite bounds are ignored.
-    points : sequence of tuple of float
-        Points, at least one [m, NED].
-    margin : float
-        Margin [m].
-
-    Returns
-    -------
-    tuple of ndarray
-        Lowest and highest corner, shape (3,) each.
-    """
+    """Return the corners of a box that holds points and the finite bounds of regions, with a margin."""
+    # with points [m, NED], margin [m]
     low, high = np.min(points, axis=0), np.max(points, axis=0)
     for region in regions:
         lowest, highest = np.array(region.shape.bounds())

@@ -15,22 +15,7 @@ Array = NDArray[np.float64]
 def evaluate_regions(
     regions: Sequence[Region], position: Sequence[float] | Array, quaternion: Sequence[float]
 ) -> tuple[Array, Array, Array]:
-    """Evaluate regions at a pose, at their positions at time 0.
-
-    Parameters
-    ----------
-    regions : sequence of Region
-        The n regions.
-    position : sequence of float
-        Position [m, NED].
-    quaternion : sequence of float
-        Unit quaternion from body to world, scalar first.
-
-    Returns
-    -------
-    tuple of ndarray
-        Values, shape (n,), gradients, shape (n, 3), clearances, shape (n,) [m], or [rad] for shapes of attitude.
-    """
+    """Evaluate regions at a pose, at their positions at time 0; position [m, NED], returns (n,) [m]."""
     n = len(regions)
     values, gradients, rotation_gradients, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
     pose = np.array(position, dtype=float), np.array(quaternion, dtype=float)

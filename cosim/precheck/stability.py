@@ -41,18 +41,7 @@ _STEP = 1e-4  # m, for the central differences of e_p
 
 
 def vehicle_findings(scenario: Scenario) -> Iterator[Finding]:
-    """Yield the findings on Properties 1-3 of the true vehicle, and on its restoring forces, linear in phi (12).
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario to check.
-
-    Yields
-    ------
-    Finding
-        Findings on Property 1, 2, 3, and (12).
-    """
+    """Yield the findings on Properties 1-3 of the true vehicle, and on its restoring forces, linear in phi (12)."""
     vehicle, model = true_vehicle(scenario), true_model(scenario)
     rng = np.random.default_rng(1)
     velocities, quaternions = rng.normal(size=(_SAMPLES, 6)), rng.normal(size=(_SAMPLES, 4))
@@ -99,18 +88,7 @@ def _damping(model: Model, velocities: Array) -> Finding:
 
 
 def start_weights(scenario: Scenario) -> Array:
-    """Return the weight of each secondary region in the master's first step, shape (n,).
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario to check.
-
-    Raises
-    ------
-    DefinitionError
-        If the arbiter cannot be set up.
-    """
+    """Return the weight of each secondary region in the master's first step, shape (n,)."""
     initial = scenario.initial
     secondary = [r.region for r in scenario.regions]
     clearances = evaluate_regions(secondary, initial.position, initial.quaternion)[2]
@@ -124,20 +102,7 @@ def start_weights(scenario: Scenario) -> Array:
 
 
 def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
-    """Yield the findings on (38) and (45) at the start, and on where else they hold, for the paper's law.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with the paper's law.
-    weights : ndarray, shape (n,)
-        Weight of each secondary region at the start, from the arbiter.
-
-    Yields
-    ------
-    Finding
-        Findings on (38) 1 and 2 as one matrix, (38) 3, (45) 1, and (45) 2 and 3.
-    """
+    """Yield the findings on (38) and (45) at the start, and on where else they hold, for the paper's law."""
     gains: Gains = scenario.law.gains
     model = true_model(scenario)
     goal = scenario.goal_region

@@ -24,18 +24,7 @@ _ROUNDING = 1e-6  # N, tolerance of the linear programs
 
 
 def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
-    """Yield the findings on thrust left beside station keeping in the current, with all thrusters and with one lost.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario to check.
-
-    Yields
-    ------
-    Finding
-        Findings on holding still, and on one thruster lost unless the first one fails.
-    """
+    """Yield the findings on thrust left beside station keeping in the current, with all thrusters and with one lost."""
     vehicle, phi = true_vehicle(scenario), scenario.true_restoring_parameters
     quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
     margin = thrust_margin(vehicle, phi, quaternion, current)
@@ -91,20 +80,7 @@ def _mend_current(scenario: Scenario) -> str:
 
 
 def asked_finding(scenario: Scenario, weights: Array) -> Finding:
-    """Compare the first force of the paper's law with the greatest force of the thrusters in that direction.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with the paper's law.
-    weights : ndarray, shape (n,)
-        Weight of each secondary region at the start, from the arbiter.
-
-    Returns
-    -------
-    Finding
-        Finding on the body force alone, at zero moment.
-    """
+    """Compare the first force of the paper's law with the greatest force of the thrusters in that direction."""
     gains, initial, vehicle = scenario.law.gains, scenario.initial, true_vehicle(scenario)
     (f,), (slope,), _ = evaluate_regions([scenario.goal_region], initial.position, initial.quaternion)
     regions = [secondary.region for secondary in scenario.regions]

@@ -48,24 +48,8 @@ class ThrustMargin:
 
 
 def greatest_force(vehicle: Vehicle, direction_body: Array, hold: Array, alive: Array) -> float | None:
-    """Return the greatest force in a direction beside a constant wrench, by a linear program.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle with its thrusters and their limits.
-    direction_body : ndarray, shape (3,)
-        Direction, a unit vector, body frame.
-    hold : ndarray, shape (6,)
-        Constant wrench that the thrusters give too [N, N m].
-    alive : ndarray of bool, shape (n,)
-        True for thrusters that work.
-
-    Returns
-    -------
-    float or None
-        Greatest force [N] beside `hold`; None if `hold` is not feasible.
-    """
+    """Return the greatest force in a direction beside a constant wrench, by a linear program; hold [N, N m]."""
+    # with returns [N]
     matrix = np.column_stack([vehicle.thruster_matrix, -np.r_[direction_body, 0.0, 0.0, 0.0]])
     bounds = [*zip(vehicle.thrust_min * alive, vehicle.thrust_max * alive, strict=True), (0.0, None)]
     done = linprog(np.r_[np.zeros(vehicle.n_thrusters), -1.0], A_eq=matrix, b_eq=hold, bounds=bounds)
@@ -73,17 +57,8 @@ def greatest_force(vehicle: Vehicle, direction_body: Array, hold: Array, alive: 
 
 
 def held_wrench(model: Model, quaternion: Array, current: Array) -> Array:
-    """Return the wrench that keeps a vehicle at rest in a current, (6,) [N, N m], body frame: (11) with nu = 0.
-
-    Parameters
-    ----------
-    model : Model
-        Model whose `mass` is the added mass alone, which causes Munk's moment.
-    quaternion : ndarray, shape (4,)
-        Attitude, from body to world.
-    current : ndarray, shape (3,)
-        Velocity of the water [m/s], world frame.
-    """
+    """Return the wrench that keeps a vehicle at rest in a current, (6,) [N, N m], body frame: (11) with nu = 0."""
+    # with current [m/s]
     relative = np.zeros(6)
     relative[:3] = -rotation_matrix(quaternion).T @ current
     drag = damping(model.linear_damping, model.quadratic_damping, relative) * relative
@@ -92,24 +67,8 @@ def held_wrench(model: Model, quaternion: Array, current: Array) -> Array:
 
 
 def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> ThrustMargin:
-    """Return the forces that the thrusters can give, and those left while the vehicle is kept still.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        The true vehicle.
-    phi : ndarray, shape (4,)
-        Restoring parameters of the vehicle [N, N m] (12).
-    quaternion : ndarray, shape (4,)
-        Attitude that is kept, from body to world.
-    current : ndarray, shape (3,)
-        Velocity of the water [m/s], world frame.
-
-    Returns
-    -------
-    ThrustMargin
-        Least forces over the 26 `DIRECTIONS`.
-    """
+    """Return the forces that the thrusters can give, and those left while the vehicle is kept still; phi [N, N m]."""
+    # with current [m/s]
     hold = held_wrench(_added(vehicle, phi), quaternion, current)
     weightless = held_wrench(_added(vehicle, np.zeros(4)), quaternion, current)
     all_alive = np.ones(vehicle.n_thrusters, dtype=bool)

@@ -18,20 +18,8 @@ _DOMINANT_WEIGHT = 0.5  # weight from which a criterion is active even if the ve
 
 
 def is_resting(goal: Array, velocity: Array) -> NDArray[np.bool_]:
-    """Return a mask of the rows in which the vehicle rests in the goal region: slower than 0.02 m/s.
-
-    Parameters
-    ----------
-    goal : ndarray, shape (rows,)
-        Clearance of the goal [m].
-    velocity : ndarray, shape (rows, 3)
-        Velocity over ground [m/s], in any frame.
-
-    Returns
-    -------
-    ndarray of bool, shape (rows,)
-        True where it rests; False where a number is missing.
-    """
+    """Return a mask of the rows in which the vehicle rests in the goal region: slower than 0.02 m/s; goal [m]."""
+    # with velocity [m/s]
     slow: NDArray[np.bool_] = np.linalg.norm(velocity, axis=1) < _SLOW
     return slow & (goal >= 0.0)
 
@@ -39,28 +27,10 @@ def is_resting(goal: Array, velocity: Array) -> NDArray[np.bool_]:
 def active_regions(
     criteria: Sequence[int], memberships: Array, weights: Array, clearances: Array, resting: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
-    """Return the active region of each row.
-
-    It is the most critical region, that of the least clearance, of the criterion with the greatest weight. It is the
-    goal if the membership of that criterion is 0, or its weight below 0.005; also if the vehicle rests in the goal
-    region, the criterion weighs less than 0.5, and its region is satisfied.
-
-    Parameters
-    ----------
-    criteria : sequence of int
-        Index of the criterion of each of the n secondary regions.
-    memberships, weights : ndarray, shape (rows, criteria)
-        Memberships and weights of the criteria.
-    clearances : ndarray, shape (rows, n)
-        Clearances of the secondary regions [m or rad].
-    resting : ndarray of bool, shape (rows,)
-        Mask of `is_resting`.
-
-    Returns
-    -------
-    ndarray, shape (rows,)
-        Index of the region: 0 for the goal, i + 1 for the secondary region i.
-    """
+    """Return the active region of each row; clearances [m or rad]."""
+    # It is the most critical region, that of the least clearance, of the criterion with the greatest weight. It is the
+    # goal if the membership of that criterion is 0, or its weight below 0.005; also if the vehicle rests in the goal
+    # region, the criterion weighs less than 0.5, and its region is satisfied.
     rows = np.arange(len(weights))
     criterion = np.argmax(np.where(np.isnan(weights), -np.inf, weights), axis=1)
     criterion_of_region = np.array(criteria, dtype=int)

@@ -38,22 +38,7 @@ _MODES = {
 
 
 def command_events(log: Sequence[tuple[int, Command]], step: float, max_moments: int) -> list[tuple[float, str]]:
-    """List times and texts of the commands, grouped by moments.
-
-    Parameters
-    ----------
-    log : sequence of (int, Command)
-        Steps, and the commands applied at them.
-    step : float
-        Step of the run [s].
-    max_moments : int
-        Greatest number of moments; of more, those closest in time are joined.
-
-    Returns
-    -------
-    list of (float, str)
-        Time [s] of the first command of each moment, and a text of all its commands.
-    """
+    """List times and texts of the commands, grouped by moments; step [s], returns [s]."""
     steps = sorted({k for k, _ in log})
     gaps = [later - earlier for earlier, later in zip(steps, steps[1:], strict=False)]
     # commands at most this many steps apart share a moment
@@ -72,13 +57,7 @@ def _joined(words: Sequence[str]) -> str:
 
 
 def command_words(command: Command) -> str:
-    """Format a command as text.
-
-    Returns
-    -------
-    str
-        Text such as ``Target at (7, 0, 4) m``.
-    """
+    """Format a command as text."""
     match command:
         case Arm():
             return "Armed" if command.armed else "Disarmed"

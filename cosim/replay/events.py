@@ -39,13 +39,7 @@ class Event:
 
 
 def events_of(run: Run, log: Log) -> list[Event]:
-    """List the events of a run in the order of time, at most `_MAX_EVENTS` of a kind.
-
-    Returns
-    -------
-    list of Event
-        The events; the last one is the end of the run.
-    """
+    """List the events of a run in the order of time, at most `_MAX_EVENTS` of a kind."""
     step, rows = run.scenario.time.step, len(run.record)
     # a killed run has logged commands of rows that it did not save; a reset comes after the last row
     log = [(min(k, rows - 1), command) for k, command in log if k <= rows]
@@ -95,18 +89,7 @@ def _violations(run: Run) -> Iterator[Event]:
 
 
 def active_region_changes(run: Run) -> list[tuple[float, int]]:
-    """List the changes of the active region; of more than 12 those after which it stays longest.
-
-    Parameters
-    ----------
-    run : Run
-        A finished, interrupted or killed run.
-
-    Returns
-    -------
-    list of (float, int)
-        Time [s] and index of the new active region, 0 for the goal; the first entry is the region at the start.
-    """
+    """List the changes of the active region; of more than 12 those after which it stays longest; returns [s]."""
     return _longest_changes(_all_changes(run))
 
 

@@ -27,22 +27,7 @@ _SEA_WATER = 1026.0 * 9.81  # N/m3; for the size of a hull without a radius in t
 
 
 def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = False) -> dict[str, Any]:
-    """Return the header of a run, which a view needs before its first row.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the run.
-    columns : sequence of Column
-        Columns of the view's rows, in their order.
-    commands : bool
-        True if the viewer may send commands.
-
-    Returns
-    -------
-    dict
-        Values for JSON: texts, numbers, booleans, lists and dicts.
-    """
+    """Return the header of a run, which a view needs before its first row."""
     limits, colours = limits_of(scenario), colours_of_regions(scenario)
     return {
         "version": VERSION,
@@ -73,23 +58,9 @@ def rules_of(system: System) -> list[dict[str, str]]:
 
 
 def shape_of(shape: Shape, limits: Bounds) -> dict[str, Any]:
-    """Return a shape with its ``kind``, its own parameters [m, rad, NED], and its ``drawing``.
-
-    The drawing of a shape of position is its ``centre`` and ``half_axes``, or its ``planes``, each with ``point`` and
-    ``normal``, or the ``points`` and ``faces`` of its mesh.
-
-    Parameters
-    ----------
-    shape : Shape
-        Shape of a region.
-    limits : Bounds
-        Box at which an unbounded mesh is cut [m, NED].
-
-    Raises
-    ------
-    RegionError
-        If the page has no drawing of the shape.
-    """
+    """Return a shape with its ``kind``, its own parameters [m, rad, NED], and its ``drawing``; limits [m, NED]."""
+    # The drawing of a shape of position is its `centre` and `half_axes`, or its `planes`, each with `point` and
+    # `normal`, or the `points` and `faces` of its mesh.
     kind = name_of(shape)
     known = {"kind": kind, **dataclasses.asdict(shape)}  # type: ignore[call-overload]
     return known if kind in ATTITUDE_SHAPES else known | {"drawing": _drawing(shape, limits)}
@@ -149,11 +120,9 @@ def _words(rule: str) -> str:
 
 
 def _vehicle(vehicle: Vehicle) -> dict[str, Any]:
-    """Return the vehicle's drawing: a hull by its radius, or else by its buoyancy, and arrows at its thrusters.
-
-    A vehicle's file has the wrench of each thruster, but no position: an arrow is at the point of its line of action
-    that is nearest to the body origin.
-    """
+    """Return the vehicle's drawing: a hull by its radius, or else by its buoyancy, and arrows at its thrusters."""
+    # A vehicle's file has the wrench of each thruster, but no position: an arrow is at the point of its line of action
+    # that is nearest to the body origin.
     radius = vehicle.hull_radius or (0.75 * vehicle.buoyancy / (_SEA_WATER * np.pi)) ** (1.0 / 3.0)
     thrusters = []
     for i, (line, least, most) in enumerate(

@@ -35,22 +35,7 @@ _MARK = '<script type="application/json" id="runs">'  # start of the data in a p
 
 
 def replay_page(runs: Sequence[dict[str, Any]], title: str, flight: dict[str, Any] | None = None) -> str:
-    """Return the page of some runs.
-
-    Parameters
-    ----------
-    runs : sequence of dict
-        Traces of the runs, from `Trace.as_json`; none for a live page, which receives its run over its connection.
-    title : str
-        Title of the page.
-    flight : dict, optional
-        Data with which an interactive page simulates its run again, from `cosim.replay.interactive.data.flight_data`.
-
-    Returns
-    -------
-    str
-        The page as HTML.
-    """
+    """Return the page of some runs."""
     assets = resources.files("cosim.replay") / "assets"
     style, script = (
         "".join(_COMMENT.sub("", (assets / name).read_text(encoding="utf-8")) for name in names)
@@ -73,24 +58,7 @@ def _embedded(data: Any) -> str:
 
 
 def write_page(path: Path, runs: Sequence[dict[str, Any]], title: str, flight: dict[str, Any] | None = None) -> Path:
-    """Write the page of some runs.
-
-    Parameters
-    ----------
-    path : Path
-        The file, which is written atomically.
-    runs : sequence of dict
-        Traces of the runs, from `Trace.as_json`.
-    title : str
-        Title of the page.
-    flight : dict, optional
-        Data of an interactive page, from `cosim.replay.interactive.data.flight_data`.
-
-    Returns
-    -------
-    Path
-        The file.
-    """
+    """Write the page of some runs."""
     return write_atomic(path, replay_page(runs, title, flight))
 
 

@@ -15,32 +15,7 @@ from cosim.results.run_result import REPLAY, Run, load_run
 
 
 def write_replay(run: Run, out: Path | None = None, title: str | None = None, interactive: bool = False) -> Path:
-    """Write the page of one run.
-
-    Parameters
-    ----------
-    run : Run
-        The run.
-    out : Path, optional
-        The file; default: ``replay.html`` in the run folder.
-    title : str, optional
-        Title of the page; default: the scenario's.
-    interactive : bool
-        True if the page can simulate the run again, with other numbers.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    RunError
-        If its log of commands cannot be read, or an interactive page cannot simulate the scenario.
-    BuildError, TranslationError, UnsupportedError
-        If the page is interactive, and there is no compiler for WebAssembly, or a law or the arbiter's rules have no
-        translation to C.
-    """
+    """Write the page of one run."""
     flight = flight_data(run, ViewColumns(run.scenario, run.record.columns).columns) if interactive else None
     trace = trace_of(run, MAX_BYTES_INTERACTIVE if interactive else MAX_BYTES)
     return write_page(out or run.folder / REPLAY, [trace.as_json()], title or run.scenario.title, flight)
@@ -49,32 +24,7 @@ def write_replay(run: Run, out: Path | None = None, title: str | None = None, in
 def replay(
     folders: Sequence[Path], out: Path | None = None, title: str | None = None, interactive: bool = False
 ) -> Path:
-    """Write the page of one or several runs that were completed, interrupted or killed.
-
-    Parameters
-    ----------
-    folders : sequence of Path
-        Run folders.
-    out : Path, optional
-        The file; default: ``replay.html``, in the folder of a single run, or in the current one.
-    title : str, optional
-        Title of the page; default: that of the scenario; of several runs `joint_title`.
-    interactive : bool
-        True if the page can simulate its one run again, with other numbers.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    RunError
-        If a folder holds no run that can be read, or is named twice; if the file exists and is no replay, or cannot be
-        written; or if an interactive page cannot simulate the scenario.
-    ScenarioError
-        If the scenario of a run is invalid.
-    """
+    """Write the page of one or several runs that were completed, interrupted or killed."""
     names = _names(folders)
     if interactive and len(folders) > 1:
         raise RunError(f"{len(folders)} runs, expected one for a page that flies")
@@ -95,18 +45,7 @@ def replay(
 
 
 def joint_title(titles: Mapping[str, str]) -> str:
-    """Join the titles of several runs: each title once, before the names of its runs.
-
-    Parameters
-    ----------
-    titles : mapping of str to str
-        Title of each run, by the run's name.
-
-    Returns
-    -------
-    str
-        Title such as ``Docking: a, b; Docking (changed: time.duration = 5 s): c``.
-    """
+    """Join the titles of several runs: each title once, before the names of its runs."""
     return "; ".join(
         f"{title}: {', '.join(n for n in titles if titles[n] == title)}" for title in dict.fromkeys(titles.values())
     )

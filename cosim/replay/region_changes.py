@@ -39,37 +39,13 @@ _SAME = 1e-6  # m; closer radii of a record are equal up to rounding
 
 
 def log_of(run: Run) -> Log:
-    """Read the log of commands of a run.
-
-    Returns
-    -------
-    sequence of (int, Command)
-        Each command with the step at which it was applied; empty for a run without commands.
-
-    Raises
-    ------
-    RunError
-        If the log cannot be read.
-    """
+    """Read the log of commands of a run."""
     file = run.folder / COMMANDS_LOG
     return read_log(file) if run.scenario.commands.enabled and file.exists() else ()
 
 
 def changes_of(run: Run, log: Log) -> list[dict[str, Any]]:
-    """List the changes of regions during a run, except their motion.
-
-    Parameters
-    ----------
-    run : Run
-        The run.
-    log : sequence of (int, Command)
-        Log of commands, from `log_of`.
-
-    Returns
-    -------
-    list of dict
-        ``time`` [s], ``region`` (its index in the header), ``shape`` and ``gain`` from then on, in the order of time.
-    """
+    """List the changes of regions during a run, except their motion; returns [s]."""
     if not run.scenario.commands.enabled:
         return []
     by_settings = _Changes(run).of(log)

@@ -28,28 +28,7 @@ def sampled_rows(
     moments: NDArray[np.intp],
     max_bytes: int = MAX_BYTES,
 ) -> NDArray[np.intp]:
-    """Select the rows of a page: evenly spaced ones, extremes of the main signals, and events.
-
-    Parameters
-    ----------
-    record : Rows
-        Record of the run, with its ``time`` [s].
-    columns : int
-        Number of columns of the page.
-    extreme_signals : iterable of sequence of ndarray
-        Signals whose extremes are kept, block by block of the record.
-    signals : int
-        Number of these signals.
-    moments : ndarray of int
-        Row indices of events, which are kept with the rows before them.
-    max_bytes : int
-        Greatest number of bytes of the page's numbers.
-
-    Returns
-    -------
-    ndarray of int
-        Row indices in rising order, including the first and the last.
-    """
+    """Select the rows of a page: evenly spaced ones, extremes of the main signals, and events; record [s]."""
     n = len(record)
     minutes = (record.value("time", -1) - record.value("time", 0)) / 60.0
     budget = min(_BYTES + _BYTES_A_MINUTE * max(0.0, minutes - 1.0), max_bytes)

@@ -36,16 +36,9 @@ class Trace:
     steps: NDArray[np.intp]  # (n,) their indices in the record
 
     def as_json(self) -> dict[str, Any]:
-        """Return the header with the packed numbers.
-
-        The numbers are float64, little-endian, column by column. Their bytes are ordered by planes, all first bytes,
-        then all second ones and so on, which compresses better; then raw deflate, and base64.
-
-        Returns
-        -------
-        dict
-            Texts, numbers, lists and dicts for JSON; the rows as text in ``data``.
-        """
+        """Return the header with the packed numbers."""
+        # The numbers are float64, little-endian, column by column. Their bytes are ordered by planes, all first bytes,
+        # then all second ones and so on, which compresses better; then raw deflate, and base64.
         numbers = np.ascontiguousarray(self.rows.T, dtype="<f8")
         planes = np.ascontiguousarray(numbers.view(np.uint8).reshape(-1, 8).T).tobytes()
         deflate = zlib.compressobj(6, zlib.DEFLATED, -zlib.MAX_WBITS)
@@ -54,25 +47,7 @@ class Trace:
 
 
 def trace_of(run: Run, max_bytes: int = MAX_BYTES) -> Trace:
-    """Make the trace of a run.
-
-    Parameters
-    ----------
-    run : Run
-        The run.
-    max_bytes : int
-        Greatest number of bytes of the trace's numbers.
-
-    Returns
-    -------
-    Trace
-        Trace with a limited number of rows.
-
-    Raises
-    ------
-    RunError
-        If its log of commands cannot be read.
-    """
+    """Make the trace of a run."""
     scenario, record, summary = run.scenario, run.record, run.summary
     view_columns = ViewColumns(scenario, record.columns)
     log = log_of(run)

@@ -20,22 +20,7 @@ _DRAWN = (  # prefixes of the columns that a view draws
 
 
 class ViewColumns:
-    """Select the columns that a view draws, and add the active region and the firing strength of each rule.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the run.
-    columns : sequence of Column
-        Columns of the run's rows.
-
-    Attributes
-    ----------
-    picked : list of int
-        Indices of the drawn columns in a row of the run.
-    columns : tuple of Column
-        Columns of a view's rows: the picked ones in their order, then ``active``, then ``rule.R1`` and so on.
-    """
+    """Select the columns that a view draws, and add the active region and the firing strength of each rule."""
 
     def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
         names = [column.name for column in columns]
@@ -59,18 +44,7 @@ class ViewColumns:
         )
 
     def compute_rows(self, picked: Array) -> Array:
-        """Compute the rows of a view.
-
-        Parameters
-        ----------
-        picked : ndarray, shape (rows, picked columns)
-            Rows of the run, of the columns `picked` alone.
-
-        Returns
-        -------
-        ndarray, shape (rows, columns)
-            The same rows with active region and firing strengths; NaN where an input of the rules is not finite.
-        """
+        """Compute the rows of a view; picked (rows, picked columns), returns (rows, columns)."""
         memberships = picked[:, self._memberships]
         weights, clearances = picked[:, self._weights], picked[:, self._clearances]
         resting = is_resting(picked[:, self._goal], picked[:, self._velocity])

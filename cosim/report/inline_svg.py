@@ -15,22 +15,8 @@ _Rgb = tuple[int, int, int]
 
 
 def inline_svg(svg: str, alt: str) -> str:
-    """Return an SVG file as an element of a page, with dark colours where the reader prefers a dark theme.
-
-    Each colour becomes a custom property whose fallback is the colour itself: paper and light screens show the file.
-
-    Parameters
-    ----------
-    svg : str
-        Text of the file.
-    alt : str
-        Description of the figure for readers who do not see it.
-
-    Returns
-    -------
-    str
-        The ``svg`` element.
-    """
+    """Return an SVG file as an element of a page, with dark colours where the reader prefers a dark theme."""
+    # Each colour becomes a custom property whose fallback is the colour itself: paper and light screens show the file.
     element = svg[svg.index("<svg") :]
     colours = sorted({c.lower() for style in _STYLE.findall(element) for c in _COLOUR.findall(style)} | {"#000000"})
     dark = "".join(f"--c{colour[1:]}:{dark_colour(colour)};" for colour in colours)
@@ -42,18 +28,7 @@ def inline_svg(svg: str, alt: str) -> str:
 
 
 def dark_colour(colour: str) -> str:
-    """Return the colour for a dark ground: greys from white to black change places, hues are lightened.
-
-    Parameters
-    ----------
-    colour : str
-        Colour on white, ``#rrggbb``.
-
-    Returns
-    -------
-    str
-        Colour on the dark ground, with a contrast of 3 to 1 at least, unless it is a light grey.
-    """
+    """Return the colour for a dark ground: greys from white to black change places, hues are lightened."""
     r, g, b = (int(colour[i : i + 2], 16) for i in (1, 3, 5))
     if max(r, g, b) - min(r, g, b) < _GREY:
         return _mixed(_DARK_INK, DARK_GROUND, (r + g + b) / 765.0)

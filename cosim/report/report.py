@@ -19,22 +19,8 @@ FORMATS = ("html", "png")
 
 
 def write_report(run: Run, formats: Collection[str] = ("html",)) -> list[Path]:
-    """Write the report of a run into its folder.
-
-    All files are written to a temporary folder, and replace the old ones at the end.
-
-    Parameters
-    ----------
-    run : Run
-        Completed, interrupted or killed run.
-    formats : collection of str
-        Formats from `FORMATS`: ``html`` is ``report.html`` with its figures as SVG, ``png`` the figures as SVG and PNG.
-
-    Returns
-    -------
-    list of Path
-        Written files, the figures last.
-    """
+    """Write the report of a run into its folder."""
+    # All files are written to a temporary folder, and replace the old ones at the end.
     # importing Matplotlib takes as long as all other imports together
     from cosim.report.figures.sampled_rows import make_figure_data
 

@@ -16,13 +16,7 @@ from cosim.simulation.signals import Array
 
 
 def scenario_as_flown(scenario: Scenario, record: Rows) -> Scenario:
-    """Return the scenario with the obstacles that were added, at their last size, and with the last target.
-
-    Returns
-    -------
-    Scenario
-        The changed scenario, or the same one if commands were not enabled.
-    """
+    """Return the scenario with the obstacles that were added, at their last size, and with the last target."""
     if not scenario.commands.enabled:
         return scenario
     regions = tuple(
@@ -35,20 +29,8 @@ def scenario_as_flown(scenario: Scenario, record: Rows) -> Scenario:
 
 
 def radii_of(record: Rows, name: str) -> Iterator[tuple[Array, Array]]:
-    """Yield times and radii of an obstacle, block by block, from the vehicle's position and the recorded clearance.
-
-    Parameters
-    ----------
-    record : Rows
-        Record of the run.
-    name : str
-        Name of a dynamic region.
-
-    Yields
-    ------
-    times, radii : ndarray, shape (rows,)
-        Times [s] and radii [m], without rows before the obstacle was added or with a NaN pose.
-    """
+    """Yield times and radii of an obstacle, block by block, from the vehicle's position and the recorded clearance."""
+    # with returns [s]
     position, shift = ([f"{of}.{axis}" for axis in "xyz"] for of in ("position", f"{name}.shift"))
     for block in record.blocks(["time", *position, *shift, f"{name}.clearance"]):
         shifts = block.stack(shift)

@@ -12,22 +12,7 @@ from cosim.simulation.signals import Array
 
 
 def extreme_rows(blocks: Iterable[Sequence[Array]], signals: int, edges: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the rows at which each signal is first least and first greatest in each part of a run.
-
-    Parameters
-    ----------
-    blocks : iterable of sequence of ndarray
-        The signals, each of shape (rows,), block by block of the run.
-    signals : int
-        Number of signals.
-    edges : ndarray of int, shape (parts + 1,)
-        The first row of each part and the one behind the last, rising.
-
-    Returns
-    -------
-    ndarray of int
-        Row indices in rising order. A signal without a finite value in a part contributes no row there.
-    """
+    """Return the rows at which each signal is first least and first greatest in each part of a run."""
     found = _Extremes(len(edges) - 1, signals)
     first = 0
     for block in blocks:
@@ -62,20 +47,7 @@ class _Extremes:
 
 
 def even_edges(rows: int, parts: int) -> NDArray[np.intp]:
-    """Return the edges of parts of equal length of a run; the first parts are one row longer if needed.
-
-    Parameters
-    ----------
-    rows : int
-        Number of rows of the run.
-    parts : int
-        Number of parts, at least one.
-
-    Returns
-    -------
-    ndarray of int, shape (parts + 1,)
-        First row of each part and the number of rows, as `numpy.array_split` divides them.
-    """
+    """Return the edges of parts of equal length of a run; the first parts are one row longer if needed."""
     size, longer = divmod(rows, parts)
     part = np.arange(parts + 1)
     edges: NDArray[np.intp] = part * size + np.minimum(part, longer)
@@ -83,20 +55,8 @@ def even_edges(rows: int, parts: int) -> NDArray[np.intp]:
 
 
 def rows_at(rows: Rows, times: Sequence[float]) -> NDArray[np.intp]:
-    """Return the index of the first row at or after each time; the number of rows for a time after the end.
-
-    Parameters
-    ----------
-    rows : Rows
-        Rows of a run with a rising ``time`` [s].
-    times : sequence of float
-        Times to look up [s].
-
-    Returns
-    -------
-    ndarray of int, shape (len(times),)
-        Row indices, from 0.
-    """
+    """Return the index of the first row at or after each time; the number of rows for a time after the end."""
+    # with rows [s], times [s]
     found = np.zeros(len(times), np.intp)
     for block in rows.blocks(["time"]):
         found += np.searchsorted(block["time"], times)

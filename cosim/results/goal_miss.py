@@ -28,25 +28,7 @@ _CHECK = "`cosim check FILE` looks for a way into the goal and for enough thrust
 
 
 def explain_miss(scenario: Scenario, record: Rows, flags: list[str], summary: dict[str, Any]) -> str | None:
-    """Explain why the run did not end at rest in its goal region.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario as flown.
-    record : Rows
-        Record of the run.
-    flags : list of str
-        Names of the flags of saturated actuators.
-    summary : dict
-        Summary of the run.
-
-    Returns
-    -------
-    str or None
-        One sentence with the cause, and one that names the command that checks a scenario; None if the goal is not
-        missed, or the run did not end by itself, was commanded from outside, or has no numbers at its end.
-    """
+    """Explain why the run did not end at rest in its goal region."""
     commanded = scenario.commands.enabled or bool(scenario.log)
     if summary["settled"] or summary["status"] != "completed" or commanded or not scenario.has_goal:
         return None

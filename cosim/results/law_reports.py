@@ -12,15 +12,10 @@ REJECTED = "law.rejected"  # column with the fraction of the samples so far that
 
 
 class Isolations:
-    """Finds when thrusters are isolated and used again, block by block.
-
-    Attributes
-    ----------
-    changes : list of (float, int, bool)
-        Time [s], number of the thruster, and True if it is isolated, False if it is used again.
-    """
+    """Finds when thrusters are isolated and used again, block by block."""
 
     def __init__(self) -> None:
+        # time [s], number of the thruster, and True if it is isolated, False if it is used again
         self.changes: list[tuple[float, int, bool]] = []
         self._isolated: list[int] = []  # in the order of their isolation
 

@@ -46,18 +46,7 @@ class LogFacts:
 
 
 def load_log_facts(folder: Path) -> LogFacts:
-    """Load the facts about the log of an imported run.
-
-    Returns
-    -------
-    LogFacts
-        The facts that `cosim.import_log` wrote.
-
-    Raises
-    ------
-    RunError
-        If the file is missing, or cannot be read.
-    """
+    """Load the facts about the log of an imported run."""
     file = folder / IMPORT
     try:
         return decode(read_json(file), LogFacts)

@@ -14,15 +14,7 @@ ROUNDING = 1e-12  # part of the greatest |V| of a run: a smaller rise between tw
 
 
 def summarise_lyapunov(record: Rows) -> dict[str, Any] | None:
-    """Summarise V over a run.
-
-    Returns
-    -------
-    dict or None
-        For each form of V: its first, last and least value [N m]; the number of steps in which it rose by more than
-        ``threshold`` [N m]; the times at which it first rose and was first negative [s], None for never. None if V is
-        not recorded.
-    """
+    """Summarise V over a run; returns [N m]."""
     if "lyapunov.rate" not in record.units:
         return None
     return {form: _summarise_form(record, f"lyapunov.{form}") for form in FORMS}

@@ -23,13 +23,7 @@ class Claim:
 
 
 def paper_claims(scenario: Scenario, summary: dict[str, Any]) -> list[Claim]:
-    """Return the paper's claims beside the results of this run.
-
-    Returns
-    -------
-    list of Claim
-        The claims in the order of the paper; their results and reasons follow from the run's summary.
-    """
+    """Return the paper's claims beside the results of this run."""
     return [
         _reaching(summary),
         _window(scenario, summary),

@@ -27,22 +27,7 @@ _KEPT = 24  # signals of a larger record that are kept in memory
 
 
 class Rows:
-    """Signals over some rows of a run, in memory.
-
-    Parameters
-    ----------
-    columns : sequence of Column
-        Columns of the signals.
-    arrays : mapping of str to ndarray of shape (rows,)
-        The signals, by the names of the columns.
-
-    Attributes
-    ----------
-    columns : tuple of Column
-        Columns in the order of the row.
-    units : dict
-        Unit of each signal, by name, in the order of the columns.
-    """
+    """Signals over some rows of a run, in memory; arrays (rows,)."""
 
     def __init__(self, columns: Sequence[Column], arrays: Mapping[str, Array]) -> None:
         self.columns = tuple(columns)
@@ -66,41 +51,13 @@ class Rows:
         return self.stack(list(self.units))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
-        """Yield all rows in their order, in blocks that fit into memory.
-
-        Parameters
-        ----------
-        names : sequence of str, optional
-            Names of the signals; default: all.
-
-        Raises
-        ------
-        RunError
-            If the signals cannot be read.
-        KeyError
-            If there is no such signal.
-        """
+        """Yield all rows in their order, in blocks that fit into memory."""
         columns = self._columns_of(names)
         for first in range(0, len(self), _BLOCK):
             yield Rows(columns, {c.name: self[c.name][first : first + _BLOCK] for c in columns})
 
     def take(self, rows: Sequence[int] | NDArray[np.intp], names: Sequence[str] | None = None) -> Rows:
-        """Return a selection of rows.
-
-        Parameters
-        ----------
-        rows : sequence of int
-            Row indices in rising order, from 0.
-        names : sequence of str, optional
-            Names of the signals; default: all.
-
-        Raises
-        ------
-        RunError
-            If the signals cannot be read.
-        KeyError
-            If there is no such signal.
-        """
+        """Return a selection of rows."""
         columns = self._columns_of(names)
         return Rows(columns, {column.name: self[column.name][np.asarray(rows, np.intp)] for column in columns})
 
@@ -230,18 +187,7 @@ class Record(Rows):
 
 
 def load_record(folder: Path) -> Record:
-    """Open the record of a run, whether it was finished or killed.
-
-    Returns
-    -------
-    Record
-        All rows that were written.
-
-    Raises
-    ------
-    RunError
-        If the folder holds no record, or it cannot be read.
-    """
+    """Open the record of a run, whether it was finished or killed."""
     require_utf8(folder)
     files = [folder / RECORD] if (folder / RECORD).exists() else part_files(folder)
     if not files:
@@ -289,13 +235,7 @@ def _opened(file: Path) -> Iterator[Any]:
 
 
 def require_utf8(path: Path) -> None:
-    """Raise a RunError for a path that is not UTF-8, which Parquet's library does not support.
-
-    Raises
-    ------
-    RunError
-        If the path is not UTF-8.
-    """
+    """Raise a RunError for a path that is not UTF-8, which Parquet's library does not support."""
     try:
         str(path).encode()
     except UnicodeEncodeError as error:

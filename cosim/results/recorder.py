@@ -28,23 +28,7 @@ _WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_spl
 
 
 class Recorder:
-    """Observer that records each step's row, in parts that stay readable after a kill.
-
-    Parameters
-    ----------
-    folder : Path
-        The run folder.
-    columns : sequence of Column
-        Columns of the rows.
-    rows_per_part : int, optional
-        Greatest number of rows in a part. A part is written at about so many rows, or after a second of the wall
-        clock. Default: as many as take 16 MiB.
-
-    Attributes
-    ----------
-    rows : int
-        Number of observed rows.
-    """
+    """Observer that records each step's row, in parts that stay readable after a kill."""
 
     # Ctrl-C may interrupt every call. So that the record has each row once, the bookkeeping is changed by single
     # assignment statements, and interrupted operations are repeated.
@@ -72,13 +56,7 @@ class Recorder:
         self.rows = 0
 
     def observe(self, k: int, row: Array) -> None:
-        """Record the row of step `k`, shape (columns,) of float64.
-
-        Raises
-        ------
-        OSError, pyarrow.ArrowException
-            If earlier rows cannot be written. They are kept, and written again with the next row.
-        """
+        """Record the row of step `k`, shape (columns,) of float64."""
         if self._filled == len(self._rows) or time.monotonic() > self._due:
             self._transpose()
         self._rows[self._filled][:] = row.data
@@ -86,10 +64,8 @@ class Recorder:
         self.rows += 1
 
     def close(self) -> None:
-        """Write the remaining rows, and replace the parts by the complete record.
-
-        After an error the parts hold all rows, and it may be called again.
-        """
+        """Write the remaining rows, and replace the parts by the complete record."""
+        # After an error the parts hold all rows, and it may be called again.
         if not self._is_complete:
             try:
                 self._conclude()

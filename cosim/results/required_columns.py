@@ -18,20 +18,7 @@ _NAMED = 3  # greatest number of columns named in a message
 
 
 def require_columns(scenario: Scenario, record: Record) -> None:
-    """Raise a RunError if a record lacks columns of its scenario; log a warning if it lacks optional ones.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-    record : Record
-        Record of the run; it may have more columns.
-
-    Raises
-    ------
-    RunError
-        If columns are missing or in another order; the message names some of them.
-    """
+    """Raise a RunError if a record lacks columns of its scenario; log a warning if it lacks optional ones."""
     expected, found = column_names(scenario), list(record.units)
     missing = [name for name in expected if name not in record.units]
     needed = [name for name in missing if not _is_optional(name)]

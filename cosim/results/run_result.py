@@ -206,29 +206,7 @@ def _text(file: Path, summary: dict[str, Any], key: str) -> str:
 
 
 def open_run(path: Path, scenario: Scenario, status: str, wall_time: float | None) -> Run:
-    """Open a run whose status and wall time are known.
-
-    Parameters
-    ----------
-    path : Path
-        The run folder.
-    scenario : Scenario
-        The scenario of the run.
-    status : str
-        ``"completed"``, ``"interrupted"``, ``"reset"``, ``"killed"``, ``"imported"``, or ``"failed: ..."``.
-    wall_time : float or None
-        Wall-clock time of the stepping [s].
-
-    Returns
-    -------
-    Run
-        The run with its summary.
-
-    Raises
-    ------
-    RunError
-        If the record cannot be read, or is not of this scenario.
-    """
+    """Open a run whose status and wall time are known; wall_time [s]."""
     record = load_record(path)
     require_columns(scenario, record)
     last = -np.inf

@@ -22,34 +22,13 @@ class Span:
 
 
 class Spans:
-    """Finds the spans in which a condition holds, from one block of rows to the next.
-
-    Attributes
-    ----------
-    open : Span or None
-        The span that has not ended.
-    """
+    """Finds the spans in which a condition holds, from one block of rows to the next."""
 
     def __init__(self) -> None:
         self.open: Span | None = None
 
     def add(self, flags: Flags, time: Array, signal: Array | None = None) -> list[Span]:
-        """Add the next rows, and return the spans that end in them.
-
-        Parameters
-        ----------
-        flags : ndarray of bool, shape (rows,)
-            The condition at each row.
-        time : ndarray, shape (rows,)
-            Time of each row [s].
-        signal : ndarray, shape (rows,), optional
-            Signal whose least value in the span is stored in `Span.least`.
-
-        Returns
-        -------
-        list of Span
-            The ended spans in the order of time.
-        """
+        """Add the next rows, and return the spans that end in them; flags (rows,), time (rows,) [s], signal (rows,)."""
         ended = []
         edges = np.flatnonzero(np.diff(flags, prepend=self.open is not None)).tolist()
         for first, end in zip([0, *edges], [*edges, len(flags)], strict=True):
@@ -68,20 +47,8 @@ class Spans:
 
 
 def spans(flags: Flags, time: Array) -> list[tuple[float, float]]:
-    """Return the spans in which a condition holds, each up to the first instant at which it no longer holds.
-
-    Parameters
-    ----------
-    flags : ndarray of bool, shape (steps,)
-        The condition at each step.
-    time : ndarray, shape (steps,)
-        Time of each step [s].
-
-    Returns
-    -------
-    list of (float, float)
-        Start and end of each span [s]; a span that has not ended ends at the last instant.
-    """
+    """Return the spans in which a condition holds, each up to the first instant at which it no longer holds."""
+    # with time [s], returns [s]
     found = Spans()
     ended = found.add(flags, time)
     return [(span.start, span.end) for span in (*ended, *([found.open] if found.open else []))]

@@ -30,34 +30,7 @@ _ESTIMATE = [f"estimate.phi{i}" for i in range(1, 5)]
 
 
 def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | None) -> dict[str, Any]:
-    """Summarise a run.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-    record : Rows
-        Record of the run, with at least one row.
-    status : str
-        ``"completed"``, ``"interrupted"``, ``"killed"``, or ``"failed: ..."``.
-    wall_time : float or None
-        Wall-clock time of the stepping [s], if it is known.
-
-    Returns
-    -------
-    dict
-        Values for JSON; times in s, lengths in m, forces in N. Clearances are distances to the surface of a region at
-        its position at that time, or angles [rad] for regions of attitude; positive where it is respected, negative
-        where it is violated (inside a region to keep out of). ``rejected_samples`` is a fraction, None for a law that
-        reports none; ``goal_miss`` a text, None if the goal is not missed.
-
-    Raises
-    ------
-    RunError
-        If the record cannot be read.
-    KeyError
-        If the record lacks a signal.
-    """
+    """Summarise a run; wall_time [s], returns [rad]."""
     names = [secondary.region.name for secondary in scenario.regions]
     first_rows = record.take(range(min(2, len(record))), ["time", *(f"{name}.clearance" for name in names)])
     # period of the record's rows, which may be fewer than the run's steps

@@ -21,10 +21,8 @@ def hull_radius(scenario: Scenario) -> float:
 
 
 def heights_above_surface(scenario: Scenario) -> Iterator[tuple[str, float]]:
-    """Yield name and least height [m] of what the vehicle is to be in, and which is wholly above the surface.
-
-    That is the start, the goal with its next places, and the regions to stay within, at time 0.
-    """
+    """Yield name and least height [m] of what the vehicle is to be in, and which is wholly above the surface."""
+    # That is the start, the goal with its next places, and the regions to stay within, at time 0.
     yield from ((name, height) for name, height in _heights(scenario) if height > 0.0)
 
 

@@ -15,31 +15,14 @@ _FEW_REJECTED = 0.005  # fraction of rejected samples below which a sentence lea
 
 
 def format_force(force: float) -> str:
-    """Format a force [N] with four digits, such as ``26.82 kN``.
-
-    Parameters
-    ----------
-    force : float
-        Force [N].
-
-    Returns
-    -------
-    str
-        Number and unit; ``no number`` for NaN and infinity.
-    """
+    """Format a force [N] with four digits, such as ``26.82 kN``."""
     if not math.isfinite(force):
         return "no number"
     return f"{force / 1e3:.4g} kN" if force >= 1e3 else f"{force:.4g} N"
 
 
 def describe_task(scenario: Scenario) -> str:
-    """Describe the task of the vehicle in a sentence.
-
-    Returns
-    -------
-    str
-        A sentence with start, goal region, other regions and law.
-    """
+    """Describe the task of the vehicle in a sentence."""
     if not scenario.has_goal:
         return f"Imported from {scenario.log}, which has no goal and no regions to judge it by."
     start = ", ".join(f"{x:g}" for x in scenario.initial.position)
@@ -56,31 +39,12 @@ def describe_task(scenario: Scenario) -> str:
 
 
 def shape_name(shape: Shape) -> str:
-    """Return the name of a shape, such as ``depth band``.
-
-    Returns
-    -------
-    str
-        Name in lower case.
-    """
+    """Return the name of a shape, such as ``depth band``."""
     return next(name for name, of in SHAPES.items() if isinstance(shape, of)).replace("_", " ")
 
 
 def format_number(value: float, digits: int) -> str:
-    """Format a number for readers.
-
-    Parameters
-    ----------
-    value : float
-        The number.
-    digits : int
-        Number of significant digits.
-
-    Returns
-    -------
-    str
-        Text with the sign U+2212 for minus; ``no number`` for NaN and infinity.
-    """
+    """Format a number for readers."""
     if not math.isfinite(value):
         return "no number"
     if abs(value) >= 10.0**digits:
@@ -89,14 +53,7 @@ def format_number(value: float, digits: int) -> str:
 
 
 def verdict(summary: dict[str, Any]) -> str:
-    """Describe the outcome of a run in a few sentences.
-
-    Returns
-    -------
-    str
-        Sentences with the arrival, violated regions, forces, isolated thrusters, rejected samples, how the run ended,
-        and why it missed its goal.
-    """
+    """Describe the outcome of a run in a few sentences."""
     if not summary["has_goal"]:
         return f"A log of {summary['simulated_time']:.1f} s, without goal and regions.{_commanded_force(summary)}"
     if summary["settled"]:

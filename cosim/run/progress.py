@@ -14,17 +14,7 @@ COMPILING_NOTICE = "compiling the law and what it needs (first use)"
 
 
 class ProgressBar:
-    """Progress bar, shown if standard error is a terminal.
-
-    Parameters
-    ----------
-    shown : bool
-        False: never show it.
-    bar_format : str
-        Format of the bar, as ``bar_format`` of `tqdm.tqdm`.
-    **options
-        Further arguments of `tqdm.tqdm`.
-    """
+    """Progress bar, shown if standard error is a terminal."""
 
     def __init__(self, shown: bool, bar_format: str, **options: Any) -> None:
         self._bar = tqdm(bar_format=bar_format, disable=None if shown and sys.stderr else True, **options)
@@ -65,13 +55,7 @@ class _Notice(logging.Handler):
 
 @contextlib.contextmanager
 def announce_compilation(report: Callable[[str], None]) -> Iterator[None]:
-    """Show one notice if code is compiled within a block.
-
-    Parameters
-    ----------
-    report : callable
-        Shows a line to the user.
-    """
+    """Show one notice if code is compiled within a block."""
     notice, logger = _Notice(report), logging.getLogger("controller.compiling.first_use")
     before = logger.level
     logger.setLevel(logging.INFO)

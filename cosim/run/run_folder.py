@@ -38,23 +38,7 @@ class RunFolder:
     created: bool  # True if the run made the folder, False if it existed and was empty
 
     def keep(self, recorder: Recorder | None) -> bool:
-        """Close the record of a run; discard a run without any rows.
-
-        Parameters
-        ----------
-        recorder : Recorder or None
-            Recorder of the run; None if the run failed before recording.
-
-        Returns
-        -------
-        bool
-            True if the folder holds a record.
-
-        Raises
-        ------
-        OSError
-            If the record cannot be written; parts that were written stay, and commands with which it can be repeated.
-        """
+        """Close the record of a run; discard a run without any rows."""
         if recorder is None or not recorder.rows:
             self.discard()
             return False
@@ -77,13 +61,7 @@ class RunFolder:
 
     @contextlib.contextmanager
     def writing(self) -> Iterator[None]:
-        """Convert an OSError within a block to a RunError that says what is kept, and which verb reads it.
-
-        Raises
-        ------
-        RunError
-            If a file cannot be written.
-        """
+        """Convert an OSError within a block to a RunError that says what is kept, and which verb reads it."""
         try:
             yield
         except OSError as error:
@@ -107,27 +85,7 @@ class RunFolder:
 
 
 def claim(out: Path | None, scenario: Scenario, overwrite: bool = False) -> RunFolder:
-    """Create the folder of a run and write the scenario into it.
-
-    Parameters
-    ----------
-    out : Path or None
-        A folder that does not exist or is empty; None for a new one below ``runs``, named by scenario and time.
-    scenario : Scenario
-        The scenario of the run.
-    overwrite : bool
-        Remove an earlier run from the folder.
-
-    Returns
-    -------
-    RunFolder
-        The claimed folder, which other runs refuse.
-
-    Raises
-    ------
-    RunError
-        If the folder is in use, or cannot be written.
-    """
+    """Create the folder of a run and write the scenario into it."""
     where = out or Path("runs")
     require_utf8(where.absolute())
     try:
@@ -193,58 +151,14 @@ def _new_folder(parent: Path, name: str) -> Path:
 
 
 def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | None, report: bool) -> Run:
-    """Write summary, report and replay of a run from its record.
-
-    Parameters
-    ----------
-    path : Path
-        The run folder.
-    scenario : Scenario
-        The scenario of the run.
-    status : str
-        ``completed``, ``interrupted``, ``reset``, or ``failed:`` with the error.
-    wall_time : float or None
-        Wall-clock time of the stepping [s].
-    report : bool
-        Write the report with its figures and the replay too.
-
-    Returns
-    -------
-    Run
-        The run with its summary.
-
-    Raises
-    ------
-    RunError
-        If the record cannot be read.
-    """
+    """Write summary, report and replay of a run from its record; wall_time [s]."""
     run = open_run(path, scenario, status, wall_time)
     _write(run, ("html",) if report else ())
     return run
 
 
 def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict[str, Any], list[Path]]:
-    """Write summary and report of a run that was completed, interrupted or killed.
-
-    Parameters
-    ----------
-    path : Path
-        The run folder.
-    formats : collection of str
-        Formats of the report, as in `write_report`; ``html`` includes the replay.
-
-    Returns
-    -------
-    dict, list of Path
-        The summary, and the written files, the report first.
-
-    Raises
-    ------
-    RunError
-        If the folder holds no run that can be read, or cannot be written.
-    ScenarioError
-        If its scenario is invalid.
-    """
+    """Write summary and report of a run that was completed, interrupted or killed."""
     run = load_run(path)
     try:
         return run.summary, _write(run, formats)

@@ -57,13 +57,7 @@ class ArbiterRules:
 
 
 def read_rules(setup: ArbiterSetup) -> ArbiterSetup:
-    """Return the setup with the text of its rule file, read if missing, and the file's name without folder.
-
-    Raises
-    ------
-    ScenarioError
-        If there is no such file, or it is not a text of rules.
-    """
+    """Return the setup with the text of its rule file, read if missing, and the file's name without folder."""
     if not setup.file:
         if setup.text:
             raise ScenarioError(
@@ -94,22 +88,7 @@ def _text(path: Path) -> str:
 def check_rules(
     setup: ArbiterSetup, criteria: tuple[CriterionSetup, ...], regions: Sequence[SecondaryRegion]
 ) -> ArbiterRules:
-    """Return the checked rules of an arbiter, whose file has been read.
-
-    Parameters
-    ----------
-    setup : ArbiterSetup
-        Setup from `read_rules`.
-    criteria : tuple of CriterionSetup
-        The criteria, each of which needs an output.
-    regions : sequence of SecondaryRegion
-        Regions that signals may refer to.
-
-    Raises
-    ------
-    ScenarioError
-        If an input has no signal, a criterion has no output, or an output may be without a value.
-    """
+    """Return the checked rules of an arbiter, whose file has been read."""
     if not setup.file:
         if setup.inputs:
             first = next(iter(setup.inputs))

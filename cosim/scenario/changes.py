@@ -41,20 +41,7 @@ def _copy(value: Any) -> Any:
 
 
 def changed_keys(before: dict[str, Any], after: dict[str, Any], vehicle: Vehicle) -> tuple[str, ...]:
-    """List the keys in which a scenario differs from another, without those that no title lists.
-
-    Parameters
-    ----------
-    before, after : dict
-        Tables of scenarios, defaults filled in.
-    vehicle : Vehicle
-        Vehicle of `after`.
-
-    Returns
-    -------
-    tuple of str
-        Keys with dots, as for ``--set``; that of the whole list or shape if its length or type differs.
-    """
+    """List the keys in which a scenario differs from another, without those that no title lists."""
     known = known_parameters(vehicle)
     one, other = (
         table | {"plant": table["plant"] | {"parameters": known | table["plant"]["parameters"]}}
@@ -67,20 +54,7 @@ def changed_keys(before: dict[str, Any], after: dict[str, Any], vehicle: Vehicle
 
 
 def differing_keys(before: Any, after: Any, path: str = "") -> Iterator[str]:
-    """Yield the keys in which a table differs from another.
-
-    Parameters
-    ----------
-    before, after : dict, or a value in one
-        Tables, lists, texts or numbers.
-    path : str
-        Key of `before` and `after`.
-
-    Yields
-    ------
-    str
-        Key with dots; items of lists by name if they have one.
-    """
+    """Yield the keys in which a table differs from another."""
     if isinstance(before, dict) and isinstance(after, dict):
         if before.get("type") == after.get("type") and (not path or before.keys() <= after.keys()):
             for key, value in after.items():
@@ -101,46 +75,13 @@ def differing_keys(before: Any, after: Any, path: str = "") -> Iterator[str]:
 
 
 def join_keys(before: Sequence[str], more: Iterable[str]) -> tuple[str, ...]:
-    """Join two lists of keys, each key once, without those that no title lists.
-
-    Parameters
-    ----------
-    before : sequence of str
-        The first keys.
-    more : iterable of str
-        Further keys.
-
-    Returns
-    -------
-    tuple of str
-        Keys in their order.
-    """
+    """Join two lists of keys, each key once, without those that no title lists."""
     varied = (key for key in more if key.partition(".")[0] not in _UNLISTED_TABLES and key not in _UNLISTED_KEYS)
     return tuple(dict.fromkeys([*before, *varied]))
 
 
 def value_at(table: dict[str, Any], key: str, vehicle: Vehicle) -> Any:
-    """Return the value of a scenario's key.
-
-    Parameters
-    ----------
-    table : dict
-        Table of the scenario, defaults filled in.
-    key : str
-        Key, as for ``--set``.
-    vehicle : Vehicle
-        Vehicle of the scenario.
-
-    Returns
-    -------
-    float, text, list or table
-        Value in the key's own unit.
-
-    Raises
-    ------
-    ScenarioError
-        If there is no such key.
-    """
+    """Return the value of a scenario's key."""
     if key.startswith(PARAMETERS):
         name, known = key.removeprefix(PARAMETERS), known_parameters(vehicle)
         if name not in known:
@@ -151,22 +92,7 @@ def value_at(table: dict[str, Any], key: str, vehicle: Vehicle) -> Any:
 
 
 def shown_title(table: dict[str, Any], vehicle: Vehicle, law: str) -> str:
-    """Return the title of a scenario with the changes since it was written, and the law if it is not a built-in one.
-
-    Parameters
-    ----------
-    table : dict
-        Table of the scenario, defaults filled in.
-    vehicle : Vehicle
-        Vehicle of the scenario.
-    law : str
-        Name of the law that flies it.
-
-    Returns
-    -------
-    str
-        Title, such as ``Force limited to 108 N (changed: limit.force = 500 N)``.
-    """
+    """Return the title of a scenario with the changes since it was written, and the law if it is not a built-in one."""
     notes = [] if law in LAWS else [f"flown by {law}"]
     keys = [key for key in table["changed"] if law in LAWS or not f"{key}.".startswith("law.")]
     if keys:

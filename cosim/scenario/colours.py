@@ -21,16 +21,9 @@ _SHADES = (
 
 
 def colours_of_regions(scenario: Scenario) -> list[str]:
-    """Return the colours of the goal and of the secondary regions, as ``#RRGGBB``.
-
-    The first region of a criterion has the criterion's colour. The others have shades of it, nearer to it in hue than
-    to any other criterion and to the goal; after six regions they repeat.
-
-    Returns
-    -------
-    list of str
-        Colours, the goal's first, such as ``["#009E73", "#D55E00"]``.
-    """
+    """Return the colours of the goal and of the secondary regions, as ``#RRGGBB``; returns ["#009E73", "#D55E00"]."""
+    # The first region of a criterion has the criterion's colour. The others have shades of it, nearer to it in hue than
+    # to any other criterion and to the goal; after six regions they repeat.
     own = {criterion.name: criterion.colour for criterion in scenario.criteria}
     seen = dict.fromkeys(own, 0)
     colours = [GOAL_COLOUR]

@@ -70,13 +70,7 @@ class CriterionSetup:
 def check_criteria(
     entries: tuple[CriterionEntry, ...],
 ) -> tuple[tuple[CriterionEntry, ...], tuple[CriterionSetup, ...]]:
-    """Check the criteria; return the entries with defaults filled in, and the criteria by descending priority.
-
-    Raises
-    ------
-    ScenarioError
-        If a key is invalid; the message names the first one.
-    """
+    """Check the criteria; return the entries with defaults filled in, and the criteria by descending priority."""
     if not 1 <= len(entries) <= MAX_CRITERIA:
         raise ScenarioError(f"criteria: {len(entries)} came, expected 1 to {MAX_CRITERIA}")
     names = [entry.name for entry in entries]

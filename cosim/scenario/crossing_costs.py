@@ -1,11 +1,10 @@
-"""Costs of paths through soft regions, computed from the arbiter's preference between pairs of criteria.
+"""Costs of paths through soft regions, computed from the arbiter's preference between pairs of criteria."""
 
-A planner chooses between regions that are far from each other and from the vehicle, for which the present weights do
-not hold. So the arbiter is evaluated beforehand for each pair of criteria with soft regions: both have membership 1,
-all others 0. The share of a criterion is the mean over its pairs of its part of the two weights. A metre of path
-through a region, half a metre deep, costs `_EQUAL` m at share 1/2, the share of all criteria without preference. At
-share 1 it costs `_PREFERRED` times as much, at share 0 as much less.
-"""
+# A planner chooses between regions that are far from each other and from the vehicle, for which the present weights do
+# not hold. So the arbiter is evaluated beforehand for each pair of criteria with soft regions: both have membership 1,
+# all others 0. The share of a criterion is the mean over its pairs of its part of the two weights. A metre of path
+# through a region, half a metre deep, costs `_EQUAL` m at share 1/2, the share of all criteria without preference. At
+# share 1 it costs `_PREFERRED` times as much, at share 0 as much less.
 
 from __future__ import annotations
 
@@ -26,19 +25,7 @@ _PREFERRED = 5.0  # factor of the cost at share 1
 def with_crossing_costs(
     regions: tuple[SecondaryRegion, ...], criteria: Sequence[str], rules: ArbiterRules, depth: float
 ) -> tuple[SecondaryRegion, ...]:
-    """Return the regions with the crossing costs of the soft ones.
-
-    Parameters
-    ----------
-    regions : tuple of SecondaryRegion
-        Secondary regions of the scenario.
-    criteria : sequence of str
-        Names of the criteria, by descending priority.
-    rules : ArbiterRules
-        Rules that weigh the criteria.
-    depth : float
-        Depth of the vehicle at the start [m], for rules with this input; speed and time are 0.
-    """
+    """Return the regions with the crossing costs of the soft ones; depth [m]."""
     soft = {r.criterion for r in regions if not r.region.hard and not of_attitude(r.region.shape)}
     if not soft:
         return regions

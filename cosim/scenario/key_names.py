@@ -52,22 +52,7 @@ class KeyName(NamedTuple):
 
 
 def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
-    """Return the name of a scenario's key.
-
-    Parameters
-    ----------
-    key : str
-        Key of the scenario, with dots, as for ``--set``.
-    table : dict
-        Table of the scenario, defaults filled in.
-    vehicle : Vehicle
-        Vehicle of the scenario.
-
-    Returns
-    -------
-    KeyName
-        Name and unit, such as ``start position y`` and ``m``.
-    """
+    """Return the name of a scenario's key."""
     if key.startswith(PARAMETERS):
         name = key.removeprefix(PARAMETERS)
         units = (v.quantity.unit for v in variables(vehicle) if v.name == name)

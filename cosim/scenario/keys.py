@@ -164,33 +164,12 @@ _LINK = re.compile(r"\[([^]]*)\]\([^)]*\)")
 
 
 def unit_of_shape(kind: str, key: str) -> str:
-    """Return the unit of a key of a shape.
-
-    Parameters
-    ----------
-    kind : str
-        Type of the shape, such as ``"sphere"``.
-    key : str
-        Key of the shape, such as ``"radius"``.
-
-    Returns
-    -------
-    str
-        Unit; empty if the key has none.
-    """
+    """Return the unit of a key of a shape."""
     return ENTRIES[kind].units.get(key, "") if kind in ENTRIES else ""
 
 
 def comments(law: str, vehicle: Vehicle) -> dict[str, str]:
-    """Return the comment for each key of a file: its unit and its meaning, as plain text.
-
-    Parameters
-    ----------
-    law : str
-        Name of the law; the comments on its gains are read from its source.
-    vehicle : Vehicle
-        The FMU's vehicle, with the parameters of the plant.
-    """
+    """Return the comment for each key of a file: its unit and its meaning, as plain text."""
     said = {path: _comment(key.unit, _LINK.sub(r"\1", key.meaning).replace("`", "")) for path, key in KEYS.items()}
     said |= {f"law.gains.{gain}": text for gain, text in _gain_comments(law).items()}
     return said | {f"plant.parameters.{v.name}": _comment(v.quantity.unit, v.description) for v in variables(vehicle)}
@@ -198,20 +177,7 @@ def comments(law: str, vehicle: Vehicle) -> dict[str, str]:
 
 @functools.cache
 def unit_of_gain(law: str, gain: str) -> str:
-    """Return the unit of a gain of a law.
-
-    Parameters
-    ----------
-    law : str
-        Name of the law.
-    gain : str
-        Name of the gain, such as ``"k_p1"``.
-
-    Returns
-    -------
-    str
-        Unit; empty if the gain has none, or if it is not known.
-    """
+    """Return the unit of a gain of a law."""
     unit = _UNIT.match(_gain_comments(law).get(gain, ""))
     return unit[0] if unit else ""
 

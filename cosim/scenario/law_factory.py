@@ -15,25 +15,7 @@ from cosim.scenario.vehicle_model import vehicle_model
 
 
 def law_of(scenario: Scenario) -> CompiledLaw:
-    """Create a scenario's law, with its own memory.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with the law's name, gains and vehicle.
-
-    Returns
-    -------
-    CompiledLaw
-        Law with the vehicle's nominal model: it does not receive the scenario's `plant.parameters`.
-
-    Raises
-    ------
-    LawError
-        If the law cannot be set up.
-    RunError
-        If the scenario has a custom law.
-    """
+    """Create a scenario's law, with its own memory."""
     require_builtin_law(scenario)
     return LAWS[scenario.law.name].for_vehicle(
         vehicle_model(scenario.vehicle),
@@ -54,27 +36,7 @@ def require_builtin_law(scenario: Scenario) -> None:
 
 
 def with_custom_law(law: Law, scenario: Scenario) -> Scenario:
-    """Return a scenario with a custom law.
-
-    Parameters
-    ----------
-    law : Law
-        Custom law.
-    scenario : Scenario
-        Scenario with any law.
-
-    Returns
-    -------
-    Scenario
-        Scenario with the source of the law as ``law.name``, and no gains.
-
-    Raises
-    ------
-    LawError
-        If the law does not implement `controller.Law`, such as a plain function.
-    ScenarioError
-        If the scenario needs a built-in law, or applies a wrench while the law drives thrusters.
-    """
+    """Return a scenario with a custom law."""
     if getattr(law, "output", None) not in get_args(Output) or not callable(getattr(law, "step", None)):
         raise LawError(f"law is {qualified_name(law)}, expected a FunctionLaw, or what else fulfils controller.Law")
     name = law.name if isinstance(law, FunctionLaw) else qualified_name(law)

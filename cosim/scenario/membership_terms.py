@@ -26,27 +26,7 @@ FUNCTIONS = (
 
 
 def read_term(data: Any, of_time: bool, where: str) -> Membership:
-    """Parse a term as in the files of `fuzzy_arbiter`.
-
-    Parameters
-    ----------
-    data : object
-        Points, or a table with a kind and its numbers.
-    of_time : bool
-        True if the argument is the time to contact, which is never below 0.
-    where : str
-        Key of the term, for error messages.
-
-    Returns
-    -------
-    Membership
-        A `Shape`, a `Curve` or a `Formula`; shapes and curves do not jump.
-
-    Raises
-    ------
-    ScenarioError
-        If the term is invalid, is a curve that jumps, or has functions that runs do not support.
-    """
+    """Parse a term as in the files of `fuzzy_arbiter`."""
     return _read(json.dumps(data, default=str), of_time, where)
 
 
@@ -100,20 +80,7 @@ def _stack_depth(tree: Node) -> int:
 
 
 def term_in_words(term: Membership, unit: str) -> str:
-    """Describe a term in words.
-
-    Parameters
-    ----------
-    term : Membership
-        Term from `read_term`.
-    unit : str
-        Unit of the term's argument.
-
-    Returns
-    -------
-    str
-        Points, kind and parameters, or formula, as text.
-    """
+    """Describe a term in words."""
     if isinstance(term, Shape):
         return ", ".join(f"{degree:g} at {place:g} {unit}" for place, degree in term.points)
     if isinstance(term, Formula):

@@ -16,23 +16,7 @@ _OFF = Shape(((0.5 - 1e-9, 1.0), (0.5 + 1e-9, 0.0)))
 
 @functools.lru_cache(maxsize=16)
 def rules_by_order(variant: RuleVariant, criteria: tuple[CriterionSetup, ...], points: int) -> System:
-    """Make the fuzzy system that weighs criteria by their order.
-
-    Parameters
-    ----------
-    variant : {"ordered", "reversed", "crisp", "none"}
-        Variant: ``ordered`` as in section VI of the paper; ``reversed`` with the order reversed; ``crisp`` with
-        memberships rounded to 0 or 1; ``none`` with each weight by its own input, which is the constant 1.
-    criteria : tuple of CriterionSetup
-        Criteria by descending priority.
-    points : int
-        Samples of the outputs, for engines that sample.
-
-    Returns
-    -------
-    System
-        System with an input named like each criterion, and its weight as output, in the order of the criteria.
-    """
+    """Make the fuzzy system that weighs criteria by their order."""
     fuzzy = [criterion.fuzzy for criterion in criteria]
     if variant == "reversed":
         system = prioritised(fuzzy[::-1], points=points)

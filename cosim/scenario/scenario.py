@@ -292,27 +292,7 @@ def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, A
 
 
 def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:
-    """Make a scenario from the table of its file.
-
-    Parameters
-    ----------
-    table : dict
-        Table of the file; its ``plant.parameters`` are changed in place to flat keys.
-    name : str
-        Name of the scenario.
-    vehicle : Vehicle, optional
-        Vehicle, if it is loaded already.
-
-    Returns
-    -------
-    Scenario
-        Checked scenario.
-
-    Raises
-    ------
-    ScenarioError, PlantFmuError, ControllerError
-        If a key is invalid; the message names the first one.
-    """
+    """Make a scenario from the table of its file."""
     plant = table.get("plant")
     if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
         plant["parameters"] = flatten(plant["parameters"])

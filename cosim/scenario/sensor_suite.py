@@ -1,9 +1,8 @@
-"""Sensors for navigation: numbers from data sheets, as parameters of the FMU.
+"""Sensors for navigation: numbers from data sheets, as parameters of the FMU."""
 
-The plant uses `DATA_SHEETS` unless a scenario's ``plant.parameters`` override them. The navigation filter receives the
-plant's standard deviations, and those from which the constant errors are drawn. A number without a data sheet is marked
-as assumed.
-"""
+# The plant uses `DATA_SHEETS` unless a scenario's `plant.parameters` override them. The navigation filter receives the
+# plant's standard deviations, and those from which the constant errors are drawn. A number without a data sheet is
+# marked as assumed.
 
 from __future__ import annotations
 
@@ -57,20 +56,7 @@ _ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 
 
 def sensor_parameters(seed: int, over: Mapping[str, float]) -> dict[str, float]:
-    """Return the FMU's sensor parameters by name: from data sheets, with constant errors drawn from the seed.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the constant errors and of all noise.
-    over : mapping of str to float
-        Parameters that override those of the data sheets and the drawn ones.
-
-    Returns
-    -------
-    dict of str to float
-        Parameters in SI units; includes `over`.
-    """
+    """Return the FMU's sensor parameters by name: from data sheets, with constant errors drawn from the seed."""
     draw = np.random.default_rng([seed, _STREAM]).standard_normal(9)
     names = (
         *((f"imu.acceleration_bias.{axis}", _CONSTANT.acceleration_bias) for axis in "xyz"),
@@ -91,13 +77,7 @@ def scenario_sensors(scenario: Scenario) -> dict[str, float]:
 
 
 def sensor_model(parameters: Mapping[str, float]) -> SensorModel:
-    """Return the navigation filter's model of the sensors: deviations of noise and of constant errors.
-
-    Parameters
-    ----------
-    parameters : mapping of str to float
-        Parameters from `sensor_parameters`; a missing one has the default of `SensorModel`.
-    """
+    """Return the navigation filter's model of the sensors: deviations of noise and of constant errors."""
     usual = SensorModel()
     return _CONSTANT._replace(
         depth=parameters.get("depth_sensor.noise", usual.depth),
@@ -113,22 +93,7 @@ def sensor_model(parameters: Mapping[str, float]) -> SensorModel:
 def outage_schedule(
     outages: Iterable[Outage], parameters: Mapping[str, float], step: float
 ) -> list[tuple[int, int, float]]:
-    """Return the changes of the sensors' loss probabilities over time.
-
-    Parameters
-    ----------
-    outages : iterable of Outage
-        The outages of the scenario.
-    parameters : mapping of str to float
-        Sensor parameters, with the loss probabilities outside of outages.
-    step : float
-        Step of the plant [s].
-
-    Returns
-    -------
-    list of tuple
-        Number of the plant step, index of the sensor in `SENSORS`, loss probability; in order of time.
-    """
+    """Return the changes of the sensors' loss probabilities over time; step [s]."""
     changes = []
     for outage in outages:
         usual = parameters.get(f"{outage.sensor}.loss_probability", 0.0)

@@ -92,10 +92,9 @@ class Outage:
 
 @dataclass(frozen=True)
 class Sensing:
-    """Source of the state for law and arbiter: the plant's state, or a navigation filter with the plant's sensors.
+    """Source of the state for law and arbiter: the plant's state, or a navigation filter with the plant's sensors."""
 
-    The plant's position and linear velocity may have noise; its attitude and body rates are exact.
-    """
+    # The plant's position and linear velocity may have noise; its attitude and body rates are exact.
 
     through: Literal["state", "sensors"] = "state"
     position_noise: float = 0.0  # m, standard deviation of each coordinate, white, drawn anew at each control step

@@ -51,29 +51,7 @@ class ScenarioTable(NamedTuple):
 
 
 def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | None = None) -> ScenarioTable:
-    """Read the table of a scenario, and merge it into that of its ``base``.
-
-    Parameters
-    ----------
-    name_or_file : str
-        A shipped name, or a file ending in .toml.
-    seen : tuple of str
-        Scenarios that have this one as a base.
-    beside : Path, optional
-        Folder of a relative path.
-
-    Returns
-    -------
-    ScenarioTable
-        Table that has not been checked yet.
-
-    Raises
-    ------
-    ScenarioError
-        If a base is unknown, or a scenario is its own base.
-    TableError
-        If a file cannot be read.
-    """
+    """Read the table of a scenario, and merge it into that of its ``base``."""
     from plant_fmu.toml_tables import hint, read_toml  # imports NumPy and FMPy, which `cosim list` does not need
 
     path = Path(name_or_file)
@@ -140,13 +118,7 @@ def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
 
 
 def plain_key(text: str) -> str:
-    """Remove the quotes from a key, such as ``regions."my rock".gain``: no name within a key needs them.
-
-    Raises
-    ------
-    ScenarioError
-        If a quote does not end, or stands within a part.
-    """
+    """Remove the quotes from a key, such as ``regions."my rock".gain``: no name within a key needs them."""
     parts, offset, dot = [], 0, "."
     while dot:
         match = _PART.match(text, offset)
@@ -168,22 +140,7 @@ def split_change(text: str) -> tuple[str, str]:
 
 
 def override(table: dict[str, Any], text: str) -> None:
-    """Set one key of a table in place.
-
-    Parameters
-    ----------
-    table : dict
-        Table of a scenario.
-    text : str
-        Change ``key=value``, with dots between the keys, which may be quoted as in TOML, and a TOML value or a bare
-        word; lists by index or name.
-        Another ``law.name`` drops the gains of the law before, another ``arbiter.file`` its inputs.
-
-    Raises
-    ------
-    ScenarioError
-        If the table has no place for such a key.
-    """
+    """Set one key of a table in place."""
     from plant_fmu.toml_tables import MAX_DEPTH, require_modest
 
     key, value_text = split_change(text)
@@ -209,23 +166,7 @@ def override(table: dict[str, Any], text: str) -> None:
 
 
 def set_key(table: dict[str, Any], key: str, value: Any) -> None:
-    """Set one key of a table in place.
-
-    Parameters
-    ----------
-    table : dict
-        Table of a scenario.
-    key : str
-        Key, as `override` has it. Another ``law.name`` drops the gains of the
-        law before, another ``arbiter.file`` its inputs.
-    value : object
-        Value, of a type of TOML.
-
-    Raises
-    ------
-    ScenarioError
-        If the table has no place for such a key.
-    """
+    """Set one key of a table in place."""
     key = plain_key(key)
     *path, last = key.split(".")
     if key == "law.name":
@@ -264,20 +205,7 @@ def _index(items: list[Any], part: str, key: str) -> int:
 
 
 def flatten(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
-    """Join nested keys with dots, since TOML nests ``r_G.z = 0.1``, the name of a parameter of the FMU.
-
-    Parameters
-    ----------
-    table : dict
-        Nested tables and values.
-    prefix : str
-        Prefix of every key.
-
-    Returns
-    -------
-    dict
-        Values by flat key.
-    """
+    """Join nested keys with dots, since TOML nests ``r_G.z = 0.1``, the name of a parameter of the FMU."""
     flat: dict[str, Any] = {}
     for key, value in table.items():
         flat |= flatten(value, f"{prefix}{key}.") if isinstance(value, dict) else {f"{prefix}{key}": value}
@@ -285,25 +213,7 @@ def flatten(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 
 def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
-    """Return the table or list that holds a key, and the name or index in it.
-
-    Parameters
-    ----------
-    table : dict
-        Table of a scenario.
-    key : str
-        Key with dots; items of lists by index or name.
-
-    Returns
-    -------
-    dict or list, str or int
-        Container, and name or index of the value in it.
-
-    Raises
-    ------
-    ScenarioError
-        If there is no such key.
-    """
+    """Return the table or list that holds a key, and the name or index in it."""
     *path, last = key.split(".")
     at: Any = table
     for depth, part in enumerate([*path, last]):

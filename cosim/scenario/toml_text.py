@@ -15,29 +15,13 @@ _COMMENT_AT = 40  # column at which comments begin, after a shorter line
 
 
 def scenario_text(table: Mapping[str, Any], said: Mapping[str, str]) -> str:
-    """Format the table of a scenario as TOML.
-
-    Parameters
-    ----------
-    table : mapping
-        Table of the file with defaults filled in.
-    said : mapping of str to str
-        Comments by the path of their key, as `cosim.scenario.keys.comments` returns them; units of shapes are added.
-        If empty, there are no comments.
-
-    Returns
-    -------
-    str
-        TOML text that reads back as the table.
-    """
+    """Format the table of a scenario as TOML."""
     return "\n".join(_lines(table, said)) + "\n"
 
 
 def _lines(table: Mapping[str, Any], said: Mapping[str, str], head: str = "", path: str = "") -> Iterator[str]:
-    """Yield the lines of a table: its values, then the tables in it, then its lists of tables.
-
-    In the paths of comments, a list of tables has one entry for all of its items.
-    """
+    """Yield the lines of a table: its values, then the tables in it, then its lists of tables."""
+    # In the paths of comments, a list of tables has one entry for all of its items.
     values, tables, lists = [], [], []
     for key, value in table.items():
         if value and isinstance(value, list | tuple) and all(isinstance(item, Mapping) for item in value):

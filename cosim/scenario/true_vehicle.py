@@ -19,20 +19,8 @@ _SYMMETRIC = ("added_mass", "inertia")
 
 
 def true_vehicle(scenario: Scenario) -> Vehicle:
-    """Return the vehicle with the scenario's `plant.parameters`.
-
-    Thrusters' limits are multiplied by their effectiveness, so that one that is failed from the start gives no force.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with `plant.parameters`.
-
-    Returns
-    -------
-    Vehicle
-        True vehicle, not checked: the FMU may still refuse its numbers.
-    """
+    """Return the vehicle with the scenario's `plant.parameters`."""
+    # Thrusters' limits are multiplied by their effectiveness, so that one that is failed from the start gives no force.
     vehicle, over = scenario.vehicle, scenario.plant.parameters
     changed: dict[str, float | Array] = {}
     effectiveness = np.ones(vehicle.n_thrusters)
@@ -55,18 +43,7 @@ def true_vehicle(scenario: Scenario) -> Vehicle:
 
 
 def true_model(scenario: Scenario) -> Model:
-    """Return the model of the true vehicle for the stability analysis.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with `plant.parameters`.
-
-    Returns
-    -------
-    Model
-        Model of the true vehicle in still water.
-    """
+    """Return the model of the true vehicle for the stability analysis."""
     vehicle = true_vehicle(scenario)
     return Model(
         np.ascontiguousarray(vehicle.mass_matrix),

@@ -182,10 +182,8 @@ def check_commands(
 
 
 def check_goal(file: File) -> tuple[Shape, GoalMotion]:
-    """Check the goal; return its shape and motion, or raise a ScenarioError.
-
-    The run of a log may have no goal: then it is a sphere far away, which no figure or summary uses.
-    """
+    """Check the goal; return its shape and motion, or raise a ScenarioError."""
+    # The run of a log may have no goal: then it is a sphere far away, which no figure or summary uses.
     table = file.goal
     if not table and file.log:
         return Sphere(PARKED_POSITION, 1.0), GoalMotion()
@@ -231,10 +229,8 @@ def check_regions(entries: tuple[RegionEntry, ...]) -> tuple[SecondaryRegion, ..
 
 
 def check_intersection(wanted: tuple[str, ...], regions: tuple[SecondaryRegion, ...]) -> tuple[int, ...]:
-    """Return the indices of the regions whose overlap is reported: those that are named, else all to keep out of.
-
-    Raise a ScenarioError if a name is unknown.
-    """
+    """Return the indices of the regions whose overlap is reported: those that are named, else all to keep out of."""
+    # Raise a ScenarioError if a name is unknown.
     kept_out = {r.region.name: i for i, r in enumerate(regions) if r.region.keep == "out"}
     _require(len(set(wanted)) == len(wanted), "intersection", f"{list(wanted)}", "each name once")
     for name in wanted:
@@ -269,13 +265,7 @@ def check_time(entry: TimeEntry) -> Time:
 
 
 def check_law(entry: LawEntry, through: str, vehicle: Vehicle, period: float, n_regions: int) -> LawSetup:
-    """Check name, gains and period [s] of a built-in law by setting it up; of a custom law check the name only.
-
-    Raises
-    ------
-    ScenarioError
-        If there is no such law, or it has no such gains.
-    """
+    """Check name, gains and period [s] of a built-in law by setting it up; of a custom law check the name only."""
     if is_custom_law(entry.name):
         if entry.gains:
             raise ScenarioError(f"law.gains has {next(iter(entry.gains))!r}, expected nothing with a law of one's own")

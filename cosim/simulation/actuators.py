@@ -16,34 +16,16 @@ MAX_WRENCH = 1e5
 
 
 class Actuators:
-    """Writes a wrench, or thruster forces, to the plant's inputs.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the run.
-    plant : SteppedPlant
-        Plant that receives the inputs, and the parameters of thrusters that fail or are limited.
-    signals : Signals
-        Signals whose row holds the commanded wrench and the inputs.
-
-    Attributes
-    ----------
-    command : ndarray, shape (6,)
-        Commanded wrench [N, N m], body frame.
-    thrusts : ndarray, shape (m,)
-        Commanded thruster forces [N].
-    health : ndarray, shape (m,)
-        Health of the thrusters as reported to the law: 1 working, 0 failed.
-    """
+    """Writes a wrench, or thruster forces, to the plant's inputs."""
 
     def __init__(self, scenario: Scenario, plant: SteppedPlant, signals: Signals) -> None:
         self._scenario, self._plant = scenario, plant
         vehicle = scenario.vehicle
         self._bounded = scenario.commands.enabled
-        self.command = signals.view("command.X", 6)
+        self.command = signals.view("command.X", 6)  # commanded wrench [N, N m], body frame
         self._saturated = signals.view("allocation_saturated", 1)
         inputs, n = signals.view("thrust[1]", len(plant.inputs)), vehicle.n_thrusters + 6
+        # thrusts: commanded thruster forces [N]
         self.thrusts, self._wrench = inputs[: vehicle.n_thrusters], inputs[vehicle.n_thrusters : n]
         # memoryviews: copying one takes a third of the time of copying an array
         self._asked, self._given = self.command.data, self._wrench.data
@@ -112,18 +94,8 @@ class Actuators:
 
 
 def saturate(wrench: Array) -> bool:
-    """Scale force and moment of a wrench in place to at most `MAX_WRENCH`; set them to 0 if they are not finite.
-
-    Parameters
-    ----------
-    wrench : ndarray, shape (6,)
-        Force and moment [N, N m].
-
-    Returns
-    -------
-    bool
-        True if the wrench was changed.
-    """
+    """Scale force and moment of a wrench in place to at most `MAX_WRENCH`; set them to 0 if they are not finite."""
+    # with wrench [N, N m]
     changed = False
     for part in (wrench[:3], wrench[3:]):
         greatest = float(np.max(np.abs(part)))

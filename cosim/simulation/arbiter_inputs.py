@@ -52,24 +52,7 @@ class ArbiterSignals(NamedTuple):
 def pack_inputs(
     regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup], rules: ArbiterRules, ramp: float
 ) -> PackedInputs:
-    """Pack the inputs of an arbiter into arrays.
-
-    Parameters
-    ----------
-    regions : sequence of SecondaryRegion
-        Secondary regions of the scenario.
-    criteria : sequence of CriterionSetup
-        Criteria of these regions.
-    rules : ArbiterRules
-        The arbiter's rules.
-    ramp : float
-        Ramp of the memberships whose criterion has none of its own [m or rad].
-
-    Returns
-    -------
-    PackedInputs
-        Packed inputs, whose ramps `Arbitration.set_ramp` may change.
-    """
+    """Pack the inputs of an arbiter into arrays; ramp [m or rad]."""
     signals, system = rules.signals, rules.system
     memberships = pack_memberships(regions, criteria, ramp)
     courses = [signal.course for signal in signals]
@@ -99,17 +82,7 @@ def empty_state() -> VehicleState:
 
 
 def write_arbiter_state(measured: VehicleState, expected: Array, out: VehicleState) -> None:
-    """Write the state that the arbiter uses: the law's prediction, which has less noise than the measurement.
-
-    Parameters
-    ----------
-    measured : VehicleState
-        Measured state. Attitude and rates come from it; position and velocity where the prediction is NaN.
-    expected : ndarray, shape (6,)
-        The law's prediction for this step, as `CompiledLaw.expected`.
-    out : VehicleState
-        Receives pose and velocity; NaN where no position is measured.
-    """
+    """Write the state that the arbiter uses: the law's prediction, which has less noise than the measurement."""
     for i in range(3):
         known = expected[i] == expected[i] and measured.position[i] == measured.position[i]
         out.position[i] = expected[i] if known else measured.position[i]
@@ -128,23 +101,7 @@ def compute_inputs(
     clearances: Array,
     signals: ArbiterSignals,
 ) -> None:
-    """Compute the memberships and the inputs of the arbiter's rules.
-
-    Parameters
-    ----------
-    packed : PackedInputs
-        Sources of the inputs.
-    goal, regions : PackedRegions
-        The goal alone, and the n regions, at their present positions.
-    state : VehicleState
-        State of the vehicle.
-    now : ndarray, shape (1,)
-        Time [s].
-    clearances : ndarray, shape (n,)
-        Clearance of each region at that pose [m or rad].
-    signals : ArbiterSignals
-        Receives the result.
-    """
+    """Compute the memberships and the inputs of the arbiter's rules; now (1,) [s], clearances (n,) [m or rad]."""
     if packed.of_goal:
         signals.goal_clearance[0] = clearance_of_pose(goal, 0, state.position, state.quaternion, zeros(3))
     if packed.by_speed:

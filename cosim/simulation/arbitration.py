@@ -21,32 +21,7 @@ from fuzzy_arbiter import Arbiter
 
 
 class Arbitration:
-    """Computes memberships and weights from regions and state; reads and writes its arrays in place.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario that defines the criteria and the inputs of the rules.
-    arbiter : Arbiter
-        Arbiter with the scenario's rules.
-    measured : VehicleState
-        State that the law receives.
-    now : ndarray, shape (1,)
-        Time [s].
-    clearances : ndarray, shape (n,)
-        Clearance of each region at the pose of `state` [m], or [rad] of attitude.
-    memberships, weights : ndarray, shape (criteria,)
-        Receive membership and weight of each criterion.
-    inputs : ndarray, shape (m,), optional
-        Receives the inputs of the rules.
-
-    Attributes
-    ----------
-    state : VehicleState
-        State that the arbiter uses.
-    region_weights : ndarray, shape (n,)
-        Weight of the criterion of each region.
-    """
+    """Computes memberships and weights from regions and state; reads and writes its arrays in place; now [s]."""
 
     def __init__(
         self,

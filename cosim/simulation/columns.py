@@ -18,45 +18,18 @@ _FORCE_UNITS = ("N",) * 3 + ("N.m",) * 3
 
 
 def columns_of(scenario: Scenario, plant: SteppedPlant, law: Law) -> list[Column]:
-    """Return the columns of a run.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-    plant : SteppedPlant
-        Plant whose outputs, flags and inputs are columns.
-    law : Law
-        Law whose diagnostics are columns.
-
-    Returns
-    -------
-    list of Column
-        Columns in the order of the row.
-    """
+    """Return the columns of a run."""
     channels = (plant.outputs.channels, plant.flags.channels, plant.inputs.channels)
     return _columns(scenario, *channels, law.diagnostics)
 
 
 def column_names(scenario: Scenario) -> list[str]:
-    """Return the names of the columns of a run, without the diagnostics of a custom law.
-
-    Returns
-    -------
-    list of str
-        Names in the order of the row.
-    """
+    """Return the names of the columns of a run, without the diagnostics of a custom law."""
     return [column.name for column in columns_without_plant(scenario)]
 
 
 def columns_without_plant(scenario: Scenario) -> list[Column]:
-    """Return the columns of a run as `columns_of` does, from the vehicle's table of variables and a built-in law.
-
-    Returns
-    -------
-    list of Column
-        Columns in the order of the row.
-    """
+    """Return the columns of a run as `columns_of` does, from the vehicle's table of variables and a built-in law."""
     law = LAWS.get(scenario.law.name)
     return _columns(scenario, *vehicle_channels(scenario.vehicle), law.diagnostics if law else ())
 

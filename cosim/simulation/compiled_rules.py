@@ -33,25 +33,7 @@ def rules_text(system: System) -> str:
 
 
 class BoundRules:
-    """Rules bound to their input and output arrays, which it keeps alive.
-
-    Parameters
-    ----------
-    system : System
-        Rules whose inputs clip, and of which each output has a default, or a rule that fires for any input.
-    inputs, outputs : ndarray
-        C-contiguous arrays; the call fills the outputs with the results of the arbiter's exact engine, to the last bit.
-
-    Attributes
-    ----------
-    address, words : int
-        Addresses of the C function ``void (*)(const void *)`` and of its argument.
-
-    Raises
-    ------
-    CompilationError
-        If the library has to be compiled and there is no compiler.
-    """
+    """Rules bound to their input and output arrays, which it keeps alive."""
 
     def __init__(self, system: System, inputs: Array, outputs: Array) -> None:
         self._kept: Any

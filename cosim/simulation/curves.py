@@ -32,18 +32,7 @@ class PackedCurves(NamedTuple):
 
 
 def pack_curves(terms: Sequence[Membership | None]) -> PackedCurves:
-    """Turn curves and formulas into programs.
-
-    Parameters
-    ----------
-    terms : sequence of Membership or None
-        Terms; None for a ramp, which has no pieces.
-
-    Returns
-    -------
-    PackedCurves
-        Curves in the order of the terms.
-    """
+    """Turn curves and formulas into programs."""
     pieces = [pieces_of(term) if term else [] for term in terms]
     programs = [_program(tree) for of in pieces for _, tree in of]
     return PackedCurves(
@@ -65,22 +54,8 @@ def _program(tree: Node) -> list[tuple[int, float]]:
 
 
 def curve_degree(packed: PackedCurves, k: int, x: float) -> float:
-    """Return the degree of a term at `x` in [0, 1], as `fuzzy_arbiter` does: at a jump the greater one.
-
-    Parameters
-    ----------
-    packed : PackedCurves
-        Curves of the terms.
-    k : int
-        Index of a term that has pieces.
-    x : float
-        Argument [m, rad or s].
-
-    Returns
-    -------
-    float
-        Degree in [0, 1]; NaN where `x` is NaN.
-    """
+    """Return the degree of a term at `x` in [0, 1], as `fuzzy_arbiter` does: at a jump the greater one."""
+    # with x [m, rad or s]
     piece, last = packed.offsets[k], packed.offsets[k + 1] - 1
     while piece < last and x > packed.ends[piece]:
         piece += 1

@@ -51,18 +51,7 @@ class RegionPlaces(NamedTuple):
 
 
 class RegionEnvironment:
-    """Goal and regions, moved by their velocities, or by `move` where the scenario has ``streamed = true``.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with goal and regions.
-
-    Attributes
-    ----------
-    regions : PackedRegions
-        The n secondary regions at their present positions.
-    """
+    """Goal and regions, moved by their velocities, or by `move` where the scenario has ``streamed = true``."""
 
     def __init__(self, scenario: Scenario) -> None:
         secondary = [region.region for region in scenario.regions]
@@ -90,15 +79,7 @@ class RegionEnvironment:
         return self._target.packed
 
     def update_positions(self, time: float, shifts: Array) -> None:
-        """Move all regions to their positions at a time.
-
-        Parameters
-        ----------
-        time : float
-            Time [s].
-        shifts : ndarray, shape (moving regions, 3)
-            Receives the shift of each moving region from its place in the scenario [m, NED].
-        """
+        """Move all regions to their positions at a time; time [s], shifts (moving regions, 3) [m, NED]."""
         if not self._moving:
             return
         for packed, origins in ((self.goal, self._target.origin), (self.regions, self._origins)):
@@ -112,58 +93,25 @@ class RegionEnvironment:
         np.hypot(self._deviations, deviation, out=self.regions.deviations)
 
     def empty_evaluation(self, values: Array, clearances: Array) -> RegionEvaluation:
-        """Return an evaluation for `evaluate` to fill.
-
-        Parameters
-        ----------
-        values, clearances : ndarray, shape (n + 1,)
-            Arrays that become part of it.
-
-        Returns
-        -------
-        RegionEvaluation
-            Evaluation with zeros in the other arrays.
-        """
+        """Return an evaluation for `evaluate` to fill; values, clearances (n + 1,)."""
         n = len(self._names)
         return RegionEvaluation(values, np.zeros((n, 3)), np.zeros((n, 3)), clearances)
 
     def evaluate(self, state: VehicleState, evaluation: RegionEvaluation) -> None:
-        """Evaluate goal and regions at a pose.
-
-        Parameters
-        ----------
-        state : VehicleState
-            State whose position and attitude are used.
-        evaluation : RegionEvaluation
-            Receives the values.
-        """
+        """Evaluate goal and regions at a pose."""
         self._evaluate_places(self._places, state, evaluation)
 
     def clearances(self, position: Array, quaternion: Array) -> Array:
-        """Return the clearances of goal and regions at a pose, shape (n + 1,) [m, rad of attitude].
-
-        Parameters
-        ----------
-        position : ndarray, shape (3,)
-            Position [m, NED].
-        quaternion : ndarray, shape (4,)
-            Unit quaternion from body to world, scalar first.
-        """
+        """Return the clearances of goal and regions at a pose, shape (n + 1,) [m, rad of attitude]."""
+        # with position [m, NED]
         n = len(self._names)
         found = self.empty_evaluation(np.zeros(n), np.zeros(n))
         self.evaluate(VehicleState(position, quaternion, np.zeros(6), np.zeros(0)), found)
         return found.clearances
 
     def advance_goal(self, clearance: float, place: Array) -> None:
-        """Move the goal to its next place, from the next step on, once the vehicle has stayed in it long enough.
-
-        Parameters
-        ----------
-        clearance : float
-            Clearance of the goal at the true position [m]; pass it once a step.
-        place : ndarray, shape (1,)
-            Receives the index of the goal's place, from 0; shape (0,) for a goal with one place.
-        """
+        """Move the goal to its next place, from the next step on, once the vehicle has stayed in it long enough."""
+        # with clearance [m]
         place[:] = self._place
         if self._place == len(self._then):
             return
@@ -175,10 +123,8 @@ class RegionEnvironment:
     # ---- moved from outside ----
 
     def move(self, name: str, displacement: Array, velocity: Array, time: float) -> None:
-        """Set position and velocity of a streamed region at a time [s], as described in `Master.move_region`.
-
-        Raise a RunError if the region is not streamed, or a number is not finite.
-        """
+        """Set position and velocity of a streamed region at a time [s], as described in `Master.move_region`."""
+        # Raise a RunError if the region is not streamed, or a number is not finite.
         if name not in self._streamed:
             known = ", ".join(self._streamed) or "none"
             raise RunError(f"region {name!r} cannot be moved, expected a streamed one: {known}")
@@ -197,21 +143,7 @@ class RegionEnvironment:
         self._origins[i] = displacement - velocity * time
 
     def add_obstacle(self, slot: int, position: Vector3, radius: float, velocity: Vector3, time: float) -> None:
-        """Place an obstacle in a slot.
-
-        Parameters
-        ----------
-        slot : int
-            Slot for dynamic obstacles, from 0.
-        position : tuple of float
-            Position of its centre [m, NED].
-        radius : float
-            Radius [m].
-        velocity : tuple of float
-            Velocity from that time on [m/s, NED].
-        time : float
-            Time [s].
-        """
+        """Place an obstacle in a slot; position [m, NED], radius [m], velocity [m/s, NED], time [s]."""
         i = self._dynamic[slot]
         self._reshape(self.regions, i, Sphere(PARKED_POSITION, radius))
         self._set_motion(i, np.subtract(position, PARKED_POSITION), np.array(velocity), time)
@@ -221,13 +153,7 @@ class RegionEnvironment:
         self._set_motion(self._dynamic[slot], np.zeros(3), np.zeros(3), 0.0)
 
     def shift_region(self, name: str, by: Vector3) -> None:
-        """Move a region, or an obstacle, by a displacement [m, NED].
-
-        Raises
-        ------
-        CommandError
-            If there is no such region, it cannot be moved, or it is an obstacle slot that is free.
-        """
+        """Move a region, or an obstacle, by a displacement [m, NED]."""
         movable = [self._names[at] for at in self._moving if at]
         if name not in movable:
             raise CommandError(f"region is {name!r}, expected one of {', '.join(movable) or 'none'}")
@@ -252,19 +178,8 @@ class RegionEnvironment:
     def set_target(
         self, position: Vector3, radius: float | None, velocity: Vector3 = _AT_REST, time: float = 0.0
     ) -> None:
-        """Set position, shape and velocity of the target region.
-
-        Parameters
-        ----------
-        position : tuple of float
-            Position of its centre [m, NED].
-        radius : float or None
-            Radius of a sphere [m]; None for the shape of the scenario's goal.
-        velocity : tuple of float
-            Velocity from that time on [m/s, NED].
-        time : float
-            Time [s].
-        """
+        """Set position, shape and velocity of the target region; position [m, NED], radius [m], velocity [m/s, NED]."""
+        # with time [s]
         target = self._new_target(radius, position)
         target.packed.velocities[0] = velocity
         target.origin[:] -= np.multiply(velocity, time)
@@ -325,19 +240,7 @@ def stay_steps(scenario: Scenario) -> int:
 
 
 def shape_center(shape: Shape) -> Vector3:
-    """Return the centre of a shape, the point by which targets are placed.
-
-    Parameters
-    ----------
-    shape : Shape
-        Shape in space, not of attitude.
-
-    Returns
-    -------
-    tuple of float
-        Its ``centre``, the middle between its ends, or else the centre of its bounding box [m, NED]; along an axis with
-        one finite bound that bound, and 0 with none.
-    """
+    """Return the centre of a shape, the point by which targets are placed; returns [m, NED]."""
     # to the last bit, which the mean of two bounds is not
     if isinstance(shape, CENTERED):
         return shape.centre

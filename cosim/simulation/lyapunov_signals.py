@@ -38,24 +38,7 @@ def lyapunov_columns(scenario: Scenario) -> list[Column]:
 
 
 class LyapunovSignals:
-    """Writes V and its rate into the row of a step.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with the paper's law.
-    state : VehicleState
-        The true state, read at each `write`.
-    goal, regions : PackedRegions
-        The goal alone, and the n secondary regions. The theory takes them to be at rest: if they move, the rate is
-        that of the vehicle's own motion.
-    weights : ndarray, shape (n,)
-        Weight of each secondary region, from the arbiter.
-    estimate : ndarray, shape (4,)
-        The law's estimate phi-hat of the restoring parameters [N, N m] (12).
-    out : ndarray, shape (4,)
-        Receives the signals of `lyapunov_columns`.
-    """
+    """Writes V and its rate into the row of a step; weights (n,), estimate (4,) [N, N m], out (4,)."""
 
     def __init__(
         self,

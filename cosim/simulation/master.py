@@ -1,8 +1,7 @@
-"""The co-simulation master: steps plant, arbiter and controller, and publishes their signals.
+"""The co-simulation master: steps plant, arbiter and controller, and publishes their signals."""
 
-`Master.run` loops over the steps; `Master.step` does one, with a call for each stage. After each step the observers
-receive the row of signals, which is read-only, and which the next step overwrites.
-"""
+# `Master.run` loops over the steps; `Master.step` does one, with a call for each stage. After each step the observers
+# receive the row of signals, which is read-only, and which the next step overwrites.
 
 from __future__ import annotations
 

@@ -36,22 +36,7 @@ class PackedMemberships(NamedTuple):
 def pack_memberships(
     regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup], width: float
 ) -> PackedMemberships:
-    """Pack the membership functions of regions into arrays.
-
-    Parameters
-    ----------
-    regions : sequence of SecondaryRegion
-        Regions of the scenario, none or more.
-    criteria : sequence of CriterionSetup
-        Criteria of these regions, in their order.
-    width : float
-        Width of the arbiter's ramp [m or rad].
-
-    Returns
-    -------
-    PackedMemberships
-        Rows in the order of the regions.
-    """
+    """Pack the membership functions of regions into arrays; width [m or rad]."""
     names = [criterion.name for criterion in criteria]
     rows = [
         (i, names.index(region.criterion), reason)
@@ -79,19 +64,7 @@ def pack_memberships(
 def compute_memberships(
     packed: PackedMemberships, clearances: Array, approach_times: Array, memberships: Array
 ) -> None:
-    """Compute the membership of each criterion: the greatest over its regions.
-
-    Parameters
-    ----------
-    packed : PackedMemberships
-        Membership functions of n regions.
-    clearances : ndarray, shape (n,)
-        Clearance of each region [m], or [rad] of attitude; NaN gives 0.
-    approach_times : ndarray, shape (n,)
-        Time to contact of each region [s]; shape (0,) where no row needs it.
-    memberships : ndarray, shape (criteria,)
-        Receives the memberships, in [0, 1].
-    """
+    """Compute the membership of each criterion: the greatest over its regions; clearances [m], approach_times [s]."""
     for i in range(memberships.size):
         memberships[i] = 0.0
     for k in range(packed.regions.size):

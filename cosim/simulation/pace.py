@@ -10,17 +10,7 @@ _MAX_SLEEP = 3600.0  # s of the wall clock, longest sleep between two periods
 
 
 class Pace:
-    """Schedule of periods that begin no earlier than the wall clock says.
-
-    Parameters
-    ----------
-    period : float
-        Duration of a period by the wall clock [s].
-    clock : callable, optional
-        Function that returns the time [s]; default: `time.perf_counter`.
-    sleep : callable, optional
-        Function that waits for a duration [s]; default: `time.sleep`.
-    """
+    """Schedule of periods that begin no earlier than the wall clock says; period [s], clock [s], sleep [s]."""
 
     def __init__(
         self,

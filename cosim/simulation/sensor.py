@@ -12,17 +12,7 @@ STREAM = 1  # second part of the seed, as in scored scenes: a scene and a scenar
 
 
 class Sensor:
-    """Computes the measured state from the true state.
-
-    Parameters
-    ----------
-    sensing : Sensing
-        Noise, and the time in which position and velocity are lost.
-    true_state : VehicleState
-        Views of the true state.
-    given : VehicleState
-        Receives the measured state.
-    """
+    """Computes the measured state from the true state."""
 
     def __init__(self, sensing: Sensing, true_state: VehicleState, given: VehicleState) -> None:
         self._sensing, self._true_state, self._given = sensing, true_state, given
@@ -31,15 +21,7 @@ class Sensor:
         self._noise: Array = np.zeros(6)
 
     def measure(self, time: float, anew: bool) -> None:
-        """Write the measured state at a time.
-
-        Parameters
-        ----------
-        time : float
-            Time [s].
-        anew : bool
-            True at a control step: draw new noise; otherwise the last noise stays.
-        """
+        """Write the measured state at a time; time [s]."""
         sensing, true_state, given = self._sensing, self._true_state, self._given
         if anew:
             self._noise[:] = self._deviation * self._rng.standard_normal(6)

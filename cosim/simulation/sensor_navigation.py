@@ -18,19 +18,7 @@ FIRST, FIRST_TIME = "measured.depth", f"measured.time.{SENSORS[0]}"  # outputs o
 
 
 class SensorNavigation:
-    """The plant's sensors and the navigation filter, step by step.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with the sensors and their outages.
-    plant : SteppedPlant
-        Plant with the sensors.
-    signals : Signals
-        Signals whose row holds the plant's outputs.
-    given : VehicleState
-        Receives the estimate.
-    """
+    """The plant's sensors and the navigation filter, step by step."""
 
     def __init__(self, scenario: Scenario, plant: SteppedPlant, signals: Signals, given: VehicleState) -> None:
         self._plant = plant
@@ -57,24 +45,7 @@ class SensorNavigation:
 def make_sensing(
     scenario: Scenario, plant: SteppedPlant, signals: Signals, true_state: VehicleState
 ) -> tuple[VehicleState, Sensor | SensorNavigation | None]:
-    """Return the state that law and arbiter receive, and the object that writes it.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario, whose `sensing` says how the state is measured.
-    plant : SteppedPlant
-        Plant with the sensors.
-    signals : Signals
-        Signals whose row holds the returned state.
-    true_state : VehicleState
-        Views of the true state.
-
-    Returns
-    -------
-    VehicleState, and Sensor, SensorNavigation or None
-        State for law and arbiter, and its writer; the true state itself and None where sensing is exact.
-    """
+    """Return the state that law and arbiter receive, and the object that writes it."""
     if scenario.sensing.exact:
         return true_state, None
     position, velocity, health = signals.view("sensed.x", 3), signals.view("sensed.u", 6), true_state.thruster_health

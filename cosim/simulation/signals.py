@@ -21,20 +21,7 @@ class Column:
 
 
 class Signals:
-    """A row of float64 in which every group of signals is a view: a step writes into it, an observer copies it once.
-
-    Parameters
-    ----------
-    columns : sequence of Column
-        Columns in the order of the row.
-
-    Attributes
-    ----------
-    columns : tuple of Column
-        Columns in the order of the row.
-    row : ndarray, shape (n,)
-        Values of the present step, each in its column's unit.
-    """
+    """A row of float64 in which every group of signals is a view: a step writes into it, an observer copies it once."""
 
     def __init__(self, columns: Sequence[Column]) -> None:
         self.columns = tuple(columns)
@@ -46,10 +33,8 @@ class Signals:
         return self._at[name]
 
     def view(self, first: str, n: int) -> Array:
-        """Return the `n` signals from the column `first` on, shape (n,), as a view into the row.
-
-        Raise an IndexError if there are fewer.
-        """
+        """Return the `n` signals from the column `first` on, shape (n,), as a view into the row."""
+        # Raise an IndexError if there are fewer.
         at = self._at[first]
         if at + n > len(self.row):
             raise IndexError(f"{n} signals from {first!r} on: the row ends after {len(self.row) - at}")

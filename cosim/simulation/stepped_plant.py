@@ -12,17 +12,11 @@ from plant_fmu.variables import variables
 
 
 class SteppedPlant(Protocol):
-    """Plant with named variables that advances in steps.
+    """Plant with named variables that advances in steps."""
 
-    Attributes
-    ----------
-    inputs, outputs, flags : Channels
-        Buffers that change in place: `step` sends the inputs and updates the outputs.
-    """
-
-    inputs: Channels
-    outputs: Channels
-    flags: Channels
+    inputs: Channels  # buffers that change in place: `step` sends the inputs and updates the outputs
+    outputs: Channels  # buffers that change in place: `step` sends the inputs and updates the outputs
+    flags: Channels  # buffers that change in place: `step` sends the inputs and updates the outputs
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Set parameters and start values by name."""

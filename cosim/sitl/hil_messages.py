@@ -23,26 +23,7 @@ _INT16, _UINT16 = 32767, 65535
 
 
 def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float, float], gps: bool) -> list[Any]:
-    """Make the messages to PX4 for an instant; the last one, HIL_SENSOR, sets its clock.
-
-    Parameters
-    ----------
-    mavlink : module
-        The MAVLink dialect.
-    motion : Motion
-        Motion of the vehicle.
-    time_us : int
-        Time of PX4's clock [us].
-    origin : (float, float)
-        Latitude and longitude [deg] of position 0, which is at the surface.
-    gps : bool
-        Include HIL_GPS.
-
-    Returns
-    -------
-    list of messages
-        HIL_GPS if `gps` is True, HIL_STATE_QUATERNION, HIL_SENSOR.
-    """
+    """Make the messages to PX4 for an instant; the last one, HIL_SENSOR, sets its clock; time_us [us], origin [deg]."""
     latitude, longitude = (round(1e7 * angle) for angle in LocalFrame(*origin).to_global(motion.position_ned)[:2])
     up = -motion.position_ned[2]
     altitude_mm = round(1e3 * up)

@@ -38,36 +38,10 @@ class _SilentError(Exception):
 
 
 class HilServer:
-    """Fly the plant in lockstep with a PX4.
+    """Fly the plant in lockstep with a PX4."""
 
-    PX4 starts up by the wall clock; meanwhile the vehicle is held at its start, and then until it is armed. The run
-    begins with the first actuator controls of an armed vehicle, and each one from then on makes one step.
-
-    Parameters
-    ----------
-    flights : SitlSession
-        The runs of the session.
-    address : (str, int)
-        Address to bind; port 0 for any free one.
-    timeout : float, optional
-        Seconds of the wall clock without data, after which the session ends; default: no limit.
-    report : callable, optional
-        Function that shows a line of progress to the user.
-    speedup : float, optional
-        Greatest number of simulated seconds per second of the wall clock; default: no limit.
-
-    Attributes
-    ----------
-    address : (str, int)
-        The bound address.
-    counts : Counts
-        Counts of frames so far.
-
-    Raises
-    ------
-    RunError
-        If the address cannot be bound.
-    """
+    # PX4 starts up by the wall clock; meanwhile the vehicle is held at its start, and then until it is armed. The run
+    # begins with the first actuator controls of an armed vehicle, and each one from then on makes one step.
 
     def __init__(
         self,

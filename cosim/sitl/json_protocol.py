@@ -1,8 +1,7 @@
-"""Wire format of ArduPilot's JSON backend: servo packets in, a line of JSON out.
+"""Wire format of ArduPilot's JSON backend: servo packets in, a line of JSON out."""
 
-The autopilot searches the line for the bare key, and parses the number two characters behind its first occurrence. So
-there is no blank after a colon, and no key contains the name of a later one.
-"""
+# The autopilot searches the line for the bare key, and parses the number two characters behind its first occurrence. So
+# there is no blank after a colon, and no key contains the name of a later one.
 
 from __future__ import annotations
 
@@ -29,18 +28,7 @@ class ServoPacket:
 
 
 def parse_packet(data: bytes) -> ServoPacket | None:
-    """Parse a servo packet.
-
-    Parameters
-    ----------
-    data : bytes
-        A datagram.
-
-    Returns
-    -------
-    ServoPacket or None
-        The packet; None if the datagram is not a servo packet.
-    """
+    """Parse a servo packet."""
     magic, packing = _PACKINGS_BY_SIZE.get(len(data), (0, None))
     if packing is None:
         return None
@@ -49,18 +37,7 @@ def parse_packet(data: bytes) -> ServoPacket | None:
 
 
 def format_motion(motion: Motion) -> bytes:
-    """Format the plant's state for the autopilot.
-
-    Returns
-    -------
-    bytes
-        A line of JSON between two newlines; each number reads back to the same bits.
-
-    Raises
-    ------
-    RunError
-        If a number is not finite, which JSON does not support.
-    """
+    """Format the plant's state for the autopilot."""
     t, (p, q, r), (fx, fy, fz), (x, y, z), (vx, vy, vz), (roll, pitch, yaw), (e0, e1, e2, e3), altitude, _ = motion
     total = t + p + q + r + fx + fy + fz + x + y + z + vx + vy + vz + roll + pitch + yaw + e0 + e1 + e2 + e3
     if not math.isfinite(total + (altitude or 0.0)):

@@ -23,31 +23,7 @@ _WARNING_PERIOD = 10.0  # s of the wall clock, between two warnings of one kind
 
 
 class JsonServer:
-    """Fly the plant in lockstep with an ArduPilot.
-
-    Parameters
-    ----------
-    flights : SitlSession
-        The runs of the session.
-    address : (str, int)
-        Address to bind; port 0 for any free one.
-    timeout : float, optional
-        Seconds of the wall clock without a frame, after which the session ends; default: no limit.
-    report : callable, optional
-        Function that shows a line of progress to the user.
-
-    Attributes
-    ----------
-    address : (str, int)
-        The bound address.
-    counts : Counts
-        Counts of frames so far.
-
-    Raises
-    ------
-    RunError
-        If the address cannot be bound.
-    """
+    """Fly the plant in lockstep with an ArduPilot."""
 
     def __init__(
         self,
@@ -74,22 +50,7 @@ class JsonServer:
         self._warned: dict[str, float] = {}
 
     def serve(self) -> Outcome:
-        """Answer frames until the scenario's end, a timeout, or Ctrl-C.
-
-        Returns
-        -------
-        Outcome
-            The runs with their statuses, and the counts.
-
-        Raises
-        ------
-        RunError
-            If a run cannot be written, or no autopilot has connected in time.
-        PlantError
-            If the FMU fails; the record until then stays readable.
-        KeyboardInterrupt
-            If there is no run yet.
-        """
+        """Answer frames until the scenario's end, a timeout, or Ctrl-C."""
         try:
             return self._flights.fly(self._answer_frames, self.counts)
         finally:

@@ -18,32 +18,7 @@ from plant_fmu.autopilot import Curve, effort_of_pulse
 
 
 class AutopilotLaw:
-    """Thruster forces from the last outputs of an autopilot.
-
-    Parameters
-    ----------
-    channels : sequence of int
-        Output of each thruster, from 1; 0 for none.
-    efforts : sequence of callable
-        Function of each thruster from its output to the fraction of its greatest force, -1 to 1.
-    vehicle : Vehicle
-        Vehicle whose thrust limits are the greatest forces.
-    output_name : str
-        Name of an output in the record, such as ``pwm``.
-    unit : str
-        Unit of an output.
-    idle : float
-        Value, beside 0, of the outputs of a disarmed autopilot.
-    link : SitlLink, optional
-        Link that receives the autopilot's estimate, which is reported too.
-
-    Attributes
-    ----------
-    lost : int
-        Number of lost frames of the autopilot.
-    link : SitlLink or None
-        The given link.
-    """
+    """Thruster forces from the last outputs of an autopilot."""
 
     output: ClassVar[Output] = "thrusters"
 
@@ -118,25 +93,7 @@ class AutopilotLaw:
 
 
 def make_pwm_law(vehicle: Vehicle, link: SitlLink | None = None) -> AutopilotLaw:
-    """Make the law of an autopilot with servo pulses as outputs.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle whose table ``autopilot`` maps pulses to forces.
-    link : SitlLink, optional
-        Link to the autopilot.
-
-    Returns
-    -------
-    AutopilotLaw
-        Law with zero forces until pulses arrive.
-
-    Raises
-    ------
-    RunError
-        If the vehicle has no such table.
-    """
+    """Make the law of an autopilot with servo pulses as outputs."""
     if vehicle.autopilot is None:
         raise RunError(f"vehicle {vehicle.name!r} has no table [autopilot], expected frame, channels and signs in it")
     table = vehicle.autopilot
@@ -146,18 +103,7 @@ def make_pwm_law(vehicle: Vehicle, link: SitlLink | None = None) -> AutopilotLaw
 
 
 def make_control_law(vehicle: Vehicle) -> AutopilotLaw:
-    """Make the law of an autopilot with controls from -1 to 1 as outputs, one for each thruster in order.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle whose thrust limits are the forces at the controls -1 and 1; the map is linear on each side of 0.
-
-    Returns
-    -------
-    AutopilotLaw
-        Law with zero forces until controls arrive.
-    """
+    """Make the law of an autopilot with controls from -1 to 1 as outputs, one for each thruster in order."""
     n = vehicle.n_thrusters
     return AutopilotLaw(range(1, n + 1), [_clip_control] * n, vehicle, "control", "")
 

@@ -8,29 +8,14 @@ Frame = Literal["first", "next", "resent", "gap", "restart"]
 
 
 class Lockstep:
-    """Tracks the frame count of one autopilot, which increases by one with each answer that it has received.
-
-    Attributes
-    ----------
-    count : int or None
-        Count of the last frame that made a step.
-    missed : int
-        Number of frames missing before the last one.
-    """
+    """Tracks the frame count of one autopilot, which increases by one with each answer that it has received."""
 
     def __init__(self) -> None:
         self.count: int | None = None
         self.missed = 0
 
     def classify(self, count: int) -> Frame:
-        """Classify a frame, and store its count.
-
-        Returns
-        -------
-        Frame
-            ``"next"`` and ``"gap"`` require one step, ``"first"`` and ``"restart"`` a new plant and one step, and
-            ``"resent"`` the last answer again.
-        """
+        """Classify a frame, and store its count."""
         last, self.count = self.count, count
         self.missed = 0
         if last is None:

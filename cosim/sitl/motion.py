@@ -41,15 +41,7 @@ class Motion(NamedTuple):
 
 
 class MotionReader:
-    """Reads the motion from a plant's outputs.
-
-    Parameters
-    ----------
-    plant : SteppedPlant
-        The initialized plant.
-    rangefinder : Rangefinder
-        Rangefinder along the body's vertical axis.
-    """
+    """Reads the motion from a plant's outputs."""
 
     def __init__(self, plant: SteppedPlant, rangefinder: Rangefinder) -> None:
         names = plant.outputs.names
@@ -79,20 +71,8 @@ def at_rest(motion: Motion) -> Motion:
 
 
 def with_vertical_motion(motion: Motion, depth: float, speed: float, acceleration: float) -> Motion:
-    """Return the motion of a vehicle that is moved down at the horizontal position and attitude of another motion.
-
-    Parameters
-    ----------
-    motion : Motion
-        Motion with the horizontal position and the attitude.
-    depth, speed, acceleration : float
-        Vertical motion of the vehicle [m, m/s, m/s2], positive down.
-
-    Returns
-    -------
-    Motion
-        Motion in which the IMU measures gravity and the acceleration, and the DVL the speed.
-    """
+    """Return the motion of a vehicle that is moved down at the horizontal position and attitude of another motion."""
+    # with depth, speed, acceleration [m, m/s, m/s2]
     to_body = rotation_matrix(np.array(motion.quaternion)).T
     fx, fy, fz = (to_body @ np.array([0.0, 0.0, acceleration - _GRAVITY])).tolist()
     u, v, w = (to_body @ np.array([0.0, 0.0, speed])).tolist()
@@ -104,22 +84,9 @@ def with_vertical_motion(motion: Motion, depth: float, speed: float, acceleratio
 
 
 class Lowering:
-    """Trajectory of a vehicle from the surface, where it is switched on, to the depth at which a scenario starts.
+    """Trajectory of a vehicle from the surface, where it is switched on, to the depth at which a scenario starts."""
 
-    ArduSub calibrates its depth sensor when it is switched on, and again whenever it rises above that depth.
-
-    Parameters
-    ----------
-    depth : float
-        Depth at the end [m]; 0 or less for no motion.
-
-    Examples
-    --------
-    >>> from cosim.sitl.motion import Lowering
-    >>> lowering = Lowering(3.0)
-    >>> lowering.at(1.0), lowering.at(60.0), lowering.is_over(60.0)
-    ((0.0, 0.0, 0.0), (3.0, 0.0, 0.0), True)
-    """
+    # ArduSub calibrates its depth sensor when it is switched on, and again whenever it rises above that depth.
 
     def __init__(self, depth: float) -> None:
         self._depth = max(0.0, depth)

@@ -19,28 +19,7 @@ _LEVEL = 0.1  # cosine of the tilt, below which the beam does not meet a flat bo
 
 
 class Rangefinder:
-    """Measure the distance to the bottom, or to the nearest hard region, along the body's vertical axis.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario, whose plant may have a ``bottom_depth``. Without one the beam meets the surfaces of static hard
-        regions, which include the vehicle's size where the scenario adds it.
-
-    Attributes
-    ----------
-    is_fitted : bool
-        True if there is a bottom or a region for the beam to meet.
-
-    Examples
-    --------
-    >>> import cosim
-    >>> import numpy as np
-    >>> from cosim.sitl.rangefinder import Rangefinder
-    >>> below = Rangefinder(cosim.load_scenario("pipe-inspection"))
-    >>> round(below.measure(np.array([0.0, 0.0, 3.0]), np.array([1.0, 0.0, 0.0, 0.0]), 0.0), 3)  # over a bed in 4.6 m
-    1.6
-    """
+    """Measure the distance to the bottom, or to the nearest hard region, along the body's vertical axis."""
 
     def __init__(self, scenario: Scenario) -> None:
         self._has_bottom = "bottom_depth" in scenario.plant.parameters
@@ -54,17 +33,8 @@ class Rangefinder:
         self._ray_distances = CompiledFunction(ray_distances)
 
     def measure(self, position_ned: Array, quaternion: Array, altitude: float) -> float:
-        """Return the distance along the body's vertical axis [m], `MAX_RANGE` at the most; 0 inside a region.
-
-        Parameters
-        ----------
-        position_ned : ndarray, shape (3,)
-            Position of the body origin [m, NED].
-        quaternion : ndarray, shape (4,)
-            Quaternion from body to world, scalar first.
-        altitude : float
-            Altitude above the plant's bottom, as its sensor measures it [m]; unused without a bottom.
-        """
+        """Return the distance along the body's vertical axis [m], `MAX_RANGE` at the most; 0 inside a region."""
+        # with position_ned [m, NED]
         self._beam[0] = rotation_matrix(quaternion)[:, 2]
         if self._has_bottom:
             down = float(self._beam[0, 2])

@@ -16,35 +16,7 @@ from cosim.sitl.rangefinder import Rangefinder
 
 
 class Flight:
-    """A run from its first frame to its summary.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-    law : AutopilotLaw
-        Law with the autopilot's outputs; not shared with other flights.
-    out : Path or None
-        The run folder, which must not exist or be empty; None for a new one below ``runs``.
-    record_rate : float
-        Greatest number of rows per simulated second [Hz].
-
-    Attributes
-    ----------
-    folder : Path
-        The run folder.
-    steps : int
-        Number of steps made.
-    waited : int
-        Number of frames before the first step, in which the vehicle is lowered to its start and held there.
-
-    Raises
-    ------
-    RunError
-        If the folder cannot be written.
-    PlantError, BuildError, DefinitionError
-        If plant or arbiter cannot be set up, as for `Master`.
-    """
+    """A run from its first frame to its summary; record_rate [Hz]."""
 
     def __init__(self, scenario: Scenario, law: AutopilotLaw, out: Path | None, record_rate: float) -> None:
         self.scenario = scenario
@@ -73,20 +45,7 @@ class Flight:
         return self.steps >= self.scenario.steps
 
     def step(self) -> Motion:
-        """Make the next step with the present outputs of the law, and record it if a row is due.
-
-        Returns
-        -------
-        Motion
-            Motion at the end of the step.
-
-        Raises
-        ------
-        PlantError
-            If the FMU fails.
-        RunError
-            If the record cannot be written.
-        """
+        """Make the next step with the present outputs of the law, and record it if a row is due."""
         self._master.step(self.steps)
         self._record()
         self.steps += 1
@@ -131,24 +90,6 @@ class Flight:
                 self._claimed.keep(self._recorder)
 
     def conclude(self, status: str, report: bool) -> Run:
-        """Write the summary of a flight that has ended after at least one step.
-
-        Parameters
-        ----------
-        status : str
-            Status for the summary.
-        report : bool
-            Write report and figures too.
-
-        Returns
-        -------
-        Run
-            The run with its summary.
-
-        Raises
-        ------
-        RunError
-            If the folder cannot be written.
-        """
+        """Write the summary of a flight that has ended after at least one step."""
         with self._claimed.writing():
             return conclude(self.folder, self.scenario, status, self._wall_time, report)

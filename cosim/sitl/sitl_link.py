@@ -46,25 +46,7 @@ class DvlOptions:
 
 
 class Dvl:
-    """Integrate the DVL's velocity and the gyro over each interval.
-
-    Parameters
-    ----------
-    options : DvlOptions
-        Rate, latency and dropout.
-
-    Examples
-    --------
-    Each delta has the autopilot's time [us], the interval [us], the rotation [rad] and the displacement [m] in it:
-
-    >>> from cosim.sitl.sitl_link import Dvl, DvlOptions
-    >>> from cosim.sitl.motion import Motion
-    >>> still, ahead = (0.0, 0.0, 0.0), (0.25, 0.0, 0.0)
-    >>> motion = Motion(0.0, still, still, still, ahead, still, (1.0, 0.0, 0.0, 0.0), None, ahead)
-    >>> dvl = Dvl(DvlOptions(rate=8.0, latency=0.0))
-    >>> [delta for k in range(9) for delta in dvl.integrate(motion._replace(time=k / 64))]
-    [(125000, 125000, (0.0, 0.0, 0.0), (0.03125, 0.0, 0.0))]
-    """
+    """Integrate the DVL's velocity and the gyro over each interval."""
 
     def __init__(self, options: DvlOptions) -> None:
         self._options = options
@@ -94,25 +76,7 @@ class Dvl:
 
 
 class SitlLink:
-    """MAVLink link to the autopilot that flies the plant.
-
-    Parameters
-    ----------
-    endpoint : Endpoint
-        Port of the autopilot; messages are sent as component 197 of the vehicle.
-    dvl : DvlOptions, optional
-        DVL whose measurements are sent; default: none.
-
-    Attributes
-    ----------
-    estimate : ndarray, shape (len(ESTIMATE),)
-        Values of `ESTIMATE`; NaN before they are received.
-
-    Raises
-    ------
-    TelemetryError
-        If the endpoint is a file, or cannot be opened.
-    """
+    """MAVLink link to the autopilot that flies the plant."""
 
     def __init__(self, endpoint: Endpoint, dvl: DvlOptions | None = None) -> None:
         if endpoint.kind == "tlog":

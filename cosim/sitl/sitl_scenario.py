@@ -17,34 +17,7 @@ MIN_RATE, MAX_RATE = 11, 65535  # Hz: an autopilot's frame is shorter than 0.1 s
 def scenario_to_fly(
     name_or_file: str | Path, overrides: Sequence[str], vehicle: str | None, frame_rate: int, autopilot: str
 ) -> Scenario:
-    """Load a scenario for an autopilot to fly.
-
-    Parameters
-    ----------
-    name_or_file : str or Path
-        Name of a shipped scenario, or a TOML file.
-    overrides : sequence of str
-        Changes such as ``plant.current.0=0.2``, as for `load_scenario`.
-    vehicle : str or None
-        Name of a shipped vehicle, or a TOML file; None for the scenario's.
-    frame_rate : int
-        Frame rate of the autopilot [Hz], `MIN_RATE` to `MAX_RATE`.
-    autopilot : str
-        Name of the autopilot, used as the law's name in summary and report, such as ``ardupilot``.
-
-    Returns
-    -------
-    Scenario
-        Scenario with thrusters, whose step and control period are the autopilot's frame. Duration and the arbiter's
-        period are rounded to multiples of it; the number of steps is limited to `MAX_STEPS`.
-
-    Raises
-    ------
-    ScenarioError
-        If the scenario is invalid, as for `load_scenario`.
-    RunError
-        If the scenario accepts commands or records V, which needs a law of this package.
-    """
+    """Load a scenario for an autopilot to fly; frame_rate [Hz]."""
     changes = [*overrides, "actuation.through=thrusters"]
     if vehicle is not None:
         changes.append(f"vehicle='{vehicle}'")

@@ -54,29 +54,7 @@ class FlightOptions:
 
 
 class SitlSession:
-    """The runs of one SITL session: the present one and those before it.
-
-    Parameters
-    ----------
-    options : FlightOptions
-        Options of the session.
-    autopilot : str
-        Name of the autopilot, used as the law's name in summary and report.
-    make_law : callable
-        Function that makes the law of a vehicle.
-
-    Attributes
-    ----------
-    flight : Flight or None
-        The present run.
-    law : AutopilotLaw
-        Law of the present run.
-
-    Raises
-    ------
-    ScenarioError, RunError, BuildError
-        If the scenario cannot be flown, which is checked before waiting for an autopilot.
-    """
+    """The runs of one SITL session: the present one and those before it."""
 
     def __init__(self, options: FlightOptions, autopilot: str, make_law: Callable[[Vehicle], AutopilotLaw]) -> None:
         self._options, self._autopilot, self._make_law = options, autopilot, make_law
@@ -91,14 +69,7 @@ class SitlSession:
         self._ended: list[tuple[Flight, str]] = []
 
     def begin(self, frame_rate: int) -> Flight:
-        """Start a run at the rate of an autopilot's frames [Hz].
-
-        Raises
-        ------
-        RunError, ScenarioError, PlantError, BuildError, DefinitionError
-            If the scenario cannot be flown at this rate, or the run cannot begin; as `scenario_to_fly` and `Flight`. Or
-            if the session has had `RUNS` runs.
-        """
+        """Start a run at the rate of an autopilot's frames [Hz]."""
         if len(self._ended) >= RUNS:
             raise RunError(f"the autopilot has restarted too often: expected at most {RUNS} runs of a session")
         o = self._options
@@ -118,29 +89,7 @@ class SitlSession:
                 flight.conclude(status, report=False)
 
     def fly(self, serve: Callable[[], str], counts: FrameCounts) -> Outcome:
-        """Run a server until it ends, and conclude its runs.
-
-        Parameters
-        ----------
-        serve : callable
-            The server's loop, which begins and steps flights, and returns the status of the last one.
-        counts : Counts
-            Counts of the server.
-
-        Returns
-        -------
-        Outcome
-            The runs with their statuses, and the counts.
-
-        Raises
-        ------
-        RunError
-            If a run cannot be written, or no autopilot has connected.
-        PlantFmuError, CosimError
-            If a run fails; its record until then stays readable.
-        KeyboardInterrupt
-            After Ctrl-C before the first run.
-        """
+        """Run a server until it ends, and conclude its runs."""
         failure: Exception | None = None
         interrupted = False
         try:

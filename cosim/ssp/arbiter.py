@@ -25,18 +25,7 @@ _DECLARATION = re.compile(r"^int (\w+)\(const double inputs\[\d+\], double outpu
 
 
 def arbiter_component(scenario: Scenario) -> Component:
-    """Make the component of a scenario's arbiter.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with the closed engine, or one with the same results.
-
-    Returns
-    -------
-    Component
-        Component without states, for co-simulation.
-    """
+    """Make the component of a scenario's arbiter."""
     rows = (
         Variable("time", "time", "time", q.TIME, "Simulated time"),
         *_inputs(scenario),

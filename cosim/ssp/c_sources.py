@@ -8,35 +8,11 @@ _NAMED = b'#include "variables.h" /* names the functions */\n'
 
 
 def c_files(package: str, folder: str) -> dict[str, bytes]:
-    """Return the C files and headers of a folder.
-
-    Parameters
-    ----------
-    package : str
-        Name of the package, such as ``"controller"``.
-    folder : str
-        Folder in the package.
-
-    Returns
-    -------
-    dict of str to bytes
-        Files by name.
-    """
+    """Return the C files and headers of a folder."""
     found = resources.files(package).joinpath(*folder.split("/"))
     return {file.name: file.read_bytes() for file in found.iterdir() if file.name.endswith((".c", ".h"))}
 
 
 def under_own_names(files: dict[str, bytes]) -> dict[str, bytes]:
-    """Prefix the functions of C files with the name of their FMU, so that several FMUs can be linked into one program.
-
-    Parameters
-    ----------
-    files : dict of str to bytes
-        Files by name, which do not depend on FMI.
-
-    Returns
-    -------
-    dict of str to bytes
-        The files; C files include the generated header first.
-    """
+    """Prefix functions of C files with the name of their FMU, so that FMUs can be linked into one program."""
     return {name: _NAMED + code if name.endswith(".c") else code for name, code in files.items()}

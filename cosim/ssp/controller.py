@@ -46,18 +46,7 @@ _GAIN_UNITS = {"m2": "N/m2", "m": "N/m", "": "N", "rad": "N/rad"}
 
 
 def controller_component(scenario: Scenario) -> Component:
-    """Make the component of a scenario's controller.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with a built-in law, and without streamed regions.
-
-    Returns
-    -------
-    Component
-        Component without states, for co-simulation.
-    """
+    """Make the component of a scenario's controller."""
     regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
     translated = translate_loop(scenario, regions, prefixes(regions))
     rows = tuple(_variables(scenario, regions, translated.places))
@@ -74,18 +63,7 @@ def controller_component(scenario: Scenario) -> Component:
 
 
 def prefixes(regions: Sequence[Region]) -> list[str]:
-    """Return the prefix of each region's variables.
-
-    Parameters
-    ----------
-    regions : sequence of Region
-        Regions, the goal first.
-
-    Returns
-    -------
-    list of str
-        Prefixes of letters, digits, underscores and dots, as in FMI's structured naming.
-    """
+    """Return the prefix of each region's variables."""
     found = ["goal"]
     for region in regions[1:]:
         name = re.sub(r"\W", "_", region.name, flags=re.ASCII)

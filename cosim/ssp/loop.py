@@ -1,7 +1,6 @@
-"""The loop of a scenario in the controller's FMU: its functions in Python, and their arrays.
+"""The loop of a scenario in the controller's FMU: its functions in Python, and their arrays."""
 
-The functions are those of the master and the fused loop; `cosim.ssp.translated` translates them to C.
-"""
+# The functions are those of the master and the fused loop; `cosim.ssp.translated` translates them to C.
 
 from __future__ import annotations
 
@@ -43,27 +42,7 @@ def decide(
     now: Array,
     signals: ArbiterSignals,
 ) -> None:
-    """Evaluate the regions at the arbiter's pose, and compute the inputs of its rules.
-
-    Parameters
-    ----------
-    places : RegionPlaces
-        Goal and regions at their present positions.
-    measured : VehicleState
-        The state that the law receives.
-    expected : ndarray, shape (6,)
-        The law's prediction for this step, NaN without one.
-    state : VehicleState
-        Receives the arbiter's state.
-    evaluation : RegionEvaluation
-        Receives values and clearances of goal and regions.
-    inputs : PackedInputs
-        Sources of the inputs of the rules.
-    now : ndarray, shape (1,)
-        Time [s].
-    signals : ArbiterSignals
-        Receives memberships and inputs.
-    """
+    """Evaluate the regions at the arbiter's pose, and compute the inputs of its rules; expected (6,), now (1,) [s]."""
     write_arbiter_state(measured, expected, state)
     evaluate_places(places, state, evaluation)
     compute_inputs(inputs, places.goal, places.regions, state, now, evaluation.clearances[1:], signals)
@@ -81,22 +60,7 @@ def find_goal(goal: PackedRegions, position: Array, quaternion: Array, clearance
 
 
 class Loop:
-    """A scenario's loop without plant and arbiter.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario without features that a system of FMUs lacks.
-
-    Attributes
-    ----------
-    setup : FlightConfig
-        Configuration of the flight.
-    law : CompiledLaw
-        The law in its initial state.
-    functions : dict of str to (function, tuple)
-        Functions by name in C, with their arguments.
-    """
+    """A scenario's loop without plant and arbiter."""
 
     def __init__(self, scenario: Scenario) -> None:
         m, n = scenario.vehicle.n_thrusters, len(scenario.regions)

@@ -17,11 +17,10 @@ _TYPES = {"numbers": np.float64, "integers": np.int64, "words": np.uint64, "flag
 
 
 class Memory:
-    """Places of arrays: variable ones in members of the C struct ``Model``, fixed ones in constants.
+    """Places of arrays: variable ones in members of the C struct ``Model``, fixed ones in constants."""
 
-    Arrays that share memory have the same place. Parameters come first: the importer sets them, and a reset does not
-    change them.
-    """
+    # Arrays that share memory have the same place. Parameters come first: the importer sets them, and a reset does not
+    # change them.
 
     def __init__(self) -> None:
         self._pools: dict[str, list[np.ndarray]] = {member: [] for member in POOLS.values()}
@@ -63,17 +62,7 @@ class Memory:
         return id(array) in self._constants
 
     def call(self, program: Program, name: str, arguments: tuple[Any, ...]) -> str:
-        """Return the C code of ``void control_name(Model *m)``, which calls a function of the program.
-
-        Parameters
-        ----------
-        program : Program
-            Program that exports the function as ``translated_name``.
-        name : str
-            Name of the function.
-        arguments : tuple
-            Arguments of the function, each a value or `Named`.
-        """
+        """Return the C code of ``void control_name(Model *m)``, which calls a function of the program."""
 
         def pointer(array: np.ndarray, _: str) -> str:
             kind = type_of(array)

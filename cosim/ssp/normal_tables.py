@@ -1,8 +1,7 @@
-"""Noise in C: the layers of a ziggurat under the normal density, and the initial state of NumPy's generator.
+"""Noise in C: the layers of a ziggurat under the normal density, and the initial state of NumPy's generator."""
 
-The method is that of Marsaglia and Tsang, The Ziggurat Method for Generating Random Variables (2000), with 256 layers
-as in NumPy.
-"""
+# The method is that of Marsaglia and Tsang, The Ziggurat Method for Generating Random Variables (2000), with 256 layers
+# as in NumPy.
 
 from __future__ import annotations
 
@@ -18,11 +17,9 @@ _SIZE = 2**128  # modulus of its state
 
 
 def ziggurat() -> str:
-    """Return the C header with the layers: ``WIDTHS``, ``INNER`` and ``HEIGHTS``.
-
-    NumPy rounds its widths in another way, so that their last bits differ from a computation here: the widths are read
-    from its generator. The other two only decide whether a number is accepted.
-    """
+    """Return the C header with the layers: ``WIDTHS``, ``INNER`` and ``HEIGHTS``."""
+    # NumPy rounds its widths in another way, so that their last bits differ from a computation here: the widths are
+    # read from its generator. The other two only decide whether a number is accepted.
     density, x = math.exp(-0.5 * OUTERMOST**2), OUTERMOST
     area = OUTERMOST * density + math.sqrt(math.pi / 2.0) * math.erfc(OUTERMOST / math.sqrt(2.0))
     edges = [x]

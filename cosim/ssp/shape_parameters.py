@@ -7,16 +7,5 @@ from plant_fmu.quantities import Quantity
 
 
 def shape_numbers(shape: Shape) -> tuple[tuple[str, Quantity], ...]:
-    """Return name and quantity of each number that a shape packs.
-
-    Parameters
-    ----------
-    shape : Shape
-        One of those in `controller.regions.SHAPES`.
-
-    Returns
-    -------
-    tuple of (str, Quantity)
-        Names and quantities in the order of ``shape.packed()``.
-    """
+    """Return name and quantity of each number that a shape packs."""
     return tuple((name, Quantity(unit, least, greatest)) for name, unit, least, greatest, _ in shape.numbers())

@@ -49,24 +49,7 @@ class Wire:
 def structure(
     name: str, description: str, parts: Sequence[Part], wires: Sequence[Wire], stop_time: float, step: float
 ) -> str:
-    """Write the text of ``SystemStructure.ssd``.
-
-    Parameters
-    ----------
-    name, description : str
-        Name and description of the system.
-    parts : sequence of Part
-        Parts in stepping order, for masters that use it.
-    wires : sequence of Wire
-        Connections between the parts.
-    stop_time, step : float
-        End and step [s]; SSP 1.0 has no element for the step, so it is in annotations of OSP and OMSimulator.
-
-    Returns
-    -------
-    str
-        XML text; deterministic.
-    """
+    """Write the text of ``SystemStructure.ssd``; stop_time, step [s]."""
     version = metadata.version("subreach")
     root = ET.Element(
         "ssd:SystemStructureDescription", _NAMESPACES, version="1.0", name=identifier(name), description=description,

@@ -35,34 +35,9 @@ WRENCH = tuple(f"wrench.{name}" for name in FORCES)
 
 
 def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str = NATIVE) -> Path:
-    """Write a scenario's plant, controller and arbiter as a system structure and package (SSP 1.0).
-
-    The system is of Jacobi type: in each step every FMU uses the outputs of the others from the beginning of the step,
-    in any stepping order of the master.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with a built-in law, and without commands and streamed regions.
-    out : Path
-        The file to write, atomically and with deterministic content.
-    fmi : int
-        FMI version of all three FMUs, 2 or 3. Most SSP masters support 2 only.
-    platforms : str
-        Platforms of the FMUs, as for `plant_fmu.build_fmu`.
-
-    Returns
-    -------
-    Path
-        The written file, `out`.
-
-    Raises
-    ------
-    RunError
-        If the scenario has a feature that such a system does not support.
-    BuildError
-        If an FMU cannot be built, or `out` cannot be written.
-    """
+    """Write a scenario's plant, controller and arbiter as a system structure and package (SSP 1.0)."""
+    # The system is of Jacobi type: in each step every FMU uses the outputs of the others from the beginning of the
+    # step, in any stepping order of the master.
     _require(scenario)
     out = Path(out)
     require_place(out)
@@ -103,10 +78,8 @@ def _wires(components: Mapping[str, Component]) -> list[Wire]:
 
 
 def _shown(part: str, component: Component, wires: Sequence[Wire]) -> tuple[str, ...]:
-    """Return the names of a component's real outputs, and of its inputs that are connected.
-
-    FMPy sets inputs that have a connector but no connection to the value of another one.
-    """
+    """Return the names of a component's real outputs, and of its inputs that are connected."""
+    # FMPy sets inputs that have a connector but no connection to the value of another one.
     connected = {name for wire in wires if wire.end == part for name in wire.names}
     return tuple(
         v.name for v in component.variables
@@ -115,18 +88,7 @@ def _shown(part: str, component: Component, wires: Sequence[Wire]) -> tuple[str,
 
 
 def plant_component(scenario: Scenario) -> Component:
-    """Make the component of a scenario's plant, with the scenario's start values.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario whose vehicle, initial state and plant parameters are used.
-
-    Returns
-    -------
-    Component
-        The vehicle's component, with other start values.
-    """
+    """Make the component of a scenario's plant, with the scenario's start values."""
     start = {name: float(value) for name, value in start_values(scenario).items()}
     for failure in scenario.failures:  # failures at time 0 are start values, since connections act after the first step
         if failure.time <= 0.0 and not failure.stuck:

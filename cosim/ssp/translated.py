@@ -50,27 +50,7 @@ class Translated:
 
 
 def translate_loop(scenario: Scenario, regions: Sequence[Region], names: Sequence[str]) -> Translated:
-    """Translate the loop of a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with a built-in law.
-    regions : sequence of Region
-        Regions of the scenario, the goal first.
-    names : sequence of str
-        Prefix of the variables of each region.
-
-    Returns
-    -------
-    Translated
-        Files for the folder with those of ``csrc/controller``.
-
-    Raises
-    ------
-    TranslationError
-        If a function uses Python that cannot be translated.
-    """
+    """Translate the loop of a scenario."""
     loop = Loop(scenario)
     memory = Memory()
     places = _place(loop, memory, scenario)

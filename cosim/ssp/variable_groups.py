@@ -14,20 +14,7 @@ _LAST = re.compile(r"(?:\.[^.\[\]]+|\[\d+\])$")  # last part of a structured nam
 
 
 def osp_model_description(component: Component, names: Iterable[str]) -> str:
-    """Write the groups of variables that are connected together, such as a position or all thruster commands.
-
-    Parameters
-    ----------
-    component : Component
-        The FMU's component.
-    names : iterable of str
-        Names of the inputs and outputs with a connector.
-
-    Returns
-    -------
-    str
-        XML text; a group has two variables or more, all inputs or all outputs.
-    """
+    """Write the groups of variables that are connected together, such as a position or all thruster commands."""
     shown = set(names)
     groups: dict[tuple[str, bool], list[str]] = {}
     for v in component.variables:

@@ -56,6 +56,14 @@ def functions() -> Iterator[griffe.Function]:
     return (what for what in everything() if isinstance(what, griffe.Function))
 
 
+def public_functions() -> Iterator[griffe.Function]:
+    for name in sorted(public.names()):
+        what = public.target(name)
+        for one in [what] if what.is_function else public.members(what) if what.is_class else []:
+            if isinstance(one, griffe.Function):
+                yield one
+
+
 def docstring_text(what: griffe.Object) -> str:
     """Return a docstring, with those of the functions that it refers to."""
     words = what.docstring.value if what.docstring else ""
@@ -96,6 +104,12 @@ def comment_on(attribute: griffe.Attribute) -> str:
     return " ".join(line.partition("#")[2] for line in lines[first : attribute.endlineno])
 
 
+def comments_in(function: griffe.Function) -> str:
+    """The comments of a function, those in its signature included."""
+    lines = function.lines_collection[function.filepath][function.lineno - 1 : function.endlineno]
+    return " ".join(line.partition("#")[2] for line in lines)
+
+
 def physical(name: str, kind: object) -> bool:
     return bool(KINDS.search(name) and NUMBERS.search(str(kind)))
 
@@ -130,20 +144,32 @@ def test_parameters_sections_match_signatures():
 def test_public_docstrings_name_every_parameter():
     """In a section, or in the words where there is none."""
     wrong = {}
-    for name in public.names():
-        what = public.target(name)
-        for function in [what] if what.is_function else public.members(what) if what.is_class else []:
-            if function.is_function:
-                listed = {entry for entry, _ in section(function, Part.parameters)}
-                words = set(re.findall(r"\w+", docstring_text(function)))
-                if missing := [p.name for p in parameters(function) if p.name not in (listed or words)]:
-                    wrong[function.path] = missing
+    for function in public_functions():
+        listed = {entry for entry, _ in section(function, Part.parameters)}
+        words = set(re.findall(r"\w+", docstring_text(function)))
+        if missing := [p.name for p in parameters(function) if p.name not in (listed or words)]:
+            wrong[function.path] = missing
     assert not wrong, shown(wrong)
+
+
+def test_internal_docstrings_have_one_line():
+    """But for parameters and fields, whose units stand beside them, and comments below for the reasons."""
+    allowed = {what.path for what in map(public.target, public.names())} | {one.path for one in public_functions()}
+    wrong = {
+        what.path: what.docstring.value
+        for what in everything()
+        if what.docstring and "\n" in what.docstring.value and not _is_within(what.path, allowed)
+    }
+    assert not wrong, shown(wrong)
+
+
+def _is_within(path: str, allowed: set[str]) -> bool:
+    return path in allowed or path.rpartition(".")[0] in allowed
 
 
 def test_return_values_are_documented():
     wrong = []
-    for function in functions():
+    for function in public_functions():
         kinds = {part.kind for part in function.docstring.parse("numpy")} if function.docstring else set()
         summary = docstring_text(function).partition("\n\n")[0]
         if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in body(function)):
@@ -159,9 +185,7 @@ def test_return_values_are_documented():
 
 def test_raised_exceptions_are_documented():
     wrong = {}
-    for function in functions():
-        if function.path.startswith("cosim.command_line."):
-            continue  # the verbs: `cosim.command_line.cli` prints what they raise
+    for function in public_functions():
         own = list(body(function))
         caught = {
             id(n) for t in own if isinstance(t, ast.Try) and t.handlers for part in t.body for n in ast.walk(part)
@@ -175,14 +199,15 @@ def test_raised_exceptions_are_documented():
 
 
 def test_physical_quantities_have_documented_units():
-    """Parameters and return values: in their section if there is one, else anywhere in the docstring."""
+    """Parameters and return values: in their section, else in the docstring, the comments below it, or beside them."""
     wrong = {}
     for function in functions():
+        words = f"{docstring_text(function)} {comments_in(function)}"
         entries = dict(section(function, Part.parameters))
         for p in parameters(function):
-            if physical(p.name, p.annotation) and not UNIT.search(entries.get(p.name, docstring_text(function))):
-                wrong[f"{function.path}({p.name})"] = entries.get(p.name, docstring_text(function))
-        back = " ".join(text for _, text in section(function, Part.returns)) or docstring_text(function)
+            if physical(p.name, p.annotation) and not UNIT.search(entries.get(p.name, words)):
+                wrong[f"{function.path}({p.name})"] = entries.get(p.name, words)
+        back = " ".join(text for _, text in section(function, Part.returns)) or words
         if physical(function.name, function.returns) and not UNIT.search(back):
             wrong[function.path] = back
     assert not wrong, shown(wrong)

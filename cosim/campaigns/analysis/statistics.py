@@ -1,7 +1,7 @@
-"""Statistics for pages and summaries: rates with intervals, quantiles, bins, effects, and paired differences.
+"""Statistics for pages and summaries: rates with intervals, quantiles, bins, effects, and paired differences."""
 
-`scipy.stats` is imported in the functions, since workers import this module without using it, and importing takes long.
-"""
+# `scipy.stats` is imported in the functions, since workers import this module without using it, and importing takes
+# long.
 
 from __future__ import annotations
 
@@ -26,19 +26,7 @@ _ROUNDING = 1e-14  # relative range within which an outcome counts as constant
 
 
 def rate(happened: Facts) -> dict[str, Any]:
-    """Return count and share of rows in which an event happened, and the 95 % interval of the share by Wilson.
-
-    Parameters
-    ----------
-    happened : ndarray of bool, shape (n,)
-        True for rows in which it happened.
-
-    Returns
-    -------
-    dict
-        Number of ``rows`` in which it happened, their ``share``, and ``low`` and ``high`` of its interval; the last
-        three are None without rows.
-    """
+    """Return count and share of rows in which an event happened, and the 95 % interval of the share by Wilson."""
     n, k = len(happened), int(happened.sum())
     if not n:
         return {"rows": 0, "share": None, "low": None, "high": None}
@@ -49,18 +37,7 @@ def rate(happened: Facts) -> dict[str, Any]:
 
 
 def quantiles(values: Array) -> dict[str, float | None]:
-    """Return quantiles of the finite numbers.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Numbers, NaN where missing.
-
-    Returns
-    -------
-    dict of str to float or None
-        Value of each quantile, with keys such as ``"0.5"``; None without finite numbers.
-    """
+    """Return quantiles of the finite numbers; values (n,)."""
     values = values[np.isfinite(values)]
     found = np.quantile(values, QUANTILES) if values.size else [None] * len(QUANTILES)
     return {str(q): None if x is None else float(x) for q, x in zip(QUANTILES, found, strict=True)}
@@ -76,18 +53,7 @@ class Bin(NamedTuple):
 
 
 def bins(values: Array) -> Iterator[Bin]:
-    """Yield the bins of a key: one for each value if there are few, otherwise bins with equal numbers of rows.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Finite values of the key in each row.
-
-    Yields
-    ------
-    Bin
-        Bins from low to high values; none is empty.
-    """
+    """Yield the bins of a key: one for each value if there are few, otherwise bins with equal numbers of rows."""
     of = _bin_numbers(values, _BINS)
     for i in np.unique(of):
         rows = of == i
@@ -105,25 +71,10 @@ def _bin_numbers(values: Array, most: int) -> NDArray[np.int64]:
 
 
 def effect(values: Array, outcome: Array) -> dict[str, float] | None:
-    """Estimate the share of an outcome's variance that a key alone explains: its first-order Sobol' index.
-
-    It measures a dependence of any form, also a non-monotonic one, which a correlation does not show. The outcome is
-    fitted by a line in each of several bins of the key, or by its mean at each value of a key with few values. The
-    estimate is the share that the fit explains, corrected for chance (adjusted R²; for means Kelley's ε²).
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Finite values of the key. Keys must vary independently.
-    outcome : ndarray, shape (n,)
-        Finite values of the outcome; 0 and 1 for a Boolean one.
-
-    Returns
-    -------
-    dict of str to float, or None
-        ``share``, up to 1, and a little below 0 by chance; ``floor``, which chance alone exceeds in one of a hundred
-        cells (F test). None if key or outcome is constant, or there are too few rows.
-    """
+    """Estimate the share of an outcome's variance that a key alone explains: its first-order Sobol' index."""
+    # It measures a dependence of any form, also a non-monotonic one, which a correlation does not show. The outcome is
+    # fitted by a line in each of several bins of the key, or by its mean at each value of a key with few values. The
+    # estimate is the share that the fit explains, corrected for chance (adjusted R²; for means Kelley's ε²).
     n = len(values)
     if n < _LEAST_ROWS or np.ptp(values) == 0.0 or np.ptp(outcome) <= _ROUNDING * np.abs(outcome).max():
         return None
@@ -146,19 +97,7 @@ def effect(values: Array, outcome: Array) -> dict[str, float] | None:
 
 
 def paired(one: Facts, other: Facts) -> dict[str, Any]:
-    """Count the scenes that both laws, only one, or none of them completes.
-
-    Parameters
-    ----------
-    one, other : ndarray of bool, shape (n,)
-        Masks of the scenes that each law completes.
-
-    Returns
-    -------
-    dict
-        Numbers of scenes that ``both`` complete, ``only_one``, ``only_other`` and ``neither``; ``p`` of McNemar's exact
-        test on the scenes that only one law completes, None if there are none.
-    """
+    """Count the scenes that both laws, only one, or none of them completes; one, other (n,)."""
     from scipy.stats import binomtest
 
     only_one, only_other = int((one & ~other).sum()), int((other & ~one).sum())
@@ -173,18 +112,7 @@ def paired(one: Facts, other: Facts) -> dict[str, Any]:
 
 
 def median_difference(differences: Array) -> dict[str, Any]:
-    """Return the median of paired differences and its distribution-free 95 % interval.
-
-    Parameters
-    ----------
-    differences : ndarray, shape (n,)
-        Finite differences between the numbers of two laws in the same row.
-
-    Returns
-    -------
-    dict
-        Number of ``pairs``, their ``median``, and ``low`` and ``high`` of its interval; None with too few pairs.
-    """
+    """Return the median of paired differences and its distribution-free 95 % interval; differences (n,)."""
     n = len(differences)
     if not n:
         return {"pairs": 0, "median": None, "low": None, "high": None}
@@ -196,19 +124,7 @@ def median_difference(differences: Array) -> dict[str, Any]:
 
 
 def mean_ratio(one: Array, other: Array) -> dict[str, Any]:
-    """Return the means of two laws over the same rows, and their ratio with its 95 % interval.
-
-    Parameters
-    ----------
-    one, other : ndarray, shape (n,)
-        Numbers of the same rows, at least 0; rows in which one is not finite are ignored.
-
-    Returns
-    -------
-    dict
-        Number of ``pairs``, the means ``one`` and ``other``, their ``ratio``, and ``low`` and ``high`` of its interval
-        by the bootstrap over rows, by percentiles; None without rows. The last three are None if the other mean is 0.
-    """
+    """Return the means of two laws over the same rows, and their ratio with its 95 % interval; one, other (n,)."""
     there = np.isfinite(one) & np.isfinite(other)
     one, other = one[there], other[there]
     n = len(one)

@@ -21,24 +21,7 @@ MEDIANS = ("reach_time", "effort", "thrust_variation", "min_clearance", "worst_s
 
 
 def summarize_campaign(plan: Plan, results: Results, folder: Path) -> dict[str, Any]:
-    """Summarize a campaign.
-
-    Parameters
-    ----------
-    plan : Plan
-        Plan of the campaign.
-    results : Results
-        Rows of the campaign.
-    folder : Path
-        Folder of the campaign, for the commands that repeat scenes.
-
-    Returns
-    -------
-    dict
-        Table for JSON: counts; rates with 95 % intervals by Wilson; quantiles and medians over the reached scenes (None
-        without any), quantiles of the clearance over all; rates and quantiles by kind of scene, if there are several;
-        the seeds that failed; the worst scenes; and the plan. Units are those of the columns of the results.
-    """
+    """Summarize a campaign."""
     reached, violation, seeds = results["reached"], results["violation"], results["seed"]
     stopped = ~np.isnan(results.number("stopped_at"))
     return {

@@ -26,21 +26,7 @@ class Worst(NamedTuple):
 
 
 def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
-    """Return the worst rows of a sweep or of a campaign of scenes, without refused ones.
-
-    Parameters
-    ----------
-    results : Results
-        Rows of the campaign.
-    count : int
-        Greatest number of rows.
-
-    Returns
-    -------
-    list of Worst
-        First what violated a hard region or was stopped by the plant, the deepest first, then what never reached the
-        goal, then the rest, the slowest first; equally bad rows in the order of their keys.
-    """
+    """Return the worst rows of a sweep or of a campaign of scenes, without refused ones."""
     names = results.schema.names
     keys, reached = results[names[0]], results.fact("reached")
     stopped = results.number("stopped_at")
@@ -67,22 +53,7 @@ def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
 
 
 def worst_table(results: Results, folder: Path, count: int = LISTED) -> list[dict[str, Any]]:
-    """Return the worst rows for a summary, each with the command that repeats it.
-
-    Parameters
-    ----------
-    results : Results
-        Rows of the campaign.
-    folder : Path
-        The campaign's folder.
-    count : int
-        Greatest number of rows.
-
-    Returns
-    -------
-    list of dict
-        For each row its key ``row``, the reason ``why``, and the ``command`` that repeats it.
-    """
+    """Return the worst rows for a summary, each with the command that repeats it."""
     return [{"row": key, "why": why, "command": rerun_command(folder, key)} for key, why in worst_rows(results, count)]
 
 

@@ -80,34 +80,7 @@ class _Flights:
 
 
 def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool = False) -> Falsification:
-    """Search for the worst rows, or estimate the probability of a violation, and write results and summary.
-
-    Parameters
-    ----------
-    work : SceneSearch or ScenarioSearch
-        Search with its objective and budget.
-    out : Path
-        A folder that does not exist, is empty, or holds the same search: a complete one, whose summary is written
-        again, or a part, which is continued.
-    workers : int
-        Number of processes. The rows do not depend on it.
-    progress : bool
-        True to show a bar, if there is a terminal.
-
-    Returns
-    -------
-    Falsification
-        All rows of the search; for a search of the worst, the folder ``random`` has as many random ones.
-
-    Raises
-    ------
-    RunError
-        If the folder holds something else or cannot be written, or processes crash on any row.
-    BuildError, PlantError
-        If there is no FMU of the vehicle.
-    KeyboardInterrupt
-        After Ctrl-C; finished rows are kept.
-    """
+    """Search for the worst rows, or estimate the probability of a violation, and write results and summary."""
     settings = work.settings
     estimate = None
     with flyer_held(work.task), CampaignFolder(out, work) as folder:
@@ -133,23 +106,7 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
 
 
 def costs_of(rows: Any, objective: Objective, horizon: float) -> NDArray[np.float64]:
-    """Return the costs that a search minimizes.
-
-    Parameters
-    ----------
-    rows : pyarrow.Table
-        Rows of a campaign or a sweep.
-    objective : str
-        Outcome that gives the cost.
-    horizon : float
-        Length of a flight [s].
-
-    Returns
-    -------
-    ndarray, shape (rows,)
-        Least clearance [m], below 0 for a stopped flight; or the negative weighted violation [m s]; or the negative
-        time of arrival [s], the horizon without arrival. Rows that were not flown cost 1e9.
-    """
+    """Return the costs that a search minimizes; horizon [s], returns (rows,) [m]."""
     values = to_array(rows[_COLUMNS[objective]]).astype(float)
     if objective == "clearance":
         values = np.where(to_array(pc.is_null(rows["stopped_at"])), values, np.fmin(values, _STOPPED))

@@ -20,29 +20,11 @@ _PATIENCE = 10  # generations without a lesser cost, after which a search ends
 
 
 def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None:
-    """Evaluate a function at `budget` points, concentrated where it is least.
-
-    A tenth of them is drawn uniformly. From the best of these starts a CMA-ES with a diagonal covariance (Ros and
-    Hansen 2008), which adapts to some eighty coordinates within a hundred generations. After ten generations without
-    improvement a narrow search starts from the least cost of all, and after it a wide one from the next best drawn
-    point. Each wide one has twice the population of the last (Auger and Hansen 2005).
-
-    Parameters
-    ----------
-    evaluate : callable
-        Function from points, shape (n, dimension), each coordinate from 0 to 1, to their finite costs, shape (n,).
-    dimension : int
-        Number of coordinates.
-    budget : int
-        Number of points to evaluate.
-    seed : int
-        Seed of the search; equal seeds and costs give equal points.
-
-    Raises
-    ------
-    RunError
-        If the package cma is not installed.
-    """
+    """Evaluate a function at `budget` points, concentrated where it is least; evaluate (n, dimension)."""
+    # A tenth of them is drawn uniformly. From the best of these starts a CMA-ES with a diagonal covariance (Ros and
+    # Hansen 2008), which adapts to some eighty coordinates within a hundred generations. After ten generations without
+    # improvement a narrow search starts from the least cost of all, and after it a wide one from the next best drawn
+    # point. Each wide one has twice the population of the last (Auger and Hansen 2005).
     cma, rng = import_cma(), np.random.default_rng(seed)
     drawn = rng.random((math.ceil(_FIRST * budget), dimension))
     costs = evaluate(drawn)
@@ -75,13 +57,7 @@ def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None
 
 
 def import_cma() -> Any:
-    """Import the package cma.
-
-    Raises
-    ------
-    RunError
-        If it is not installed; the text has the command that installs it.
-    """
+    """Import the package cma."""
     try:
         import cma
     except ImportError as error:

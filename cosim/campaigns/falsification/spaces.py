@@ -21,17 +21,7 @@ Point = NDArray[np.float64]  # (dimension,) coordinates from 0 to 1
 
 
 class Shares:
-    """Replacement of a random number generator: each number is a given quantile of its distribution.
-
-    Parameters
-    ----------
-    shares : ndarray, shape (n,)
-        Quantiles of the first n numbers, from 0 to 1.
-    rest : numpy.random.Generator
-        Generator of the numbers after those.
-    limit : float
-        Greatest distance of a normal number from its mean [standard deviations].
-    """
+    """Replacement of a random number generator: each number is a given quantile of its distribution; shares (n,)."""
 
     def __init__(self, shares: Point, rest: np.random.Generator, limit: float = np.inf) -> None:
         self._shares, self._rest, self._limit = shares, rest, limit
@@ -70,20 +60,10 @@ class Shares:
 
 
 class SceneSpace:
-    """The scenes of a family of the generator, each a point of a unit cube.
+    """The scenes of a family of the generator, each a point of a unit cube."""
 
-    Uniformly drawn points give scenes with the generator's own distribution: a coordinate is the quantile of one
-    number. An obstacle too close to start or goal is drawn again, as by the generator.
-
-    Parameters
-    ----------
-    family : str
-        Name of the family, one of `FAMILIES`.
-    limit : float, optional
-        Greatest distance of a normal number from its mean [standard deviations]. Noise, and obstacles that are drawn
-        again, then depend on the scene's seed. Without a limit they depend on the last coordinate, so that a flight
-        depends only on its point, and close points mostly have similar outcomes.
-    """
+    # Uniformly drawn points give scenes with the generator's own distribution: a coordinate is the quantile of one
+    # number. An obstacle too close to start or goal is drawn again, as by the generator.
 
     def __init__(self, family: str, limit: float | None = None) -> None:
         self.family, self._limit = family, np.inf if limit is None else limit
@@ -101,20 +81,7 @@ class SceneSpace:
         self.dimension = self._others + self._of_obstacles + self._chance_in_point
 
     def line(self, point: Point, seed: int) -> bytes:
-        """Return the scene at a point as a line of JSON.
-
-        Parameters
-        ----------
-        point : ndarray, shape (dimension,)
-            Coordinates from 0 to 1.
-        seed : int
-            Seed of the scene.
-
-        Returns
-        -------
-        bytes
-            Line for `cosim.campaigns.scenes.scene_file.decode_scene`.
-        """
+        """Return the scene at a point as a line of JSON; point (dimension,)."""
         chance = int(point[-1] * _CHANCES) if self._chance_in_point else seed
         rest = np.random.default_rng([chance, 2])
         others = Shares(point[: self._others], rest, self._limit)

@@ -35,33 +35,15 @@ class Estimate:
 
 
 def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> Estimate:
-    """Estimate the probability that the cost of a uniformly drawn point is below 0.
-
-    Particles are drawn uniformly. At each level the half with the greater costs is replaced by copies of the others,
-    which a Markov chain then moves to costs no greater than the level that separates the halves: the estimate is the
-    product of the fractions (Au and Beck 2001, Cerou and others 2012). A move changes half of the coordinates, by
-    preconditioned Crank-Nicolson steps in normal numbers, which preserve the distribution. A cost may be random: it is
-    then drawn again with each move.
-
-    The interval is that of the logarithm, by Student's distribution. Its variance is the sum over the fractions, each
-    between the families of first particles: copies of one are not independent.
-
-    Parameters
-    ----------
-    evaluate : callable
-        Function from points, shape (n, dimension), each coordinate from 0 to 1, to their costs, shape (n,).
-    dimension : int
-        Number of coordinates.
-    budget : int
-        Greatest number of points, at least `LEAST_BUDGET`.
-    seed : int
-        Seed of the random particles and moves.
-
-    Returns
-    -------
-    Estimate
-        Probability and interval; without a cost below 0 only its upper bound is valid, the least of all levels.
-    """
+    """Estimate the probability that the cost of a uniformly drawn point is below 0; evaluate (n, dimension)."""
+    # Particles are drawn uniformly. At each level the half with the greater costs is replaced by copies of the others,
+    # which a Markov chain then moves to costs no greater than the level that separates the halves: the estimate is the
+    # product of the fractions (Au and Beck 2001, Cerou and others 2012). A move changes half of the coordinates, by
+    # preconditioned Crank-Nicolson steps in normal numbers, which preserve the distribution. A cost may be random: it
+    # is then drawn again with each move.
+    #
+    # The interval is that of the logarithm, by Student's distribution. Its variance is the sum over the fractions, each
+    # between the families of first particles: copies of one are not independent.
     rng = np.random.default_rng(seed)
     n = max(LEAST_BUDGET // 5, budget // _PARTICLES)
     z = rng.standard_normal((n, dimension))

@@ -36,30 +36,14 @@ _MOST = 1_000_000  # greatest number of rows
 
 @dataclass(frozen=True)
 class SearchSettings:
-    """Objective and budget of a search.
+    """Objective and budget of a search."""
 
-    Parameters
-    ----------
-    objective : str
-        Outcome to be found: ``"clearance"``, the least one; ``"violation"``, the greatest one weighted by priority;
-        ``"arrival"``, the latest one, where no arrival is the worst.
-    budget : int
-        Number of rows.
-    seed : int
-        Seed of the search.
-    rare_event : bool
-        True to estimate the probability of a violation, instead of a search for the worst row.
-
-    Raises
-    ------
-    RunError
-        If the settings are invalid.
-    """
-
+    # outcome to be found: ``"clearance"``, the least one; ``"violation"``, the greatest one weighted by priority;
+    # ``"arrival"``, the latest one, where no arrival is the worst
     objective: Objective = "clearance"
-    budget: int = 2000
-    seed: int = 0
-    rare_event: bool = False
+    budget: int = 2000  # number of rows
+    seed: int = 0  # seed of the search
+    rare_event: bool = False  # true to estimate the probability of a violation, instead of a search for the worst row
 
     def __post_init__(self) -> None:
         if self.objective not in OBJECTIVES:
@@ -78,22 +62,7 @@ class SearchSettings:
 
 
 class SceneSearch:
-    """A search for the worst scenes of a family of the generator.
-
-    Parameters
-    ----------
-    family : str
-        Name of the family, one of `cosim.campaigns.falsification.spaces.FAMILIES`.
-    task : SceneTask
-        Law and conditions of the flights.
-    settings : SearchSettings
-        Objective, budget and seed of the search.
-
-    Raises
-    ------
-    RunError
-        If there is no such family, or the package cma is not installed.
-    """
+    """A search for the worst scenes of a family of the generator."""
 
     unit, schema = "scene", SCHEMA
     files: Mapping[str, bytes] = {}
@@ -141,24 +110,7 @@ class SceneSearch:
 
 
 class ScenarioSearch(SweepWork):
-    """A search for the worst values of some keys of a scenario.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario whose keys vary.
-    vary : sequence of Vary
-        Keys and ranges of their values.
-    settings : SearchSettings
-        Objective, budget and seed of the search.
-
-    Raises
-    ------
-    ScenarioError
-        If a key is unknown, or its value is not a number.
-    RunError
-        If no key varies, an integer key has other values, or the package cma is not installed.
-    """
+    """A search for the worst values of some keys of a scenario."""
 
     def __init__(self, scenario: Scenario, vary: Sequence[Vary], settings: SearchSettings) -> None:
         super().__init__(scenario, Design(tuple(vary), "random", settings.budget, settings.seed))

@@ -61,21 +61,7 @@ def campaign_lines(summary: dict[str, Any]) -> Iterator[str]:
 
 
 def spreads_of(results: Results, groups: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the values whose distributions are drawn, by column and group.
-
-    Parameters
-    ----------
-    results : Results
-        Rows of a campaign.
-    groups : mapping from str to ndarray of bool, shape (scenes,)
-        Mask of the scenes of each group.
-
-    Returns
-    -------
-    dict of str to dict of str to ndarray
-        Values by column, then by group. Reach times are NaN where the goal was not reached; the other columns that are
-        not in `OF_ALL` hold reached scenes only.
-    """
+    """Return the values whose distributions are drawn, by column and group; groups (scenes,)."""
     reached, found = results["reached"], {}
     for name in SPREADS:
         counts = np.ones(len(results), dtype=bool) if name in (*OF_ALL, "reach_time") else reached

@@ -16,22 +16,7 @@ _NEVER = 1.12  # distance of missing numbers from the least number, as a multipl
 
 
 def side_by_side(one: str, results: Results, other: str, others: Results, columns: Sequence[tuple[str, str]]) -> Figure:
-    """Draw each scene as a marker at the numbers of both laws, by which of them completes it.
-
-    Parameters
-    ----------
-    one, other : str
-        Names of the laws.
-    results, others : Results
-        Rows of the two laws, of the same scenes in the same order.
-    columns : sequence of (str, str)
-        Columns and their labels; each has a panel.
-
-    Returns
-    -------
-    Figure
-        Figure with the line on which both numbers are equal.
-    """
+    """Draw each scene as a marker at the numbers of both laws, by which of them completes it."""
     some = np.unique(np.linspace(0, len(results) - 1, min(len(results), _MOST)).astype(int))
     mine, theirs = (rows["reached"] & ~rows["violation"] for rows in (results, others))
     figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")

@@ -46,18 +46,7 @@ class Key(NamedTuple):
 
 
 def forest(lines: Sequence[Rated]) -> Figure:
-    """Draw rates as markers with their 95 % intervals, a line each, under a heading for each fact.
-
-    Parameters
-    ----------
-    lines : sequence of Rated
-        Lines, those of one fact one after the other.
-
-    Returns
-    -------
-    Figure
-        Figure with shares from 0 to 100 %.
-    """
+    """Draw rates as markers with their 95 % intervals, a line each, under a heading for each fact."""
     heads = len({line.fact for line in lines if line.group})
     figure = Figure(figsize=(WIDTH, 0.75 + 0.27 * (len(lines) + heads)), layout="constrained")
     axes = figure.add_subplot()
@@ -96,20 +85,7 @@ def _interval(axes: Axes, line: Rated, y: float) -> None:
 
 
 def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> Iterator[NamedFigure]:
-    """Yield the figure of empirical distributions, a panel for each column, with a dot at the median.
-
-    Parameters
-    ----------
-    columns : mapping from str to mapping from str to ndarray, shape (n,)
-        Numbers by column, then by group; NaN where missing.
-    addition : str
-        Sentences that are added to the caption.
-
-    Yields
-    ------
-    NamedFigure
-        Figure ``distributions``; none without finite numbers. Missing numbers keep a curve below 100 %.
-    """
+    """Yield the figure of empirical distributions, a panel for each column, with a dot at the median; columns (n,)."""
     there = {name: of for name, of in columns.items() if any(np.isfinite(values).any() for values in of.values())}
     if not there:
         return
@@ -136,37 +112,13 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> 
 
 
 def shares_up_to(values: Array) -> tuple[Array, Array]:
-    """Return the empirical distribution of numbers.
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Numbers; NaN where missing, which counts in the total.
-
-    Returns
-    -------
-    ndarray, ndarray
-        The finite numbers in rising order, and the share of all numbers up to each.
-    """
+    """Return the empirical distribution of numbers; values (n,)."""
     finite = np.sort(values[np.isfinite(values)])
     return finite, np.arange(1, len(finite) + 1) / max(1, len(values))
 
 
 def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
-    """Draw the rate of each fact in bins of each key, with 95 % intervals by Wilson.
-
-    Parameters
-    ----------
-    keys : sequence of Key
-        Keys, the first eight of which are drawn.
-    facts : mapping from str to ndarray of bool, shape (n,)
-        Outcome of each row by the outcome's name, one of `FACT_COLOURS`.
-
-    Returns
-    -------
-    Figure
-        Figure with a panel for each key.
-    """
+    """Draw the rate of each fact in bins of each key, with 95 % intervals by Wilson; facts (n,)."""
     figure, panels = _panels(min(len(keys), _MOST_KEYS), 2.1)
     for axes, key in zip(panels, keys, strict=False):
         parts = list(bins(key.values))
@@ -185,24 +137,7 @@ def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
 
 
 def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, violated: Facts) -> Figure:
-    """Draw a number of every row over each key, with markers by outcome.
-
-    Parameters
-    ----------
-    keys : sequence of Key
-        Keys, the first eight of which are drawn.
-    values : ndarray, shape (n,)
-        Numbers to be drawn; rows with NaN or infinity are skipped.
-    label : str
-        Label of the numbers, with unit.
-    reached, violated : ndarray of bool, shape (n,)
-        Outcomes of the rows.
-
-    Returns
-    -------
-    Figure
-        Figure with a panel for each key, each with at most 700 rows.
-    """
+    """Draw a number of every row over each key, with markers by outcome; values (n,), reached, violated (n,)."""
     some = np.flatnonzero(np.isfinite(values))
     if len(some) > _POINTS:
         some = some[np.unique(np.linspace(0, len(some) - 1, _POINTS).astype(int))]

@@ -45,37 +45,7 @@ def write_page_with_replays(
     folders: Sequence[Path],
     title: Callable[[int], str],
 ) -> Path:
-    """Write a page and its figures, fly rows again, and write the page again with their replays.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the page; its template has the same name, and the replays are written into the folder ``worst`` beside.
-    numbers : Path
-        File with the numbers of the page, for error messages.
-    drawings : iterable of NamedFigure
-        Figures of the page.
-    values : mapping of str to Any
-        Values of the template, by name.
-    keys : iterable of int
-        Keys of the rows to fly again.
-    folders : sequence of Path
-        Folders of campaigns that flew the same scenes by several laws, or the folder of a single campaign.
-    title : callable
-        Function that makes the title of a replay, given the key of its row.
-
-    Returns
-    -------
-    Path
-        Path of the page.
-
-    Raises
-    ------
-    RunError
-        If the numbers are not those of such a page, or a file cannot be read or written.
-    KeyboardInterrupt
-        After Ctrl-C; the page is written without the replays.
-    """
+    """Write a page and its figures, fly rows again, and write the page again with their replays."""
     template = f"cosim.campaigns.pages/{path.name}.j2"
 
     def write(shown: Mapping[int, Replay]) -> None:
@@ -94,33 +64,7 @@ def write_page_with_replays(
 
 
 def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Replay:
-    """Fly a row of one or several campaigns again, unless done before, and write a page with the flights.
-
-    Parameters
-    ----------
-    out : Path
-        Folder into which the replay is written, as ``worst/KEY``.
-    key : int
-        Key of the row.
-    folders : sequence of Path
-        Folders of campaigns that flew the same scene by several laws, or the folder of a single campaign.
-    title : str
-        Title of the replay's page.
-
-    Returns
-    -------
-    Replay
-        Replay with a page if one of the flights can be shown, and with remarks.
-
-    Raises
-    ------
-    RunError
-        If a folder cannot be read.
-    OSError
-        If the page cannot be written; its files are removed.
-    KeyboardInterrupt
-        After Ctrl-C; its files are removed.
-    """
+    """Fly a row of one or several campaigns again, unless done before, and write a page with the flights."""
     place = out / WORST / str(key)
     if not (place / _FLOWN).exists():
         place.parent.mkdir(exist_ok=True)

@@ -62,26 +62,7 @@ class Repeat:
 
 
 def repeat_of(folder: Path, key: int) -> Repeat:
-    """Prepare the repetition of a row.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of a complete campaign.
-    key : int
-        Number of the row in a sweep, seed of the scene in a campaign of scenes.
-
-    Returns
-    -------
-    Repeat
-        Task, batch and scenario of that row.
-
-    Raises
-    ------
-    RunError
-        If the folder holds no complete campaign, there is no such row, it crashes its worker, or its scenario is
-        invalid.
-    """
+    """Prepare the repetition of a row."""
     plan = read_plan(folder)
     if plan.get("kind") not in (SCENES, SWEEP):
         raise RunError(f"{folder}: holds a campaign of another version, expected one of this")
@@ -105,25 +86,7 @@ def repeat_of(folder: Path, key: int) -> Repeat:
 
 
 def complete_results(folder: Path, schema: Any) -> Results:
-    """Open the rows of a complete campaign.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the campaign.
-    schema : pyarrow.Schema
-        Expected schema of the rows.
-
-    Returns
-    -------
-    Results
-        All rows of the campaign.
-
-    Raises
-    ------
-    RunError
-        If the campaign is not complete, or its rows cannot be read.
-    """
+    """Open the rows of a complete campaign."""
     require_complete(folder)
     return Results(folder / RESULTS, schema)
 

@@ -32,31 +32,7 @@ class Rerun:
 
 
 def rerun(folder: Path, key: int, out: Path | None = None, progress: bool = False) -> Rerun:
-    """Fly a row again with its engine, and once more step by step with full record and report.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of a complete campaign.
-    key : int
-        Number of the row in a sweep, seed of the scene in a campaign of scenes.
-    out : Path, optional
-        Folder of the run, new or empty. Default: a new one below ``runs``.
-    progress : bool
-        True to show a bar of the run, if there is a terminal.
-
-    Returns
-    -------
-    Rerun
-        Bitwise differences from the stored row, the run, and differences of the run.
-
-    Raises
-    ------
-    RunError
-        If the folder holds no complete campaign, there is no such row, or it crashes its worker.
-    Exception
-        All errors of `run_scenario`.
-    """
+    """Fly a row again with its engine, and once more step by step with full record and report."""
     repeat = repeat_of(folder, key)
     flyer = repeat.task.flyer()
     try:

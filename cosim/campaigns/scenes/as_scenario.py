@@ -18,31 +18,7 @@ _OF_THE_SCENARIO = ("substep", "current", "position")  # values of the plant wit
 
 
 def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions) -> Scenario:
-    """Convert a scene to a scenario.
-
-    Parameters
-    ----------
-    scene : Scene or ScenarioScene
-        Scene to convert.
-    law : str
-        Name of the law, a key of `controller.LAWS`.
-    gains : NamedTuple
-        Gains of the law.
-    conditions : Conditions
-        Conditions of the flight.
-
-    Returns
-    -------
-    Scenario
-        Scenario that `SceneFlyer` flies.
-
-    Raises
-    ------
-    ScenarioError
-        If the vehicle cannot have the scene's parameters.
-    PlantFmuError, ControllerError
-        If the law refuses the gains, or there is no such vehicle.
-    """
+    """Convert a scene to a scenario."""
     if isinstance(scene, ScenarioScene):
         return scene.with_law(law, gains._asdict(), _changes(scene, conditions))
     vehicle = load_vehicle(VEHICLE)

@@ -17,10 +17,9 @@ from fuzzy_arbiter.formats import FORMATS, reads
 
 @dataclass(frozen=True)
 class Conditions:
-    """Conditions of flights; the defaults are those of the score.
+    """Conditions of flights; the defaults are those of the score."""
 
-    A scene that is a scenario has its own duration, periods and ramp.
-    """
+    # A scene that is a scenario has its own duration, periods and ramp.
 
     duration: float = 120.0  # s, duration of a flight
     control: float = 0.02  # s, control period
@@ -44,13 +43,7 @@ class Conditions:
 
     @classmethod
     def by_arbiter(cls, arbiter: str, **others: Any) -> Conditions:
-        """Make conditions with a rule variant, or with the rules of a file.
-
-        Raises
-        ------
-        ScenarioError
-            If there is no such variant or file, or the file holds no rules.
-        """
+        """Make conditions with a rule variant, or with the rules of a file."""
         if arbiter in get_args(RuleVariant):
             return cls(arbiter=arbiter, **others)  # type: ignore[arg-type]
         if Path(arbiter).suffix.lower().removeprefix(".") not in FORMATS:

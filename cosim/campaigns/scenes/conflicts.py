@@ -1,10 +1,9 @@
-"""Scenes with conflicting regions, some of which must be violated by the arbiter's choice.
+"""Scenes with conflicting regions, some of which must be violated by the arbiter's choice."""
 
-Each scene is a scenario: four criteria in a random order, soft and hard regions that exclude each other, a net weight
-of up to 50 N (more for a heavy vehicle), a current of up to 0.4 m/s, noise, and one of three vehicles. The score is the
-priority-weighted violation: a region has four times the weight of one of the next criterion in that order. The
-generator does not depend on the performance of any law.
-"""
+# Each scene is a scenario: four criteria in a random order, soft and hard regions that exclude each other, a net weight
+# of up to 50 N (more for a heavy vehicle), a current of up to 0.4 m/s, noise, and one of three vehicles. The score is
+# the priority-weighted violation: a region has four times the weight of one of the next criterion in that order. The
+# generator does not depend on the performance of any law.
 
 from __future__ import annotations
 
@@ -29,40 +28,12 @@ _CRITERIA = ("obstacle", "shape", "depth", "visibility")
 
 
 def make_conflict(seed: int, family: str = "conflict") -> Table:
-    """Make the conflict of a seed.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the scene, 0 or above.
-    family : {"conflict", "tour"}
-        Family of the scene; a tour is a conflict with goals in turn.
-
-    Returns
-    -------
-    dict
-        Seed, kind with the vehicle's name, and table of the scenario without a law.
-    """
+    """Make the conflict of a seed."""
     return draw_conflict(np.random.default_rng([CONFLICTS[family].stream, seed]), seed, family)
 
 
 def draw_conflict(rng: Any, seed: int, family: str = "conflict") -> Table:
-    """Make a conflict from random numbers.
-
-    Parameters
-    ----------
-    rng : numpy.random.Generator
-        Source of random numbers, or an object with its methods.
-    seed : int
-        Seed of the scene, 0 or above.
-    family : {"conflict", "tour"}
-        Family of the scene; a tour is a conflict with goals in turn.
-
-    Returns
-    -------
-    dict
-        Seed, kind with the vehicle's name, and table of the scenario without a law.
-    """
+    """Make a conflict from random numbers."""
     _, kinds, duration = CONFLICTS[family]
     vehicle = load_vehicle(list(_LAGS)[int(rng.integers(len(_LAGS)))])
     kind = list(kinds)[int(rng.integers(len(kinds)))]
@@ -255,11 +226,9 @@ def _depths_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _views_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make places from which a structure is viewed in turn, with a pillar between them.
-
-    A path outside of the pillar loses the view; one inside of it violates the region around the structure. A greatest
-    depth excludes the deeper places.
-    """
+    """Make places from which a structure is viewed in turn, with a pillar between them."""
+    # A path outside of the pillar loses the view; one inside of it violates the region around the structure. A greatest
+    # depth excludes the deeper places.
     x, y, z = 4.0, 4.0, 4.2  # m, NED: centre of the structure
     off, pillar, radius = rng.uniform(1.7, 2.2), rng.uniform(1.8, 2.2), rng.uniform(0.5, 0.9)
     angles = rng.uniform(0.7, 1.0, 3) * [-1.0, 1.0, -1.0]  # rad, about the structure, from east

@@ -1,9 +1,8 @@
-"""Generators of random scenes for campaigns, determined by the seed.
+"""Generators of random scenes for campaigns, determined by the seed."""
 
-A scene has a start, a spherical goal region, spheres near the straight path to it, a depth band, a steady current, and
-restoring forces that laws do not receive. A hard one has more obstacles, the first of which drifts, a stronger current,
-noise, and a thruster that fails. `cosim.campaigns.scenes.scene` defines the numbers.
-"""
+# A scene has a start, a spherical goal region, spheres near the straight path to it, a depth band, a steady current,
+# and restoring forces that laws do not receive. A hard one has more obstacles, the first of which drifts, a stronger
+# current, noise, and a thruster that fails. `cosim.campaigns.scenes.scene` defines the numbers.
 
 from __future__ import annotations
 
@@ -67,43 +66,13 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
 
 
 def make_scene(seed: int, kind: str = "plain") -> dict[str, Any]:
-    """Make the scene of a seed.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the scene, 0 or above.
-    kind : {"plain", "hard"}
-        Kind of the scene; a hard one has drift, noise and a failing thruster.
-
-    Returns
-    -------
-    dict
-        Table of the scene for JSON; SI units, NED.
-    """
+    """Make the scene of a seed."""
     rng = np.random.default_rng([20261121, seed, int(kind == "hard")])
     return draw_scene(rng, itertools.repeat(rng), seed, kind)
 
 
 def draw_scene(rng: Draws, of_obstacles: Iterable[Draws], seed: int, kind: str) -> dict[str, Any]:
-    """Make a plain or hard scene from random numbers.
-
-    Parameters
-    ----------
-    rng : Draws
-        Source for all numbers but those of the obstacles.
-    of_obstacles : iterable of Draws
-        Source for each obstacle, `MOST_OBSTACLES` of them.
-    seed : int
-        Seed of the scene, 0 or above.
-    kind : {"plain", "hard"}
-        Kind of the scene; a hard one has drift, noise and a failing thruster.
-
-    Returns
-    -------
-    dict
-        Table of the scene for JSON; SI units, NED.
-    """
+    """Make a plain or hard scene from random numbers."""
     hard = kind == "hard"
     start = np.array([0.0, 0.0, rng.uniform(1.5, 4.0)])
     goal = np.array([rng.uniform(8.0, 12.0), rng.uniform(-3.0, 3.0), rng.uniform(1.5, 4.5)])

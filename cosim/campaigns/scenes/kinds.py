@@ -42,23 +42,7 @@ class SceneKinds:
 
 
 def scene_kinds(results: Results) -> SceneKinds:
-    """Return kinds and features of a campaign's scenes.
-
-    Parameters
-    ----------
-    results : Results
-        Rows with the column ``scene``, which is read in pieces.
-
-    Returns
-    -------
-    SceneKinds
-        Kinds and features in the order of the rows.
-
-    Raises
-    ------
-    RunError
-        If the rows cannot be read, or a line is not a scene.
-    """
+    """Return kinds and features of a campaign's scenes."""
     kinds: list[str] = []
     numbers: list[tuple[float, ...]] = []
     for lines in results.pieces("scene"):

@@ -28,24 +28,5 @@ class Plan:
 
 
 def plan_of(law: str, gains: Any, conditions: Conditions, scenes: int, digest: str) -> Plan:
-    """Make the plan of a campaign with the installed code and libraries.
-
-    Parameters
-    ----------
-    law : str
-        Name of the law, a key of `controller.LAWS`.
-    gains : NamedTuple
-        Gains of the law.
-    conditions : Conditions
-        Conditions of the flights.
-    scenes : int
-        Number of scenes.
-    digest : str
-        SHA-256 of the scenes.
-
-    Returns
-    -------
-    Plan
-        Plan of the campaign; equal plans give the same rows on the same machine.
-    """
+    """Make the plan of a campaign with the installed code and libraries."""
     return Plan(law, gains._asdict(), conditions, scenes, digest, code_digest(), versions())

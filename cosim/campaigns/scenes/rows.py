@@ -67,24 +67,7 @@ SCHEMA: Any = pa.schema(
 
 
 def row_of(seed: int, score: Score, plant_step: float, scene: str = "") -> Row:
-    """Make the row of a flight.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the scene.
-    score : Score
-        Score of the flight.
-    plant_step : float
-        Length of a plant step [s].
-    scene : str
-        JSON line of the scene.
-
-    Returns
-    -------
-    Row
-        Row of the scene. A NaN clearance and a stopped flight count as violations: they are not known to be safe.
-    """
+    """Make the row of a flight; plant_step [s]."""
     stopped = score.failed_step >= 0
     return Row(
         seed=seed,

@@ -18,29 +18,14 @@ _MOST = 60  # greatest number of characters of a kind
 
 @dataclass(frozen=True)
 class ScenarioScene:
-    r"""One scene of a file.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> import cosim
-    >>> _ = Path("conflicts.jsonl").write_text("\n".join(cosim.generate_scenes(1, kind="conflict")))
-    >>> next(cosim.read_scenes(Path("conflicts.jsonl"))).scenario["time"]["duration"]
-    60.0
-    """
+    """One scene of a file."""
 
     seed: int
     kind: str  # name under which scenes are summarized together
     scenario: dict[str, Any]  # table of the scenario, without a law
 
     def with_law(self, law: str, gains: dict[str, float], changes: dict[str, Any]) -> Scenario:
-        """Make the scenario with a law, its gains, and replaced tables.
-
-        Raises
-        ------
-        ScenarioError
-            If the scenario is invalid.
-        """
+        """Make the scenario with a law, its gains, and replaced tables."""
         table = copy.deepcopy(self.scenario) | {"law": {"name": law, "gains": gains}} | changes
         try:
             return validate_scenario(table, f"{law}-scene-{self.seed}")

@@ -1,7 +1,6 @@
-"""Scored scenes: a start, a goal region, obstacles, a depth band, and parameters of the plant.
+"""Scored scenes: a start, a goal region, obstacles, a depth band, and parameters of the plant."""
 
-The law receives `scene_regions` and the goal; `plant_values` are for the plant alone.
-"""
+# The law receives `scene_regions` and the goal; `plant_values` are for the plant alone.
 
 from __future__ import annotations
 
@@ -76,13 +75,7 @@ class Scene:
 
 
 def scene_regions(scene: Scene) -> list[tuple[Region, str]]:
-    """Return the regions of a scene beside its goal, each with its criterion.
-
-    Returns
-    -------
-    list of (Region, str)
-        The obstacles in their order, then the depth band.
-    """
+    """Return the regions of a scene beside its goal, each with its criterion."""
     obstacles = [
         (Region(f"obstacle {i + 1}", Sphere(o.centre, o.radius), "out", o.velocity), "obstacle")
         for i, o in enumerate(scene.obstacles)
@@ -93,27 +86,8 @@ def scene_regions(scene: Scene) -> list[tuple[Region, str]]:
 
 
 def plant_values(scene: Scene, vehicle: Vehicle, substep: float) -> dict[str, float]:
-    """Return the plant's parameters and start values for a scene; weight, mass and r_G are the vehicle's.
-
-    Parameters
-    ----------
-    scene : Scene
-        Scene with start, current and restoring forces.
-    vehicle : Vehicle
-        Vehicle, whose weight and centre of gravity are used.
-    substep : float
-        Greatest integration step [s].
-
-    Returns
-    -------
-    dict of str to float
-        Values by the names of the FMU's variables.
-
-    Raises
-    ------
-    ScenarioError
-        If the buoyancy is not above 0, or the vehicle has no such thruster.
-    """
+    """Return the plant's parameters and start values for a scene; weight, mass and r_G are the vehicle's."""
+    # with substep [s]
     buoyancy = vehicle.weight - scene.weight_minus_buoyancy
     if not buoyancy > 0.0:
         raise ScenarioError(

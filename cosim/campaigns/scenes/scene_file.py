@@ -18,23 +18,7 @@ _LONGEST = 1_000_000  # greatest number of bytes of a line, since a pipe may sen
 
 
 def decode_scene(line: bytes) -> AnyScene:
-    """Parse the scene of a line.
-
-    Parameters
-    ----------
-    line : bytes
-        Text of one JSON object.
-
-    Returns
-    -------
-    Scene or ScenarioScene
-        Scene with valid numbers; a `ScenarioScene` if the line has a ``scenario``.
-
-    Raises
-    ------
-    ScenarioError
-        If the line is not a scene; the message names the key.
-    """
+    """Parse the scene of a line."""
     try:
         table = msgspec.json.decode(line)
         if not isinstance(table, dict):
@@ -83,25 +67,7 @@ def read_scenes(path: str | Path) -> Iterator[AnyScene]:
 
 
 def scenes_in(file: IO[bytes], name: str) -> Iterator[AnyScene]:
-    """Read scenes from an open file.
-
-    Parameters
-    ----------
-    file : file object
-        Open binary file with one JSON object per line; blank lines are skipped. It may be an endless pipe.
-    name : str
-        Name of the source, for messages.
-
-    Yields
-    ------
-    Scene or ScenarioScene
-        Scenes in the order of the file.
-
-    Raises
-    ------
-    ScenarioError
-        At a line that is not a scene; the message names the line and the key.
-    """
+    """Read scenes from an open file."""
     for number, line in enumerate(iter(lambda: file.readline(_LONGEST + 1), b""), 1):
         if len(line) > _LONGEST:
             raise ScenarioError(f"{name}, line {number}: has more than {_LONGEST} bytes, expected a scene")

@@ -19,25 +19,7 @@ STANDARD_INPUT = Path("-")
 
 
 class SceneStore:
-    """Checked scenes in a temporary file, found by seed.
-
-    Parameters
-    ----------
-    path : Path
-        File of the scenes with one JSON object per line; ``-`` for standard input.
-
-    Attributes
-    ----------
-    seeds : list of int
-        Seeds of the scenes, in rising order.
-    digest : str
-        SHA-256 of the scenes in the order of the file, independent of blanks.
-
-    Raises
-    ------
-    ScenarioError
-        If the file cannot be read, holds no scene, a line is not a scene, or two have the same seed.
-    """
+    """Checked scenes in a temporary file, found by seed."""
 
     def __init__(self, path: Path) -> None:
         self._file = tempfile.TemporaryFile()  # noqa: SIM115 -- closed by close

@@ -1,8 +1,7 @@
-"""Scenes that test one part of a law each: an estimate, fault detection, or path planning.
+"""Scenes that test one part of a law each: an estimate, fault detection, or path planning."""
 
-Each scene is a scenario with hard regions only: spheres near the path with narrow gaps, and one property that laws do
-not receive and that is far from nominal. The generator does not depend on the performance of any law.
-"""
+# Each scene is a scenario with hard regions only: spheres near the path with narrow gaps, and one property that laws do
+# not receive and that is far from nominal. The generator does not depend on the performance of any law.
 
 from __future__ import annotations
 
@@ -23,18 +22,7 @@ _FREE = 0.8  # m, least distance of an obstacle from the start and from the goal
 
 
 def make_trial(seed: int) -> Table:
-    """Make the trial of a seed.
-
-    Parameters
-    ----------
-    seed : int
-        Seed of the scene, 0 or above.
-
-    Returns
-    -------
-    dict
-        Seed; kind, which names the tested part; and table of the scenario without a law.
-    """
+    """Make the trial of a seed."""
     rng = np.random.default_rng([20261125, seed])
     vehicle = load_vehicle(VEHICLES[int(rng.integers(len(VEHICLES)))])
     kind = list(_KINDS)[int(rng.integers(len(_KINDS)))]

@@ -33,18 +33,7 @@ class SceneTask:
 
 
 class SceneBatches:
-    """Flies scenes, given as lines, one after the other.
-
-    Parameters
-    ----------
-    task : SceneTask
-        Law, gains and conditions of the flights.
-
-    Raises
-    ------
-    RunError, LawError, BuildError, PlantError
-        Errors of `SceneFlyer`: an unknown law, refused gains, or no FMU of the vehicle.
-    """
+    """Flies scenes, given as lines, one after the other."""
 
     def __init__(self, task: SceneTask) -> None:
         self._flyer = SceneFlyer(task.law, task.conditions, task.gains)
@@ -68,15 +57,7 @@ class SceneBatches:
 
 
 class SceneWork:
-    """The scenes of a store, flown by one law.
-
-    Parameters
-    ----------
-    store : SceneStore
-        Scenes of the campaign.
-    task : SceneTask
-        Law, gains and conditions of the flights.
-    """
+    """The scenes of a store, flown by one law."""
 
     unit, schema = "scene", SCHEMA
     files: Mapping[str, bytes] = {}

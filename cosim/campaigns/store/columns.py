@@ -1,7 +1,6 @@
-"""Conversion between columns of a table and arrays or texts.
+"""Conversion between columns of a table and arrays or texts."""
 
-``pyarrow.array`` and ``to_numpy`` do the same, but import pandas if it is installed: a third of a second per worker.
-"""
+# `pyarrow.array` and `to_numpy` do the same, but import pandas if it is installed: a third of a second per worker.
 
 from __future__ import annotations
 
@@ -17,38 +16,14 @@ _TYPES = {"f": pa.float64(), "i": pa.int64(), "b": pa.bool_()}  # type of a colu
 
 
 def of_numbers(values: NDArray[Any], absent: NDArray[np.bool_] | None = None) -> Any:
-    """Make a column of numbers or Booleans.
-
-    Parameters
-    ----------
-    values : ndarray of float64, int64 or bool, shape (n,)
-        Values of the rows.
-    absent : ndarray of bool, shape (n,), optional
-        True for rows whose value is null.
-
-    Returns
-    -------
-    pyarrow.Array
-        Column of n values.
-    """
+    """Make a column of numbers or Booleans; values (n,), absent (n,)."""
     facts = values.dtype.kind == "b"
     content = _bits(values) if facts else pa.py_buffer(np.ascontiguousarray(values))
     return pa.Array.from_buffers(_TYPES[values.dtype.kind], len(values), [_presence(absent), content])
 
 
 def of_texts(texts: Sequence[str | None]) -> Any:
-    """Make a column of texts.
-
-    Parameters
-    ----------
-    texts : sequence of str or None
-        Texts of the rows; None for null.
-
-    Returns
-    -------
-    pyarrow.Array
-        Column of strings.
-    """
+    """Make a column of texts."""
     content = [(text or "").encode() for text in texts]
     ends = np.cumsum([0, *map(len, content)], dtype=np.int32)
     absent = np.array([text is None for text in texts], dtype=bool)
@@ -57,18 +32,7 @@ def of_texts(texts: Sequence[str | None]) -> Any:
 
 
 def to_array(column: Any) -> NDArray[Any]:
-    """Return the values of a column.
-
-    Parameters
-    ----------
-    column : pyarrow.ChunkedArray
-        Column of numbers, Booleans or texts.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Values of the rows; NaN for a null among numbers with fractions, None for any other null.
-    """
+    """Return the values of a column; returns (n,)."""
     if column.type == pa.string():
         return np.array(column.to_pylist(), dtype=object)
     values = _values(column)

@@ -29,22 +29,9 @@ LOCK = ".lock"
 
 
 class CampaignFolder:
-    """The folder of one campaign, locked by one process at a time.
+    """The folder of one campaign, locked by one process at a time."""
 
-    Rows are written in parts, each an atomic file. The rows of an unreadable part are flown again.
-
-    Parameters
-    ----------
-    path : Path
-        A folder that does not exist, is empty, or holds the same campaign.
-    work : Work
-        Rows of the campaign, with plan and schema.
-
-    Raises
-    ------
-    RunError
-        If the folder holds something else, is in use by another process, or cannot be written.
-    """
+    # Rows are written in parts, each an atomic file. The rows of an unreadable part are flown again.
 
     def __init__(self, path: Path, work: Work) -> None:
         self.path, self._schema = path, work.schema
@@ -87,13 +74,7 @@ class CampaignFolder:
         return (self.path / RESULTS).exists()
 
     def results(self) -> Results:
-        """Return the joined rows.
-
-        Raises
-        ------
-        RunError
-            If the rows cannot be read.
-        """
+        """Return the joined rows."""
         return Results(self.path / RESULTS, self._schema)
 
     def remove_parts(self) -> None:
@@ -134,13 +115,7 @@ class CampaignFolder:
 
 @contextlib.contextmanager
 def held(path: Path) -> Iterator[None]:
-    """Lock the folder of a campaign during a block that writes into it.
-
-    Raises
-    ------
-    RunError
-        If another process has locked it, or it cannot be written.
-    """
+    """Lock the folder of a campaign during a block that writes into it."""
     try:
         lock = _lock(path / LOCK)
     except OSError as error:
@@ -155,13 +130,7 @@ def held(path: Path) -> Iterator[None]:
 
 
 def read_plan(path: Path) -> dict[str, Any]:
-    """Read the plan of the campaign in a folder.
-
-    Raises
-    ------
-    RunError
-        If the folder holds no readable plan.
-    """
+    """Read the plan of the campaign in a folder."""
     if not (path / PLAN).exists():
         raise RunError(f"{path}: holds no campaign ({PLAN} is missing)")
     plan = read_json(path / PLAN)

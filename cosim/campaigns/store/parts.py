@@ -27,18 +27,10 @@ _NAME = re.compile(r"[0-9]{8,}-[0-9]{8,}\.parquet")
 
 
 class Parts:
-    """Parquet files of one schema in a folder, each written atomically.
+    """Parquet files of one schema in a folder, each written atomically."""
 
-    The name of a part is the range of its batches, ``00000003-00000003``, or ``00000000-00000063`` for a merged one. A
-    kill after merging and before the removal of the sources leaves both, which the names show.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the parts; it is created.
-    schema : pyarrow.Schema
-        Schema of the rows, whose first column is their key.
-    """
+    # The name of a part is the range of its batches, `00000003-00000003`, or `00000000-00000063` for a merged one. A
+    # kill after merging and before the removal of the sources leaves both, which the names show.
 
     def __init__(self, folder: Path, schema: Any) -> None:
         self._folder, self._schema = folder, schema
@@ -55,10 +47,8 @@ class Parts:
         self._next = _span(self._files[-1])[1] + 1 if self._files else 0
 
     def keys(self) -> Rows:
-        """Return the keys of all rows, shape (n,).
-
-        Parts that cannot be read, or that hold a row of another part, are removed.
-        """
+        """Return the keys of all rows, shape (n,)."""
+        # Parts that cannot be read, or that hold a row of another part, are removed.
         found: list[Rows] = []
         for file in tuple(self._files):
             try:
@@ -83,18 +73,7 @@ class Parts:
         self._files.remove(file)
 
     def add(self, table: Any) -> None:
-        """Write a part.
-
-        Parameters
-        ----------
-        table : pyarrow.Table
-            Rows of a batch, in order of key.
-
-        Raises
-        ------
-        OSError
-            If the part cannot be written; the incomplete file is removed.
-        """
+        """Write a part."""
         file = self._folder / f"{self._next:08}-{self._next:08}.parquet"
         write_tables(file, [table], self._schema)
         self._files.append(file)
@@ -121,13 +100,7 @@ class Parts:
         return pa.concat_tables([self._schema.empty_table(), *in_order(self._files, self._schema)])
 
     def join(self, path: Path) -> None:
-        """Write all rows to one file in order of key.
-
-        Raises
-        ------
-        OSError
-            If the file cannot be written.
-        """
+        """Write all rows to one file in order of key."""
         write_tables(path, in_order(self._files, self._schema), self._schema)
 
     def remove(self) -> None:
@@ -186,22 +159,7 @@ def check_schema(file: Path, schema: Any) -> None:
 
 
 def write_tables(path: Path, tables: Any, schema: Any) -> None:
-    """Write tables to one Parquet file atomically.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the file; an existing one is replaced.
-    tables : iterable of pyarrow.Table
-        Tables of this schema.
-    schema : pyarrow.Schema
-        Schema of the file.
-
-    Raises
-    ------
-    OSError
-        If the file cannot be written; the incomplete file is removed.
-    """
+    """Write tables to one Parquet file atomically."""
     with atomic_file(path) as file, pq.ParquetWriter(file, schema, compression="zstd") as writer:
         for table in _grouped(tables):
             writer.write_table(table)
@@ -222,20 +180,7 @@ def _grouped(tables: Any) -> Iterator[Any]:
 
 
 def in_order(files: Sequence[Path], schema: Any) -> Iterator[Any]:
-    """Merge the rows of sorted files in order of key; only files with overlapping keys are open at a time.
-
-    Parameters
-    ----------
-    files : sequence of Path
-        Parquet files, each in order of key.
-    schema : pyarrow.Schema
-        Schema of the rows, whose first column is their key.
-
-    Yields
-    ------
-    pyarrow.Table
-        Rows with greater keys than those of the tables before.
-    """
+    """Merge the rows of sorted files in order of key; only files with overlapping keys are open at a time."""
     key = schema.names[0]
     closed = sorted(((_least(file), file) for file in files), reverse=True)
     open_files: list[_Reader] = []

@@ -41,18 +41,7 @@ def code_digest() -> str:
 
 
 def difference(one: dict[str, Any], other: dict[str, Any]) -> str:
-    """Describe the differences of two plans.
-
-    Parameters
-    ----------
-    one, other : dict
-        Table of the plan in a folder, and table of the present plan.
-
-    Returns
-    -------
-    str
-        Text such as ``"gains.k_p1 is 18.8, now 10.0"``; only kind or law if these differ; "" if the plans are equal.
-    """
+    """Describe the differences of two plans."""
     alone = next((key for key in ("kind", "law") if one.get(key) != other.get(key)), None)
     keys = [alone] if alone else sorted(one.keys() | other.keys())
     found = list(_differences(one, other, keys))

@@ -23,20 +23,7 @@ _PIECE = 1000  # number of rows that are read at once
 
 
 class Results:
-    """The rows of a campaign in a file, whose columns are read at each use.
-
-    Parameters
-    ----------
-    path : Path
-        Parquet file with the rows in order of key.
-    schema : pyarrow.Schema, optional
-        Expected schema of the rows.
-
-    Raises
-    ------
-    RunError
-        If the file cannot be read, or has other columns.
-    """
+    """The rows of a campaign in a file, whose columns are read at each use."""
 
     def __init__(self, path: Path, schema: Any = None) -> None:
         self.path = path

@@ -225,23 +225,7 @@ class Design:
 
 
 def design_of(table: dict[str, Any]) -> Design:
-    """Make a design from a table of `Design.table`.
-
-    Parameters
-    ----------
-    table : dict
-        Table of the design, as in the plan of a sweep.
-
-    Returns
-    -------
-    Design
-        Design equal to the one that made the table.
-
-    Raises
-    ------
-    RunError
-        If the table is invalid.
-    """
+    """Make a design from a table of `Design.table`."""
     try:
         vary = tuple(_vary_of(key, of) for key, of in table["vary"].items())
         samples = None if table["design"] == "grid" else table["samples"]
@@ -291,23 +275,7 @@ def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
 
 
 def vary_vehicles(path: Path) -> tuple[Vary, ...]:
-    """Read the parameters that vary between vehicles from a file that ``cosim identify`` has written.
-
-    Parameters
-    ----------
-    path : Path
-        File with one JSON object per line, whose ``parameters`` are those of the vehicle's FMU, the same on each line.
-
-    Returns
-    -------
-    tuple of Vary
-        Lists of the parameters' values, for the design ``"paired"``.
-
-    Raises
-    ------
-    RunError
-        If the file cannot be read, or a line has other parameters than the first.
-    """
+    """Read the parameters that vary between vehicles from a file that ``cosim identify`` has written."""
     lists: dict[str, list[float]] = {}
     try:
         lines = [line for line in path.read_bytes().splitlines() if line.strip()]

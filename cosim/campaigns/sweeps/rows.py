@@ -39,23 +39,7 @@ class SweepBatch(NamedTuple):
 
 
 def schema_of(keys: tuple[str, ...]) -> Any:
-    """Make the schema of the rows of a sweep.
-
-    Parameters
-    ----------
-    keys : tuple of str
-        Keys that vary.
-
-    Returns
-    -------
-    pyarrow.Schema
-        Columns: number of the row, values of the keys, seed, outcomes or null, reason for refusing the row.
-
-    Raises
-    ------
-    ValueError
-        If a key has the name of another column, which no key of a scenario has.
-    """
+    """Make the schema of the rows of a sweep."""
     if taken := {"row", "seed", "refused", *FIELDS} & set(keys):
         raise ValueError(f"{min(taken)!r} varies, expected keys of a scenario")
 
@@ -75,22 +59,7 @@ def schema_of(keys: tuple[str, ...]) -> Any:
 
 
 def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: BatchResult) -> Any:
-    """Convert flights to a table.
-
-    Parameters
-    ----------
-    keys : tuple of str
-        Keys that vary.
-    batch : SweepBatch
-        Rows that were flown.
-    flown : BatchResult
-        Outcomes of these rows.
-
-    Returns
-    -------
-    pyarrow.Table
-        Table with the schema of `schema_of`; null for NaN outcomes, and for all outcomes of a refused row.
-    """
+    """Convert flights to a table."""
     refused = np.zeros(len(batch.rows), dtype=bool)
     refused[list(flown.refused)] = True
     outcomes = []
@@ -116,18 +85,7 @@ class SweepTask:
 
 
 class SweepFlyer:
-    """Flies batches of a sweep by an engine.
-
-    Parameters
-    ----------
-    task : SweepTask
-        Variation of the scenario, and engine.
-
-    Raises
-    ------
-    RunError
-        If the engine does not support the scenario.
-    """
+    """Flies batches of a sweep by an engine."""
 
     def __init__(self, task: SweepTask) -> None:
         module, _, name = task.engine.partition(":")
@@ -144,24 +102,7 @@ class SweepFlyer:
 
 
 class SweepWork:
-    """The rows of a design, flown by one engine.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Base scenario.
-    design : Design
-        Keys that vary, with their values in each row.
-    engine : str
-        Name of the engine, one of `ENGINES`.
-
-    Raises
-    ------
-    ScenarioError
-        If a key is unknown, or not one of a number.
-    RunError
-        If there is no such engine, or a key of a whole number has fractional values.
-    """
+    """The rows of a design, flown by one engine."""
 
     unit = "row"
 

@@ -22,25 +22,7 @@ _REASONS = 5  # greatest number of listed reasons for refusing rows
 
 
 def summarize_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str, Any]:
-    """Summarize a sweep.
-
-    Parameters
-    ----------
-    work : SweepWork
-        Rows of the sweep, with design and engine.
-    results : Results
-        Outcomes of the rows.
-    folder : Path
-        Folder of the sweep, for the commands that repeat rows.
-
-    Returns
-    -------
-    dict
-        Table for JSON: counts, and reasons for refusing the first rows; rates with 95 % intervals by Wilson over the
-        flown rows; quantiles (None without numbers); the worst rows; for every key and outcome the `effect` and the
-        rank correlation by Spearman, None if one is constant; and the plan. Units are those of the columns of the
-        results.
-    """
+    """Summarize a sweep."""
     flown, base = results.absent("refused"), work.variation.base
     return {
         "name": work.name,

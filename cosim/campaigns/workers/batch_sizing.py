@@ -31,13 +31,7 @@ class Batch:
 
 
 class Batches:
-    """The batches of a campaign, cut as they are taken.
-
-    Parameters
-    ----------
-    rows : ndarray of int, shape (n,)
-        Numbers of the rows that are left, in rising order.
-    """
+    """The batches of a campaign, cut as they are taken; rows (n,)."""
 
     def __init__(self, rows: Rows) -> None:
         self._rows = rows
@@ -47,18 +41,7 @@ class Batches:
         self._row_time = math.inf  # s, measured time of a row
 
     def take(self, width: int) -> Batch | None:
-        """Take the next batch.
-
-        Parameters
-        ----------
-        width : int
-            Number of batches that are flown at the same time.
-
-        Returns
-        -------
-        Batch or None
-            Next batch, None if no rows are left; batches that were put back come first.
-        """
+        """Take the next batch."""
         if self._back:
             return self._back.pop()
         left = len(self._rows) - self._at

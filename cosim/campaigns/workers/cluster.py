@@ -39,13 +39,7 @@ def is_cluster(executor: Executor) -> bool:
 
 
 class Cluster:
-    """The workers of a Dask cluster. Batches lost with a worker are flown again by another one.
-
-    Parameters
-    ----------
-    executor : distributed.cfexecutor.ClientExecutor
-        Executor of the cluster's client.
-    """
+    """The workers of a Dask cluster. Batches lost with a worker are flown again by another one."""
 
     def __init__(self, executor: Any) -> None:
         import distributed
@@ -131,10 +125,8 @@ def _lost(error: BaseException) -> RunError:
 
 @contextlib.contextmanager
 def _quiet(name: str) -> Iterator[None]:
-    """Silence the log of a library, whose errors the campaign reports itself.
-
-    Each of its loggers is silenced, since each has its own level.
-    """
+    """Silence the log of a library, whose errors the campaign reports itself."""
+    # Each of its loggers is silenced, since each has its own level.
     names = [name, *(other for other in logging.root.manager.loggerDict if other.startswith(f"{name}."))]
     before = {logger: logger.level for logger in map(logging.getLogger, names)}
     for logger in before:
@@ -148,25 +140,7 @@ def _quiet(name: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
-    """Connect to a cluster, or start a local one on this machine.
-
-    Parameters
-    ----------
-    scheduler : str or None
-        Address of the scheduler, such as ``tcp://10.0.0.1:8786``; None for a local cluster.
-    workers : int
-        Number of processes of a local cluster, with one thread each.
-
-    Yields
-    ------
-    concurrent.futures.Executor
-        Executor of the cluster; it is closed at the end of the block, with a local cluster.
-
-    Raises
-    ------
-    RunError
-        If Dask is not installed, or the cluster cannot be reached or has no workers.
-    """
+    """Connect to a cluster, or start a local one on this machine."""
     try:
         import dask
         import distributed

@@ -20,30 +20,9 @@ _MAX_CRASHES = 30  # greatest number of crashes without a finished batch in betw
 
 
 def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, None, None]:
-    """Fly batches, and yield the table of each as it finishes, in any order.
-
-    A batch that crashes its worker is flown again. After three crashes it is halved, down to the row that causes them,
-    which is refused. The first batch is flown alone: it compiles the code that the others load from disk.
-
-    Parameters
-    ----------
-    work : Work
-        Rows of the campaign, and the task that flies them.
-    batches : Batches
-        Rows that are left, in batches.
-    pool : WorkerPool
-        Workers that fly the batches.
-
-    Yields
-    ------
-    pyarrow.Table
-        Rows of one batch, or a refused row.
-
-    Raises
-    ------
-    RunError
-        If workers crash with any row, or the pool fails.
-    """
+    """Fly batches, and yield the table of each as it finishes, in any order."""
+    # A batch that crashes its worker is flown again. After three crashes it is halved, down to the row that causes
+    # them, which is refused. The first batch is flown alone: it compiles the code that the others load from disk.
     under_way: dict[Flight, Batch] = {}
     refused: list[Any] = []  # tables of rows to be refused, once another batch has finished
     n_finished, crashes = 0, 0

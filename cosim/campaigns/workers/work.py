@@ -29,10 +29,9 @@ class Task(Protocol):
 
 
 class Work(Protocol):
-    """Rows 0 to ``len(work)`` - 1, and the task by which they are flown.
+    """Rows 0 to ``len(work)`` - 1, and the task by which they are flown."""
 
-    The first column of the schema, a 64-bit integer, is the key of a row; keys rise with the rows.
-    """
+    # The first column of the schema, a 64-bit integer, is the key of a row; keys rise with the rows.
 
     @property
     def name(self) -> str:

@@ -39,20 +39,7 @@ _held = _Held()
 
 
 def fly(task: Task, batch: Any) -> tuple[Any, float]:
-    """Fly a batch; threads of one process take turns.
-
-    Parameters
-    ----------
-    task : Task
-        Task that flies the batch.
-    batch : object
-        Batch, as made by `Work.batch`.
-
-    Returns
-    -------
-    pyarrow.Table, float
-        Rows of the batch, and the time that the flights took [s].
-    """
+    """Fly a batch; threads of one process take turns; returns [s]."""
     with _held.lock:
         flyer = _held.of(task)
         started = time.perf_counter()
@@ -61,25 +48,13 @@ def fly(task: Task, batch: Any) -> tuple[Any, float]:
 
 
 def prepare(task: Task) -> None:
-    """Create the flyer of a task; after a failure the first batch raises the error.
-
-    Parameters
-    ----------
-    task : Task
-        Task of the batches to come.
-    """
+    """Create the flyer of a task; after a failure the first batch raises the error."""
     with _held.lock:
         _held.of(task)
 
 
 def release(patience: float) -> None:
-    """Free the flyer of this process.
-
-    Parameters
-    ----------
-    patience : float
-        Time to wait for a batch under way [s]; after it the flyer is kept.
-    """
+    """Free the flyer of this process; patience [s]."""
     if _held.lock.acquire(timeout=patience):
         try:
             _held.free()

@@ -87,15 +87,7 @@ class _Worker:
 
 
 class Processes:
-    """Worker processes on this machine; one that crashes is replaced.
-
-    Parameters
-    ----------
-    n : int
-        Number of processes.
-    task : Task
-        Task for which each process creates its flyer at its start.
-    """
+    """Worker processes on this machine; one that crashes is replaced."""
 
     def __init__(self, n: int, task: Task) -> None:
         self._task = task
@@ -158,15 +150,7 @@ class Processes:
 
 
 class ExternalExecutor:
-    """An executor that the caller has created, and closes.
-
-    Parameters
-    ----------
-    executor : Executor
-        Executor, whose threads take turns. A crash of its processes ends the campaign, which can be continued later.
-    workers : int
-        Number of batches that it flies at the same time.
-    """
+    """An executor that the caller has created, and closes."""
 
     def __init__(self, executor: Executor, workers: int) -> None:
         self._executor = executor
@@ -204,10 +188,8 @@ def _has_finished(flight: Flight) -> bool:
 
 @contextlib.contextmanager
 def interrupts_held() -> Iterator[None]:
-    """Block SIGINT and SIGHUP while a process is started, which inherits the blocked signals.
-
-    Python's resource tracker inherits them too.
-    """
+    """Block SIGINT and SIGHUP while a process is started, which inherits the blocked signals."""
+    # Python's resource tracker inherits them too.
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return

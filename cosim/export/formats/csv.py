@@ -10,22 +10,8 @@ from cosim.export.format import Format
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
-    """Write the tables.
-
-    The header has the names without units, so that a column is found by its signal's name.
-
-    Parameters
-    ----------
-    excerpt : Excerpt
-        The run with the selected signals.
-    path : Path
-        The file.
-
-    Returns
-    -------
-    list of Path
-        The file, and the table of units beside it.
-    """
+    """Write the tables."""
+    # The header has the names without units, so that a column is found by its signal's name.
     names = [column.name for column in excerpt.columns]
     with path.open("w", encoding="utf-8", newline="") as file:
         csv.writer(file, lineterminator="\n").writerow(names)

@@ -10,13 +10,7 @@ from cosim.export.format import Format
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
-    """Write the file.
-
-    Raises
-    ------
-    ExportError
-        If a part of the run could not be written.
-    """
+    """Write the file."""
     from cosim.mavlink.replay import replay
     from cosim.mavlink.wire.endpoint import Endpoint
     from cosim.mavlink.wire.options import MavlinkOptions

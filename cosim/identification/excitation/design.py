@@ -73,39 +73,8 @@ def design(
     progress: Callable[[float], None] = lambda part: None,
     current: float = CURRENT,
 ) -> Design:
-    """Choose stick inputs that give the most information on the free numbers.
-
-    Parameters
-    ----------
-    start : str
-        Name of a shipped vehicle, or path of a vehicle's file.
-    box : tuple of float
-        Sizes of the box north, east and down, about the start [m].
-    depth : float
-        Depth of the center of the box [m].
-    duration : float
-        Duration of the whole schedule [s].
-    free, nuisance : sequence of str
-        Keys and nuisances to estimate, as for `free_parameters` and `nuisances`.
-    seed : int
-        Seed of the random candidates and vehicles.
-    progress : callable
-        Receives the fraction of the work done so far, 0 to 1.
-    current : float
-        Speed of a current [m/s], in which vehicles with less damping and added mass should stay inside the box too.
-
-    Returns
-    -------
-    Design
-        Schedule, with the rehearsal of the whole.
-
-    Raises
-    ------
-    VehicleError, ScenarioError
-        If the vehicle or the scenario cannot be loaded.
-    IdentificationError
-        If the duration or the box is too small for any segment or for the current, or the box leaves the water.
-    """
+    """Choose stick inputs that give the most information on the free numbers; box [m], depth [m], duration [s]."""
+    # with current [m/s]
     with single_thread():
         return _design(start, box, depth, duration, free, nuisance, seed, progress, current)
 
@@ -172,19 +141,7 @@ def _design(
 def draw_others(
     scenario: Scenario, parameters: Sequence[Parameter], current: float, rng: np.random.Generator
 ) -> list[Scenario]:
-    """Return scenarios of random vehicles, each in a current of random direction.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the known vehicle.
-    parameters : sequence of Parameter
-        Free numbers; damping and diagonal added mass are drawn from 0.5 to 1.5 times their start values.
-    current : float
-        Speed of the current [m/s].
-    rng : Generator
-        Source of the random numbers.
-    """
+    """Return scenarios of random vehicles, each in a current of random direction; current [m/s]."""
     found = []
     for _ in range(_OTHERS):
         values = {p.plant: p.start * rng.uniform(0.5, 1.5) for p in parameters if _is_uncertain(p)}
@@ -193,17 +150,8 @@ def draw_others(
 
 
 def fastest_others(scenario: Scenario, parameters: Sequence[Parameter], current: float) -> list[Scenario]:
-    """Return scenarios of the fastest vehicle of `draw_others`, in currents of evenly spaced directions.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the known vehicle.
-    parameters : sequence of Parameter
-        Free numbers; damping and diagonal added mass are half their start values.
-    current : float
-        Speed of the current [m/s].
-    """
+    """Return scenarios of the fastest vehicle of `draw_others`, in currents of evenly spaced directions."""
+    # with current [m/s]
     values = {p.plant: 0.5 * p.start for p in parameters if _is_uncertain(p)}
     return [_in_current(scenario, values, current, 2.0 * math.pi * k / _OTHERS) for k in range(_OTHERS)]
 
@@ -217,24 +165,7 @@ def _in_current(scenario: Scenario, values: dict[str, float], current: float, an
 def keep_inside(
     segments: Sequence[Segment], scenario: Scenario, box: tuple[float, float, float], others: Sequence[Scenario]
 ) -> tuple[Segment, ...]:
-    """Return segments with reduced forces where other vehicles would leave the box.
-
-    Parameters
-    ----------
-    segments : sequence of Segment
-        Chosen segments, in their order.
-    scenario : Scenario
-        Scenario of the known vehicle, which starts at the center of the box.
-    box : tuple of float
-        Sizes of the box north, east and down [m].
-    others : sequence of Scenario
-        Scenarios of other vehicles, such as from `fastest_others`.
-
-    Returns
-    -------
-    tuple of Segment
-        Segments after at most seven reductions. A vehicle may still leave the box, by the current alone.
-    """
+    """Return segments with reduced forces where other vehicles would leave the box; box [m]."""
     found = list(segments)
     for _ in range(_TRIES):
         commands = schedule(found)
@@ -269,17 +200,7 @@ def schedule(segments: Sequence[Segment]) -> list[tuple[int, Command]]:
 
 
 def information(logs: Sequence[Log], vehicle: Vehicle, parameters: Sequence[Parameter]) -> Array | None:
-    """Return the information of runs on the free numbers, shape (p, p), without the prior; None without windows.
-
-    Parameters
-    ----------
-    logs : sequence of Log
-        The runs.
-    vehicle : Vehicle
-        Vehicle with the start values of the parameters.
-    parameters : sequence of Parameter
-        Free parameters; the start of each window is eliminated.
-    """
+    """Return the information of runs on the free numbers, shape (p, p), without the prior; None without windows."""
     windows, _ = cut_windows(logs, vehicle, ROW, STAGES[0])
     if not windows:
         return None

@@ -50,25 +50,7 @@ def warnings(done: Design) -> Iterator[str]:
 
 
 def write_folder(done: Design, out: Path) -> Path:
-    """Write the folder of a design.
-
-    Parameters
-    ----------
-    done : Design
-        Chosen schedule.
-    out : Path
-        Path of a new or empty folder.
-
-    Returns
-    -------
-    Path
-        Path of the page.
-
-    Raises
-    ------
-    IdentificationError
-        If the folder cannot be written.
-    """
+    """Write the folder of a design."""
     own = done.start.endswith(".toml")
     vehicle = VEHICLE_COPY if own else done.start
     files = {

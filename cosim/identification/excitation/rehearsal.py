@@ -51,27 +51,7 @@ class Rehearsal:
 def rehearse(
     scenario: Scenario, commands: Sequence[tuple[int, Command]], plant: SteppedPlant | None = None
 ) -> Rehearsal:
-    """Simulate a run with scheduled commands.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with enabled commands.
-    commands : sequence of (int, Command)
-        Steps and commands, in the order of the steps.
-    plant : SteppedPlant, optional
-        Plant to simulate; default: the FMU of the scenario's vehicle.
-
-    Returns
-    -------
-    Rehearsal
-        Simulated run with a row for each step.
-
-    Raises
-    ------
-    PlantError
-        If the FMU fails.
-    """
+    """Simulate a run with scheduled commands."""
     source, rows = ScheduledCommands(commands), []
     with Master(scenario, plant=plant) as master:
         columns = [column.name for column in master.signals.columns]

@@ -39,37 +39,12 @@ pilot_gain = 1.0        # sticks are parts of the greatest wrench
 
 
 def scenario_text(vehicle: str, depth: float, duration: float, name: str) -> str:
-    """Return the TOML text of the scenario.
-
-    Parameters
-    ----------
-    vehicle : str
-        Name of a shipped vehicle, or path of a file relative to the scenario's folder.
-    depth : float
-        Depth of the center of the box [m].
-    duration : float
-        Duration of the scenario [s].
-    name : str
-        Name in the title, such as the vehicle's.
-    """
+    """Return the TOML text of the scenario; depth [m], duration [s]."""
     return _TEXT.format(name=name, vehicle=json.dumps(vehicle), duration=duration, depth=depth, row=ROW)
 
 
 def load(text: str, vehicle: str) -> Scenario:
-    """Load a scenario from its text, by a temporary file.
-
-    Parameters
-    ----------
-    text : str
-        Text from `scenario_text`.
-    vehicle : str
-        Name or path of the vehicle in the text.
-
-    Returns
-    -------
-    Scenario
-        Scenario of the text; a vehicle's path is relative to the working folder.
-    """
+    """Load a scenario from its text, by a temporary file."""
     path = str(Path(vehicle).resolve()) if vehicle.endswith(".toml") else vehicle
     with temporary_folder("excite-") as folder:
         file = folder / "excite.toml"

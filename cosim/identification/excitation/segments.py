@@ -41,22 +41,7 @@ class Segment:
 
 
 def candidates(axes: NDArray[np.bool_], rng: np.random.Generator, draws: int) -> Iterator[Segment]:
-    """Yield multisines and steps on all groups of axes, in each stick mode.
-
-    Parameters
-    ----------
-    axes : ndarray of bool, shape (6,)
-        True for axes along or about which the thrusters act.
-    rng : Generator
-        Source of the random phases, levels and times.
-    draws : int
-        Number of candidates for each group, mode, and band of multisines or dwell of steps.
-
-    Yields
-    ------
-    Segment
-        Candidate with zero mean on each axis.
-    """
+    """Yield multisines and steps on all groups of axes, in each stick mode; axes (6,)."""
     groups = dict.fromkeys(tuple(i for i in group if axes[i]) for group in _GROUPS)
     modes: tuple[StickMode, ...] = ("manual", "stabilize", "depth_hold")
     for group in (group for group in groups if group):

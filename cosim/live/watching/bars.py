@@ -8,13 +8,7 @@ from rich.text import Text
 
 
 class Bars:
-    """Draws bars in block characters or in ASCII.
-
-    Parameters
-    ----------
-    ascii_only : bool
-        Use ASCII characters only.
-    """
+    """Draws bars in block characters or in ASCII."""
 
     def __init__(self, ascii_only: bool) -> None:
         self._full, self._empty, self._zero, self._more = ("#", ".", "|", ">") if ascii_only else ("█", "░", "│", "▶")

@@ -92,29 +92,7 @@ class Look:
 
 
 def looks(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[Look]:
-    """Iterate over instants of a run until it is over.
-
-    Parameters
-    ----------
-    what : str
-        Run folder; or port, or address (``ws://HOST:PORT``), of a live view.
-    rate : float or None
-        Simulated seconds per second in the playback of a finished run; None for full speed.
-    once : bool
-        Yield the newest instant only.
-
-    Yields
-    ------
-    Look
-        The run at one instant, several times per second.
-
-    Raises
-    ------
-    RunError, ScenarioError
-        If the folder holds no run that can be read.
-    TelemetryError
-        If the address does not answer, or the connection is lost.
-    """
+    """Iterate over instants of a run until it is over."""
     if what.isdecimal() or "://" in what:
         found = _live(_endpoint(what))
         return _newest(found) if once else found

@@ -20,24 +20,7 @@ _WIDE = 120  # least width for three columns, characters
 
 
 def picture(look: Look, width: int = 80, height: int | None = None, ascii_only: bool = False) -> RenderableType:
-    """Draw a run at one instant.
-
-    Parameters
-    ----------
-    look : Look
-        The run at that instant.
-    width : int
-        Greatest length of a line, in characters.
-    height : int, optional
-        Greatest number of lines; regions and rules that do not fit are only counted.
-    ascii_only : bool
-        Draw bars in ASCII characters.
-
-    Returns
-    -------
-    RenderableType
-        Lines for a rich console of that width.
-    """
+    """Draw a run at one instant."""
     bars = Bars(ascii_only)
     foot = _foot(look)
     head = _head(look, width, bars)

@@ -18,22 +18,9 @@ _QUEUE_SIZE = 1 << 13  # bytes in the queue; more would be outdated before they 
 
 
 class Serial(SinglePeer):
-    """A raw line of 8 bits, no parity, one stop bit, without flow control.
+    """A raw line of 8 bits, no parity, one stop bit, without flow control."""
 
-    It uses the calls of POSIX systems, so no package is needed; Windows is not supported.
-
-    Parameters
-    ----------
-    path : str
-        Path of the device.
-    baud : int
-        Bits per second, one of the rates of the operating system.
-
-    Raises
-    ------
-    TelemetryError
-        If the device cannot be opened.
-    """
+    # It uses the calls of POSIX systems, so no package is needed; Windows is not supported.
 
     def __init__(self, path: str, baud: int) -> None:
         self._path, self._baud = path, baud
@@ -61,15 +48,7 @@ class Serial(SinglePeer):
 
 
 def open_line(path: str, baud: int) -> Stream:
-    """Open a device.
-
-    Raises
-    ------
-    OSError
-        If the device cannot be opened.
-    TelemetryError
-        If the operating system does not have the baud rate, or is Windows.
-    """
+    """Open a device."""
     speed = _baud_constant(path, baud)
     file = os.open(path, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
     try:

@@ -14,22 +14,7 @@ STALL_TIME = 5.0  # s without progress, after which `flush` reports a stall
 
 
 class Outgoing:
-    """A queue of frames for a stream that accepts partial writes.
-
-    Parameters
-    ----------
-    write : callable
-        Function that writes bytes and returns the number written; it raises BlockingIOError if it cannot write now,
-        another OSError if the other side has closed.
-    limit : int
-        Maximum number of bytes in the queue. A frame beyond the limit is dropped whole, so the other side never gets
-        part of one.
-
-    Attributes
-    ----------
-    dropped : int
-        Number of frames dropped because the queue was full.
-    """
+    """A queue of frames for a stream that accepts partial writes."""
 
     def __init__(self, write: Callable[[bytes], int], limit: int = QUEUE_SIZE) -> None:
         self._write: Final = write
@@ -39,13 +24,7 @@ class Outgoing:
         self.dropped = 0
 
     def put(self, frame: bytes) -> bool:
-        """Queue a frame for the next flush; write at once if the queue is long; return False if it was full.
-
-        Raises
-        ------
-        OSError
-            If the other side has closed.
-        """
+        """Queue a frame for the next flush; write at once if the queue is long; return False if it was full."""
         if len(self._queue) > _WRITE_THRESHOLD and self._stalled_at is None:
             self._write_available()
         if len(self._queue) + len(frame) > self._limit:
@@ -55,13 +34,7 @@ class Outgoing:
         return True
 
     def flush(self, now: float) -> bool:
-        """Write as much of the queue as possible; return False after 5 s without progress.
-
-        Raises
-        ------
-        OSError
-            If the other side has closed.
-        """
+        """Write as much of the queue as possible; return False after 5 s without progress."""
         if not self._queue or self._write_available():
             self._stalled_at = None
         elif self._stalled_at is None:
@@ -79,25 +52,7 @@ class Outgoing:
 
 
 class Stream:
-    """An open stream with its queue of frames.
-
-    Parameters
-    ----------
-    read, write, close : callable
-        Calls of the operating system; their arguments are the maximum number of bytes to read, the bytes to
-        write, and none.
-    limit : int
-        Maximum number of bytes in the queue.
-
-    Attributes
-    ----------
-    outgoing : Outgoing
-        The queue of frames.
-    is_open : bool
-        False once a read or write has failed.
-    version : int
-        Highest version of MAVLink received from the other side; 0 before any.
-    """
+    """An open stream with its queue of frames."""
 
     def __init__(
         self,
@@ -166,15 +121,7 @@ class StreamChannel:
 
 
 class SinglePeer(StreamChannel):
-    """A channel to one peer, by a stream that is reopened after a loss.
-
-    Parameters
-    ----------
-    stream : Stream or None
-        The first stream, if it is open already.
-    peer, slow : str
-        Words in the texts about dropped frames: the name of the absent peer, and that it is too slow.
-    """
+    """A channel to one peer, by a stream that is reopened after a loss."""
 
     def __init__(self, stream: Stream | None, peer: str, slow: str) -> None:
         super().__init__()

@@ -29,18 +29,7 @@ def make_stream(connection: socket.socket) -> Stream:
 
 
 class TcpIn(StreamChannel):
-    """A server. Each client has its own queue of frames; a client that accepts none for 5 s is closed.
-
-    Attributes
-    ----------
-    port : int
-        Port on which it listens.
-
-    Raises
-    ------
-    TelemetryError
-        If the port is in use.
-    """
+    """A server. Each client has its own queue of frames; a client that accepts none for 5 s is closed."""
 
     def __init__(self, host: str, port: int) -> None:
         super().__init__()

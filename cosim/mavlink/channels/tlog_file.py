@@ -20,29 +20,18 @@ _BUFFER_SIZE = 1 << 20  # bytes, limit while the disk is full
 
 
 class Tlog:
-    """A new file of frames, each after its time: 8 bytes, big-endian, microseconds since 1970.
+    """A new file of frames, each after its time: 8 bytes, big-endian, microseconds since 1970."""
 
-    Without any frame, as for a run that could not start, the file is removed.
-
-    The time is the wall clock at the start plus simulated time, so a run of any speed replays in real time.
-    QGroundControl reads a time in the future with the other byte order; hence `advance_start`.
-
-    Attributes
-    ----------
-    simulated : float
-        Simulated time [s] of the next frames, set by the sender.
-
-    Raises
-    ------
-    TelemetryError
-        If the file exists or cannot be made.
-    """
+    # Without any frame, as for a run that could not start, the file is removed.
+    #
+    # The time is the wall clock at the start plus simulated time, so a run of any speed replays in real time.
+    # QGroundControl reads a time in the future with the other byte order; hence `advance_start`.
 
     datagrams = True
 
     def __init__(self, path: str) -> None:
         self.losses: dict[str, int] = Counter()
-        self.simulated = 0.0
+        self.simulated = 0.0  # simulated time [s] of the next frames, set by the sender
         self._path = path
         self._start = time.time_ns() // 1000
         self._stamp = self._start & ~3

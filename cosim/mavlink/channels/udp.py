@@ -1,8 +1,7 @@
-"""UDP: to one address, or to each peer that sends to a local port.
+"""UDP: to one address, or to each peer that sends to a local port."""
 
-The frames of one call of `poll` share a datagram, as those of autopilots do: each system call delays the stepper,
-since it releases the interpreter lock.
-"""
+# The frames of one call of `poll` share a datagram, as those of autopilots do: each system call delays the stepper,
+# since it releases the interpreter lock.
 
 from __future__ import annotations
 
@@ -25,13 +24,7 @@ _MAX_PACKET = 1000  # bytes of frames in a datagram: the limit of small receiver
 
 
 class UdpOut:
-    """One fixed peer; the kernel drops datagrams of others.
-
-    Raises
-    ------
-    TelemetryError
-        If there is no route to the peer.
-    """
+    """One fixed peer; the kernel drops datagrams of others."""
 
     datagrams = True
 
@@ -92,21 +85,10 @@ class _Peer:
 
 
 class UdpIn:
-    """A server. Each address that sent an accepted frame within the last 10 s is a peer, up to 8 of them.
+    """A server. Each address that sent an accepted frame within the last 10 s is a peer, up to 8 of them."""
 
-    A silent peer is kept until a new address replaces it; the one active for longest is always kept. So
-    frames from many addresses cannot displace a ground station.
-
-    Attributes
-    ----------
-    port : int
-        Port on which it listens.
-
-    Raises
-    ------
-    TelemetryError
-        If the port is in use.
-    """
+    # A silent peer is kept until a new address replaces it; the one active for longest is always kept. So frames from
+    # many addresses cannot displace a ground station.
 
     datagrams = True
 

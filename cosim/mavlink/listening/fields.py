@@ -66,18 +66,7 @@ _CLOCKS = ("time_boot_ms", "time_usec", "time_unix_usec")
 
 
 def format_values(message: Any) -> str:
-    """Format the main values of a message.
-
-    Parameters
-    ----------
-    message : Any
-        Message of the dialect.
-
-    Returns
-    -------
-    str
-        Values in usual units, without control characters.
-    """
+    """Format the main values of a message."""
     groups = _FORMATS.get(message.get_type())
     if groups is not None:
         return "  ".join(_format_group(message, group) for group in groups)

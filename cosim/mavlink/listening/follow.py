@@ -15,26 +15,7 @@ _MAX_WAIT = 0.1  # s, longest wait for a message
 def follow(
     link: GroundLink, table: TelemetryTable, period: float, seconds: float | None = None, count: int | None = None
 ) -> Iterator[float]:
-    """Receive messages, and yield whenever the table is due to be shown.
-
-    Parameters
-    ----------
-    link : GroundLink
-        Link to listen on. A link that speaks first also sends a heartbeat once a second.
-    table : TelemetryTable
-        TelemetryTable that records the messages.
-    period : float
-        Time between two yields [s].
-    seconds : float, optional
-        Duration [s]; default: until interrupted.
-    count : int, optional
-        Number of messages after which listening ends; default: no limit.
-
-    Yields
-    ------
-    float
-        Monotonic time [s], once per period, and at the end.
-    """
+    """Receive messages, and yield whenever the table is due to be shown; period [s], seconds [s], returns [s]."""
     started = now = time.monotonic()
     due, next_heartbeat = started + period, started
     while (seconds is None or now - started < seconds) and (count is None or table.total < count):

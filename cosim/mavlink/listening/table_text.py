@@ -20,26 +20,7 @@ _MIN_WIDTH = 40
 def format_table(
     link: GroundLink, table: TelemetryTable, now: float, width: int = 120, height: int | None = None
 ) -> list[str]:
-    """Format the received messages as lines of text.
-
-    Parameters
-    ----------
-    link : GroundLink
-        Link whose name and bad frames are shown.
-    table : TelemetryTable
-        The received messages.
-    now : float
-        Present time of the monotonic clock [s].
-    width : int
-        Greatest number of characters of a line.
-    height : int, optional
-        Greatest number of lines, of which the last one counts omitted rows; default: no limit.
-
-    Returns
-    -------
-    list of str
-        Lines without control characters.
-    """
+    """Format the received messages as lines of text; now [s]."""
     width = max(width, _MIN_WIDTH)
     lines = [_link_line(link, table, now), *_vehicle_lines(table, now), *_text_lines(table, now)]
     rows = [f"{'message':<34} {'from':>7} {'Hz':>7} {'count':>8}  last values"]

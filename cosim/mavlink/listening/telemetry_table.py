@@ -40,24 +40,11 @@ class Row:
 
 
 class TelemetryTable:
-    """Rows of messages, recent texts, and the vehicle's identity.
-
-    Attributes
-    ----------
-    rows : dict of Key to Row
-        Rows in the order of first reception, at most 300.
-    texts : deque of (float, Any)
-        Time of reception [s] and message of recent STATUSTEXTs.
-    vehicle : (int, int) or None
-        System and component id of the first autopilot received.
-    modes : dict of int to str
-        Names of the vehicle's modes by custom mode, from AVAILABLE_MODES.
-    total, omitted : int
-        Numbers of received messages, and of those without a row because there were 300.
-    """
+    """Rows of messages, recent texts, and the vehicle's identity."""
 
     def __init__(self) -> None:
         self.rows: dict[Key, Row] = {}
+        # time of reception [s] and message of recent STATUSTEXTs
         self.texts: deque[tuple[float, Any]] = deque(maxlen=MAX_TEXTS)
         self.vehicle: tuple[int, int] | None = None
         self.modes: dict[int, str] = {}

@@ -89,10 +89,8 @@ def named_values(context: VehicleContext) -> list[tuple[str, float]]:
 
 
 def weight_names(criteria: Sequence[str]) -> list[str]:
-    """Return names of the criteria's weights, of up to ten characters: ``w_obstacle``, ``w_visibili``.
-
-    A number at the end distinguishes equal names.
-    """
+    """Return names of the criteria's weights, of up to ten characters: ``w_obstacle``, ``w_visibili``."""
+    # A number at the end distinguishes equal names.
     names: list[str] = []
     for criterion in criteria:
         name, number = f"w_{criterion}"[:_MAX_NAME], 2
@@ -109,12 +107,10 @@ def named_value_float(context: VehicleContext) -> list[Any]:
 
 
 def debug_float_array(context: VehicleContext) -> list[Any]:
-    """DEBUG_FLOAT_ARRAY: all outputs and reports of law and arbiter, by array_id.
-
-    1, ``weights``: memberships, then weights, in the order of the criteria. 2, ``values``: g of the goal, then of
-    each region of the scenario. 3, ``clearances``: in the same order. 4, ``thrusts``: the force of each thruster [N],
-    then its command. 5, ``law``: reports of the law, in the order of the columns. Each has 58 numbers at most.
-    """
+    """DEBUG_FLOAT_ARRAY: all outputs and reports of law and arbiter, by array_id."""
+    # 1, `weights`: memberships, then weights, in the order of the criteria. 2, `values`: g of the goal, then of each
+    # region of the scenario. 3, `clearances`: in the same order. 4, `thrusts`: the force of each thruster [N], then its
+    # command. 5, `law`: reports of the law, in the order of the columns. Each has 58 numbers at most.
     view = context.view
     arrays: list[tuple[int, str, Sequence[float]]] = [
         (WEIGHTS, "weights", [*view.memberships, *view.weights]),

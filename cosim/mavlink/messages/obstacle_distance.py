@@ -17,11 +17,9 @@ _INCREMENT = 360 // SECTORS  # degrees
 
 
 def obstacle_distance(context: VehicleContext) -> list[Any]:
-    """OBSTACLE_DISTANCE: a level scan, sector by sector clockwise from the vehicle's heading.
-
-    A sector's angle is that of its center. In cm: `max_distance` plus one without an obstacle, 65535 if position,
-    heading or an obstacle's position is NaN.
-    """
+    """OBSTACLE_DISTANCE: a level scan, sector by sector clockwise from the vehicle's heading."""
+    # A sector's angle is that of its center. In cm: `max_distance` plus one without an obstacle, 65535 if position,
+    # heading or an obstacle's position is NaN.
     m, view, proximity = context.mavlink, context.view, context.proximity
     proximity.update(view, context.settings)
     max_range = MAX_RANGE * _CENTIMETERS
@@ -34,10 +32,8 @@ def obstacle_distance(context: VehicleContext) -> list[Any]:
 
 
 def obstacle_distance_3d(context: VehicleContext) -> list[Any]:
-    """OBSTACLE_DISTANCE_3D: the nearest point, in the body frame, of each region that is an obstacle.
-
-    `obstacle_id` is the region's number in the scenario, from 1. No message before the first snapshot.
-    """
+    """OBSTACLE_DISTANCE_3D: the nearest point, in the body frame, of each region that is an obstacle."""
+    # `obstacle_id` is the region's number in the scenario, from 1. No message before the first snapshot.
     m, view, proximity = context.mavlink, context.view, context.proximity
     if not context.has_view:
         return []

@@ -53,11 +53,9 @@ def system_time(context: VehicleContext) -> list[Any]:
 
 
 def extended_sys_state(context: VehicleContext) -> list[Any]:
-    """EXTENDED_SYS_STATE: in the air while armed, else on the ground.
-
-    QGroundControl selects its actions by it: in the air it offers neither disarming nor the start of a mission, on the
-    ground neither pause nor go-to. Contact with the bottom does not count as on the ground.
-    """
+    """EXTENDED_SYS_STATE: in the air while armed, else on the ground."""
+    # QGroundControl selects its actions by it: in the air it offers neither disarming nor the start of a mission, on
+    # the ground neither pause nor go-to. Contact with the bottom does not count as on the ground.
     m = context.mavlink
     landed = m.MAV_LANDED_STATE_IN_AIR if context.armed else m.MAV_LANDED_STATE_ON_GROUND
     return [context.make("EXTENDED_SYS_STATE", 0, landed)]
@@ -98,12 +96,10 @@ def combine_flags(mavlink: Any, prefix: str, names: str) -> int:
 
 
 def autopilot_version(context: VehicleContext) -> list[Any]:
-    """AUTOPILOT_VERSION: this package's version as middleware; the unique id follows from vehicle and system id.
-
-    The flight software's version is the same, or, if the profile imitates an autopilot, a development version of that
-    autopilot. QGroundControl selects views and warnings by it, and compares only official versions with the newest.
-    The custom version is the name, or for PX4, where it is shown as numbers, the package's version again.
-    """
+    """AUTOPILOT_VERSION: this package's version as middleware; the unique id follows from vehicle and system id."""
+    # The flight software's version is the same, or, if the profile imitates an autopilot, a development version of that
+    # autopilot. QGroundControl selects views and warnings by it, and compares only official versions with the newest.
+    # The custom version is the name, or for PX4, where it is shown as numbers, the package's version again.
     version, profile = Version(metadata.version("subreach")), context.profile
     own = version.major, version.minor, version.micro
     kind = _DEVELOPMENT if profile.imitated_release or version.is_prerelease else _OFFICIAL

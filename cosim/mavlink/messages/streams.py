@@ -16,22 +16,7 @@ _SECOND = 1_000_000
 
 
 class Streams:
-    """The schedule of a link, in whole microseconds of a monotonic clock, without drift.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle whose messages are sent.
-    link : MessageSink
-        The link that sends them.
-    clock_us : int
-        Start time [µs]; every message is due then.
-
-    Attributes
-    ----------
-    heartbeat_sent : bool
-        True if a heartbeat was sent since this was last set to False.
-    """
+    """The schedule of a link, in whole microseconds of a monotonic clock, without drift; clock_us [µs]."""
 
     def __init__(self, context: VehicleContext, link: MessageSink, clock_us: int) -> None:
         self._context, self._link, self._clock = context, link, clock_us
@@ -70,18 +55,7 @@ class Streams:
         return self._intervals.get(message_id, -1) if message_id in self._specs else 0
 
     def set_intervals(self, changes: Iterable[tuple[int, int]]) -> bool:
-        """Change intervals, all or none.
-
-        Parameters
-        ----------
-        changes : iterable of (int, int)
-            Message id and interval [µs]: 0 for its default, below 0 to end it. Others are limited to 10 ms to an hour.
-
-        Returns
-        -------
-        bool
-            True if the intervals were changed; False if a message is unknown, or the load would exceed `MAX_LOAD`.
-        """
+        """Change intervals, all or none; changes [µs]."""
         new: dict[int, int] = {}
         for message_id, interval_us in changes:
             spec = self._specs.get(message_id)
@@ -100,13 +74,7 @@ class Streams:
         return True
 
     def advance(self, clock_us: int) -> None:
-        """Send each message that is due, once, even if several of its intervals have passed.
-
-        Parameters
-        ----------
-        clock_us : int
-            Present time of the clock [µs].
-        """
+        """Send each message that is due, once, even if several of its intervals have passed; clock_us [µs]."""
         self._clock = clock_us
         if clock_us < self._earliest:
             return

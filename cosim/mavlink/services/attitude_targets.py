@@ -22,12 +22,11 @@ _NO_FORCE: Vector3 = (0.0, 0.0, 0.0)
 
 
 class AttitudeTargets(Service):
-    """Apply set-points of attitude as the autopilot of the profile does.
+    """Apply set-points of attitude as the autopilot of the profile does."""
 
-    As ArduSub: in ALT_HOLD a set-point without thrust leaves surge, sway and the rate of depth to the sticks. In GUIDED
-    thrust is a rate of climb, and nothing pushes ahead or aside. As PX4: in OFFBOARD, with a thrust along each body
-    axis, or along the first one.
-    """
+    # As ArduSub: in ALT_HOLD a set-point without thrust leaves surge, sway and the rate of depth to the sticks. In
+    # GUIDED thrust is a rate of climb, and nothing pushes ahead or aside. As PX4: in OFFBOARD, with a thrust along each
+    # body axis, or along the first one.
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)

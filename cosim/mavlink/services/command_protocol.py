@@ -13,15 +13,7 @@ _NO_POSITION = 0x7FFFFFFF  # x or y of a COMMAND_INT without a position
 
 
 class CommandProtocol(Service):
-    """COMMAND_LONG and COMMAND_INT.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle.
-    services : iterable of Service
-        Services with the handlers of commands.
-    """
+    """COMMAND_LONG and COMMAND_INT."""
 
     def __init__(self, context: VehicleContext, services: Iterable[Service]) -> None:
         super().__init__(context)

@@ -58,15 +58,7 @@ class FtpError(Exception):
 
 
 class FileServer(Service):
-    """FILE_TRANSFER_PROTOCOL.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle.
-    parameters : ParameterProtocol
-        Service with the parameters that the file contains.
-    """
+    """FILE_TRANSFER_PROTOCOL."""
 
     def __init__(self, context: VehicleContext, parameters: ParameterProtocol) -> None:
         super().__init__(context)

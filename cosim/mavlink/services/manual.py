@@ -98,11 +98,9 @@ class ManualControlService(Service):
             context.sticks = sticks
 
     def _wrench_fractions(self, sticks: Vector6, by_gain: bool) -> Vector6:
-        """Return the fractions of the greatest wrench that the sticks command, before the pilot gain.
-
-        ArduSub commands its thrusters by gain times stick, and their force is proportional to the square of the sum.
-        The gain does not apply to overridden channels.
-        """
+        """Return the fractions of the greatest wrench that the sticks command, before the pilot gain."""
+        # ArduSub commands its thrusters by gain times stick, and their force is proportional to the square of the sum.
+        # The gain does not apply to overridden channels.
         context, mode = self.context, self.context.mode_ahead
         if context.profile.name != "ardusub":
             return sticks

@@ -36,19 +36,9 @@ class _Upload:
 
 
 class MissionProtocol(Service):
-    """MISSION_*: one mission of regions; fences and rally points are always empty.
+    """MISSION_*: one mission of regions; fences and rally points are always empty."""
 
-    In ArduPilot's profile item 0 is home: it is added to downloads, and ignored in uploads.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle.
-    targets : Targets
-        Service that executes guided items at once.
-    parameters : ParameterProtocol
-        Service that is updated with the settings that a mission changes.
-    """
+    # In ArduPilot's profile item 0 is home: it is added to downloads, and ignored in uploads.
 
     def __init__(self, context: VehicleContext, targets: Targets, parameters: ParameterProtocol) -> None:
         super().__init__(context)

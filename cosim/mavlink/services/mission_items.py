@@ -30,38 +30,15 @@ class ItemError(Exception):
 def decode_mission_item(
     context: VehicleContext, item: ReceivedMissionItem, before: Sequence[MissionItem], count: int
 ) -> MissionItem:
-    """Decode a received mission item.
-
-    NAV_WAYPOINT is a sphere about its position, of its acceptance radius (parameter 2), or for 0 the scenario's goal
-    region moved there; parameter 1 is the time to stay. NAV_SPLINE_WAYPOINT is the goal region, without its spline.
-    NAV_LOITER_TIME and NAV_LOITER_UNLIM are that region, for a time and without end. NAV_LAND is a sphere at the
-    surfacing depth above its position, or for 0, 0 above the previous one; NAV_RETURN_TO_LAUNCH is the same at home.
-    Both are without end.
-
-    NAV_DELAY and CONDITION_DELAY stay at the previous item for parameter 1. DO_CHANGE_SPEED sets the law's speed, if
-    it has one, CONDITION_YAW a heading, and DO_JUMP continues at another item, a given number of times.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle, with its global frame and home.
-    item : ReceivedMissionItem
-        Item to decode.
-    before : sequence of MissionItem
-        Decoded previous items.
-    count : int
-        Number of items of the mission.
-
-    Returns
-    -------
-    MissionItem
-        The decoded item.
-
-    Raises
-    ------
-    ItemError
-        If the command is not supported, or a parameter is invalid.
-    """
+    """Decode a received mission item."""
+    # NAV_WAYPOINT is a sphere about its position, of its acceptance radius (parameter 2), or for 0 the scenario's goal
+    # region moved there; parameter 1 is the time to stay. NAV_SPLINE_WAYPOINT is the goal region, without its spline.
+    # NAV_LOITER_TIME and NAV_LOITER_UNLIM are that region, for a time and without end. NAV_LAND is a sphere at the
+    # surfacing depth above its position, or for 0, 0 above the previous one; NAV_RETURN_TO_LAUNCH is the same at home.
+    # Both are without end.
+    #
+    # NAV_DELAY and CONDITION_DELAY stay at the previous item for parameter 1. DO_CHANGE_SPEED sets the law's speed, if
+    # it has one, CONDITION_YAW a heading, and DO_JUMP continues at another item, a given number of times.
     m = context.mavlink
     settings = context.settings
     radius, surface = settings["commands.hold_radius"], settings["commands.surface_depth"]

@@ -13,23 +13,9 @@ _ALL_ONES = 0xFFFFFFFF
 
 
 def pack_parameters(parameters: Sequence[tuple[str, float]], total: int) -> bytes:
-    """Encode parameters as a packed file.
-
-    Each has its type, the lengths of the prefix shared with the previous name and of the rest, the rest of the name,
-    and its value, little-endian. A header has a magic number, their number, and the number of all parameters.
-
-    Parameters
-    ----------
-    parameters : sequence of (str, float)
-        Names, all different, of up to sixteen characters, and values.
-    total : int
-        Number of all parameters.
-
-    Returns
-    -------
-    bytes
-        Content of the file.
-    """
+    """Encode parameters as a packed file."""
+    # Each has its type, the lengths of the prefix shared with the previous name and of the rest, the rest of the name,
+    # and its value, little-endian. A header has a magic number, their number, and the number of all parameters.
     parts = [struct.pack("<HHH", _MAGIC, len(parameters), total)]
     before = ""
     for name, value in parameters:

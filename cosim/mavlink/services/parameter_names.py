@@ -41,21 +41,9 @@ _AXES = {"0": "X", "1": "Y", "2": "Z"}
 
 
 def parameter_names(keys: Iterable[str]) -> dict[str, str]:
-    """Return a name for each key: ``law.gains.k_p1`` is LAW_K_P1, ``regions.SR1.shape.radius`` SR1_RADIUS.
-
-    In names that are too long the longest words are shortened one by one: by a table, then by removing vowels, then
-    from their ends. A number at the end distinguishes equal names.
-
-    Parameters
-    ----------
-    keys : iterable of str
-        Keys of settings.
-
-    Returns
-    -------
-    dict of str to str
-        Names by key. The same keys in the same order give the same names.
-    """
+    """Return a name for each key: ``law.gains.k_p1`` is LAW_K_P1, ``regions.SR1.shape.radius`` SR1_RADIUS."""
+    # In names that are too long the longest words are shortened one by one: by a table, then by removing vowels, then
+    # from their ends. A number at the end distinguishes equal names.
     all_keys = list(keys)
     names: dict[str, str] = {}
     used: set[str] = set()

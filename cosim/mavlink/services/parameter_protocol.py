@@ -36,12 +36,11 @@ class _LinkParameter:
 
 
 class ParameterProtocol(Service):
-    """PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET; all parameters are REAL32.
+    """PARAM_REQUEST_LIST, PARAM_REQUEST_READ and PARAM_SET; all parameters are REAL32."""
 
-    The list is sent in slices, one per tick, and at most once at a time on a link: a request while it is under way
-    restarts the count from the present parameter. It pauses while a link has no room, so that a slow line loses none,
-    and repeated requests do not displace other messages.
-    """
+    # The list is sent in slices, one per tick, and at most once at a time on a link: a request while it is under way
+    # restarts the count from the present parameter. It pauses while a link has no room, so that a slow line loses none,
+    # and repeated requests do not displace other messages.
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)

@@ -28,10 +28,9 @@ class _AddedObstacle:
 
 
 class ReceivedObstacles(Service):
-    """Add each obstacle as a sphere to keep out of, about the received point.
+    """Add each obstacle as a sphere to keep out of, about the received point."""
 
-    In LOCAL_FRD forward is the vehicle's heading at time 0.
-    """
+    # In LOCAL_FRD forward is the vehicle's heading at time 0.
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)

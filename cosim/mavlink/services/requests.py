@@ -19,15 +19,7 @@ _NANO = 1000  # ns in a µs
 
 
 class Requests(Service):
-    """Intervals and single messages, by command or by REQUEST_DATA_STREAM.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle.
-    streams : mapping of MessageSink to Streams
-        The schedule of each link.
-    """
+    """Intervals and single messages, by command or by REQUEST_DATA_STREAM."""
 
     def __init__(self, context: VehicleContext, streams: Mapping[MessageSink, Streams]) -> None:
         super().__init__(context)

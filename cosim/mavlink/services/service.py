@@ -21,20 +21,12 @@ _LOCAL_NED = 1
 
 @dataclass(frozen=True)
 class CommandRequest:
-    """A command of a COMMAND_LONG or COMMAND_INT.
-
-    Attributes
-    ----------
-    params : tuple of float
-        Parameters 1 to 7; clients fill unused ones with NaN or 0.
-    frame : int
-        MAV_FRAME of parameters 5 to 7; global for COMMAND_LONG.
-    """
+    """A command of a COMMAND_LONG or COMMAND_INT."""
 
     sender: Sender
     command: int
-    params: tuple[float, ...]
-    frame: int
+    params: tuple[float, ...]  # parameters 1 to 7; clients fill unused ones with NaN or 0
+    frame: int  # MAV_FRAME of parameters 5 to 7; global for COMMAND_LONG
 
     def __getitem__(self, i: int) -> float:
         """Return parameter `i`, from 1."""
@@ -49,23 +41,10 @@ CommandHandler = Callable[[CommandRequest], int]  # returns MAV_RESULT
 
 
 class Service:
-    """A micro-service.
+    """A micro-service."""
 
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle.
-
-    Attributes
-    ----------
-    messages : mapping of str to callable
-        Handlers by the name of the message.
-    commands : mapping of int to callable
-        Handlers by MAV_CMD.
-    """
-
-    messages: Mapping[str, Handler]
-    commands: Mapping[int, CommandHandler]
+    messages: Mapping[str, Handler]  # handlers by the name of the message
+    commands: Mapping[int, CommandHandler]  # handlers by MAV_CMD
 
     def __init__(self, context: VehicleContext) -> None:
         self.context = context
@@ -94,22 +73,7 @@ class Service:
 
 
 def to_local_position(context: VehicleContext, frame: int, x: float, y: float, z: float) -> Vector3 | None:
-    """Convert a received position to the local frame [m, NED]; NaN where it is not finite.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle, with its global frame.
-    frame : int
-        MAV_FRAME.
-    x, y, z : float
-        Latitude and longitude [deg] and altitude [m], above sea level or above home; or north, east, down [m].
-
-    Returns
-    -------
-    tuple of float or None
-        Position [m, NED]; None for an unsupported frame.
-    """
+    """Convert a received position to the local frame [m, NED]; NaN where it is not finite; x, y, z [deg]."""
     if frame == _LOCAL_NED:
         position = x, y, z
     elif frame in _GLOBAL_FRAMES:

@@ -15,20 +15,7 @@ _UNCHANGED, _DEFAULT = -1.0, -2.0  # special values of the protocol
 
 
 def resolve_speed(context: VehicleContext, speed: float) -> float | None:
-    """Return the speed [m/s] that a change of speed commands, or None for no change.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle, whose law has a speed.
-    speed : float
-        Parameter 2 of the command: -1 for no change, -2 for the scenario's speed, else the speed [m/s].
-
-    Raises
-    ------
-    CommandError
-        If the vehicle cannot reach that speed.
-    """
+    """Return the speed [m/s] that a change of speed commands, or None for no change."""
     if speed == _UNCHANGED:
         return None
     if speed == _DEFAULT:
@@ -40,13 +27,7 @@ def resolve_speed(context: VehicleContext, speed: float) -> float | None:
 
 
 def terminal_speed(vehicle: Vehicle) -> float:
-    """Return the greatest speed in still water at full thrust along a body axis, where drag equals thrust [m/s].
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle with thruster limits and damping; without damping of an axis the speed is infinite.
-    """
+    """Return the greatest speed in still water at full thrust along a body axis, where drag equals thrust [m/s]."""
     thrust = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)[:3].tolist()
     speeds = []
     for axis, force in enumerate(thrust):

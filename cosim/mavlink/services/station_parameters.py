@@ -1,8 +1,7 @@
-"""Read-only parameters that ground stations read by name.
+"""Read-only parameters that ground stations read by name."""
 
-QGroundControl reads them when it connects and in its summary of a vehicle. It reports a missing one as a bug of the
-firmware, and a sensor without calibration as a vehicle that needs setup.
-"""
+# QGroundControl reads them when it connects and in its summary of a vehicle. It reports a missing one as a bug of the
+# firmware, and a sensor without calibration as a vehicle that needs setup.
 
 from __future__ import annotations
 

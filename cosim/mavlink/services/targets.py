@@ -30,20 +30,12 @@ _WARNING_PERIOD = 2.0  # s
 
 
 class Targets(Service):
-    """SET_POSITION_TARGET_*, and commands of position, heading and speed.
+    """SET_POSITION_TARGET_*, and commands of position, heading and speed."""
 
-    Set-points apply only in mode ``reach``, as in ArduSub only in GUIDED. A set-point received before that mode, as
-    PX4's stations send it, is kept for 1 s. A repeated set-point makes no command, unless it is relative and follows
-    1 s of silence: QGroundControl's change of depth, made twice. A velocity without a position moves a sphere about
-    the vehicle; it ends after 3 s without a set-point.
-
-    Parameters
-    ----------
-    context : VehicleContext
-        The vehicle.
-    parameters : ParameterProtocol
-        Service that sets the speed.
-    """
+    # Set-points apply only in mode `reach`, as in ArduSub only in GUIDED. A set-point received before that mode, as
+    # PX4's stations send it, is kept for 1 s. A repeated set-point makes no command, unless it is relative and follows
+    # 1 s of silence: QGroundControl's change of depth, made twice. A velocity without a position moves a sphere about
+    # the vehicle; it ends after 3 s without a set-point.
 
     def __init__(self, context: VehicleContext, parameters: ParameterProtocol) -> None:
         super().__init__(context)
@@ -180,15 +172,7 @@ class Targets(Service):
                 self.warn_about(position)
 
     def warn_about(self, position: Vector3, target: str = "target") -> None:
-        """Send a warning for each objection to a target, which is accepted nevertheless.
-
-        Parameters
-        ----------
-        position : tuple of float
-            Center of the target [m, NED].
-        target : str
-            Name of the target in the text.
-        """
+        """Send a warning for each objection to a target, which is accepted nevertheless; position [m, NED]."""
         context = self.context
         for words in self._keep_in.objections(position, context.view, context.settings):
             context.send_text(
@@ -206,22 +190,8 @@ class Targets(Service):
         return self.go(request.sender, position, request[4])
 
     def go(self, sender: Sender, position: Vector3, yaw: float = math.nan) -> int:
-        """Move the target region, and reach it; without a finite coordinate, hold, as QGroundControl pauses PX4.
-
-        Parameters
-        ----------
-        sender : Sender
-            Sender of the command.
-        position : tuple of float
-            Center of the target [m, NED]; a coordinate that is not finite stays at the vehicle's.
-        yaw : float
-            Heading [rad]; NaN for none.
-
-        Returns
-        -------
-        int
-            MAV_RESULT.
-        """
+        """Move the target region, and reach it; without a finite coordinate, hold, as QGroundControl pauses PX4."""
+        # with position [m, NED], yaw [rad]
         context = self.context
         if not self.accept_control(sender):
             return int(context.mavlink.MAV_RESULT_DENIED)

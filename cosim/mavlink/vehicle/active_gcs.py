@@ -7,13 +7,7 @@ _MAX_SYSTEMS = 64  # systems whose heartbeats are stored
 
 
 class ActiveGcs:
-    """The system in control: the first to send set-points or sticks keeps control until it is silent for 3 s.
-
-    Attributes
-    ----------
-    commander : int or None
-        System id of the last accepted command, whose loss triggers the failsafe.
-    """
+    """The system in control: the first to send set-points or sticks keeps control until it is silent for 3 s."""
 
     def __init__(self) -> None:
         self.commander: int | None = None
@@ -21,15 +15,7 @@ class ActiveGcs:
         self._heartbeat_times: dict[int, float] = {}
 
     def request_control(self, system: int, now: float) -> bool:
-        """Return True if set-points or sticks of a system apply, and give it control if so.
-
-        Parameters
-        ----------
-        system : int
-            System id.
-        now : float
-            The wall clock [s].
-        """
+        """Return True if set-points or sticks of a system apply, and give it control if so; now [s]."""
         if self._controller is not None:
             controller, last = self._controller
             if controller != system and now - last < _CONTROL_TIMEOUT:

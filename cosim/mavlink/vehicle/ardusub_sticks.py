@@ -18,22 +18,7 @@ _MIN_FRACTION = 0.6  # of a thruster's maximum matrix element above which it is 
 
 
 class MotorMixer:
-    """Add the commands of the sticks to each thruster, 1, 0 or -1 for a full stick, and square the sum.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle with the thrusters, their limits, and the curve of its table ``autopilot``.
-
-    Attributes
-    ----------
-    commands : ndarray, shape (n, 6)
-        Command of each thruster by a full stick of each axis.
-    max_forces : ndarray, shape (n,)
-        Maximum force of each thruster [N], the mean of both directions.
-    is_quadratic : bool
-        True if the force is proportional to the square of the command.
-    """
+    """Add the commands of the sticks to each thruster, 1, 0 or -1 for a full stick, and square the sum."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self._matrix, table = vehicle.thruster_matrix, vehicle.autopilot
@@ -41,6 +26,7 @@ class MotorMixer:
         self.commands: Array = np.where(
             size > _MIN_FRACTION * size.max(axis=1, keepdims=True), np.sign(self._matrix), 0.0
         ).T
+        # maximum force of each thruster [N], the mean of both directions
         self.max_forces: Array = 0.5 * (vehicle.thrust_max - vehicle.thrust_min)
         self.is_quadratic = table is not None and table.curve == "quadratic"
 
@@ -52,26 +38,7 @@ class MotorMixer:
 
 
 def apply_dead_zone(deflection: float, dead_zone: float) -> float:
-    """Return the fraction of a full rate that a stick commands.
-
-    Parameters
-    ----------
-    deflection : float
-        Deflection of the stick times its gain, -1 to 1.
-    dead_zone : float
-        Deflection up to which the rate is 0, below 1.
-
-    Returns
-    -------
-    float
-        Fraction from -1 to 1: 0 within the dead zone, and linear beyond it.
-
-    Examples
-    --------
-    >>> from cosim.mavlink.vehicle.ardusub_sticks import apply_dead_zone, invert_dead_zone
-    >>> apply_dead_zone(0.1, 0.2), round(apply_dead_zone(invert_dead_zone(-0.3, 0.2), 0.2), 6)
-    (0.0, -0.3)
-    """
+    """Return the fraction of a full rate that a stick commands."""
     beyond = abs(deflection) - dead_zone
     return math.copysign(beyond / (1.0 - dead_zone), deflection) if beyond > 0.0 else 0.0
 

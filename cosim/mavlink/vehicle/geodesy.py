@@ -12,15 +12,7 @@ _LEAST_COSINE = 1e-6  # keeps longitudes finite at the poles
 
 
 class LocalFrame:
-    """Positions about an origin at the surface [m, NED] as latitude and longitude [deg] and altitude [m].
-
-    Parameters
-    ----------
-    latitude, longitude : float
-        Latitude and longitude of the origin [deg].
-    altitude : float
-        Altitude of the origin above the ellipsoid [m].
-    """
+    """Positions about an origin at the surface [m, NED] as latitude and longitude [deg] and altitude [m]."""
 
     def __init__(self, latitude: float, longitude: float, altitude: float = 0.0) -> None:
         self.latitude, self.longitude, self.altitude = latitude, longitude, altitude

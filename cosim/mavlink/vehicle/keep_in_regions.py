@@ -19,15 +19,9 @@ _LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 class KeepInRegions:
-    """The regions in space that a vehicle must stay in.
+    """The regions in space that a vehicle must stay in."""
 
-    The constructor loads the library that evaluates them, which may take seconds: call it before the simulation.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with the regions.
-    """
+    # The constructor loads the library that evaluates them, which may take seconds: call it before the simulation.
 
     def __init__(self, scenario: Scenario) -> None:
         every = [secondary.region for secondary in scenario.regions if not secondary.is_dynamic]
@@ -35,17 +29,7 @@ class KeepInRegions:
         self._clearances_at((0.0, 0.0, 0.0), {}, [])
 
     def objections(self, position_ned: Vector3, view: View, settings: LiveSettings) -> list[str]:
-        """Return a text for each violated region of a target, and for one above the surface.
-
-        Parameters
-        ----------
-        position_ned : tuple of float
-            Center of the target [m].
-        view : View
-            Snapshot with the positions of moving regions.
-        settings : LiveSettings
-            Settings with the present shapes.
-        """
+        """Return a text for each violated region of a target, and for one above the surface; position_ned [m]."""
         shifts = [view.shift(region.name) for region in self._regions]
         clearances = self._clearances_at(position_ned, settings.shapes, shifts)
         words = [

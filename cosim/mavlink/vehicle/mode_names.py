@@ -19,20 +19,7 @@ _PX4_AUTO = {1: "READY", 2: "TAKEOFF", 3: "LOITER", 4: "MISSION", 5: "RTL", 6: "
 
 
 def mode_name(heartbeat: Any, names: Mapping[int, str]) -> str:
-    """Return the name of a vehicle's mode.
-
-    Parameters
-    ----------
-    heartbeat : Any
-        HEARTBEAT of the vehicle.
-    names : mapping of int to str
-        Names that the vehicle sent itself, by custom mode; they take precedence.
-
-    Returns
-    -------
-    str
-        Name of the mode, or the custom mode's number if unknown.
-    """
+    """Return the name of a vehicle's mode."""
     number = heartbeat.custom_mode
     if names.get(number):
         return names[number]

@@ -21,11 +21,10 @@ _RETURN = _px4(4, 5)
 
 
 class ModeEntry(NamedTuple):
-    """A mode as ground stations know it.
+    """A mode as ground stations know it."""
 
-    MAV_MODE_FLAG has the bits custom mode 1, auto 4, guided 8, stabilized 16, manual input 64; ArduSub sets the
-    stabilized and manual input bits in each mode.
-    """
+    # MAV_MODE_FLAG has the bits custom mode 1, auto 4, guided 8, stabilized 16, manual input 64; ArduSub sets the
+    # stabilized and manual input bits in each mode.
 
     name: str
     standard: int  # MAV_STANDARD_MODE; 0 for none
@@ -48,58 +47,27 @@ MODE_TABLE: dict[Mode, ModeEntry] = {
 
 @dataclass(frozen=True)
 class Profile:
-    """An autopilot that ground stations know.
-
-    Attributes
-    ----------
-    autopilot : int
-        MAV_AUTOPILOT.
-    custom_modes : dict of str to int
-        ``custom_mode`` of each mode.
-    is_packed : bool
-        True if a mode's number is PX4's: main mode shifted by 16 bits, sub-mode by 24.
-    centered_stick : int
-        Value of MANUAL_CONTROL's vertical stick at rest.
-    full_tilt_stick : int
-        Value of MANUAL_CONTROL's roll and pitch extensions at full deflection.
-    has_home_item : bool
-        True if item 0 of a mission is home, as in ArduPilot.
-    has_parameter_hash : bool
-        True if the list of parameters begins with its hash.
-    casts_parameters : bool
-        True if stations send parameters of any type, as ArduPilot's do; otherwise only REAL32 is accepted.
-    system_id_parameter : str
-        Name of the parameter of the system id.
-    imitated_release : tuple of int or None
-        Release of the imitated autopilot; None if none is imitated.
-    """
+    """An autopilot that ground stations know."""
 
     name: ProfileName
-    autopilot: int
-    custom_modes: dict[Mode, int]
-    is_packed: bool
-    centered_stick: int
-    full_tilt_stick: int
-    has_home_item: bool
-    has_parameter_hash: bool
+    autopilot: int  # MAV_AUTOPILOT
+    custom_modes: dict[Mode, int]  # ``custom_mode`` of each mode
+    is_packed: bool  # true if a mode's number is PX4's: main mode shifted by 16 bits, sub-mode by 24
+    centered_stick: int  # value of MANUAL_CONTROL's vertical stick at rest
+    full_tilt_stick: int  # value of MANUAL_CONTROL's roll and pitch extensions at full deflection
+    has_home_item: bool  # true if item 0 of a mission is home, as in ArduPilot
+    has_parameter_hash: bool  # true if the list of parameters begins with its hash
+    # true if stations send parameters of any type, as ArduPilot's do; otherwise only REAL32 is accepted
     casts_parameters: bool
-    system_id_parameter: str
-    imitated_release: tuple[int, int, int] | None
+    system_id_parameter: str  # name of the parameter of the system id
+    imitated_release: tuple[int, int, int] | None  # release of the imitated autopilot; None if none is imitated
 
     def find_mode(self, number: int) -> Mode | None:
         """Return the mode with a ``custom_mode``, or None if there is none."""
         return next((mode for mode in MODES if self.custom_modes[mode] == number), None)
 
     def find_commanded_mode(self, first: int, second: int) -> Mode | None:
-        """Return the mode that MAV_CMD_DO_SET_MODE selects, or None if there is none.
-
-        Parameters
-        ----------
-        first, second : int
-            Parameters 2 and 3 of the command: main mode and sub-mode of PX4, or ArduPilot's number. With sub-mode 0 a
-            number of ArduSub is no other mode of PX4 here, except 1 and 7: ACRO and CIRCLE in ArduSub, MANUAL and
-            STABILIZED in PX4.
-        """
+        """Return the mode that MAV_CMD_DO_SET_MODE selects, or None if there is none."""
         if not self.is_packed:
             return self.find_mode(first)
         if not (0 <= first <= 0xFF and 0 <= second <= 0xFF):

@@ -23,20 +23,9 @@ _NO_SHIFT = (0.0, 0.0, 0.0)
 
 
 class Proximity:
-    """Obstacles, packed once; an update writes only changes.
+    """Obstacles, packed once; an update writes only changes."""
 
-    The constructor loads libraries, which may take seconds: call it before the simulation.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario whose regions in space to keep out of, of the criterion ``obstacle``, are the obstacles.
-
-    Attributes
-    ----------
-    ids : tuple of int
-        Numbers of the n obstacles among the scenario's regions, from 1.
-    """
+    # The constructor loads libraries, which may take seconds: call it before the simulation.
 
     def __init__(self, scenario: Scenario) -> None:
         obstacles = [(i, secondary) for i, secondary in enumerate(scenario.regions, 1) if _is_obstacle(secondary)]
@@ -57,15 +46,7 @@ class Proximity:
         self.scan(_NO_SHIFT, 0.0)
 
     def update(self, view: View, settings: LiveSettings) -> None:
-        """Update positions of the obstacles from a snapshot, and their shapes from the settings.
-
-        Parameters
-        ----------
-        view : View
-            The snapshot.
-        settings : LiveSettings
-            Settings with the present shapes.
-        """
+        """Update positions of the obstacles from a snapshot, and their shapes from the settings."""
         regions, clearances = self._regions, view.clearances
         for k, name in enumerate(self._names):
             shift, first = view.shift(name), regions.offsets[k]
@@ -81,18 +62,7 @@ class Proximity:
                 regions.numbers[first : regions.offsets[k + 1]] = shape.packed()
 
     def inward_directions(self, position_ned: Vector3) -> list[list[float]]:
-        """Return the direction in which the clearance of each obstacle decreases.
-
-        Parameters
-        ----------
-        position_ned : tuple of float
-            Position of the vehicle [m].
-
-        Returns
-        -------
-        list of list of float
-            n vectors of any length, NED.
-        """
+        """Return the direction in which the clearance of each obstacle decreases; position_ned [m]."""
         self._position[:] = position_ned
         self._regions.evaluate(
             self._position, self._level, self._values, self._gradients, self._rotation_gradients, self._clearances
@@ -101,21 +71,7 @@ class Proximity:
         return directions
 
     def scan(self, position_ned: Vector3, heading: float) -> list[float]:
-        """Scan the horizontal plane of the vehicle.
-
-        Parameters
-        ----------
-        position_ned : tuple of float
-            Position of the vehicle [m].
-        heading : float
-            Heading from north, clockwise [rad].
-
-        Returns
-        -------
-        list of float
-            Distance to the nearest obstacle in each sector [m], from the sector about the heading clockwise; infinite
-            beyond `MAX_RANGE`, 0 everywhere for a vehicle inside an obstacle, NaN where unknown.
-        """
+        """Scan the horizontal plane of the vehicle; position_ned [m], heading [rad], returns [m]."""
         self._position[:] = position_ned
         np.cos(self._angles + heading, out=self._directions[:, 0])
         np.sin(self._angles + heading, out=self._directions[:, 1])

@@ -15,15 +15,7 @@ from cosim.simulation.signals import Array, Column
 
 
 class RowLayout:
-    """Column indices of the quantities in a row.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the run.
-    columns : sequence of Column
-        Columns of the run's rows.
-    """
+    """Column indices of the quantities in a row."""
 
     def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
         self.index = {column.name: i for i, column in enumerate(columns)}
@@ -38,13 +30,7 @@ class RowLayout:
         )
 
     def make_first_row(self, scenario: Scenario) -> Array:
-        """Return the row before the first step: the vehicle's initial state, 0 in other columns.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Row in the order of the columns.
-        """
+        """Return the row before the first step: the vehicle's initial state, 0 in other columns; returns (n,)."""
         row = np.zeros(self.length)
         initial, commands = scenario.initial, scenario.commands
         roll, pitch, yaw = quaternion_to_euler(initial.quaternion)

@@ -19,19 +19,7 @@ _MAX_REASONS = 8  # different reasons of a kind that are stored; further ones ar
 
 
 class StatusTexts:
-    """Send texts on every link.
-
-    Parameters
-    ----------
-    mavlink : module
-        The dialect.
-    make : Encoder
-        Encoder of messages.
-    links : sequence of MessageSink
-        Attached links; the list may grow.
-    clock : callable
-        Function that returns the wall clock [s].
-    """
+    """Send texts on every link; clock [s]."""
 
     def __init__(self, mavlink: Any, make: Encoder, links: Sequence[MessageSink], clock: Callable[[], float]) -> None:
         self._mavlink, self._make, self._links, self._clock = mavlink, make, links, clock
@@ -42,19 +30,8 @@ class StatusTexts:
         self._text_id = 0
 
     def send_text(self, text: str, severity: int | None = None, key: str = "", every: float = 0.0) -> None:
-        """Send a text on every link, in parts if it is long; at once, or later if the rate is at its limit.
-
-        Parameters
-        ----------
-        text : str
-            Text of one line.
-        severity : int, optional
-            MAV_SEVERITY; default: information.
-        key : str
-            Kind of text: of each kind one is sent in `every` seconds, and the others are dropped.
-        every : float
-            Minimum time between two texts of a key [s, wall clock].
-        """
+        """Send a text on every link, in parts if it is long; at once, or later if the rate is at its limit."""
+        # with every [s, wall clock]
         now = self._clock()
         if every and now - self._last_sent.get(key, -every) < every:
             return
@@ -64,15 +41,7 @@ class StatusTexts:
         self._send_pending()
 
     def reject(self, reason: str, key: str) -> None:
-        """Report a rejection: at once, or up to 2 s later if one of that kind was reported in the last 2 s.
-
-        Parameters
-        ----------
-        reason : str
-            Reason in a few words.
-        key : str
-            Kind of rejection. Equal reasons are reported once, with their count.
-        """
+        """Report a rejection: at once, or up to 2 s later if one of that kind was reported in the last 2 s."""
         if self._clock() - self._last_sent.get(f"reject {key}", -_REJECTION_PERIOD) >= _REJECTION_PERIOD:
             self._last_sent[f"reject {key}"] = self._clock()
             self._send_rejection(reason)

@@ -41,58 +41,7 @@ class Sender:
 
 
 class VehicleContext:
-    """State of the vehicle for the micro-services.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the run.
-    columns : sequence of Column
-        Columns of the run's rows.
-    options : MavlinkOptions
-        Identity, profile, and accepted systems.
-    commands : CommandQueue or None
-        Queue that receives the commands; None for a read-only vehicle.
-    live : bool
-        False for a recorded run.
-
-    Attributes
-    ----------
-    mavlink : module
-        The dialect.
-    make : Encoder
-        Encoder of messages.
-    view : View
-        The latest snapshot.
-    waited_us : int
-        Wall time spent waiting for arming [µs], which counts as time since boot.
-    has_view : bool
-        True after the first snapshot.
-    links : list of MessageSink
-        Attached links.
-    settings : LiveSettings
-        Settings after all submitted commands.
-    proximity : Proximity
-        Proximity sensing of obstacles.
-    frame : LocalFrame
-        Conversion between local and global positions.
-    home : tuple of float
-        North and east of home [m]; home is at the surface.
-    status_texts : StatusTexts
-        Sender of texts; `send_text`, `reject` and `make_text` are its methods.
-    now : float
-        Wall clock at the last call of the autopilot [s].
-    failsafe : bool
-        True while the commanding ground station is lost.
-    loss_timeout, loss_action : float, str
-        Silence of the commanding station [s] after which the action is taken, and the action.
-    plan : tuple of ReceivedMissionItem
-        Received items of the mission, without home.
-    mission_items : tuple of MissionItem
-        Decoded items of the mission.
-    sticks : tuple of float
-        Last commanded sticks, X Y Z K M N, from -1 to 1.
-    """
+    """State of the vehicle for the micro-services."""
 
     def __init__(
         self,
@@ -109,8 +58,10 @@ class VehicleContext:
         self.layout = RowLayout(scenario, columns)
         self.active_gcs = ActiveGcs()
         self.links: list[MessageSink] = []
-        self.now = 0.0
+        self.now = 0.0  # wall clock at the last call of the autopilot [s]
         self.failsafe = False
+        # loss_action: silence of the commanding station [s] after which the action is taken, and the action
+        # loss_timeout: silence of the commanding station [s] after which the action is taken, and the action
         self.loss_timeout, self.loss_action = options.loss_timeout, options.loss_action
         self.proximity = Proximity(scenario)
         self.frame = LocalFrame(*options.origin)
@@ -186,10 +137,8 @@ class VehicleContext:
         return self._thrust_fractions(self.view.thruster_forces)
 
     def servo_pulses(self) -> list[float]:
-        """Return the pulse of each servo output [us], by the vehicle's table ``autopilot``; 0 for unused outputs.
-
-        Without that table, and as PX4, a thruster's output has its number, and pulses are linear in the force.
-        """
+        """Return the pulse of each servo output [us], by the vehicle's table ``autopilot``; 0 for unused outputs."""
+        # Without that table, and as PX4, a thruster's output has its number, and pulses are linear in the force.
         pulses = [0.0] * max(self._outputs, default=0)
         for fraction, output, pulse in zip(
             self._thrust_fractions(self.view.thruster_commands), self._outputs, self._curves, strict=True
@@ -208,19 +157,7 @@ class VehicleContext:
     # ---- commands ----
 
     def submit(self, *commands: Command) -> int:
-        """Submit commands, which are applied at the next step.
-
-        Parameters
-        ----------
-        *commands : Command
-            Commands in the order of application.
-
-        Returns
-        -------
-        int
-            MAV_RESULT: accepted; denied for a read-only vehicle or an invalid command; temporarily rejected if the
-            run's queue rejects it.
-        """
+        """Submit commands, which are applied at the next step."""
         m = self.mavlink
         if self._commands is None:
             self.reject("commands are off: start with --commands" if self.live else "this is a recorded run", "off")

@@ -27,17 +27,7 @@ class _Vector:
 
 
 class View:
-    """One row, by named quantities; no property raises for any numbers.
-
-    Parameters
-    ----------
-    layout : RowLayout
-        Column indices of the row.
-    row : ndarray, shape (n,)
-        Row of a step; copied.
-    waited_us : int
-        Wall time spent waiting for arming before simulated time started [µs].
-    """
+    """One row, by named quantities; no property raises for any numbers; row (n,), waited_us [µs]."""
 
     def __init__(self, layout: RowLayout, row: Array, waited_us: int = 0) -> None:
         self._layout, self._row, self._waited_us = layout, row.tolist(), waited_us

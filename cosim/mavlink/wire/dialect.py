@@ -6,11 +6,9 @@ from typing import Any
 
 
 def dialect() -> Any:
-    """Return pymavlink's module of the dialect ``all``, MAVLink 2.
-
-    It is the only dialect with both the messages of ArduPilot and those of modes. It is imported at the first call,
-    since the import takes 0.1 s.
-    """
+    """Return pymavlink's module of the dialect ``all``, MAVLink 2."""
+    # It is the only dialect with both the messages of ArduPilot and those of modes. It is imported at the first call,
+    # since the import takes 0.1 s.
     from pymavlink.dialects.v20 import all as mavlink
 
     return mavlink

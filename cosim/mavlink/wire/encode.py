@@ -43,13 +43,7 @@ def wrap_time(microseconds: int, per_unit: int = 1000) -> int:
 
 
 class Encoder:
-    """Make messages of a dialect from any numbers.
-
-    Parameters
-    ----------
-    mavlink : module
-        Dialect of pymavlink.
-    """
+    """Make messages of a dialect from any numbers."""
 
     def __init__(self, mavlink: Any) -> None:
         self._classes: dict[str, Any] = {}

@@ -19,11 +19,10 @@ _MAX_BAUD = 4_000_000
 
 @dataclass(frozen=True)
 class Endpoint:
-    """A network address, serial device or log file.
+    """A network address, serial device or log file."""
 
-    `host` and `port` are for networks, the host as an IPv4 address; `path` is that of a serial device, with its
-    `baud`, or of a file. `text` is the user's text.
-    """
+    # `host` and `port` are for networks, the host as an IPv4 address; `path` is that of a serial device, with its
+    # `baud`, or of a file. `text` is the user's text.
 
     kind: Kind
     text: str

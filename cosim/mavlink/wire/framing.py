@@ -119,18 +119,7 @@ def parse_header(data: bytes, offset: int) -> Header | None:
 
 
 class Framer:
-    """Encode messages as unsigned frames, as pymavlink does, in less than half the time.
-
-    Parameters
-    ----------
-    source : (int, int)
-        System and component id of the sender.
-
-    Attributes
-    ----------
-    seq, seq_v1 : int
-        Sequence number of the next frame of MAVLink 2 and of MAVLink 1, 0 to 255.
-    """
+    """Encode messages as unsigned frames, as pymavlink does, in less than half the time."""
 
     def __init__(self, source: tuple[int, int]) -> None:
         self._source = source
@@ -144,20 +133,12 @@ class Framer:
         self.seq_v1 = (self.seq_v1 + (frame_v1 is not None)) % 256
 
     def encode(self, message: Any) -> bytes:
-        """Encode a message as a frame of MAVLink 2.
-
-        Raises
-        ------
-        struct.error, OverflowError, IndexError, TypeError, ValueError
-            If a field cannot hold its value.
-        """
+        """Encode a message as a frame of MAVLink 2."""
         return self._pack(message, self._frame_v2)
 
     def encode_v1(self, message: Any) -> bytes | None:
-        """Encode a message as a frame of MAVLink 1, without extension fields; None for ids above 255.
-
-        It raises as `encode` does.
-        """
+        """Encode a message as a frame of MAVLink 1, without extension fields; None for ids above 255."""
+        # It raises as `encode` does.
         return None if message.get_msgId() > _MAX_V1_ID else self._pack(message, self._frame_v1)
 
     def _pack(self, message: Any, pack: Callable[..., bytes]) -> bytes:
@@ -186,20 +167,7 @@ class Framer:
 
 
 class FrameFilter:
-    """Accept or reject frames, and decode the accepted ones.
-
-    Parameters
-    ----------
-    stats : RxStats
-        Counts of the frames by outcome.
-    own : (int, int), optional
-        Own system and component id: frames from them, and those for other systems, are ignored. Default: frames for
-        all systems are accepted.
-    allowed : frozenset of int, optional
-        System ids that are accepted; default: all.
-    verifier : Verifier, optional
-        Verifier of signatures; with it, frames not signed with its key are rejected, and so is all of MAVLink 1.
-    """
+    """Accept or reject frames, and decode the accepted ones."""
 
     def __init__(
         self,
@@ -216,10 +184,8 @@ class FrameFilter:
         self._codec = mavlink.MAVLink(None)
 
     def read_datagram(self, data: bytes) -> Iterator[tuple[bytes, Any]]:
-        """Yield the accepted frames of a datagram with their messages.
-
-        Frames follow one another without gaps. A malformed one ends the datagram.
-        """
+        """Yield the accepted frames of a datagram with their messages."""
+        # Frames follow one another without gaps. A malformed one ends the datagram.
         offset = 0
         while offset < len(data):
             header = parse_header(data, offset)
@@ -287,13 +253,7 @@ class FrameFilter:
 
 
 class StreamReader:
-    """Find the frames in a stream of bytes; invalid bytes do not lose a following frame.
-
-    Parameters
-    ----------
-    frame_filter : FrameFilter
-        Filter that accepts the frames.
-    """
+    """Find the frames in a stream of bytes; invalid bytes do not lose a following frame."""
 
     def __init__(self, frame_filter: FrameFilter) -> None:
         self._filter = frame_filter

@@ -32,31 +32,7 @@ class ReceivedMessage(NamedTuple):
 
 
 class GroundLink:
-    """A ground station's end of an endpoint.
-
-    Parameters
-    ----------
-    endpoint : Endpoint
-        A network or a serial device.
-    key : bytes, optional
-        Signing key; with it, only frames signed with it are accepted. Default: all are.
-    identity : (int, int)
-        Own system and component id.
-
-    Attributes
-    ----------
-    channel : Channel
-        Channel that carries the frames.
-    v1_frames : int
-        Number of accepted frames of MAVLink 1.
-    stats : RxStats
-        Counts of received frames by outcome.
-
-    Raises
-    ------
-    TelemetryError
-        If the endpoint cannot be opened.
-    """
+    """A ground station's end of an endpoint."""
 
     def __init__(self, endpoint: Endpoint, key: bytes | None = None, identity: Identity = GROUND_STATION) -> None:
         self.name, self.identity = endpoint.text, identity
@@ -73,18 +49,7 @@ class GroundLink:
         )
 
     def receive(self, timeout: float) -> list[ReceivedMessage]:
-        """Return received messages, waiting for the first.
-
-        Parameters
-        ----------
-        timeout : float
-            Longest wait [s].
-
-        Returns
-        -------
-        list of ReceivedMessage
-            Messages in the order of reception; empty if there are none.
-        """
+        """Return received messages, waiting for the first; timeout [s]."""
         deadline = time.monotonic() + timeout
         while True:
             now = time.monotonic()

@@ -46,13 +46,7 @@ _SEND_RULES = {
 
 
 class Budget:
-    """A token bucket of bytes that may be sent.
-
-    Parameters
-    ----------
-    rate : float
-        Refill rate [bytes/s].
-    """
+    """A token bucket of bytes that may be sent; rate [bytes/s]."""
 
     def __init__(self, rate: float) -> None:
         self._rate, self._capacity = rate, rate * _BURST
@@ -80,17 +74,7 @@ class Budget:
 
 
 class Signer:
-    """Sign the frames of one link.
-
-    Parameters
-    ----------
-    key : bytes
-        Key of 32 bytes.
-    clock : SigningClock
-        Clock of the vehicle's timestamps.
-    link : int
-        Id of the link, which has its own sequence of timestamps.
-    """
+    """Sign the frames of one link."""
 
     def __init__(self, key: bytes, clock: SigningClock, link: int) -> None:
         self._clock = clock
@@ -106,30 +90,7 @@ class Signer:
 
 
 class Link:
-    """An endpoint with its peers; a `MessageSink`.
-
-    Parameters
-    ----------
-    name : str
-        Name such as ``udpout:127.0.0.1:14550``.
-    channel : Channel
-        Channel of the frames.
-    frame_filter : FrameFilter
-        Filter that accepts received frames.
-    source : (int, int)
-        Own system and component id.
-    budget : float, optional
-        Greatest number of bytes per second of the wall clock; default: no limit.
-    signer : Signer, optional
-        Signer of the frames; default: none are signed.
-
-    Attributes
-    ----------
-    logs : list of Link
-        Logs that also get the answers sent on this link; streams are sent on each link anyway.
-    sent, dropped, unencodable : int
-        Numbers of messages that were passed to the channel, dropped for the budget, and not encodable.
-    """
+    """An endpoint with its peers; a `MessageSink`."""
 
     def __init__(
         self,
@@ -195,10 +156,8 @@ class Link:
         return frame
 
     def receive(self, until: float) -> Iterator[tuple[bytes, Any]]:
-        """Yield accepted frames with their messages, until none is left or a time of `time.perf_counter`.
-
-        The rest follows at the next call.
-        """
+        """Yield accepted frames with their messages, until none is left or a time of `time.perf_counter`."""
+        # The rest follows at the next call.
         while time.perf_counter() < until:
             received = next(self._frames, None)
             if received is not None:
@@ -228,25 +187,7 @@ class Link:
 
 
 def open_links(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> list[Link]:
-    """Open endpoints as links of one vehicle.
-
-    Parameters
-    ----------
-    endpoints : sequence of Endpoint
-        Endpoints to open.
-    options : MavlinkOptions
-        Identity of the vehicle, accepted systems, and the key, if there is one.
-
-    Returns
-    -------
-    list of Link
-        Links in the order of the endpoints.
-
-    Raises
-    ------
-    TelemetryError
-        If an endpoint cannot be opened; the others are closed again.
-    """
+    """Open endpoints as links of one vehicle."""
     source, key = (options.system_id, COMPONENT_ID), options.key
     clock = SigningClock(None if key is None else timestamp_file(key, source))
     verifier = None if key is None else Verifier(key, clock)
@@ -265,13 +206,7 @@ def open_links(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> list[L
 
 
 def open_channel(endpoint: Endpoint) -> tuple[Channel, float | None]:
-    """Open the channel of an endpoint; return it and its limit [bytes/s], None for no limit.
-
-    Raises
-    ------
-    TelemetryError
-        If the endpoint cannot be opened.
-    """
+    """Open the channel of an endpoint; return it and its limit [bytes/s], None for no limit."""
     if endpoint.kind == "tlog":
         return Tlog(endpoint.path), None
     if endpoint.kind == "serial":

@@ -45,26 +45,9 @@ class Rejection(Enum):
 
 
 def load_key(path: Path) -> bytes:
-    """Load the signing key from a file.
-
-    32 bytes that are not text, or 64 hexadecimal digits, are the key itself. Any other text is a passphrase, and its
-    SHA-256 is the key, as in MAVProxy, QGroundControl and Mission Planner; white space around it is ignored.
-
-    Parameters
-    ----------
-    path : Path
-        File that only its owner can read.
-
-    Returns
-    -------
-    bytes
-        Key of 32 bytes.
-
-    Raises
-    ------
-    TelemetryError
-        If there is no such file, others can read it, or it holds no key.
-    """
+    """Load the signing key from a file."""
+    # 32 bytes that are not text, or 64 hexadecimal digits, are the key itself. Any other text is a passphrase, and its
+    # SHA-256 is the key, as in MAVProxy, QGroundControl and Mission Planner; white space around it is ignored.
     try:
         with path.open("rb") as file:
             mode = os.fstat(file.fileno()).st_mode
@@ -94,39 +77,22 @@ def _is_hexadecimal(text: str) -> bool:
 
 
 def timestamp_file(key: bytes, identity: tuple[int, int]) -> Path:
-    """Return the file that keeps the last timestamp of a key and a system and component id, in the user's state folder.
-
-    Its name shows nothing of the key.
-    """
+    """Return the file in the user's state folder that keeps the last timestamp of a key and an identity."""
+    # Its name shows nothing of the key.
     name = hmac.new(key, b"timestamps", hashlib.sha256).hexdigest()[:16]
     return platformdirs.user_state_path("subreach") / "signing" / "{}-{}-{}".format(name, *identity)
 
 
 class SigningClock:
-    """Strictly increasing timestamps of all signed frames of this vehicle, also across restarts.
+    """Strictly increasing timestamps of all signed frames of this vehicle, also across restarts."""
 
-    They follow the wall clock, or the latest verified timestamp of a peer, at most a minute ahead: a peer whose clock
-    is ahead would refuse earlier ones as old. The file is written ahead of the timestamps, every two seconds.
-
-    Parameters
-    ----------
-    file : Path, optional
-        File that keeps a timestamp above all that were used or accepted; default: none is kept.
-
-    Attributes
-    ----------
-    floor : int
-        Timestamp of the file at the start [10 us since 2015]; frames up to it may be those of an earlier process.
-
-    Raises
-    ------
-    TelemetryError
-        If the file cannot be read or written, or the wall clock is more than a minute behind it.
-    """
+    # They follow the wall clock, or the latest verified timestamp of a peer, at most a minute ahead: a peer whose clock
+    # is ahead would refuse earlier ones as old. The file is written ahead of the timestamps, every two seconds.
 
     def __init__(self, file: Path | None = None) -> None:
         self._file = file
         self._offset = time.time() - time.monotonic()  # s: guards against a wall clock that is set back
+        # timestamp of the file at the start [10 us since 2015]; frames up to it may be those of an earlier process
         self.floor = self._last = self._saved = 0
         if file is None:
             return
@@ -187,15 +153,7 @@ def _load_timestamp(file: Path) -> int:
 
 
 class Verifier:
-    """Verify signatures. All links share one, so that a frame of one link cannot be replayed on another.
-
-    Parameters
-    ----------
-    key : bytes
-        Key of 32 bytes.
-    clock : SigningClock
-        Clock of the vehicle's timestamps.
-    """
+    """Verify signatures. All links share one, so that a frame of one link cannot be replayed on another."""
 
     def __init__(self, key: bytes, clock: SigningClock) -> None:
         self._key: Final = key
@@ -203,10 +161,8 @@ class Verifier:
         self._latest: dict[tuple[int, int, int], int] = {}  # timestamps, by system, component and link
 
     def check(self, frame: bytes, system: int, component: int, is_signed: bool) -> Rejection | None:
-        """Return the reason to reject a frame, or None to accept it.
-
-        Only a frame with a valid signature updates the sender's last timestamp.
-        """
+        """Return the reason to reject a frame, or None to accept it."""
+        # Only a frame with a valid signature updates the sender's last timestamp.
         if not is_signed:
             return Rejection.UNSIGNED
         digest = hashlib.sha256(self._key + frame[:-_HASH_SIZE]).digest()

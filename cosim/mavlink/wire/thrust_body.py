@@ -13,22 +13,7 @@ _HEADER_SIZE = 10  # bytes of a header of MAVLink 2
 
 
 def make_attitude_target(mavlink: Any, *fields: Any, thrust_body: tuple[float, float, float]) -> Any:
-    """Return SET_ATTITUDE_TARGET with a thrust along each body axis [-].
-
-    Parameters
-    ----------
-    mavlink : module
-        The dialect.
-    fields
-        Fields of the message before the extension, in pymavlink's order.
-    thrust_body : tuple of float
-        Fractions of the maximum thrust ahead, right and down [-], -1 to 1.
-
-    Returns
-    -------
-    MAVLink_set_attitude_target_message
-        The message, whose frame in MAVLink 2 ends with the extension.
-    """
+    """Return SET_ATTITUDE_TARGET with a thrust along each body axis [-]."""
     message = mavlink.MAVLink_set_attitude_target_message(*fields)
     pack_message = message.pack
 

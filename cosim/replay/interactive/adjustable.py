@@ -1,8 +1,7 @@
-"""The numbers of a scenario that a page may change, and their places in the WebAssembly of its flight.
+"""The numbers of a scenario that a page may change, and their places in the WebAssembly of its flight."""
 
-Each key is tried: if its new number appears unchanged in the flight's arrays, its places are known. A key whose number
-is only used to compute others is not offered: the page writes numbers, and computes none from them.
-"""
+# Each key is tried: if its new number appears unchanged in the flight's arrays, its places are known. A key whose
+# number is only used to compute others is not offered: the page writes numbers, and computes none from them.
 
 from __future__ import annotations
 
@@ -40,47 +39,20 @@ _TOGETHER = (2.0**-8, 2.0**-9, 2.0**-10)
 
 @dataclass(frozen=True)
 class Slot:
-    """A number that a page may change.
+    """A number that a page may change."""
 
-    Attributes
-    ----------
-    key : str
-        Key of the scenario, as in ``--set``.
-    words, unit : str
-        Description and unit for the page.
-    value : float
-        Value in the scenario.
-    places : tuple of (str, int)
-        Places: ``number`` or ``gain`` with a place in the module's arrays, ``start`` with a value reference of
-        the plant, ``noise`` with 0 or 1; ``middle`` with the place of the mean of a cylinder's two ends; ``shift`` with
-        the place of the difference to the goal's center.
-    """
-
-    key: str
-    words: str
-    unit: str
-    value: float
+    key: str  # key of the scenario, as in ``--set``
+    words: str  # description and unit for the page
+    unit: str  # description and unit for the page
+    value: float  # value in the scenario
+    # places: ``number`` or ``gain`` with a place in the module's arrays, ``start`` with a value reference of the
+    # plant, ``noise`` with 0 or 1; ``middle`` with the place of the mean of a cylinder's two ends; ``shift`` with the
+    # place of the difference to the goal's center
     places: tuple[tuple[str, int], ...]
 
 
 def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[tuple[tuple[str, ...], ...] | None]]:
-    """Return the numbers that a page may change.
-
-    Parameters
-    ----------
-    flight : Flight
-        Flight of the scenario.
-    memory : Memory
-        Memory with the places of the flight's arrays.
-
-    Returns
-    -------
-    list of Slot
-        The numbers, in the order in which the page shows them.
-    list of three tuples of str, or None
-        Keys of each region, the goal first, that change when it moves north, east and down; None for a region that
-        cannot be moved.
-    """
+    """Return the numbers that a page may change."""
     scenario, table = flight.scenario, flight.scenario.table
     noise = NOISE if flight.exact or (flight.noisy and not scenario.sensing.exact) else ()
     numbers = [*CURRENT, BUOYANCY, *noise, *(f"law.gains.{name}" for name in scenario.law.gains._fields)]
@@ -106,13 +78,7 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[tuple[t
 
 
 def changed_scenario(scenario: Scenario, changes: Mapping[str, float]) -> Scenario:
-    """Return a scenario with other numbers at some keys.
-
-    Raises
-    ------
-    ScenarioError
-        If the changed scenario is invalid.
-    """
+    """Return a scenario with other numbers at some keys."""
     try:
         return validate_scenario(with_values(scenario.table, changes), scenario.name, scenario.vehicle)
     except (PlantFmuError, ControllerError) as error:
@@ -177,10 +143,8 @@ def _value(scenario: Scenario, key: str) -> float:
 def _places(
     flight: Flight, memory: Memory, other: Flight, keys: Mapping[float, str]
 ) -> dict[str, list[tuple[str, int]]] | None:
-    """Return the places of numbers in the flight, by comparison with another one that has the numbers of `keys` there.
-
-    None if anything else differs: then a changed number also enters a computation.
-    """
+    """Return the places of numbers in the flight, by comparison with one that has the numbers of `keys` there."""
+    # None if anything else differs: then a changed number also enters a computation.
     found: dict[str, list[tuple[str, int]]] = {}
 
     def put(value: float, kind: str, place: int) -> bool:

@@ -27,29 +27,7 @@ from plant_fmu.variables import variables
 
 
 def flight_data(run: Run, columns: Sequence[Column]) -> dict[str, Any]:
-    """Return the data by which a page simulates a run again, with other numbers.
-
-    Parameters
-    ----------
-    run : Run
-        Run of a scenario that the fused loop supports.
-    columns : sequence of Column
-        Columns of the page's view of the run.
-
-    Returns
-    -------
-    dict
-        Values for JSON. The WebAssembly is deflated without a header, in base64.
-
-    Raises
-    ------
-    RunError
-        If the page cannot simulate the scenario; the message names the key.
-    TranslationError, UnsupportedError
-        If a law or the arbiter's rules have no translation to C.
-    BuildError
-        If the WebAssembly must be compiled, and the ziglang package is not installed.
-    """
+    """Return the data by which a page simulates a run again, with other numbers."""
     scenario = run.scenario
     if scenario.log:
         raise RunError(
@@ -104,10 +82,8 @@ def _restoring(flight: Flight) -> dict[str, Any]:
 
 
 def _water(flight: Flight, run: Run) -> dict[str, Any]:
-    """Return the current at the surface, its growth with depth, and its variation at knots a period apart.
-
-    The variation follows from the seed alone, so that it is the recorded one whatever a page changes.
-    """
+    """Return the current at the surface, its growth with depth, and its variation at knots a period apart."""
+    # The variation follows from the seed alone, so that it is the recorded one whatever a page changes.
     start = {v.name: v.start for v in variables(flight.scenario.vehicle)} | flight.start
     surface, shear, deviation = (
         np.array([start[f"{name}.{axis}"] for axis in "xyz"])

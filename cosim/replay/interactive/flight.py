@@ -30,31 +30,7 @@ NEVER = -1  # step of an unused failure
 
 
 class Flight:
-    """The arguments of `cosim.batch.fused_loop.fly` for a scenario, with a slot for one more thruster failure.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario to simulate.
-
-    Attributes
-    ----------
-    law : CompiledLaw
-        Law in its initial state.
-    decide : tuple
-        Arguments of the law's function.
-    fly : tuple
-        Arguments of the fused loop.
-    start : dict of str to float
-        Start values of the plant, set before initialisation.
-    exact : bool
-        True if the law measures the true state when the noise is zero.
-
-    Raises
-    ------
-    RunError
-        If the fused loop does not support a key of the scenario; the message names it.
-    """
+    """The arguments of `cosim.batch.fused_loop.fly` for a scenario, with a slot for one more thruster failure."""
 
     def __init__(self, scenario: Scenario) -> None:
         require_fused(scenario, "a page that flies")

@@ -31,27 +31,7 @@ class FlightModule:
 
 
 def flight_module(scenario: Scenario) -> FlightModule:
-    """Return the WebAssembly of a scenario's flight.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with a built-in law.
-
-    Returns
-    -------
-    FlightModule
-        The module, from the cache if it is there.
-
-    Raises
-    ------
-    RunError
-        If the fused loop does not support a key of the scenario; the message names it.
-    TranslationError, UnsupportedError
-        If a law or the arbiter's rules have no translation to C.
-    BuildError
-        If the ziglang package is not installed, or its compiler fails.
-    """
+    """Return the WebAssembly of a scenario's flight."""
     flight, memory = Flight(scenario), Memory()
     component = of_vehicle(scenario.vehicle)
     key = token(component, 3)

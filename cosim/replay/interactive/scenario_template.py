@@ -24,15 +24,7 @@ class ScenarioTemplate:
 
 
 def scenario_template(scenario: Scenario, slots: Sequence[Slot]) -> ScenarioTemplate:
-    """Return the file of a scenario with gaps for its title and some numbers; failures can be added at its end.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the page.
-    slots : sequence of Slot
-        Numbers that the page may change.
-    """
+    """Return the file of a scenario with gaps for its title and some numbers; failures can be added at its end."""
     marks = {repr(_MARK + i): slot.key for i, slot in enumerate(slots)}
     table = with_values(scenario.table, {key: float(mark) for mark, key in marks.items()})
     if not table["failures"]:

@@ -12,24 +12,8 @@ _AXES = ("X", "Y", "Z", "K", "M", "N")
 
 
 def signal_sources(flight: Flight, columns: Sequence[Column]) -> dict[str, list[Any]]:
-    """Return the place of each signal in a flight's arrays, or the numbers from which the page computes it.
-
-    Parameters
-    ----------
-    flight : Flight
-        Flight of the scenario.
-    columns : sequence of Column
-        Columns of a view's rows, from `cosim.replay.view_columns.ViewColumns`.
-
-    Returns
-    -------
-    dict of str to list
-        Sources by name of the signal: ``["trace", place]``, ``["reasons", place]`` or ``["rules", place]`` for an index
-        in a row of that array; ``["sum", array, first, coefficients]`` for a weighted sum of neighbouring numbers;
-        ``["shift", region, axis]``, ``["attitude", axis]``, ``["water", axis]`` or ``["active"]`` for signals that the
-        page computes.
-        Signals that a flight does not write are missing.
-    """
+    """Return the place of each signal in a flight's arrays, or the numbers from which the page computes it."""
+    # with returns ["trace", place]
     known = dict(_known(flight))
     return {column.name: known[column.name] for column in columns if column.name in known}
 

@@ -64,24 +64,7 @@ static void rewind_model(Model *m)
 
 
 def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, bytes]:
-    """Return the C files of a flight, to be compiled with those of the plant's FMU.
-
-    Parameters
-    ----------
-    flight : Flight
-        Flight to compile.
-    memory : Memory
-        An empty memory, in which the arrays get their places.
-    token : str
-        Token of the plant's description.
-
-    Raises
-    ------
-    TranslationError
-        If the translator does not support a function.
-    UnsupportedError
-        If the arbiter's rules have no translation to C.
-    """
+    """Return the C files of a flight, to be compiled with those of the plant's FMU."""
     program, calls, law = Program(), [], flight.law
     _name_arrays(flight, memory)
     for name, function, arguments in (("law", type(law).function, flight.decide), ("fly", fly, flight.fly)):
@@ -173,20 +156,7 @@ def _scene(flight: Flight, token: str) -> Iterator[str]:
 
 
 def tail_draws(scenario: Scenario, rows: int) -> list[tuple[int, float]]:
-    """Return the places and values of the noise's tail draws, for which NumPy's generator takes logarithms.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario with the seed of the noise.
-    rows : int
-        Number of control steps, each of which draws six numbers.
-
-    Returns
-    -------
-    list of (int, float)
-        Index of each tail draw among all draws, and its value in standard deviations.
-    """
+    """Return the places and values of the noise's tail draws, for which NumPy's generator takes logarithms."""
     drawn = np.random.default_rng([scenario.sensing.seed, STREAM]).standard_normal(6 * rows)
     return [(int(i), float(drawn[i])) for i in np.flatnonzero(np.abs(drawn) >= OUTERMOST)]
 

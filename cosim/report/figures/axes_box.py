@@ -18,24 +18,12 @@ _FACE, _GRID = "#f6f6f6", "#d8d8d8"
 
 
 class Box:
-    """A box between two corners, in parallel projection.
-
-    Parameters
-    ----------
-    low, high : ndarray, shape (3,)
-        Corners of the box [m, NED].
-
-    Attributes
-    ----------
-    view : ndarray, shape (2, 3)
-        Directions [NED] that point right and up in the picture.
-    outline : ndarray, shape (n, 2)
-        Closed outline of the box in the picture.
-    """
+    """A box between two corners, in parallel projection; low, high (3,) [m, NED]."""
 
     def __init__(self, low: Array, high: Array) -> None:
         self._low, self._high = low, high
         ahead, right = [np.cos(_HEADING), np.sin(_HEADING)], [-np.sin(_HEADING), np.cos(_HEADING)]
+        # directions [NED] that point right and up in the picture
         self.view = np.array([[*right, 0.0], [*(np.sin(_DOWN) * np.array(ahead)), -np.cos(_DOWN)]])
         corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
         self.outline = hull_of(corners, self.view)

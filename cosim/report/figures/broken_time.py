@@ -21,14 +21,7 @@ _TAIL = 0.15  # fraction of the axis that shows the time at rest
 
 
 def rests_from(record: Rows) -> float | None:
-    """Return the time from which the vehicle stays at its final pose [s], by the rule of replays.
-
-    Returns
-    -------
-    float or None
-        Time, a little later for a margin; None if the vehicle never moves, if it moves in the last third of the run, or
-        if a pose is missing.
-    """
+    """Return the time from which the vehicle stays at its final pose [s], by the rule of replays."""
     time = record["time"]
     places = record.stack([f"position.{axis}" for axis in "xyz"])
     turns = record.stack([f"quaternion.e{i}" for i in range(4)])

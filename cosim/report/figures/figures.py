@@ -19,18 +19,7 @@ _AFTER = {figure: f" (after Fig. {figure})" for figure in ("5a", "5b", "7")}  # 
 
 
 def drawings(data: FigureData) -> Iterator[NamedFigure]:
-    """Yield every figure for which the run has data.
-
-    Parameters
-    ----------
-    data : FigureData
-        Scenario, record and summary.
-
-    Yields
-    ------
-    NamedFigure
-        Figures in the order of the report.
-    """
+    """Yield every figure for which the run has data."""
     for name, caption, draw in _figures(data):
         with mpl.rc_context(FIGURE_STYLE):
             yield NamedFigure(name, caption, draw(data))

@@ -18,18 +18,7 @@ _ESTIMATES = ("W − B", "x_G W − x_B B", "y_G W − y_B B", "z_G W − z_B B"
 
 
 def norms_of(record: Rows) -> dict[str, Array]:
-    """Return the norms of the acting and the commanded body force, each of shape (rows,) [N].
-
-    Parameters
-    ----------
-    record : Rows
-        Rows of a run, or a part of them.
-
-    Returns
-    -------
-    dict
-        Norms by label, ``acting`` and ``asked for``.
-    """
+    """Return the norms of the acting and the commanded body force, each of shape (rows,) [N]."""
     of = {"acting": "actuation", "asked for": "command"}
     forces = {words: record.stack([f"{name}.{axis}" for axis in "XYZ"]) for words, name in of.items()}
     return {words: np.maximum(np.linalg.norm(force, axis=1), _FLOOR) for words, force in forces.items()}
@@ -71,20 +60,7 @@ def thruster_caption(scenario: Scenario) -> str:
 
 
 def thrusts_of(scenario: Scenario, record: Rows) -> Array:
-    """Return the force of each thruster, or the one that the wrench would require, shape (rows, thrusters) [N].
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the run.
-    record : Rows
-        Rows of the run, or a part of them.
-
-    Returns
-    -------
-    ndarray
-        Force of each thruster at each row [N].
-    """
+    """Return the force of each thruster, or the one that the wrench would require, shape (rows, thrusters) [N]."""
     vehicle = scenario.vehicle
     if scenario.actuation.through == "thrusters":
         return record.stack([f"thruster_force[{i + 1}]" for i in range(vehicle.n_thrusters)])

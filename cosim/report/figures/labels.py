@@ -18,17 +18,7 @@ _CORNERS = np.array([[i, j] for i in (-1.0, 1.0) for j in (-1.0, 1.0)])
 
 
 class Labels:
-    """Collects labels and places them.
-
-    Parameters
-    ----------
-    ax : Axes
-        Axes whose limits are set.
-    scale : float
-        Scale of the picture along both axes [inch/m].
-    frame : ndarray, shape (n, 2)
-        Convex outline of the area for labels [m, in the picture].
-    """
+    """Collects labels and places them; scale [inch/m], frame (n, 2)."""
 
     def __init__(self, ax: Axes, scale: float, frame: Array) -> None:
         self._ax, self._scale, self._frame = ax, scale, frame

@@ -40,24 +40,8 @@ def panels(
     labels: Sequence[str] = (),
     titles: float = 0.0,
 ) -> tuple[Figure, Any]:
-    """Create a figure and its axes; axes of a column share their x axis, and those of a row their y axis.
-
-    Parameters
-    ----------
-    heights : sequence of float
-        Heights of the rows [inch].
-    widths : sequence of float
-        Widths of the columns, relative to each other.
-    labels : sequence of str
-        Labels of the legend above all axes.
-    titles : float
-        Height of titles above the axes [inch].
-
-    Returns
-    -------
-    Figure, ndarray of Axes, shape (rows, columns)
-        Figure, and its axes with tick labels at the left and at the bottom only.
-    """
+    """Create a figure and its axes; axes of a column share their x axis, and those of a row their y axis."""
+    # with heights [inch], titles [inch]
     top = TOP + LEGEND_ROW * legend_rows(labels) + titles
     total = top + sum(heights) + _GAP * (len(heights) - 1) + BOTTOM
     figure = new_figure(total)
@@ -126,20 +110,7 @@ def _power(value: float, _: object = None) -> str:
 
 
 def limits_of(signals: Sequence[Array], *, least: float = 0.0) -> tuple[float, float]:
-    """Return limits of an axis that contain all values of signals.
-
-    Parameters
-    ----------
-    signals : sequence of ndarray
-        Signals of any shape; NaN and infinity are ignored.
-    least : float
-        Least span of the axis.
-
-    Returns
-    -------
-    float, float
-        Lower and upper limit; those of -1 to 1 with margin if there is no finite value.
-    """
+    """Return limits of an axis that contain all values of signals."""
     finite = [s[np.isfinite(s)] for s in map(np.asarray, signals)]
     shown = np.concatenate([f for f in finite if f.size] or [np.array([-1.0, 1.0])])
     low, high = float(shown.min()), float(shown.max())

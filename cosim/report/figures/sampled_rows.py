@@ -30,22 +30,10 @@ _EXTREME = ("attitude.", "membership.", "weight.", "estimate.", "lyapunov.")
 
 
 def make_figure_data(run: Run) -> FigureData:
-    """Select the rows from which the figures of a run are drawn.
-
-    From a long record, these are the rows with the minimum and maximum of each drawn signal in each of some hundred
-    parts of the run and of the enlarged spans; rows evenly spaced in time and along the path; and rows at which
-    commands changed a signal.
-
-    Returns
-    -------
-    FigureData
-        Scenario, summary, and the whole record if it is short, else the selected rows in memory.
-
-    Raises
-    ------
-    RunError
-        If the record cannot be read.
-    """
+    """Select the rows from which the figures of a run are drawn."""
+    # From a long record, these are the rows with the minimum and maximum of each drawn signal in each of some hundred
+    # parts of the run and of the enlarged spans; rows evenly spaced in time and along the path; and rows at which
+    # commands changed a signal.
     data = FigureData(run.scenario, run.record, run.summary)
     if len(run.record) <= _WHOLE:
         return data

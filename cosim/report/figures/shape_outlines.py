@@ -1,7 +1,6 @@
-"""Projection of shapes to lines: visible areas, outlines, and edges that show them as solids.
+"""Projection of shapes to lines: visible areas, outlines, and edges that show them as solids."""
 
-The input is the entry of a shape: its mesh, or for finer lines its half axes or planes.
-"""
+# The input is the entry of a shape: its mesh, or for finer lines its half axes or planes.
 
 from __future__ import annotations
 
@@ -36,22 +35,7 @@ class ShapeLines:
 
 
 def lines_of_shape(shape: Shape, low: Array, high: Array, view: Array) -> ShapeLines | None:
-    """Project a shape to lines.
-
-    Parameters
-    ----------
-    shape : Shape
-        Shape in space.
-    low, high : ndarray, shape (3,)
-        Corners of a box [m, NED], at which infinite shapes are cut.
-    view : ndarray, shape (2, 3)
-        Orthonormal rows: the directions [NED] that point right and up in the picture.
-
-    Returns
-    -------
-    ShapeLines
-        Lines of the shape; None if no part of it is in the box.
-    """
+    """Project a shape to lines; low, high (3,) [m, NED], view (2, 3) [NED]."""
     entry = shape_entry(shape)
     if entry.half_axes is not None:
         return _ellipsoid(*entry.half_axes(shape), low, high, view)

@@ -73,20 +73,7 @@ class NamedFigure:
 
 
 def thin(time: Array, signal: Array) -> tuple[Array, Array]:
-    """Thin a signal for drawing to the least and the greatest value in each part of the time.
-
-    Parameters
-    ----------
-    time : ndarray, shape (n,)
-        Times [s].
-    signal : ndarray, shape (n,)
-        Values at these times; gaps of NaN are kept.
-
-    Returns
-    -------
-    ndarray, ndarray
-        Remaining times [s] and values.
-    """
+    """Thin a signal for drawing to the least and the greatest value in each part of the time; time [s], returns [s]."""
     n = len(time)
     if n <= 2 * POINTS:
         return time, signal
@@ -100,13 +87,7 @@ def thin(time: Array, signal: Array) -> tuple[Array, Array]:
 
 
 def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
-    """Yield the goal and every secondary region with its colour.
-
-    Yields
-    ------
-    (Region, str)
-        Region and colour; the goal first, if there is one.
-    """
+    """Yield the goal and every secondary region with its colour."""
     goal, *colours = colours_of_regions(scenario)
     if scenario.has_goal:
         yield scenario.goal_region, goal
@@ -124,16 +105,9 @@ class Place:
 
 
 def places_of(data: FigureData) -> Iterator[Place]:
-    """Yield the goal at the end of the run, and each region at the time of its least clearance.
-
-    A moving region is preceded by itself at the start and at the end, marked as faint. Regions of attitude have no
-    position and are skipped.
-
-    Yields
-    ------
-    Place
-        The goal, then the other regions in the order of the scenario.
-    """
+    """Yield the goal at the end of the run, and each region at the time of its least clearance."""
+    # A moving region is preceded by itself at the start and at the end, marked as faint. Regions of attitude have no
+    # position and are skipped.
     dynamic = {secondary.region.name for secondary in data.scenario.regions if secondary.is_dynamic}
     for region, colour in regions_of(data.scenario):
         if of_attitude(region.shape):
@@ -149,42 +123,19 @@ def places_of(data: FigureData) -> Iterator[Place]:
 
 
 def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
-    """Yield name, colour and final position [m, NED], shape (3,), of the feature of every visibility region.
-
-    Yields
-    ------
-    (str, str, ndarray)
-        Name, colour and position, in the order of the regions.
-    """
+    """Yield name, colour and final position [m, NED], shape (3,), of the feature of every visibility region."""
     for region, colour in regions_of(data.scenario):
         if isinstance(region.shape, Visibility):
             yield region.name, colour, np.array(region.shape.feature) + shifts_of(data.record, region.name)[-1]
 
 
 def shifts_of(record: Rows, name: str) -> Array:
-    """Return the shift of a region from its place in the scenario at each step, shape (steps, 3) [m, NED].
-
-    Returns
-    -------
-    ndarray, shape (steps, 3)
-        Shift at each step; zeros for a region at rest.
-    """
+    """Return the shift of a region from its place in the scenario at each step, shape (steps, 3) [m, NED]."""
     if f"{name}.shift.x" not in record.units:
         return np.zeros((len(record), 3))
     return record.stack([f"{name}.shift.{axis}" for axis in "xyz"])
 
 
 def legend_columns(labels: Iterable[str]) -> int:
-    """Return the number of columns of a legend across a figure, all as wide as the longest label.
-
-    Parameters
-    ----------
-    labels : iterable of str
-        Labels of the legend, at least one.
-
-    Returns
-    -------
-    int
-        Number of columns, at least 1.
-    """
+    """Return the number of columns of a legend across a figure, all as wide as the longest label."""
     return max(1, _LEGEND_WIDTH // (max(map(len, labels)) + _LEGEND_MARK))

@@ -108,20 +108,8 @@ def _zero_line(ax: Axes) -> None:
 
 
 def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
-    """Return name and values of the RMS error to the goal's centre, or of the distance to a goal without one.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        Scenario of the run.
-    record : Rows
-        Rows of the run, or a part of them.
-
-    Returns
-    -------
-    str, ndarray of shape (rows,)
-        Name, and error or distance at each row [m].
-    """
+    """Return name and values of the RMS error to the goal's centre, or of the distance to a goal without one."""
+    # with returns [m]
     bounds = np.array(scenario.goal.bounds())
     if not np.isfinite(bounds).all():
         return "distance to the goal", np.maximum(0.0, -record["goal.clearance"])

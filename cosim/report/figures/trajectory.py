@@ -31,18 +31,7 @@ def is_known(data: FigureData) -> bool:
 
 
 def sample_path(data: FigureData) -> SampledPath:
-    """Sample the path of a run.
-
-    Parameters
-    ----------
-    data : FigureData
-        Data of a run whose record has a finite position.
-
-    Returns
-    -------
-    SampledPath
-        Path with about as many points as a figure resolves.
-    """
+    """Sample the path of a run."""
     path = data.record.stack(POSITION)
     known = np.flatnonzero(np.isfinite(path).all(axis=1))
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[known], axis=0), axis=1))])
@@ -52,13 +41,7 @@ def sample_path(data: FigureData) -> SampledPath:
 
 
 def targets_of(data: FigureData) -> list[tuple[Array, float]]:
-    """Return the targets that were commanded before the last one: centre [m, NED] and radius [m].
-
-    Returns
-    -------
-    list of (ndarray of shape (3,), float)
-        Center and radius of at most 12 targets; the radius is 0 for the scenario's goal.
-    """
+    """Return the targets that were commanded before the last one: centre [m, NED] and radius [m]; returns (3,)."""
     if not data.scenario.commands.enabled:
         return []
     targets = data.record.stack([*(f"target.{axis}" for axis in "xyz"), "target.radius"])

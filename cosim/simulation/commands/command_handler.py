@@ -46,36 +46,7 @@ log = logging.getLogger(__name__)
 
 
 class CommandHandler:
-    """Applies commands, and moves the target region from one mission item to the next.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run, with commands enabled.
-    environment : RegionEnvironment
-        Environment whose target and obstacles the commands move.
-    actuators : Actuators
-        Actuators whose limits the commands change.
-    state : VehicleState
-        State that the law receives.
-    out : ndarray, shape (7,)
-        Receives armed, mode, item of the mission (-1 for none), and the target's centre [m, NED] and radius [m].
-
-    Attributes
-    ----------
-    settings : LiveSettings
-        Present settings.
-    armed : bool
-        True if the thrusters may work.
-    mode : Mode
-        Present mode.
-    heading : float or None
-        Desired heading [rad], None until one is commanded.
-    control_regained, turned, changed : bool
-        True if the law has taken over control, a heading was commanded, or settings were changed since `mark_applied`.
-    reset : bool
-        True if the run is to begin again.
-    """
+    """Applies commands, and moves the target region from one mission item to the next; out (7,) [m, NED]."""
 
     def __init__(
         self,
@@ -87,7 +58,7 @@ class CommandHandler:
     ) -> None:
         self.settings = LiveSettings(scenario)
         self.armed, self.mode = not scenario.commands.await_arm, "reach"
-        self.heading: float | None = None
+        self.heading: float | None = None  # desired heading [rad], None until one is commanded
         self.control_regained = self.turned = self.changed = self.reset = False
         self._environment, self._actuators, self._state, self._out = environment, actuators, state, out
         vehicle = scenario.vehicle
@@ -124,15 +95,7 @@ class CommandHandler:
         return self._stabilizer.wrench(sticks, gain, self.mode == "depth_hold", rate)
 
     def apply(self, command: Command, time: float) -> None:
-        """Apply a command at the beginning of a step; one that is invalid is logged and changes nothing.
-
-        Parameters
-        ----------
-        command : Command
-            Command to apply.
-        time : float
-            Time of the step [s].
-        """
+        """Apply a command at the beginning of a step; one that is invalid is logged and changes nothing; time [s]."""
         was_automatic = self.automatic_control
         try:
             self._dispatch(command, time)
@@ -249,20 +212,7 @@ class CommandHandler:
             self._environment.set_target(item.position, item.radius)
 
     def update(self, time: float, clearance: float) -> bool:
-        """Write the outputs, and begin the next mission item once the present one is done.
-
-        Parameters
-        ----------
-        time : float
-            Time of the step [s].
-        clearance : float
-            Clearance of the target region at the measured pose [m]; 0 or above within it.
-
-        Returns
-        -------
-        bool
-            True if another item has begun; the master then applies its changes.
-        """
+        """Write the outputs, and begin the next mission item once the present one is done; time [s], clearance [m]."""
         following = None
         if self.armed and self.mode == "mission":
             following = self._mission.following(time, clearance)
@@ -274,20 +224,8 @@ class CommandHandler:
 
 
 def greatest_wrench(matrix: Array, lower: Array, upper: Array) -> Array:
-    """Return the greatest wrench along and about each single axis, in both directions, by least-norm allocation.
-
-    Parameters
-    ----------
-    matrix : ndarray, shape (6, m)
-        Body wrench of one newton of each thruster [-, m].
-    lower, upper : ndarray, shape (m,)
-        Limits of each thruster [N].
-
-    Returns
-    -------
-    ndarray, shape (6,)
-        Greatest wrench [N, N m]; 0 for an axis that the thrusters cannot actuate.
-    """
+    """Return the greatest wrench along and about each single axis, in both directions, by least-norm allocation."""
+    # with matrix [-, m], lower, upper [N], returns [N, N m]
     inverse = np.linalg.pinv(matrix)
     limit = np.minimum(-lower, upper)
     result = np.zeros(6)

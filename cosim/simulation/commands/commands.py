@@ -40,21 +40,19 @@ class Arm(_Command, frozen=True):
 
 
 class SetMode(_Command, frozen=True):
-    """Change the mode.
+    """Change the mode."""
 
-    ``manual``, ``hold`` the present position, ``reach`` the target region, follow the ``mission``, ``surface``,
-    ``stabilize`` (manual, attitude kept), or ``depth_hold`` (manual, attitude and depth kept).
-    """
+    # `manual`, `hold` the present position, `reach` the target region, follow the `mission`, `surface`, `stabilize`
+    # (manual, attitude kept), or `depth_hold` (manual, attitude and depth kept).
 
     mode: Mode
 
 
 class SetTarget(_Command, frozen=True):
-    """Move the target region, and reach it.
+    """Move the target region, and reach it."""
 
-    With a radius the target is a sphere about `position` [m, NED]; otherwise the scenario's goal region, moved so that
-    its centre is there. It travels from there at `velocity` [m/s, NED].
-    """
+    # With a radius the target is a sphere about `position` [m, NED]; otherwise the scenario's goal region, moved so
+    # that its centre is there. It travels from there at `velocity` [m/s, NED].
 
     position: Vector3  # m, NED
     radius: float | None = None  # m
@@ -75,10 +73,9 @@ class ManualControl(_Command, frozen=True):
 
 
 class SetAttitude(_Command, frozen=True):
-    """Keep an attitude in the modes in which sticks steer, or with a force in place of the law while it reaches.
+    """Keep an attitude in the modes in which sticks steer, or with a force in place of the law while it reaches."""
 
-    Another mode, another target, or an attitude of None ends it.
-    """
+    # Another mode, another target, or an attitude of None ends it.
 
     quaternion: tuple[float, float, float, float] | None  # unit quaternion from body to world, scalar first
     force: Vector3 | None = None  # fractions [-] of the greatest force along each body axis; None: the sticks'
@@ -86,10 +83,9 @@ class SetAttitude(_Command, frozen=True):
 
 
 class AddObstacle(_Command, frozen=True):
-    """Keep out of a sphere about `position` [m, NED] that travels at `velocity` [m/s, NED].
+    """Keep out of a sphere about `position` [m, NED] that travels at `velocity` [m/s, NED]."""
 
-    The number of an obstacle that exists moves that obstacle.
-    """
+    # The number of an obstacle that exists moves that obstacle.
 
     number: int
     position: Vector3  # m, NED
@@ -118,10 +114,9 @@ class ChangeSetting(_Command, frozen=True):
 
 
 class MissionItem(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One item of a mission: a region to be reached, and how long to stay within it.
+    """One item of a mission: a region to be reached, and how long to stay within it."""
 
-    An item without a position has no region: its commands are applied at once, and the target stays as it is.
-    """
+    # An item without a position has no region: its commands are applied at once, and the target stays as it is.
 
     position: Vector3 | None  # m, NED
     radius: float | None = None  # m, of a sphere; None: the scenario's goal region, moved there
@@ -165,13 +160,7 @@ Command = (
 
 
 def validate_command(command: Command) -> None:
-    """Raise a CommandError if a number of a command is out of range.
-
-    Raises
-    ------
-    CommandError
-        If a number is not finite or out of range.
-    """
+    """Raise a CommandError if a number of a command is out of range."""
     match command:
         case SetTarget() | AddObstacle():
             _check_place(command.position, command.radius)

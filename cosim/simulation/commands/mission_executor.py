@@ -10,15 +10,7 @@ from cosim.simulation.commands.commands import MissionItem
 
 
 class MissionExecutor:
-    """Executes the items of a mission.
-
-    Attributes
-    ----------
-    items : tuple of MissionItem
-        Items of the mission.
-    at : int
-        Index of the present item, from 0; -1 before the mission begins.
-    """
+    """Executes the items of a mission."""
 
     def __init__(self) -> None:
         self.set_items(())
@@ -30,13 +22,7 @@ class MissionExecutor:
         self._since = math.inf  # s, time since which the vehicle is within the region of the present item
 
     def begin(self, item: int) -> None:
-        """Continue with an item, and reset the counts of jumps.
-
-        Raises
-        ------
-        CommandError
-            If there is no such item.
-        """
+        """Continue with an item, and reset the counts of jumps."""
         if not 0 <= item < len(self.items):
             raise CommandError(f"item is {item}, expected 0 to {len(self.items) - 1}")
         self._jumps.clear()
@@ -52,15 +38,8 @@ class MissionExecutor:
         return next((item for item in self.items[self.at :: -1] if item.position is not None), None)
 
     def following(self, time: float, clearance: float) -> int | None:
-        """Return the index of the next item; None while the present one is not done, or if it is the last one.
-
-        Parameters
-        ----------
-        time : float
-            Time [s].
-        clearance : float
-            Clearance of the target region [m]; 0 or above within it. It is not used for an item without a position.
-        """
+        """Return the index of the next item; None while the present one is not done, or if it is the last one."""
+        # with time [s], clearance [m]
         if not 0 <= self.at < len(self.items):
             return None
         item = self.items[self.at]
@@ -76,22 +55,8 @@ class MissionExecutor:
 
 
 def passed_items(items: Sequence[MissionItem], before: int, now: int) -> list[int] | None:
-    """Return the items that a mission passed through from one item to the present one.
-
-    Only items without a position are passed through at once.
-
-    Parameters
-    ----------
-    items : sequence of MissionItem
-        Items of the mission.
-    before, now : int
-        Indices of the item before and of the present one.
-
-    Returns
-    -------
-    list of int or None
-        Indices that end with `now`; None if the mission does not lead there from `before`.
-    """
+    """Return the items that a mission passed through from one item to the present one."""
+    # Only items without a position are passed through at once.
     ways, seen = [[before + 1]], set[int]()
     while ways:
         path = ways.pop(0)

@@ -6,26 +6,14 @@ from cosim.errors import CommandError
 
 
 class ObstacleSlots:
-    """Slots for obstacles, of which the lowest free one is assigned next.
-
-    Parameters
-    ----------
-    count : int
-        Number of slots.
-    """
+    """Slots for obstacles, of which the lowest free one is assigned next."""
 
     def __init__(self, count: int) -> None:
         self._taken: dict[int, int] = {}  # slot of each obstacle by its number
         self._free = list(range(count))
 
     def assign(self, number: int) -> int:
-        """Return the slot of an obstacle, from 0; assign a free one if it has none yet.
-
-        Raises
-        ------
-        CommandError
-            If no slot is free.
-        """
+        """Return the slot of an obstacle, from 0; assign a free one if it has none yet."""
         if number not in self._taken:
             if not self._free:
                 raise CommandError(f"no room for obstacle {number}: {len(self._taken)} have come already")

@@ -34,22 +34,9 @@ class Setting:
 
 
 class LiveSettings:
-    """The present settings; each change is checked before it is applied.
+    """The present settings; each change is checked before it is applied."""
 
-    They depend on the scenario and the sequence of changes alone.
-
-    Parameters
-    ----------
-    scenario : Scenario
-        The scenario of the run.
-
-    Attributes
-    ----------
-    gains : NamedTuple
-        Gains of the law.
-    shapes : dict of str to Shape
-        Shape of each region, and of ``"goal"``, by name.
-    """
+    # They depend on the scenario and the sequence of changes alone.
 
     def __init__(self, scenario: Scenario) -> None:
         self._law = scenario.law.name
@@ -111,20 +98,7 @@ class LiveSettings:
         return self._numbers[key]
 
     def change(self, key: str, value: float) -> None:
-        """Change the value of a setting.
-
-        Parameters
-        ----------
-        key : str
-            Key of a setting.
-        value : float
-            New value, in the setting's unit.
-
-        Raises
-        ------
-        CommandError
-            If there is no such setting, or the value is out of range; then nothing is changed.
-        """
+        """Change the value of a setting."""
         try:
             if key.startswith("law.gains."):
                 name = key.removeprefix("law.gains.")
@@ -168,13 +142,7 @@ class LiveSettings:
             return None
 
     def _part(self, key: str) -> tuple[str, str, int | None]:
-        """Split a key of a shape into region, field of the shape, and index in that field (None for a scalar).
-
-        Raises
-        ------
-        CommandError
-            If the key is not one of a shape.
-        """
+        """Split a key of a shape into region, field of the shape, and index in that field (None for a scalar)."""
         for name, shape in self.shapes.items():
             where = "goal." if name == "goal" else f"regions.{name}.shape."
             if not key.startswith(where):

@@ -34,13 +34,7 @@ class CommandSource(Protocol):
 
 
 class CommandQueue:
-    """Commands from another thread, in the order of submission. Bounded: further commands are rejected.
-
-    Attributes
-    ----------
-    run : int
-        Number of the run that takes the commands, from 0; a reset begins the next one.
-    """
+    """Commands from another thread, in the order of submission. Bounded: further commands are rejected."""
 
     exhausted = False
 
@@ -51,25 +45,7 @@ class CommandQueue:
         self._lock = threading.Lock()
 
     def submit(self, command: Command, run: int | None = None) -> bool:
-        """Queue a command for the next step.
-
-        Parameters
-        ----------
-        command : Command
-            Command to queue.
-        run : int, optional
-            Number of the run for which it is; default: any.
-
-        Returns
-        -------
-        bool
-            False if it is rejected; `refusal` returns the reason.
-
-        Raises
-        ------
-        CommandError
-            If a number of the command is out of range.
-        """
+        """Queue a command for the next step."""
         validate_command(command)
         with self._lock:
             if self.refusal(command, run):
@@ -114,20 +90,8 @@ class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def read_log(file: Path) -> list[tuple[int, Command]]:
-    """Return the commands of an earlier run, each with the step that took it, in their order.
-
-    A last line that is incomplete, after a kill or on a full disk, is skipped: that run did not apply it either.
-
-    Returns
-    -------
-    list of (int, Command)
-        Step and command, in the order in which they were applied.
-
-    Raises
-    ------
-    RunError
-        If the log cannot be read, or a line is not a command.
-    """
+    """Return the commands of an earlier run, each with the step that took it, in their order."""
+    # A last line that is incomplete, after a kill or on a full disk, is skipped: that run did not apply it either.
     try:
         content = file.read_bytes()
     except OSError as error:
@@ -149,13 +113,7 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
 
 
 class ScheduledCommands:
-    """Commands that are known before the run.
-
-    Parameters
-    ----------
-    entries : iterable of (int, Command)
-        Commands, each with the step that takes it, in the order of the steps.
-    """
+    """Commands that are known before the run."""
 
     def __init__(self, entries: Iterable[tuple[int, Command]]) -> None:
         self._entries = deque(entries)
@@ -174,35 +132,14 @@ class ScheduledCommands:
 
 
 class ReplayedCommands(ScheduledCommands):
-    """The commands of an earlier run, at the steps at which that run took them.
-
-    Parameters
-    ----------
-    file : Path
-        Log of the commands, as for `read_log`.
-
-    Raises
-    ------
-    RunError
-        If the log cannot be read, or a line is not a command.
-    """
+    """The commands of an earlier run, at the steps at which that run took them."""
 
     def __init__(self, file: Path) -> None:
         super().__init__(read_log(file))
 
 
 class LoggedCommands:
-    """Wraps a source, and logs each command as it is taken, so that a killed run has its log.
-
-    Parameters
-    ----------
-    source : CommandSource
-        Source of the commands.
-    file : Path
-        Log of the commands, created when the first command is taken.
-    report : callable, optional
-        Function that is called with the step and its commands once they are written.
-    """
+    """Wraps a source, and logs each command as it is taken, so that a killed run has its log."""
 
     def __init__(
         self, source: CommandSource, file: Path, report: Callable[[int, Sequence[Command]], None] | None = None

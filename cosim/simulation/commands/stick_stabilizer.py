@@ -24,21 +24,9 @@ _NORTH, _EAST, _DOWN = np.eye(3)
 
 
 class StickStabilizer:
-    """Computes a wrench from sticks: surge and sway command forces, the others angles and rates.
+    """Computes a wrench from sticks: surge and sway command forces, the others angles and rates; period [s]."""
 
-    It knows the vehicle's mass and inertia, with added mass, like a tuned autopilot, but no damping and no current.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle, for its mass and inertia.
-    state : VehicleState
-        The state that the law receives; read at each step.
-    period : float
-        Time between two steps [s].
-    reach : ndarray, shape (6,)
-        Greatest wrench along and about each axis [N, N m].
-    """
+    # It knows the vehicle's mass and inertia, with added mass, like a tuned autopilot, but no damping and no current.
 
     def __init__(self, vehicle: Vehicle, state: VehicleState, period: float, reach: Array) -> None:
         self._inertia: Final[Array] = np.diag(vehicle.inertia) + np.diag(vehicle.added_mass)[3:]
@@ -53,25 +41,7 @@ class StickStabilizer:
         self._integral = 0.0  # N, integral part of the force down
 
     def wrench(self, sticks: Array, gain: float, keep_depth: bool, rate_down: float | None = None) -> Array:
-        """Return the wrench of a control period.
-
-        Parameters
-        ----------
-        sticks : ndarray, shape (6,)
-            Stick positions for X, Y, Z, K, M, N, from -1 to 1.
-        gain : float
-            Pilot's gain, 0 to 1.
-        keep_depth : bool
-            True if the vertical stick commands a vertical speed, and the depth is kept once it is released; False if it
-            commands a force.
-        rate_down : float, optional
-            Desired rate of the depth [m/s], in place of the vertical stick.
-
-        Returns
-        -------
-        ndarray, shape (6,)
-            Wrench [N, N m], body frame; 0 in elements whose state is NaN.
-        """
+        """Return the wrench of a control period; sticks (6,), rate_down [m/s], returns (6,) [N, N m]."""
         if math.isnan(self._heading):  # there was no measurement when it was set
             self._heading = self._yaw()
         if math.isnan(self._depth):
