@@ -18,7 +18,7 @@ BIN := $(VENV)/bin
 comma := ,
 # without a C compiler the ziglang package is one
 COMPILER := $(if $(shell command -v cc),,build)
-EXTRAS := importers,dev$(addprefix $(comma),$(COMPILER))
+EXTRAS := dev$(addprefix $(comma),$(COMPILER))
 PYTEST_FLAGS ?=
 PORTABLE ?=
 # uv takes seconds where pip takes minutes

@@ -22,7 +22,8 @@ def _missing(error: ModuleNotFoundError) -> str:
 try:
     from plant_fmu.archive import write_atomic
     from plant_fmu.build import FMI_VERSIONS, build_fmu
-    from plant_fmu.check import Verdict, check_fmu
+    from plant_fmu.checking.check import check_fmu
+    from plant_fmu.checking.task import Result
     from plant_fmu.compiling.platforms import ALL, NATIVE, PLATFORMS, WASM
     from plant_fmu.contents.layered import reference_files
     from plant_fmu.contents.parameter_set import ssv
@@ -83,7 +84,7 @@ def _parser() -> argparse.ArgumentParser:
     build.add_argument("--coupled", action="store_true", help="with inputs for currents, external forces and the like")
     build.add_argument("--out", type=Path, help="file to write (default: NAME.fmu here)")
 
-    check = verbs.add_parser("check", help="try an FMU in every validator and importer that is installed")
+    check = verbs.add_parser("check", help="validate an FMU, and simulate it in FMPy and in Plant")
     check.add_argument("fmu", type=Path, metavar="FILE.fmu", help="any FMU of FMI 2.0 or 3.0; its binary is run")
     check.add_argument("--stop-time", type=float, metavar="S", help="default: the FMU's own, else 10")
     check.add_argument("--step", type=float, metavar="S", help="default: the FMU's own, else 0.01")
@@ -133,18 +134,16 @@ def _assignment(text: str) -> tuple[str, float]:
         raise argparse.ArgumentTypeError(f"{text!r}: expected NAME=NUMBER") from None
 
 
-def _print_verdicts(verdicts: Sequence[Verdict]) -> None:
+def _print_results(results: Sequence[Result]) -> None:
     rows = [("importer", "version", "type", "verdict", "difference", "note")]
-    for verdict in verdicts:
-        result = verdict.result
-        difference = "" if verdict.difference is None else f"{verdict.difference:.1e}"
+    for result in results:
+        difference = "" if result.difference is None else f"{result.difference:.1e}"
         rows.append((result.importer, result.version, result.interface, result.status, difference, result.note))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         print("  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip())
-    compared = [verdict for verdict in verdicts if verdict.difference is not None]
-    if compared:
-        print("difference: the greatest of an output at the stop time to FMPy's co-simulation")
+    if any(result.difference is not None for result in results):
+        print("difference: maximum over the outputs at the stop time, to FMPy's co-simulation")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -194,9 +193,9 @@ def _run(options: argparse.Namespace) -> int:
             print(f"{name:{max(map(len, names))}}  {load_vehicle(name).title}")
         return 0
     if options.verb == "check":
-        verdicts = check_fmu(options.fmu, options.stop_time, options.step, dict(options.set))
-        _print_verdicts(verdicts)
-        return 1 if any(verdict.result.status == "failed" for verdict in verdicts) else 0
+        results = check_fmu(options.fmu, options.stop_time, options.step, dict(options.set))
+        _print_results(results)
+        return 1 if any(result.status == "failed" for result in results) else 0
     vehicle = load_vehicle(options.vehicle)
     if options.verb == "docs":
         print(documentation(vehicle), end="")

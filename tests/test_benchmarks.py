@@ -22,7 +22,10 @@ from benchmarks.timing import NotMeasuredError, Own, Timing, count_for, growth, 
 from benchmarks.vehicle_numbers import vehicle_numbers
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
-from plant_fmu.importers import IMPORTERS, Task, read_fmu, run_importer
+from plant_fmu.checking.check import IMPORTERS
+from plant_fmu.checking.fmu_file import read_fmu
+from plant_fmu.checking.process import run_importer
+from plant_fmu.checking.task import Task
 from tests.plant_fmu.conftest import STATES
 
 

@@ -17,7 +17,7 @@ MAY = {
 PROCESSES = {
     "controller/compiling/compiler.py",
     "plant_fmu/compiling/compiler.py",
-    "plant_fmu/importers/process.py",
+    "plant_fmu/checking/process.py",
     "cosim/identification/shooting.py",
 }
 XML = {"plant_fmu/unpacking.py"}
@@ -54,10 +54,10 @@ def faults_of(path):
                 )
                 and name not in XML
             )
-            # other importers get what was looked through
+            # FMPy gets what was looked through
             or (
                 (call == "fmpy.extract" or call.endswith("extractall"))
-                and not (name == "plant_fmu/unpacking.py" or name.startswith("plant_fmu/importers/"))
+                and not (name == "plant_fmu/unpacking.py" or name == "plant_fmu/checking/drivers.py")
             )
         ):
             yield call

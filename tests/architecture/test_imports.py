@@ -27,14 +27,10 @@ MOST_AT_THE_ROOT = 8  # modules of cosim
 
 # what is optional, heavy or foreign to the rest: the one place that takes it
 ONE_PLACE = {
-    "casadi": {"plant_fmu.importers.casadi_import"},
     "dask": {"cosim.campaigns.workers.cluster"},
     "distributed": {"cosim.campaigns.workers.cluster"},
-    "ecospy": {"plant_fmu.importers.ecos"},
-    "fmu_manipulation_toolbox": {"plant_fmu.importers.toolbox"},
     "foxglove_schemas_protobuf": {"cosim.export.mcap_writer", "cosim.export.foxglove_scene"},
     "google": {"cosim.export.foxglove_scene", "cosim.export.protobuf_table"},
-    "libcosimpy": {"plant_fmu.importers.libcosim"},
     "mcap": {"cosim.export.mcap_writer", "cosim.logs.bag_storage"},
     "mcap_protobuf": {"cosim.export.mcap_writer"},
     "numba": {"fuzzy_arbiter.export.compiled"},
@@ -52,23 +48,16 @@ ONE_PLACE = {
 
 # of these, what the base install does not bring, and the modules that cannot be imported without it
 OPTIONAL = {
-    "casadi",
     "dask",
     "distributed",
-    "ecospy",
-    "fmu_manipulation_toolbox",
     "foxglove_schemas_protobuf",
 }
-OPTIONAL |= {"google", "libcosimpy", "mcap", "mcap_protobuf", "pandas", "rerun", "rosbags"}
+OPTIONAL |= {"google", "mcap", "mcap_protobuf", "pandas", "rerun", "rosbags"}
 WANT_AN_EXTRA = {
     "cosim.export.mcap_writer",
     "cosim.export.rrd_writer",
     "cosim.export.foxglove_scene",
     "cosim.export.protobuf_table",
-    "plant_fmu.importers.casadi_import",
-    "plant_fmu.importers.ecos",
-    "plant_fmu.importers.libcosim",
-    "plant_fmu.importers.toolbox",
 }
 
 # what shows a run while it goes on: a run that nobody watches does without

@@ -16,9 +16,7 @@ def main() -> int:
     parser.add_argument("--only", default="", metavar="NAMES", help="of the variants only these, as haswell,py313")
     parser.add_argument("--turn", metavar="COMMIT", help="one of them, which follows from a commit's hash")
     parser.add_argument("--limit", type=float, default=1800.0, metavar="S", help="for the tests of a variant (1800)")
-    parser.add_argument(
-        "--extras", default="importers,dev", metavar="NAMES", help="of the project, for other Pythons (importers,dev)"
-    )
+    parser.add_argument("--extras", default="dev", metavar="NAMES", help="of the project, for other Pythons (dev)")
     parser.add_argument("--list", action="store_true", help="only name the variants")
     parser.add_argument("tests", nargs="*", help="arguments of pytest, after -- (all fast tests)")
     arguments = parser.parse_args()

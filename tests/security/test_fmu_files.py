@@ -17,8 +17,8 @@ from hypothesis import strategies as st
 
 from plant_fmu import Plant, PlantError, load_vehicle, unpacking
 from plant_fmu.build import cached_fmu
+from plant_fmu.checking.fmu_file import read_fmu
 from plant_fmu.errors import FmuFileError
-from plant_fmu.importers import read_fmu
 from plant_fmu.running import instance
 from plant_fmu.shared_library import library_defect
 

@@ -32,7 +32,7 @@ def fmpy(path, steps, step):
 
 
 def ecos(path, steps, step):
-    from plant_fmu.importers.ecos import EcosLib, EcosSimulation  # loads what ecospy needs
+    from tests.plant_fmu.importers.ecos import EcosLib, EcosSimulation  # loads what ecospy needs
 
     EcosLib.set_log_level("err")
     rows = []

@@ -28,8 +28,8 @@ from fuzzy_arbiter import formats as arbiters
 from fuzzy_arbiter.command_line.files import read_text
 from fuzzy_arbiter.command_line.values import evaluated_table
 from plant_fmu import Plant, load_vehicle
+from plant_fmu.checking.fmu_file import read_fmu
 from plant_fmu.description import model_description
-from plant_fmu.importers import read_fmu
 from tests.fuzzy_arbiter.formats.systems import RICHER
 from tests.security.fuzzing.registry import KINDS, ROOT, SCENES, Case, Seeds, reader
 

@@ -43,8 +43,8 @@ ITS_OWN = {  # what parses nothing that comes from outside: why
     "plant_fmu.compiling.signature:_signed": "what the linker wrote",
     "plant_fmu.compiling.signature:re_sign": "what the linker wrote",
     "plant_fmu.compiling.universal:universal_library": "what the linker wrote",
-    "plant_fmu.importers.__main__:main": "what its parent process wrote",
-    "plant_fmu.importers.process:run_importer": "what its child process wrote",
+    "plant_fmu.checking.__main__:main": "what its parent process wrote",
+    "plant_fmu.checking.process:run_importer": "what its child process wrote",
     "plant_fmu.running.channels:_as_bools": "an array in memory",
 }
 

@@ -9,7 +9,7 @@ from xml.etree import ElementTree as ET
 
 import fmpy
 
-from plant_fmu.importers.task import Task
+from plant_fmu.checking.task import Task
 from plant_fmu.unpacking import library_names, open_fmu, read_description
 
 NATIVE = (fmpy.platform, fmpy.platform_tuple)  # names of this machine in FMI 2.0 and 3.0
@@ -46,7 +46,7 @@ class FmuFile:
     step: float  # s, step of its default experiment
     libraries: frozenset[str]  # interfaces, of "CS" and "ME", for which it has a library for this machine
 
-    def of(self, causality: str) -> tuple[FmuVariable, ...]:
+    def with_causality(self, causality: str) -> tuple[FmuVariable, ...]:
         """Return the scalar double precision variables of a causality, such as ``"output"``."""
         return tuple(v for v in self.variables if v.is_real and v.causality == causality)
 

@@ -12,9 +12,10 @@ from libcosimpy.CosimLogging import CosimLogLevel, log_output_level
 from libcosimpy.CosimObserver import CosimObserver
 from libcosimpy.CosimSlave import CosimLocalSlave
 
+from plant_fmu.checking.drivers import Answer
+from plant_fmu.checking.fmu_file import FmuFile
+from plant_fmu.checking.task import Task
 from plant_fmu.errors import ImporterError
-from plant_fmu.importers.fmu_file import FmuFile
-from plant_fmu.importers.task import Answer, Task
 
 _TICKS = 10**9  # a second: libcosim counts time in whole nanoseconds
 
@@ -43,6 +44,6 @@ def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
     status = execution.status()
     if status.error_code != CosimErrorCode.SUCCESS.value or status.current_time != ticks * task.steps:
         raise ImporterError(f"stopped at t = {status.current_time / _TICKS:g} s: {get_last_error_message()}")
-    outputs = {v.name: v.reference for v in fmu.of("output")}
+    outputs = {v.name: v.reference for v in fmu.with_causality("output")}
     values = observer.last_real_values(slave, list(outputs.values()))
-    return Answer(dict(zip(outputs, map(float, values), strict=True)))
+    return dict(zip(outputs, map(float, values), strict=True)), ""

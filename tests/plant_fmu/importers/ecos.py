@@ -7,9 +7,10 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
+from plant_fmu.checking.drivers import Answer
+from plant_fmu.checking.fmu_file import FmuFile
+from plant_fmu.checking.task import Task
 from plant_fmu.errors import ImporterError
-from plant_fmu.importers.fmu_file import FmuFile
-from plant_fmu.importers.task import Answer, Task
 
 
 def _preload_tbb() -> None:
@@ -44,6 +45,6 @@ def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
             time = simulation.step(task.steps)
             if not abs(time - task.stop_time) < 0.5 * task.step:
                 raise ImporterError(f"stopped at t = {time:g} s: {EcosLib.get_last_error()}")
-            values = {v.name: float(simulation.get_real(f"fmu::{v.name}")) for v in fmu.of("output")}
+            values = {v.name: float(simulation.get_real(f"fmu::{v.name}")) for v in fmu.with_causality("output")}
             simulation.terminate()
-    return Answer(values)
+    return values, ""

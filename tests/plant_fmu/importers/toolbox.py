@@ -8,9 +8,10 @@ from pathlib import Path
 from fmu_manipulation_toolbox.checker import get_checkers
 from fmu_manipulation_toolbox.operations import FMU
 
+from plant_fmu.checking.drivers import Answer
+from plant_fmu.checking.fmu_file import FmuFile
+from plant_fmu.checking.task import Task
 from plant_fmu.errors import ImporterError
-from plant_fmu.importers.fmu_file import FmuFile
-from plant_fmu.importers.task import Answer, Task
 
 
 class _Complaints(logging.Handler):
@@ -37,4 +38,4 @@ def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
             opened.apply_operation(check)
     if complaints.texts:
         raise ImporterError(f"problems found: {len(complaints.texts)}; first: {complaints.texts[0]}")
-    return Answer(note=f"no problems found by {len(checks)} checks")
+    return {}, f"no problems found by {len(checks)} checks"

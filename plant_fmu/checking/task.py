@@ -1,4 +1,4 @@
-"""The task of an importer with an FMU, and its answer."""
+"""The task of an importer with an FMU, and its result."""
 
 from __future__ import annotations
 
@@ -9,10 +9,9 @@ from typing import Literal
 
 from plant_fmu.errors import TaskError
 
-Status = Literal["ok", "failed", "not installed", "does not apply"]
-Jacobian = dict[str, dict[str, float]]  # derivatives by names: [state whose derivative is taken][state or input]
+Status = Literal["ok", "failed", "does not apply"]
 
-MAX_STEPS = 100_000_000  # greatest number of steps of a task
+MAX_STEPS = 100_000_000  # of a task
 
 _ROUNDING = 1e-9  # relative tolerance of a stop time against a whole number of steps
 
@@ -55,22 +54,13 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Answer:
-    """The result that a driver returns from its process when the importer accepted the FMU."""
-
-    values: dict[str, float] = field(default_factory=dict)  # real outputs at the stop time
-    jacobian: Jacobian = field(default_factory=dict)  # Jacobian of the states' derivatives at the start
-    note: str = ""
-
-
-@dataclass(frozen=True)
 class Result:
     """The result of one importer; `note` is one line, with the reason where the status is not ``"ok"``."""
 
     importer: str
-    version: str  # "" where it is not installed
+    version: str
     interface: str  # "CS", "ME", or "" for a validator without simulation
     status: Status
     note: str = ""
-    values: dict[str, float] = field(default_factory=dict)
-    jacobian: Jacobian = field(default_factory=dict)
+    values: dict[str, float] = field(default_factory=dict)  # real outputs at the stop time, by name
+    difference: float | None = None  # maximum of an output to FMPy's, in its unit; None without a comparison
