@@ -32,7 +32,7 @@ try:
     from plant_fmu.errors import PlantFmuError, one_line
     from plant_fmu.pictures import IMAGES, PICTURES, image
     from plant_fmu.vehicle import load_vehicle, shipped_vehicles
-    from plant_fmu.vehicle_component import of_vehicle
+    from plant_fmu.vehicle_component import make_vehicle_component
 except ModuleNotFoundError as error:  # in a checkout that is not installed
     print(_missing(error), file=sys.stderr)
     sys.exit(2)
@@ -209,16 +209,16 @@ def _run(options: argparse.Namespace) -> int:
         for name, text in reference_files(vehicle, reference(vehicle)).items():
             print(_write(options.out / name, text))
     else:
-        what = of_vehicle(vehicle, coupled=options.coupled)
-        print(build_fmu(what, options.fmi, options.out or Path(f"{vehicle.name}.fmu"), options.platforms))
+        component = make_vehicle_component(vehicle, coupled=options.coupled)
+        print(build_fmu(component, options.fmi, options.out or Path(f"{vehicle.name}.fmu"), options.platforms))
     return 0
 
 
-def _report(what: str) -> None:
+def _report(message: str) -> None:
     """Print one line on standard error; nothing where that is closed or gone."""
     if sys.stderr is not None:  # else `print` would take standard output
         with contextlib.suppress(OSError):
-            print(f"plant_fmu: {one_line(what)}", file=sys.stderr, flush=True)
+            print(f"plant_fmu: {one_line(message)}", file=sys.stderr, flush=True)
 
 
 def _drop_output() -> None:

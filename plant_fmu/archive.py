@@ -115,8 +115,8 @@ def remove_abandoned(parent: Path, prefix: str) -> None:
 
 
 def _remove_abandoned(entry: os.DirEntry[str]) -> None:
-    about = entry.stat(follow_symlinks=False)
-    if entry.is_symlink() or about.st_uid != os.geteuid() or time.time() - about.st_mtime < _MIN_AGE:
+    status = entry.stat(follow_symlinks=False)
+    if entry.is_symlink() or status.st_uid != os.geteuid() or time.time() - status.st_mtime < _MIN_AGE:
         return
     with _opened(Path(entry.path)) as descriptor:
         if descriptor is not None and _lock(descriptor):
@@ -152,7 +152,7 @@ def _lock(descriptor: int | None) -> bool:
     return True
 
 
-def require_place(out: Path) -> None:
+def require_writable(out: Path) -> None:
     """Require that a file can be written, before the work that goes into it.
 
     Raises
@@ -177,7 +177,7 @@ def write_atomic(out: Path, data: bytes) -> None:
     BuildError
         If `out` cannot be written, or is there and is no file.
     """
-    require_place(out)
+    require_writable(out)
     try:
         with atomic_file(out) as file:
             file.write(data)
@@ -200,10 +200,10 @@ def write_archive(out: Path, members: Mapping[str, bytes]) -> None:
     BuildError
         If `out` cannot be written, or is there and is no file.
     """
-    write_atomic(out, archive_of(members))
+    write_atomic(out, make_archive(members))
 
 
-def archive_of(members: Mapping[str, bytes]) -> bytes:
+def make_archive(members: Mapping[str, bytes]) -> bytes:
     """Return the bytes of a zip file.
 
     Parameters

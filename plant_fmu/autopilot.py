@@ -7,10 +7,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-MAX_CHANNELS = 32  # greatest number of channels, those of MAVLink's longer servo packet
-SHORTEST, LONGEST = 800, 2200  # us, least and greatest length of a pulse that a speed controller accepts
+MAX_CHANNELS = 32  # maximum number of channels, those of MAVLink's longer servo packet
+MIN_PULSE, MAX_PULSE = 800, 2200  # us, minimum and maximum length of a pulse that a speed controller accepts
 
-Curve = Callable[[float], float]  # from a servo output [us] to a part of the greatest force, -1 to 1; or the inverse
+Curve = Callable[[float], float]  # from a servo output [us] to a fraction of the maximum force, -1 to 1; or the inverse
 
 
 @dataclass(frozen=True)
@@ -45,32 +45,32 @@ def validate_autopilot(
     Autopilot
         The table, complete.
     """
-    given = autopilot
-    channels = given.channels or tuple(range(1, n_thrusters + 1))
-    signs = given.signs if isinstance(given.signs, tuple) else (given.signs,) * n_thrusters
-    require(bool(given.frame) and given.frame.isprintable(), "autopilot.frame", repr(given.frame), "a name")
+    table = autopilot
+    channels = table.channels or tuple(range(1, n_thrusters + 1))
+    signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * n_thrusters
+    require(bool(table.frame) and table.frame.isprintable(), "autopilot.frame", repr(table.frame), "a name")
     for key, values in (("channels", channels), ("signs", signs)):
         require(len(values) == n_thrusters, f"autopilot.{key}", f"{len(values)} numbers", f"{n_thrusters}")
-    good = all(0 <= channel <= MAX_CHANNELS for channel in channels)
-    require(good, "autopilot.channels", channels, f"1 to {MAX_CHANNELS}, or 0 for none")
+    ok = all(0 <= channel <= MAX_CHANNELS for channel in channels)
+    require(ok, "autopilot.channels", channels, f"1 to {MAX_CHANNELS}, or 0 for none")
     used = [channel for channel in channels if channel]
     require(len(set(used)) == len(used), "autopilot.channels", channels, "each servo output once")
     require(all(abs(sign) == 1 for sign in signs), "autopilot.signs", signs, "1 or -1")
-    good = given.pwm_neutral - given.pwm_span >= SHORTEST and given.pwm_neutral + given.pwm_span <= LONGEST
-    received = f"{given.pwm_neutral} and {given.pwm_span} us"
+    ok = table.pwm_neutral - table.pwm_span >= MIN_PULSE and table.pwm_neutral + table.pwm_span <= MAX_PULSE
+    received = f"{table.pwm_neutral} and {table.pwm_span} us"
     require(
-        good and given.pwm_span > 0,
+        ok and table.pwm_span > 0,
         "autopilot.pwm_neutral and pwm_span",
         received,
-        f"pulses of {SHORTEST} to {LONGEST} us",
+        f"pulses of {MIN_PULSE} to {MAX_PULSE} us",
     )
-    good = 0 <= given.pwm_dead_band < given.pwm_span
-    require(good, "autopilot.pwm_dead_band", f"{given.pwm_dead_band} us", "0 or above, and less than pwm_span")
-    return Autopilot(given.frame, channels, signs, given.pwm_neutral, given.pwm_span, given.pwm_dead_band, given.curve)
+    ok = 0 <= table.pwm_dead_band < table.pwm_span
+    require(ok, "autopilot.pwm_dead_band", f"{table.pwm_dead_band} us", "0 or above, and less than pwm_span")
+    return Autopilot(table.frame, channels, signs, table.pwm_neutral, table.pwm_span, table.pwm_dead_band, table.curve)
 
 
 def effort_of_pulse(table: Autopilot, sign: int) -> Curve:
-    """Return the function from a pulse [us] to a part of the greatest force.
+    """Return the function from a pulse [us] to a fraction of the maximum force.
 
     Parameters
     ----------
@@ -90,16 +90,16 @@ def effort_of_pulse(table: Autopilot, sign: int) -> Curve:
     )  # fmt: skip
 
     def effort(pulse: float) -> float:
-        if not SHORTEST <= pulse <= LONGEST or abs(pulse - neutral) <= dead_band:
+        if not MIN_PULSE <= pulse <= MAX_PULSE or abs(pulse - neutral) <= dead_band:
             return 0.0
-        u = min(max((pulse - neutral) / span, -1.0), 1.0)
-        return sign * u * abs(u) if quadratic else sign * u
+        fraction = min(max((pulse - neutral) / span, -1.0), 1.0)
+        return sign * fraction * abs(fraction) if quadratic else sign * fraction
 
     return effort
 
 
 def pulse_of_effort(table: Autopilot, sign: int) -> Curve:
-    """Return the function from a part of the greatest force to the pulse [us] that commands it.
+    """Return the function from a fraction of the maximum force to the pulse [us] that commands it.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def pulse_of_effort(table: Autopilot, sign: int) -> Curve:
     neutral, span, quadratic = table.pwm_neutral, table.pwm_span, table.curve == "quadratic"
 
     def pulse(effort: float) -> float:
-        part = min(max(effort, -1.0), 1.0) if effort == effort else 0.0
-        return neutral + sign * span * (math.copysign(math.sqrt(abs(part)), part) if quadratic else part)
+        fraction = min(max(effort, -1.0), 1.0) if effort == effort else 0.0
+        return neutral + sign * span * (math.copysign(math.sqrt(abs(fraction)), fraction) if quadratic else fraction)
 
     return pulse

@@ -15,7 +15,7 @@ from pathlib import Path
 import fmpy
 import platformdirs
 
-from plant_fmu.archive import require_place, temporary_folder, write_archive
+from plant_fmu.archive import require_writable, temporary_folder, write_archive
 from plant_fmu.compiling import webassembly
 from plant_fmu.compiling.compiler import FLAGS, cross_compiler, find_compiler
 from plant_fmu.compiling.libraries import compiled_libraries, digest
@@ -27,7 +27,7 @@ from plant_fmu.component import Component
 from plant_fmu.description import model_description, token
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle import Vehicle
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 
 log = logging.getLogger(__name__)
 
@@ -82,16 +82,16 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: str | Path, platforms: s
         raise BuildError(
             "platform is 'wasm', expected FMI 3.0 with it: fmi-ls-wasm is a layered standard of that alone"
         )
-    native = libraries_for == NATIVE
-    chosen = [native_platform()] if native else [] if libraries_for is None else cross_platforms(libraries_for)
+    is_native = libraries_for == NATIVE
+    targets = [native_platform()] if is_native else [] if libraries_for is None else cross_platforms(libraries_for)
     key = token(component, fmi)
-    libraries = prebuilt_libraries(component, key, fmi, chosen)
+    libraries = prebuilt_libraries(component, key, fmi, targets)
     if libraries is None:
-        compilers = [(platform, find_compiler() if native else cross_compiler(platform)) for platform in chosen]
-        require_place(out)
+        compilers = [(platform, find_compiler() if is_native else cross_compiler(platform)) for platform in targets]
+        require_writable(out)
         libraries = compiled_libraries(component, key, fmi, compilers)
-    more = webassembly.members(component, key) if wasm else {}
-    write_archive(out, neutral_members(component, fmi) | _binaries(component, fmi, libraries) | more)
+    wasm_members = webassembly.members(component, key) if wasm else {}
+    write_archive(out, neutral_members(component, fmi) | _binaries(component, fmi, libraries) | wasm_members)
     return out
 
 
@@ -120,7 +120,7 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
     require_version(fmi)
     name = f"{what.name}-fmi{fmi}-{_digest(what, fmi)[:16]}"
     path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{name}-{_compiler_digest()}.fmu"
-    if _is_whole(path):  # a damaged file is built again
+    if _is_intact(path):  # a damaged file is built again
         return path
     component = _component(what)
     if prebuilt_libraries(component, token(component, fmi), fmi, [native_platform()]) is None:
@@ -128,7 +128,7 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
             find_compiler()  # so that a missing compiler is reported before anything is written
         except BuildError:
             for other in sorted(path.parent.glob(f"{name}-*.fmu")):
-                if _is_whole(other):
+                if _is_intact(other):
                     return other
             raise
     try:
@@ -137,23 +137,23 @@ def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
             raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     except OSError as error:
         log.warning("FMU cache %s: %s; building for this process alone", path.parent, error.strerror or error)
-        path = _own_folder() / path.name
+        path = _process_folder() / path.name
         if path.exists():
             return path
     return build_fmu(component, fmi, path)
 
 
-def _is_whole(path: Path) -> bool:
+def _is_intact(path: Path) -> bool:
     """Return True if a file exists and all its members have their checksums."""
     try:
-        about = path.stat()
+        status = path.stat()
     except OSError:
         return False
-    return _has_checksums(path, about.st_mtime_ns, about.st_size)
+    return _has_valid_checksums(path, status.st_mtime_ns, status.st_size)
 
 
 @functools.lru_cache(maxsize=64)
-def _has_checksums(path: Path, written: int, size: int) -> bool:
+def _has_valid_checksums(path: Path, written: int, size: int) -> bool:
     try:
         with zipfile.ZipFile(path) as archive:
             return archive.testzip() is None
@@ -178,7 +178,7 @@ def _compiler_digest() -> str:
 
 
 @functools.cache
-def _own_folder() -> Path:
+def _process_folder() -> Path:
     """Return a temporary folder that is removed with the process."""
     stack = contextlib.ExitStack()
     atexit.register(stack.close)
@@ -186,7 +186,7 @@ def _own_folder() -> Path:
 
 
 def _component(what: Vehicle | Component) -> Component:
-    return of_vehicle(what) if isinstance(what, Vehicle) else what
+    return make_vehicle_component(what) if isinstance(what, Vehicle) else what
 
 
 def neutral_members(what: Vehicle | Component, fmi: int) -> dict[str, bytes]:
@@ -205,9 +205,12 @@ def neutral_members(what: Vehicle | Component, fmi: int) -> dict[str, bytes]:
 
 def _binaries(component: Component, fmi: int, libraries: list[tuple[Platform, bytes]]) -> dict[str, bytes]:
     """Return the libraries by name in the archive."""
-    places: dict[str, list[bytes]] = {}
+    libraries_by_path: dict[str, list[bytes]] = {}
     for platform, library in libraries:
-        for place in platform.fmi2_names if fmi == 2 else (platform.name,):
-            places.setdefault(f"binaries/{place}/{component.name}{platform.suffix}", []).append(library)
+        for folder in platform.fmi2_names if fmi == 2 else (platform.name,):
+            libraries_by_path.setdefault(f"binaries/{folder}/{component.name}{platform.suffix}", []).append(library)
     # FMI 2.0 has one place for the libraries of both Macs
-    return {place: found[0] if len(found) == 1 else universal_library(found) for place, found in places.items()}
+    return {
+        folder: copies[0] if len(copies) == 1 else universal_library(copies)
+        for folder, copies in libraries_by_path.items()
+    }

@@ -191,14 +191,14 @@ def _add_structure(parent: ET.Element, rows: list[Variable], fmi: int, number: d
     for section, tag, unknowns, instant in sections:
         if not unknowns:
             continue
-        under = ET.SubElement(parent, section) if fmi == 2 else parent
+        section_element = ET.SubElement(parent, section) if fmi == 2 else parent
         for v in unknowns:
             depends = (v.name,) if v.role == "state" else v.depends
             knowns = [number[name] for name in depends if name in number and (name in continuous or not instant)]
             attribute = "index" if fmi == 2 else "valueReference"
             references = " ".join(sorted(knowns, key=int))
             ET.SubElement(
-                under, "Unknown" if fmi == 2 else tag, {attribute: number[v.name], "dependencies": references}
+                section_element, "Unknown" if fmi == 2 else tag, {attribute: number[v.name], "dependencies": references}
             )
 
 
@@ -216,7 +216,7 @@ def documentation(vehicle: Vehicle) -> str:
         Page with a table for each role, and one of the additional variables of a coupled plant.
     """
     rows = variables(vehicle)
-    plain = {v.name for v in rows}
+    uncoupled = {v.name for v in rows}
     titles = {
         "input": "Inputs",
         "state": "States (outputs; start values may be set before initialisation ends)",
@@ -226,9 +226,9 @@ def documentation(vehicle: Vehicle) -> str:
     }
     lines = [f"# Variables of the `{vehicle.name}` FMU", "", vehicle.title + ".", "", vehicle.source]
     tables = [(title, [v for v in rows if v.role == role]) for role, title in titles.items()]
-    beside = [v for v in variables(vehicle, coupled=True) if v.name not in plain]
-    tables.append(("Further inputs and parameters of a coupled plant", beside))
-    for title, shown in tables:
+    coupled_only = [v for v in variables(vehicle, coupled=True) if v.name not in uncoupled]
+    tables.append(("Further inputs and parameters of a coupled plant", coupled_only))
+    for title, section_rows in tables:
         lines += [
             "",
             f"## {title}",
@@ -236,11 +236,11 @@ def documentation(vehicle: Vehicle) -> str:
             "| name | unit | start | min | max | description |",
             "|---|---|---|---|---|---|",
         ]
-        for v in shown:
+        for v in section_rows:
             q = v.quantity
             start = f"{v.start:g}" if v.type == "real" else v.text(v.start)
             if v.role in ("output", "derivative"):
                 start = ""
-            least, most = (f"{q.minimum:g}", f"{q.maximum:g}") if q.bounded and v.type != "boolean" else ("", "")
-            lines.append(f"| `{v.name}` | {q.unit} | {start} | {least} | {most} | {v.description} |")
+            minimum, maximum = (f"{q.minimum:g}", f"{q.maximum:g}") if q.bounded and v.type != "boolean" else ("", "")
+            lines.append(f"| `{v.name}` | {q.unit} | {start} | {minimum} | {maximum} | {v.description} |")
     return "\n".join([*lines, ""])

@@ -26,16 +26,16 @@ def install_hint(*requirements: str) -> str:
     str
         A command for any shell. ``python`` is a full path where the shell would find another one, or none.
     """
-    python = "python" if _is_this(shutil.which("python")) else sys.executable
+    python = "python" if _is_running_python(shutil.which("python")) else sys.executable
     return " ".join(map(_quoted, (python, "-m", "pip", "install", *requirements)))
 
 
-def _is_this(found: str | None) -> bool:
+def _is_running_python(program: str | None) -> bool:
     """Return True if a program is the running Python, under any of the names that an environment has for it."""
     return (
-        found is not None
-        and os.path.dirname(found) == os.path.dirname(sys.executable)
-        and os.path.samefile(found, sys.executable)
+        program is not None
+        and os.path.dirname(program) == os.path.dirname(sys.executable)
+        and os.path.samefile(program, sys.executable)
     )
 
 

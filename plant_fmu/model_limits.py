@@ -9,10 +9,10 @@ from xml.etree import ElementTree as ET
 
 from plant_fmu.errors import FmuFileError
 
-MAX_REFERENCE = 2**32 - 1  # greatest value reference: 32 bits in FMI 2.0 and 3.0
-MAX_NAME = 10_000  # greatest number of characters of a variable's name
-MAX_INDICATORS = 1_000_000  # greatest number of event indicators, for which an importer allocates memory
-MAX_ENTRIES = 100_000_000  # greatest number of entries of an array, for which an importer allocates memory
+MAX_REFERENCE = 2**32 - 1  # maximum value reference: 32 bits in FMI 2.0 and 3.0
+MAX_NAME = 10_000  # maximum number of characters of a variable's name
+MAX_INDICATORS = 1_000_000  # maximum number of event indicators, for which an importer allocates memory
+MAX_ENTRIES = 100_000_000  # maximum number of entries of an array, for which an importer allocates memory
 
 # part of the path of the library that is loaded
 _IDENTIFIER = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+ -]{0,199}")
@@ -47,10 +47,12 @@ def validate_description(path: Path, root: ET.Element) -> None:
                 )
     indicators = root.get("numberOfEventIndicators")
     if indicators is not None:
-        _whole(f"{path}: numberOfEventIndicators", indicators, MAX_INDICATORS)
+        _parse_integer(f"{path}: numberOfEventIndicators", indicators, MAX_INDICATORS)
     for times in root.findall("DefaultExperiment"):
         for key in ("startTime", "stopTime", "stepSize", "tolerance"):
-            _finite(f"{path}: DefaultExperiment.{key}", times.get(key), above_zero=key in ("stepSize", "tolerance"))
+            _require_finite(
+                f"{path}: DefaultExperiment.{key}", times.get(key), above_zero=key in ("stepSize", "tolerance")
+            )
     _check_variables(path, root)
 
 
@@ -66,7 +68,7 @@ def _check_variables(path: Path, root: ET.Element) -> None:
             raise FmuFileError(
                 f"{path}: a variable's name has {len(name)} characters ({_short(name)}), expected 1 to {MAX_NAME}"
             )
-        _whole(f"{path}: valueReference of {_short(name)}", reference, MAX_REFERENCE)
+        _parse_integer(f"{path}: valueReference of {_short(name)}", reference, MAX_REFERENCE)
         if dimensions := element.findall("Dimension"):
             arrays.append((name, dimensions))
         elif (start := element.get("start")) is not None:
@@ -75,27 +77,25 @@ def _check_variables(path: Path, root: ET.Element) -> None:
         entries = 1
         for dimension in dimensions:
             length = dimension.get("start") or starts.get(dimension.get("valueReference", ""), "1")
-            entries *= _whole(f"{path}: a dimension of {_short(name)}", length, MAX_ENTRIES)
+            entries *= _parse_integer(f"{path}: a dimension of {_short(name)}", length, MAX_ENTRIES)
             if entries > MAX_ENTRIES:
                 raise FmuFileError(f"{path}: {_short(name)} has {entries} entries, expected at most {MAX_ENTRIES}")
 
 
-def _whole(what: str, text: str, most: int) -> int:
-    number = int(text) if len(text) <= 20 and re.fullmatch(r"\s*\+?[0-9]+\s*", text, re.ASCII) else most + 1
-    if number > most:
-        raise FmuFileError(f"{what} is {_short(text)}, expected a whole number of at most {most}")
+def _parse_integer(key: str, text: str, maximum: int) -> int:
+    number = int(text) if len(text) <= 20 and re.fullmatch(r"\s*\+?[0-9]+\s*", text, re.ASCII) else maximum + 1
+    if number > maximum:
+        raise FmuFileError(f"{key} is {_short(text)}, expected a whole number of at most {maximum}")
     return number
 
 
-def _finite(what: str, text: str | None, *, above_zero: bool) -> None:
+def _require_finite(key: str, text: str | None, *, above_zero: bool) -> None:
     try:
         number = 1.0 if text is None else float(text)
     except ValueError:
         number = math.nan
     if not (math.isfinite(number) and (number > 0.0 or not above_zero)):
-        raise FmuFileError(
-            f"{what} is {_short(text or '')}, expected a finite number{' above 0' if above_zero else ''}"
-        )
+        raise FmuFileError(f"{key} is {_short(text or '')}, expected a finite number{' above 0' if above_zero else ''}")
 
 
 def _short(text: str) -> str:

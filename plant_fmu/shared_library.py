@@ -18,7 +18,7 @@ _PROCESSORS = {  # names of FMI 3.0 by number, of each format
     "Mach-O": {7: "x86", 0x01000007: "x86_64", 0x0100000C: "aarch64"},
 }
 _PROGRAM_HEADER = {32: ("I8xI", 4), 64: ("Q16xQ", 8)}  # ELF: offset and size of a segment, and where they stand
-_MAX_PARTS = 10_000  # greatest number of load commands, or of libraries in a universal one
+_MAX_PARTS = 10_000  # maximum number of load commands, or of libraries in a universal one
 _SEGMENTS = {0x1: "8xII", 0x19: "16xQQ"}  # Mach-O: offset and size of a segment, by load command
 
 
@@ -30,7 +30,7 @@ class _DefectError(Exception):
 class _Headers:
     processor: str  # name of FMI 3.0, or the format's number
     is_library: bool  # False for a program or an object file
-    end: int  # least number of bytes of the file
+    end: int  # minimum number of bytes of the file
 
 
 class _File:
@@ -67,17 +67,17 @@ def library_defect(source: IO[bytes], size: int, platform: str, is_loaded: bool 
         Words such as ``is cut short: ...``; empty if its headers fit the platform and the size.
     """
     processor, _, system = platform.partition("-")
-    form = _FORMATS.get(system, "")
+    format_name = _FORMATS.get(system, "")
     try:
-        headers = _read_headers(_File(source, size), form, processor)
+        headers = _read_headers(_File(source, size), format_name, processor)
     except _DefectError as defect:
         return str(defect)
     if headers is None:
-        return f"is no {form} library" if is_loaded and form else ""
-    if is_loaded and processor in _PROCESSORS[form].values() and headers.processor != processor:
+        return f"is no {format_name} library" if is_loaded and format_name else ""
+    if is_loaded and processor in _PROCESSORS[format_name].values() and headers.processor != processor:
         return f"is for processor {headers.processor}, expected {processor}"
     if is_loaded and not headers.is_library:
-        return f"is no {form} library but another {form} file"
+        return f"is no {format_name} library but another {format_name} file"
     return _cut_short(size, headers.end) if headers.end > size else ""
 
 
@@ -85,17 +85,17 @@ def _cut_short(size: int, end: int) -> str:
     return f"is cut short: {size} bytes, expected at least {end}"
 
 
-def _read_headers(file: _File, form: str, processor: str) -> _Headers | None:
+def _read_headers(file: _File, format_name: str, processor: str) -> _Headers | None:
     """Read the headers of a file; of a universal one for a processor. None if it is of another format."""
     file.source.seek(0)
     magic = file.source.read(4)
-    if form == "ELF" and magic == b"\x7fELF":
+    if format_name == "ELF" and magic == b"\x7fELF":
         return _elf(file)
-    if form == "PE" and magic[:2] == b"MZ":
+    if format_name == "PE" and magic[:2] == b"MZ":
         return _pe(file)
-    if form == "Mach-O" and magic in (b"\xca\xfe\xba\xbe", b"\xca\xfe\xba\xbf"):
+    if format_name == "Mach-O" and magic in (b"\xca\xfe\xba\xbe", b"\xca\xfe\xba\xbf"):
         return _universal(file, magic[3] == 0xBF, processor)
-    if form == "Mach-O" and magic in (b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe"):
+    if format_name == "Mach-O" and magic in (b"\xcf\xfa\xed\xfe", b"\xce\xfa\xed\xfe"):
         return _mach_o(file)
     return None
 
@@ -146,7 +146,7 @@ def _pe(file: _File) -> _Headers:
     return _Headers(_PROCESSORS["PE"].get(machine, str(machine)), bool(flags & 0x2000), end)
 
 
-def _universal(file: _File, wide: bool, wanted: str) -> _Headers:
+def _universal(file: _File, wide: bool, expected: str) -> _Headers:
     (count,) = file.read(4, ">I")
     _require_few(count)
     layout = ">IIQQ8x" if wide else ">IIII4x"
@@ -156,8 +156,8 @@ def _universal(file: _File, wide: bool, wanted: str) -> _Headers:
         number, _, offset, size = file.read(8 + i * entry, layout)
         parts.append((_PROCESSORS["Mach-O"].get(number, str(number)), offset, size))
         end = max(end, offset + size)
-    processor, offset, size = next((part for part in parts if part[0] == wanted), (*parts, ("none", 0, 0))[0])
-    if end > file.size or processor != wanted:
+    processor, offset, size = next((part for part in parts if part[0] == expected), (*parts, ("none", 0, 0))[0])
+    if end > file.size or processor != expected:
         return _Headers(processor, True, end)
     inner = _mach_o(_File(file.source, size, offset))
     return _Headers(inner.processor, inner.is_library, offset + inner.end if inner.end > size else end)
@@ -166,15 +166,15 @@ def _universal(file: _File, wide: bool, wanted: str) -> _Headers:
 def _mach_o(file: _File) -> _Headers:
     magic, machine, _, kind, count, commands_size = file.read(0, "<6I")
     _require_few(count)
-    at = 32 if magic == 0xFEEDFACF else 28
-    end = at + commands_size
+    offset = 32 if magic == 0xFEEDFACF else 28
+    end = offset + commands_size
     for _ in range(count):
-        command, size = file.read(at, "<II")
+        command, size = file.read(offset, "<II")
         if size < 8:
             raise _DefectError("is no Mach-O library: a load command has less than 8 bytes")
         if command in _SEGMENTS:
-            end = max(end, sum(file.read(at + 24, f"<{_SEGMENTS[command]}")))
-        at += size
+            end = max(end, sum(file.read(offset + 24, f"<{_SEGMENTS[command]}")))
+        offset += size
     return _Headers(_PROCESSORS["Mach-O"].get(machine, str(machine)), kind in (6, 8), end)
 
 

@@ -66,12 +66,12 @@ def force_of_pulse(pulses: NDArray[np.float64], voltages: NDArray[np.float64]) -
     >>> force_of_pulse(np.array([1900.0, 1500.0]), np.array([16.0, 16.0])).round(2).tolist()
     [51.48, 0.0]
     """
-    at = np.clip((voltages - VOLTAGES[0]) / 2.0, 0.0, len(VOLTAGES) - 1.0)
-    whole = np.minimum(np.nan_to_num(at).astype(int), len(VOLTAGES) - 2)
-    part = at - whole
+    position = np.clip((voltages - VOLTAGES[0]) / 2.0, 0.0, len(VOLTAGES) - 1.0)
+    row = np.minimum(np.nan_to_num(position).astype(int), len(VOLTAGES) - 2)
+    fraction = position - row
     rows = np.array([np.interp(pulses, PULSES, row) for row in FORCES])
-    low, high = (np.take_along_axis(rows, (whole + k)[None], axis=0)[0] for k in (0, 1))
-    force: NDArray[np.float64] = low + part * (high - low)
+    low, high = (np.take_along_axis(rows, (row + k)[None], axis=0)[0] for k in (0, 1))
+    force: NDArray[np.float64] = low + fraction * (high - low)
     return force
 
 

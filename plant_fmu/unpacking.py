@@ -19,23 +19,23 @@ from plant_fmu.shared_library import SUFFIXES, library_defect
 
 DESCRIPTION = "modelDescription.xml"
 
-MAX_SIZE = 2**30  # greatest number of bytes of an FMU's files together
-MAX_FILES = 100_000  # greatest number of files of an FMU
-MAX_RATIO = 200  # greatest ratio of those bytes to the FMU's own: libraries and descriptions compress to about a tenth
+MAX_SIZE = 2**30  # maximum number of bytes of an FMU's files together
+MAX_FILES = 100_000  # maximum number of files of an FMU
+MAX_RATIO = 200  # maximum ratio of those bytes to the FMU's own: libraries and descriptions compress to about a tenth
 FREE_SIZE = 2**26  # number of bytes below which that ratio does not matter
-MAX_READ = 2**24  # greatest number of bytes that are read at once; so the list of files is read, before any check
-MAX_NAME = 1000  # greatest number of characters of a file's name
-MAX_XML = 2**26  # greatest number of bytes of a description
-MAX_ELEMENTS = 1_000_000  # greatest number of elements of a description
-MAX_VARIABLES = 200_000  # greatest number of variables and aliases, for each of which an importer takes 50 us
-MAX_DEPTH = 100  # greatest number of levels of nested elements
+MAX_READ = 2**24  # maximum number of bytes that are read at once; so the list of files is read, before any check
+MAX_NAME = 1000  # maximum number of characters of a file's name
+MAX_XML = 2**26  # maximum number of bytes of a description
+MAX_ELEMENTS = 1_000_000  # maximum number of elements of a description
+MAX_VARIABLES = 200_000  # maximum number of variables and aliases, for each of which an importer takes 50 us
+MAX_DEPTH = 100  # maximum number of levels of nested elements
 
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # methods that FMI allows; others have no bound when unpacked
 _DESCRIPTIONS = (DESCRIPTION, "sources/buildDescription.xml")  # files that FMPy parses
-_PIECE = 2**20  # number of bytes that are parsed at once
+_CHUNK = 2**20  # number of bytes that are parsed at once
 
 
-class _Source(io.BufferedReader):
+class _BoundedFile(io.BufferedReader):
     """A file of which at most `MAX_READ` bytes are read at once, whatever sizes a zip file states."""
 
     def read(self, size: int | None = -1, /) -> bytes:
@@ -65,7 +65,7 @@ def open_fmu(path: Path) -> Iterator[zipfile.ZipFile]:
     try:
         if path.exists() and not path.is_file() and not path.is_dir():  # to open a pipe would wait for its other end
             raise FmuFileError(f"{path}: is no FMU: expected a file")
-        with _Source(io.FileIO(path)) as source, zipfile.ZipFile(source) as archive:
+        with _BoundedFile(io.FileIO(path)) as source, zipfile.ZipFile(source) as archive:
             _check_members(path, archive)
             if DESCRIPTION not in archive.namelist():
                 raise FmuFileError(f"{path}: is no FMU: there is no {DESCRIPTION} in it")
@@ -107,8 +107,8 @@ def unpack(path: Path, folder: Path, platforms: Sequence[str]) -> ET.Element:
 
 
 def _is_needed(name: str, platforms: Collection[str]) -> bool:
-    top, *below = name.split("/")
-    return below[0] in platforms if top == "binaries" and below else top not in ("documentation", "sources")
+    top, *rest = name.split("/")
+    return rest[0] in platforms if top == "binaries" and rest else top not in ("documentation", "sources")
 
 
 def read_description(path: Path, archive: zipfile.ZipFile, platforms: Sequence[str]) -> ET.Element:
@@ -135,7 +135,7 @@ def read_description(path: Path, archive: zipfile.ZipFile, platforms: Sequence[s
         is damaged; if a library of this machine is cut short, or of another machine.
     """
     names = set(archive.namelist())
-    roots = [_parsed(f"{path}: {name}", archive, name) for name in _DESCRIPTIONS if name in names]
+    roots = [_parse_member(f"{path}: {name}", archive, name) for name in _DESCRIPTIONS if name in names]
     validate_description(path, roots[0])
     damaged = archive.testzip()  # reads no more than the sizes it states, and so finds those that lie
     if damaged is not None:
@@ -179,7 +179,7 @@ def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
         raise FmuFileError(
             f"{path}: refused: {packed} bytes become {size} when extracted, expected at most {MAX_RATIO} times as many"
         )
-    seen: dict[str, str] = {}
+    names: dict[str, str] = {}
     for member in members:
         name = member.orig_filename
         if len(name) > MAX_NAME:
@@ -189,15 +189,15 @@ def _check_members(path: Path, archive: zipfile.ZipFile) -> None:
             raise FmuFileError(f"{path}: refused: {name!r} leads out of the folder it is extracted to")
         if not name.isprintable():
             raise FmuFileError(f"{path}: refused: {name!r} is no name of a file")
-        folded = _folded(name)
-        if folded in seen and not (name.endswith("/") and seen[folded].endswith("/")):  # a folder may be named twice
-            raise FmuFileError(f"{path}: refused: {name!r} would be written over {seen[folded]!r}")
-        seen[folded] = name
+        key = _file_key(name)
+        if key in names and not (name.endswith("/") and names[key].endswith("/")):  # a folder may be named twice
+            raise FmuFileError(f"{path}: refused: {name!r} would be written over {names[key]!r}")
+        names[key] = name
         if member.compress_type not in _METHODS:
             raise FmuFileError(f"{path}: refused: {name!r} is neither stored nor deflated")
 
 
-def _folded(name: str) -> str:
+def _file_key(name: str) -> str:
     """Return a key that is equal for names of one file on some system: case folded, accents composed, ends trimmed."""
     parts = (part.rstrip(" .") for part in PurePosixPath(name).parts)
     return unicodedata.normalize("NFC", "/".join(parts)).casefold()
@@ -210,7 +210,7 @@ class _TooLargeError(ET.ParseError):
     """Raised for a document that is XML, but too large."""
 
 
-class _Bounded(ET.TreeBuilder):
+class _BoundedTreeBuilder(ET.TreeBuilder):
     """Build a tree of limited size and depth, from a document without a document type, and so without entities."""
 
     def __init__(self) -> None:
@@ -240,13 +240,13 @@ class _Bounded(ET.TreeBuilder):
         return super().end(tag)
 
 
-def _parsed(where: str, archive: zipfile.ZipFile, name: str) -> ET.Element:
+def _parse_member(where: str, archive: zipfile.ZipFile, name: str) -> ET.Element:
     size = archive.getinfo(name).file_size
     if size > MAX_XML:
         raise FmuFileError(f"{where} has {size} bytes, expected at most {MAX_XML}")
     try:
         with archive.open(name) as source:
-            return _tree_of(source.read()) if size <= _PIECE else _tree(source)
+            return _cached_tree(source.read()) if size <= _CHUNK else _parse_tree(source)
     except _TooLargeError as error:
         raise FmuFileError(f"{where} {error}") from error
     except ET.ParseError as error:
@@ -256,15 +256,15 @@ def _parsed(where: str, archive: zipfile.ZipFile, name: str) -> ET.Element:
 
 
 @functools.lru_cache(maxsize=16)
-def _tree_of(content: bytes) -> ET.Element:
+def _cached_tree(content: bytes) -> ET.Element:
     """Return the root of a document, which is not to be changed; one FMU is often opened again and again."""
-    return _tree(io.BytesIO(content))
+    return _parse_tree(io.BytesIO(content))
 
 
-def _tree(source: IO[bytes]) -> ET.Element:
+def _parse_tree(source: IO[bytes]) -> ET.Element:
     # expat guards its own expansions, and here no document type is let through that could have any
-    parser = ET.XMLParser(target=_Bounded())  # noqa: S314
-    while piece := source.read(_PIECE):
-        parser.feed(piece)
+    parser = ET.XMLParser(target=_BoundedTreeBuilder())  # noqa: S314
+    while chunk := source.read(_CHUNK):
+        parser.feed(chunk)
     root: ET.Element = parser.close()
     return root

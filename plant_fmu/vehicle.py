@@ -21,8 +21,8 @@ Vector6 = tuple[float, float, float, float, float, float]
 Rows = tuple[tuple[float, ...], ...]
 Matrix = tuple[float | tuple[float, ...], ...]  # rows, or a diagonal
 
-GREATEST = 1e15  # bound of every number of a vehicle, so that derived numbers are finite
-MAX_THRUSTERS = 100  # greatest number of thrusters of a vehicle
+MAX_NUMBER = 1e15  # bound of every number of a vehicle, so that derived numbers are finite
+MAX_THRUSTERS = 100  # maximum number of thrusters of a vehicle
 
 # a name becomes C text and a file's name: neither may be a word that C99 or Windows keep for themselves
 _RESERVED = re.compile(
@@ -86,9 +86,9 @@ class Thrusters:
 
     matrix: Rows  # 6 rows (X Y Z K M N), a column for each thruster: wrench of one newton
     force_min: float | tuple[float, ...]  # N, most negative force
-    force_max: float | tuple[float, ...]  # N, greatest force
+    force_max: float | tuple[float, ...]  # N, maximum force
     time_constant: float | tuple[float, ...] = 0.0  # s, time constant of the lag
-    rate_limit: float | tuple[float, ...] = 0.0  # N/s, greatest change of the force; 0: none
+    rate_limit: float | tuple[float, ...] = 0.0  # N/s, maximum rate of the force; 0: none
     dead_band: float | tuple[float, ...] = 0.0  # fraction of the command's range that gives no force
     curve: float | tuple[float, ...] = 0.0  # 0: force linear in the command; 1: quadratic; between: a mixture
 
@@ -140,9 +140,9 @@ class Vehicle:
     quadratic_damping: NDArray[np.float64]  # (6,) N s2/m2, N m s2/rad2
     thruster_matrix: NDArray[np.float64]  # (6, n) body wrench of one newton of each thruster
     thrust_min: NDArray[np.float64]  # (n,) N, most negative force of each thruster
-    thrust_max: NDArray[np.float64]  # (n,) N, greatest force of each thruster
+    thrust_max: NDArray[np.float64]  # (n,) N, maximum force of each thruster
     thrust_time_constant: NDArray[np.float64]  # (n,) s, time constant of the lag
-    thrust_rate_limit: NDArray[np.float64]  # (n,) N/s, greatest change of the force; 0 for none
+    thrust_rate_limit: NDArray[np.float64]  # (n,) N/s, maximum rate of the force; 0 for none
     thrust_dead_band: NDArray[np.float64]  # (n,) [-] fraction of the command's range that gives no force
     thrust_curve: NDArray[np.float64]  # (n,) [-] 0: force linear in the command; 1: quadratic
     hull_radius: float  # m, radius of the sphere that meets surface and bottom
@@ -222,34 +222,34 @@ def _decode(path: Path, where: str) -> Vehicle:
         file = decode(read_toml(path), _File)
     except TableError as error:
         raise TableError(f"{where}: {error}") from error
-    return _check(file, where)
+    return _make_vehicle(file, where)
 
 
 def _folder() -> resources.abc.Traversable:
     return resources.files("plant_fmu") / "vehicles"
 
 
-def _check(file: _File, where: str) -> Vehicle:
+def _make_vehicle(file: _File, where: str) -> Vehicle:
     """Convert the file's numbers to arrays, and name the first impossible one."""
 
-    def require(good: bool, key: str, received: object, expected: str) -> None:
-        if not good:
+    def require(ok: bool, key: str, received: object, expected: str) -> None:
+        if not ok:
             raise VehicleError(f"{where}: {key} is {received}, expected {expected}")
 
     def square(value: Matrix, n: int, key: str) -> NDArray[np.float64]:
         widths = {len(row) or -1 if isinstance(row, tuple) else 0 for row in value}  # 0: a number, no row
-        good = len(value) == n and widths in ({0}, {n})
+        ok = len(value) == n and widths in ({0}, {n})
         received = f"{len(value)} rows of {sorted(max(width, 0) for width in widths)} numbers"
-        require(good, key, received, f"a diagonal of {n}, or {n} by {n}")
+        require(ok, key, received, f"a diagonal of {n}, or {n} by {n}")
         return np.diag(np.array(value)) if widths == {0} else np.array(value, dtype=float)
 
     body, statics, dynamics, thrusters = file.rigid_body, file.hydrostatics, file.hydrodynamics, file.thrusters
-    good_name = re.fullmatch("[A-Za-z_][A-Za-z0-9_-]{0,63}", file.name) is not None
-    require(good_name, "name", repr(file.name[:80]), "at most 64 letters, digits, _ and -, the first a letter or _")
+    name_ok = re.fullmatch("[A-Za-z_][A-Za-z0-9_-]{0,63}", file.name) is not None
+    require(name_ok, "name", repr(file.name[:80]), "at most 64 letters, digits, _ and -, the first a letter or _")
     require(not _RESERVED.fullmatch(file.name), "name", repr(file.name), "a word that neither C nor Windows reserves")
     require(file.title.isprintable(), "title", repr(file.title), "one line of printable characters")
-    odd = next((c for c in " ".join(file.source.split()) if not c.isprintable()), "")
-    require(not odd, "source", f"text with {odd!r}", "printable characters")
+    unprintable = next((c for c in " ".join(file.source.split()) if not c.isprintable()), "")
+    require(not unprintable, "source", f"text with {unprintable!r}", "printable characters")
 
     widths = {len(row) for row in thrusters.matrix}
     require(
@@ -292,24 +292,27 @@ def _check(file: _File, where: str) -> Vehicle:
 
     for key, value in vars(vehicle).items():
         if not isinstance(value, str | Autopilot | None):
-            good = bool(np.all(np.abs(value) <= GREATEST))  # False for NaN too
-            require(good, _KEYS.get(key, key), "not finite", f"finite numbers of up to {GREATEST:g}")
+            ok = bool(np.all(np.abs(value) <= MAX_NUMBER))  # False for NaN too
+            require(ok, _KEYS.get(key, key), "not finite", f"finite numbers of up to {MAX_NUMBER:g}")
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
     require(vehicle.mass > 0, "rigid_body.mass", f"{vehicle.mass} kg", "above 0")
     require(vehicle.weight >= 0, "rigid_body.weight", f"{vehicle.weight} N", "0 or above")
     require(vehicle.buoyancy >= 0, "hydrostatics.buoyancy", f"{vehicle.buoyancy} N", "0 or above")
     for key in ("linear_damping", "quadratic_damping"):
-        worst = getattr(vehicle, key).min()
-        require(worst >= 0, _KEYS[key], worst, "0 or above (Property 3)")
+        minimum = getattr(vehicle, key).min()
+        require(minimum >= 0, _KEYS[key], minimum, "0 or above (Property 3)")
     for key in ("inertia", "added_mass"):
         matrix = getattr(vehicle, key)
         symmetric = bool(np.allclose(matrix, matrix.T, rtol=1e-9, atol=1e-9))
         require(symmetric, _KEYS[key], "not symmetric", "a symmetric matrix")
     require(
-        bool((vehicle.thrust_min <= vehicle.thrust_max).all()), "thrusters.force_min", "above force_max", "below it"
+        bool((vehicle.thrust_min <= vehicle.thrust_max).all()),
+        "thrusters.force_min",
+        "above force_max",
+        "at most force_max",
     )
-    for key, most in (
+    for key, maximum in (
         ("thrust_time_constant", np.inf),
         ("thrust_rate_limit", np.inf),
         ("thrust_dead_band", 1.0),
@@ -318,9 +321,14 @@ def _check(file: _File, where: str) -> Vehicle:
     ):
         values = np.atleast_1d(getattr(vehicle, key))
         require(bool((values >= 0).all()), _KEYS[key], f"negative, {values.min():g}", "0 or above")
-        require(bool((values <= most).all()), _KEYS[key], f"{values.max():g}", f"at most {most:g}")
+        require(bool((values <= maximum).all()), _KEYS[key], f"{values.max():g}", f"at most {maximum:g}")
     rigid = vehicle.mass_matrix - vehicle.added_mass
     for key, matrix in (("rigid-body mass matrix", rigid), ("mass matrix with added mass", vehicle.mass_matrix)):
-        least = float(np.linalg.eigvalsh(matrix)[0])
-        require(least > 0, key, f"not positive definite (least eigenvalue {least:.4g})", "that it is (Property 1)")
+        min_eigenvalue = float(np.linalg.eigvalsh(matrix)[0])
+        require(
+            min_eigenvalue > 0,
+            key,
+            f"not positive definite (min. eigenvalue {min_eigenvalue:.4g})",
+            "positive definite (Property 1)",
+        )
     return vehicle

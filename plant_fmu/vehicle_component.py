@@ -15,7 +15,7 @@ from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
 
-def of_vehicle(
+def make_vehicle_component(
     vehicle: Vehicle,
     start: Mapping[str, float] | None = None,
     stop_time: float = STOP_TIME,

@@ -26,7 +26,7 @@ from plant_fmu.compiling.sources import c_sources, header
 from plant_fmu.errors import BuildError
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 
 Array = NDArray[np.float64]
 
@@ -127,7 +127,7 @@ NO_DIRECTIONS = Directions(np.empty((0, STATE_SIZE)), (), (), np.empty((0, 3)), 
 
 @functools.cache
 def _library(vehicle: Vehicle) -> ctypes.CDLL:
-    component = of_vehicle(vehicle)
+    component = make_vehicle_component(vehicle)
     own = resources.files("cosim.identification").joinpath("csrc")
     files = {name: text for name, text in c_sources(component, 3).items() if name not in _FMI}
     files |= {file.name: file.read_bytes() for file in own.iterdir() if file.name.endswith((".c", ".h"))}

@@ -61,7 +61,7 @@ from cosim.scenario.validation import (
     steps_per_period,
 )
 from plant_fmu.errors import PlantFmuError
-from plant_fmu.toml_tables import decode, hint, require_modest
+from plant_fmu.toml_tables import decode, hint, require_bounded
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 __all__ = ["VEHICLE_COPY", "Limit", "Scenario", "Time", "load_scenario"]
@@ -160,7 +160,7 @@ class Scenario:
         try:
             for key, value in changes.items():
                 set_key(table, key, value.tolist() if isinstance(value, np.generic | np.ndarray) else value)
-            require_modest(table)
+            require_bounded(table)
             scenario = validate_scenario(table, self.name)
             return _with_changes(scenario, table, before)
         except (PlantFmuError, ControllerError, ScenarioError) as error:
@@ -263,7 +263,7 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
             one.setdefault("criteria", [dataclasses.asdict(entry) for entry in PAPER_CRITERIA])
         for change in overrides:
             override(table, change)
-        require_modest(table)
+        require_bounded(table)
         if table.get("title") != titled.get("title"):  # a new title covers all changes so far
             table.pop("changed", None)
             titled = table

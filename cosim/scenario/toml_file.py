@@ -141,7 +141,7 @@ def split_change(text: str) -> tuple[str, str]:
 
 def override(table: dict[str, Any], text: str) -> None:
     """Set one key of a table in place."""
-    from plant_fmu.toml_tables import MAX_DEPTH, require_modest
+    from plant_fmu.toml_tables import MAX_DEPTH, require_bounded
 
     key, value_text = split_change(text)
     if not key:
@@ -151,7 +151,7 @@ def override(table: dict[str, Any], text: str) -> None:
         raise ScenarioError(f"--set {_short(key)}: {depth} tables within each other, expected less than {MAX_DEPTH}")
     try:
         parsed = tomllib.loads(f"value = {value_text}")
-        require_modest(parsed)
+        require_bounded(parsed)
     except tomllib.TOMLDecodeError:
         parsed = {"value": value_text.strip()}  # a bare word is a string
     except RecursionError as error:

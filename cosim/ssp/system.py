@@ -17,13 +17,13 @@ from cosim.ssp.variable_groups import osp_model_description
 from fuzzy_arbiter import ArbiterError
 from fuzzy_arbiter.export import to_c
 from plant_fmu import build_fmu
-from plant_fmu.archive import require_place, temporary_folder, write_archive
+from plant_fmu.archive import require_writable, temporary_folder, write_archive
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import NATIVE
 from plant_fmu.component import Component
 from plant_fmu.contents.parameter_set import parameter_set
 from plant_fmu.variables import AXES, FORCES, VELOCITIES
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 
 _EXACT = ("closed", "exact")  # engines whose weights are those of the closed form
 MOTION = (
@@ -40,7 +40,7 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     # step, in any stepping order of the master.
     _require(scenario)
     out = Path(out)
-    require_place(out)
+    require_writable(out)
     components = {
         "plant": plant_component(scenario),
         "controller": controller_component(scenario),
@@ -94,7 +94,7 @@ def plant_component(scenario: Scenario) -> Component:
         if failure.time <= 0.0 and not failure.stuck:
             start[f"thrust_effectiveness[{failure.thruster}]"] = failure.effectiveness
     coupled = bool(scenario.failures or scenario.outages)
-    return of_vehicle(scenario.vehicle, start, scenario.time.duration, scenario.time.step, coupled)
+    return make_vehicle_component(scenario.vehicle, start, scenario.time.duration, scenario.time.step, coupled)
 
 
 def _origin(scenario: Scenario) -> dict[str, bytes]:

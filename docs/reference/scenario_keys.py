@@ -10,7 +10,7 @@ from typing import Any
 
 from cosim.scenario.keys import KEYS
 from cosim.scenario.tables import CriterionEntry, File, RegionEntry
-from plant_fmu.toml_tables import dataclass_of
+from plant_fmu.toml_tables import find_dataclass
 
 PAGE = Path(__file__).parents[1] / "scenarios.md"
 
@@ -39,7 +39,7 @@ def defaults(kind: type, path: str = "") -> Iterator[tuple[str, Any]]:
     hints = typing.get_type_hints(kind)
     for field in dataclasses.fields(kind):
         listed = [kind for kind in (CriterionEntry, RegionEntry) if hints[field.name] == tuple[kind, ...]]
-        inner = listed[0] if listed else dataclass_of(hints[field.name])
+        inner = listed[0] if listed else find_dataclass(hints[field.name])
         if inner is None or hints[field.name] is not inner:
             factory = field.default_factory
             yield f"{path}{field.name}", field.default if factory is dataclasses.MISSING else factory()

@@ -16,7 +16,7 @@ from pythonfmu.builder import FmuBuilder
 from plant_fmu import load_vehicle
 from plant_fmu.archive import write_archive
 from plant_fmu.build import cached_fmu
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 
 START = {"weight": 1248.25}  # N, of a buoyancy of 1228.25 N
 POSE = {f"position.{axis}": f"position_{axis}" for axis in "xyz"} | {f"quaternion.e{i}": f"e{i}" for i in range(4)}
@@ -66,7 +66,7 @@ def structure(stop_time: float, step: float) -> bytes:
 
 def write_system(out: Path, stop_time: float, step: float) -> Path:
     """Write the three FMUs and their connections."""
-    plant = of_vehicle(load_vehicle("odin"), START, coupled=True)
+    plant = make_vehicle_component(load_vehicle("odin"), START, coupled=True)
     members = {"SystemStructure.ssd": structure(stop_time, step)}
     members["resources/plant.fmu"] = cached_fmu(plant, 2).read_bytes()
     with tempfile.TemporaryDirectory() as folder:

@@ -26,7 +26,7 @@ FLAGS = (
     "-std=c99", "-O3", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-shared",
     "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
 )  # fmt: skip
-_BESIDE_STEPS = ("constants.c", "forces_tangent.c", "tangent.c")  # not in a step: unrolling only makes them larger
+_NOT_UNROLLED = ("constants.c", "forces_tangent.c", "tangent.c")  # not in a step: unrolling only makes them larger
 _WARNINGS = ("-Wall", "-Wextra", "-Wpedantic")
 _ZIGLANG = "ziglang>=0.13"  # the package holds a C compiler
 
@@ -44,14 +44,14 @@ def find_compiler() -> list[str]:
     BuildError
         If there is no compiler.
     """
-    named = os.environ.get("CC")
-    if named:
+    cc = os.environ.get("CC")
+    if cc:
         try:
-            words = shlex.split(named)
+            words = shlex.split(cc)
         except ValueError as error:
-            raise BuildError(f"no C compiler: CC is {named!r}: {error}") from error
+            raise BuildError(f"no C compiler: CC is {cc!r}: {error}") from error
         if not words or shutil.which(words[0]) is None:
-            raise BuildError(f"no C compiler: CC is {named!r}, which is not on the PATH")
+            raise BuildError(f"no C compiler: CC is {cc!r}, which is not on the PATH")
         return words
     if path := shutil.which("cc"):
         return [path]
@@ -124,8 +124,8 @@ def compile_library(
         objects = [scratch / f"{source.stem}.o" for source in sources]
         with ThreadPoolExecutor(os.cpu_count()) as pool:  # a process each: they take turns if there is but one core
             commands = [
-                [*compiler, *options, *_compact(source), "-c", str(source), "-o", str(made)]
-                for source, made in zip(sources, objects, strict=True)
+                [*compiler, *options, *_extra_flags(source), "-c", str(source), "-o", str(output)]
+                for source, output in zip(sources, objects, strict=True)
             ]
             list(pool.map(run_compiler, commands))
         run_compiler([*compiler, *FLAGS, *link, *map(str, objects), "-o", str(library), "-lm"])
@@ -133,8 +133,8 @@ def compile_library(
         raise BuildError(f"C compiler {shlex.join(compiler)} failed: it wrote neither a library nor a message")
 
 
-def _compact(source: Path) -> tuple[str, ...]:
-    return ("-fno-unroll-loops",) if source.name in _BESIDE_STEPS else ()
+def _extra_flags(source: Path) -> tuple[str, ...]:
+    return ("-fno-unroll-loops",) if source.name in _NOT_UNROLLED else ()
 
 
 def run_compiler(command: Sequence[str]) -> None:
@@ -152,12 +152,12 @@ def run_compiler(command: Sequence[str]) -> None:
     """
     log.debug("%s", shlex.join(command))
     try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+        process = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
     except OSError as error:
         raise BuildError(f"C compiler {command[0]}: {error.strerror or error}") from error
-    if done.returncode != 0:
-        lines = done.stderr.splitlines()
-        said = [line for line in lines if "error" in line] or lines or ["it wrote no message"]
-        raise BuildError(f"C compiler {command[0]} failed: {said[0].strip()}")
-    for line in done.stderr.splitlines():
+    if process.returncode != 0:
+        lines = process.stderr.splitlines()
+        errors = [line for line in lines if "error" in line] or lines or ["it wrote no message"]
+        raise BuildError(f"C compiler {command[0]} failed: {errors[0].strip()}")
+    for line in process.stderr.splitlines():
         log.debug("%s", line)

@@ -45,7 +45,7 @@ def compiled_libraries(
     BuildError
         If a compiler fails.
     """
-    made = []
+    libraries = []
     with temporary_folder("plant_fmu-") as folder:
         for name, data in {**c_sources(component, fmi), component.header: header(component, token).encode()}.items():
             (folder / name).write_bytes(data)
@@ -54,8 +54,8 @@ def compiled_libraries(
             library = folder / platform.name / f"{component.name}{platform.suffix}"
             library.parent.mkdir()
             compile_library(compiler, platform, files, [folder, FMI_HEADERS], library)
-            made.append((platform, library.read_bytes()))
-    return made
+            libraries.append((platform, library.read_bytes()))
+    return libraries
 
 
 def source_digest(component: Component, token: str, fmi: int) -> str:
@@ -97,7 +97,7 @@ def digest(files: dict[str, bytes], *words: str) -> str:
     str
         Digest as a hexadecimal text.
     """
-    found = hashlib.sha256(" ".join(words).encode())
+    sha256 = hashlib.sha256(" ".join(words).encode())
     for name, data in sorted(files.items()):
-        found.update(f"\n{name} {len(data)}\n".encode() + data)
-    return found.hexdigest()
+        sha256.update(f"\n{name} {len(data)}\n".encode() + data)
+    return sha256.hexdigest()

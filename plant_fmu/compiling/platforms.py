@@ -67,10 +67,12 @@ def native_platform() -> Platform:
     )
     system = {"Linux": "linux", "Windows": "windows", "Darwin": "darwin"}.get(platform.system())
     if system is None or machine is None:
-        place = f"{platform.system()} on {platform.machine()}"
-        raise BuildError(f"no FMU can be built here, {place}: expected Linux, Windows or macOS on x86_64 or aarch64")
-    here = PLATFORMS.get(f"{machine}-{system}", _ARM_WINDOWS)
-    return replace(here, fmi2_names=tuple(dict.fromkeys((_NATIVE_FMI2[system], *here.fmi2_names))))
+        machine_name = f"{platform.system()} on {platform.machine()}"
+        raise BuildError(
+            f"no FMU can be built here, {machine_name}: expected Linux, Windows or macOS on x86_64 or aarch64"
+        )
+    native = PLATFORMS.get(f"{machine}-{system}", _ARM_WINDOWS)
+    return replace(native, fmi2_names=tuple(dict.fromkeys((_NATIVE_FMI2[system], *native.fmi2_names))))
 
 
 def without_wasm(text: str) -> tuple[str | None, bool]:

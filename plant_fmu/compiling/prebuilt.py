@@ -27,13 +27,13 @@ from plant_fmu.component import Component
 from plant_fmu.errors import BuildError
 from plant_fmu.variables import Variable
 from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 
 FOLDER = Path(__file__).parents[1] / "prebuilt"  # folder in a wheel; missing in a checkout
 NAME = "prebuilt"  # prefix of the libraries' functions
 
 STAND_IN = "{" + "-".join("0" * n for n in (8, 4, 4, 4, 12)) + "}"  # instead of a token
-_GIVEN = ("state", "input", "parameter")  # roles of variables with a start value
+_ROLES_WITH_START = ("state", "input", "parameter")  # roles of variables with a start value
 _ROW = struct.Struct("<4d")  # row of the table: start, min, max, nominal; every platform is little-endian
 
 
@@ -69,9 +69,9 @@ def prebuilt_libraries(
     BuildError
         If a prebuilt file is damaged.
     """
-    if not FOLDER.is_dir() or not all(map(_has_libc, platforms)):
+    if not FOLDER.is_dir() or not all(map(_can_load, platforms)):
         return None
-    general = general_component(component)
+    general = make_general_component(component)
     path = FOLDER / file_name(general, fmi)
     if not path.is_file():
         return None
@@ -79,10 +79,10 @@ def prebuilt_libraries(
         with zipfile.ZipFile(path) as archive:
             if not set(map(_member, platforms)) <= set(archive.namelist()):
                 return None
-            found = [(platform, archive.read(_member(platform))) for platform in platforms]
+            libraries = [(platform, archive.read(_member(platform))) for platform in platforms]
     except (OSError, zipfile.BadZipFile, zlib.error) as error:
         raise BuildError(f"{path}: damaged ({error}); install subreach anew") from error
-    return [(platform, _numbered(library, general, component, token)) for platform, library in found]
+    return [(platform, _patch(library, general, component, token)) for platform, library in libraries]
 
 
 def shipped_structures() -> list[Component]:
@@ -94,7 +94,9 @@ def shipped_structures() -> list[Component]:
         Components, one for each number of thrusters.
     """
     vehicles = [load_vehicle(name) for name in shipped_vehicles()]
-    structures = [general_component(of_vehicle(v)) for v in (*vehicles, _with_thrusters(vehicles[0], 6))]
+    structures = [
+        make_general_component(make_vehicle_component(v)) for v in (*vehicles, _with_thrusters(vehicles[0], 6))
+    ]
     return list({structure.constants["N_THRUSTERS"]: structure for structure in structures}.values())
 
 
@@ -138,7 +140,7 @@ def _with_thrusters(vehicle: Vehicle, n: int) -> Vehicle:
     return replace(vehicle, autopilot=None, **{name: getattr(vehicle, name)[..., :n] for name in names})
 
 
-def general_component(component: Component) -> Component:
+def make_general_component(component: Component) -> Component:
     """Return the component of a prebuilt library: the same with a stand-in for each start value.
 
     Parameters
@@ -151,7 +153,9 @@ def general_component(component: Component) -> Component:
     Component
         Component that is equal for all that differ only in numbers, except for its description.
     """
-    rows = tuple(replace(v, start=_stand_in(i)) if v.role in _GIVEN else v for i, v in enumerate(component.variables))
+    rows = tuple(
+        replace(v, start=_stand_in(i)) if v.role in _ROLES_WITH_START else v for i, v in enumerate(component.variables)
+    )
     return replace(component, name=NAME, variables=rows)
 
 
@@ -181,7 +185,7 @@ def _member(platform: Platform) -> str:
     return f"{platform.name}{platform.suffix}"
 
 
-def _has_libc(platform: Platform) -> bool:
+def _can_load(platform: Platform) -> bool:
     """Return True if a library that needs glibc can load: Linux may have another C library."""
     if platform.system != "linux" or not sys.platform.startswith("linux"):
         return True
@@ -191,19 +195,19 @@ def _has_libc(platform: Platform) -> bool:
         return False
 
 
-def _numbered(library: bytes, general: Component, component: Component, token: str) -> bytes:
+def _patch(library: bytes, general: Component, component: Component, token: str) -> bytes:
     """Return a library with a component's numbers and token in place of the stand-ins."""
     changes = [(STAND_IN.encode() + b"\0", token.encode() + b"\0")]
-    for there, here in zip(general.variables, component.variables, strict=True):
-        if there.role in _GIVEN:
-            changes.append((_row(there), _row(here)))
-    written = bytearray(library)
+    for old_row, new_row in zip(general.variables, component.variables, strict=True):
+        if old_row.role in _ROLES_WITH_START:
+            changes.append((_row(old_row), _row(new_row)))
+    patched = bytearray(library)
     for old, new in changes:
         if library.count(old) != 1 or len(old) != len(new):
             raise BuildError("a library that comes with subreach has another table of variables than expected")
-        at = library.index(old)
-        written[at : at + len(new)] = new
-    return re_sign(bytes(written))
+        offset = library.index(old)
+        patched[offset : offset + len(new)] = new
+    return re_sign(bytes(patched))
 
 
 def _row(v: Variable) -> bytes:

@@ -38,24 +38,24 @@ def re_sign(library: bytes) -> bytes:
     """
     if not library.startswith(_MACH_O_64):
         return library
-    at = _HEADER
+    offset = _HEADER
     for _ in range(struct.unpack_from("<I", library, 16)[0]):
-        command, size = struct.unpack_from("<2I", library, at)
+        command, size = struct.unpack_from("<2I", library, offset)
         if command == _CODE_SIGNATURE:
-            return _signed(library, struct.unpack_from("<I", library, at + 8)[0])
-        at += size
+            return _sign(library, struct.unpack_from("<I", library, offset + 8)[0])
+        offset += size
     return library
 
 
-def _signed(library: bytes, signature: int) -> bytes:
+def _sign(library: bytes, signature: int) -> bytes:
     directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
     magic, *_, hashes, _, _, slots, limit = struct.unpack_from(">9I", library, directory)
     size, kind, _, page = struct.unpack_from(">4B", library, directory + 36)
     if magic != _DIRECTORY or (size, kind) != _SHA256 or limit != signature:
         raise BuildError("a library for macOS has a signature of an unknown kind, expected a linker's with SHA-256")
-    signed = bytearray(library)
+    patched = bytearray(library)
     for i in range(slots):
-        of_page = library[i << page : min((i + 1) << page, limit)]
-        place = directory + hashes + size * i
-        signed[place : place + size] = hashlib.sha256(of_page).digest()
-    return bytes(signed)
+        content = library[i << page : min((i + 1) << page, limit)]
+        offset = directory + hashes + size * i
+        patched[offset : offset + size] = hashlib.sha256(content).digest()
+    return bytes(patched)

@@ -46,8 +46,8 @@ def c_sources(component: Component, fmi: int) -> dict[str, bytes]:
 
 def _files(folder: str) -> dict[str, bytes]:
     """Return the C files and headers of a folder of this package, by name."""
-    found = resources.files("plant_fmu").joinpath(*folder.split("/"))
-    return {file.name: file.read_bytes() for file in found.iterdir() if file.name.endswith((".c", ".h"))}
+    root = resources.files("plant_fmu").joinpath(*folder.split("/"))
+    return {file.name: file.read_bytes() for file in root.iterdir() if file.name.endswith((".c", ".h"))}
 
 
 def _external_names(headers: Iterable[bytes]) -> list[str]:

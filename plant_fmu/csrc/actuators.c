@@ -1,4 +1,4 @@
-/* Actuators between commands and the body: limits, thruster curves, lag, rate limits, and points of action. */
+/* From commands to the body wrench: limits, thruster curves, lags, rate limits, thruster positions. */
 #include <string.h>
 
 #include "elementary.h"
@@ -7,31 +7,31 @@
 
 /* Returns the force of a command within the limits: 0 in the dead band, then linear to quadratic in the rest of the range,
  * up to the limit itself. */
-static double after_curve(const Parameters *p, int i, double command)
+static double apply_curve(const Parameters *p, int i, double command)
 {
     const double dead = p->thrust_dead_band[i], curve = p->thrust_curve[i];
 
     if ((dead == 0.0 && curve == 0.0) || command == 0.0)
         return command;
     const double limit = command < 0.0 ? p->thrust_min[i] : p->thrust_max[i];
-    const double live = max2((command / limit - dead) / (1.0 - dead), 0.0);
-    return limit * live * (1.0 - curve + curve * live);
+    const double active = max2((command / limit - dead) / (1.0 - dead), 0.0);
+    return limit * active * (1.0 - curve + curve * active);
 }
 
-void actuators_target(const Parameters *p, const Inputs *inputs, Actuators *target, int thrust_cut[N_THRUSTERS],
-                      int *wrench_cut)
+void actuators_target(const Parameters *p, const Inputs *inputs, Actuators *target, int thrust_saturated[N_THRUSTERS],
+                      int *wrench_saturated)
 {
     const double *w = inputs->wrench;
 
     for (int i = 0; i < N_THRUSTERS; i++) {
         const double limited = min2(max2(inputs->thrust[i], p->thrust_min[i]), p->thrust_max[i]);
-        thrust_cut[i] = limited != inputs->thrust[i];
-        target->thrust[i] = after_curve(p, i, limited);
+        thrust_saturated[i] = limited != inputs->thrust[i];
+        target->thrust[i] = apply_curve(p, i, limited);
     }
 
     const double norm = sqrt(dot3(w, w));
-    *wrench_cut = norm > p->wrench_force_limit;
-    const double scale = *wrench_cut ? p->wrench_force_limit / norm : 1.0;
+    *wrench_saturated = norm > p->wrench_force_limit;
+    const double scale = *wrench_saturated ? p->wrench_force_limit / norm : 1.0;
     for (int i = 0; i < 3; i++) {
         target->wrench[i] = scale * w[i];
         target->wrench[3 + i] = w[3 + i];
@@ -50,7 +50,7 @@ double actuators_thrust_lag(const Parameters *p, int i)
 {
     const double T = lag(p->thrust_time_constant[i]);
 
-    return p->thrust_rate_limit[i] > 0.0 ? max2(T, LEAST_RATE_LAG) : T;
+    return p->thrust_rate_limit[i] > 0.0 ? max2(T, MIN_RATE_LAG) : T;
 }
 
 double actuators_wrench_lag(const Parameters *p)
@@ -58,7 +58,7 @@ double actuators_wrench_lag(const Parameters *p)
     return lag(p->wrench_time_constant);
 }
 
-void actuators_settle(const Plant *plant, const Actuators *start, const Actuators *target, Actuators *out)
+void actuators_apply_unlagged(const Plant *plant, const Actuators *start, const Actuators *target, Actuators *out)
 {
     const Derived *d = &plant->derived;
 
@@ -71,9 +71,9 @@ void actuators_settle(const Plant *plant, const Actuators *start, const Actuator
 /* exp(-dt / T) - 1, cached for the next actuator with the same lag. */
 typedef struct {
     double dt, T, value;
-} Fade;
+} Decay;
 
-static double fade(Fade *last, double dt, double T)
+static double decay(Decay *last, double dt, double T)
 {
     if (dt != last->dt || T != last->T) {
         last->dt = dt;
@@ -84,29 +84,29 @@ static double fade(Fade *last, double dt, double T)
 }
 
 /* Solution of x' = (to - x) / T, |x'| at most `limit`: a ramp while the gap is wide, then an exponential. */
-static double lagged(double from, double to, double dt, double T, double limit, Fade *last)
+static double advance_lag(double from, double to, double dt, double T, double limit, Decay *last)
 {
     const double gap = to - from;
 
     if (!(limit > 0.0 && fabs(gap) > limit * T))
-        return T > 0.0 ? from - gap * fade(last, dt, T) : to;
+        return T > 0.0 ? from - gap * decay(last, dt, T) : to;
     const double ramp = fabs(gap) / limit - T; /* time during which the rate limit acts */
     if (dt <= ramp)
         return from + copysign(limit * dt, gap);
     const double start = to - copysign(limit * T, gap);
-    return T > 0.0 ? start - (to - start) * fade(last, dt - ramp, T) : to;
+    return T > 0.0 ? start - (to - start) * decay(last, dt - ramp, T) : to;
 }
 
-void actuators_after(const Plant *plant, const Actuators *start, const Actuators *target, double dt, Actuators *out)
+void actuators_advance(const Plant *plant, const Actuators *start, const Actuators *target, double dt, Actuators *out)
 {
     const Derived *d = &plant->derived;
-    Fade last = {0.0, 1.0, 0.0};
+    Decay last = {0.0, 1.0, 0.0};
 
     for (int i = 0; i < N_THRUSTERS; i++)
-        out->thrust[i] = lagged(start->thrust[i], target->thrust[i], dt, d->thrust_lag[i],
+        out->thrust[i] = advance_lag(start->thrust[i], target->thrust[i], dt, d->thrust_lag[i],
                                 plant->parameters.thrust_rate_limit[i], &last);
     for (int i = 0; i < 6; i++)
-        out->wrench[i] = lagged(start->wrench[i], target->wrench[i], dt, d->wrench_lag, 0.0, &last);
+        out->wrench[i] = advance_lag(start->wrench[i], target->wrench[i], dt, d->wrench_lag, 0.0, &last);
 }
 
 void actuators_rate(const Plant *plant, const Actuators *now, const Actuators *target, Actuators *rate)
@@ -122,14 +122,14 @@ void actuators_rate(const Plant *plant, const Actuators *now, const Actuators *t
         rate->wrench[i] = T_wrench > 0.0 ? (target->wrench[i] - now->wrench[i]) / T_wrench : 0.0;
 }
 
-/* ---- where forces act -------------------------------------------------------------------------------------- */
+/* ---- wrench on the body ------------------------------------------------------------------------------------ */
 
 void actuators_wrench(const Parameters *p, const Actuators *now, double tau[6])
 {
     memcpy(tau, now->wrench, sizeof now->wrench);
     for (int j = 0; j < N_THRUSTERS; j++) {
         const double force = p->thrust_effectiveness[j] * now->thrust[j];
-        if (force != 0.0) /* saves the time where a direct wrench is used */
+        if (force != 0.0) /* saves time with a direct wrench */
             for (int i = 0; i < 6; i++)
                 tau[i] += p->thruster_matrix[i][j] * force;
     }

@@ -4,7 +4,7 @@
 #include "linear.h"
 #include "plant.h"
 
-static const double MOST_MOBILE = 1e12; /* 1/kg, 1/(kg m), 1/(kg m2): of the inverse of the mass matrix */
+static const double MAX_MOBILITY = 1e12; /* 1/kg, 1/(kg m), 1/(kg m2): of the inverse of the mass matrix */
 
 /* Lower Cholesky factor in place. Returns 0 if A is not positive definite. */
 static int cholesky(double A[6][6])
@@ -65,21 +65,21 @@ void plant_mass_matrix(const Parameters *p, double M[6][6])
             M[i][j] += rigid[i][j];
 }
 
-/* Returns the greatest absolute row sum of a block of the inverse mass matrix, an upper bound of its eigenvalues. */
+/* Returns the maximum absolute row sum of a block of the inverse mass matrix, an upper bound of its eigenvalues. */
 static double mobility(const Derived *d, int first, int last, int *row)
 {
-    double greatest = 0.0;
+    double max_sum = 0.0;
 
     for (int i = first; i <= last; i++) {
         double sum = 0.0;
         for (int j = first; j <= last; j++)
             sum += fabs(d->mass_inverse[i][j]);
-        if (sum > greatest) {
-            greatest = sum;
+        if (sum > max_sum) {
+            max_sum = sum;
             *row = i;
         }
     }
-    return greatest;
+    return max_sum;
 }
 
 const char *plant_prepare(Plant *plant)
@@ -102,31 +102,31 @@ const char *plant_prepare(Plant *plant)
         column[j] = 1.0;
         solve((const double(*)[6])L, column);
         for (int i = 0; i < 6; i++) {
-            if (!(fabs(column[i]) < MOST_MOBILE))
+            if (!(fabs(column[i]) < MAX_MOBILITY))
                 return "mass matrix with added mass is too close to singular";
             d->mass_inverse[i][j] = column[i];
         }
     }
 
     int row;
-    double arm[3];
+    double lever[3];
     for (int i = 0; i < 3; i++)
-        arm[i] = p->r_G[i] * p->weight - p->r_B[i] * p->buoyancy;
-    const double floating = p->free_surface ? 0.75 * p->buoyancy / p->hull_radius : 0.0; /* N/m, at half submersion */
+        lever[i] = p->r_G[i] * p->weight - p->r_B[i] * p->buoyancy;
+    const double surface_stiffness = p->free_surface ? 0.75 * p->buoyancy / p->hull_radius : 0.0; /* N/m, at half submersion */
     const double r_B = sqrt(dot3(p->r_B, p->r_B));
-    const double stiffness = sqrt(dot3(arm, arm)) + floating * (1.0 + r_B) * (1.0 + r_B);
-    d->swing = sqrt(stiffness * mobility(d, 0, 5, &row));
-    d->contact_mass = 1.0 / mobility(d, 0, 2, &d->stiffest);
+    const double stiffness = sqrt(dot3(lever, lever)) + surface_stiffness * (1.0 + r_B) * (1.0 + r_B);
+    d->max_oscillation = sqrt(stiffness * mobility(d, 0, 5, &row));
+    d->contact_mass = 1.0 / mobility(d, 0, 2, &d->contact_mass_row);
     d->contact_time = fmax(p->bottom_time_constant, CONTACT_SUBSTEPS * p->substep);
     d->wrench_lag = actuators_wrench_lag(p);
-    d->lags = d->wrench_lag > 0.0;
+    d->has_lag = d->wrench_lag > 0.0;
     for (int i = 0; i < N_THRUSTERS; i++) {
         d->thrust_lag[i] = actuators_thrust_lag(p, i);
-        d->lags = d->lags || d->thrust_lag[i] > 0.0;
+        d->has_lag = d->has_lag || d->thrust_lag[i] > 0.0;
     }
-    d->water_moves = 0;
+    d->has_current = 0;
     for (int i = 0; i < 3; i++)
-        d->water_moves = d->water_moves || p->current[i] != 0.0 || p->current_shear[i] != 0.0 ||
+        d->has_current = d->has_current || p->current[i] != 0.0 || p->current_shear[i] != 0.0 ||
                          p->current_variation[i] != 0.0;
     return NULL;
 }

@@ -8,7 +8,7 @@
 #include "model.h"
 
 /* Returns true if any of these inputs is on. */
-bool coupling_acts(const Model *model);
+bool coupling_is_active(const Model *model);
 
 /* Writes the model with the effects of these inputs in its parameters, inputs and external wrench. */
 void coupling_apply(const Model *model, Model *out);

@@ -13,12 +13,12 @@ static double curve_tangent(const Parameters *p, const Parameters *dp, int i, do
 
     if (command == 0.0)
         return dead == 0.0 ? dcommand * (1.0 - curve) : 0.0;
-    const double part = command / limit, live = (part - dead) / (1.0 - dead);
-    if (live <= 0.0)
+    const double fraction = command / limit, active = (fraction - dead) / (1.0 - dead);
+    if (active <= 0.0)
         return 0.0;
-    const double limit_dlive = (dcommand - part * dlimit + limit * (live - 1.0) * ddead) / (1.0 - dead);
-    return dlimit * live * (1.0 - curve + curve * live) + limit_dlive * (1.0 - curve + 2.0 * curve * live) +
-           limit * live * (live - 1.0) * dcurve;
+    const double limit_dactive = (dcommand - fraction * dlimit + limit * (active - 1.0) * ddead) / (1.0 - dead);
+    return dlimit * active * (1.0 - curve + curve * active) + limit_dactive * (1.0 - curve + 2.0 * curve * active) +
+           limit * active * (active - 1.0) * dcurve;
 }
 
 static void target_tangent(const Parameters *p, const Parameters *dp, const Inputs *inputs, const Inputs *dinputs,
@@ -38,9 +38,9 @@ static void target_tangent(const Parameters *p, const Parameters *dp, const Inpu
 
     const double *w = inputs->wrench, *dw = dinputs->wrench;
     const double norm = sqrt(dot3(w, w)), limit = p->wrench_force_limit;
-    const int cut = norm > limit;
-    const double scale = cut ? limit / norm : 1.0;
-    const double dscale = cut ? (dp->wrench_force_limit - scale * dot3(w, dw) / norm) / norm : 0.0;
+    const int saturated = norm > limit;
+    const double scale = saturated ? limit / norm : 1.0;
+    const double dscale = saturated ? (dp->wrench_force_limit - scale * dot3(w, dw) / norm) / norm : 0.0;
     for (int i = 0; i < 3; i++) {
         d->wrench[i] = scale * dw[i] + dscale * w[i];
         d->wrench[3 + i] = dw[3 + i];
@@ -61,20 +61,20 @@ void actuators_tangent(const Parameters *p, const Parameters *dp, const Inputs *
                        const Actuators *now, const Actuators *dnow, Actuators *drate, Actuators *dforce, double dtau[6])
 {
     Actuators target, dtarget;
-    int thrust_cut[N_THRUSTERS], wrench_cut;
+    int thrust_saturated[N_THRUSTERS], wrench_saturated;
     double force[N_THRUSTERS];
 
-    actuators_target(p, inputs, &target, thrust_cut, &wrench_cut);
+    actuators_target(p, inputs, &target, thrust_saturated, &wrench_saturated);
     target_tangent(p, dp, inputs, dinputs, &dtarget);
     for (int i = 0; i < N_THRUSTERS; i++) {
-        const double T = actuators_thrust_lag(p, i), whole = p->thrust_effectiveness[i];
+        const double T = actuators_thrust_lag(p, i), effectiveness = p->thrust_effectiveness[i];
         const double dT = T == p->thrust_time_constant[i] ? dp->thrust_time_constant[i] : 0.0;
-        const double given = T > 0.0 ? now->thrust[i] : target.thrust[i];
-        const double dgiven = T > 0.0 ? dnow->thrust[i] : dtarget.thrust[i];
+        const double force_now = T > 0.0 ? now->thrust[i] : target.thrust[i];
+        const double dforce_now = T > 0.0 ? dnow->thrust[i] : dtarget.thrust[i];
         drate->thrust[i] = lag_tangent(target.thrust[i] - now->thrust[i], dtarget.thrust[i] - dnow->thrust[i], T, dT,
                                        p->thrust_rate_limit[i], dp->thrust_rate_limit[i]);
-        force[i] = whole * given;
-        dforce->thrust[i] = dp->thrust_effectiveness[i] * given + whole * dgiven;
+        force[i] = effectiveness * force_now;
+        dforce->thrust[i] = dp->thrust_effectiveness[i] * force_now + effectiveness * dforce_now;
     }
     for (int i = 0; i < 6; i++) {
         const double T = actuators_wrench_lag(p);
@@ -95,14 +95,14 @@ double environment_submerged_tangent(const Parameters *p, const Parameters *dp, 
 
     if (!p->free_surface || depth >= r || depth <= -r)
         return 0.0;
-    const double part = (depth + r) / (2.0 * r), dpart = (ddepth + dr - 2.0 * part * dr) / (2.0 * r);
-    return 6.0 * part * (1.0 - part) * dpart;
+    const double fraction = (depth + r) / (2.0 * r), dpart = (ddepth + dr - 2.0 * fraction * dr) / (2.0 * r);
+    return 6.0 * fraction * (1.0 - fraction) * dpart;
 }
 
 /* The contact's mass is the inverse of a row sum of M^-1, which changes by -M^-1 dM M^-1. */
 static double contact_mass_tangent(const Derived *d, const double dM[6][6])
 {
-    const double *row = d->mass_inverse[d->stiffest];
+    const double *row = d->mass_inverse[d->contact_mass_row];
     double dsum = 0.0;
 
     for (int j = 0; j < 3; j++)
@@ -119,10 +119,10 @@ void environment_contact_tangent(const Plant *plant, const Parameters *dp, const
     const double m = plant->derived.contact_mass, dm = contact_mass_tangent(&plant->derived, dM);
     const double T = plant->derived.contact_time;
     const double dT = T == p->bottom_time_constant ? dp->bottom_time_constant : CONTACT_SUBSTEPS * dp->substep;
-    const double x = environment_sunk(p, depth), dx = ddepth + dp->hull_radius - dp->bottom_depth;
+    const double x = environment_penetration(p, depth), dx = ddepth + dp->hull_radius - dp->bottom_depth;
     const double u = v[2], du = dv[2], speed_u = fabs(u), dspeed_u = u < 0.0 ? -du : du;
 
-    const double x1 = environment_softening(T), dx1 = (x1 == 4.0 * T ? 4.0 : 100.0 * T) * dT, q = 1.0 + x / x1;
+    const double x1 = environment_softening_depth(T), dx1 = (x1 == 4.0 * T ? 4.0 : 100.0 * T) * dT, q = 1.0 + x / x1;
     const double spring = x / q / (T * T);
     const double dspring = (dx - x * (dx - x * dx1 / x1) / x1 / q) / q / (T * T) - 2.0 * spring * dT / T;
 
@@ -134,9 +134,9 @@ void environment_contact_tangent(const Plant *plant, const Parameters *dp, const
 
     const double speed = sqrt(v[0] * v[0] + v[1] * v[1] + 1e-4), dspeed = (v[0] * dv[0] + v[1] * dv[1]) / speed;
     const double friction = p->bottom_friction * normal / speed;
-    const int slides = friction < m / T;
-    const double drag = slides ? friction : m / T;
-    const double ddrag = slides ? (dp->bottom_friction * normal + p->bottom_friction * dnormal - drag * dspeed) / speed
+    const int sliding = friction < m / T;
+    const double drag = sliding ? friction : m / T;
+    const double ddrag = sliding ? (dp->bottom_friction * normal + p->bottom_friction * dnormal - drag * dspeed) / speed
                                 : (dm - m * dT / T) / T;
     dforce[0] = -ddrag * v[0] - drag * dv[0];
     dforce[1] = -ddrag * v[1] - drag * dv[1];

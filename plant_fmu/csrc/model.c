@@ -6,19 +6,19 @@
 #include <math.h>
 #include <string.h>
 
-static void evaluate_alone(Model *m);
+static void evaluate_core(Model *m);
 
 /* ---- clocks ------------------------------------------------------------------------------------------------ */
 
-static const double LONGEST_PERIOD = 1e8; /* s */
+static const double MAX_PERIOD = 1e8; /* s */
 
-static double period_wanted(const Parameters *p, int clock)
+static double clock_period(const Parameters *p, int clock)
 {
     if (clock == CURRENT_CLOCK) {
         const double *v = p->current_variation;
         return v[0] > 0.0 || v[1] > 0.0 || v[2] > 0.0 ? p->current_variation_period : 0.0;
     }
-    return p->sensor_rate[clock] > 0.0 ? fmin(1.0 / p->sensor_rate[clock], LONGEST_PERIOD) : 0.0;
+    return p->sensor_rate[clock] > 0.0 ? fmin(1.0 / p->sensor_rate[clock], MAX_PERIOD) : 0.0;
 }
 
 /* Holds the current's variation at its present value until its next knot. */
@@ -33,16 +33,16 @@ static void hold_current(Model *m)
     drift->since = m->time;
 }
 
-static double next_tick_of(const Clock *clock)
+static double clock_next_tick(const Clock *clock)
 {
     return clock->period > 0.0 ? clock->since + clock->ticks * clock->period : INFINITY;
 }
 
-static void note_next_tick(Held *held)
+static void update_next_tick(Held *held)
 {
     held->next_tick = INFINITY;
     for (int i = 0; i < N_CLOCKS; i++)
-        held->next_tick = fmin(held->next_tick, next_tick_of(&held->clocks[i]));
+        held->next_tick = fmin(held->next_tick, clock_next_tick(&held->clocks[i]));
     for (int i = 0; i < N_SENSORS; i++)
         if (held->pending[i] > 0.0)
             held->next_tick = fmin(held->next_tick, held->queue[i][0].due);
@@ -52,17 +52,17 @@ const char *model_prepare(Model *m)
 {
     const Parameters *p = &m->plant.parameters;
     Drift *drift = &m->held.drift;
-    const char *fault = plant_prepare(&m->plant);
+    const char *error = plant_prepare(&m->plant);
 
-    if (fault)
-        return fault;
+    if (error)
+        return error;
     for (int i = 0; i < N_CLOCKS; i++) {
         Clock *clock = &m->held.clocks[i];
-        const double period = period_wanted(p, i);
+        const double period = clock_period(p, i);
         /* a changed deviation of the current starts a new knot, too */
-        const int anew = period != clock->period ||
+        const int restarts = period != clock->period ||
                          (i == CURRENT_CLOCK && memcmp(drift->deviation, p->current_variation, sizeof drift->deviation));
-        if (!anew)
+        if (!restarts)
             continue;
         if (i == CURRENT_CLOCK)
             hold_current(m);
@@ -73,7 +73,7 @@ const char *model_prepare(Model *m)
     for (int i = 0; i < 3; i++)
         if (p->current_variation[i] == 0.0)
             drift->value[i] = drift->slope[i] = drift->deviation[i] = 0.0;
-    note_next_tick(&m->held);
+    update_next_tick(&m->held);
     return NULL;
 }
 
@@ -88,7 +88,7 @@ static void tick_current(Model *m, unsigned long long count)
     const Parameters *p = &m->plant.parameters;
     Drift *drift = &m->held.drift;
     const double period = m->held.clocks[CURRENT_CLOCK].period, ratio = period / p->current_correlation_time;
-    const double kept = 1.0 + elementary_expm1(-ratio), fresh = sqrt(-elementary_expm1(-2.0 * ratio));
+    const double correlation = 1.0 + elementary_expm1(-ratio), innovation = sqrt(-elementary_expm1(-2.0 * ratio));
 
     hold_current(m);
     for (int i = 0; i < 3; i++) {
@@ -96,9 +96,9 @@ static void tick_current(Model *m, unsigned long long count)
         const unsigned stream = (unsigned)(CURRENT_STREAM + i);
         if (deviation == 0.0)
             continue;
-        if (drift->deviation[i] == 0.0) /* first knot of an axis: from the stationary distribution */
+        if (drift->deviation[i] == 0.0) /* an axis's first knot: from the stationary distribution */
             drift->value[i] = deviation * random_normal(p->seed, count ? stream + 3 : stream, count);
-        const double next = kept * drift->value[i] + fresh * deviation * random_normal(p->seed, stream, count + 1);
+        const double next = correlation * drift->value[i] + innovation * deviation * random_normal(p->seed, stream, count + 1);
         drift->slope[i] = (next - drift->value[i]) / period;
         drift->deviation[i] = deviation;
     }
@@ -140,7 +140,7 @@ static void take_sample(Model *m, int sensor, unsigned long long count, const do
     held->pending[sensor] += 1.0;
 }
 
-static int tick_alone(Model *m)
+static int tick_core(Model *m)
 {
     int ticked = 0, measured = 0;
     double ideal[N_MEASURED];
@@ -149,21 +149,21 @@ static int tick_alone(Model *m)
         return 0;
     for (int i = N_CLOCKS - 1; i >= 0; i--) { /* the current before the sensors, which may measure it */
         Clock *clock = &m->held.clocks[i];
-        /* importers add up their time, which may be early by rounding */
+        /* importers sum up their time, which may be early by rounding */
         const double due = m->time + 1e-6 * clock->period + 1e-15 * (fabs(m->time) + fabs(clock->since));
 
-        if (!(next_tick_of(clock) <= due))
+        if (!(clock_next_tick(clock) <= due))
             continue;
-        const double passed = fmax(clock->ticks, floor((due - clock->since) / clock->period)) + 1.0;
-        clock->samples += passed - clock->ticks; /* every missed tick takes its place in the stream */
-        clock->ticks = passed;
+        const double ticks = fmax(clock->ticks, floor((due - clock->since) / clock->period)) + 1.0;
+        clock->samples += ticks - clock->ticks; /* missed ticks advance the stream too */
+        clock->ticks = ticks;
         ticked = 1;
         const unsigned long long count = (unsigned long long)clock->samples - 1;
         if (i == CURRENT_CLOCK)
             tick_current(m, count);
         else {
             if (!measured) {
-                evaluate_alone(m);
+                evaluate_core(m);
                 sensors_measure(&m->plant.parameters, m->state.rigid, m->outputs.rate.rigid, m->outputs.euler[2],
                                 m->outputs.altitude, ideal);
             }
@@ -176,7 +176,7 @@ static int tick_alone(Model *m)
             deliver_sample(&m->held, i);
             ticked = 1;
         }
-    note_next_tick(&m->held);
+    update_next_tick(&m->held);
     return ticked;
 }
 
@@ -184,10 +184,10 @@ int model_tick(Model *m)
 {
     Model coupled;
 
-    if (m->held.next_tick == INFINITY || !COUPLED || !coupling_acts(m))
-        return tick_alone(m);
+    if (m->held.next_tick == INFINITY || !COUPLED || !coupling_is_active(m))
+        return tick_core(m);
     coupling_apply(m, &coupled);
-    const int ticked = tick_alone(&coupled);
+    const int ticked = tick_core(&coupled);
     m->held = coupled.held;
     m->outputs = coupled.outputs;
     return ticked;
@@ -196,14 +196,14 @@ int model_tick(Model *m)
 /* ---- evaluation -------------------------------------------------------------------------------------------- */
 
 /* Returns true if a sensor shows a sample. */
-static int holds(const Model *m, int sensor)
+static int has_sample(const Model *m, int sensor)
 {
     return m->held.clocks[sensor].period > 0.0 && m->held.delivered[sensor] > 0.0;
 }
 
-int model_holds(const Model *m, int channel)
+int model_shows_sample(const Model *m, int channel)
 {
-    return holds(m, sensors_of_channel(channel));
+    return has_sample(m, sensors_of_channel(channel));
 }
 
 /* Writes roll, pitch, yaw (zyx) of a quaternion. */
@@ -213,21 +213,21 @@ static void euler_angles(const double e[4], double euler[3])
 
     plant_rotation(e, R);
     const double cosine = elementary_hypot(R[2][1], R[2][2]);
-    const int upright = cosine > UPRIGHT; /* at gimbal lock roll is 0 and yaw takes the whole angle */
+    const int upright = cosine > MIN_COS_PITCH; /* at gimbal lock roll is 0 and yaw takes the whole angle */
 
     euler[0] = upright ? elementary_atan2(R[2][1], R[2][2]) : 0.0;
     euler[1] = elementary_atan2(-R[2][0], cosine);
     euler[2] = upright ? elementary_atan2(R[1][0], R[0][0]) : elementary_atan2(-R[0][1], R[1][1]);
 }
 
-static void evaluate_alone(Model *m)
+static void evaluate_core(Model *m)
 {
     const Parameters *p = &m->plant.parameters;
     Outputs *o = &m->outputs;
     Actuators target, now;
 
-    actuators_target(p, &m->inputs, &target, o->flags.thrust_cut, &o->flags.wrench_cut);
-    actuators_settle(&m->plant, &m->state.actuators, &target, &now);
+    actuators_target(p, &m->inputs, &target, o->flags.thrust_saturated, &o->flags.wrench_saturated);
+    actuators_apply_unlagged(&m->plant, &m->state.actuators, &target, &now);
     actuators_wrench(p, &now, o->wrench);
     for (int i = 0; i < N_THRUSTERS; i++)
         o->thrust[i] = p->thrust_effectiveness[i] * now.thrust[i];
@@ -238,70 +238,70 @@ static void evaluate_alone(Model *m)
     euler_angles(m->state.rigid + 3, o->euler);
     environment_current(p, &m->held.drift, m->time, m->state.rigid[2], o->water);
     o->altitude = p->bottom_depth - m->state.rigid[2];
-    o->flags.bottom_touched = environment_sunk(p, m->state.rigid[2]) > 0.0;
+    o->flags.bottom_touched = environment_penetration(p, m->state.rigid[2]) > 0.0;
 
     sensors_measure(p, m->state.rigid, o->rate.rigid, o->euler[2], o->altitude, o->measured);
     for (int i = 0; i < N_MEASURED; i++)
-        if (model_holds(m, i))
+        if (model_shows_sample(m, i))
             o->measured[i] = m->held.samples[i];
     for (int i = 0; i < N_SENSORS; i++)
-        o->stamp[i] = holds(m, i) ? m->held.sample_time[i] : m->held.clocks[i].period > 0.0 ? NO_SAMPLE : m->time;
+        o->stamp[i] = has_sample(m, i) ? m->held.sample_time[i] : m->held.clocks[i].period > 0.0 ? NO_SAMPLE : m->time;
 }
 
 void model_evaluate(Model *m)
 {
     Model coupled;
 
-    if (!COUPLED || !coupling_acts(m)) {
-        evaluate_alone(m);
+    if (!COUPLED || !coupling_is_active(m)) {
+        evaluate_core(m);
         return;
     }
     coupling_apply(m, &coupled);
-    evaluate_alone(&coupled);
+    evaluate_core(&coupled);
     m->outputs = coupled.outputs;
 }
 
-static int settle_alone(Model *m)
+static int apply_unlagged_core(Model *m)
 {
     const Actuators before = m->state.actuators;
     Actuators target;
-    int thrust_cut[N_THRUSTERS], wrench_cut;
+    int thrust_saturated[N_THRUSTERS], wrench_saturated;
 
-    actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_cut, &wrench_cut);
-    actuators_settle(&m->plant, &before, &target, &m->state.actuators);
+    actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_saturated, &wrench_saturated);
+    actuators_apply_unlagged(&m->plant, &before, &target, &m->state.actuators);
     return memcmp(&before, &m->state.actuators, sizeof before) != 0;
 }
 
-int model_settle(Model *m)
+int model_apply_unlagged(Model *m)
 {
     Model coupled;
 
-    if (!COUPLED || !coupling_acts(m))
-        return settle_alone(m);
+    if (!COUPLED || !coupling_is_active(m))
+        return apply_unlagged_core(m);
     coupling_apply(m, &coupled);
-    const int changed = settle_alone(&coupled);
+    const int changed = apply_unlagged_core(&coupled);
     m->state.actuators = coupled.state.actuators;
     return changed;
 }
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 
-static int advance_alone(Model *m, double end, double *failed)
+static int advance_core(Model *m, double end, double *failed)
 {
-    const double hair = 1e-9 * (end - m->time); /* no segment is shorter */
-    int thrust_cut[N_THRUSTERS], wrench_cut;
+    const double min_segment = 1e-9 * (end - m->time); /* no segment is shorter */
+    int thrust_saturated[N_THRUSTERS], wrench_saturated;
     Actuators target;
 
-    tick_alone(m);
-    actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_cut, &wrench_cut);
+    tick_core(m);
+    actuators_target(&m->plant.parameters, &m->inputs, &target, thrust_saturated, &wrench_saturated);
     while (m->time < end) {
-        const double tick = m->held.next_tick, until = tick < end - hair ? tick : end;
+        const double tick = m->held.next_tick, until = tick < end - min_segment ? tick : end;
 
         if (!plant_advance(&m->plant, &m->held.drift, m->time, until, m->plant.parameters.substep, &target, &m->state,
                            failed))
             return 0;
         m->time = until;
-        tick_alone(m);
+        tick_core(m);
     }
     return 1;
 }
@@ -310,10 +310,10 @@ int model_advance(Model *m, double end, double *failed)
 {
     Model coupled;
 
-    if (!COUPLED || !coupling_acts(m))
-        return advance_alone(m, end, failed);
+    if (!COUPLED || !coupling_is_active(m))
+        return advance_core(m, end, failed);
     coupling_apply(m, &coupled);
-    const int done = advance_alone(&coupled, end, failed);
+    const int done = advance_core(&coupled, end, failed);
     m->state = coupled.state;
     m->held = coupled.held;
     m->time = coupled.time;

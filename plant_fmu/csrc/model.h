@@ -5,21 +5,21 @@
 #include "plant.h"
 
 #define NO_SAMPLE -1e12 /* s, stamp before the first sample */
-#define UPRIGHT 1e-12 /* cosine of pitch below which roll and yaw are not separate */
+#define MIN_COS_PITCH 1e-12 /* below it roll and yaw are not separate */
 
 enum { CURRENT_CLOCK = N_SENSORS, N_CLOCKS }; /* one for each sensor, one for the current's variation */
 
 typedef struct {
     double period;  /* s, 0: does not run */
     double since;   /* s, time of its tick 0 */
-    double ticks;   /* since then */
-    double samples; /* since the start: the place in the stream of random numbers */
+    double ticks;   /* since `since` */
+    double samples; /* since the start: the index into the stream of random numbers */
 } Clock;
 
 enum { MAX_PENDING = 8, MAX_SENSOR_CHANNELS = 6 }; /* samples of a sensor that are not delivered yet; channels of the IMU */
 
 typedef struct { /* a sample that is not delivered yet */
-    double taken, due; /* s */
+    double taken, due; /* s, times of the sample and of its delivery */
     double values[MAX_SENSOR_CHANNELS];
 } Pending;
 
@@ -29,14 +29,14 @@ typedef struct { /* values that change only at ticks */
     double samples[N_MEASURED];
     double sample_time[N_SENSORS];         /* s, of the last delivered sample */
     double delivered[N_SENSORS];           /* number of samples */
-    double pending[N_SENSORS];             /* number of samples taken, but not delivered yet, in the order of their times */
+    double pending[N_SENSORS];             /* number of samples in the queue, oldest first */
     Pending queue[N_SENSORS][MAX_PENDING];
     Drift drift;
 } Held;
 
 typedef struct {
-    int thrust_cut[N_THRUSTERS]; /* the command exceeds its limits */
-    int wrench_cut;
+    int thrust_saturated[N_THRUSTERS]; /* the command exceeds its limits */
+    int wrench_saturated;
     int bottom_touched;
 } Flags;
 
@@ -57,7 +57,7 @@ typedef struct {
     double point[3];            /* m, body frame: where the force acts */
 } Load;
 
-typedef struct { /* effects of other components, see coupling.h; real numbers only */
+typedef struct { /* effects of other components, see coupling.h; doubles only */
     double supply_voltage;                 /* V, of thrusters commanded by pulses or revolutions */
     double current[3], current_rate[3];    /* m/s, m/s2, world frame, added to that of the parameters */
     Load world, body;                      /* in the world and in the body frame */
@@ -88,22 +88,21 @@ void model_evaluate(Model *model);
 /* Returns the time of the next tick of any clock; INFINITY: none runs. */
 double model_next_tick(const Model *model);
 
-/* Takes the samples that are due now, and draws the current's next knot. Returns 1 if any was due. */
+/* Takes and delivers the samples that are due, and draws the current's next knot. Returns 1 if anything was due. */
 int model_tick(Model *model);
 
-/* Returns 1 if a measured channel shows its last sample; else, without a rate or before the first, it shows the truth. */
-int model_holds(const Model *model, int channel);
+/* Returns 1 if a measured channel shows its last sample; without a rate, or before the first sample, it shows the truth. */
+int model_shows_sample(const Model *model, int channel);
 
-/* Sets the forces without lag, which are no states of motion, to their commands. Returns 1 if any changed. */
-int model_settle(Model *model);
+/* Sets the forces without a lag to their commands. Returns 1 if any changed. */
+int model_apply_unlagged(Model *model);
 
-/* Integrates up to the time `end` with whole substeps from tick to tick. Returns 0 if that is not possible, with the
- * step that failed in `failed`; the model is then left where it failed. */
+/* Integrates to the time `end`, with whole substeps from tick to tick. Returns 0 if a substep is unstable, and writes its
+ * length [s] to `failed`; the model is then left where it failed. */
 int model_advance(Model *model, double end, double *failed);
 
-/* Exact directional derivative: how the evaluated outputs change along the direction that `seed` holds in its parameters, state,
- * inputs and time, with random numbers as they were drawn. Samples follow the state when `starting`, before their time begins,
- * and are held afterwards. Of `tangent` the state and the outputs are set. */
+/* Writes the exact directional derivative of state and outputs to `tangent`, along the parameters, state, inputs and time in
+ * `seed`. Random numbers stay as drawn. Samples follow the state while `starting`, and are held afterwards. */
 void model_tangent(const Model *model, const Model *seed, int starting, Model *tangent);
 
 #endif

@@ -12,7 +12,7 @@ static const double RK4_TURN_LIMIT = 1.0; /* rad in h: unstable beyond 2.83, ina
 void plant_rotation(const double e[4], double R[3][3])
 {
     const double square = e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3];
-    const double s = square > LEAST_QUATERNION * LEAST_QUATERNION ? 2.0 / square : 0.0;
+    const double s = square > MIN_QUATERNION_NORM * MIN_QUATERNION_NORM ? 2.0 / square : 0.0;
 
     R[0][0] = 1.0 - s * (e[2] * e[2] + e[3] * e[3]);
     R[0][1] = s * (e[1] * e[2] - e[0] * e[3]);
@@ -25,11 +25,11 @@ void plant_rotation(const double e[4], double R[3][3])
     R[2][2] = 1.0 - s * (e[1] * e[1] + e[2] * e[2]);
 }
 
-int plant_normalise(double rigid[N_RIGID])
+int plant_normalize(double rigid[N_RIGID])
 {
     double *e = rigid + 3;
     const double norm = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
-    const int has_direction = norm > LEAST_QUATERNION && norm < 1.0 / LEAST_QUATERNION;
+    const int has_direction = norm > MIN_QUATERNION_NORM && norm < 1.0 / MIN_QUATERNION_NORM;
     const double divisor = has_direction ? norm : 1.0;
 
     for (int i = 0; i < 4; i++)
@@ -39,7 +39,7 @@ int plant_normalise(double rigid[N_RIGID])
 
 /* ---- dynamics ---------------------------------------------------------------------------------------------- */
 
-/* Adds the effects of water that moves at v_c. In body axes R^T v_c changes at R^T v_c' - w x R^T v_c. Writes the relative
+/* Adds the effects of water that moves at v_c, which in body axes changes at R^T v_c' - w x R^T v_c. Writes the relative
  * velocity v_r and the momentum M_RB v + M_A v_r; adds to the wrench the part of -M_A v_r' that is not in v', and the
  * difference of v_r x M_A v_r from v x M_A v_r. */
 static void add_current_effects(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID],
@@ -47,12 +47,12 @@ static void add_current_effects(const Plant *plant, const Drift *drift, double t
 {
     const Parameters *p = &plant->parameters;
     const double(*added_mass)[6] = plant->derived.added_mass;
-    double water[3], water_rate[3], nu_c[6], nu_c_rate[6], turning[3], added[6], lost[6], moment[3];
+    double water[3], water_rate[3], nu_c[6], nu_c_rate[6], turning[3], added[6], current_momentum[6], moment[3];
 
     environment_current(p, drift, time, rigid[2], water);
     for (int i = 0; i < 3; i++)
         water_rate[i] = drift->slope[i] + (rigid[2] > 0.0 ? p->current_shear[i] * velocity_world[2] : 0.0);
-    if (plant->external.acts)
+    if (plant->external.active)
         for (int i = 0; i < 3; i++) {
             water[i] += plant->external.current_rate[i] * (time - plant->external.since);
             water_rate[i] += plant->external.current_rate[i];
@@ -65,14 +65,14 @@ static void add_current_effects(const Plant *plant, const Drift *drift, double t
         nu_c_rate[i] -= turning[i];
         nu_c[3 + i] = nu_c_rate[3 + i] = 0.0;
     }
-    multiply6(added_mass, nu_c, lost);
+    multiply6(added_mass, nu_c, current_momentum);
     multiply6(added_mass, nu_r, added);
     cross(nu_c, added, moment);
     for (int i = 0; i < 3; i++)
         wrench[3 + i] += moment[i];
     multiply6(added_mass, nu_c_rate, added);
     for (int i = 0; i < 6; i++) {
-        momentum[i] -= lost[i];
+        momentum[i] -= current_momentum[i];
         wrench[i] += added[i];
     }
 }
@@ -106,11 +106,11 @@ void plant_derivative(const Plant *plant, const Drift *drift, double time, const
     memcpy(nu_r, nu, sizeof nu_r);
     memcpy(wrench, tau, sizeof wrench);
     multiply6(plant->derived.mass_matrix, nu, momentum);
-    if (plant->derived.water_moves)
+    if (plant->derived.has_current)
         add_current_effects(plant, drift, time, rigid, (const double(*)[3])R, rate, nu_r, momentum, wrench);
 
-    /* C(v) v of the body and of the water that moves along, in the Kirchhoff form: its matrix [0, -S(a); -S(a), -S(b)],
-     * with a and b the linear and the angular momentum, is skew (Property 2), so that it does no work */
+    /* C(v) v of body and added mass in Kirchhoff form: its matrix [0, -S(a); -S(a), -S(b)], with linear momentum a and
+     * angular momentum b, is skew (Property 2), so it does no work */
     double force[3], moment_v[3], moment_omega[3];
     cross(omega, momentum, force);
     cross(nu, momentum, moment_v);
@@ -132,24 +132,24 @@ void plant_derivative(const Plant *plant, const Drift *drift, double time, const
     for (int i = 0; i < 6; i++)
         wrench[i] -= (p->linear_damping[i] + p->quadratic_damping[i] * fabs(nu_r[i])) * nu_r[i];
 
-    const double sunk = environment_sunk(p, rigid[2]);
-    if (sunk > 0.0) {
+    const double penetration = environment_penetration(p, rigid[2]);
+    if (penetration > 0.0) {
         double contact_world[3], contact[3];
-        environment_contact(plant, sunk, rate, contact_world);
+        environment_contact(plant, penetration, rate, contact_world);
         to_body((const double(*)[3])R, contact_world, contact);
         for (int i = 0; i < 3; i++)
             wrench[i] += contact[i];
     }
 
-    if (plant->external.acts)
+    if (plant->external.active)
         add_external(&plant->external, (const double(*)[3])R, wrench);
 
     multiply6(plant->derived.mass_inverse, wrench, rate + 7);
 }
 
-/* ---- what steps can follow ---------------------------------------------------------------------------------- */
+/* ---- stability of steps ------------------------------------------------------------------------------------- */
 
-/* Returns an upper bound of the fastest present decay rate of a velocity by damping and bottom, 1/s. */
+/* Returns an upper bound [1/s] of the present decay rates of the velocities by damping and bottom. */
 static double damping_rate(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID])
 {
     const Parameters *p = &plant->parameters;
@@ -162,24 +162,24 @@ static double damping_rate(const Plant *plant, const Drift *drift, double time, 
         const double nu_r = i < 3 ? rigid[7 + i] - current[i] : rigid[7 + i];
         root[i] = sqrt(p->linear_damping[i] + 2.0 * p->quadratic_damping[i] * fabs(nu_r));
     }
-    /* eigenvalues of M^-1 D are those of D^1/2 M^-1 D^1/2, at most its greatest row sum */
+    /* eigenvalues of M^-1 D are those of D^1/2 M^-1 D^1/2, at most its maximum row sum */
     for (int i = 0; i < 6; i++) {
         double sum = 0.0;
         for (int j = 0; j < 6; j++)
             sum += fabs(plant->derived.mass_inverse[i][j]) * root[j];
         bound = root[i] * sum <= bound ? bound : root[i] * sum; /* NaN propagates */
     }
-    return bound + (environment_sunk(p, rigid[2]) > 0.0 ? 2.0 / plant->derived.contact_time : 0.0);
+    return bound + (environment_penetration(p, rigid[2]) > 0.0 ? 2.0 / plant->derived.contact_time : 0.0);
 }
 
-/* Returns true if steps of h are well within the limit of damping_rate, by a bound without roots and attitude: the trace
- * of D^1/2 M^-1 D^1/2. No row sum of a positive matrix of six rows exceeds its trace by more than (1 + sqrt 6) / 2. */
-static int follows_easily(const Plant *plant, const Drift *drift, double time, double h, const double rigid[N_RIGID])
+/* Returns true if steps of h are well within the limit of damping_rate, by a cheaper bound: the trace of D^1/2 M^-1 D^1/2.
+ * No row sum of a positive matrix of six rows exceeds its trace by more than a factor (1 + sqrt 6) / 2. */
+static int is_clearly_stable(const Plant *plant, const Drift *drift, double time, double h, const double rigid[N_RIGID])
 {
     const Parameters *p = &plant->parameters;
     double water[3], current = 0.0, trace = 0.0;
 
-    if (plant->derived.water_moves) {
+    if (plant->derived.has_current) {
         environment_current(p, drift, time, rigid[2], water);
         current = fabs(water[0]) + fabs(water[1]) + fabs(water[2]);
     }
@@ -187,29 +187,29 @@ static int follows_easily(const Plant *plant, const Drift *drift, double time, d
         const double speed = i < 3 ? fabs(rigid[7 + i]) + current : fabs(rigid[7 + i]);
         trace += plant->derived.mass_inverse[i][i] * (p->linear_damping[i] + 2.0 * p->quadratic_damping[i] * speed);
     }
-    return 1.75 * h * trace < RK4_STABILITY_LIMIT && environment_sunk(p, rigid[2]) <= 0.0;
+    return 1.75 * h * trace < RK4_STABILITY_LIMIT && environment_penetration(p, rigid[2]) <= 0.0;
 }
 
-/* Returns true if steps of h are stable for the present damping, oscillation and turning. */
-static int follows(const Plant *plant, const Drift *drift, double time, double h, const double rigid[N_RIGID])
+/* Returns true if steps of h are stable for the present damping, oscillation and rotation. */
+static int is_stable(const Plant *plant, const Drift *drift, double time, double h, const double rigid[N_RIGID])
 {
     const double *omega = rigid + 10;
 
-    if (!(h * (sqrt(dot3(omega, omega)) + plant->derived.swing) < RK4_TURN_LIMIT))
+    if (!(h * (sqrt(dot3(omega, omega)) + plant->derived.max_oscillation) < RK4_TURN_LIMIT))
         return 0;
-    return follows_easily(plant, drift, time, h, rigid) ||
+    return is_clearly_stable(plant, drift, time, h, rigid) ||
            h * damping_rate(plant, drift, time, rigid) < RK4_STABILITY_LIMIT;
 }
 
 /* ---- stepping ---------------------------------------------------------------------------------------------- */
 
-static void move(const double from[N_RIGID], const double rate[N_RIGID], double h, double to[N_RIGID])
+static void add_scaled(const double from[N_RIGID], const double rate[N_RIGID], double h, double to[N_RIGID])
 {
     for (int i = 0; i < N_RIGID; i++)
         to[i] = from[i] + h * rate[i];
 }
 
-/* Makes one Runge-Kutta step of order four. Checks stability at its end; the caller has checked its start. */
+/* Makes one fourth-order Runge-Kutta step. Checks stability at its end; the caller has checked its start. */
 static int step(const Plant *plant, const Drift *drift, double time, const Actuators *target, double h, State *state)
 {
     const Parameters *p = &plant->parameters;
@@ -217,13 +217,13 @@ static int step(const Plant *plant, const Drift *drift, double time, const Actua
     double tau_start[6], tau_middle[6], tau_end[6];
     double k1[N_RIGID], k2[N_RIGID], k3[N_RIGID], k4[N_RIGID], trial[N_RIGID];
 
-    /* lags do not depend on the body, so their stages are exact, and stable for any time constant; for one much below h
-     * the step sees Simpson's mean of them, late by up to h/6 */
-    actuators_settle(plant, &state->actuators, target, &state->actuators);
+    /* lags do not depend on the body, so their stages are exact, and stable for any time constant; with one much below h
+     * the step integrates Simpson's mean of the forces, late by up to h/6 */
+    actuators_apply_unlagged(plant, &state->actuators, target, &state->actuators);
     actuators_wrench(p, &state->actuators, tau_start);
-    if (plant->derived.lags) {
-        actuators_after(plant, &state->actuators, target, 0.5 * h, &middle);
-        actuators_after(plant, &state->actuators, target, h, &state->actuators);
+    if (plant->derived.has_lag) {
+        actuators_advance(plant, &state->actuators, target, 0.5 * h, &middle);
+        actuators_advance(plant, &state->actuators, target, h, &state->actuators);
         actuators_wrench(p, &middle, tau_middle);
         actuators_wrench(p, &state->actuators, tau_end);
     } else {
@@ -232,18 +232,18 @@ static int step(const Plant *plant, const Drift *drift, double time, const Actua
     }
 
     plant_derivative(plant, drift, time, state->rigid, tau_start, k1);
-    move(state->rigid, k1, 0.5 * h, trial);
+    add_scaled(state->rigid, k1, 0.5 * h, trial);
     plant_derivative(plant, drift, time + 0.5 * h, trial, tau_middle, k2);
-    move(state->rigid, k2, 0.5 * h, trial);
+    add_scaled(state->rigid, k2, 0.5 * h, trial);
     plant_derivative(plant, drift, time + 0.5 * h, trial, tau_middle, k3);
-    move(state->rigid, k3, h, trial);
-    if (!follows(plant, drift, time + h, h, trial)) /* a step may end at rest by chance, but not all its stages */
+    add_scaled(state->rigid, k3, h, trial);
+    if (!is_stable(plant, drift, time + h, h, trial)) /* a step may end at rest by chance, but not all of its stages */
         return 0;
     plant_derivative(plant, drift, time + h, trial, tau_end, k4);
 
     for (int i = 0; i < N_RIGID; i++)
         state->rigid[i] += h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i]);
-    return plant_normalise(state->rigid) && follows(plant, drift, time + h, h, state->rigid);
+    return plant_normalize(state->rigid) && is_stable(plant, drift, time + h, h, state->rigid);
 }
 
 int plant_advance(const Plant *plant, const Drift *drift, double start, double end, double substep,
@@ -253,8 +253,8 @@ int plant_advance(const Plant *plant, const Drift *drift, double start, double e
     const int n = (int)fmax(1.0, ceil((end - start) / substep - rounding));
 
     *h = (end - start) / n;
-    int followed = follows(plant, drift, start, *h, state->rigid);
-    for (int i = 0; i < n && followed; i++)
-        followed = step(plant, drift, start + i * *h, target, *h, state);
-    return followed;
+    int stable = is_stable(plant, drift, start, *h, state->rigid);
+    for (int i = 0; i < n && stable; i++)
+        stable = step(plant, drift, start + i * *h, target, *h, state);
+    return stable;
 }

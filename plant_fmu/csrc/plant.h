@@ -5,7 +5,7 @@
  *
  *     M_RB v' + C_RB(v) v + M_A v_r' + C_A(v_r) v_r + D_l v_r + D_q |v_r| v_r + g(eta) = tau            (11)
  *
- * with v_r = v - [R^T v_c; 0], the motion through water that moves at v_c and is taken as uniform around the hull.
+ * with v_r = v - [R^T v_c; 0], the motion through water that moves at v_c, assumed uniform around the hull.
  * These functions do not depend on FMI, and keep no state between calls. Functions named _tangent give exact
  * directional derivatives: dx is the tangent of x, and a struct has its tangent in a struct of the same type. At a kink
  * they take the branch of the function itself. */
@@ -17,7 +17,7 @@
 #include "vehicle.h" /* generated: N_THRUSTERS and the table of variables */
 
 enum { N_RIGID = 13 };                        /* position 3, quaternion 4, velocity 6 */
-enum { N_STATES = N_RIGID + N_THRUSTERS + 6 };/* and the lagging forces */
+enum { N_STATES = N_RIGID + N_THRUSTERS + 6 };/* and the forces with a lag */
 
 enum { DEPTH_SENSOR, DVL, IMU, COMPASS, USBL, N_SENSORS };
 
@@ -46,7 +46,7 @@ enum { /* standard deviations: several channels share one */
 typedef struct {
     double mass;                               /* kg */
     double inertia[6];                         /* kg m2, about the body origin: elements xx yy zz xy xz yz */
-    double r_G[3], r_B[3];                     /* m, centres of gravity and of buoyancy */
+    double r_G[3], r_B[3];                     /* m, centers of gravity and of buoyancy */
     double weight, buoyancy;                   /* N */
     double added_mass[6][6];                   /* upper triangle */
     double linear_damping[6];                  /* N s/m, N m s/rad */
@@ -61,8 +61,8 @@ typedef struct {
     double bottom_depth;                       /* m */
     double bottom_friction;                    /* Coulomb's coefficient */
     double bottom_time_constant;               /* s, in which the bottom stops the hull */
-    double gravity;                            /* m/s2, as an accelerometer feels it */
-    int free_surface;                       /* true: buoyancy decreases where the hull leaves the water */
+    double gravity;                            /* m/s2, as an accelerometer senses it */
+    int free_surface;                          /* true: buoyancy fades as the hull leaves the water */
 
     double thruster_matrix[6][N_THRUSTERS];    /* body wrench of one newton of each thruster */
     double thrust_min[N_THRUSTERS];            /* N, most negative force */
@@ -71,7 +71,7 @@ typedef struct {
     double thrust_rate_limit[N_THRUSTERS];     /* N/s, 0: none */
     double thrust_dead_band[N_THRUSTERS];      /* fraction of the command's range without force */
     double thrust_curve[N_THRUSTERS];          /* from 0, force linear in the command, to 1, quadratic */
-    double thrust_effectiveness[N_THRUSTERS];  /* 1: whole, 0: failed */
+    double thrust_effectiveness[N_THRUSTERS];  /* 1: full, 0: failed */
     double wrench_force_limit;                 /* N, on the norm of the direct force; its direction is kept */
     double wrench_time_constant;               /* s, 0: no lag */
 
@@ -83,22 +83,22 @@ typedef struct {
     double loss_probability[N_SENSORS];        /* of each sample */
     double outlier_probability[N_SENSORS];     /* of each sample */
     double outlier_scale;                      /* standard deviation of an outlier, as a multiple of that of the noise */
-    int seed;                                /* of all noise and of the current's variation */
+    int seed;                                  /* of all noise and of the current's variation */
     double substep;                            /* s, greatest integration step */
 } Parameters;
 
 typedef struct { /* constants that follow from the parameters */
-    double added_mass[6][6];         /* M_A, whole */
+    double added_mass[6][6];         /* M_A, both triangles */
     double mass_matrix[6][6];        /* M_RB + M_A */
     double mass_inverse[6][6];
     double contact_mass;             /* kg, lower bound of the mass that a force at the origin accelerates, in any direction */
     double contact_time;             /* s, bottom_time_constant, but not below the limit of the substep */
-    double swing;                    /* rad/s, upper bound of the oscillation by weight, buoyancy and surface */
+    double max_oscillation;          /* rad/s, upper bound of the oscillation by weight, buoyancy and surface */
     double thrust_lag[N_THRUSTERS];  /* s, time constants of the thrusters; 0: no lag */
     double wrench_lag;               /* s, time constant of the direct wrench */
-    int lags;                      /* whether any force follows its command with a delay */
-    int water_moves;               /* whether there may be a current */
-    int stiffest;                  /* row of mass_inverse from which contact_mass follows */
+    int has_lag;                     /* true: some force follows its command with a lag */
+    int has_current;                 /* true: the water may move */
+    int contact_mass_row;            /* row of mass_inverse that gives contact_mass */
 } Derived;
 
 typedef struct {
@@ -109,11 +109,11 @@ typedef struct {
 typedef struct {
     double thrust[N_THRUSTERS];
     double wrench[6];
-} Actuators; /* forces: targets of the limited commands, or present ones */
+} Actuators; /* forces: of the limited commands, or present ones */
 
 typedef struct {
     double rigid[N_RIGID];
-    Actuators actuators; /* of those that lag; the others follow their command */
+    Actuators actuators; /* only those with a lag are states; the others equal their command */
 } State;
 
 typedef struct { /* the current's Gauss-Markov part between two knots: value + slope (t - since) */
@@ -123,8 +123,8 @@ typedef struct { /* the current's Gauss-Markov part between two knots: value + s
 } Drift;
 
 typedef struct { /* effects of other components on the body, beside its actuators */
-    int acts;             /* 0: nothing */
-    double since;         /* s, time at which the current is that of the parameters */
+    int active;           /* 0: nothing */
+    double since;         /* s, time at which the current equals that of the parameters */
     double current_rate[3]; /* m/s2, world frame */
     double force[3], moment[3], point[3]; /* N, N m, world frame, at a point of the body [m], body frame */
     double wrench[6];       /* N, N m, body frame, about the origin */
@@ -146,23 +146,23 @@ void plant_mass_matrix(const Parameters *parameters, double M[6][6]);
 
 /* ---- plant.c: the rigid body in water ---- */
 
-#define CONTACT_SUBSTEPS 4.0 /* substeps in which the bottom stops the hull at the fastest: far from instability */
+#define CONTACT_SUBSTEPS 4.0 /* minimum of bottom_time_constant, in substeps: far from instability */
 
-#define LEAST_QUATERNION 1e-6 /* length below which a quaternion has no direction */
+#define MIN_QUATERNION_NORM 1e-6 /* norm below which a quaternion has no direction */
 
 /* Scales the quaternion to unit length. Returns false, and changes nothing, if its length is 0 or not finite. */
-int plant_normalise(double rigid[N_RIGID]);
+int plant_normalize(double rigid[N_RIGID]);
 
-/* Writes the rotation from body to world (3): a pure rotation for a quaternion of any length, the identity for length 0. */
+/* Writes the rotation from body to world (3), for a quaternion of any norm; the identity for norm 0. */
 void plant_rotation(const double quaternion[4], double R[3][3]);
 
 /* Writes the time derivative of the rigid-body state under the body wrench tau. */
 void plant_derivative(const Plant *plant, const Drift *drift, double time, const double rigid[N_RIGID],
                       const double tau[6], double rate[N_RIGID]);
 
-/* Advances the state from `start` to `end` with Runge-Kutta steps of order four and equal length h, at most `substep`; the
- * commands hold, with the actuators' `target`. Returns false if the state is not finite, or steps of h are not stable for
- * damping, oscillation or turning, where results may still look plausible; the state is invalid then. */
+/* Advances the state from `start` to `end` by fourth-order Runge-Kutta steps of equal length h, at most `substep`, while the
+ * actuators move to `target`. Returns false, and leaves an invalid state, if the state is not finite or steps of h are
+ * unstable for damping, oscillation or rotation, where results may still look plausible. */
 int plant_advance(const Plant *plant, const Drift *drift, double start, double end, double substep,
                    const Actuators *target, State *state, double *h);
 
@@ -171,18 +171,18 @@ int plant_advance(const Plant *plant, const Drift *drift, double start, double e
 /* Writes the velocity of the water at a depth, world frame. */
 void environment_current(const Parameters *parameters, const Drift *drift, double time, double depth, double velocity[3]);
 
-/* Returns the submerged fraction of the hull's volume, 0 to 1; depth is that of its centre, r_B. */
+/* Returns the submerged fraction of the hull's volume, 0 to 1; depth is that of its center, r_B. */
 double environment_submerged(const Parameters *parameters, double depth);
 
-/* Returns the depth of contact of the hull with the bottom; negative above it. */
-double environment_sunk(const Parameters *parameters, double depth);
+/* Returns how deep the hull has penetrated the bottom; negative above it. */
+double environment_penetration(const Parameters *parameters, double depth);
 
-/* Returns the depth x1 at which the bottom's spring has half the force of a linear one: a hull that starts deep in it
- * leaves at some 2 m/s. The spring's force tends to x1 / T^2 per mass, at least 50 m/s2. */
-double environment_softening(double contact_time);
+/* Returns the penetration x1 at which the bottom's spring has half the force of a linear one: a hull that starts deep in
+ * the bottom leaves at about 2 m/s. The spring's force tends to x1 / T^2 per mass, at least 50 m/s2. */
+double environment_softening_depth(double contact_time);
 
-/* Writes the force of the bottom on a hull at a depth of contact, world frame: zero without contact. */
-void environment_contact(const Plant *plant, double sunk, const double velocity_world[3], double force[3]);
+/* Writes the force of the bottom on the hull, world frame: zero without contact. */
+void environment_contact(const Plant *plant, double penetration, const double velocity_world[3], double force[3]);
 
 double environment_submerged_tangent(const Parameters *parameters, const Parameters *dparameters, double depth,
                                      double ddepth);
@@ -197,19 +197,19 @@ void environment_contact_tangent(const Plant *plant, const Parameters *dparamete
 /* Writes the steady forces of the commands: limited, and after the thrusters' curves. Sets the flags of limited
  * commands. */
 void actuators_target(const Parameters *parameters, const Inputs *inputs, Actuators *target,
-                      int thrust_cut[N_THRUSTERS], int *wrench_cut);
+                      int thrust_saturated[N_THRUSTERS], int *wrench_saturated);
 
-#define LEAST_RATE_LAG 1e-3 /* s: least time constant of a thruster with a rate limit */
+#define MIN_RATE_LAG 1e-3 /* s: minimum time constant of a thruster with a rate limit */
 
 /* Return the time constants of thruster i and of the direct wrench; 0: no lag. */
 double actuators_thrust_lag(const Parameters *parameters, int i);
 double actuators_wrench_lag(const Parameters *parameters);
 
-/* Writes the forces after those without a lag have followed their commands. */
-void actuators_settle(const Plant *plant, const Actuators *start, const Actuators *target, Actuators *out);
+/* Writes the forces, with those without a lag set to their commands. */
+void actuators_apply_unlagged(const Plant *plant, const Actuators *start, const Actuators *target, Actuators *out);
 
-/* Writes the forces a time dt after `start` on their way to `target`: exact for lag and rate limit. */
-void actuators_after(const Plant *plant, const Actuators *start, const Actuators *target, double dt, Actuators *out);
+/* Writes the forces a time dt after `start`, as they approach `target`: exact for lag and rate limit. */
+void actuators_advance(const Plant *plant, const Actuators *start, const Actuators *target, double dt, Actuators *out);
 
 /* Writes the rates of change of the forces, 0 for those without a lag. */
 void actuators_rate(const Plant *plant, const Actuators *now, const Actuators *target, Actuators *rate);
@@ -228,8 +228,8 @@ void actuators_tangent(const Parameters *parameters, const Parameters *dparamete
 void sensors_measure(const Parameters *parameters, const double rigid[N_RIGID], const double rate[N_RIGID],
                      double heading, double altitude, double measured[N_MEASURED]);
 
-/* Writes sample number `count` of one sensor, with noise. Returns false, and changes nothing, if the sample is lost. Channels
- * of other sensors stay. */
+/* Writes sample number `count` of one sensor, with noise; channels of other sensors stay. Returns false, and changes
+ * nothing, if the sample is lost. */
 int sensors_sample(const Parameters *parameters, int sensor, unsigned long long count,
                    const double measured[N_MEASURED], double sample[N_MEASURED]);
 
@@ -241,10 +241,11 @@ int sensors_of_channel(int channel);
 /* Streams of random numbers: noise of each channel, three of the current's knots, three of its first knot, then chances. */
 enum { CURRENT_STREAM = N_MEASURED, CHANCE_STREAM = CURRENT_STREAM + 6 };
 
-/* Writes two independent numbers, uniform in [0, 1), at a place of a seeded stream. */
+/* Writes two independent numbers, uniform in [0, 1), at index `count` of a seeded stream. */
 void random_uniform(int seed, unsigned stream, unsigned long long count, double out[2]);
 
-/* Returns the standard normal number at a place of a seeded stream: the same at every call (Philox 4x32-10, Box-Muller). */
+/* Returns the standard normal number at index `count` of a seeded stream: the same at every call (Philox 4x32-10,
+ * Box-Muller). */
 double random_normal(int seed, unsigned stream, unsigned long long count);
 
 #endif

@@ -1,5 +1,5 @@
-/* Random numbers without a state: a keyed hash of stream and place. A run repeats whatever the
- * steps, a saved state needs no generator, and streams do not disturb each other. */
+/* Random numbers without a state: a keyed hash of stream and index. Runs repeat with any step size, saved states need no
+ * generator, and streams are independent. */
 #include "elementary.h"
 
 #include <math.h>
@@ -19,7 +19,7 @@ static void philox(uint32_t c[4], uint32_t key0, uint32_t key1)
     }
 }
 
-/* Writes four words at a place of a stream. */
+/* Writes four words at index `count` of a stream. */
 static void draw(int seed, unsigned stream, unsigned long long count, uint32_t c[4])
 {
     c[0] = (uint32_t)count;
@@ -49,7 +49,7 @@ double random_normal(int seed, unsigned stream, unsigned long long count)
     uint32_t c[4];
 
     draw(seed, stream, count, c);
-    /* the first in (0, 1] */
+    /* u in (0, 1], for the logarithm */
     const double u = ((double)(c[0] >> 5) * 67108864.0 + (double)(c[1] >> 6) + 1.0) / 9007199254740992.0;
     const double v = uniform(c[2], c[3]);
     return sqrt(-2.0 * elementary_log(u)) * elementary_cos_turns(v); /* Box-Muller */

@@ -29,7 +29,7 @@ static void rotation_tangent(const double e[4], const double de[4], double dR[3]
     double B[3][3], dB[3][3];
 
     memset(dR, 0, 9 * sizeof(double));
-    if (!(square > LEAST_QUATERNION * LEAST_QUATERNION))
+    if (!(square > MIN_QUATERNION_NORM * MIN_QUATERNION_NORM))
         return;
     bilinear(e, e, B);
     bilinear(e, de, dB);
@@ -41,7 +41,7 @@ static void rotation_tangent(const double e[4], const double de[4], double dR[3]
 static void euler_tangent(const double R[3][3], const double dR[3][3], double deuler[3])
 {
     const double square = R[2][1] * R[2][1] + R[2][2] * R[2][2], cosine = sqrt(square);
-    const int upright = cosine > UPRIGHT;
+    const int upright = cosine > MIN_COS_PITCH;
     const double dcosine = upright ? (R[2][1] * dR[2][1] + R[2][2] * dR[2][2]) / cosine : 0.0;
 
     deuler[0] = upright ? (R[2][2] * dR[2][1] - R[2][1] * dR[2][2]) / square : 0.0;
@@ -79,12 +79,12 @@ static void momentum_tangent(const Parameters *p, const Parameters *dp, const do
 /* Subtracts the tangent of a x b. */
 static void subtract_cross(const double a[3], const double da[3], const double b[3], const double db[3], double out[3])
 {
-    double left[3], right[3];
+    double first[3], second[3];
 
-    cross(da, b, left);
-    cross(a, db, right);
+    cross(da, b, first);
+    cross(a, db, second);
     for (int i = 0; i < 3; i++)
-        out[i] -= left[i] + right[i];
+        out[i] -= first[i] + second[i];
 }
 
 /* Tangent of subtract_coriolis in plant.c: p holds the momenta, linear and angular. */
@@ -99,13 +99,13 @@ static void subtract_coriolis_tangent(const double p[6], const double dp[6], con
 /* Tangent of the mass matrix: column by column, momentum_tangent of a constant motion. */
 static void mass_matrix_tangent(const Parameters *p, const Parameters *dp, double dM[6][6])
 {
-    static const double still[6] = {0.0};
+    static const double zero[6] = {0.0};
 
     symmetric6(dp->added_mass, dM);
     for (int j = 0; j < 6; j++) {
         double unit[6] = {0.0}, column[6];
         unit[j] = 1.0;
-        momentum_tangent(p, dp, unit, still, column, column + 3);
+        momentum_tangent(p, dp, unit, zero, column, column + 3);
         for (int i = 0; i < 6; i++)
             dM[i][j] += column[i];
     }
@@ -115,7 +115,7 @@ static void mass_matrix_tangent(const Parameters *p, const Parameters *dp, doubl
 static void add_external_tangent(const External *x, const External *dx, const double R[3][3], const double dR[3][3],
                                  double dwrench[6])
 {
-    double force[3], dforce[3], moment[3], turned[3], left[3], right[3];
+    double force[3], dforce[3], moment[3], turned[3], first[3], second[3];
 
     to_body(R, x->force, force);
     to_body(dR, x->force, turned);
@@ -124,11 +124,11 @@ static void add_external_tangent(const External *x, const External *dx, const do
         dforce[i] += turned[i];
     to_body(dR, x->moment, turned);
     to_body(R, dx->moment, moment);
-    cross(dx->point, force, left);
-    cross(x->point, dforce, right);
+    cross(dx->point, force, first);
+    cross(x->point, dforce, second);
     for (int i = 0; i < 3; i++) {
         dwrench[i] += dforce[i] + dx->wrench[i];
-        dwrench[3 + i] += turned[i] + moment[i] + left[i] + right[i] + dx->wrench[3 + i];
+        dwrench[3 + i] += turned[i] + moment[i] + first[i] + second[i] + dx->wrench[3 + i];
     }
 }
 
@@ -140,31 +140,31 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
     const double *x = m->state.rigid, *e = x + 3, *nu = x + 7, *omega = x + 10;
     const double *dx = seed->state.rigid, *de = dx + 3, *dnu = dx + 7, *domega = dx + 10;
     const Drift *drift = &m->held.drift;
-    const double still[6] = {0.0};
-    double left[4], right[4], dwrench[6], dadded_mass[6][6];
+    const double zero[6] = {0.0};
+    double first[4], second[4], dwrench[6], dadded_mass[6][6];
 
     plant_rotation(e, R);
     rotation_tangent(e, de, dR);
     for (int i = 0; i < 3; i++)
         drate[i] = dot3(dR[i], nu) + dot3(R[i], dnu);
-    quaternion_rate(de, omega, left);
-    quaternion_rate(e, domega, right);
+    quaternion_rate(de, omega, first);
+    quaternion_rate(e, domega, second);
     for (int i = 0; i < 4; i++)
-        drate[3 + i] = left[i] + right[i];
+        drate[3 + i] = first[i] + second[i];
 
     /* velocity relative to the water */
-    const double below = fmax(x[2], 0.0), under = x[2] > 0.0 ? 1.0 : 0.0;
+    const double below = fmax(x[2], 0.0), is_below = x[2] > 0.0 ? 1.0 : 0.0;
     double water[3], current[3], dcurrent[3], nu_r[6], dnu_r[6], nu_c_rate[6] = {0.0}, dnu_c_rate[6] = {0.0};
     environment_current(p, drift, m->time, x[2], water);
     for (int i = 0; i < 3; i++)
-        dwater[i] = dp->current[i] + dp->current_shear[i] * below + p->current_shear[i] * under * dx[2] +
+        dwater[i] = dp->current[i] + dp->current_shear[i] * below + p->current_shear[i] * is_below * dx[2] +
                     drift->slope[i] * seed->time;
     for (int i = 0; i < 3; i++) {
         current[i] = dcurrent[i] = 0.0;
         for (int j = 0; j < 3; j++) {
             const double water_rate =
-                drift->slope[j] + p->current_shear[j] * under * rate[2] + m->plant.external.current_rate[j];
-            const double dwater_rate = under * (dp->current_shear[j] * rate[2] + p->current_shear[j] * drate[2]) +
+                drift->slope[j] + p->current_shear[j] * is_below * rate[2] + m->plant.external.current_rate[j];
+            const double dwater_rate = is_below * (dp->current_shear[j] * rate[2] + p->current_shear[j] * drate[2]) +
                                        seed->plant.external.current_rate[j];
             current[i] += R[j][i] * water[j];
             dcurrent[i] += dR[j][i] * water[j] + R[j][i] * dwater[j];
@@ -172,15 +172,15 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
             dnu_c_rate[i] += dR[j][i] * water_rate + R[j][i] * dwater_rate;
         }
     }
-    cross(omega, current, left);
+    cross(omega, current, first);
     for (int i = 0; i < 3; i++)
-        nu_c_rate[i] -= left[i];
-    cross(domega, current, left);
-    cross(omega, dcurrent, right);
+        nu_c_rate[i] -= first[i];
+    cross(domega, current, first);
+    cross(omega, dcurrent, second);
     for (int i = 0; i < 6; i++) {
         nu_r[i] = nu[i] - (i < 3 ? current[i] : 0.0);
         dnu_r[i] = dnu[i] - (i < 3 ? dcurrent[i] : 0.0);
-        dnu_c_rate[i] -= i < 3 ? left[i] + right[i] : 0.0;
+        dnu_c_rate[i] -= i < 3 ? first[i] + second[i] : 0.0;
     }
 
     memcpy(dwrench, dtau, sizeof dwrench);
@@ -188,7 +188,7 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
     /* momenta of the body and of the water; M_RB nu itself is linear in nu, so its own tangent gives it */
     double a[6], da[6], added[6], dadded[6], term[6];
     const Parameters nothing = {0};
-    momentum_tangent(p, &nothing, still, nu, a, a + 3);
+    momentum_tangent(p, &nothing, zero, nu, a, a + 3);
     momentum_tangent(p, dp, nu, dnu, da, da + 3);
     subtract_coriolis_tangent(a, da, nu, dnu, dwrench);
 
@@ -219,17 +219,17 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
         lever[i] = p->r_G[i] * p->weight - p->r_B[i] * buoyancy;
         dlever[i] = dp->r_G[i] * p->weight + p->r_G[i] * dp->weight - dp->r_B[i] * buoyancy - p->r_B[i] * dbuoyancy;
     }
-    cross(dlever, R[2], left);
-    cross(lever, dR[2], right);
+    cross(dlever, R[2], first);
+    cross(lever, dR[2], second);
     for (int i = 0; i < 3; i++) {
         dwrench[i] += (dp->weight - dbuoyancy) * R[2][i] + (p->weight - buoyancy) * dR[2][i];
-        dwrench[3 + i] += left[i] + right[i];
+        dwrench[3 + i] += first[i] + second[i];
     }
 
-    const double sunk = environment_sunk(p, x[2]);
-    if (sunk > 0.0) {
+    const double penetration = environment_penetration(p, x[2]);
+    if (penetration > 0.0) {
         double contact[3], dcontact[3], dM[6][6];
-        environment_contact(&m->plant, sunk, rate, contact);
+        environment_contact(&m->plant, penetration, rate, contact);
         mass_matrix_tangent(p, dp, dM);
         environment_contact_tangent(&m->plant, dp, (const double(*)[6])dM, x[2], dx[2], rate, drate, dcontact);
         for (int i = 0; i < 3; i++)
@@ -237,12 +237,12 @@ static void derivative_tangent(const Model *m, const Model *seed, const double r
                 dwrench[i] += dR[j][i] * contact[j] + R[j][i] * dcontact[j];
     }
 
-    if (m->plant.external.acts)
+    if (m->plant.external.active)
         add_external_tangent(&m->plant.external, &seed->plant.external, (const double(*)[3])R, (const double(*)[3])dR,
                              dwrench);
 
     /* M nu' = wrench */
-    momentum_tangent(p, dp, rate + 7, still, da, da + 3);
+    momentum_tangent(p, dp, rate + 7, zero, da, da + 3);
     multiply6((const double(*)[6])dadded_mass, rate + 7, term);
     for (int i = 0; i < 6; i++)
         dwrench[i] -= da[i] + term[i];
@@ -257,26 +257,26 @@ static void measured_tangent(const Model *m, const Model *seed, int starting, co
     const Parameters *p = &m->plant.parameters, *dp = &seed->plant.parameters;
     const double *nu = m->state.rigid + 7, *omega = m->state.rigid + 10;
     const double *dx = seed->state.rigid, *dnu = dx + 7, *domega = dx + 10;
-    double left[3], right[3];
+    double first[3], second[3];
 
-    cross(domega, nu, left);
-    cross(omega, dnu, right);
+    cross(domega, nu, first);
+    cross(omega, dnu, second);
     dmeasured[MEASURED_DEPTH] = dx[2];
     dmeasured[MEASURED_ALTITUDE] = d->altitude;
     dmeasured[MEASURED_HEADING] = d->euler[2];
     for (int i = 0; i < 3; i++) {
         dmeasured[MEASURED_VELOCITY + i] = (1.0 + p->velocity_scale_error) * dnu[i] + dp->velocity_scale_error * nu[i];
         dmeasured[MEASURED_ACCELERATION + i] =
-            d->rate.rigid[7 + i] + left[i] + right[i] - dp->gravity * R[2][i] - p->gravity * dR[2][i];
+            d->rate.rigid[7 + i] + first[i] + second[i] - dp->gravity * R[2][i] - p->gravity * dR[2][i];
         dmeasured[MEASURED_ANGULAR_VELOCITY + i] = domega[i];
         dmeasured[MEASURED_POSITION + i] = dx[i];
     }
     for (int i = 0; i < N_MEASURED; i++) {
-        dmeasured[i] = !starting && model_holds(m, i) ? 0.0 : dmeasured[i] + dp->bias[i];
+        dmeasured[i] = !starting && model_shows_sample(m, i) ? 0.0 : dmeasured[i] + dp->bias[i];
     }
 }
 
-static void tangent_of(const Model *m, const Model *seed, int starting, Model *tangent)
+static void tangent_core(const Model *m, const Model *seed, int starting, Model *tangent)
 {
     const Parameters *p = &m->plant.parameters, *dp = &seed->plant.parameters;
     Outputs *d = &tangent->outputs;
@@ -301,10 +301,10 @@ void model_tangent(const Model *m, const Model *seed, int starting, Model *tange
     Model coupled, direction;
 
     if (!COUPLED) {
-        tangent_of(m, seed, starting, tangent);
+        tangent_core(m, seed, starting, tangent);
         return;
     }
     coupling_apply(m, &coupled); /* inputs that are off have derivatives too */
     coupling_tangent(m, seed, &direction);
-    tangent_of(&coupled, &direction, starting, tangent);
+    tangent_core(&coupled, &direction, starting, tangent);
 }

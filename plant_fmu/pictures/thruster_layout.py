@@ -24,23 +24,23 @@ class _View:
 
     title: str
     across: int  # axis that points to the right
-    upright: int  # axis that is drawn upright
-    down: bool  # the upright axis points downwards
-    eye: tuple[float, float, float]  # direction from the body towards the viewer
+    vertical: int  # axis that is drawn vertically
+    down: bool  # the vertical axis points down
+    eye: tuple[float, float, float]  # direction from the body toward the viewer
 
 
 @dataclass(frozen=True, eq=False)
 class _Push:
-    """Thrusters of one place and one direction in a view."""
+    """Thrusters with one position and one direction in a view."""
 
-    place: Array  # (2,) m, place in the view
+    position: Array  # (2,) m, in the view
     arrow: Array  # (2,) m, arrow in the direction of the force
-    towards: float  # 1 towards the viewer, -1 away, 0 across
+    toward: float  # 1 toward the viewer, -1 away, 0 across
     numbers: str
 
     def along(self) -> Array:
         """Return points of the arrow."""
-        return np.asarray(self.place + np.linspace(0.0, 1.0, 9)[:, None] * self.arrow)
+        return np.asarray(self.position + np.linspace(0.0, 1.0, 9)[:, None] * self.arrow)
 
 
 _VIEWS = (
@@ -49,14 +49,14 @@ _VIEWS = (
     _View("from behind", 1, 2, True, (-1.0, 0.0, 0.0)),
 )
 _AXES = ("x forward", "y to starboard", "z down")
-_PUSH, _HULL, _WEIGHT, _LIFT = "#0072b2", "#999999", "#d55e00", "#009e73"
+_PUSH, _HULL, _WEIGHT, _BUOYANCY = "#0072b2", "#999999", "#d55e00", "#009e73"
 _FLAT = 0.2  # component of a unit force in the plane of a view below which it is drawn as a dot or a cross
-_SAME = 1e-3  # distance within which points are one place, as a fraction of the vehicle's reach
+_SAME_POSITION = 1e-3  # distance within which points coincide, as a fraction of the vehicle's reach
 # fractions of that reach: half a view, an arrow, the distance to a number, a letter
-_ROOM, _ARROW, _BESIDE, _LETTER = 1.7, 0.42, 0.17, 0.06
-_AROUND = 16  # possible places of the numbers about an end of an arrow
+_HALF_VIEW, _ARROW, _TEXT_DISTANCE, _LETTER = 1.7, 0.42, 0.17, 0.06
+_N_CANDIDATES = 16  # candidate positions of the numbers around an end of an arrow
 _NOTE = (
-    "An arrow is the force of a positive command; a dot comes towards you, a cross goes away. A vehicle's file has the "
+    "An arrow is the force of a positive command; a dot points at you, a cross away from you. A vehicle's file has the "
     "thrusters' wrenches alone:\neach stands at the point of its line of action that is nearest to the body origin."
 )
 
@@ -72,7 +72,7 @@ def thrusters(vehicle: Vehicle) -> Figure:
     Returns
     -------
     Figure
-        Three views in metres, body frame.
+        Three views in meters, body frame.
     """
     from matplotlib.figure import Figure
 
@@ -84,37 +84,42 @@ def thrusters(vehicle: Vehicle) -> Figure:
         _draw_view(ax, view, vehicle, lines, reach)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, fontsize=8, frameon=False, ncols=2, loc="outside upper right")
-    turning = [str(i + 1) for i, line in enumerate(lines) if not line.force.any()]
-    only = f"\nThrusters that only turn the body are left out: {', '.join(turning)}." if turning else ""
-    figure.supxlabel(_NOTE + only, fontsize=8, color="#555555")
+    without_force = [str(i + 1) for i, line in enumerate(lines) if not line.force.any()]
+    footnote = f"\nThrusters that give only a moment are left out: {', '.join(without_force)}." if without_force else ""
+    figure.supxlabel(_NOTE + footnote, fontsize=8, color="#555555")
     return figure
 
 
 def _draw_view(ax: Axes, view: _View, vehicle: Vehicle, lines: list[ThrusterLine], reach: float) -> None:
     from matplotlib.patches import Circle
 
-    plane = [view.across, view.upright]
+    plane = [view.across, view.vertical]
     if vehicle.hull_radius > 0.0:
         ax.add_patch(Circle((0.0, 0.0), vehicle.hull_radius, fill=False, edgecolor=_HULL, linestyle=":"))
-    for point, colour, marker, label in (
-        (vehicle.r_G, _WEIGHT, "v", "centre of gravity"),
-        (vehicle.r_B, _LIFT, "^", "centre of buoyancy"),
+    for point, color, marker, label in (
+        (vehicle.r_G, _WEIGHT, "v", "center of gravity"),
+        (vehicle.r_B, _BUOYANCY, "^", "center of buoyancy"),
     ):
-        ax.plot(*point[plane], marker, color=colour, markersize=5, fillstyle="none", label=label)
+        ax.plot(*point[plane], marker, color=color, markersize=5, fillstyle="none", label=label)
     pushes = [
-        _Push(np.array(place), np.array(way[:2]) * _ARROW * reach, way[2], ", ".join(str(i + 1) for i in numbers))
-        for place, members in _places(lines, plane, reach).items()
-        for way, numbers in _ways(lines, members, view).items()
+        _Push(
+            np.array(position),
+            np.array(direction[:2]) * _ARROW * reach,
+            direction[2],
+            ", ".join(str(i + 1) for i in numbers),
+        )
+        for position, members in _group_by_position(lines, plane, reach).items()
+        for direction, numbers in _group_by_direction(lines, members, view).items()
     ]
     for push in pushes:
         _draw_push(ax, push)
-    taken = np.vstack([np.zeros((0, 2)), *(push.along() for push in pushes)])
+    occupied = np.vstack([np.zeros((0, 2)), *(push.along() for push in pushes)])
     for push in pushes:
         width = _LETTER * reach * np.array([len(push.numbers) / 2.0, 0.0])
-        at = _free_place(push, width, taken, _BESIDE * reach)
+        position = _free_position(push, width, occupied, _TEXT_DISTANCE * reach)
         ax.text(
-            float(at[0]),
-            float(at[1]),
+            float(position[0]),
+            float(position[1]),
             push.numbers,
             color=_PUSH,
             ha="center",
@@ -122,57 +127,61 @@ def _draw_view(ax: Axes, view: _View, vehicle: Vehicle, lines: list[ThrusterLine
             fontsize=10,
             fontweight="bold",
         )
-        taken = np.vstack([taken, at, at - width, at + width])
-    limit = _ROOM * reach
+        occupied = np.vstack([occupied, position, position - width, position + width])
+    limit = _HALF_VIEW * reach
     ax.set(xlim=(-limit, limit), ylim=(limit, -limit) if view.down else (-limit, limit), aspect="equal")
     ax.set_title(view.title, fontsize=10)
     ax.set_xlabel(f"{_AXES[view.across]} [m]", fontsize=9)
-    ax.set_ylabel(f"{_AXES[view.upright]} [m]", fontsize=9)
+    ax.set_ylabel(f"{_AXES[view.vertical]} [m]", fontsize=9)
     ax.tick_params(labelsize=8)
     ax.grid(color="#e4e4e4", linewidth=0.6)
     ax.set_axisbelow(True)
 
 
-def _places(lines: list[ThrusterLine], plane: list[int], reach: float) -> dict[tuple[float, float], list[int]]:
-    """Group the thrusters by their place in a view; thrusters behind each other share a place."""
-    places: dict[tuple[float, float], list[int]] = {}
+def _group_by_position(
+    lines: list[ThrusterLine], plane: list[int], reach: float
+) -> dict[tuple[float, float], list[int]]:
+    """Group the thrusters by their position in a view; thrusters behind each other share one."""
+    groups: dict[tuple[float, float], list[int]] = {}
     for i, line in enumerate(lines):
         if not line.force.any():
             continue
-        x, y = (float(part) for part in line.nearest[plane])
-        near = (place for place in places if abs(place[0] - x) + abs(place[1] - y) < _SAME * reach)
-        places.setdefault(next(near, (x, y)), []).append(i)
-    return places
+        x, y = (float(component) for component in line.nearest[plane])
+        near = (position for position in groups if abs(position[0] - x) + abs(position[1] - y) < _SAME_POSITION * reach)
+        groups.setdefault(next(near, (x, y)), []).append(i)
+    return groups
 
 
-def _ways(lines: list[ThrusterLine], members: list[int], view: _View) -> dict[tuple[float, float, float], list[int]]:
+def _group_by_direction(
+    lines: list[ThrusterLine], members: list[int], view: _View
+) -> dict[tuple[float, float, float], list[int]]:
     """Group thrusters by the direction of their force: (x, y, 0) in the view's plane, or (0, 0, ±1) across it."""
-    ways: dict[tuple[float, float, float], list[int]] = {}
+    groups: dict[tuple[float, float, float], list[int]] = {}
     for i in members:
         force = lines[i].force / np.linalg.norm(lines[i].force)
-        x, y = (round(float(part), 3) for part in force[[view.across, view.upright]])
-        way = (x, y, 0.0) if np.hypot(x, y) >= _FLAT else (0.0, 0.0, float(np.sign(force @ np.array(view.eye))))
-        ways.setdefault(way, []).append(i)
-    return ways
+        x, y = (round(float(component), 3) for component in force[[view.across, view.vertical]])
+        direction = (x, y, 0.0) if np.hypot(x, y) >= _FLAT else (0.0, 0.0, float(np.sign(force @ np.array(view.eye))))
+        groups.setdefault(direction, []).append(i)
+    return groups
 
 
 def _draw_push(ax: Axes, push: _Push) -> None:
-    place = (float(push.place[0]), float(push.place[1]))
-    if push.towards:
-        ax.plot(*place, "o", color=_PUSH, markersize=13, fillstyle="none", markeredgewidth=1.5)
-        ax.plot(*place, "." if push.towards > 0.0 else "x", color=_PUSH, markersize=8)
+    position = (float(push.position[0]), float(push.position[1]))
+    if push.toward:
+        ax.plot(*position, "o", color=_PUSH, markersize=13, fillstyle="none", markeredgewidth=1.5)
+        ax.plot(*position, "." if push.toward > 0.0 else "x", color=_PUSH, markersize=8)
     else:
         arrow = {"arrowstyle": "-|>", "color": _PUSH, "linewidth": 1.6, "shrinkA": 0.0, "shrinkB": 0.0}
-        end = push.place + push.arrow
-        ax.annotate("", xy=(float(end[0]), float(end[1])), xytext=place, arrowprops=arrow)
-        ax.plot(*place, "o", color=_PUSH, markersize=4)
+        end = push.position + push.arrow
+        ax.annotate("", xy=(float(end[0]), float(end[1])), xytext=position, arrowprops=arrow)
+        ax.plot(*position, "o", color=_PUSH, markersize=4)
 
 
-def _free_place(push: _Push, width: Array, taken: Array, beside: float) -> Array:
-    """Return the place for a push's numbers that is farthest from everything drawn."""
-    angles = np.linspace(0.0, 2.0 * np.pi, _AROUND, endpoint=False)
-    around = beside * np.column_stack([np.cos(angles), np.sin(angles)])
-    candidates = np.vstack([push.place + around, push.place + push.arrow + around])
+def _free_position(push: _Push, width: Array, occupied: Array, distance: float) -> Array:
+    """Return the position for a push's numbers that is farthest from everything drawn."""
+    angles = np.linspace(0.0, 2.0 * np.pi, _N_CANDIDATES, endpoint=False)
+    around = distance * np.column_stack([np.cos(angles), np.sin(angles)])
+    candidates = np.vstack([push.position + around, push.position + push.arrow + around])
     texts = np.stack([candidates - width, candidates, candidates + width], axis=1)
-    gaps = np.linalg.norm(texts[:, :, None] - taken, axis=3).min(axis=(1, 2))
+    gaps = np.linalg.norm(texts[:, :, None] - occupied, axis=3).min(axis=(1, 2))
     return np.asarray(candidates[int(np.argmax(np.round(gaps, 9)))])

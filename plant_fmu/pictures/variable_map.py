@@ -24,7 +24,7 @@ FAMILIES = {
     "sensors": ("depth_sensor.", "dvl.", "imu.", "compass.", "usbl.", "outlier_scale"),
     "calculation": ("substep", "seed"),
 }
-_COLOURS = {"input": "#e69f00", "state": "#0072b2", "output": "#009e73", "parameter": "#cc79a7"}
+_COLORS = {"input": "#e69f00", "state": "#0072b2", "output": "#009e73", "parameter": "#cc79a7"}
 _LINE, _HEAD, _GAP, _WIDTH = 0.185, 0.36, 0.32, 3.75  # inches: line, head of a box, gap between boxes, box
 _MARGIN, _LETTER = 0.15, 8.0  # inches; points
 
@@ -40,7 +40,7 @@ class Row:
 
 @dataclass(frozen=True)
 class _Box:
-    role: str  # role of the variables, which determines the colour
+    role: str  # role of the variables, which determines the color
     title: str
     rows: list[Row]
 
@@ -67,13 +67,15 @@ def variable_map(vehicle: Vehicle) -> Figure:
     table = variables(vehicle)
     roles = {role: [v for v in table if v.role == role] for role in ("input", "state", "output", "parameter")}
     flow = [
-        _Box("input", f"{len(roles['input'])} inputs", rows_of(roles["input"])),
-        _Box("state", f"{len(roles['state'])} states, and the derivative of each", rows_of(roles["state"])),
-        _Box("output", f"{len(roles['output'])} outputs, and the states that are not local", rows_of(roles["output"])),
+        _Box("input", f"{len(roles['input'])} inputs", group_rows(roles["input"])),
+        _Box("state", f"{len(roles['state'])} states, and the derivative of each", group_rows(roles["state"])),
+        _Box(
+            "output", f"{len(roles['output'])} outputs, and the states that are not local", group_rows(roles["output"])
+        ),
     ]
     families = [
         _Box("parameter", f"{family}: {sum(row.count for row in rows)}", rows)
-        for family, rows in ((family, rows_of(of_family(roles["parameter"], family))) for family in FAMILIES)
+        for family, rows in ((family, group_rows(family_members(roles["parameter"], family))) for family in FAMILIES)
     ]
     columns = _columns(families, len(flow))
     flow_height = max(box.height for box in flow)
@@ -94,18 +96,18 @@ def variable_map(vehicle: Vehicle) -> Figure:
     y -= flow_height + _GAP
     ax.text(
         _MARGIN, y, f"{len(roles['parameter'])} parameters, all tunable: they may change while it runs",
-        fontsize=10, va="center", color=_COLOURS["parameter"], fontweight="bold",
+        fontsize=10, va="center", color=_COLORS["parameter"], fontweight="bold",
     )  # fmt: skip
     y -= 0.2
     for i, column in enumerate(columns):
-        at = y
+        top = y
         for box in column:
-            _draw(ax, box, _MARGIN + i * (_WIDTH + _GAP), at)
-            at -= box.height + _GAP / 2.0
+            _draw(ax, box, _MARGIN + i * (_WIDTH + _GAP), top)
+            top -= box.height + _GAP / 2.0
     return figure
 
 
-def rows_of(table: Iterable[Variable]) -> list[Row]:
+def group_rows(table: Iterable[Variable]) -> list[Row]:
     """Group variables into lines; names that differ in an index or a last part share one.
 
     Parameters
@@ -125,7 +127,7 @@ def rows_of(table: Iterable[Variable]) -> list[Row]:
     return [_row(stem, members) for stem, members in stems.items()]
 
 
-def of_family(parameters: Iterable[Variable], family: str) -> list[Variable]:
+def family_members(parameters: Iterable[Variable], family: str) -> list[Variable]:
     """Return the parameters of a family of `FAMILIES`."""
     return [v for v in parameters if v.name.startswith(FAMILIES[family])]
 
@@ -148,8 +150,8 @@ def _row(stem: str, members: Sequence[Variable]) -> Row:
 
 def _indices(members: Sequence[Variable]) -> str:
     """Return the first and the last of each index, such as 1…6, 1…8."""
-    found = [[int(i) for i in re.findall(r"\d+", v.name.partition("[")[2])] for v in members]
-    return ", ".join(f"{min(axis)}…{max(axis)}" for axis in zip(*found, strict=True))
+    indices = [[int(i) for i in re.findall(r"\d+", v.name.partition("[")[2])] for v in members]
+    return ", ".join(f"{min(axis)}…{max(axis)}" for axis in zip(*indices, strict=True))
 
 
 def _columns(boxes: Sequence[_Box], n: int) -> list[list[_Box]]:
@@ -161,18 +163,18 @@ def _columns(boxes: Sequence[_Box], n: int) -> list[list[_Box]]:
 
 
 def _draw(ax: Axes, box: _Box, x: float, y: float) -> None:
-    """Draw a box whose upper left corner is at a place."""
+    """Draw a box from its upper left corner."""
     from matplotlib.patches import Rectangle
 
-    colour = _COLOURS[box.role]
-    ax.add_patch(Rectangle((x, y - box.height), _WIDTH, box.height, facecolor="white", edgecolor=colour, linewidth=1.2))
-    ax.add_patch(Rectangle((x, y - _HEAD + 0.06), _WIDTH, _HEAD - 0.06, facecolor=colour, edgecolor=colour, alpha=0.25))
+    color = _COLORS[box.role]
+    ax.add_patch(Rectangle((x, y - box.height), _WIDTH, box.height, facecolor="white", edgecolor=color, linewidth=1.2))
+    ax.add_patch(Rectangle((x, y - _HEAD + 0.06), _WIDTH, _HEAD - 0.06, facecolor=color, edgecolor=color, alpha=0.25))
     ax.text(x + 0.08, y - (_HEAD - 0.06) / 2.0, box.title, fontsize=_LETTER + 1.0, fontweight="bold", va="center")
     for i, row in enumerate(box.rows):
-        at = y - _HEAD - (i + 0.5) * _LINE
-        ax.text(x + 0.08, at, row.text, fontsize=_LETTER, va="center")
+        middle = y - _HEAD - (i + 0.5) * _LINE
+        ax.text(x + 0.08, middle, row.text, fontsize=_LETTER, va="center")
         ax.text(
-            x + _WIDTH - 0.08, at, f"{row.count} × {row.units}", fontsize=_LETTER, va="center", ha="right",
+            x + _WIDTH - 0.08, middle, f"{row.count} × {row.units}", fontsize=_LETTER, va="center", ha="right",
             color="#555555",
         )  # fmt: skip
 

@@ -75,36 +75,36 @@ class BoundCalls:
         flags = [v for v in scalars if v.causality == "output" and v.type == "Boolean"]
 
         self.starts = np.array([float(v.start or 0.0) for v in inputs])
-        sent, read = self.starts.copy(), np.zeros(len(outputs))
+        input_values, output_values = self.starts.copy(), np.zeros(len(outputs))
         flag_type = ctypes.c_int if instance.fmi == 2 else ctypes.c_bool
         flag_buffer = (flag_type * len(flags))()
-        self.inputs = Channels(_described(inputs), sent)
-        self.outputs = Channels(_described(outputs), _read_only(read))
-        self.flags = Channels(_described(flags), _read_only(_as_bools(flag_buffer, ctypes.sizeof(flag_type))))
+        self.inputs = Channels(_make_channels(inputs), input_values)
+        self.outputs = Channels(_make_channels(outputs), _read_only(output_values))
+        self.flags = Channels(_make_channels(flags), _read_only(_as_bools(flag_buffer, ctypes.sizeof(flag_type))))
 
         self.now, self.length, self.ended = ctypes.c_double(), ctypes.c_double(), ctypes.c_bool()
         if instance.fmi == 2:
             names = ("fmi2SetReal", "fmi2GetReal", "fmi2GetBoolean")
         else:
             names = ("fmi3SetFloat64", "fmi3GetFloat64", "fmi3GetBoolean")
-        self.set_inputs = self._of_values(instance, names[0], inputs, _doubles(sent))
-        self.get_outputs = self._of_values(instance, names[1], outputs, _doubles(read))
-        self.get_flags = self._of_values(instance, names[2], flags, flag_buffer)
-        self.do_step = self._of_step(instance)
+        self.set_inputs = self._values_call(instance, names[0], inputs, _doubles(input_values))
+        self.get_outputs = self._values_call(instance, names[1], outputs, _doubles(output_values))
+        self.get_flags = self._values_call(instance, names[2], flags, flag_buffer)
+        self.do_step = self._step_call(instance)
 
-    def _of_step(self, instance: Instance) -> Call:
+    def _step_call(self, instance: Instance) -> Call:
         component = ctypes.c_void_p(instance.fmu.component)
         # an FMU without save and restore may discard the state before a step
-        forgets = "state" not in instance.capabilities
+        no_rollback = "state" not in instance.capabilities
         if instance.fmi == 2:
-            return self._library["fmi2DoStep"], (component, self.now, self.length, ctypes.c_int(forgets))
+            return self._library["fmi2DoStep"], (component, self.now, self.length, ctypes.c_int(no_rollback))
         event, early, last = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()
         results = [ctypes.byref(result) for result in (event, self.ended, early, last)]
-        return self._library["fmi3DoStep"], (component, self.now, self.length, ctypes.c_bool(forgets), *results)
+        return self._library["fmi3DoStep"], (component, self.now, self.length, ctypes.c_bool(no_rollback), *results)
 
-    def _of_values(self, instance: Instance, name: str, variables: list[Any], buffer: Any) -> Call:
+    def _values_call(self, instance: Instance, name: str, variables: list[Any], buffer: Any) -> Call:
         if not variables:  # some FMUs refuse a call without variables
-            return _nothing, ()
+            return _no_call, ()
         n = ctypes.c_size_t(len(variables))
         references = (ctypes.c_uint * len(variables))(*(v.valueReference for v in variables))
         arguments: tuple[Any, ...] = (ctypes.c_void_p(instance.fmu.component), references, n, buffer)
@@ -112,7 +112,7 @@ class BoundCalls:
         return self._library[name], arguments if instance.fmi == 2 else (*arguments, n)
 
 
-def _nothing() -> int:
+def _no_call() -> int:
     return 0
 
 
@@ -128,7 +128,7 @@ def _as_bools(buffer: Any, size: int) -> NDArray[np.bool_]:
     return np.frombuffer(buffer, np.bool_)[0 if sys.byteorder == "little" else size - 1 :: size]
 
 
-def _described(variables: list[Any]) -> tuple[Channel, ...]:
+def _make_channels(variables: list[Any]) -> tuple[Channel, ...]:
     return tuple(Channel(v.name, v.unit or "", v.description or "") for v in variables)
 
 

@@ -18,7 +18,7 @@ from plant_fmu.running.instance import WARNING, Instance
 from plant_fmu.running.state import Clock
 from plant_fmu.running.values import Value, convert_value, require_settable
 
-_LONGEST_STEP = 1e9  # s, bound of a step
+_MAX_STEP = 1e9  # s, bound of a step
 _AT_ZERO = Clock(0.0, 0, math.nan)
 
 
@@ -58,8 +58,8 @@ class CoSimulationInstance:
             self._instance.close()
             raise
         self.inputs, self.outputs, self.flags = bound.inputs, bound.outputs, bound.flags
-        self._input_at = {name: i for i, name in enumerate(self.inputs.names)}
-        self._output_at = {name: i for i, name in enumerate(self.outputs.names)}
+        self._input_index = {name: i for i, name in enumerate(self.inputs.names)}
+        self._output_index = {name: i for i, name in enumerate(self.outputs.names)}
         self._calls = (*bound.set_inputs, *bound.do_step, *bound.get_outputs)
         self._now, self._ended = bound.now, bound.ended
         self._set_clock(_AT_ZERO, initialised=False)
@@ -118,27 +118,27 @@ class CoSimulationInstance:
         for _, (variables, numbers) in sorted(batches.items(), key=lambda batch: batch[0] in DOUBLES):
             self._instance.set(variables, numbers)
             for variable, number in zip(variables, numbers, strict=True):
-                if variable.name in self._input_at:
-                    self.inputs.values[self._input_at[variable.name]] = number
+                if variable.name in self._input_index:
+                    self.inputs.values[self._input_index[variable.name]] = number
         if self.initialised:
             self._read()
 
     def __setitem__(self, name: str, value: Value) -> None:
-        if name in self._input_at:
+        if name in self._input_index:
             self._require_open()
-            self.inputs.values[self._input_at[name]] = convert_value(self._variable(name), value)
+            self.inputs.values[self._input_index[name]] = convert_value(self._variable(name), value)
         else:
             self.set({name: value})
 
     def __getitem__(self, name: str) -> Value:
         self._require_open()
-        if name in self._input_at:
-            return float(self.inputs.values[self._input_at[name]])
+        if name in self._input_index:
+            return float(self.inputs.values[self._input_index[name]])
         variable = self._variable(name)
         if not self.initialised:
             raise PlantError(f"{name} has no value before initialise()")
-        if name in self._output_at:
-            return float(self.outputs.values[self._output_at[name]])
+        if name in self._output_index:
+            return float(self.outputs.values[self._output_index[name]])
         if variable.dimensions or variable.type in ("Binary", "Clock"):
             kind = "an array" if variable.dimensions else f"of type {variable.type}"
             raise PlantError(f"{name} is {kind}, expected a scalar number, Boolean or text")
@@ -148,21 +148,23 @@ class CoSimulationInstance:
     def _variable(self, name: str) -> Any:
         known = self._instance.variables
         if name not in known:
-            near = difflib.get_close_matches(str(name), known, n=1)
-            said = f"did you mean {near[0]!r}?" if near else f"expected one of the {len(known)} in plant.names"
-            raise PlantError(f"FMU variable {name!r} is unknown; {said}")
+            matches = difflib.get_close_matches(str(name), known, n=1)
+            suggestion = (
+                f"did you mean {matches[0]!r}?" if matches else f"expected one of the {len(known)} in plant.names"
+            )
+            raise PlantError(f"FMU variable {name!r} is unknown; {suggestion}")
         return known[name]
 
     def _require_open(self) -> None:
         if self._instance.closed:
             raise PlantError(f"plant {self.name} is closed")
 
-    def _require_initialised(self, what: str) -> None:
+    def _require_initialised(self, action: str) -> None:
         self._require_open()
         if not self.initialised:
-            raise PlantError(f"plant {self.name} {what} before initialise()")
+            raise PlantError(f"plant {self.name} {action} before initialise()")
 
-    # ---- life ----
+    # ---- life cycle ----
 
     def initialise(self, time: float = 0.0) -> None:
         """Initialise the FMU, and read the outputs.
@@ -193,7 +195,7 @@ class CoSimulationInstance:
                 instance.do(fmu.enterInitializationMode, startTime=time)
             instance.do(fmu.exitInitializationMode)
         except PlantError as error:
-            raise PlantError(f"{error}; reset(), then set what is right") from error
+            raise PlantError(f"{error}; reset(), then set valid values") from error
         self._set_clock(Clock(time, 0, math.nan), initialised=True)
         self._read()
 
@@ -226,39 +228,39 @@ class CoSimulationInstance:
         """
         if step != self._step:
             self._change_step(step)
-        set_inputs, of_inputs, do_step, of_step, get_outputs, of_outputs = self._calls
+        set_inputs, input_arguments, do_step, step_arguments, get_outputs, output_arguments = self._calls
         self._now.value = self.time
-        if set_inputs(*of_inputs) > WARNING or do_step(*of_step) > WARNING:
-            raise PlantError(f"t = {self.time:.6g} s: {self._said()}")
+        if set_inputs(*input_arguments) > WARNING or do_step(*step_arguments) > WARNING:
+            raise PlantError(f"t = {self.time:.6g} s: {self._failure_message()}")
         self._count = count = self._count + 1
         self.time = self._start + count * self._step
-        if get_outputs(*of_outputs) > WARNING:
-            raise PlantError(f"t = {self.time:.6g} s: {self._said()}")
+        if get_outputs(*output_arguments) > WARNING:
+            raise PlantError(f"t = {self.time:.6g} s: {self._failure_message()}")
         if self._ended.value:
-            raise PlantError(f"t = {self.time:.6g} s: the FMU asks to end the simulation")
+            raise PlantError(f"t = {self.time:.6g} s: the FMU requests the end of the simulation")
 
     def _change_step(self, step: float) -> None:
         """Prepare steps of another length than before."""
         self._require_initialised("cannot step")
         number = isinstance(step, (int, float, np.integer, np.floating)) and not isinstance(step, bool)
-        if not (number and 0.0 < step < _LONGEST_STEP):
+        if not (number and 0.0 < step < _MAX_STEP):
             raise PlantError(f"step is {step!r}, expected seconds above 0")
         if step != self._last_step:
             self._start, self._count = self.time, 0
         self._step = self._last_step = self._bound.length.value = float(step)
 
     def _send(self) -> None:
-        set_inputs, of_inputs = self._bound.set_inputs
-        if set_inputs(*of_inputs) > WARNING:
-            raise PlantError(f"the inputs are refused: {self._said()}")
+        set_inputs, input_arguments = self._bound.set_inputs
+        if set_inputs(*input_arguments) > WARNING:
+            raise PlantError(f"the inputs are refused: {self._failure_message()}")
 
-    def _said(self) -> str:
+    def _failure_message(self) -> str:
         return self._instance.messages.take_failures() or "the FMU failed without a message"
 
     def _read(self) -> None:
-        get_outputs, of_outputs = self._bound.get_outputs
-        if get_outputs(*of_outputs) > WARNING:
-            raise PlantError(f"the outputs cannot be read: {self._said()}")
+        get_outputs, output_arguments = self._bound.get_outputs
+        if get_outputs(*output_arguments) > WARNING:
+            raise PlantError(f"the outputs cannot be read: {self._failure_message()}")
 
     def read_flags(self) -> NDArray[np.bool_]:
         """Read the Boolean outputs after the last step.
@@ -275,9 +277,9 @@ class CoSimulationInstance:
         """
         if not self.initialised:
             self._require_initialised("has no flags")
-        get_flags, of_flags = self._bound.get_flags
-        if get_flags(*of_flags) > WARNING:
-            raise PlantError(f"the flags cannot be read: {self._said()}")
+        get_flags, flag_arguments = self._bound.get_flags
+        if get_flags(*flag_arguments) > WARNING:
+            raise PlantError(f"the flags cannot be read: {self._failure_message()}")
         return self.flags.values
 
     def close(self) -> None:

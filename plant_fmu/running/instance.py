@@ -19,7 +19,7 @@ from fmpy.fmi2 import FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi2 import defaultCallbacks as default_callbacks
 from fmpy.fmi3 import FMU3Slave
 
-from plant_fmu.archive import archive_of, temporary_folder
+from plant_fmu.archive import make_archive, temporary_folder
 from plant_fmu.errors import FmuFileError, PlantError
 from plant_fmu.unpacking import DESCRIPTION, library_names, unpack
 
@@ -96,7 +96,7 @@ class Instance:
             raise
         except Exception as error:
             self._end()
-            raise PlantError(f"{path}: {self.messages.take_failures() or _one_line(error)}") from error
+            raise PlantError(f"{path}: {self.messages.take_failures() or _message_of(error)}") from error
         except BaseException:
             self._end()
             raise
@@ -115,7 +115,7 @@ class Instance:
             name for name, keys in _CAPABILITIES.items() if interface.get(keys[self.fmi - 2]) in ("true", "1")
         }
 
-        description = _described(Path(folder, DESCRIPTION).read_bytes())
+        description = _parse_description(Path(folder, DESCRIPTION).read_bytes())
         self.name, self.token = description.modelName, description.guid
         self.variables = {v.name: v for v in description.modelVariables}
         identifier = description.coSimulation.modelIdentifier
@@ -123,14 +123,14 @@ class Instance:
         if not Path(folder, library).is_file():
             raise PlantError(f"{path}: has no binary for this machine, expected {library}")
         with _LOADING:
-            here = os.getcwd()
+            working_folder = os.getcwd()
             try:
                 kind = FMU2Slave if self.fmi == 2 else FMU3Slave
                 self.fmu = kind(
                     guid=self.token, unzipDirectory=folder, modelIdentifier=identifier, instanceName=self.name
                 )
             finally:
-                os.chdir(here)
+                os.chdir(working_folder)
         loaded.append(self.fmu)
         if self.fmi == 2:
             self.fmu.instantiate(callbacks=_callbacks_fmi2(self.messages))
@@ -145,7 +145,7 @@ class Instance:
         try:
             return call(*arguments, **named)
         except Exception as error:
-            raise PlantError(self.messages.take_failures() or _one_line(error)) from error
+            raise PlantError(self.messages.take_failures() or _message_of(error)) from error
 
     def get(self, variable: Any) -> Any:
         """Return the value of a scalar variable, as a float, int, bool or str."""
@@ -196,12 +196,12 @@ class Instance:
 
 
 @functools.lru_cache(maxsize=16)
-def _described(xml: bytes) -> Any:
+def _parse_description(xml: bytes) -> Any:
     """Return FMPy's parsed model description, which is not to be changed; parsing is half of an instance's start.
 
     FMPy reads FMUs only, so the text is packed into one without other files.
     """
-    return fmpy.read_model_description(io.BytesIO(archive_of({DESCRIPTION: xml})))
+    return fmpy.read_model_description(io.BytesIO(make_archive({DESCRIPTION: xml})))
 
 
 def _release(loaded: list[Any], states: dict[int, Any], extracted: contextlib.ExitStack) -> None:
@@ -214,13 +214,13 @@ def _release(loaded: list[Any], states: dict[int, Any], extracted: contextlib.Ex
             else:
                 fmu.freeLibrary()
     except Exception as error:  # noqa: BLE001 -- an FMU that cannot end well must not keep the folder
-        log.warning("FMU not freed: %s", _one_line(error))
+        log.warning("FMU not freed: %s", _message_of(error))
     finally:
         states.clear()
         extracted.close()
 
 
-def _one_line(error: Exception) -> str:
+def _message_of(error: Exception) -> str:
     return " ".join(str(error).split()) or type(error).__name__
 
 

@@ -30,7 +30,7 @@ class Native(NamedTuple):
     results: NDArray[np.int64]  # (4,) results of fmi3DoStep by pointer, each at the first byte of its element
 
 
-def native_of(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Native:
+def native_calls(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Native:
     """Return the addresses of an instance's C functions, with buffers.
 
     Parameters

@@ -12,7 +12,7 @@ from plant_fmu.build import FMI_VERSIONS, cached_fmu
 from plant_fmu.errors import PlantError
 from plant_fmu.running.channels import DOUBLES
 from plant_fmu.running.co_simulation_instance import CoSimulationInstance
-from plant_fmu.running.native import Native, native_of
+from plant_fmu.running.native import Native, native_calls
 from plant_fmu.running.state import Clock, State, from_bytes, to_bytes
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
@@ -65,7 +65,7 @@ class Plant(CoSimulationInstance):
     """
 
     def __init__(self, source: str | Path | Vehicle, fmi: int = 3) -> None:
-        path = _fmu_of(source, fmi)
+        path = _locate_fmu(source, fmi)
         super().__init__(path, brief=str(path) != str(source))  # a vehicle's FMU is this package's own, and fast
 
     def save(self) -> State:
@@ -159,13 +159,13 @@ class Plant(CoSimulationInstance):
         self._require_initialised("has no derivatives")
         rows, columns = ([self._real(name) for name in names] for names in (unknowns, knowns))
         self._send()
-        found = np.zeros((len(rows), len(columns)))
+        jacobian = np.zeros((len(rows), len(columns)))
         for j, column in enumerate(columns if rows else ()):
             try:
-                found[:, j] = self._instance.do(self._instance.fmu.getDirectionalDerivative, rows, [column], [1.0])
+                jacobian[:, j] = self._instance.do(self._instance.fmu.getDirectionalDerivative, rows, [column], [1.0])
             except PlantError as error:
                 raise PlantError(f"derivatives of {', '.join(unknowns)} by {knowns[j]}: {error}") from error
-        return found
+        return jacobian
 
     def native(self, inputs: Sequence[str], outputs: Sequence[str]) -> Native:
         """Return the C functions of an initialised FMI 3.0 plant for a compiled loop.
@@ -189,7 +189,7 @@ class Plant(CoSimulationInstance):
             If the plant is not initialised or of another version, or a variable is no real scalar.
         """
         self._require_initialised("cannot be stepped")
-        return native_of(self._instance, tuple(inputs), tuple(outputs))
+        return native_calls(self._instance, tuple(inputs), tuple(outputs))
 
     def _real(self, name: str) -> int:
         """Return the value reference of a variable that has derivatives."""
@@ -199,13 +199,13 @@ class Plant(CoSimulationInstance):
             raise PlantError(f"{name} is {kind}, expected a real scalar variable")
         return int(variable.valueReference)
 
-    def _require(self, capability: str, what: str) -> None:
+    def _require(self, capability: str, action: str) -> None:
         self._require_open()
         if capability not in self._instance.capabilities:
-            raise PlantError(f"{self._instance.path}: this FMU {what}")
+            raise PlantError(f"{self._instance.path}: this FMU {action}")
 
 
-def _fmu_of(source: str | Path | Vehicle, fmi: int) -> Path:
+def _locate_fmu(source: str | Path | Vehicle, fmi: int) -> Path:
     if fmi not in FMI_VERSIONS:
         raise PlantError(f"FMI version is {fmi!r}, expected 2 or 3")
     if isinstance(source, Vehicle):

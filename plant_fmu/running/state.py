@@ -87,11 +87,11 @@ class State:
 
 def to_bytes(state: State, instance: Instance) -> bytes:
     """Serialise a state to bytes that any plant with the same FMU can read, on the same kind of machine."""
-    own: bytes = instance.do(instance.fmu.serializeFMUState, state.handle(instance))
+    fmu_state: bytes = instance.do(instance.fmu.serializeFMUState, state.handle(instance))
     clock, inputs = state.clock, state.inputs.astype("<f8")
-    start = _BODY.pack(state.initialised, clock.start, clock.count, clock.step, len(inputs))
-    body = start + inputs.tobytes() + own
-    return _HEAD.pack(_MAGIC, _mark(instance), zlib.crc32(body)) + body
+    header = _BODY.pack(state.initialised, clock.start, clock.count, clock.step, len(inputs))
+    body = header + inputs.tobytes() + fmu_state
+    return _HEAD.pack(_MAGIC, _fmu_digest(instance), zlib.crc32(body)) + body
 
 
 def from_bytes(data: bytes, instance: Instance) -> State:
@@ -104,8 +104,8 @@ def from_bytes(data: bytes, instance: Instance) -> State:
     """
     if len(data) < _HEAD.size + _BODY.size or not data.startswith(_MAGIC):
         raise PlantError(f"{len(data)} bytes came, expected a serialised state of a plant")
-    _, mark, checksum = _HEAD.unpack_from(data)
-    if mark != _mark(instance):
+    _, fmu_digest, checksum = _HEAD.unpack_from(data)
+    if fmu_digest != _fmu_digest(instance):
         raise PlantError(f"the serialised state is of another FMU than {instance.path}")
     body = data[_HEAD.size :]
     if zlib.crc32(body) != checksum:
@@ -116,6 +116,6 @@ def from_bytes(data: bytes, instance: Instance) -> State:
     return State(instance, handle, Clock(start, count, step), initialised, inputs)
 
 
-def _mark(instance: Instance) -> bytes:
+def _fmu_digest(instance: Instance) -> bytes:
     """Return an 8-byte digest that identifies the FMU: its FMI version and token."""
     return hashlib.sha256(f"{instance.fmi} {instance.token}".encode()).digest()[:8]

@@ -13,7 +13,7 @@ from plant_fmu.running.channels import DOUBLES
 Value = float | int | bool | str
 
 _REALS = (*DOUBLES, "Float32")
-_WHOLE = {  # number of bits of each type of whole numbers, and True if signed
+_INTEGERS = {  # number of bits of each type of whole numbers, and True if signed
     "Integer": (32, True),
     "Enumeration": (32, True),  # wider in FMI 3.0, but no enumeration has that many items
     **{f"Int{bits}": (bits, True) for bits in (8, 16, 32, 64)},
@@ -46,16 +46,16 @@ def convert_value(variable: Any, value: object) -> Value:
         raise PlantError(f"{variable.name} is an array, expected a scalar: arrays cannot be set")
     if kind in _REALS:
         return _real(variable, value)
-    if kind in _WHOLE:
-        return _whole(variable, value, *_WHOLE[kind])
+    if kind in _INTEGERS:
+        return _integer(variable, value, *_INTEGERS[kind])
     if kind == "Boolean":
         if isinstance(value, (bool, np.bool_)) or (_is_number(value) and value in (0, 1)):
             return bool(value)
-        raise _refused(variable, value, "true or false")
+        raise _type_error(variable, value, "true or false")
     if kind == "String":
         if isinstance(value, str):
             return value
-        raise _refused(variable, value, "a text")
+        raise _type_error(variable, value, "a text")
     raise PlantError(f"{variable.name} is of type {kind}, which cannot be set")
 
 
@@ -85,20 +85,20 @@ def require_settable(variable: Any, initialised: bool) -> None:
 
 def _real(variable: Any, value: object) -> float:
     if not _is_number(value):
-        raise _refused(variable, value, "a number")
+        raise _type_error(variable, value, "a number")
     number = float(value)  # type: ignore[arg-type]
     if math.isnan(number):
-        raise _refused(variable, number, "a number")
+        raise _type_error(variable, number, "a number")
     return number
 
 
-def _whole(variable: Any, value: object, bits: int, signed: bool) -> int:
+def _integer(variable: Any, value: object, bits: int, signed: bool) -> int:
     if not _is_number(value) or not math.isfinite(value) or value != int(value):  # type: ignore[arg-type, call-overload]
-        raise _refused(variable, value, "a whole number")
+        raise _type_error(variable, value, "a whole number")
     number = int(value)  # type: ignore[call-overload]
-    least, greatest = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
-    if not least <= number <= greatest:
-        raise _refused(variable, number, f"a whole number from {least} to {greatest}")
+    minimum, maximum = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
+    if not minimum <= number <= maximum:
+        raise _type_error(variable, number, f"a whole number from {minimum} to {maximum}")
     return int(number)
 
 
@@ -106,6 +106,6 @@ def _is_number(value: object) -> bool:
     return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
-def _refused(variable: Any, value: object, expected: str) -> PlantError:
+def _type_error(variable: Any, value: object, expected: str) -> PlantError:
     unit = f" in {variable.unit}" if variable.unit else ""
     return PlantError(f"{variable.name} is {value!r}, expected {expected}{unit}")

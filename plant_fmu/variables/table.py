@@ -49,9 +49,9 @@ def variables(vehicle: Vehicle, coupled: bool = False) -> list[Variable]:
     ]
     for v in rows:
         if not v.quantity.minimum <= v.start <= v.quantity.maximum:
-            least, most = v.quantity.minimum, v.quantity.maximum
+            minimum, maximum = v.quantity.minimum, v.quantity.maximum
             raise VehicleError(
-                f"{vehicle.name}: {v.name} is {v.start:g} {v.quantity.unit}, expected {least:g} to {most:g}"
+                f"{vehicle.name}: {v.name} is {v.start:g} {v.quantity.unit}, expected {minimum:g} to {maximum:g}"
             )
     names = [v.name for v in rows if v.role in ("time", "state", "input", "parameter")]
     depends = {patterns: _expand(patterns, names) for patterns in {v.depends for v in rows}}  # many have the same
@@ -122,13 +122,13 @@ _MOTION = (
 )  # fmt: skip
 
 
-def _of_thruster(i: int, *names: str) -> tuple[str, ...]:
+def _thruster_names(i: int, *names: str) -> tuple[str, ...]:
     return tuple(f"{name}[{i + 1}]" for name in names)
 
 
-def _of_wrench(i: int, *more: str) -> tuple[str, ...]:
-    known = _WRENCH if i < 3 else (f"wrench.{FORCES[i]}", "wrench_time_constant")
-    return (*known, f"actuator.wrench.{FORCES[i]}", *more)
+def _wrench_names(i: int, *more: str) -> tuple[str, ...]:
+    own = _WRENCH if i < 3 else (f"wrench.{FORCES[i]}", "wrench_time_constant")
+    return (*own, f"actuator.wrench.{FORCES[i]}", *more)
 
 
 def _outputs(vehicle: Vehicle) -> Iterator[Variable]:
@@ -145,7 +145,7 @@ def _outputs(vehicle: Vehicle) -> Iterator[Variable]:
     for i in range(vehicle.n_thrusters):
         description = f"Force that thruster {i + 1} gives now"
         depends = (
-            *_of_thruster(i, *_THRUSTER, "thrust_rate_limit", "thrust_effectiveness", "thrust_failure"),
+            *_thruster_names(i, *_THRUSTER, "thrust_rate_limit", "thrust_effectiveness", "thrust_failure"),
             "supply_voltage",
             f"actuator.thrust[{i + 1}]",
         )
@@ -154,7 +154,7 @@ def _outputs(vehicle: Vehicle) -> Iterator[Variable]:
         kind, quantity = ("Force", q.ALL_FORCES) if i < 3 else ("Moment", q.ALL_MOMENTS)
         pushing = (f"thruster_matrix[{i + 1},*", "thrust[*", "thrust_*", "actuator.thrust*", "supply_voltage")
         description = f"{kind} of all actuators on the body {_along(i)}"
-        yield output(f"actuation.{name}", f"wrench[{i}]", quantity, description, *_of_wrench(i, *pushing))
+        yield output(f"actuation.{name}", f"wrench[{i}]", quantity, description, *_wrench_names(i, *pushing))
 
 
 def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
@@ -196,9 +196,9 @@ def _derivatives(vehicle: Vehicle) -> Iterator[Variable]:
             depends = _MOTION
         elif part.startswith("thrust"):
             i = int(part.removeprefix("thrust[").removesuffix("]")) - 1
-            depends = (*_of_thruster(i, *_THRUSTER, "thrust_rate_limit"), "supply_voltage", name)
+            depends = (*_thruster_names(i, *_THRUSTER, "thrust_rate_limit"), "supply_voltage", name)
         else:
-            depends = _of_wrench(FORCES.index(part[-1]))
+            depends = _wrench_names(FORCES.index(part[-1]))
         member = state.member.replace("state.", "outputs.rate.", 1)
         quantity = q.unbounded(units[state.quantity.unit], state.quantity.nominal)
         yield Variable(f"der({name})", "derivative", member, quantity, f"Time derivative of {name}", depends=depends)
@@ -335,9 +335,9 @@ def _discrete(vehicle: Vehicle) -> Iterator[Variable]:
     for i in range(vehicle.n_thrusters):
         description = f"The command of thruster {i + 1} is beyond its limits"
         yield flag(
-            f"thrust_saturated[{i + 1}]", f"flags.thrust_cut[{i}]", description,
-            *_of_thruster(i, *_THRUSTER[:3], *_THRUSTER[-3:]), "supply_voltage",
+            f"thrust_saturated[{i + 1}]", f"flags.thrust_saturated[{i}]", description,
+            *_thruster_names(i, *_THRUSTER[:3], *_THRUSTER[-3:]), "supply_voltage",
         )  # fmt: skip
     description = "The force of the wrench input is beyond its limit"
-    yield flag("wrench_saturated", "flags.wrench_cut", description, *_WRENCH[:4])
+    yield flag("wrench_saturated", "flags.wrench_saturated", description, *_WRENCH[:4])
     yield flag("bottom_contact", "flags.bottom_touched", "The hull touches the bottom", *_BOTTOM, "hull_radius")

@@ -72,7 +72,7 @@ static void count(int which, int status)
 
 #if FMI == 2
 
-static void hear(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status, fmi2String category, fmi2String text, ...)
+static void log_callback(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status, fmi2String category, fmi2String text, ...)
 {
     (void)e;
     if (!name || !category || !text || (int)status < 0)
@@ -81,7 +81,7 @@ static void hear(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status,
 
 static Unit create(int me, int quiet)
 {
-    static fmi2CallbackFunctions loud = {hear, NULL, NULL, NULL, NULL}, silent = {NULL, NULL, NULL, NULL, NULL};
+    static fmi2CallbackFunctions loud = {log_callback, NULL, NULL, NULL, NULL}, silent = {NULL, NULL, NULL, NULL, NULL};
     return fmi2Instantiate(draw(20) ? "x" : NULL, me ? fmi2ModelExchange : fmi2CoSimulation,
                            draw(50) ? INSTANTIATION_TOKEN : "no%s%n", NULL, quiet ? &silent : &loud, 0, draw(2) != 0);
 }
@@ -130,7 +130,7 @@ static int integers(Unit c, unsigned reference, int value)
 
 #else
 
-static void hear(fmi3InstanceEnvironment e, fmi3Status status, fmi3String category, fmi3String text)
+static void log_callback(fmi3InstanceEnvironment e, fmi3Status status, fmi3String category, fmi3String text)
 {
     (void)e;
     if (!category || !text || (int)status < 0)
@@ -140,8 +140,8 @@ static void hear(fmi3InstanceEnvironment e, fmi3Status status, fmi3String catego
 static Unit create(int me, int quiet)
 {
     const char *token = draw(50) ? INSTANTIATION_TOKEN : "no%s%n", *name = draw(20) ? "x" : NULL;
-    return me ? fmi3InstantiateModelExchange(name, token, NULL, 0, draw(2), NULL, quiet ? NULL : hear)
-              : fmi3InstantiateCoSimulation(name, token, NULL, 0, draw(2), 0, 0, NULL, 0, NULL, quiet ? NULL : hear, NULL);
+    return me ? fmi3InstantiateModelExchange(name, token, NULL, 0, draw(2), NULL, quiet ? NULL : log_callback)
+              : fmi3InstantiateCoSimulation(name, token, NULL, 0, draw(2), 0, 0, NULL, 0, NULL, quiet ? NULL : log_callback, NULL);
 }
 
 #define CALL(name) fmi3##name

@@ -15,7 +15,7 @@ typedef fmi2Component Unit;
 typedef fmi2FMUstate Kept;
 typedef fmi2String Text;
 
-static void hear(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status, fmi2String category, fmi2String text, ...)
+static void log_callback(fmi2ComponentEnvironment e, fmi2String name, fmi2Status status, fmi2String category, fmi2String text, ...)
 {
     (void)e, (void)name, (void)status, (void)category;
     snprintf(said + strlen(said), sizeof said - strlen(said), "%s; ", text);
@@ -33,7 +33,7 @@ static void tell(fmi3InstanceEnvironment e, fmi3Status status, fmi3String catego
     snprintf(said + strlen(said), sizeof said - strlen(said), "%s; ", text);
 }
 
-static fmi3LogMessageCallback hear;
+static fmi3LogMessageCallback log_callback;
 #endif
 
 #define CALL(name) fmi@FMI@##name
@@ -53,9 +53,9 @@ static int begin(int mode, const char *function, const char *argument)
     printf("%s\t%s\t%s\t", MODES[mode], function, argument);
     fflush(stdout);
 #if @FMI@ == 2
-    callbacks.logger = mode == 3 ? NULL : hear;
+    callbacks.logger = mode == 3 ? NULL : log_callback;
 #else
-    hear = mode == 3 ? NULL : tell;
+    log_callback = mode == 3 ? NULL : tell;
 #endif
     memset(area, 0, sizeof area);
     c = @INSTANTIATE@;

@@ -34,7 +34,7 @@ _HANDLES = {"fmi2Component", "fmi3Instance"}
 _STATES = {"fmi2FMUstate", "fmi3FMUState"}
 _POINTERS = _HANDLES | _STATES | {"fmi2String", "fmi3String", "fmi3InstanceEnvironment"}
 _GIVEN = {
-    "functions": "&callbacks", "logMessage": "hear", "instanceName": '"x"',
+    "functions": "&callbacks", "logMessage": "log_callback", "instanceName": '"x"',
     "fmuGUID": "TOKEN", "instantiationToken": "TOKEN",
 }  # fmt: skip
 _COUNTS = {
@@ -138,8 +138,8 @@ def program(fmi: int, token: str, states: int) -> str:
             cases.append(f'    if (begin(mode, "{function.name}", "{argument}")) status = {done}, end(status);')
     instantiate = {
         2: 'fmi2Instantiate("x", mode > 3 ? fmi2ModelExchange : fmi2CoSimulation, TOKEN, NULL, &callbacks, 0, 0)',
-        3: 'mode > 3 ? fmi3InstantiateModelExchange("x", TOKEN, NULL, 0, 0, NULL, hear)\n'
-        '                 : fmi3InstantiateCoSimulation("x", TOKEN, NULL, 0, 0, 0, 0, NULL, 0, NULL, hear, NULL)',
+        3: 'mode > 3 ? fmi3InstantiateModelExchange("x", TOKEN, NULL, 0, 0, NULL, log_callback)\n'
+        '    : fmi3InstantiateCoSimulation("x", TOKEN, NULL, 0, 0, 0, 0, NULL, 0, NULL, log_callback, NULL)',
     }[fmi]
     start = {2: "fmi2SetupExperiment(c, 0, 0, 0, 0, 0), fmi2EnterInitializationMode(c)",
              3: "fmi3EnterInitializationMode(c, 0, 0, 0, 0, 0)"}[fmi]  # fmt: skip

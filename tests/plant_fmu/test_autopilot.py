@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from plant_fmu.autopilot import LONGEST, SHORTEST, Autopilot, effort_of_pulse, pulse_of_effort, validate_autopilot
+from plant_fmu.autopilot import MAX_PULSE, MIN_PULSE, Autopilot, effort_of_pulse, pulse_of_effort, validate_autopilot
 
 
 def require(good, key, came, expected):
@@ -32,10 +32,10 @@ def test_invalid_autopilot_parameters_are_rejected(change):
 @pytest.mark.parametrize(("neutral", "span"), [(1200, 400), (1800, 400), (1500, 700)])
 def test_pulse_range_matches_speed_controller_limits(neutral, span):
     low, high = neutral - span, neutral + span
-    assert low == SHORTEST or high == LONGEST
+    assert low == MIN_PULSE or high == MAX_PULSE
     assert checked(pwm_neutral=neutral, pwm_span=span).pwm_span == span
     for beyond in (1, 50):
-        shift = -beyond if low == SHORTEST else beyond
+        shift = -beyond if low == MIN_PULSE else beyond
         with pytest.raises(ValueError, match="pulses of 800 to 2200 us"):
             checked(pwm_neutral=neutral + shift, pwm_span=span)
 

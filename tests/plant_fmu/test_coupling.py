@@ -9,7 +9,7 @@ from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.t200 import force_of_pulse
 from plant_fmu.variables import variables
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.t200_by_rpm import force_of_rpm
 
 MOTION = ("position.x", "position.y", "position.z", "velocity.u", "velocity.v", "velocity.w", "velocity.q")
@@ -17,7 +17,7 @@ MOTION = ("position.x", "position.y", "position.z", "velocity.u", "velocity.v", 
 
 @pytest.fixture(scope="module")
 def coupled():
-    return cached_fmu(of_vehicle(load_vehicle("odin"), coupled=True), 3)
+    return cached_fmu(make_vehicle_component(load_vehicle("odin"), coupled=True), 3)
 
 
 def fly(fmu, parameters=None, steps=20, **inputs):
@@ -45,7 +45,7 @@ def test_without_coupling_inputs_the_variables_are_unchanged():
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_importers_read_units_of_pulses_and_revolutions(fmi):
     """FMPy validates the file by the official schema; factors to SI units are SciPy's."""
-    fmu = cached_fmu(of_vehicle(load_vehicle("odin"), coupled=True), fmi)
+    fmu = cached_fmu(make_vehicle_component(load_vehicle("odin"), coupled=True), fmi)
     described = fmpy.read_model_description(str(fmu), validate=True)
     read = {v.name: v.unit for v in described.modelVariables}
     assert (read["thrust_pulse[1]"], read["thrust_rpm[8]"]) == ("us", "rev/min")

@@ -17,7 +17,7 @@ from plant_fmu.compiling.sources import header
 from plant_fmu.description import documentation, model_description
 from plant_fmu.quantities import UNITS
 from plant_fmu.variables import variables
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 
 ROOT = Path(__file__).parents[2]
 
@@ -100,14 +100,14 @@ def test_angles_are_shown_in_degrees(fmi):
 
 
 def test_header_names_each_variable_once():
-    text = header(of_vehicle(load_vehicle("odin")), "{token}")
+    text = header(make_vehicle_component(load_vehicle("odin")), "{token}")
     names = re.findall(r'\{"([^"]+)"', text)
     assert names == [v.name for v in variables(load_vehicle("odin"))]
 
 
 @pytest.mark.slow
 def test_instantiation_token_depends_on_the_parameters():
-    descriptions = {model_description(of_vehicle(load_vehicle(name)), 3, "") for name in shipped_vehicles()}
+    descriptions = {model_description(make_vehicle_component(load_vehicle(name)), 3, "") for name in shipped_vehicles()}
     tokens = {read_model_description(str(cached_fmu(load_vehicle(name), 3))).guid for name in shipped_vehicles()}
     assert len(descriptions) == len(tokens) == len(shipped_vehicles())
 
@@ -118,7 +118,7 @@ def test_docs_page_is_up_to_date():
 
 def test_odin_is_labelled_as_unsourced():
     assert "unsourced" in load_vehicle("odin").title
-    assert "unsourced" in model_description(of_vehicle(load_vehicle("odin")), 3, "")
+    assert "unsourced" in model_description(make_vehicle_component(load_vehicle("odin")), 3, "")
 
 
 def test_no_python_inside(fmi, tmp_path):

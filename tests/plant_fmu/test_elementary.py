@@ -13,7 +13,7 @@ from plant_fmu.compiling.compiler import compile_library, find_compiler
 from plant_fmu.compiling.libraries import FMI_HEADERS
 from plant_fmu.compiling.platforms import native_platform
 from plant_fmu.compiling.sources import c_sources, header
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 
 TURN = Decimal("6.28318530717958647692528676655900576839433879875021")
 WITHIN = 2.0  # units in the last place, as elementary.h says
@@ -25,7 +25,7 @@ def functions(once):
     """Return a function that gives one of the functions by name."""
 
     def make(folder):
-        component = of_vehicle(load_vehicle("odin"))
+        component = make_vehicle_component(load_vehicle("odin"))
         for name, data in {**c_sources(component, 3), component.header: header(component, "").encode()}.items():
             (folder / name).write_bytes(data)
         # by its plain name, and for other libraries to see
@@ -122,7 +122,7 @@ def arctangent(x):
 
 def test_table_of_arctangents_holds_each_eighth_and_what_it_lacks():
     getcontext().prec = 50
-    text = c_sources(of_vehicle(load_vehicle("odin")), 3)["elementary.c"].decode()
+    text = c_sources(make_vehicle_component(load_vehicle("odin")), 3)["elementary.c"].decode()
     table = re.search(r"ATAN\[9\]\[2\] = \{(.*?)\};", text, re.DOTALL)
     rows = re.findall(r"\{(.+?), (.+?)\}", table[1])
     assert len(rows) == 9

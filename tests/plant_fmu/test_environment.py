@@ -203,7 +203,7 @@ def test_bottom_is_off_by_default(make_slave):
 def test_hull_starting_inside_the_bottom_is_pushed_out_slowly(make_slave, fmi):
     """However it got there: the bottom's spring is no catapult."""
     slave = make_slave(fmi=fmi, logging_on=True).start(**SINKING | NEUTRAL | {"position.z": 12.0})
-    assert "the hull begins 2.3 m deep in the bottom" in [text for _, text in slave.said]
+    assert "the hull starts 2.3 m deep in the bottom" in [text for _, text in slave.said]
     fastest = 0.0
     for k in range(2000):
         slave.fmu.doStep(k * 0.005, 0.005)

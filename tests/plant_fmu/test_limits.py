@@ -161,4 +161,4 @@ def test_zero_quaternion_has_zero_derivatives(make_slave, fmi, length):
 @pytest.mark.parametrize("i", range(4))
 def test_non_unit_quaternion_is_normalized_and_logged(make_slave, fmi, i):
     said = make_slave(fmi=fmi, logging_on=True).start(**{"quaternion.e0": 0.0, f"quaternion.e{i}": 1.5}).said
-    assert said[0][1] == "quaternion of length 1.5 made a unit quaternion"
+    assert said[0][1] == "quaternion of length 1.5 normalized"

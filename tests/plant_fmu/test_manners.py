@@ -256,9 +256,9 @@ def test_log_categories_are_enabled_on_request(make_slave, fmi):
     quiet, loud = make_slave(fmi=fmi), make_slave(fmi=fmi, logging_on=True)
     for slave in (quiet, loud):
         slave.start(**{"quaternion.e0": 0.5})
-    warning = "quaternion of length 0.5 made a unit quaternion"
+    warning = "quaternion of length 0.5 normalized"
     assert [text for _, text in quiet.said] == [warning]
-    assert [text for _, text in loud.said] == [warning, "initialised at t = 0 s"]
+    assert [text for _, text in loud.said] == [warning, "initialized at t = 0 s"]
     assert [status for status, _ in loud.said] == [1, 0]
 
 
@@ -267,7 +267,7 @@ def test_log_categories_are_enabled_individually(make_slave, fmi):
     slave.fmu.setDebugLogging(False, [])
     slave.fmu.setDebugLogging(True, ["logEvents"])
     slave.start(**{"quaternion.e0": 0.5})
-    assert [text for _, text in slave.said] == ["initialised at t = 0 s"]
+    assert [text for _, text in slave.said] == ["initialized at t = 0 s"]
 
 
 def test_an_unknown_category_is_refused(make_slave, fmi):

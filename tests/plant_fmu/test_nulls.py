@@ -7,7 +7,7 @@ import pytest
 
 from plant_fmu import load_vehicle
 from plant_fmu.build import cached_fmu
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.libraries import read_libraries
 from tests.plant_fmu.nulls import exports, faults, functions, sweep, sweep_sources
 
@@ -41,6 +41,6 @@ def test_null_pointers_are_rejected(fmi, library, tmp_path):
 def test_null_pointers_are_memory_safe(fmi, tmp_path):
     """The same with the sources, under AddressSanitizer and UndefinedBehaviorSanitizer."""
     vehicle = load_vehicle("odin")
-    rows = sweep_sources(tmp_path, fmi, of_vehicle(vehicle))
+    rows = sweep_sources(tmp_path, fmi, make_vehicle_component(vehicle))
     assert len(rows) > 500
     assert faults(rows) == []

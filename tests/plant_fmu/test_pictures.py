@@ -11,7 +11,7 @@ from PIL import Image
 from plant_fmu import load_vehicle, shipped_vehicles
 from plant_fmu.__main__ import main
 from plant_fmu.pictures import PICTURES, image
-from plant_fmu.pictures.variable_map import FAMILIES, of_family, rows_of
+from plant_fmu.pictures.variable_map import FAMILIES, family_members, group_rows
 from plant_fmu.thruster_lines import thruster_lines
 from plant_fmu.variables import variables
 
@@ -85,14 +85,14 @@ def test_every_variable_is_counted_once_in_the_map(name):
     table = variables(load_vehicle(name))
     for role in ("input", "state", "output"):
         of = [v for v in table if v.role == role]
-        assert sum(row.count for row in rows_of(of)) == len(of)
+        assert sum(row.count for row in group_rows(of)) == len(of)
     parameters = [v for v in table if v.role == "parameter"]
-    found = [v.name for family in FAMILIES for v in of_family(parameters, family)]
+    found = [v.name for family in FAMILIES for v in family_members(parameters, family)]
     assert sorted(found) == sorted(v.name for v in parameters)
 
 
 def test_variable_rows_show_indices_components_units_and_types():
-    rows = {row.text: (row.count, row.units) for row in rows_of(variables(load_vehicle("odin")))}
+    rows = {row.text: (row.count, row.units) for row in group_rows(variables(load_vehicle("odin")))}
     assert rows["thrust[1…8]"] == (8, "N")
     assert rows["thruster_matrix[1…6, 1…8]"] == (48, "–, N.m/N")
     assert rows["position.{x, y, z}"] == (3, "m")

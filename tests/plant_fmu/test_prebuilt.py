@@ -17,7 +17,7 @@ from plant_fmu.compiling.platforms import cross_platforms, native_platform
 from plant_fmu.compiling.signature import re_sign
 from plant_fmu.description import token
 from plant_fmu.errors import BuildError
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 
 HERE = native_platform()
@@ -34,7 +34,7 @@ def folder(once, fmi):
     """A folder as in a wheel, with this machine's libraries alone, of eight thrusters."""
 
     def make(folder):
-        general = prebuilt.general_component(of_vehicle(load_vehicle("rexrov")))
+        general = prebuilt.make_general_component(make_vehicle_component(load_vehicle("rexrov")))
         ((_, library),) = compiled_libraries(general, prebuilt.STAND_IN, fmi, [(HERE, find_compiler())])
         with zipfile.ZipFile(folder / prebuilt.file_name(general, fmi), "w") as archive:
             archive.writestr(f"{HERE.name}{HERE.suffix}", library)
@@ -131,7 +131,7 @@ def test_prebuilt_libraries_of_other_sources_are_rejected(no_compiler, tmp_path,
 
 def test_missing_platforms_are_compiled(folder, monkeypatch):
     monkeypatch.setattr(prebuilt, "FOLDER", folder)
-    odin = of_vehicle(load_vehicle("odin"))
+    odin = make_vehicle_component(load_vehicle("odin"))
     key = token(odin, 3)
     assert prebuilt.prebuilt_libraries(odin, key, 3, [HERE])
     other = dataclasses.replace(HERE, name="riscv64-linux")
@@ -183,7 +183,7 @@ def test_libraries_without_a_signature_are_unchanged():
 def test_prebuilt_libraries_match_linker_output(prebuilt_of_eight, monkeypatch):
     """Even the signature of a Mac's: the linker wrote the one, `re_sign` the other. But for marks of identity."""
     compilers = [(platform, cross_compiler(platform)) for platform in cross_platforms("all")]
-    odin = of_vehicle(load_vehicle("odin"))
+    odin = make_vehicle_component(load_vehicle("odin"))
     key = token(odin, 3)
     with zipfile.ZipFile(prebuilt_of_eight) as archive:
         stand_ins = [archive.read(f"{platform.name}{platform.suffix}") for platform, _ in compilers]

@@ -291,7 +291,7 @@ def test_restored_state_keeps_delayed_samples(make_slave, fmi):
     ("values", "said"),
     [
         ({"dvl.delay": 0.1}, "dvl.delay = 0.1 needs the sensor's rate"),
-        ({"imu.rate": 100.0, "imu.delay": 0.1}, "imu.delay = 0.1 s at 100 Hz leaves more than 8 samples under way"),
+        ({"imu.rate": 100.0, "imu.delay": 0.1}, "imu.delay = 0.1 s at 100 Hz leaves more than 8 samples undelivered"),
     ],
 )
 def test_invalid_delay_is_rejected(make_slave, fmi, values, said):

@@ -205,5 +205,5 @@ def test_hull_shape_defaults_to_frame(tmp_path):
     assert {name: load_vehicle(name).hull_shape for name in ("odin", "rexrov")} == {"odin": "sphere", "rexrov": "frame"}
     odin = (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text()
     (tmp_path / "egg.toml").write_text(odin.replace('shape = "sphere"', 'shape = "egg"'))
-    with pytest.raises(TableError, match=r"hull\.shape: expected one of 'frame', 'sphere' \(came: 'egg'\)"):
+    with pytest.raises(TableError, match=r"hull\.shape: expected one of 'frame', 'sphere' \(got 'egg'\)"):
         load_vehicle(tmp_path / "egg.toml")

@@ -24,7 +24,7 @@ from plant_fmu.compiling.platforms import without_wasm
 from plant_fmu.compiling.sources import c_sources, compiled_files, header
 from plant_fmu.description import token
 from plant_fmu.errors import BuildError
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.conftest import CoSimulationInstance
 
 pytestmark = pytest.mark.timeout(900)  # the first build compiles a C library too
@@ -44,7 +44,7 @@ def binaries(once):
     def make(folder):
         odin = load_vehicle("odin")
         build_fmu(odin, 3, folder / "odin.fmu", "native,wasm")
-        component = of_vehicle(odin)
+        component = make_vehicle_component(odin)
         (folder / "odin.wasm").write_bytes(webassembly.module(component, token(component, 3)))
 
     folder = once("webassembly", make)
@@ -141,7 +141,7 @@ def test_other_processors_equal_the_native_library_bit_for_bit(expected, target,
     if emulator and shutil.which(*emulator) is None:
         pytest.skip("qemu-aarch64 is not installed")
     plan, want = expected
-    component = of_vehicle(load_vehicle("odin"))
+    component = make_vehicle_component(load_vehicle("odin"))
     files = {**c_sources(component, 3), component.header: header(component, plan["token"]).encode()}
     for name, data in files.items():
         (tmp_path / name).write_bytes(data)

@@ -190,7 +190,7 @@ static int normalise(Shooter *s)
     double *e = s->model.state.rigid + 3;
     const double norm = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
 
-    if (!plant_normalise(s->model.state.rigid))
+    if (!plant_normalize(s->model.state.rigid))
         return 0;
     for (int j = 0; j < s->asked->n_directions; j++) {
         double *de = s->tangent + N_RIGID * (size_t)j + 3;

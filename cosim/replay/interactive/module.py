@@ -18,7 +18,7 @@ from plant_fmu.compiling.libraries import digest
 from plant_fmu.compiling.sources import c_sources, header
 from plant_fmu.compiling.webassembly import module
 from plant_fmu.description import token
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class FlightModule:
 def flight_module(scenario: Scenario) -> FlightModule:
     """Return the WebAssembly of a scenario's flight."""
     flight, memory = Flight(scenario), Memory()
-    component = of_vehicle(scenario.vehicle)
+    component = make_vehicle_component(scenario.vehicle)
     key = token(component, 3)
     sources = flight_sources(flight, memory, key)
     made_from = {**c_sources(component, 3), component.header: header(component, key).encode(), **sources}

@@ -53,13 +53,13 @@ static inline bool ticks_due(Ticks *ticks, double time)
 }
 
 /* Returns true if a step is so long that it would skip a tick. */
-static inline bool ticks_left_out(const Ticks *ticks, double step)
+static inline bool ticks_would_skip(const Ticks *ticks, double step)
 {
     return step > ticks->period * (1.0 + 1e-6);
 }
 
 /* Returns true if restored counts are valid. */
-static inline bool ticks_possible(const Ticks *ticks)
+static inline bool ticks_valid(const Ticks *ticks)
 {
     return ticks->period >= 0.0 && ticks->period < 1e9 && fabs(ticks->since) <= 1e9 && ticks->count >= 0.0 &&
            ticks->count < 1e15 && (ticks->warned == 0.0 || ticks->warned == 1.0);

@@ -41,7 +41,7 @@ typedef struct Block {
 
 static Block *blocks;
 
-static void *kept(size_t size)
+static void *allocate(size_t size)
 {
     Block *block = malloc(sizeof *block + size);
 
@@ -61,9 +61,9 @@ static void release(void)
     }
 }
 
-static const char *terminated(Text text)
+static const char *c_string(Text text)
 {
-    char *copy = kept(text.n + 1);
+    char *copy = allocate(text.n + 1);
 
     memcpy(copy, text.bytes, text.n);
     copy[text.n] = '\0';
@@ -72,12 +72,12 @@ static const char *terminated(Text text)
 
 /* ---- results ----------------------------------------------------------------------------------------------- */
 
-static bool fails(fmi3Status status)
+static bool has_failed(fmi3Status status)
 {
     return status != fmi3OK && status != fmi3Warning;
 }
 
-static int done(fmi3Status status)
+static int finish(fmi3Status status)
 {
     release();
     return (int)status;
@@ -89,17 +89,17 @@ static Result *success(void)
     return &result;
 }
 
-/* Writes a failure; `place` is that of a success's payload. */
-static Result *failure(fmi3Status status, int place)
+/* Writes a failure; `offset` is that of a success's payload. */
+static Result *failure(fmi3Status status, int offset)
 {
     result.at.bytes[0] = 1;
-    result.at.bytes[place] = (unsigned char)status;
+    result.at.bytes[offset] = (unsigned char)status;
     return &result;
 }
 
 static Result *list(fmi3Status status, void *values, size_t n)
 {
-    if (fails(status))
+    if (has_failed(status))
         return failure(status, 4);
     result.at.words[1] = (size_t)values;
     result.at.words[2] = n;

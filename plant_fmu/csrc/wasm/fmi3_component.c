@@ -3,7 +3,7 @@
 
 __attribute__((export_name("cabi_realloc"))) void *cabi_realloc(void *old, size_t old_size, size_t align, size_t size)
 {
-    void *block = kept(size);
+    void *block = allocate(size);
 
     (void)align;
     if (old)
@@ -78,8 +78,8 @@ Result *co_simulation_instantiate(const char *name, size_t n_name, const char *t
 {
     Handle *handle = new_handle((Text){name, n_name});
 
-    handle->fmu = fmi3InstantiateCoSimulation(handle->name, terminated((Text){token, n_token}),
-                                              terminated((Text){path, n_path}), visible, logging_on, event_mode_used,
+    handle->fmu = fmi3InstantiateCoSimulation(handle->name, c_string((Text){token, n_token}),
+                                              c_string((Text){path, n_path}), visible, logging_on, event_mode_used,
                                               early_return_allowed, intermediate, n_intermediate, handle, log_message,
                                               NULL);
     return instantiated(handle, co_simulation_new);
@@ -97,7 +97,7 @@ METHOD("set-input-derivatives")
 int co_simulation_set_input_derivatives(Handle *self, const void *requests, size_t n, const double values[], size_t nv)
 {
     (void)requests, (void)values, (void)nv;
-    return done(n == 0 ? fmi3OK : (fmi3Status)instance_unsupported(self->fmu, "set-input-derivatives"));
+    return finish(n == 0 ? fmi3OK : (fmi3Status)instance_unsupported(self->fmu, "set-input-derivatives"));
 }
 
 METHOD("do-step") Result *co_simulation_do_step(Handle *self, double time, double step, int no_set_state_before)
@@ -106,7 +106,7 @@ METHOD("do-step") Result *co_simulation_do_step(Handle *self, double time, doubl
     double last;
     const fmi3Status status = fmi3DoStep(self->fmu, time, step, no_set_state_before, &event, &terminate, &early, &last);
 
-    if (fails(status))
+    if (has_failed(status))
         return failure(status, 8);
     result.at.numbers[1] = last;
     result.at.bytes[16] = event;
@@ -144,8 +144,8 @@ Result *model_exchange_instantiate(const char *name, size_t n_name, const char *
 {
     Handle *handle = new_handle((Text){name, n_name});
 
-    handle->fmu = fmi3InstantiateModelExchange(handle->name, terminated((Text){token, n_token}),
-                                               terminated((Text){path, n_path}), visible, logging_on, handle, log_message);
+    handle->fmu = fmi3InstantiateModelExchange(handle->name, c_string((Text){token, n_token}),
+                                               c_string((Text){path, n_path}), visible, logging_on, handle, log_message);
     return instantiated(handle, model_exchange_new);
 }
 
@@ -160,18 +160,18 @@ PLAIN("enter-continuous-time-mode", enter_continuous_time_mode, fmi3EnterContinu
 
 METHOD("set-time") int model_exchange_set_time(Handle *self, double time)
 {
-    return done(fmi3SetTime(self->fmu, time));
+    return finish(fmi3SetTime(self->fmu, time));
 }
 
 METHOD("set-continuous-states") int model_exchange_set_states(Handle *self, const double states[], size_t n)
 {
-    return done(fmi3SetContinuousStates(self->fmu, states, n));
+    return finish(fmi3SetContinuousStates(self->fmu, states, n));
 }
 
 #define STATES(method, x, function)                                                      \
     METHOD(method) Result *model_exchange_##x(Handle *self)                              \
     {                                                                                    \
-        double *values = kept(N_STATES * sizeof *values);                                \
+        double *values = allocate(N_STATES * sizeof *values);                                \
         return list(function(self->fmu, values, N_STATES), values, N_STATES);            \
     }                                                                                    \
     AFTER(method, x)
@@ -182,7 +182,7 @@ STATES("get-nominals-of-continuous-states", get_nominals, fmi3GetNominalsOfConti
 
 METHOD("get-event-indicators") Result *model_exchange_get_event_indicators(Handle *self)
 {
-    return list(fmi3GetEventIndicators(self->fmu, NULL, 0), kept(0), 0);
+    return list(fmi3GetEventIndicators(self->fmu, NULL, 0), allocate(0), 0);
 }
 AFTER("get-event-indicators", get_event_indicators)
 
@@ -191,7 +191,7 @@ AFTER("get-event-indicators", get_event_indicators)
     {                                                                                    \
         size_t n = 0;                                                                    \
         const fmi3Status status = function(self->fmu, &n);                               \
-        if (fails(status))                                                               \
+        if (has_failed(status))                                                               \
             return failure(status, 8);                                                   \
         result.at.integers[1] = n;                                                       \
         return success();                                                                \
@@ -206,7 +206,7 @@ METHOD("completed-integrator-step") Result *model_exchange_completed_integrator_
     fmi3Boolean event, terminate;
     const fmi3Status status = fmi3CompletedIntegratorStep(self->fmu, no_set_state_before, &event, &terminate);
 
-    if (fails(status))
+    if (has_failed(status))
         return failure(status, 1);
     result.at.bytes[1] = event;
     result.at.bytes[2] = terminate;

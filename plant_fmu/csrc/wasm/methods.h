@@ -23,21 +23,21 @@ __attribute__((export_name(INTERFACE "[dtor]" RESOURCE))) void NAME(drop)(Handle
 
 METHOD("set-debug-logging") int NAME(set_debug_logging)(Handle *self, int on, const Text categories[], size_t n)
 {
-    const char **names = kept(n * sizeof *names);
+    const char **names = allocate(n * sizeof *names);
 
     for (size_t i = 0; i < n; i++)
-        names[i] = terminated(categories[i]);
-    return done(fmi3SetDebugLogging(self->fmu, on, n, names));
+        names[i] = c_string(categories[i]);
+    return finish(fmi3SetDebugLogging(self->fmu, on, n, names));
 }
 
 METHOD("enter-initialization-mode")
 int NAME(enter_initialization_mode)(Handle *self, int with_tolerance, double tolerance, double start, int with_stop, double stop)
 {
-    return done(fmi3EnterInitializationMode(self->fmu, with_tolerance, tolerance, start, with_stop, stop));
+    return finish(fmi3EnterInitializationMode(self->fmu, with_tolerance, tolerance, start, with_stop, stop));
 }
 
 #define PLAIN(method, x, function) \
-    METHOD(method) int NAME(x)(Handle *self) { return done(function(self->fmu)); }
+    METHOD(method) int NAME(x)(Handle *self) { return finish(function(self->fmu)); }
 
 PLAIN("exit-initialization-mode", exit_initialization_mode, fmi3ExitInitializationMode)
 PLAIN("enter-event-mode", enter_event_mode, fmi3EnterEventMode)
@@ -54,7 +54,7 @@ METHOD("update-discrete-states") Result *NAME(update_discrete_states)(Handle *se
     double next;
     const fmi3Status status = fmi3UpdateDiscreteStates(self->fmu, &needed, &terminate, &nominals, &values, &defined, &next);
 
-    if (fails(status))
+    if (has_failed(status))
         return failure(status, 8);
     result.at.bytes[8] = needed;
     result.at.bytes[9] = terminate;
@@ -70,7 +70,7 @@ AFTER("update-discrete-states", update_discrete_states)
 
 METHOD("get-float64") Result *NAME(get_float64)(Handle *self, const unsigned references[], size_t n)
 {
-    double *values = kept(n * sizeof *values);
+    double *values = allocate(n * sizeof *values);
 
     return list(fmi3GetFloat64(self->fmu, references, n, values, n), values, n);
 }
@@ -78,12 +78,12 @@ AFTER("get-float64", get_float64)
 
 METHOD("set-float64") int NAME(set_float64)(Handle *self, const unsigned r[], size_t n, const double values[], size_t nv)
 {
-    return done(fmi3SetFloat64(self->fmu, r, n, values, nv));
+    return finish(fmi3SetFloat64(self->fmu, r, n, values, nv));
 }
 
 METHOD("get-int32") Result *NAME(get_int32)(Handle *self, const unsigned references[], size_t n)
 {
-    int *values = kept(n * sizeof *values);
+    int *values = allocate(n * sizeof *values);
 
     return list(fmi3GetInt32(self->fmu, references, n, values, n), values, n);
 }
@@ -91,12 +91,12 @@ AFTER("get-int32", get_int32)
 
 METHOD("set-int32") int NAME(set_int32)(Handle *self, const unsigned r[], size_t n, const int values[], size_t nv)
 {
-    return done(fmi3SetInt32(self->fmu, r, n, values, nv));
+    return finish(fmi3SetInt32(self->fmu, r, n, values, nv));
 }
 
 METHOD("get-boolean") Result *NAME(get_boolean)(Handle *self, const unsigned references[], size_t n)
 {
-    bool *values = kept(n * sizeof *values);
+    bool *values = allocate(n * sizeof *values);
 
     return list(fmi3GetBoolean(self->fmu, references, n, values, n), values, n);
 }
@@ -104,21 +104,21 @@ AFTER("get-boolean", get_boolean)
 
 METHOD("set-boolean") int NAME(set_boolean)(Handle *self, const unsigned r[], size_t n, const bool values[], size_t nv)
 {
-    return done(fmi3SetBoolean(self->fmu, r, n, values, nv));
+    return finish(fmi3SetBoolean(self->fmu, r, n, values, nv));
 }
 
 /* types without a variable in this FMU: only an empty list succeeds */
 #define NONE_GOT(method, x, ...)                                                             \
     METHOD(method) Result *NAME(x)(Handle *self, const unsigned references[], size_t n)      \
     {                                                                                        \
-        return list(__VA_ARGS__, kept(0), 0);                                                \
+        return list(__VA_ARGS__, allocate(0), 0);                                                \
     }                                                                                        \
     AFTER(method, x)
 #define NONE_SET(method, x, ...)                                                                        \
     METHOD(method) int NAME(x)(Handle *self, const unsigned references[], size_t n, const void *values, size_t nv) \
     {                                                                                                   \
         (void)values, (void)nv;                                                                         \
-        return done(__VA_ARGS__);                                                                       \
+        return finish(__VA_ARGS__);                                                                       \
     }
 #define NO_VALUES(type, x, Type)                                                                 \
     NONE_GOT("get-" type, get_##x, fmi3Get##Type(self->fmu, references, n, NULL, n))            \
@@ -169,7 +169,7 @@ METHOD("get-directional-derivative")
 Result *NAME(get_directional_derivative)(Handle *self, const unsigned unknowns[], size_t nu, const unsigned knowns[],
                                          size_t nk, const double seed[], size_t ns)
 {
-    double *values = kept(nu * sizeof *values);
+    double *values = allocate(nu * sizeof *values);
 
     return list(fmi3GetDirectionalDerivative(self->fmu, unknowns, nu, knowns, nk, seed, ns, values, nu), values, nu);
 }
@@ -179,7 +179,7 @@ METHOD("get-adjoint-derivative")
 Result *NAME(get_adjoint_derivative)(Handle *self, const unsigned unknowns[], size_t nu, const unsigned knowns[],
                                      size_t nk, const double seed[], size_t ns)
 {
-    double *values = kept(nk * sizeof *values);
+    double *values = allocate(nk * sizeof *values);
 
     return list(fmi3GetAdjointDerivative(self->fmu, unknowns, nu, knowns, nk, seed, ns, values, nk), values, nk);
 }
@@ -194,10 +194,10 @@ METHOD("get-fmu-state") Result *NAME(get_fmu_state)(Handle *self)
     unsigned char *bytes = NULL;
     fmi3Status status = fmi3GetFMUState(self->fmu, &state);
 
-    if (!fails(status))
+    if (!has_failed(status))
         status = fmi3SerializedFMUStateSize(self->fmu, state, &size);
-    if (!fails(status)) {
-        bytes = kept(size);
+    if (!has_failed(status)) {
+        bytes = allocate(size);
         status = fmi3SerializeFMUState(self->fmu, state, bytes, size);
     }
     if (state)
@@ -211,9 +211,9 @@ METHOD("set-fmu-state") int NAME(set_fmu_state)(Handle *self, const unsigned cha
     fmi3FMUState state = NULL;
     fmi3Status status = fmi3DeserializeFMUState(self->fmu, bytes, size, &state);
 
-    if (!fails(status))
+    if (!has_failed(status))
         status = fmi3SetFMUState(self->fmu, state);
     if (state)
         fmi3FreeFMUState(self->fmu, &state);
-    return done(status);
+    return finish(status);
 }

@@ -21,23 +21,23 @@ typedef struct {
 
     /* Clears samples and clocks before time begins. */
     void (*rewind)(Model *model);
-    /* Updates constants and clocks from the parameters; refuses parameters that contradict each other. */
+    /* Updates constants and clocks from the parameters; refuses contradictory parameters. */
     Status (*prepare)(Instance *instance);
-    /* Ends initialisation: corrects or refuses the start values, and executes the clocks that are due. */
+    /* Ends initialization: corrects or refuses the start values, and executes the clocks that are due. */
     Status (*begin)(Instance *instance);
     /* Computes the outputs. */
     void (*evaluate)(Instance *instance);
     /* Refuses a step [s] that is too long. */
-    Status (*fits)(const Instance *instance, double step);
-    /* Makes a step that ends at a time; on refusal the model stays as before. */
+    Status (*check_step_size)(const Instance *instance, double step);
+    /* Makes a step that ends at the time `end` [s]; on refusal the model stays as before. */
     Status (*advance)(Instance *instance, double end);
     /* True if a restored model is valid; the ranges of its variables are checked elsewhere. */
-    bool (*possible)(const Model *model);
+    bool (*valid_state)(const Model *model);
 
     /* For model exchange; all NULL without states: then the FMU offers co-simulation alone, and no derivatives. */
 
-    /* Sets states without lag to their inputs. Returns 1 if any changed. */
-    int (*settle)(Model *model);
+    /* Sets states without a lag to their inputs. Returns 1 if any changed. */
+    int (*apply_unlagged)(Model *model);
     /* Executes the clocks that are due. Returns 1 if there was one. */
     int (*tick)(Model *model);
     /* Returns the time of the next tick; INFINITY: none. */

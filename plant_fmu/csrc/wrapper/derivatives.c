@@ -1,10 +1,10 @@
-/* Directional and adjoint derivatives by the table of variables: a second Model holds each seed at the place of its
- * variable, and a third the sensitivities at those of theirs. */
+/* Directional and adjoint derivatives by the table of variables: a second Model holds the seeds at their variables'
+ * offsets, and a third one the sensitivities. */
 #include <string.h>
 
 #include "instance.h"
 
-static Status prepare(Instance *instance, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[],
+static Status check_references(Instance *instance, const unsigned unknowns[], size_t n_unknowns, const unsigned knowns[],
                       size_t n_knowns)
 {
     if (!COMPONENT.tangent)
@@ -24,9 +24,9 @@ static Status prepare(Instance *instance, const unsigned unknowns[], size_t n_un
     return instance_update(instance);
 }
 
-static int starting(const Instance *instance)
+static int is_initializing(const Instance *instance)
 {
-    return instance->mode == MODE_INITIALISING;
+    return instance->mode == MODE_INITIALIZING;
 }
 
 Status instance_directional_derivative(Instance *instance, const unsigned unknowns[], size_t n_unknowns,
@@ -35,12 +35,12 @@ Status instance_directional_derivative(Instance *instance, const unsigned unknow
 {
     Model direction, tangent;
 
-    if (prepare(instance, unknowns, n_unknowns, knowns, n_knowns) != STATUS_OK)
+    if (check_references(instance, unknowns, n_unknowns, knowns, n_knowns) != STATUS_OK)
         return STATUS_ERROR;
     memset(&direction, 0, sizeof direction);
     for (size_t i = 0; i < n_knowns; i++)
         *variable_real(&direction, &VARIABLES[knowns[i]]) += seed[i];
-    COMPONENT.tangent(&instance->model, &direction, starting(instance), &tangent);
+    COMPONENT.tangent(&instance->model, &direction, is_initializing(instance), &tangent);
     for (size_t i = 0; i < n_unknowns; i++)
         sensitivity[i] = *variable_real(&tangent, &VARIABLES[unknowns[i]]);
     return STATUS_OK;
@@ -53,14 +53,14 @@ Status instance_adjoint_derivative(Instance *instance, const unsigned unknowns[]
 {
     Model direction, tangent;
 
-    if (prepare(instance, unknowns, n_unknowns, knowns, n_knowns) != STATUS_OK)
+    if (check_references(instance, unknowns, n_unknowns, knowns, n_knowns) != STATUS_OK)
         return STATUS_ERROR;
     memset(&direction, 0, sizeof direction);
     for (size_t i = 0; i < n_knowns; i++) {
-        double *at = variable_real(&direction, &VARIABLES[knowns[i]]);
-        *at = 1.0;
-        COMPONENT.tangent(&instance->model, &direction, starting(instance), &tangent);
-        *at = 0.0;
+        double *component = variable_real(&direction, &VARIABLES[knowns[i]]);
+        *component = 1.0;
+        COMPONENT.tangent(&instance->model, &direction, is_initializing(instance), &tangent);
+        *component = 0.0;
         sensitivity[i] = 0.0;
         for (size_t j = 0; j < n_unknowns; j++)
             sensitivity[i] += seed[j] * *variable_real(&tangent, &VARIABLES[unknowns[j]]);

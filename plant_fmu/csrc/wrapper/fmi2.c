@@ -25,7 +25,7 @@ static void log_message(const Instance *instance, Status status, const char *cat
 /* Refuses a call without an instance, or with NULL as one of the pointers to n values each. */
 #define REFUSE_NULL(n, ...)                                    \
     do {                                                       \
-        if (!INSTANCE_GIVEN(c, n, __VA_ARGS__))                \
+        if (!CHECK_POINTERS(c, n, __VA_ARGS__))                \
             return fmi2Error;                                  \
     } while (0)
 
@@ -74,12 +74,12 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
 
 fmi2Status fmi2EnterInitializationMode(fmi2Component c)
 {
-    return (fmi2Status)instance_enter_initialisation(c);
+    return (fmi2Status)instance_enter_initialization(c);
 }
 
 fmi2Status fmi2ExitInitializationMode(fmi2Component c)
 {
-    return (fmi2Status)instance_exit_initialisation(c);
+    return (fmi2Status)instance_exit_initialization(c);
 }
 
 fmi2Status fmi2Terminate(fmi2Component c)
@@ -161,19 +161,19 @@ fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *FMUstate)
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, size_t *size)
 {
     REFUSE_NULL(1, FMUstate, size);
-    return (fmi2Status)instance_serialised_size(c, FMUstate, size);
+    return (fmi2Status)instance_serialized_size(c, FMUstate, size);
 }
 
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size)
 {
     REFUSE_NULL(1, FMUstate, serializedState);
-    return (fmi2Status)instance_serialise(c, FMUstate, (unsigned char *)serializedState, size);
+    return (fmi2Status)instance_serialize(c, FMUstate, (unsigned char *)serializedState, size);
 }
 
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedState[], size_t size, fmi2FMUstate *FMUstate)
 {
     REFUSE_NULL(1, serializedState, FMUstate);
-    return (fmi2Status)instance_deserialise(c, (const unsigned char *)serializedState, size, (Saved **)FMUstate);
+    return (fmi2Status)instance_deserialize(c, (const unsigned char *)serializedState, size, (Saved **)FMUstate);
 }
 
 /* ---- co-simulation ----------------------------------------------------------------------------------------- */

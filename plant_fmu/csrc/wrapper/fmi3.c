@@ -13,7 +13,7 @@ static void log_message(const Instance *instance, Status status, const char *cat
 /* Refuses a call without an instance, or with NULL as one of the pointers to n values each. */
 #define REFUSE_NULL(n, ...)                                    \
     do {                                                       \
-        if (!INSTANCE_GIVEN(instance, n, __VA_ARGS__))         \
+        if (!CHECK_POINTERS(instance, n, __VA_ARGS__))         \
             return fmi3Error;                                  \
     } while (0)
 
@@ -76,7 +76,7 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     (void)instanceName, (void)instantiationToken, (void)resourcePath, (void)visible, (void)loggingOn;
     (void)clockUpdate, (void)lockPreemption, (void)unlockPreemption;
     const char *both = "this FMU offers co-simulation and model exchange, not scheduled execution";
-    return refuse_instance(instanceEnvironment, logMessage, COMPONENT.settle ? both : "this FMU offers co-simulation alone");
+    return refuse_instance(instanceEnvironment, logMessage, COMPONENT.apply_unlagged ? both : "this FMU offers co-simulation alone");
 }
 
 void fmi3FreeInstance(fmi3Instance instance)
@@ -91,12 +91,12 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
     if (instance_require_new(instance) != STATUS_OK ||
         instance_set_experiment(instance, startTime, stopTimeDefined ? stopTime : INFINITY) != STATUS_OK)
         return fmi3Error;
-    return (fmi3Status)instance_enter_initialisation(instance);
+    return (fmi3Status)instance_enter_initialization(instance);
 }
 
 fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
 {
-    return (fmi3Status)instance_exit_initialisation(instance);
+    return (fmi3Status)instance_exit_initialization(instance);
 }
 
 fmi3Status fmi3Terminate(fmi3Instance instance)
@@ -214,20 +214,20 @@ fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
 fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
 {
     REFUSE_NULL(1, FMUState, size);
-    return (fmi3Status)instance_serialised_size(instance, FMUState, size);
+    return (fmi3Status)instance_serialized_size(instance, FMUState, size);
 }
 
 fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size)
 {
     REFUSE_NULL(1, FMUState, serializedState);
-    return (fmi3Status)instance_serialise(instance, FMUState, serializedState, size);
+    return (fmi3Status)instance_serialize(instance, FMUState, serializedState, size);
 }
 
 fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
                                    fmi3FMUState *FMUState)
 {
     REFUSE_NULL(1, serializedState, FMUState);
-    return (fmi3Status)instance_deserialise(instance, serializedState, size, (Saved **)FMUState);
+    return (fmi3Status)instance_deserialize(instance, serializedState, size, (Saved **)FMUState);
 }
 
 /* ---- co-simulation ------------------------------------------------------------------------------------------ */
@@ -256,7 +256,7 @@ fmi3Status fmi3EnterEventMode(fmi3Instance instance)
 /* Does nothing: all is evaluated already. No flag offers it, but importers may call it. */
 fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance instance)
 {
-    return (fmi3Status)instance_require(instance, MODE_INITIALISING | MODE_EVENT, "evaluating discrete states");
+    return (fmi3Status)instance_require(instance, MODE_INITIALIZING | MODE_EVENT, "evaluating discrete states");
 }
 
 fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discreteStatesNeedUpdate,

@@ -58,9 +58,9 @@ Status instance_log(const Instance *instance, LogCategories category, const char
     return STATUS_OK;
 }
 
-Status instance_refuse_null(const Instance *instance, const char *function, const char *names, size_t place)
+Status instance_refuse_null(const Instance *instance, const char *function, const char *names, size_t index)
 {
-    for (; place > 0; place--)
+    for (; index > 0; index--)
         names = strchr(names, ',') + 1;
     names += strspn(names, " ");
     return instance_refuse(instance, "%s: %.*s is NULL", function, (int)strcspn(names, ","), names);
@@ -68,20 +68,20 @@ Status instance_refuse_null(const Instance *instance, const char *function, cons
 
 Status instance_set_logging(Instance *instance, bool on, size_t n, const char *const categories[])
 {
-    unsigned wanted = n == 0 ? LOG_ALL : 0;
+    unsigned selected = n == 0 ? LOG_ALL : 0;
 
     for (size_t i = 0; i < n; i++) {
         int known = 0;
         for (int j = 0; j < N_CATEGORIES; j++)
             if (categories[i] && strcmp(categories[i], CATEGORIES[j].name) == 0) {
-                wanted |= (unsigned)CATEGORIES[j].category;
+                selected |= (unsigned)CATEGORIES[j].category;
                 known = 1;
             }
         if (!known)
             return instance_refuse(instance, "log category \"%s\" is unknown",
                                    categories[i] ? categories[i] : "NULL");
     }
-    instance->categories = on ? instance->categories | wanted : instance->categories & ~wanted;
+    instance->categories = on ? instance->categories | selected : instance->categories & ~selected;
     return STATUS_OK;
 }
 
@@ -102,9 +102,9 @@ Status instance_require(const Instance *instance, unsigned modes, const char *ac
                                instance->kind == CO_SIMULATION ? "co-simulation" : "model exchange");
     const char *when = "after termination";
     switch (instance->mode) {
-    case MODE_INSTANTIATED: when = "before initialisation"; break;
-    case MODE_INITIALISING: when = "during initialisation"; break;
-    case MODE_STEPPING: when = "once initialisation has ended"; break;
+    case MODE_INSTANTIATED: when = "before initialization"; break;
+    case MODE_INITIALIZING: when = "during initialization"; break;
+    case MODE_STEPPING: when = "once initialization has ended"; break;
     case MODE_EVENT: when = "in event mode"; break;
     case MODE_CONTINUOUS: when = "in continuous-time mode"; break;
     case MODE_TERMINATED: break;
@@ -112,22 +112,22 @@ Status instance_require(const Instance *instance, unsigned modes, const char *ac
     return instance_refuse(instance, "%s: not allowed %s", action, when);
 }
 
-/* ---- life -------------------------------------------------------------------------------------------------- */
+/* ---- life cycle -------------------------------------------------------------------------------------------------- */
 
 Instance *instance_create(const char *name, const char *token, Interface kind, bool logging_on, LogCallback *log,
                           void *environment, void (*logger)(void))
 {
-    const char *shown = name ? name : "";
+    const char *copy = name ? name : "";
     Instance *instance = calloc(1, sizeof *instance);
 
     if (!instance)
         return NULL;
-    instance->name = malloc(strlen(shown) + 1);
+    instance->name = malloc(strlen(copy) + 1);
     if (!instance->name) {
         free(instance);
         return NULL;
     }
-    strcpy(instance->name, shown);
+    strcpy(instance->name, copy);
     instance->kind = kind;
     instance->categories = logging_on ? LOG_ALL : LOG_ERRORS | LOG_WARNINGS; /* errors and warnings until they are switched off */
     instance->log = log;
@@ -143,7 +143,7 @@ Instance *instance_create(const char *name, const char *token, Interface kind, b
         instance_free(instance);
         return NULL;
     }
-    if (kind == MODEL_EXCHANGE && !COMPONENT.settle) {
+    if (kind == MODEL_EXCHANGE && !COMPONENT.apply_unlagged) {
         instance_refuse(instance, "this FMU offers co-simulation alone");
         instance_free(instance);
         return NULL;
@@ -184,16 +184,16 @@ Status instance_prepare(Instance *instance)
     return STATUS_OK;
 }
 
-bool instance_starting(const Instance *instance)
+bool instance_is_starting(const Instance *instance)
 {
-    return instance->mode == MODE_INSTANTIATED || instance->mode == MODE_INITIALISING;
+    return instance->mode == MODE_INSTANTIATED || instance->mode == MODE_INITIALIZING;
 }
 
 Status instance_update(Instance *instance)
 {
     if (!instance->outdated)
         return STATUS_OK;
-    if (instance_starting(instance)) { /* the outputs will show the first samples */
+    if (instance_is_starting(instance)) { /* the outputs will show the first samples */
         COMPONENT.rewind(&instance->model);
         instance->unprepared = true;
     }
@@ -210,7 +210,7 @@ Status instance_set_experiment(Instance *instance, double start_time, double sto
 {
     if (instance_require(instance, MODE_INSTANTIATED, "setting the experiment") != STATUS_OK)
         return STATUS_ERROR;
-    instance->refused = true; /* until all is well */
+    instance->refused = true; /* until both times are valid */
     if (!(fabs(start_time) <= MAX_TIME))
         return instance_refuse(instance, "start time is %g s, expected a number within %g", start_time, MAX_TIME);
     if (!(stop_time >= start_time))
@@ -223,24 +223,24 @@ Status instance_set_experiment(Instance *instance, double start_time, double sto
 
 Status instance_require_new(const Instance *instance)
 {
-    if (instance && instance->mode == MODE_INITIALISING)
-        return instance_refuse(instance, "entering initialisation: it was entered already and has not ended");
-    return instance_require(instance, MODE_INSTANTIATED, "entering initialisation");
+    if (instance && instance->mode == MODE_INITIALIZING)
+        return instance_refuse(instance, "entering initialization: it was entered already and has not ended");
+    return instance_require(instance, MODE_INSTANTIATED, "entering initialization");
 }
 
-Status instance_enter_initialisation(Instance *instance)
+Status instance_enter_initialization(Instance *instance)
 {
     if (instance_require_new(instance) != STATUS_OK)
         return STATUS_ERROR;
     if (instance->refused)
-        return instance_refuse(instance, "entering initialisation: start and stop time were refused, set others first");
-    instance->mode = MODE_INITIALISING;
+        return instance_refuse(instance, "entering initialization: start and stop time were refused, set valid ones first");
+    instance->mode = MODE_INITIALIZING;
     return STATUS_OK;
 }
 
-Status instance_exit_initialisation(Instance *instance)
+Status instance_exit_initialization(Instance *instance)
 {
-    if (instance_require(instance, MODE_INITIALISING, "leaving initialisation") != STATUS_OK)
+    if (instance_require(instance, MODE_INITIALIZING, "leaving initialization") != STATUS_OK)
         return STATUS_ERROR;
     COMPONENT.rewind(&instance->model); /* the clocks start now */
     instance->unprepared = true;
@@ -248,7 +248,7 @@ Status instance_exit_initialisation(Instance *instance)
         return STATUS_ERROR;
     instance->mode = instance->kind == CO_SIMULATION ? MODE_STEPPING : MODE_EVENT;
     instance->outdated = true;
-    instance_log(instance, LOG_EVENTS, "initialised at t = %.9g s", instance->model.time);
+    instance_log(instance, LOG_EVENTS, "initialized at t = %.9g s", instance->model.time);
     return STATUS_OK;
 }
 

@@ -16,7 +16,7 @@ typedef enum { CO_SIMULATION, MODEL_EXCHANGE } Interface;
 
 typedef enum {
     MODE_INSTANTIATED = 1,
-    MODE_INITIALISING = 2,
+    MODE_INITIALIZING = 2,
     MODE_STEPPING = 4,    /* co-simulation */
     MODE_EVENT = 8,       /* model exchange */
     MODE_CONTINUOUS = 16, /* model exchange */
@@ -43,29 +43,29 @@ struct Instance {
     Interface kind;
     Mode mode;
     double start_time;    /* s, of the experiment */
-    bool refused;         /* invalid experiment times: no initialisation until valid ones are set */
+    bool refused;         /* invalid experiment times: no initialization until valid ones are set */
     bool unprepared;      /* parameters changed since the component was prepared */
     bool outdated;        /* outputs are older than the state, the inputs or the parameters */
     unsigned categories;  /* enabled LogCategories */
     char *name;
     LogCallback *log;
-    void *environment;    /* of the importer, */
-    void (*logger)(void); /* its type differs between FMI versions */
+    void *environment;    /* of the importer */
+    void (*logger)(void); /* of the importer; its type differs between FMI versions */
 };
 
-/* ---- instance.c: life, modes, messages ---- */
+/* ---- instance.c: life cycle, modes, messages ---- */
 
 Instance *instance_create(const char *name, const char *token, Interface kind, bool logging_on, LogCallback *log,
                           void *environment, void (*logger)(void));
 void instance_free(Instance *instance);
 Status instance_reset(Instance *instance);
 
-/* Refuses to enter initialisation twice, or after it has ended. */
+/* Refuses to enter initialization twice, or after it has ended. */
 Status instance_require_new(const Instance *instance);
 /* Sets the experiment's times; a stop time of INFINITY: none. */
 Status instance_set_experiment(Instance *instance, double start_time, double stop_time);
-Status instance_enter_initialisation(Instance *instance);
-Status instance_exit_initialisation(Instance *instance);
+Status instance_enter_initialization(Instance *instance);
+Status instance_exit_initialization(Instance *instance);
 Status instance_terminate(Instance *instance);
 
 /* Refuses an action outside its allowed modes. */
@@ -77,8 +77,8 @@ Status instance_update(Instance *instance);
 /* Updates constants and clocks from the parameters. */
 Status instance_prepare(Instance *instance);
 
-/* True until initialisation ends. */
-bool instance_starting(const Instance *instance);
+/* True until initialization ends. */
+bool instance_is_starting(const Instance *instance);
 
 /* Logs an error with printf's arguments, unless errors are switched off or there is no instance. Returns STATUS_ERROR, so
  * that a check is one line. */
@@ -92,11 +92,11 @@ Status instance_set_logging(Instance *instance, bool on, size_t n, const char *c
 /* Refuses a function that this FMU does not offer. */
 Status instance_unsupported(const Instance *instance, const char *function);
 
-/* Refuses NULL as the argument at a place among names that commas separate. */
-Status instance_refuse_null(const Instance *instance, const char *function, const char *names, size_t place);
+/* Refuses a NULL argument, named by its index in a comma-separated list of names. */
+Status instance_refuse_null(const Instance *instance, const char *function, const char *names, size_t index);
 
 /* True if there is an instance and, for n above 0, no NULL among the pointers to n values each. */
-static inline bool instance_given(const Instance *instance, const char *function, size_t n,
+static inline bool instance_check_pointers(const Instance *instance, const char *function, size_t n,
                                   const void *const pointers[], size_t n_pointers, const char *names)
 {
     for (size_t i = 0; i < n_pointers; i++)
@@ -105,9 +105,9 @@ static inline bool instance_given(const Instance *instance, const char *function
     return instance != NULL;
 }
 
-/* Calls instance_given for the enclosing function, as INSTANCE_GIVEN(instance, n, first, second). */
-#define INSTANCE_GIVEN(instance, n, ...)                                                  \
-    instance_given(instance, __func__, n, (const void *const[]){__VA_ARGS__},             \
+/* Calls instance_check_pointers for the enclosing function, as CHECK_POINTERS(instance, n, first, second). */
+#define CHECK_POINTERS(instance, n, ...)                                                  \
+    instance_check_pointers(instance, __func__, n, (const void *const[]){__VA_ARGS__},             \
                    sizeof((const void *const[]){__VA_ARGS__}) / sizeof(void *), #__VA_ARGS__)
 
 /* ---- variables.c ---- */
@@ -116,11 +116,11 @@ extern const Variable VARIABLES[]; /* by value reference */
 extern const unsigned N_VARIABLES;
 extern const char TOKEN[]; /* INSTANTIATION_TOKEN; its file alone depends on the vehicle */
 
-/* Returns the place of a variable in the model. */
+/* Returns the address of a variable in the model. */
 double *variable_real(Model *model, const Variable *variable);
 int *variable_integer(Model *model, const Variable *variable);
 
-/* Sets every variable but the outputs to its start value, and all else to zero. */
+/* Sets every variable except outputs to its start value, and everything else to zero. */
 void variables_start(Model *model);
 
 Status instance_get_reals(Instance *instance, const unsigned references[], size_t n, double values[]);
@@ -129,9 +129,9 @@ Status instance_get_integer(Instance *instance, Type type, unsigned reference, i
 Status instance_set_integer(Instance *instance, Type type, unsigned reference, int value);
 
 /* Returns the first independent variable that is not finite or out of its range; NULL: none. */
-const Variable *variables_stray(const Model *model);
+const Variable *variables_first_invalid(const Model *model);
 /* The same for the states alone. */
-const Variable *variables_stray_state(const Model *model);
+const Variable *variables_first_invalid_state(const Model *model);
 
 /* ---- stepping.c ---- */
 
@@ -166,8 +166,8 @@ typedef struct Saved Saved;
 Status instance_save(Instance *instance, Saved **saved);
 Status instance_restore(Instance *instance, const Saved *saved);
 Status instance_free_saved(Instance *instance, Saved **saved);
-Status instance_serialised_size(Instance *instance, const Saved *saved, size_t *size);
-Status instance_serialise(Instance *instance, const Saved *saved, unsigned char bytes[], size_t size);
-Status instance_deserialise(Instance *instance, const unsigned char bytes[], size_t size, Saved **saved);
+Status instance_serialized_size(Instance *instance, const Saved *saved, size_t *size);
+Status instance_serialize(Instance *instance, const Saved *saved, unsigned char bytes[], size_t size);
+Status instance_deserialize(Instance *instance, const unsigned char bytes[], size_t size, Saved **saved);
 
 #endif

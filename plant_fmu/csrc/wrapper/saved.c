@@ -11,7 +11,7 @@ struct Saved {
     uint32_t magic;    /* marks a block of this format and byte order */
     uint32_t size;
     uint64_t origin;   /* hash of the instantiation token: refuses blocks of another FMU */
-    uint64_t checksum; /* of a serialised block: checksum of all that follows */
+    uint64_t checksum; /* of a serialized block: checksum of all that follows */
     int32_t kind, mode, unprepared, refused;
     double start_time;
     Model model;
@@ -32,16 +32,16 @@ static uint64_t hash(const void *data, size_t size)
 
 static uint64_t checksum(const Saved *saved)
 {
-    const size_t head = offsetof(Saved, kind);
+    const size_t start = offsetof(Saved, kind);
 
-    return hash((const char *)saved + head, sizeof *saved - head);
+    return hash((const char *)saved + start, sizeof *saved - start);
 }
 
 static Status check_block(const Instance *instance, const Saved *saved)
 {
     if (saved->zero != 0 || saved->magic != MAGIC || saved->size != sizeof *saved ||
         saved->origin != hash(TOKEN, strlen(TOKEN)))
-        return instance_refuse(instance, "FMU state is not one of this FMU");
+        return instance_refuse(instance, "FMU state is of another FMU, or damaged");
     return STATUS_OK;
 }
 
@@ -94,7 +94,7 @@ Status instance_free_saved(Instance *instance, Saved **saved)
     return STATUS_OK;
 }
 
-Status instance_serialised_size(Instance *instance, const Saved *saved, size_t *size)
+Status instance_serialized_size(Instance *instance, const Saved *saved, size_t *size)
 {
     if (check_block(instance, saved) != STATUS_OK)
         return STATUS_ERROR;
@@ -102,12 +102,12 @@ Status instance_serialised_size(Instance *instance, const Saved *saved, size_t *
     return STATUS_OK;
 }
 
-Status instance_serialise(Instance *instance, const Saved *saved, unsigned char bytes[], size_t size)
+Status instance_serialize(Instance *instance, const Saved *saved, unsigned char bytes[], size_t size)
 {
     if (check_block(instance, saved) != STATUS_OK)
         return STATUS_ERROR;
     if (size < sizeof *saved)
-        return instance_refuse(instance, "serialising: %zu bytes given, %zu needed", size, sizeof *saved);
+        return instance_refuse(instance, "serializing: %zu bytes given, %zu needed", size, sizeof *saved);
     memcpy(bytes, saved, sizeof *saved);
     const uint64_t sum = checksum(saved);
     memcpy(bytes + offsetof(Saved, checksum), &sum, sizeof sum);
@@ -118,32 +118,32 @@ Status instance_serialise(Instance *instance, const Saved *saved, unsigned char 
 static Status check_content(const Instance *instance, const Saved *saved)
 {
     const Model *m = &saved->model;
-    const Variable *stray = variables_stray(m);
-    bool good = fabs(m->time) <= MAX_TIME && fabs(saved->start_time) <= MAX_TIME && saved->start_time <= m->time &&
-                !isnan(m->stop_time) && COMPONENT.possible(m);
+    const Variable *invalid = variables_first_invalid(m);
+    bool valid = fabs(m->time) <= MAX_TIME && fabs(saved->start_time) <= MAX_TIME && saved->start_time <= m->time &&
+                !isnan(m->stop_time) && COMPONENT.valid_state(m);
 
-    if (stray)
-        return instance_refuse(instance, "serialised FMU state: %s is outside [%.9g, %.9g]", stray->name, stray->min,
-                               stray->max);
-    const int32_t modes[] = {MODE_INSTANTIATED, MODE_INITIALISING, MODE_TERMINATED, MODE_STEPPING, MODE_EVENT, MODE_CONTINUOUS};
+    if (invalid)
+        return instance_refuse(instance, "serialized FMU state: %s is outside [%.9g, %.9g]", invalid->name, invalid->min,
+                               invalid->max);
+    const int32_t modes[] = {MODE_INSTANTIATED, MODE_INITIALIZING, MODE_TERMINATED, MODE_STEPPING, MODE_EVENT, MODE_CONTINUOUS};
     bool known = false; /* each of the last three belongs to one interface */
     for (int i = 0; i < 6; i++)
         known = known || (saved->mode == modes[i] && (i < 3 || (i == 3) == (saved->kind == CO_SIMULATION)));
-    good = good && known;
-    return good ? STATUS_OK : instance_refuse(instance, "serialised FMU state holds what no state can");
+    valid = valid && known;
+    return valid ? STATUS_OK : instance_refuse(instance, "serialized FMU state is invalid: a time, mode or held value is out of range");
 }
 
-Status instance_deserialise(Instance *instance, const unsigned char bytes[], size_t size, Saved **saved)
+Status instance_deserialize(Instance *instance, const unsigned char bytes[], size_t size, Saved **saved)
 {
     if (size != sizeof **saved)
-        return instance_refuse(instance, "serialised FMU state has %zu bytes, expected %zu", size, sizeof **saved);
+        return instance_refuse(instance, "serialized FMU state has %zu bytes, expected %zu", size, sizeof **saved);
     Saved *s = malloc(sizeof *s);
     if (!s)
         return instance_refuse(instance, "no memory for an FMU state");
     memcpy(s, bytes, sizeof *s);
     Status status = check_block(instance, s);
     if (status == STATUS_OK && s->checksum != checksum(s))
-        status = instance_refuse(instance, "serialised FMU state is damaged: its checksum does not fit");
+        status = instance_refuse(instance, "serialized FMU state is damaged: its checksum does not fit");
     if (status == STATUS_OK)
         status = check_content(instance, s);
     if (status != STATUS_OK) {

@@ -24,7 +24,7 @@ static Status check_step(const Instance *instance, double time, double step)
 
     if (time + step > MAX_TIME)
         return instance_refuse(instance, "step to t = %.12g s is beyond %g s", time + step, MAX_TIME);
-    return COMPONENT.fits(instance, step);
+    return COMPONENT.check_step_size(instance, step);
 }
 
 Status instance_step(Instance *instance, double time, double step)
@@ -38,8 +38,8 @@ Status instance_step(Instance *instance, double time, double step)
 
 /* ---- model exchange ---------------------------------------------------------------------------------------- */
 
-/* Returns the place of the contiguous states, or of their derivatives. */
-static double *states_at(Model *model, int first)
+/* Returns the address of the contiguous states, or of their derivatives. */
+static double *states_address(Model *model, int first)
 {
     return variable_real(model, &VARIABLES[first]);
 }
@@ -56,7 +56,7 @@ Status instance_enter_event_mode(Instance *instance, unsigned from)
     if (instance_require(instance, from, "entering event mode") != STATUS_OK ||
         instance_prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
-    COMPONENT.settle(&instance->model);
+    COMPONENT.apply_unlagged(&instance->model);
     instance->mode = MODE_EVENT;
     instance->outdated = true;
     return STATUS_OK;
@@ -78,7 +78,7 @@ Status instance_update_discrete(Instance *instance, bool *states_changed, double
     if (instance_require(instance, MODE_EVENT, "updating discrete states") != STATUS_OK ||
         instance_prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
-    *states_changed = COMPONENT.settle(m) != 0;
+    *states_changed = COMPONENT.apply_unlagged(m) != 0;
     if (COMPONENT.tick(m))
         instance_log(instance, LOG_EVENTS, "sampled at t = %.9g s", m->time);
     *next_event_time = COMPONENT.next_tick(m);
@@ -108,14 +108,14 @@ Status instance_set_states(Instance *instance, const double states[], size_t n)
     if (instance_require(instance, MODE_CONTINUOUS, "setting continuous states") != STATUS_OK ||
         require_count(instance, n, "setting continuous states") != STATUS_OK)
         return STATUS_ERROR;
-    memcpy(before, states_at(m, FIRST_STATE), N_STATES * sizeof(double));
-    memcpy(states_at(m, FIRST_STATE), states, N_STATES * sizeof(double));
-    const Variable *stray = variables_stray_state(m);
-    if (stray) { /* an integrator may try again with a shorter step */
-        const double value = *variable_real(m, stray);
-        memcpy(states_at(m, FIRST_STATE), before, N_STATES * sizeof(double));
-        return instance_log(instance, LOG_DISCARDS, "%s = %.9g discarded: outside [%.9g, %.9g]", stray->name, value,
-                             stray->min, stray->max);
+    memcpy(before, states_address(m, FIRST_STATE), N_STATES * sizeof(double));
+    memcpy(states_address(m, FIRST_STATE), states, N_STATES * sizeof(double));
+    const Variable *invalid = variables_first_invalid_state(m);
+    if (invalid) { /* an integrator may try again with a shorter step */
+        const double value = *variable_real(m, invalid);
+        memcpy(states_address(m, FIRST_STATE), before, N_STATES * sizeof(double));
+        return instance_log(instance, LOG_DISCARDS, "%s = %.9g discarded: outside [%.9g, %.9g]", invalid->name, value,
+                             invalid->min, invalid->max);
     }
     instance->outdated = true;
     return STATUS_OK;
@@ -126,18 +126,18 @@ Status instance_get_states(Instance *instance, double states[], size_t n)
     if (require_count(instance, n, "getting continuous states") != STATUS_OK)
         return STATUS_ERROR;
     if (n > 0)
-        memcpy(states, states_at(&instance->model, FIRST_STATE), n * sizeof(double));
+        memcpy(states, states_address(&instance->model, FIRST_STATE), n * sizeof(double));
     return STATUS_OK;
 }
 
 Status instance_get_derivatives(Instance *instance, double derivatives[], size_t n)
 {
-    if (instance_require(instance, MODE_INITIALISING | MODE_EVENT | MODE_CONTINUOUS | MODE_TERMINATED,
+    if (instance_require(instance, MODE_INITIALIZING | MODE_EVENT | MODE_CONTINUOUS | MODE_TERMINATED,
                          "getting derivatives") != STATUS_OK ||
         require_count(instance, n, "getting derivatives") != STATUS_OK || instance_update(instance) != STATUS_OK)
         return STATUS_ERROR;
     if (n > 0)
-        memcpy(derivatives, states_at(&instance->model, FIRST_DERIVATIVE), n * sizeof(double));
+        memcpy(derivatives, states_address(&instance->model, FIRST_DERIVATIVE), n * sizeof(double));
     return STATUS_OK;
 }
 

@@ -75,7 +75,7 @@ Status instance_get_integer(Instance *instance, Type type, unsigned reference, i
 
 static unsigned modes_to_set(Role role)
 {
-    const unsigned start = MODE_INSTANTIATED | MODE_INITIALISING;
+    const unsigned start = MODE_INSTANTIATED | MODE_INITIALIZING;
 
     switch (role) {
     case STATE: /* in model exchange also one by one (FMI 3.0.2, 2.3.5 and 3.2.1), as CasADi does */
@@ -133,26 +133,26 @@ Status instance_set_integer(Instance *instance, Type type, unsigned reference, i
 
 /* ---- ranges ------------------------------------------------------------------------------------------------ */
 
-static bool strays(const Model *model, const Variable *v)
+static bool is_out_of_range(const Model *model, const Variable *v)
 {
-    const void *at = (const char *)model + v->offset;
-    const double value = v->type == TYPE_REAL ? *(const double *)at : *(const int *)at;
+    const void *address = (const char *)model + v->offset;
+    const double value = v->type == TYPE_REAL ? *(const double *)address : *(const int *)address;
 
     return !(value >= v->min && value <= v->max);
 }
 
-const Variable *variables_stray(const Model *model)
+const Variable *variables_first_invalid(const Model *model)
 {
     for (unsigned i = 0; i < N_VARIABLES; i++)
-        if (VARIABLES[i].role != OUTPUT && VARIABLES[i].role != TIME && strays(model, &VARIABLES[i]))
+        if (VARIABLES[i].role != OUTPUT && VARIABLES[i].role != TIME && is_out_of_range(model, &VARIABLES[i]))
             return &VARIABLES[i];
     return NULL;
 }
 
-const Variable *variables_stray_state(const Model *model)
+const Variable *variables_first_invalid_state(const Model *model)
 {
     for (int i = 0; i < (int)N_STATES; i++)
-        if (strays(model, &VARIABLES[FIRST_STATE + i]))
+        if (is_out_of_range(model, &VARIABLES[FIRST_STATE + i]))
             return &VARIABLES[FIRST_STATE + i];
     return NULL;
 }

@@ -16,7 +16,7 @@ from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.sweeps.design import KINDS
 from cosim.command_line.cli import main
 from cosim.scenario.scenario import load_scenario
-from plant_fmu.toml_tables import dataclass_of
+from plant_fmu.toml_tables import find_dataclass
 
 PAGE = (Path(__file__).parents[3] / "docs" / "campaigns.md").read_text()
 
@@ -36,7 +36,7 @@ def table_after(heading):
 def test_every_key_of_a_scene_is_documented():
     words = " ".join(row[0] for row in table_after("## Scenes"))
     for field in dataclasses.fields(Scene):
-        kind = dataclass_of(typing.get_type_hints(Scene)[field.name])
+        kind = find_dataclass(typing.get_type_hints(Scene)[field.name])
         assert f"`{field.name}" in words
         for inner in dataclasses.fields(kind) if kind else ():
             assert f".{inner.name}`" in words, (field.name, inner.name)

@@ -11,7 +11,7 @@ from cosim.ssp.system import MOTION
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.variables import variables
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 from tests.cosim.ssp.masters import in_master
 from tests.plant_fmu.transcription import evaluate, rotation
 
@@ -48,7 +48,7 @@ def tether(motion):
 
 def in_turn(steps, step):
     """Return the motion with the outputs exchanged after each step (Jacobi's order)."""
-    vehicle = of_vehicle(load_vehicle("odin"), {"weight": WEIGHT}, coupled=True)
+    vehicle = make_vehicle_component(load_vehicle("odin"), {"weight": WEIGHT}, coupled=True)
     rows, force, water, rate, before = [], np.zeros(3), 0j, 0j, 0.0
     with Plant(cached_fmu(vehicle, 2)) as plant:
         plant.initialise()

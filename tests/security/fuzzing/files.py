@@ -135,25 +135,25 @@ def _zipped(description: bytes) -> bytes:
     return made.getvalue()
 
 
-@reader("FMU", "zip", "plant_fmu.unpacking:open_fmu", "plant_fmu.unpacking:_parsed")
+@reader("FMU", "zip", "plant_fmu.unpacking:open_fmu", "plant_fmu.unpacking:_parse_member")
 def fmu(seeds: Seeds) -> Case:
     return seeds.file("it.fmu", read_fmu, _zipped(SMALL))
 
 
-@reader("model description, checked", "xml", "plant_fmu.unpacking:_tree")
+@reader("model description, checked", "xml", "plant_fmu.unpacking:_parse_tree")
 def description(seeds: Seeds) -> Case:
     case = seeds.file("it.fmu", read_fmu, b"")
     return replace(case, contents=_descriptions(), read=lambda content: case.read(_zipped(content)))
 
 
 def _descriptions() -> tuple[bytes, ...]:
-    from plant_fmu.vehicle_component import of_vehicle
+    from plant_fmu.vehicle_component import make_vehicle_component
 
-    component = of_vehicle(load_vehicle("odin"))
+    component = make_vehicle_component(load_vehicle("odin"))
     return SMALL, *(model_description(component, fmi, "token").encode() for fmi in (2, 3))
 
 
-@reader("model description, run", "xml", "plant_fmu.unpacking:_tree", "plant_fmu.running.instance:Instance._load",
+@reader("model description, run", "xml", "plant_fmu.unpacking:_parse_tree", "plant_fmu.running.instance:Instance._load",
         "plant_fmu.running.instance:_described")  # fmt: skip
 def description_run(seeds: Seeds) -> Case:
     """Up to the binary, which these have not: their code is not run."""

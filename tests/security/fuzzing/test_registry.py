@@ -37,10 +37,10 @@ ITS_OWN = {  # what parses nothing that comes from outside: why
     "cosim.scenario.toml_file:shipped_titles": "what came with the package",
     "cosim.scenario.toml_file:read_table": "calls the reader of plant_fmu.toml_tables",
     "cosim.scenario.scenario:load_scenario": "calls cosim.scenario.toml_file:read_table",
-    "plant_fmu.archive:archive_of": "writes",
-    "plant_fmu.build:_has_checksums": "a file of the cache, built anew if it is damaged",
+    "plant_fmu.archive:make_archive": "writes",
+    "plant_fmu.build:_has_valid_checksums": "a file of the cache, built anew if it is damaged",
     "plant_fmu.compiling.prebuilt:prebuilt_libraries": "what came with the package; test_prebuilt damages it",
-    "plant_fmu.compiling.signature:_signed": "what the linker wrote",
+    "plant_fmu.compiling.signature:_sign": "what the linker wrote",
     "plant_fmu.compiling.signature:re_sign": "what the linker wrote",
     "plant_fmu.compiling.universal:universal_library": "what the linker wrote",
     "plant_fmu.checking.__main__:main": "what its parent process wrote",
@@ -79,7 +79,7 @@ def test_every_parser_is_fuzzed_or_reads_own_files():
 @pytest.mark.parametrize("name", READERS)
 def test_unmodified_files_pass_through_the_named_parsers(name, seeds):
     case, met = READERS[name].case(seeds), set()
-    for kept in (unpacking._tree_of, instance._described):  # which may have read the same before
+    for kept in (unpacking._cached_tree, instance._parse_description):  # which may have read the same before
         kept.cache_clear()
 
     def seen(frame, event, argument):

@@ -19,7 +19,7 @@ static Model MODEL;
 static double STRENGTHS[N_ROWS][N_RULES]; /* of the rules, at each control step */
 static char MESSAGE[512]; /* why the last flight did not begin, or ended before its time */
 
-static void hear(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message)
+static void log_callback(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message)
 {
     (void)environment, (void)category;
     if (status > fmi3Warning)
@@ -33,7 +33,7 @@ EXPORT(begin) int begin(void)
     rewind_model(&MODEL);
     if (PLANT)
         fmi3FreeInstance(PLANT);
-    PLANT = fmi3InstantiateCoSimulation("plant", PLANT_TOKEN, NULL, false, true, false, false, NULL, 0, NULL, hear, NULL);
+    PLANT = fmi3InstantiateCoSimulation("plant", PLANT_TOKEN, NULL, false, true, false, false, NULL, 0, NULL, log_callback, NULL);
     if (!PLANT)
         return 0;
     for (int i = 0; i < N_STARTS; i++)

@@ -29,11 +29,11 @@ static void evaluate(Instance *instance)
     (void)instance;
 }
 
-static Status fits(const Instance *instance, double step)
+static Status check_step_size(const Instance *instance, double step)
 {
     const Ticks *ticks = &instance->model.ticks;
 
-    if (ticks_left_out(ticks, step))
+    if (ticks_would_skip(ticks, step))
         return instance_refuse(instance, "step of %g s is longer than time.arbiter = %g s", step, ticks->period);
     return STATUS_OK;
 }
@@ -60,14 +60,14 @@ static Status advance(Instance *instance, double end)
     return STATUS_OK;
 }
 
-static bool possible(const Model *m)
+static bool valid_state(const Model *m)
 {
     for (int i = 0; i < N_CRITERIA; i++)
         if (!isfinite(m->weights[i]))
             return false;
-    return ticks_possible(&m->ticks);
+    return ticks_valid(&m->ticks);
 }
 
 const Component COMPONENT = {
-    "the arbiter", rewind_ticks, prepare, begin, evaluate, fits, advance, possible, NULL, NULL, NULL, NULL,
+    "the arbiter", rewind_ticks, prepare, begin, evaluate, check_step_size, advance, valid_state, NULL, NULL, NULL, NULL,
 };

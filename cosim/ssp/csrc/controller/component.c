@@ -125,11 +125,11 @@ static void evaluate(Instance *instance)
     (void)instance;
 }
 
-static Status fits(const Instance *instance, double step)
+static Status check_step_size(const Instance *instance, double step)
 {
     const Ticks *control = &instance->model.memory.control;
 
-    if (ticks_left_out(control, step))
+    if (ticks_would_skip(control, step))
         return instance_refuse(instance, "step of %g s is longer than time.control = %g s", step, control->period);
     return STATUS_OK;
 }
@@ -354,7 +354,7 @@ static bool counts(double count, double most)
     return count >= 0.0 && count <= most && count == floor(count);
 }
 
-static bool possible(const Model *m)
+static bool valid_state(const Model *m)
 {
     const Memory *memory = &m->memory;
     const unsigned char *flags = (const unsigned char *)m->flags;
@@ -362,7 +362,7 @@ static bool possible(const Model *m)
     for (int i = 0; i < N_FLAGS; i++)
         if (flags[i] > 1)
             return false;
-    return ticks_possible(&memory->control) && counts(memory->reported, sizeof FAILURES / sizeof FAILURES[0] - 1) &&
+    return ticks_valid(&memory->control) && counts(memory->reported, sizeof FAILURES / sizeof FAILURES[0] - 1) &&
            counts(memory->failed, sizeof FAILURES / sizeof FAILURES[0] - 1) &&
            counts(memory->changed, sizeof OUTAGES / sizeof OUTAGES[0] - 1) && counts(memory->place, SCENE_N_PLACES) &&
            counts(m->numbers[AT_STAGE], SCENE_STAGES - 1) && is_finite(memory->noise, 6) &&
@@ -370,5 +370,5 @@ static bool possible(const Model *m)
 }
 
 const Component COMPONENT = {
-    "the controller", rewind_memory, prepare, begin, evaluate, fits, advance, possible, NULL, NULL, NULL, NULL,
+    "the controller", rewind_memory, prepare, begin, evaluate, check_step_size, advance, valid_state, NULL, NULL, NULL, NULL,
 };
