@@ -106,7 +106,7 @@ def _parser() -> argparse.ArgumentParser:
     numbers.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
     numbers.add_argument("--out", type=Path, help="file to write (default: NAME.ssv here)")
 
-    results = verbs.add_parser("reference", help="write a manoeuvre and its results, integrated without the FMU")
+    results = verbs.add_parser("reference", help="write a maneuver and its results, integrated without the FMU")
     results.add_argument("--vehicle", required=True, help="a shipped name, or a TOML file")
     results.add_argument("--out", type=Path, default=Path(), help="folder to write to (default: here)")
     return parser

@@ -38,7 +38,7 @@ _INTERFACES = {  # capabilities, by FMI version
 }
 _NEEDS_STATES = ("providesDirectionalDerivative", "providesDirectionalDerivatives", "providesAdjointDerivatives")
 _LOG_CATEGORIES = {
-    "logEvents": "Initialisation, and samples in model exchange",
+    "logEvents": "Initialization, and samples in model exchange",
     "logStatusWarning": "Values that were mended, steps that do not fit; logged until switched off",
     "logStatusDiscard": "States that an integrator tried and that lie outside the plant's domain",
     "logStatusError": "Refused values and calls; logged until switched off",
@@ -181,7 +181,7 @@ def _add_variable(parent: ET.Element, vr: int, v: Variable, fmi: int, number: di
 
 
 def _add_structure(parent: ET.Element, rows: list[Variable], fmi: int, number: dict[str, str]) -> None:
-    """Add outputs and derivatives with their direct dependencies, and the unknowns of initialisation."""
+    """Add outputs and derivatives with their direct dependencies, and the unknowns of initialization."""
     continuous = {v.name for v in rows if v.role in ("time", "state", "input")}
     sections = (
         ("Outputs", "Output", [v for v in rows if v.role in ("state", "output") and not v.local], True),
@@ -219,7 +219,7 @@ def documentation(vehicle: Vehicle) -> str:
     uncoupled = {v.name for v in rows}
     titles = {
         "input": "Inputs",
-        "state": "States (outputs; start values may be set before initialisation ends)",
+        "state": "States (outputs; start values may be set before initialization ends)",
         "output": "Outputs",
         "derivative": "Derivatives of the states",
         "parameter": "Parameters (tunable)",

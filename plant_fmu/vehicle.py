@@ -55,7 +55,7 @@ _KEYS = {
 
 @dataclass(frozen=True)
 class RigidBody:
-    """Mass, inertia about the body origin, centre of gravity and weight."""
+    """Mass, inertia about the body origin, center of gravity and weight."""
 
     mass: float  # kg
     inertia: Matrix  # kg m2, 3 by 3 about the body origin, or its diagonal
@@ -65,7 +65,7 @@ class RigidBody:
 
 @dataclass(frozen=True)
 class Hydrostatics:
-    """Buoyancy and its centre."""
+    """Buoyancy and its center."""
 
     buoyancy: float  # N
     center_of_buoyancy: Vector3  # m, body frame
@@ -131,8 +131,8 @@ class Vehicle:
     source: str  # origin of the numbers
     mass: float  # kg
     inertia: NDArray[np.float64]  # (3, 3) kg m2, about the body origin
-    r_G: NDArray[np.float64]  # (3,) m, body frame: centre of gravity
-    r_B: NDArray[np.float64]  # (3,) m, body frame: centre of buoyancy
+    r_G: NDArray[np.float64]  # (3,) m, body frame: center of gravity
+    r_B: NDArray[np.float64]  # (3,) m, body frame: center of buoyancy
     weight: float  # N
     buoyancy: float  # N
     added_mass: NDArray[np.float64]  # (6, 6) kg, kg m, kg m2
@@ -328,7 +328,7 @@ def _make_vehicle(file: _File, where: str) -> Vehicle:
         require(
             min_eigenvalue > 0,
             key,
-            f"not positive definite (min. eigenvalue {min_eigenvalue:.4g})",
+            f"not positive definite (smallest eigenvalue {min_eigenvalue:.4g})",
             "positive definite (Property 1)",
         )
     return vehicle

@@ -40,8 +40,6 @@ class FmuFile:
     fmi: int  # FMI version, 2 or 3
     interfaces: dict[str, dict[str, str]]  # attributes of each interface, by "CS" and "ME"
     variables: tuple[FmuVariable, ...]
-    states: int  # number of continuous states
-    event_indicators: int  # number of event indicators
     stop_time: float  # s, end of its default experiment
     step: float  # s, step of its default experiment
     libraries: frozenset[str]  # interfaces, of "CS" and "ME", for which it has a library for this machine
@@ -76,19 +74,11 @@ def read_fmu(path: Path) -> FmuFile:
     experiment = root.find("DefaultExperiment")
     times = {} if experiment is None else experiment.attrib
     default = Task()
-    if fmi == 2:
-        indicators = int(root.get("numberOfEventIndicators", "0"))
-        states = len(root.findall("ModelStructure/Derivatives/Unknown"))
-    else:
-        indicators = len(root.findall("ModelStructure/EventIndicator"))
-        states = len(root.findall("ModelStructure/ContinuousStateDerivative"))
     return FmuFile(
         path=path.absolute(),
         fmi=fmi,
         interfaces={short: dict(e.attrib) for e in root if (short := _INTERFACES.get(e.tag))},
         variables=tuple(_variables(root, fmi)),
-        states=states,
-        event_indicators=indicators,
         stop_time=float(times.get("stopTime", default.stop_time)),
         step=float(times.get("stepSize", default.step)),
         libraries=frozenset(filter(None, libraries)),

@@ -1,4 +1,4 @@
-"""Members of an FMU beside description, binaries and sources: page, licences, icon, terminals, references.
+"""Members of an FMU beside description, binaries and sources: page, licenses, icon, terminals, references.
 
 Imports: variables.
 """
@@ -37,7 +37,7 @@ def contents(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None)
     Raises
     ------
     BuildError
-        If the installation lacks its licence file.
+        If the installation lacks its license file.
     VehicleError
         If a number of the vehicle is beyond the range of its parameter.
     """
@@ -48,7 +48,7 @@ def contents(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None)
     texts = {
         "documentation/index.html": page(vehicle, fmi, rows),
         "documentation/fmi-ls-ref.txt": Template(guide).substitute(name=vehicle.name),
-        **{f"documentation/licenses/{name}": licence for name, licence in licenses(fmi).items()},
+        **{f"documentation/licenses/{name}": content for name, content in licenses(fmi).items()},
         **{f"{FOLDER}/{name}": file for name, file in references.items()},
     }
     picture = (resources.files("plant_fmu.contents") / "pages" / "icon.png").read_bytes()

@@ -24,9 +24,9 @@ _MANIFEST = {
     # the schema of the layered standard fixes this sentence
     "fmi-ls:fmi-ls-description": "Layered Standard providing information on related files included in an FMU.",
 }
-_LABEL = {"name": "manoeuvre:reference", "description": "Start, inputs and results of one manoeuvre"}
+_LABEL = {"name": "manoeuvre:reference", "description": "Start, inputs and results of one maneuver"}
 _SSV = "application/x-ssp-parameter-set"
-_START = "Start of the reference manoeuvre, and its current"
+_START = "Start of the reference maneuver, and its current"
 _DIGITS = 11  # significant: more than the plant's own integration holds
 
 
@@ -44,7 +44,7 @@ def layered_files(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> d
     -------
     dict of str to str
         The manifest and the vehicle's parameter set; for an unchanged vehicle of the package also a
-        manoeuvre and its reference results.
+        maneuver and its reference results.
     """
     name = vehicle.name
     related = [(f"{name}.ssv", _SSV, "parameter", f"Parameters of {vehicle.title}")]
@@ -54,7 +54,7 @@ def layered_files(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> d
         folder = resources.files("plant_fmu.contents") / "references"
         results = [
             (f"{name}_start.ssv", _SSV, "parameter", _START),
-            (f"{name}_in.csv", "text/csv", "testcase", "Inputs of the reference manoeuvre, held until they jump"),
+            (f"{name}_in.csv", "text/csv", "testcase", "Inputs of the reference maneuver, held until they jump"),
             (f"{name}_out.csv", "text/csv", "result", "Its results, from an integration independent of this FMU"),
         ]
         files |= {source: (folder / source).read_text(encoding="utf-8") for source, *_ in results}

@@ -1,4 +1,4 @@
-"""Licences of an FMU: this project's, and that of the code that is compiled into it."""
+"""Licenses of an FMU: this project's, and that of the code that is compiled into it."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def licenses(fmi: int) -> dict[str, str]:
     Raises
     ------
     BuildError
-        If the installation lacks its licence file.
+        If the installation lacks its license file.
     """
     package = resources.files("plant_fmu")
     # a wheel has a copy in the package, a checkout has the one file beside it
@@ -40,5 +40,5 @@ def licenses(fmi: int) -> dict[str, str]:
     header = (Path(fmpy.__file__).parent / "c-code" / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
     start, end = header.find("Copyright"), header.find("*/")
     if not text or not 0 <= start < end:
-        raise BuildError("the licence of subreach or of FMPy's FMI headers is not installed; install both anew")
+        raise BuildError("the license of subreach or of FMPy's FMI headers is not installed; install both anew")
     return {"license.txt": text.rstrip() + "\n" + _NOTE, "fmi-headers.txt": header[start:end].rstrip() + "\n"}

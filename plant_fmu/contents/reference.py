@@ -1,4 +1,4 @@
-"""Reference results: a manoeuvre of all six degrees of freedom, integrated apart from the FMU.
+"""Reference results: a maneuver of all six degrees of freedom, integrated apart from the FMU.
 
 The C core is not used; only the vehicle's numbers are shared. Fossen's equations are here in matrix form and in the
 velocity relative to the water, in which a steady current drops out of them (Fossen 2011, Property 8.1); attitude is a
@@ -51,7 +51,7 @@ RATE_LIMITED_LAG = 1e-3  # s, the minimum time constant of a thruster with a rat
 
 @dataclass(frozen=True)
 class Reference:
-    """A manoeuvre and its results."""
+    """A maneuver and its results."""
 
     input_names: tuple[str, ...]  # names of the columns of `inputs` after the time
     inputs: Array  # (rows, 1 + inputs), time [s] and inputs [N, N m]; two rows of one time are a jump
@@ -64,7 +64,7 @@ def reference(vehicle: Vehicle) -> Reference:
     Returns
     -------
     Reference
-        Manoeuvre of 16 s, from still thrusters, in a steady current, without surface and bottom.
+        Maneuver of 16 s, from still thrusters, in a steady current, without surface and bottom.
     """
     from scipy.integrate import solve_ivp  # half a second, and needed for nothing else
 

@@ -11,13 +11,13 @@ from plant_fmu.variables import Variable, variables
 from plant_fmu.vehicle import Vehicle
 
 _DESCRIPTIONS = {
-    "pose": "Where the vehicle is and how it lies",
+    "pose": "Position and attitude of the vehicle",
     "position": "Position of the body origin, world frame NED",
     "quaternion": "Unit quaternion from body to world, scalar first",
     "attitude": "Euler angles, in the order yaw, pitch, roll",
     "velocity": "Velocity over ground, body frame",
     "thrusters": "All thrusters",
-    "wrench": "Commanded wrench on the body, beside the thrusters",
+    "wrench": "Commanded wrench on the body, in addition to the thrusters",
     "actuation": "Wrench of all actuators on the body",
     "water_velocity": "Velocity of the water at the vehicle, world frame NED",
     "measured": "Samples of the sensors",

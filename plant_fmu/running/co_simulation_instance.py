@@ -181,7 +181,7 @@ class CoSimulationInstance:
         """
         self._require_open()
         if self.initialised:
-            raise PlantError(f"plant {self.name} is initialised already; reset() takes it back")
+            raise PlantError(f"plant {self.name} is initialized already; reset() it first")
         if not isinstance(time, (int, float, np.integer, np.floating)):
             raise PlantError(f"start time is {time!r}, expected seconds")
         time = float(time)

@@ -103,7 +103,7 @@ def from_bytes(data: bytes, instance: Instance) -> State:
         If the bytes are no state, a state of another FMU, or damaged.
     """
     if len(data) < _HEAD.size + _BODY.size or not data.startswith(_MAGIC):
-        raise PlantError(f"{len(data)} bytes came, expected a serialised state of a plant")
+        raise PlantError(f"got {len(data)} bytes, expected a serialised state of a plant")
     _, fmu_digest, checksum = _HEAD.unpack_from(data)
     if fmu_digest != _fmu_digest(instance):
         raise PlantError(f"the serialised state is of another FMU than {instance.path}")

@@ -17,30 +17,30 @@ def coupling_inputs(vehicle: Vehicle) -> Iterator[Variable]:
         return Variable(name, "input", f"coupling.{member}", quantity, description)
 
     for i, where in enumerate(("north", "east", "down")):
-        description = f"Velocity of the water beside that of the parameters, {where}, world frame NED"
+        description = f"Velocity of the water, added to that of the parameters, {where}, world frame NED"
         yield row(f"current_input.{AXES[i]}", f"current[{i}]", q.CURRENT, description)
     for i, where in enumerate(("north", "east", "down")):
-        description = f"Rate of that velocity, {where}, by which it goes on within a step"
+        description = f"Rate of that velocity, {where}, which extrapolates it within a step"
         yield row(f"current_input_rate.{AXES[i]}", f"current_rate[{i}]", q.ACCELERATION, description)
     for frame in ("world", "body"):
         for kind, quantity, what in (
             ("force", q.FORCE, "External force, {} frame {}"),
             ("moment", q.MOMENT, "External moment, {} frame {}"),
-            ("point", q.LEVER, "Where the external force of the {} frame acts, body {}"),
+            ("point", q.LEVER, "Point where the external force of the {} frame acts, body {}"),
         ):
             for i, axis in enumerate(AXES):
                 description = what.format(frame, axis)
                 yield row(f"external.{frame}.{kind}.{axis}", f"{frame}.{kind}[{i}]", quantity, description)
     for name, quantity, what in (
-        ("normalized", q.SHARE, "Command of thruster {} as a share of its limits, beside its commanded force"),
-        ("pulse", q.PULSE, "Command of thruster {} as a pulse of a T200, beside its commanded force; 0: none"),
-        ("rpm", q.RPM, "Command of thruster {} as revolutions of a T200, beside its commanded force"),
-        ("failure", q.FRACTION, "Part of the force of thruster {} that is lost"),
+        ("normalized", q.SHARE, "Command of thruster {} as a fraction of its limits, added to its commanded force"),
+        ("pulse", q.PULSE, "Command of thruster {} as a pulse of a T200, added to its commanded force; 0: none"),
+        ("rpm", q.RPM, "Command of thruster {} as revolutions of a T200, added to its commanded force"),
+        ("failure", q.FRACTION, "Lost fraction of thruster {}'s force"),
     ):
         for i in range(vehicle.n_thrusters):
             yield row(f"thrust_{name}[{i + 1}]", f"thrust_{name}[{i}]", quantity, what.format(i + 1))
     for i, (sensor, what) in enumerate(SENSORS):
-        description = f"Probability that a sample of {what} is lost, if that of the parameter is not greater"
+        description = f"Probability that a sample of {what} is lost, if above that of the parameter"
         yield row(f"{sensor}.outage", f"outage[{i}]", q.FRACTION, description)
 
 

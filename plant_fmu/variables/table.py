@@ -78,30 +78,30 @@ def _states(vehicle: Vehicle) -> Iterator[Variable]:
         description = f"Position of the body origin, {where}, world frame NED"
         yield Variable(f"position.{AXES[i]}", "state", f"state.rigid[{i}]", q.LENGTH, description)
     for i, part in enumerate(("scalar part", "vector part x", "vector part y", "vector part z")):
-        description = f"Attitude as unit quaternion from body to world, {part} (normalised when initialisation ends)"
+        description = f"Attitude as unit quaternion from body to world, {part} (normalized when initialization ends)"
         start = 1.0 if i == 0 else 0.0
         yield Variable(f"quaternion.e{i}", "state", f"state.rigid[{3 + i}]", q.QUATERNION, description, start)
     for i, name in enumerate(VELOCITIES):
         kind, quantity = ("Velocity over ground", q.SPEED) if i < 3 else ("Angular velocity", q.ANGULAR_SPEED)
         yield Variable(f"velocity.{name}", "state", f"state.rigid[{7 + i}]", quantity, f"{kind} {_along(i)}")
-    unlagged = "without a lag its command, brought up to date at initialisation and events"
+    unlagged = "without a lag equal to its command, updated at initialization and events"
     for i in range(vehicle.n_thrusters):
-        description = f"Force of thruster {i + 1} behind its lag, before its effectiveness; {unlagged}"
+        description = f"Force of thruster {i + 1} after its lag, before its effectiveness; {unlagged}"
         member = f"state.actuators.thrust[{i}]"
         yield Variable(f"actuator.thrust[{i + 1}]", "state", member, q.FORCE, description, local=True)
     for i, name in enumerate(FORCES):
-        description = f"Wrench input's component {name} behind its lag; {unlagged}"
+        description = f"Wrench input's component {name} after its lag; {unlagged}"
         member, quantity = f"state.actuators.wrench[{i}]", q.FORCE if i < 3 else q.MOMENT
         yield Variable(f"actuator.wrench.{name}", "state", member, quantity, description, local=True)
 
 
 def _inputs(vehicle: Vehicle) -> Iterator[Variable]:
     for i in range(vehicle.n_thrusters):
-        description = f"Commanded force of thruster {i + 1}, cut at its limits"
+        description = f"Commanded force of thruster {i + 1}, clipped to its limits"
         yield Variable(f"thrust[{i + 1}]", "input", f"inputs.thrust[{i}]", q.FORCE, description)
     for i, name in enumerate(FORCES):
         kind, quantity = ("force", q.FORCE) if i < 3 else ("moment", q.MOMENT)
-        description = f"Commanded {kind} on the body {_along(i)}, beside the thrusters"
+        description = f"Commanded {kind} on the body {_along(i)}, in addition to the thrusters"
         yield Variable(f"wrench.{name}", "input", f"inputs.wrench[{i}]", quantity, description)
 
 
@@ -143,7 +143,7 @@ def _outputs(vehicle: Vehicle) -> Iterator[Variable]:
     yield output("altitude", "altitude", q.unbounded("m"), "Height of the body origin above the bottom", *_BOTTOM)
     yield from _measured(output)
     for i in range(vehicle.n_thrusters):
-        description = f"Force that thruster {i + 1} gives now"
+        description = f"Present force of thruster {i + 1}"
         depends = (
             *_thruster_names(i, *_THRUSTER, "thrust_rate_limit", "thrust_effectiveness", "thrust_failure"),
             "supply_voltage",
@@ -179,7 +179,7 @@ def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
     for i, where in enumerate(("north", "east", "down")):
         yield measured(f"position.{AXES[i]}", "m", f"USBL's position, {where}", "usbl", f"position.{AXES[i]}")
     for i, (sensor, what) in enumerate(SENSORS):
-        description = f"Time at which {what} took the sample that it gives; -1e12 before the first"
+        description = f"Time of the last sample of {what}; -1e12 before the first"
         yield output(f"measured.time.{sensor}", f"stamp[{i}]", q.unbounded("s"), description, f"{sensor}.rate", "time")
 
 
@@ -218,7 +218,7 @@ def _parameters(vehicle: Vehicle) -> Iterator[Variable]:
         yield _parameter(name, f"inertia[{k}]", q.inertial("kg.m2", i == j), description, vehicle.inertia[i, j])
     for name, what, values in (("r_G", "gravity", vehicle.r_G), ("r_B", "buoyancy", vehicle.r_B)):
         for i, axis in enumerate(AXES):
-            yield _parameter(f"{name}.{axis}", f"{name}[{i}]", q.LEVER, f"Centre of {what}, body {axis}", values[i])
+            yield _parameter(f"{name}.{axis}", f"{name}[{i}]", q.LEVER, f"Center of {what}, body {axis}", values[i])
     yield _parameter("weight", "weight", q.WEIGHT, "Weight", vehicle.weight)
     yield _parameter("buoyancy", "buoyancy", q.WEIGHT, "Buoyancy", vehicle.buoyancy)
 
@@ -241,60 +241,70 @@ def _parameters(vehicle: Vehicle) -> Iterator[Variable]:
         quantity = Quantity("" if i < 3 else "N.m/N", -1e3, 1e3)
         for j in range(vehicle.n_thrusters):
             name, member = f"thruster_matrix[{i + 1},{j + 1}]", f"thruster_matrix[{i}][{j}]"
-            description = f"{force} on the body of one newton of thruster {j + 1}"
+            description = f"{force} on the body per newton of thruster {j + 1}"
             yield _parameter(name, member, quantity, description, vehicle.thruster_matrix[i, j])
     for i in range(vehicle.n_thrusters):
         for name, quantity, what, start in (
             ("min", q.FORCE, "Most negative force of thruster {}", vehicle.thrust_min[i]),
-            ("max", q.FORCE, "Greatest force of thruster {}", vehicle.thrust_max[i]),
+            ("max", q.FORCE, "Maximum force of thruster {}", vehicle.thrust_max[i]),
             ("time_constant", q.TIME_CONSTANT, "Lag of thruster {}, 0 for none", vehicle.thrust_time_constant[i]),
-            ("rate_limit", q.FORCE_RATE, "Fastest change of thruster {}, 0 for any", vehicle.thrust_rate_limit[i]),
-            ("dead_band", q.DEAD_BAND, "Part of thruster {}'s range without force", vehicle.thrust_dead_band[i]),
+            ("rate_limit", q.FORCE_RATE, "Rate limit of thruster {}'s force, 0 for none", vehicle.thrust_rate_limit[i]),
+            (
+                "dead_band",
+                q.DEAD_BAND,
+                "Dead band of thruster {}, as a fraction of its range",
+                vehicle.thrust_dead_band[i],
+            ),
             (
                 "curve",
                 q.FRACTION,
                 "Force of thruster {}: 0 linear in its command, 1 quadratic",
                 vehicle.thrust_curve[i],
             ),
-            ("effectiveness", q.FRACTION, "Part of its force that thruster {} still gives, 0 when failed", 1.0),
+            ("effectiveness", q.FRACTION, "Effectiveness of thruster {}: 1 full, 0 failed", 1.0),
         ):
             yield _parameter(f"thrust_{name}[{i + 1}]", f"thrust_{name}[{i}]", quantity, what.format(i + 1), start)
 
-    description = "Limit on the norm of the wrench input's force; its direction is kept, the moment left alone"
+    description = "Limit on the norm of the wrench input's force, which keeps its direction; the moment has none"
     yield _parameter("wrench_force_limit", "wrench_force_limit", q.FORCE_LIMIT, description, q.FORCE_LIMIT.maximum)
     description = "Lag of the wrench input, after its limit, 0 for none"
     yield _parameter("wrench_time_constant", "wrench_time_constant", q.TIME_CONSTANT, description, 0.0)
-    yield _parameter("substep", "substep", q.SUBSTEP, "Greatest step of the integration (co-simulation)", 0.005)
+    yield _parameter("substep", "substep", q.SUBSTEP, "Maximum integration step (co-simulation)", 0.005)
 
 
 def _environment(vehicle: Vehicle) -> Iterator[Variable]:
     for name, quantity, what in (
         ("current", q.CURRENT, "Velocity of the water at the surface, {}"),
-        ("current_shear", q.SHEAR, "Growth of the current with depth, {}"),
+        ("current_shear", q.SHEAR, "Shear of the current with depth, {}"),
         ("current_variation", q.CURRENT_DEVIATION, "Standard deviation of the current's Gauss-Markov part, {}"),
     ):
         for i, where in enumerate(("north", "east", "down")):
             yield _parameter(f"{name}.{AXES[i]}", f"{name}[{i}]", quantity, what.format(where))
     for name, quantity, description, start in (
         ("current_correlation_time", q.LONG_TIME, "Correlation time of the current's Gauss-Markov part", 60.0),
-        ("current_variation_period", q.LONG_TIME, "Time between knots of that part, straight lines between them", 1.0),
+        ("current_variation_period", q.LONG_TIME, "Time between knots of that part, linear between them", 1.0),
         (
             "hull_radius",
             q.RADIUS,
-            "Radius of the sphere that meets surface (about r_B) and bottom (about the origin)",
+            "Radius of the sphere that touches the surface (about r_B) and the bottom (about the origin)",
             vehicle.hull_radius,
         ),
-        ("bottom_depth", q.LENGTH, "Depth of the flat bottom; the greatest for none", q.LENGTH.maximum),
+        ("bottom_depth", q.LENGTH, "Depth of the flat bottom; the maximum for none", q.LENGTH.maximum),
         ("bottom_friction", q.FRICTION, "Coulomb's friction coefficient of the bottom, viscous below 1 cm/s", 0.4),
-        ("bottom_time_constant", q.TIME_CONSTANT, "Time in which the bottom stops the hull, 4 substeps at least", 0.02),
-        ("gravity", q.GRAVITY, "Gravity that the IMU feels", 9.81),
+        (
+            "bottom_time_constant",
+            q.TIME_CONSTANT,
+            "Time constant of contact with the bottom, at least 4 substeps",
+            0.02,
+        ),
+        ("gravity", q.GRAVITY, "Gravity that the IMU senses", 9.81),
     ):
         yield _parameter(name, name, quantity, description, start)
 
 
 def _sensors() -> Iterator[Variable]:
     for i, (sensor, what) in enumerate(SENSORS):
-        description = f"Samples a second of {what}; 0: continuous, without noise"
+        description = f"Sample rate of {what}; 0: continuous, without noise"
         yield _parameter(f"{sensor}.rate", f"sensor_rate[{i}]", q.SAMPLE_RATE, description)
         yield _parameter(f"{sensor}.delay", f"delay[{i}]", q.DELAY, "Time from a sample to its delivery")
         for event, description in (("loss", "is lost"), ("outlier", "is an outlier")):
@@ -318,7 +328,7 @@ def _sensors() -> Iterator[Variable]:
         ("compass.bias", "MEASURED_HEADING", "rad"),
     ):
         yield _parameter(name, f"bias[{channel}]", q.bias(unit), "Constant error")
-    description = "Part of the velocity that the DVL measures too much"
+    description = "Scale error of the DVL, as a fraction of the velocity"
     yield _parameter("dvl.scale_error", "velocity_scale_error", q.SCALE_ERROR, description)
 
 

@@ -282,7 +282,7 @@ int main(int argc, char **argv)
         double t = 0.0;
         if (!c)
             continue;
-        if (draw(4)) { /* most runs get through initialisation */
+        if (draw(4)) { /* most runs get through initialization */
             const unsigned state = FIRST_STATE + (unsigned)draw(N_STATES);
             const double start = 0.5;
             SET_REALS(c, &state, 1, &start);

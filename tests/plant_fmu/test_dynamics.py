@@ -127,7 +127,7 @@ def test_quaternion_stays_a_unit(make_slave):
         assert np.linalg.norm(slave.get(*STATES[3:7])) == pytest.approx(1.0, abs=1e-15)
 
 
-def test_quaternion_is_normalized_when_initialisation_ends(make_slave):
+def test_quaternion_is_normalized_when_initialization_ends(make_slave):
     slave = make_slave().start(**{"quaternion.e0": 0.5, "quaternion.e1": 0.5})
     assert slave.get("quaternion.e0", "quaternion.e1") == pytest.approx([np.sqrt(0.5)] * 2)
 

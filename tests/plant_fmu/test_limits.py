@@ -121,7 +121,7 @@ def test_time_beyond_the_representable_range_is_rejected(make_slave, fmi):
     assert "beyond 1e+09 s" in slave.said[-1][1]
 
 
-def test_outputs_of_initialisation_are_those_after_it(make_slave, fmi):
+def test_outputs_of_initialization_are_those_after_it(make_slave, fmi):
     """First samples with their noise, and the current as it begins."""
     values = {
         "depth_sensor.rate": 10.0,

@@ -72,7 +72,7 @@ def test_setting_outputs_is_rejected(make_slave, fmi):
 
 def test_setting_states_after_initialization_is_rejected(make_slave, fmi):
     slave = make_slave(fmi=fmi).start()
-    refused(slave, lambda: slave.set_values({"position.x": 1.0}), "position.x", "initialisation")
+    refused(slave, lambda: slave.set_values({"position.x": 1.0}), "position.x", "initialization")
 
 
 @pytest.mark.parametrize("step", [0.0, -0.1, math.nan, math.inf])
@@ -145,7 +145,7 @@ def test_invalid_times_are_rejected(make_slave):
 
 
 @pytest.mark.parametrize(("start", "stop"), [(math.nan, None), (1.0, 0.5), (0.0, math.nan), (-2e9, None)])
-def test_refused_times_block_initialisation(make_slave, fmi, start, stop):
+def test_refused_times_block_initialization(make_slave, fmi, start, stop):
     """Until valid times are set: an importer that ignores the status must not run at rejected times."""
     slave = make_slave(fmi=fmi)
     if fmi == 2:
@@ -153,7 +153,7 @@ def test_refused_times_block_initialisation(make_slave, fmi, start, stop):
             slave.fmu.setupExperiment(startTime=start, stopTime=stop)
         state = slave.save()
         for _ in range(2):
-            said = "entering initialisation: start and stop time were refused"
+            said = "entering initialization: start and stop time were refused"
             refused(slave, slave.fmu.enterInitializationMode, said)
             slave.restore(state)  # which keeps it
         slave.free(state)
@@ -162,7 +162,7 @@ def test_refused_times_block_initialisation(make_slave, fmi, start, stop):
     else:
         with pytest.raises(FMICallException):
             slave.fmu.enterInitializationMode(startTime=start, stopTime=stop)
-        refused(slave, slave.fmu.exitInitializationMode, "leaving initialisation: not allowed before initialisation")
+        refused(slave, slave.fmu.exitInitializationMode, "leaving initialization: not allowed before initialization")
         slave.fmu.enterInitializationMode(startTime=1.0)
     slave.fmu.exitInitializationMode()
 
@@ -175,13 +175,13 @@ def test_a_reset_forgets_refused_times(make_slave):
     slave.fmu.enterInitializationMode()
 
 
-def test_initialisation_is_entered_once(make_slave, fmi):
+def test_initialization_is_entered_once(make_slave, fmi):
     slave = make_slave(fmi=fmi)
     slave.fmu.enterInitializationMode()
-    said = "entering initialisation: it was entered already and has not ended"
+    said = "entering initialization: it was entered already and has not ended"
     refused(slave, slave.fmu.enterInitializationMode, said)
     slave.fmu.exitInitializationMode()  # the first counts
-    said = "entering initialisation: not allowed once initialisation has ended"
+    said = "entering initialization: not allowed once initialization has ended"
     refused(slave, slave.fmu.enterInitializationMode, said)
 
 
@@ -190,9 +190,9 @@ def test_reading_no_variables_succeeds(make_slave):
     assert make_slave(fmi=3).fmu.getInt32([]) == []
 
 
-def test_no_stepping_before_initialisation(make_slave, fmi):
+def test_no_stepping_before_initialization(make_slave, fmi):
     slave = make_slave(fmi=fmi)
-    refused(slave, lambda: slave.step(0.1), "before initialisation")
+    refused(slave, lambda: slave.step(0.1), "before initialization")
 
 
 def test_wrong_token_is_rejected(make_slave, fmi):

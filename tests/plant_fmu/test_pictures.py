@@ -41,7 +41,7 @@ def test_a_thruster_that_only_turns_the_body_has_no_line():
     turned = dataclasses.replace(vehicle, thruster_matrix=matrix)
     assert not thruster_lines(turned)[2].nearest.any()
     texts = [text.get_text() for text in PICTURES["thrusters"](turned).findobj() if hasattr(text, "get_text")]
-    assert any("only turn the body are left out: 3" in text for text in texts)
+    assert any("give only a moment are left out: 3" in text for text in texts)
 
 
 def extents(figure):

@@ -175,7 +175,7 @@ def test_only_setting_is_allowed_before_initialise(make_plant, fmi):
             act()
     assert plant["thrust[1]"] == 0.0
     plant.initialise()
-    with pytest.raises(PlantError, match=r"initialised already; reset\(\) takes it back"):
+    with pytest.raises(PlantError, match=r"initialized already; reset\(\) it first"):
         plant.initialise()
 
 
@@ -230,7 +230,7 @@ def test_start_time_is_arbitrary(make_plant, fmi):
     assert plant.time == 100.5
 
 
-def test_contradictory_parameters_are_rejected_at_initialisation(make_plant, fmi):
+def test_contradictory_parameters_are_rejected_at_initialization(make_plant, fmi):
     plant = make_plant("odin", fmi, start=False)
     plant.set({"added_mass[1,1]": 1.0, "added_mass[1,2]": 1e4})
     with pytest.raises(PlantError, match="positive definite"):
@@ -282,10 +282,10 @@ def test_rejected_integer_leaves_real_values_unchanged(make_plant):
     assert plant["mass"] == mass and plant["thrust[1]"] == 0.0
 
 
-def test_failed_initialisation_error_names_the_remedy():
+def test_failed_initialization_error_names_the_remedy():
     with Plant("odin") as plant:
         plant.set({"dvl.velocity_noise": 0.1})
-        with pytest.raises(PlantError, match=r"needs the sensor's rate .*; reset\(\), then set what is right"):
+        with pytest.raises(PlantError, match=r"needs the sensor's rate .*; reset\(\), then set valid values"):
             plant.initialise()
         plant.reset()
         plant.set({"dvl.velocity_noise": 0.1, "dvl.rate": 5.0})

@@ -58,8 +58,8 @@ def test_invalid_state_bytes_are_rejected(make_plant):
     flipped = bytearray(data)
     flipped[-9] ^= 1
     for wrong, words in (
-        (b"", "0 bytes came, expected a serialised state"),
-        (b"x" * 1000, "1000 bytes came, expected a serialised state"),
+        (b"", "got 0 bytes, expected a serialised state"),
+        (b"x" * 1000, "got 1000 bytes, expected a serialised state"),
         (data[:-1], "damaged"),
         (bytes(flipped), "damaged"),
     ):

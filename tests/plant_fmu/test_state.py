@@ -73,7 +73,7 @@ def test_state_transfers_to_another_instance(make_slave, fmi):
 
 
 def test_state_includes_the_mode(make_slave, fmi):
-    """A state saved before initialisation restores that mode."""
+    """A state saved before initialization restores that mode."""
     slave = make_slave(fmi=fmi)
     slave.set_values({"position.x": 3.0})
     state = slave.save()

@@ -168,8 +168,8 @@ def test_invalid_vehicle_names_are_rejected(tmp_path, name):
     [
         (("mass = 125.0 ", "mass = inf "), "rigid_body.mass is not finite"),
         (("[0.0, 0.0, 0.05] ", "[0.0, 0.0, nan] "), "rigid_body.center_of_gravity is not finite"),
-        (("[0.0, 0.0, 0.05] ", "[0.0, 0.0, 0.9] "), r"rigid-body mass matrix is not positive definite \(least eig"),
-        (("[0.0, 0.0, 0.05] ", "[0.0, 0.0, 0.3] "), r"rigid-body mass matrix is not positive definite \(least eig"),
+        (("[0.0, 0.0, 0.05] ", "[0.0, 0.0, 0.9] "), r"rigid-body mass matrix is not positive definite \(smallest eig"),
+        (("[0.0, 0.0, 0.05] ", "[0.0, 0.0, 0.3] "), r"rigid-body mass matrix is not positive definite \(smallest eig"),
         (("force_max = 27.0 ", "force_max = inf "), "thrusters.force_max is not finite"),
         (("[0.508, -0.508,", "[nan, -0.508,"), "thrusters.matrix is not finite"),
         (("[8.0, 8.0, 8.0]", "[[8, 1, 0], [0, 8, 0], [0, 0, 8]]"), "rigid_body.inertia is not symmetric"),

@@ -214,7 +214,7 @@ def test_rejections_are_logged_with_the_instance_name(binaries, importers):
         ("get-number-of-variable-dependencies", (0,), "not offered"),
         ("set-input-derivatives", ([(0, 1)], [1.0]), "set-input-derivatives: not offered"),
         ("set-debug-logging", (True, ["logNothing"]), '"logNothing" is unknown'),
-        ("do-step", (0.0, 0.01, True), "not allowed before initialisation"),
+        ("do-step", (0.0, 0.01, True), "not allowed before initialization"),
         ("set-fmu-state", (b"nonsense",), ""),
     ):
         fmu.said.clear()

@@ -21,7 +21,7 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
-from plant_fmu.vehicle_component import of_vehicle
+from plant_fmu.vehicle_component import make_vehicle_component
 
 SHORT = ("arbiter.engine=closed", "time.duration=0.1", "time.step=0.01", "time.control=0.02", "time.arbiter=0.01")
 SCENARIO = load_scenario("paper", SHORT)
@@ -151,7 +151,7 @@ def test_verb_that_needs_a_built_in_law_refuses_a_run_of_a_custom_one(facility, 
 
 
 def coupled(fmi):
-    return Plant(cached_fmu(of_vehicle(load_vehicle("odin"), {}, coupled=True), fmi))
+    return Plant(cached_fmu(make_vehicle_component(load_vehicle("odin"), {}, coupled=True), fmi))
 
 
 @pytest.mark.medium

@@ -3,6 +3,8 @@
 import sys
 from importlib import metadata
 
+import fmpy
+
 from plant_fmu.checking.check import IMPORTERS as CHECKED
 from plant_fmu.checking.fmu_file import FmuFile
 from plant_fmu.checking.process import Importer
@@ -20,9 +22,12 @@ def _not_many(fmu: FmuFile) -> str:
 
 
 def _not_casadi(fmu: FmuFile) -> str:
-    if fmu.event_indicators:
-        return f"integrates no FMU with state events; this one has {fmu.event_indicators} event indicators"
-    if not fmu.states:
+    description = fmpy.read_model_description(str(fmu.path), validate=False)
+    if description.numberOfEventIndicators:
+        return (
+            f"integrates no FMU with state events; this one has {description.numberOfEventIndicators} event indicators"
+        )
+    if not description.numberOfContinuousStates:
         return "the FMU has no continuous states"
     return _not_many(fmu)
 
