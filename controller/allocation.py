@@ -26,10 +26,8 @@ def _greatest(forces: Array) -> float:
 
 
 def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
-    """Clip thruster forces [N], shape (n,), in place, each at its own limits; return True if any was beyond them.
-
-    The direction of the wrench may change.
-    """
+    """Clip thruster forces [N], shape (n,), in place, each at its own limits; return True if any was beyond them."""
+    # The direction of the wrench may change.
     cut, negligible = False, _ROUNDING * _greatest(forces)
     for i in range(forces.size):
         within = min(max(forces[i], lower[i]), upper[i])
@@ -39,10 +37,8 @@ def clip_each(forces: Array, lower: Array, upper: Array) -> bool:
 
 
 def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
-    """Scale thruster forces [N], shape (n,), in place until all are within limits; return True if any was beyond.
-
-    The wrench keeps its direction.
-    """
+    """Scale thruster forces [N], shape (n,), in place until all are within limits; return True if any was beyond."""
+    # The wrench keeps its direction.
     scale, negligible = 1.0, _ROUNDING * _greatest(forces)
     for i in range(forces.size):
         if forces[i] > upper[i] and forces[i] > negligible:
@@ -56,26 +52,8 @@ def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
 
 
 def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: Array, forces: Array) -> bool:
-    """Write the least-squares thruster forces for a wrench, within limits, into `forces`.
-
-    Parameters
-    ----------
-    inverse : ndarray, shape (n, 6)
-        Pseudo-inverse of the thruster matrix.
-    lower, upper : ndarray, shape (n,)
-        Limits of each thruster [N].
-    direction : bool
-        True to scale all forces together; False to clip each on its own.
-    tau : ndarray, shape (6,)
-        Wrench [N, N m], body frame.
-    forces : ndarray, shape (n,)
-        Receives the forces [N].
-
-    Returns
-    -------
-    bool
-        True if the limits cut the wrench.
-    """
+    """Write the least-squares thruster forces for a wrench, within limits, into `forces`; lower, upper [N]."""
+    # with tau [N, N m], forces [N]
     for i in range(forces.size):
         forces[i] = 0.0
         for j in range(6):
@@ -84,30 +62,10 @@ def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: A
 
 
 class Allocation:
-    """Thruster allocation by the pseudo-inverse, the least forces that give a wrench.
+    """Thruster allocation by the pseudo-inverse, the least forces that give a wrench; lower, upper [N]."""
 
-    Thrusters whose limits are both 0 are left out. Forces of the pseudo-inverse are cut to the limits, and not
-    reallocated, so that one-sided thrusters (a limit of 0) stop every wrench that needs their other side.
-
-    Parameters
-    ----------
-    matrix : ndarray, shape (6, n)
-        Body wrench of one newton of each thruster.
-    lower, upper : ndarray, shape (n,)
-        Limits of each thruster [N]; 0 must lie within them.
-    limits : {"direction", "per-thruster"}
-        Way to bring forces within the limits.
-
-    Attributes
-    ----------
-    arguments : tuple
-        First arguments of `allocate`: inverse, lower and upper limits, True if direction is kept.
-
-    Raises
-    ------
-    LawError
-        If the shapes differ, or zero force is not within the limits.
-    """
+    # Thrusters whose limits are both 0 are left out. Forces of the pseudo-inverse are cut to the limits, and not
+    # reallocated, so that one-sided thrusters (a limit of 0) stop every wrench that needs their other side.
 
     def __init__(
         self, matrix: Array, lower: Array, upper: Array, limits: Literal["direction", "per-thruster"] = "direction"
@@ -126,18 +84,5 @@ class Allocation:
         self.arguments = inverse, np.array(lower, dtype=float), np.array(upper, dtype=float), limits == "direction"
 
     def __call__(self, tau: Array, forces: Array) -> bool:
-        """Write the thruster forces for a wrench into `forces`.
-
-        Parameters
-        ----------
-        tau : ndarray, shape (6,)
-            Wrench [N, N m], body frame.
-        forces : ndarray, shape (n,)
-            Receives the forces [N], within the limits.
-
-        Returns
-        -------
-        bool
-            True if the limits cut the wrench.
-        """
+        """Write the thruster forces for a wrench into `forces`; tau (6,) [N, N m], forces (n,) [N]."""
         return bool(allocate(*self.arguments, tau, forces))

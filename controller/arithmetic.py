@@ -1,8 +1,7 @@
-"""Arithmetic whose bits are the same in Python and in C, whatever the C library.
+"""Arithmetic whose bits are the same in Python and in C, whatever the C library."""
 
-Only +, -, *, / and square roots round alike everywhere. Powers, angles and their cosines are computed from these here,
-for laws and shapes: the functions of C libraries, and of Python, differ in their last bits.
-"""
+# Only +, -, *, / and square roots round alike everywhere. Powers, angles and their cosines are computed from these
+# here, for laws and shapes: the functions of C libraries, and of Python, differ in their last bits.
 
 from __future__ import annotations
 
@@ -64,10 +63,8 @@ def exponential(x: float) -> float:
 
 
 def arctangent(y: float, x: float) -> float:
-    """Return the angle of the point (x, y) [rad], within 5e-16 of itself; 0 of (0, 0), and NaN of NaN.
-
-    The tangent's distance from the nearest of 0, 1/4 .. 1 goes into Taylor's series.
-    """
+    """Return the angle of the point (x, y) [rad], within 5e-16 of itself; 0 of (0, 0), and NaN of NaN."""
+    # The tangent's distance from the nearest of 0, 1/4 .. 1 goes into Taylor's series.
     if math.isnan(x) or math.isnan(y):
         return math.nan
     greater, less = max(abs(x), abs(y)), min(abs(x), abs(y))

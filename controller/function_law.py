@@ -140,18 +140,7 @@ def _shown(received: object) -> str:
 
 
 def qualified_name(law: object) -> str:
-    """Return module and name of a function, or of an object's class.
-
-    Parameters
-    ----------
-    law : object
-        A function, or any object.
-
-    Returns
-    -------
-    str
-        Name such as ``my_laws:steer``, or ``my_laws.py:steer`` if that file is the script that runs.
-    """
+    """Return module and name of a function, or of an object's class."""
     named = law if hasattr(law, "__qualname__") else type(law)
     module, name = str(named.__module__), str(named.__qualname__)
     script = getattr(sys.modules.get(module), "__file__", None) if module == "__main__" else None

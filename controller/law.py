@@ -1,9 +1,8 @@
-"""The interface of every law: state, regions and weights in; a body wrench or thruster forces out.
+"""The interface of every law: state, regions and weights in; a body wrench or thruster forces out."""
 
-A law's mathematics is one compiled function ``step(state, goal, regions, weights, gains, memory, forces)``. Its state
-between steps is its `memory`, a named tuple of arrays, so that the same function serves the readable
-master, which calls `CompiledLaw.step`, and compiled loops, which call the function itself.
-"""
+# A law's mathematics is one compiled function `step(state, goal, regions, weights, gains, memory, forces)`. Its state
+# between steps is its `memory`, a named tuple of arrays, so that the same function serves the readable master, which
+# calls `CompiledLaw.step`, and compiled loops, which call the function itself.
 
 from __future__ import annotations
 
@@ -270,24 +269,7 @@ class CompiledLaw:
 
 
 class WrenchLaw(CompiledLaw):
-    """A law that gives a wrench, and uses no numbers of the vehicle.
-
-    Parameters
-    ----------
-    gains : NamedTuple
-        Gains of `gains_type`.
-    desired_quaternion : array_like, shape (4,)
-        Attitude to be kept, from body to world.
-    period : float
-        Control period [s].
-    n_regions : int
-        Number of secondary regions.
-
-    Raises
-    ------
-    LawError
-        If gains, attitude or period are invalid.
-    """
+    """A law that gives a wrench, and uses no numbers of the vehicle; desired_quaternion (4,), period [s]."""
 
     output: ClassVar[Output] = "wrench"
     make_memory: ClassVar[Callable[..., Any]]  # takes attitude (4,), period (1,) [s], and number of regions
@@ -306,46 +288,14 @@ class WrenchLaw(CompiledLaw):
 
 
 def validate_period(period: float) -> float:
-    """Validate a control period [s], and return it.
-
-    Parameters
-    ----------
-    period : float
-        Control period [s].
-
-    Returns
-    -------
-    float
-        The same period [s].
-
-    Raises
-    ------
-    LawError
-        If the period is not a finite number above 0.
-    """
+    """Validate a control period [s], and return it."""
     if not 0.0 < period < np.inf:
         raise LawError(f"control period is {period} s, expected a finite number above 0")
     return period
 
 
 def validate_quaternion(quaternion: Array) -> Array:
-    """Validate a desired attitude, and return it as an array of its own, shape (4,).
-
-    Parameters
-    ----------
-    quaternion : array_like, shape (4,)
-        Desired attitude, a unit quaternion from body to world, scalar first.
-
-    Returns
-    -------
-    ndarray, shape (4,)
-        The same quaternion.
-
-    Raises
-    ------
-    LawError
-        If the quaternion is not of length 1.
-    """
+    """Validate a desired attitude, and return it as an array of its own, shape (4,)."""
     desired = np.array(quaternion, dtype=float)
     if desired.shape != (4,) or not abs(np.linalg.norm(desired) - 1.0) < 1e-6:
         raise LawError(f"desired quaternion is {desired}, expected four numbers of length 1")
@@ -353,25 +303,7 @@ def validate_quaternion(quaternion: Array) -> Array:
 
 
 def validate_gains(gains: G, above_zero: Container[str]) -> G:
-    """Validate gains, and return them.
-
-    Parameters
-    ----------
-    gains : NamedTuple of float
-        Gains to validate.
-    above_zero : container of str
-        Names of gains that must not be 0.
-
-    Returns
-    -------
-    NamedTuple of float
-        The same gains.
-
-    Raises
-    ------
-    LawError
-        If a gain is negative or not finite, or 0 although it divides.
-    """
+    """Validate gains, and return them."""
     for name, value in zip(type(gains)._fields, gains, strict=True):  # type: ignore[attr-defined]
         positive = name in above_zero
         if not (math.isfinite(value) and (value > 0.0 if positive else value >= 0.0)):

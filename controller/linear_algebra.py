@@ -32,10 +32,8 @@ def norm(a: Array) -> float:
 
 
 def invert_symmetric(A: Array) -> None:
-    """Replace a symmetric positive definite matrix, shape (n, n), by its inverse, which is symmetric to the last bit.
-
-    A^-1 = L^-T L^-1 with the Cholesky factor A = L L^T, in the place of A's lower triangle.
-    """
+    """Replace a symmetric positive definite matrix (n, n) by its inverse, symmetric to the last bit."""
+    # A^-1 = L^-T L^-1 with the Cholesky factor A = L L^T, in the place of A's lower triangle.
     n = A.shape[0]
     for i in range(n):  # L
         for j in range(i + 1):

@@ -1,8 +1,7 @@
-"""The paper's law: equations (16)-(29), to the letter where it can be read, as resolved where it cannot.
+"""The paper's law: equations (16)-(29), to the letter where it can be read, as resolved where it cannot."""
 
-It has no thrusters and no limits. With the paper's gains it commands tens of kilonewtons far from the goal; under a
-limit its adaptation (27) winds up. It is here for study, not for use on a vehicle.
-"""
+# It has no thrusters and no limits. With the paper's gains it commands tens of kilonewtons far from the goal; under a
+# limit its adaptation (27) winds up. It is here for study, not for use on a vehicle.
 
 from __future__ import annotations
 
@@ -39,10 +38,8 @@ class Gains(NamedTuple):
 
 
 def positive_part(value: float) -> float:
-    """Return max(0, g) of a `value` g, as in (16), (17), (20) and (22).
-
-    NaN stays NaN, so that a lost measurement does not look like safety.
-    """
+    """Return max(0, g) of a `value` g, as in (16), (17), (20) and (22)."""
+    # NaN stays NaN, so that a lost measurement does not look like safety.
     return 0.0 if value <= 0.0 else value
 
 
@@ -52,10 +49,8 @@ def primary_potential(value: float, k_p1: float) -> float:
 
 
 def secondary_potential(values: Array, alphas: Array) -> float:
-    """Return P_s: (17), of the g_i, `values`, and the alpha_i, `alphas`, each of shape (n,).
-
-    The law follows its gradient only where |dg_i/dp| = 1: (19) normalizes each gradient.
-    """
+    """Return P_s: (17), of the g_i, `values`, and the alpha_i, `alphas`, each of shape (n,)."""
+    # The law follows its gradient only where |dg_i/dp| = 1: (19) normalizes each gradient.
     total = 0.0
     for i in range(values.size):
         total += 0.5 * alphas[i] * square(positive_part(values[i]))
@@ -82,17 +77,7 @@ def secondary_parts(values: Array, gradients: Array, alphas: Array, k_q: float) 
 
 
 def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
-    """Return e_s, shape (3,): (21), (22); k_q times it is (19).
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Values g_i of the regions.
-    gradients : ndarray, shape (n, 3)
-        Gradients dg_i/dp; a region whose gradient is zero contributes nothing.
-    betas : ndarray, shape (n,)
-        Factors beta_i = alpha_i / k_q.
-    """
+    """Return e_s, shape (3,): (21), (22); k_q times it is (19); values (n,), gradients (n, 3), betas (n,)."""
     e_s = np.empty(3)
     e_s[0], e_s[1], e_s[2] = secondary_parts(values, gradients, betas, 1.0)
     return e_s
@@ -118,27 +103,8 @@ def apply(
     estimate: Array,
     tau: Array,
 ) -> None:
-    """Write tau: (25) with (26), (29); then update the estimate over a period: (27) with (28).
-
-    Parameters
-    ----------
-    e_p, e_s : three numbers
-        Region errors (20), (21), world frame.
-    e_att : three numbers
-        Vector part of the error quaternion (23).
-    R : three rows
-        Rotation matrix from body to world.
-    velocity_body : ndarray, shape (6,)
-        Velocity nu [m/s, rad/s], body frame.
-    gains : Gains
-        Gains of K_0 = diag(k_p1 R^T, k_p2 I), K_s = [k_q R^T; 0], K_v = diag(k_v1 I, k_v2 I) (26).
-    period : float
-        Time for which the wrench is held [s]; (27) is integrated over it by Euler's rule.
-    estimate : ndarray, shape (4,)
-        Estimate phi-hat [N, N m], updated in place after its use.
-    tau : ndarray, shape (6,)
-        Receives the wrench [N, N m], body frame.
-    """
+    """Write tau: (25) with (26), (29); then update the estimate over a period: (27) with (28)."""
+    # with velocity_body [m/s, rad/s], gains [k_q R^T; 0], period [s], estimate [N, N m], tau [N, N m]
     k_p1, k_q, nu = gains.k_p1, gains.k_q, velocity_body
     # (12): Z = [-k 0; 0 S(k)] with k = R^T e3, the last row of R
     k = R[2]
@@ -181,31 +147,8 @@ def step(
     estimate: Array,
     tau: Array,
 ) -> None:
-    """Compute the wrench of one control period, then update the estimate over it.
-
-    Parameters
-    ----------
-    quaternion, desired_quaternion : ndarray, shape (4,)
-        Actual and desired attitude, from body to world.
-    velocity_body : ndarray, shape (6,)
-        Velocity nu [m/s, rad/s], body frame.
-    goal_value : float
-        Value f of the primary region (13).
-    goal_gradient : ndarray, shape (3,)
-        Gradient df/dp.
-    values, gradients : ndarray, shape (n,), (n, 3)
-        Values g_i and gradients dg_i/dp of the secondary regions (14).
-    alphas : ndarray, shape (n,)
-        Gain of each region (section VII) times its weight from the arbiter (section VI).
-    gains : Gains
-        Gains of the law.
-    period : float
-        Time for which the wrench is held [s]; (27) is integrated over it by Euler's rule.
-    estimate : ndarray, shape (4,)
-        Estimate phi-hat [N, N m], updated in place after its use.
-    tau : ndarray, shape (6,)
-        Receives the wrench [N, N m], body frame.
-    """
+    """Compute the wrench of one control period, then update the estimate over it; velocity_body [m/s, rad/s]."""
+    # with period [s], estimate [N, N m], tau [N, N m]
     f = positive_part(goal_value)
     e_p = (f * goal_gradient[0], f * goal_gradient[1], f * goal_gradient[2])
     e_s = secondary_parts(values, gradients, alphas, gains.k_q)

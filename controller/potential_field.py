@@ -1,10 +1,8 @@
-"""Common parts of the laws for comparison: a bounded pull to the goal, the push of all other regions, and damping.
+"""Common parts of the laws for comparison: a bounded pull to the goal, the push of all other regions, and damping."""
 
-Their sources have no obstacles and no arbiter. Here each law gets the potential force (22) of every secondary
-region, with a weight of 1. A region is grown by a `reach`, so that it pushes
-before the vehicle is at its surface, and g is the signed distance to the grown region, whose gradient has the length
-1, as (19) requires.
-"""
+# Their sources have no obstacles and no arbiter. Here each law gets the potential force (22) of every secondary region,
+# with a weight of 1. A region is grown by a `reach`, so that it pushes before the vehicle is at its surface, and g is
+# the signed distance to the grown region, whose gradient has the length 1, as (19) requires.
 
 from __future__ import annotations
 
@@ -57,21 +55,8 @@ def empty_field(n_regions: int) -> Field:
 def evaluate_field(
     state: VehicleState, goal: PackedRegions, regions: PackedRegions, repulsion: float, reach: float, field: Field
 ) -> None:
-    """Evaluate all regions at a pose, and sum up the push of those that depend on position alone.
-
-    Parameters
-    ----------
-    state : VehicleState
-        Measured state.
-    goal, regions : PackedRegions
-        The primary region, and the n secondary ones.
-    repulsion : float
-        Slope of the push of a region of gain 1 [N/m].
-    reach : float
-        Clearance at which a region begins to push [m].
-    field : Field
-        Receives everything but `error`.
-    """
+    """Evaluate all regions at a pose, and sum up the push of those that depend on position alone; repulsion [N/m]."""
+    # with reach [m]
     evaluate_regions(state, goal, regions, field)
     field.push[:] = 0.0
     for i in range(field.values.size):
@@ -98,20 +83,10 @@ def add_along(gradient: Array, length: float, total: Array) -> None:
 
 
 def set_point_error(field: Field, inset: float, most: float) -> None:
-    """Write the vector from the set point to the vehicle [m, NED] into `field.error`, shortened to a length.
-
-    The set point is the nearest point whose clearance within the goal region is `inset`: the centre of a sphere of that
-    radius. No region's deepest point is needed, so that every shape can be a goal.
-
-    Parameters
-    ----------
-    field : Field
-        Evaluated regions; its `error` is written.
-    inset : float
-        Clearance of the set point [m], at most the greatest clearance in the goal region.
-    most : float
-        Greatest length of the error [m].
-    """
+    """Write the vector from the set point to the vehicle [m, NED] into `field.error`, shortened to a length."""
+    # with inset [m], most [m]
+    # The set point is the nearest point whose clearance within the goal region is `inset`: the centre of a sphere of
+    # that radius. No region's deepest point is needed, so that every shape can be a goal.
     field.error[:] = 0.0
     add_along(field.goal_gradient[0], positive_part(inset - field.goal_clearance[0]), field.error)
     shorten(field.error, most)
@@ -141,10 +116,8 @@ def write_damping(
 
 
 def clip_estimate(estimate: Array, first: int, last: int, bound: float) -> None:
-    """Clip the numbers from `first` up to, not including, `last` of an estimate to +-`bound`; NaN stays.
-
-    This projection prevents windup of the estimate while an obstacle holds the vehicle back.
-    """
+    """Clip the numbers from `first` up to, not including, `last` of an estimate to +-`bound`; NaN stays."""
+    # This projection prevents windup of the estimate while an obstacle holds the vehicle back.
     for i in range(first, last):
         if abs(estimate[i]) > bound:
             estimate[i] = math.copysign(bound, estimate[i])

@@ -1,23 +1,22 @@
-"""The quadratic program of barriers: the thruster forces nearest to the nominal ones that keep every barrier.
+"""The quadratic program of barriers: the thruster forces nearest to the nominal ones that keep every barrier."""
 
-    minimise    1/2 (u - u0)^T H (u - u0) + 1/2 sum rho_i s_i^2
-    subject to  a_i^T u + s_i >= b_i,   lower <= u <= upper
-
-Slack s_i of a barrier costs rho_i, so there is always exactly one solution. Its dual has a multiplier
-for each barrier and each limit, and only the constraint y >= 0,
-
-    minimise    1/2 y^T G y - d^T y,   y >= 0,   G = A H^-1 A^T + diag(1 / rho),   d = b - A u0,
-
-which the active-set method of Lawson and Hanson (Solving Least Squares Problems, 1974, ch. 23) solves. It adds the row
-that is violated most, measured by sqrt(G_ii), and moves to the minimum over the passive rows, dropping those whose
-multiplier would turn negative. Each such minimum is below the one before, so that no set of rows occurs twice and the
-search ends. Rounding could still cause a cycle: a row that cannot be added, because it depends on the passive rows or
-its multiplier would not grow, is set aside until another one has moved the forces, and three steps a row end the search
-in any case.
-
-It is not taken from a library, because it must compile into the loop (a call of quadprog costs 7 us, of which 1 us is
-work), allocate nothing, and end after a known number of steps.
-"""
+#     minimise    1/2 (u - u0)^T H (u - u0) + 1/2 sum rho_i s_i^2
+#     subject to  a_i^T u + s_i >= b_i,   lower <= u <= upper
+#
+# Slack s_i of a barrier costs rho_i, so there is always exactly one solution. Its dual has a multiplier for each
+# barrier and each limit, and only the constraint y >= 0,
+#
+#     minimise    1/2 y^T G y - d^T y,   y >= 0,   G = A H^-1 A^T + diag(1 / rho),   d = b - A u0,
+#
+# which the active-set method of Lawson and Hanson (Solving Least Squares Problems, 1974, ch. 23) solves. It adds the
+# row that is violated most, measured by sqrt(G_ii), and moves to the minimum over the passive rows, dropping those
+# whose multiplier would turn negative. Each such minimum is below the one before, so that no set of rows occurs twice
+# and the search ends. Rounding could still cause a cycle: a row that cannot be added, because it depends on the passive
+# rows or its multiplier would not grow, is set aside until another one has moved the forces, and three steps a row end
+# the search in any case.
+#
+# It is not taken from a library, because it must compile into the loop (a call of quadprog costs 7 us, of which 1 us is
+# work), allocate nothing, and end after a known number of steps.
 
 from __future__ import annotations
 
@@ -39,10 +38,9 @@ _FREE, _PASSIVE, _ASIDE, _NOTHING = 0, 1, 2, 3  # state of a row: may be added, 
 
 
 class Workspace(NamedTuple):
-    """Arrays for a program of up to r barriers and m thrusters.
+    """Arrays for a program of up to r barriers and m thrusters."""
 
-    Its rows are the barriers in use, then the lower limits, then the upper ones.
-    """
+    # Its rows are the barriers in use, then the lower limits, then the upper ones.
 
     rows: Array  # (r, m) a_i
     right: Array  # (r,) b_i
@@ -61,18 +59,7 @@ class Workspace(NamedTuple):
 
 
 def empty_workspace(barriers: int, thrusters: int) -> Workspace:
-    """Return a workspace for programs of a size.
-
-    Parameters
-    ----------
-    barriers, thrusters : int
-        Greatest numbers of barriers and thrusters.
-
-    Returns
-    -------
-    Workspace
-        Workspace of zeros.
-    """
+    """Return a workspace for programs of a size."""
     n = barriers + 2 * thrusters
     return Workspace(
         rows=np.zeros((barriers, thrusters)),
@@ -93,28 +80,8 @@ def empty_workspace(barriers: int, thrusters: int) -> Workspace:
 
 
 def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array, forces: Array) -> int:
-    """Solve the program with `barriers` rows, right sides and prices in `work`, and with u0 in `nominal`.
-
-    Parameters
-    ----------
-    work : Workspace
-        Program, and afterwards the multipliers of the solution. A barrier with a number that is not finite is
-        left out; a nominal force that is not finite becomes 0.
-    barriers : int
-        Number of rows in use.
-    inverse : ndarray, shape (m, m)
-        H^-1, positive definite and symmetric to the last bit.
-    lower, upper : ndarray, shape (m,)
-        Limits [N], lower <= upper.
-    forces : ndarray, shape (m,)
-        Receives u [N], within the limits.
-
-    Returns
-    -------
-    int
-        Steps taken, each a change of the passive rows: at most 3 (barriers + 2 m). Negative if that bound, or numbers
-        beyond 1e150, ended the search; the forces are then within the limits, but not optimal.
-    """
+    """Solve the program with `barriers` rows, right sides and prices in `work`, and with u0 in `nominal`."""
+    # with lower, upper [N], forces [N]
     n = barriers + 2 * forces.size
     tolerance = _TOLERANCE * _prepare(work, barriers, inverse, lower, upper)
     copy(work.nominal, forces)
@@ -235,12 +202,10 @@ def _most_violated(work: Workspace, barriers: int, lower: Array, upper: Array, f
 def _refine(
     work: Workspace, barriers: int, count: int, inverse: Array, lower: Array, upper: Array, forces: Array
 ) -> None:
-    """Correct forces and multipliers of the passive rows by their residuals: iterative refinement.
-
-    The conditions are u = u0 + H^-1 A^T y and A u + y / rho = b. Where rows contradict each other, A^T y is a million
-    times less than its terms, so that their rounding would show in the forces. The residuals are summed in twice the
-    precision; the correction itself is small, and does not need that.
-    """
+    """Correct forces and multipliers of the passive rows by their residuals: iterative refinement."""
+    # The conditions are u = u0 + H^-1 A^T y and A u + y / rho = b. Where rows contradict each other, A^T y is a million
+    # times less than its terms, so that their rounding would show in the forces. The residuals are summed in twice the
+    # precision; the correction itself is small, and does not need that.
     m, refined, finite = forces.size, work.refined, 0.0
     _sum_dual_force(work, barriers, count)
     for j in range(m):
@@ -301,10 +266,8 @@ def _row_residual(work: Workspace, barriers: int, i: int, lower: Array, upper: A
 
 
 def _add_product(total: float, rest: float, a: float, b: float) -> tuple[float, float]:
-    """Return total + a b, rounded, and rest plus the rounding errors of product and sum.
-
-    Both are exact, by Dekker, Veltkamp and Knuth: Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26 (2005), 1955-1988.
-    """
+    """Return total + a b, rounded, and rest plus the rounding errors of product and sum."""
+    # Both are exact, by Dekker, Veltkamp and Knuth: Ogita, Rump and Oishi, SIAM J. Sci. Comput. 26 (2005), 1955-1988.
     product = a * b
     wide_a, wide_b = _HALF * a, _HALF * b
     high_a, high_b = wide_a - (wide_a - a), wide_b - (wide_b - b)

@@ -1,9 +1,8 @@
-"""Unit quaternions, scalar first, rotating body vectors into the world: equations (1)-(9), (23), (24).
+"""Unit quaternions, scalar first, rotating body vectors into the world: equations (1)-(9), (23), (24)."""
 
-Functions take and return float64 arrays; those of parts and rows return tuples, which C keeps in registers,
-where an array costs it a place in memory. The sign of the last term of (3) is that which (6), (7) and (10) need: the
-printed matrix is the transpose.
-"""
+# Functions take and return float64 arrays; those of parts and rows return tuples, which C keeps in registers, where an
+# array costs it a place in memory. The sign of the last term of (3) is that which (6), (7) and (10) need: the printed
+# matrix is the transpose.
 
 from __future__ import annotations
 
@@ -121,10 +120,10 @@ def error_parts(desired: Array, actual: Array) -> Vector4:
 
 
 def error(desired: Array, actual: Array) -> Array:
-    """Return the error quaternion desired^-1 * actual, shape (4,), of the shortest rotation (scalar part >= 0): (23).
-
-    In body coordinates, so that it moves with the body rates by (24).
-    """
+    """Return the error quaternion desired^-1 * actual, shape (4,), of the shortest rotation (scalar part >= 0)."""
+    # (23).
+    #
+    # In body coordinates, so that it moves with the body rates by (24).
     e = np.empty(4)
     e[0], e[1], e[2], e[3] = error_parts(desired, actual)
     return e

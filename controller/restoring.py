@@ -1,7 +1,6 @@
-"""Weight and buoyancy, linear in the unknown parameters: g(eta) = Z(eta) phi (12).
+"""Weight and buoyancy, linear in the unknown parameters: g(eta) = Z(eta) phi (12)."""
 
-phi = [W - B, x_G W - x_B B, y_G W - y_B B, z_G W - z_B B], in N and N m.
-"""
+# phi = [W - B, x_G W - x_B B, y_G W - y_B B, z_G W - z_B B], in N and N m.
 
 from __future__ import annotations
 

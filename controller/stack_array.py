@@ -7,18 +7,6 @@ from numpy.typing import NDArray
 
 
 def zeros(*shape: int) -> NDArray[np.float64]:
-    """Return an array of zeros, which in C lasts until the calling function returns.
-
-    It must not be returned, nor stored beyond the call.
-
-    Parameters
-    ----------
-    *shape : int
-        Literal numbers, such as ``zeros(3, 3)``; some dozen elements at most.
-
-    Returns
-    -------
-    ndarray
-        Array of float64, in C order.
-    """
+    """Return an array of zeros, which in C lasts until the calling function returns."""
+    # It must not be returned, nor stored beyond the call.
     return np.zeros(shape)

@@ -147,19 +147,7 @@ def _print_results(results: Sequence[Result]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Words of the command line; default: those of the process.
-
-    Returns
-    -------
-    int
-        Exit code: 0; 1 if an importer failed with a checked FMU; 2 if the input or an option is wrong; 130 if
-        interrupted; 141 if the reader of the output closed it.
-    """
+    """Run the command line."""
     if sys.stdout is None:  # closed by the parent process: the next file that is opened would take its place
         _report("standard output is closed; expected it open, such as on /dev/null")
         return FAULT

@@ -1,8 +1,7 @@
-"""Temporary files and folders, atomic writes, and zip files that are the same bytes each time.
+"""Temporary files and folders, atomic writes, and zip files that are the same bytes each time."""
 
-Temporary ones are locked while they are in use, and the system drops the lock when the process ends, however it ends:
-later processes remove those of killed ones.
-"""
+# Temporary ones are locked while they are in use, and the system drops the lock when the process ends, however it ends:
+# later processes remove those of killed ones.
 
 from __future__ import annotations
 
@@ -31,20 +30,7 @@ _UNIX = 3  # else the byte for the system of origin would differ between systems
 
 @contextlib.contextmanager
 def temporary_folder(prefix: str, parent: Path | None = None) -> Iterator[Path]:
-    """Create a folder for a block, below `parent` or the system's temporary folder, and remove it afterwards.
-
-    Parameters
-    ----------
-    prefix : str
-        Beginning of its name. Abandoned folders and files of the same prefix are removed first.
-    parent : Path, optional
-        Folder in which it is created; default: that of the system.
-
-    Yields
-    ------
-    Path
-        The folder, which only its owner can read.
-    """
+    """Create a folder for a block, below `parent` or the system's temporary folder, and remove it afterwards."""
     parent = Path(tempfile.gettempdir()) if parent is None else parent
     remove_abandoned(parent, prefix)
     folder = parent / f"{prefix}{secrets.token_hex(8)}"
@@ -59,28 +45,9 @@ def temporary_folder(prefix: str, parent: Path | None = None) -> Iterator[Path]:
 
 @contextlib.contextmanager
 def atomic_file(path: Path) -> Iterator[BinaryIO]:
-    """Open a temporary file that replaces `path` once the block has ended without an error.
-
-    The temporary file is new and has a random name: a link in a shared folder is not followed, and two processes do not
-    write into one file.
-
-    Parameters
-    ----------
-    path : Path
-        The file. An existing one is replaced; a link is replaced itself, not its target.
-
-    Yields
-    ------
-    binary file
-        The temporary file, open for writing.
-
-    Raises
-    ------
-    FileExistsError
-        If `path` exists and is not a file, such as a folder or a device.
-    OSError
-        If the file cannot be written; the temporary file is removed.
-    """
+    """Open a temporary file that replaces `path` once the block has ended without an error."""
+    # The temporary file is new and has a random name: a link in a shared folder is not followed, and two processes do
+    # not write into one file.
     if path.exists() and not path.is_file():
         raise FileExistsError(errno.EEXIST, "exists and is no file", str(path))
     remove_abandoned(path.parent, f".{path.name}-")
@@ -153,13 +120,7 @@ def _lock(descriptor: int | None) -> bool:
 
 
 def require_writable(out: Path) -> None:
-    """Require that a file can be written, before the work that goes into it.
-
-    Raises
-    ------
-    BuildError
-        If it exists and is not a file, or its folder cannot be written to.
-    """
+    """Require that a file can be written, before the work that goes into it."""
     try:
         if out.is_dir() or (out.exists() and not out.is_file()):
             raise BuildError(f"{out}: exists and is no file; expected the name of a new one")
@@ -170,13 +131,7 @@ def require_writable(out: Path) -> None:
 
 
 def write_atomic(out: Path, data: bytes) -> None:
-    """Write a file atomically, and replace an older one.
-
-    Raises
-    ------
-    BuildError
-        If `out` cannot be written, or is there and is no file.
-    """
+    """Write a file atomically, and replace an older one."""
     require_writable(out)
     try:
         with atomic_file(out) as file:
@@ -186,36 +141,12 @@ def write_atomic(out: Path, data: bytes) -> None:
 
 
 def write_archive(out: Path, members: Mapping[str, bytes]) -> None:
-    """Write a zip file atomically.
-
-    Parameters
-    ----------
-    out : Path
-        Path of the file; an older one is replaced.
-    members : mapping of str to bytes
-        Contents by name, with forward slashes.
-
-    Raises
-    ------
-    BuildError
-        If `out` cannot be written, or is there and is no file.
-    """
+    """Write a zip file atomically."""
     write_atomic(out, make_archive(members))
 
 
 def make_archive(members: Mapping[str, bytes]) -> bytes:
-    """Return the bytes of a zip file.
-
-    Parameters
-    ----------
-    members : mapping of str to bytes
-        Contents by name, with forward slashes.
-
-    Returns
-    -------
-    bytes
-        The archive; equal members give equal bytes.
-    """
+    """Return the bytes of a zip file."""
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in sorted(members.items()):

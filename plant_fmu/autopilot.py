@@ -29,22 +29,7 @@ class Autopilot:
 def validate_autopilot(
     autopilot: Autopilot, n_thrusters: int, require: Callable[[bool, str, object, str], None]
 ) -> Autopilot:
-    """Return the table with a channel and a sign for each thruster.
-
-    Parameters
-    ----------
-    autopilot : Autopilot
-        Table of the vehicle's file.
-    n_thrusters : int
-        Number of thrusters of the vehicle.
-    require : callable
-        Raises unless its first argument is true; the others are the key, its value, and the expected value.
-
-    Returns
-    -------
-    Autopilot
-        The table, complete.
-    """
+    """Return the table with a channel and a sign for each thruster."""
     table = autopilot
     channels = table.channels or tuple(range(1, n_thrusters + 1))
     signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * n_thrusters
@@ -70,21 +55,7 @@ def validate_autopilot(
 
 
 def effort_of_pulse(table: Autopilot, sign: int) -> Curve:
-    """Return the function from a pulse [us] to a fraction of the maximum force.
-
-    Parameters
-    ----------
-    table : Autopilot
-        Neutral, span, dead band and curve.
-    sign : int
-        -1 where a pulse above neutral makes the force negative.
-
-    Returns
-    -------
-    callable
-        Function that returns u or u|u|, -1 to 1, with u the distance from neutral in spans; 0 within the dead band, and
-        for an invalid pulse.
-    """
+    """Return the function from a pulse [us] to a fraction of the maximum force."""
     neutral, span, dead_band, quadratic = (
         table.pwm_neutral, table.pwm_span, table.pwm_dead_band, table.curve == "quadratic",
     )  # fmt: skip
@@ -99,26 +70,7 @@ def effort_of_pulse(table: Autopilot, sign: int) -> Curve:
 
 
 def pulse_of_effort(table: Autopilot, sign: int) -> Curve:
-    """Return the function from a fraction of the maximum force to the pulse [us] that commands it.
-
-    Parameters
-    ----------
-    table : Autopilot
-        Neutral, span and curve.
-    sign : int
-        Sign as for `effort_of_pulse`, of which this is the inverse outside the dead band.
-
-    Returns
-    -------
-    callable
-        Function of a part from -1 to 1, which it clips; it returns neutral for NaN.
-
-    Examples
-    --------
-    >>> from plant_fmu.autopilot import Autopilot, pulse_of_effort
-    >>> pulse_of_effort(Autopilot("vectored_6dof"), -1)(0.25)
-    1300.0
-    """
+    """Return the function from a fraction of the maximum force to the pulse [us] that commands it."""
     neutral, span, quadratic = table.pwm_neutral, table.pwm_span, table.curve == "quadratic"
 
     def pulse(effort: float) -> float:

@@ -96,27 +96,7 @@ def build_fmu(what: Vehicle | Component, fmi: int, out: str | Path, platforms: s
 
 
 def cached_fmu(what: Vehicle | Component, fmi: int) -> Path:
-    """Return the FMU of a vehicle or another component from the cache; build it first where it is missing.
-
-    Parameters
-    ----------
-    what : Vehicle or Component
-        Vehicle or component, as for `build_fmu`.
-    fmi : int
-        FMI version, 2 or 3.
-
-    Returns
-    -------
-    Path
-        Path of the FMU; its name has a digest of its sources and compiler. Without a compiler, an FMU that
-        another compiler made is used. The file is in the user's cache folder or, where that cannot be made,
-        in a temporary folder of the process.
-
-    Raises
-    ------
-    BuildError
-        If there is no compiler, it fails, or the file cannot be written, as in `build_fmu`.
-    """
+    """Return the FMU of a vehicle or another component from the cache; build it first where it is missing."""
     require_version(fmi)
     name = f"{what.name}-fmi{fmi}-{_digest(what, fmi)[:16]}"
     path = Path(platformdirs.user_cache_dir("subreach")) / "fmu" / f"{name}-{_compiler_digest()}.fmu"
@@ -163,10 +143,8 @@ def _has_valid_checksums(path: Path, written: int, size: int) -> bool:
 
 @functools.lru_cache(maxsize=64)
 def _digest(what: Vehicle | Component, fmi: int) -> str:
-    """Return a digest of everything that an FMU for this machine is made from.
-
-    The digest takes longer than loading an FMU, so a process computes it once for each vehicle.
-    """
+    """Return a digest of everything that an FMU for this machine is made from."""
+    # The digest takes longer than loading an FMU, so a process computes it once for each vehicle.
     return digest(neutral_members(what, fmi), native_platform().name, *FLAGS, fmpy.__version__)
 
 

@@ -13,11 +13,10 @@ STEP = 0.01  # s, step of the default experiment
 
 @dataclass(frozen=True, eq=False)
 class Component:
-    """One FMU to be built: its variables, its C code behind the common wrappers, and its further members.
+    """One FMU to be built: its variables, its C code behind the common wrappers, and its further members."""
 
-    Its C files include a header ``model.h`` and the definition of ``COMPONENT``, see ``csrc/wrapper/component.h``.
-    With states among its variables it is for co-simulation and model exchange, without for co-simulation alone.
-    """
+    # Its C files include a header `model.h` and the definition of `COMPONENT`, see `csrc/wrapper/component.h`. With
+    # states among its variables it is for co-simulation and model exchange, without for co-simulation alone.
 
     name: str  # model identifier, and the beginning of its names in C
     description: str  # one line

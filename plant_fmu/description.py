@@ -52,42 +52,14 @@ def _number(value: float) -> str:
 
 
 def token(component: Component, fmi: int) -> str:
-    """Return the token that ties a description to the binary made with it.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the FMU.
-    fmi : int
-        FMI version, 2 or 3.
-
-    Returns
-    -------
-    str
-        Token; it changes whenever the description or the sources do.
-    """
+    """Return the token that ties a description to the binary made with it."""
     text = model_description(component, fmi, "") + header(component, "")
     digest = hashlib.sha256(text.encode() + b"".join(c_sources(component, fmi).values())).hexdigest()
     return "{" + "-".join((digest[:8], digest[8:12], digest[12:16], digest[16:20], digest[20:32])) + "}"
 
 
 def model_description(component: Component, fmi: int, token: str) -> str:
-    """Return ``modelDescription.xml``.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the FMU.
-    fmi : int
-        FMI version, 2 for FMI 2.0, 3 for FMI 3.0.
-    token : str
-        The FMU's guid or instantiation token.
-
-    Returns
-    -------
-    str
-        XML text.
-    """
+    """Return ``modelDescription.xml``."""
     root = ET.Element(
         "fmiModelDescription",
         {
@@ -203,18 +175,7 @@ def _add_structure(parent: ET.Element, rows: list[Variable], fmi: int, number: d
 
 
 def documentation(vehicle: Vehicle) -> str:
-    """Return the docs page of the variables, as Markdown.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle of the FMU.
-
-    Returns
-    -------
-    str
-        Page with a table for each role, and one of the additional variables of a coupled plant.
-    """
+    """Return the docs page of the variables, as Markdown."""
     rows = variables(vehicle)
     uncoupled = {v.name for v in rows}
     titles = {

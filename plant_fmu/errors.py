@@ -51,18 +51,7 @@ class ImporterError(PlantFmuError):
 
 
 def one_line(message: object) -> str:
-    """Format a message as one printable line, and cut the middle out of long quotations.
-
-    Parameters
-    ----------
-    message : object
-        Message, such as ``FILE: key is VALUE, expected ...``.
-
-    Returns
-    -------
-    str
-        The line; a file's name before the first colon is kept, unless it is very long.
-    """
+    """Format a message as one printable line, and cut the middle out of long quotations."""
     line = _QUOTED.sub(lambda quoted: _cut(quoted[0], MAX_QUOTED), printable(message))
     file, colon, rest = line.partition(": ")
     if not (colon and _FILE.fullmatch(file)):
@@ -71,13 +60,7 @@ def one_line(message: object) -> str:
 
 
 def printable(message: object) -> str:
-    """Format a message as one line without control characters.
-
-    Returns
-    -------
-    str
-        The line; characters that are not printable, such as terminal escapes, are written as Python escapes.
-    """
+    """Format a message as one line without control characters."""
     line = " ".join(str(message).splitlines())
     return line if line.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
 

@@ -11,21 +11,9 @@ _PLAIN = re.compile(r"[\w./\\:+-]+")  # needs no quotes in any shell
 
 
 def install_hint(*requirements: str) -> str:
-    """Return the command that installs packages for the Python that runs.
-
-    It names the packages and not an extra of this distribution: so it works for a checkout, a wheel and an
-    index, and does not change an editable installation.
-
-    Parameters
-    ----------
-    *requirements : str
-        Requirements of pip, such as ``"ziglang>=0.13"``: the same as in ``pyproject.toml``.
-
-    Returns
-    -------
-    str
-        A command for any shell. ``python`` is a full path where the shell would find another one, or none.
-    """
+    """Return the command that installs packages for the Python that runs."""
+    # It names the packages and not an extra of this distribution: so it works for a checkout, a wheel and an index, and
+    # does not change an editable installation.
     python = "python" if _is_running_python(shutil.which("python")) else sys.executable
     return " ".join(map(_quoted, (python, "-m", "pip", "install", *requirements)))
 

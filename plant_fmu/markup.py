@@ -6,17 +6,6 @@ from xml.etree import ElementTree as ET
 
 
 def xml_text(root: ET.Element) -> str:
-    """Format a tree as the text of a file.
-
-    Parameters
-    ----------
-    root : Element
-        Root of the tree; it is indented in place.
-
-    Returns
-    -------
-    str
-        XML text with a declaration and a newline at its end.
-    """
+    """Format a tree as the text of a file."""
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"

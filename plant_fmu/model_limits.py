@@ -20,20 +20,7 @@ INTERFACES = ("CoSimulation", "ModelExchange", "ScheduledExecution")
 
 
 def validate_description(path: Path, root: ET.Element) -> None:
-    """Refuse a model description whose numbers or names could harm an importer.
-
-    Parameters
-    ----------
-    path : Path
-        The FMU, for messages.
-    root : Element
-        Root of ``modelDescription.xml``.
-
-    Raises
-    ------
-    FmuFileError
-        If it is not of FMI 2.0 or 3.0, or a number or a name is invalid; the message names the first one.
-    """
+    """Refuse a model description whose numbers or names could harm an importer."""
     version = root.get("fmiVersion", "")
     if root.tag != "fmiModelDescription" or not (version == "2.0" or version.startswith("3.0")):
         raise FmuFileError(f"{path}: FMI version is {_short(version)}, expected 2.0 or 3.0")

@@ -128,23 +128,7 @@ FORCE_LIMIT = Quantity("N", 0.0, 1e10)  # its maximum is above the norm of any f
 
 
 def base_unit(unit: str) -> dict[str, str]:
-    """Return the attributes of a unit's element ``BaseUnit``, which FMI and SSP share.
-
-    Parameters
-    ----------
-    unit : str
-        Key of `UNITS`.
-
-    Returns
-    -------
-    dict of str to str
-        Exponents, and ``factor`` where it is not 1.
-
-    Examples
-    --------
-    >>> base_unit("us")
-    {'s': '1', 'factor': '1e-06'}
-    """
+    """Return the attributes of a unit's element ``BaseUnit``, which FMI and SSP share."""
     factor = {"factor": repr(_FACTORS[unit])} if unit in _FACTORS else {}
     return {base: str(power) for base, power in UNITS[unit].items()} | factor
 

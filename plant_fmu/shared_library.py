@@ -1,7 +1,6 @@
-"""Check a shared library's headers before the system loads it: mapping a file that is cut short kills the process.
+"""Check a shared library's headers before the system loads it: mapping a file that is cut short kills the process."""
 
-ELF: System V ABI, chapters 4 and 5. PE: Microsoft's "PE Format". Mach-O: Apple's mach-o/loader.h and mach-o/fat.h.
-"""
+# ELF: System V ABI, chapters 4 and 5. PE: Microsoft's "PE Format". Mach-O: Apple's mach-o/loader.h and mach-o/fat.h.
 
 from __future__ import annotations
 
@@ -48,24 +47,7 @@ class _File:
 
 
 def library_defect(source: IO[bytes], size: int, platform: str, is_loaded: bool = True) -> str:
-    """Describe why a shared library cannot be loaded.
-
-    Parameters
-    ----------
-    source : file
-        The library.
-    size : int
-        Number of its bytes.
-    platform : str
-        Platform of FMI 3.0, such as ``x86_64-linux``.
-    is_loaded : bool
-        False for a file beside the FMU's library, which may be of another format or processor, or none at all.
-
-    Returns
-    -------
-    str
-        Words such as ``is cut short: ...``; empty if its headers fit the platform and the size.
-    """
+    """Describe why a shared library cannot be loaded."""
     processor, _, system = platform.partition("-")
     format_name = _FORMATS.get(system, "")
     try:

@@ -46,26 +46,8 @@ RPM = np.array([
 
 
 def force_of_pulse(pulses: NDArray[np.float64], voltages: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the force of a T200 at rest, linear between the published points.
-
-    Parameters
-    ----------
-    pulses : ndarray
-        Pulses [us], clipped to 1100 and 1900.
-    voltages : ndarray of the same shape
-        Supply voltages [V], clipped to 10 and 20.
-
-    Returns
-    -------
-    ndarray
-        Forces [N], above 0 where the pulse is above neutral; NaN where pulse or voltage is NaN.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> force_of_pulse(np.array([1900.0, 1500.0]), np.array([16.0, 16.0])).round(2).tolist()
-    [51.48, 0.0]
-    """
+    """Return the force of a T200 at rest, linear between the published points; pulses [us], voltages [V]."""
+    # with returns [N]
     position = np.clip((voltages - VOLTAGES[0]) / 2.0, 0.0, len(VOLTAGES) - 1.0)
     row = np.minimum(np.nan_to_num(position).astype(int), len(VOLTAGES) - 2)
     fraction = position - row

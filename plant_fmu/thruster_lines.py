@@ -19,18 +19,7 @@ class ThrusterLine:
 
 
 def thruster_lines(vehicle: Vehicle) -> list[ThrusterLine]:
-    """Return the line of action of each thruster.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle with any number of thrusters.
-
-    Returns
-    -------
-    list of ThrusterLine
-        Lines in the order of the columns of the thruster matrix.
-    """
+    """Return the line of action of each thruster."""
     lines = []
     for column in vehicle.thruster_matrix.T:
         force, moment = column[:3].copy(), column[3:]

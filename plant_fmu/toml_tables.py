@@ -28,13 +28,7 @@ _MAX_LISTED = 30  # maximum number of names that a message lists
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Return the content of a TOML file.
-
-    Raises
-    ------
-    TableError
-        If the file cannot be read, is no TOML, or is too long or deep; the caller adds the file's name.
-    """
+    """Return the content of a TOML file."""
     try:
         if path.exists() and not path.is_file():  # to open a pipe would wait for its other end
             raise TableError("is a folder, a pipe or a device, expected a file")
@@ -52,13 +46,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def require_bounded(table: dict[str, Any]) -> None:
-    """Refuse tables and whole numbers beyond the limits, on which Python itself would fail.
-
-    Raises
-    ------
-    TableError
-        If the table is too deep, or a whole number too long; the message names the key.
-    """
+    """Refuse tables and whole numbers beyond the limits, on which Python itself would fail."""
     stack: list[tuple[str, Any, int]] = [(key, value, 1) for key, value in table.items()]
     while stack:
         key, value, depth = stack.pop()
@@ -73,27 +61,7 @@ def require_bounded(table: dict[str, Any]) -> None:
 
 
 def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
-    """Turn a table into a dataclass, checking every key and type.
-
-    Parameters
-    ----------
-    table : dict
-        Content of a TOML file, or a table in it.
-    kind : type
-        A dataclass; nested dataclasses are nested tables.
-    where : str
-        Path of keys to this table, for messages.
-
-    Returns
-    -------
-    kind
-        Value with the content of the table.
-
-    Raises
-    ------
-    TableError
-        If a key is unknown (the message suggests the nearest known one), missing, or of another type.
-    """
+    """Turn a table into a dataclass, checking every key and type."""
     _refuse_unknown(table, kind, where)
     try:
         return msgspec.convert(table, kind)
@@ -105,13 +73,7 @@ def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
 
 
 def hint(received: str, known: typing.Iterable[str]) -> str:
-    """Format a hint for an unknown name: the nearest known one, else a list of all.
-
-    Returns
-    -------
-    str
-        Text such as ``did you mean 'mass'?``.
-    """
+    """Format a hint for an unknown name: the nearest known one, else a list of all."""
     known, received = sorted(known), received[:_MAX_COMPARED]  # a comparison takes time with the square of the length
     matches = difflib.get_close_matches(received, known, n=1, cutoff=0.5)
     if matches:
@@ -121,13 +83,7 @@ def hint(received: str, known: typing.Iterable[str]) -> str:
 
 
 def find_dataclass(annotation: Any) -> type | None:
-    """Return the dataclass within an annotation such as ``X | None`` or ``tuple[X, ...]``, if there is one.
-
-    Parameters
-    ----------
-    annotation : type
-        A resolved annotation.
-    """
+    """Return the dataclass within an annotation such as ``X | None`` or ``tuple[X, ...]``, if there is one."""
     if dataclasses.is_dataclass(annotation):
         return typing.cast(type, annotation)
     if typing.get_origin(annotation) in (types.UnionType, typing.Union, tuple, list):

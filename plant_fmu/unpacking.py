@@ -49,19 +49,7 @@ class _BoundedFile(io.BufferedReader):
 
 @contextmanager
 def open_fmu(path: Path) -> Iterator[zipfile.ZipFile]:
-    """Open an FMU whose files are safe to extract.
-
-    Yields
-    ------
-    ZipFile
-        Open archive; only what is read from it was checked.
-
-    Raises
-    ------
-    FmuFileError
-        If there is no such file, it is no whole zip, lacks a model description, would write outside its folder or one
-        file over another, or becomes too large when extracted. Errors of reading within the block become one too.
-    """
+    """Open an FMU whose files are safe to extract."""
     try:
         if path.exists() and not path.is_file() and not path.is_dir():  # to open a pipe would wait for its other end
             raise FmuFileError(f"{path}: is no FMU: expected a file")
@@ -77,29 +65,7 @@ def open_fmu(path: Path) -> Iterator[zipfile.ZipFile]:
 
 
 def unpack(path: Path, folder: Path, platforms: Sequence[str]) -> ET.Element:
-    """Extract the files that a run needs from an FMU into a folder, and return its model description.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the FMU.
-    folder : Path
-        Empty folder of this user alone.
-    platforms : sequence of str
-        Names of this machine in FMI 2.0 and 3.0, which are the folders of the binaries that are needed. Documents and
-        sources are never extracted: no library can rely on them.
-
-    Returns
-    -------
-    Element
-        Root of ``modelDescription.xml``.
-
-    Raises
-    ------
-    FmuFileError
-        If the file cannot be read or is unsafe to extract, or its content is invalid, as in `open_fmu` and
-        `read_description`.
-    """
+    """Extract the files that a run needs from an FMU into a folder, and return its model description."""
     with open_fmu(path) as archive:
         root = read_description(path, archive, platforms)
         archive.extractall(folder, [name for name in archive.namelist() if _is_needed(name, platforms)])
@@ -112,28 +78,7 @@ def _is_needed(name: str, platforms: Collection[str]) -> bool:
 
 
 def read_description(path: Path, archive: zipfile.ZipFile, platforms: Sequence[str]) -> ET.Element:
-    """Return the model description of an open FMU, after a check of all that an importer reads.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the FMU, for messages.
-    archive : ZipFile
-        The FMU, from `open_fmu`.
-    platforms : sequence of str
-        Names of this machine in FMI 2.0 and 3.0; its libraries are checked.
-
-    Returns
-    -------
-    Element
-        Root of ``modelDescription.xml``.
-
-    Raises
-    ------
-    FmuFileError
-        If a description is no XML, declares a document type, is too large or deep, or has invalid content; if a member
-        is damaged; if a library of this machine is cut short, or of another machine.
-    """
+    """Return the model description of an open FMU, after a check of all that an importer reads."""
     names = set(archive.namelist())
     roots = [_parse_member(f"{path}: {name}", archive, name) for name in _DESCRIPTIONS if name in names]
     validate_description(path, roots[0])

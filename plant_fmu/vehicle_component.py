@@ -22,31 +22,7 @@ def make_vehicle_component(
     step: float = STEP,
     coupled: bool = False,
 ) -> Component:
-    """Return the plant of a vehicle.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle of the FMU.
-    start : mapping from str to float, optional
-        Start values of parameters and states, by name, over those of the vehicle.
-    stop_time, step : float, optional
-        Times of the default experiment [s].
-    coupled : bool, optional
-        True to add the inputs by which other components act on the vehicle; they are off while they are 0.
-
-    Returns
-    -------
-    Component
-        Component for the build of its FMU.
-
-    Raises
-    ------
-    BuildError
-        If a start value belongs to no parameter, input or state, or is beyond its range.
-    VehicleError
-        If a number of the vehicle is beyond the range of its parameter.
-    """
+    """Return the plant of a vehicle; stop_time, step [s]."""
     rows = tuple(variables(vehicle, coupled))
     if start is not None:
         rows = _started(rows, start)

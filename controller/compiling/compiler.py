@@ -18,13 +18,7 @@ FLAGS = ("-std=c99", "-O2", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPI
 
 
 def compiler_command() -> list[str]:
-    """Return the command of a C compiler: ``CC``, else ``cc``, else that of the ziglang package.
-
-    Raises
-    ------
-    CompilationError
-        If there is no compiler.
-    """
+    """Return the command of a C compiler: ``CC``, else ``cc``, else that of the ziglang package."""
     named = os.environ.get("CC")
     if named:
         try:
@@ -42,20 +36,7 @@ def compiler_command() -> list[str]:
 
 
 def compile_file(source: Path, library: Path, compiler: Sequence[str] | None = None) -> None:
-    """Compile one C file into a shared library.
-
-    Parameters
-    ----------
-    source, library : Path
-        C file to read, and library to write.
-    compiler : sequence of str, optional
-        Command and first arguments; default: those of this machine's compiler.
-
-    Raises
-    ------
-    CompilationError
-        If there is no compiler, or it fails; its first complaint is in the message.
-    """
+    """Compile one C file into a shared library."""
     # named, for Apple's linker else writes the build folder into the library; for others without a table of names
     link = f"-Wl,-install_name,@rpath/{library.name}" if library.suffix == ".dylib" else "-s"
     command = [*(compiler or compiler_command()), *FLAGS, link, str(source), "-o", str(library), "-lm"]

@@ -1,8 +1,7 @@
-"""Call plain functions as C many times with the same arrays, in which the numbers change.
+"""Call plain functions as C many times with the same arrays, in which the numbers change."""
 
-A law has about forty arrays; to validate each at each call would take several times as long as its mathematics.
-Here they are validated once, and stored as the words from which the C function makes its arguments.
-"""
+# A law has about forty arrays; to validate each at each call would take several times as long as its mathematics. Here
+# they are validated once, and stored as the words from which the C function makes its arguments.
 
 from __future__ import annotations
 
@@ -29,27 +28,7 @@ _CALLBACK = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
 
 
 def c_text(function: Callable[..., None], arguments: tuple[Any, ...]) -> str:
-    """Translate a function to C for arguments of these types, as its library is compiled from it.
-
-    Parameters
-    ----------
-    function : function
-        Plain Python in the translator's subset, which returns nothing.
-    arguments : tuple
-        Numbers, C-contiguous arrays, and tuples of such; only their types matter.
-
-    Returns
-    -------
-    str
-        One file, in which ``entry`` is called with the address of the arguments' words.
-
-    Raises
-    ------
-    TranslationError
-        If the function, or one that it calls, is beyond the subset; the message names file and line.
-    TypeError
-        If an argument has another type.
-    """
+    """Translate a function to C for arguments of these types, as its library is compiled from it."""
     return _text(function, tuple(map(type_of, arguments)))
 
 
@@ -75,24 +54,7 @@ def _described(argument: Any, known: Described) -> tuple[Any, Type, list[int]]:
 
 
 class BoundCall:
-    """A function with its arguments, which stay alive as long as it, or its `call`, does.
-
-    Parameters
-    ----------
-    function : callable
-        Plain Python in the translator's subset; anything else that can be called is called as it is.
-    arguments : tuple
-        Numbers, C-contiguous arrays, and tuples of such; no array is resized in place.
-    known : dict, optional
-        Cache of argument types and words by id, which grows. Its ids are valid while it holds the arguments.
-
-    Attributes
-    ----------
-    call : callable
-        Callable without arguments that calls the function.
-    address, words : int
-        Addresses of the C function ``void (*)(const void *)``, and of its argument.
-    """
+    """A function with its arguments, which stay alive as long as it, or its `call`, does."""
 
     def __init__(self, function: Any, arguments: tuple[Any, ...], known: Described | None = None) -> None:
         self._raised: BaseException | None = None
@@ -123,23 +85,7 @@ class BoundCall:
 
 
 class CompiledFunction:
-    """A plain function, run as C: compiled when it is first called, fast when it is called with the same objects.
-
-    Parameters
-    ----------
-    function : callable
-        Plain Python in the translator's subset, which returns nothing, of at most seven parameters.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from controller.compiling.function import CompiledFunction
-    >>> from controller.quaternion import write_rotation
-    >>> write, R = CompiledFunction(write_rotation), np.empty((3, 3))
-    >>> write(np.array([0.0, 1.0, 0.0, 0.0]), R)
-    >>> R.diagonal()
-    array([ 1., -1., -1.])
-    """
+    """A plain function, run as C: compiled when it is first called, fast when it is called with the same objects."""
 
     def __init__(self, function: Any) -> None:
         self._function = function
@@ -150,18 +96,7 @@ class CompiledFunction:
     def __call__(
         self, a: Any, b: Any = None, c: Any = None, d: Any = None, e: Any = None, f: Any = None, g: Any = None
     ) -> None:
-        """Call the function.
-
-        Parameters
-        ----------
-        a, b, c, d, e, f, g : object
-            Arguments of the function; None for those that it lacks.
-
-        Raises
-        ------
-        TranslationError, CompilationError
-            If the function cannot be translated, or there is no compiler where one is needed.
-        """
+        """Call the function."""
         # one by one: a comparison of two tuples item by item takes twice as long
         call, a0, b0, c0, d0, e0, f0, g0 = self._last
         if not (a is a0 and b is b0 and c is c0 and d is d0 and e is e0 and f is f0 and g is g0):

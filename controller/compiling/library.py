@@ -1,8 +1,7 @@
-"""Find or compile the C library of a text: in the package, in the user's cache, or compiled now.
+"""Find or compile the C library of a text: in the package, in the user's cache, or compiled now."""
 
-A library's name is a digest of the C text that it is made from, so that it is unique. Beside it is a file with its
-checksum: loading half of one could end the process.
-"""
+# A library's name is a digest of the C text that it is made from, so that it is unique. Beside it is a file with its
+# checksum: loading half of one could end the process.
 
 from __future__ import annotations
 
@@ -44,24 +43,7 @@ _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 
 @functools.cache
 def library_of(text: str) -> ctypes.PyDLL:
-    """Return the library of a C text, loaded; it is compiled where neither the package nor the cache has it.
-
-    Parameters
-    ----------
-    text : str
-        One file of C99.
-
-    Returns
-    -------
-    PyDLL
-        The library; calls keep Python's lock: they take microseconds, and to get the lock back can take
-        milliseconds.
-
-    Raises
-    ------
-    CompilationError
-        If the library has to be compiled, and there is no compiler or it fails.
-    """
+    """Return the library of a C text, loaded; it is compiled where neither the package nor the cache has it."""
     name = library_name(text)
     for folder in (PREBUILT / _platform(), _cache()):
         path = folder / f"{name}{_SUFFIX}"
@@ -72,18 +54,7 @@ def library_of(text: str) -> ctypes.PyDLL:
 
 
 def library_name(text: str) -> str:
-    """Return the name of the library of a C text, without the system's suffix.
-
-    Parameters
-    ----------
-    text : str
-        One file of C99.
-
-    Returns
-    -------
-    str
-        Digest of the text and of the compiler's flags.
-    """
+    """Return the name of the library of a C text, without the system's suffix."""
     return hashlib.sha256("\n".join((*FLAGS, text)).encode()).hexdigest()[:32]
 
 
@@ -152,20 +123,7 @@ def _compiled(text: str, name: str) -> Path:
 
 
 def keep(built: Path, folder: Path) -> Path:
-    """Copy a library with its checksum into a folder of the cache, atomically.
-
-    Parameters
-    ----------
-    built : Path
-        Path of the library.
-    folder : Path
-        Folder of the cache, which is made if it is missing.
-
-    Returns
-    -------
-    Path
-        Path of the copy, or `built` if the folder cannot be written.
-    """
+    """Copy a library with its checksum into a folder of the cache, atomically."""
     kept = folder / built.name
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)

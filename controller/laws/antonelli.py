@@ -1,19 +1,18 @@
-"""Antonelli's reduced adaptive law: PD control that adapts to restoring forces and current, nine parameters in all.
+"""Antonelli's reduced adaptive law: PD control that adapts to restoring forces and current, nine parameters in all."""
 
-G. Antonelli, "On the use of adaptive/integral actions for six-degrees-of-freedom control of autonomous underwater
-vehicles", IEEE J. Oceanic Eng. 32(2), 2007, and "Underwater Robots", Springer: the law in mixed earth-fixed and
-vehicle-fixed frames, for a set point,
-
-    tau = -K_P y - K_D nu + Phi theta-hat,    d(theta-hat)/dt = -K_theta^-1 Phi^T s,    s = nu + Lambda y
-    y = [R^T sat(p - p_d); e_eps],    Phi = [0 R^T 0; S(R^T e3) 0 R^T]  (6 by 9)
-
-theta holds the three first moments of weight and buoyancy, which turn with the vehicle, and a force and a moment that
-are constant in the world, which is how he takes the effect of a steady current. The net weight W - B is constant in
-the world too, and so is a part of that force: with a parameter of its own there would be ten, two of them the same.
-Neither article nor book was at hand. This is the law as we know it, and the division 3 + 3 + 3 follows from that
-equality, not from a page. Ours are the saturation, the bounds of the estimate, and the push of the regions, which is
-not part of the adaptation.
-"""
+# G. Antonelli, "On the use of adaptive/integral actions for six-degrees-of-freedom control of autonomous underwater
+# vehicles", IEEE J. Oceanic Eng. 32(2), 2007, and "Underwater Robots", Springer: the law in mixed earth-fixed and
+# vehicle-fixed frames, for a set point,
+#
+#     tau = -K_P y - K_D nu + Phi theta-hat,    d(theta-hat)/dt = -K_theta^-1 Phi^T s,    s = nu + Lambda y
+#     y = [R^T sat(p - p_d); e_eps],    Phi = [0 R^T 0; S(R^T e3) 0 R^T]  (6 by 9)
+#
+# theta holds the three first moments of weight and buoyancy, which turn with the vehicle, and a force and a moment that
+# are constant in the world, which is how he takes the effect of a steady current. The net weight W - B is constant in
+# the world too, and so is a part of that force: with a parameter of its own there would be ten, two of them the same.
+# Neither article nor book was at hand. This is the law as we know it, and the division 3 + 3 + 3 follows from that
+# equality, not from a page. Ours are the saturation, the bounds of the estimate, and the push of the regions, which is
+# not part of the adaptation.
 
 from __future__ import annotations
 

@@ -1,13 +1,12 @@
-"""PD control to a set point with gravity compensation, the simplest law for comparison.
+"""PD control to a set point with gravity compensation, the simplest law for comparison."""
 
-    tau = -k_p1 R^T sat(p - p_d) - k_p2 e_eps - K_v nu + g-hat
-
-Takegaki and Arimoto's regulator (ASME J. Dyn. Syst. Meas. Control 103, 1981) for a vehicle, with attitude in
-quaternions as in Fjellstad and Fossen (IEEE Oceans, 1994), the proportional action saturated, and the push of
-the regions. g-hat compensates weight and buoyancy as far as they are given. No law is given either (`VehicleModel`),
-so that g-hat is that of a neutral vehicle, zero, and the vehicle droops by (W - B) / k_p1. Integral action would make
-it another law.
-"""
+#     tau = -k_p1 R^T sat(p - p_d) - k_p2 e_eps - K_v nu + g-hat
+#
+# Takegaki and Arimoto's regulator (ASME J. Dyn. Syst. Meas. Control 103, 1981) for a vehicle, with attitude in
+# quaternions as in Fjellstad and Fossen (IEEE Oceans, 1994), the proportional action saturated, and the push of the
+# regions. g-hat compensates weight and buoyancy as far as they are given. No law is given either (`VehicleModel`), so
+# that g-hat is that of a neutral vehicle, zero, and the vehicle droops by (W - B) / k_p1. Integral action would make it
+# another law.
 
 from __future__ import annotations
 

@@ -1,31 +1,30 @@
-"""PD control with a disturbance observer for integral action, behind a second-order control-barrier-function filter.
+"""PD control with a disturbance observer for integral action, behind a second-order control-barrier-function filter."""
 
-The nominal force is that of `pd`, less the disturbance from an observer:
-
-    f = -k_p1 sat(p - p_d) - k_v1 v + push - M d-hat
-
-The observer compares measured velocities with those that the nominal model (11) predicts in still water; for each of
-the six axes, with the acceleration a by model and thrusters over a period T,
-
-    v-hat <- v-hat + T (a + d-hat) + (1 - z^2) e,   d-hat <- d-hat + (1 - z)^2 / T e,   z = 1 / (1 + omega T)
-
-where e is measured less predicted: two poles at z, omega being `observer`. d-hat is the integral of e, so that net
-weight, current and a lost thruster leave no steady error (extended state observer: J. Han, IEEE Trans. Ind. Electron.
-56(3), 2009). A position is filtered with the same pole.
-
-The filter changes the thruster forces u as little as possible. With h the clearance of a hard region less `margin`, n
-its gradient and v its rate against the region's,
-
-    h'' + (k_1 + k_2) h' + k_1 k_2 h >= 0,   h' = n^T v,   h'' = n^T (A u + a_free + d-hat) + (dn/dt)^T v
-
-keeps h >= 0 if it holds at all times and k_1 h + h' >= 0 at the start: an exponential barrier (Nguyen and Sreenath,
-American Control Conference, 2016), the linear case of high-order barriers (Xiao and Belta, IEEE CDC, 2019). `pull_in`
-and `brake` are k_1 and k_2. Thruster limits are in the quadratic program, and a slack with a price, since limits and
-barriers may contradict each other. Unlike the barriers of the deployable law, these require a deceleration that grows
-with speed, whether the thrusters have it or not.
-
-None of these sources was at hand. Model, gradients and program are those of the deployable law.
-"""
+# The nominal force is that of `pd`, less the disturbance from an observer:
+#
+#     f = -k_p1 sat(p - p_d) - k_v1 v + push - M d-hat
+#
+# The observer compares measured velocities with those that the nominal model (11) predicts in still water; for each of
+# the six axes, with the acceleration a by model and thrusters over a period T,
+#
+#     v-hat <- v-hat + T (a + d-hat) + (1 - z^2) e,   d-hat <- d-hat + (1 - z)^2 / T e,   z = 1 / (1 + omega T)
+#
+# where e is measured less predicted: two poles at z, omega being `observer`. d-hat is the integral of e, so that net
+# weight, current and a lost thruster leave no steady error (extended state observer: J. Han, IEEE Trans. Ind. Electron.
+# 56(3), 2009). A position is filtered with the same pole.
+#
+# The filter changes the thruster forces u as little as possible. With h the clearance of a hard region less `margin`, n
+# its gradient and v its rate against the region's,
+#
+#     h'' + (k_1 + k_2) h' + k_1 k_2 h >= 0,   h' = n^T v,   h'' = n^T (A u + a_free + d-hat) + (dn/dt)^T v
+#
+# keeps h >= 0 if it holds at all times and k_1 h + h' >= 0 at the start: an exponential barrier (Nguyen and Sreenath,
+# American Control Conference, 2016), the linear case of high-order barriers (Xiao and Belta, IEEE CDC, 2019). `pull_in`
+# and `brake` are k_1 and k_2. Thruster limits are in the quadratic program, and a slack with a price, since limits and
+# barriers may contradict each other. Unlike the barriers of the deployable law, these require a deceleration that grows
+# with speed, whether the thrusters have it or not.
+#
+# None of these sources was at hand. Model, gradients and program are those of the deployable law.
 
 from __future__ import annotations
 
@@ -193,10 +192,8 @@ def observe(memory: PidCbfMemory, state: VehicleState, R: Array, gains: PidCbfGa
 
 
 def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Array, gains: PidCbfGains) -> int:
-    """Write the barrier of each hard region that the thrusters could violate; return the number of barriers.
-
-    `free`, shape (6,), is the acceleration without thrust.
-    """
+    """Write the barrier of each hard region that the thrusters could violate; return the number of barriers."""
+    # `free`, shape (6,), is the acceleration without thrust.
     work, observation, rows = memory.program, memory.observation, 0
     n, later, relative = zeros(6), zeros(6), zeros(6)
     lower, upper, price = (
@@ -225,26 +222,7 @@ def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Array, gains
 
 
 class PidCbfLaw(CompiledLaw):
-    """PD control with a disturbance observer, filtered by second-order barriers.
-
-    Parameters
-    ----------
-    vehicle : VehicleModel
-        Nominal numbers of the vehicle.
-    gains : PidCbfGains
-        Gains of the law.
-    desired_quaternion : array_like, shape (4,)
-        Attitude to be kept, from body to world.
-    period : float
-        Control period [s].
-    n_regions : int
-        Number of secondary regions.
-
-    Raises
-    ------
-    LawError
-        If gains, attitude or period are invalid.
-    """
+    """PD control with a disturbance observer, filtered by second-order barriers; period [s]."""
 
     output: ClassVar[Output] = "thrusters"
     function = staticmethod(step)

@@ -1,15 +1,14 @@
-"""Adaptive set-point control through the transposed Jacobian, in the manner of Sun and Cheah.
+"""Adaptive set-point control through the transposed Jacobian, in the manner of Sun and Cheah."""
 
-Y. C. Sun and C. C. Cheah, "Adaptive control schemes for autonomous underwater vehicle", Robotica 27, 2009, the
-paper's reference [1]:
-
-    tau = -J^T K_p s(e) - K_v nu + Z(eta) phi-hat,    d(phi-hat)/dt = -L Z^T (nu + sigma J^T s(e))
-
-with s() saturated and only the four numbers of the restoring forces (12) adapted: the law that the paper's
-one (25)-(29) generalises to regions. The article was not at hand; this is its form as the paper's law shows it,
-with attitude errors as quaternions, where J is blkdiag(R, I). Ours are the bounds of the estimate and the push of the
-regions, which is not part of the adaptation.
-"""
+# Y. C. Sun and C. C. Cheah, "Adaptive control schemes for autonomous underwater vehicle", Robotica 27, 2009, the
+# paper's reference [1]:
+#
+#     tau = -J^T K_p s(e) - K_v nu + Z(eta) phi-hat,    d(phi-hat)/dt = -L Z^T (nu + sigma J^T s(e))
+#
+# with s() saturated and only the four numbers of the restoring forces (12) adapted: the law that the paper's one
+# (25)-(29) generalises to regions. The article was not at hand; this is its form as the paper's law shows it, with
+# attitude errors as quaternions, where J is blkdiag(R, I). Ours are the bounds of the estimate and the push of the
+# regions, which is not part of the adaptation.
 
 from __future__ import annotations
 

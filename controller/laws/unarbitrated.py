@@ -1,9 +1,8 @@
-"""The paper's law (25)-(29) without its arbiter: every region has its full weight at all times.
+"""The paper's law (25)-(29) without its arbiter: every region has its full weight at all times."""
 
-As every law for comparison, it has the parts that the paper's law lacks for real thrusters: a bound on the pull of
-the primary region, a margin within that region, regions that push from a `reach` on, and bounds on the estimate. All
-else is the paper's.
-"""
+# As every law for comparison, it has the parts that the paper's law lacks for real thrusters: a bound on the pull of
+# the primary region, a margin within that region, regions that push from a `reach` on, and bounds on the estimate. All
+# else is the paper's.
 
 from __future__ import annotations
 

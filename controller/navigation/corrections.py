@@ -1,11 +1,10 @@
-"""Corrections of the estimate by a sample of one sensor: depth, velocity, heading or position.
+"""Corrections of the estimate by a sample of one sensor: depth, velocity, heading or position."""
 
-A late measurement is compared with the estimate of its time, and corrects by the growth of the errors since then:
-an error of the position then is that of now less the effect of the velocity's error, and so on. Samples farther off
-than `_GATE` standard deviations are rejected. After `_REJECTED_IN_A_ROW` of them the estimate counts as wrong,
-perhaps by an outlier while it was uncertain: its covariance is then that of the start. If that does not
-help either, the filter starts again.
-"""
+# A late measurement is compared with the estimate of its time, and corrects by the growth of the errors since then: an
+# error of the position then is that of now less the effect of the velocity's error, and so on. Samples farther off than
+# `_GATE` standard deviations are rejected. After `_REJECTED_IN_A_ROW` of them the estimate counts as wrong, perhaps by
+# an outlier while it was uncertain: its covariance is then that of the start. If that does not help either, the filter
+# starts again.
 
 from __future__ import annotations
 
@@ -54,19 +53,7 @@ _LEAST_SCALE = 1e-3  # least noise of a sensor, in its unit, which keeps the cov
 
 
 def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sensor: int, sensors: SensorModel) -> None:
-    """Correct the estimate by the last sample of a sensor.
-
-    Parameters
-    ----------
-    memory : NavigationMemory
-        Memory to correct in place.
-    measurements : Measurements
-        Samples of all sensors.
-    sensor : int
-        Index of the sensor: `DEPTH_SENSOR`, `DVL`, `COMPASS` or `USBL`.
-    sensors : SensorModel
-        Noise of the sensors.
-    """
+    """Correct the estimate by the last sample of a sensor."""
     count = 3 if sensor in (DVL, USBL) else 1
     position, velocity, quaternion, innovation = zeros(3), zeros(3), zeros(4), zeros(3)
     rows, R = zeros(3, 18), zeros(3, 3)

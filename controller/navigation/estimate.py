@@ -1,8 +1,7 @@
-"""The memory of the navigation filter: motion and constant errors, their covariance, and the recent past.
+"""The memory of the navigation filter: motion and constant errors, their covariance, and the recent past."""
 
-The covariance is that of the errors, true less estimated: position and velocity in world axes, attitude as a small
-rotation in world axes, then the constant errors of gyros, accelerometers, compass, pressure sensor and DVL.
-"""
+# The covariance is that of the errors, true less estimated: position and velocity in world axes, attitude as a small
+# rotation in world axes, then the constant errors of gyros, accelerometers, compass, pressure sensor and DVL.
 
 from __future__ import annotations
 
@@ -80,15 +79,7 @@ def empty_memory() -> NavigationMemory:
 
 
 def set_first_covariance(memory: NavigationMemory, sensors: SensorModel) -> None:
-    """Set the covariance of the start, with constant errors from the data sheets.
-
-    Parameters
-    ----------
-    memory : NavigationMemory
-        Memory whose covariance is set.
-    sensors : SensorModel
-        Standard deviations of the constant errors.
-    """
+    """Set the covariance of the start, with constant errors from the data sheets."""
     P = memory.covariance
     P[:, :] = 0.0
     for i in range(3):

@@ -1,12 +1,11 @@
-"""Inertial navigation: propagate the estimate and its covariance from one IMU sample to the next.
+"""Inertial navigation: propagate the estimate and its covariance from one IMU sample to the next."""
 
-p' = v,  v' = R f + g e3,  R' = R S(omega), with the specific force f and the rates omega less their constant errors.
-The errors, true less estimated, follow
-
-    dp' = dv,   dv' = -S(R f) dtheta - R db_a,   dtheta' = -R db_g,
-
-with dtheta the small rotation in world axes that turns the estimated attitude into the true one.
-"""
+# p' = v, v' = R f + g e3, R' = R S(omega), with the specific force f and the rates omega less their constant errors.
+# The errors, true less estimated, follow
+#
+#     dp' = dv,   dv' = -S(R f) dtheta - R db_a,   dtheta' = -R db_g,
+#
+# with dtheta the small rotation in world axes that turns the estimated attitude into the true one.
 
 from __future__ import annotations
 
@@ -33,10 +32,8 @@ _DRIFT = 1e-3  # 1/sqrt(s), random walk of a constant error, as a fraction of it
 
 
 def propagate(memory: NavigationMemory, force: Array, omega: Array, sensors: SensorModel, period: float) -> None:
-    """Propagate over a period [s] up to a sample of specific force [m/s2] and rates [rad/s], body axes, (3,) each.
-
-    The force is that of the period before the sample; the rates change evenly within it.
-    """
+    """Propagate over a period [s] up to a sample of specific force [m/s2] and rates [rad/s], body axes, (3,) each."""
+    # The force is that of the period before the sample; the rates change evenly within it.
     R, turn, f = zeros(3, 3), zeros(3), zeros(3)
     for i in range(3):
         turn[i] = 0.5 * period * (memory.omega[i] + omega[i])

@@ -22,14 +22,7 @@ VALUES = (
 
 
 class Measurements(NamedTuple):
-    """The last sample of each sensor, and its time; in the order of the plant's ``measured`` outputs.
-
-    Examples
-    --------
-    >>> from controller.navigation import empty_measurements
-    >>> empty_measurements().values.shape
-    (15,)
-    """
+    """The last sample of each sensor, and its time; in the order of the plant's ``measured`` outputs."""
 
     values: (
         Array  # (15,) depth [m]; velocity over ground, body [m/s] (3); altitude [m]; specific force, body [m/s2] (3)
@@ -39,14 +32,7 @@ class Measurements(NamedTuple):
 
 
 class SensorModel(NamedTuple):
-    """Standard deviations of the sensors' errors, from data sheets: of each sample, and of constant errors.
-
-    Examples
-    --------
-    >>> from controller.navigation import SensorModel
-    >>> SensorModel().position
-    0.15
-    """
+    """Standard deviations of the sensors' errors, from data sheets: of each sample, and of constant errors."""
 
     depth: float = 0.002  # m
     velocity: float = 0.005  # m/s

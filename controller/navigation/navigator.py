@@ -1,8 +1,7 @@
-"""The navigation filter: pose, motion and their standard deviations from sensors alone.
+"""The navigation filter: pose, motion and their standard deviations from sensors alone."""
 
-An error-state Kalman filter. The IMU propagates the estimate; pressure sensor, DVL, compass and USBL correct it, each
-at its own rate, each sample at the time at which it was taken. It needs no model of the vehicle.
-"""
+# An error-state Kalman filter. The IMU propagates the estimate; pressure sensor, DVL, compass and USBL correct it, each
+# at its own rate, each sample at the time at which it was taken. It needs no model of the vehicle.
 
 from __future__ import annotations
 
@@ -87,11 +86,9 @@ def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: N
 
 
 def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory) -> None:
-    """Start once IMU, compass, pressure sensor and USBL have given a sample, at rest, level by the accelerometers.
-
-    The USBL must have given two positions that agree, since either may be an outlier. The first position is their
-    mean; half their distance adds to its deviation where noise does not explain it.
-    """
+    """Start once IMU, compass, pressure sensor and USBL have given a sample, at rest, level by the accelerometers."""
+    # The USBL must have given two positions that agree, since either may be an outlier. The first position is their
+    # mean; half their distance adds to its deviation where noise does not explain it.
     times = measurements.times
     latest = min(times[IMU], times[COMPASS], times[DEPTH_SENSOR], times[USBL])
     if not latest > _NEVER or times[IMU] != memory.time[0] or not times[USBL] > memory.sample_times[USBL]:
@@ -164,36 +161,7 @@ def _write_state(memory: NavigationMemory, sensors: SensorModel, now: float, sta
 
 
 class Navigator:
-    """Estimate the vehicle's state from samples of its sensors.
-
-    Parameters
-    ----------
-    sensors : SensorModel
-        Standard deviations of the sensors' errors.
-    state : VehicleState
-        Receives the estimate.
-
-    Attributes
-    ----------
-    measurements : Measurements
-        Samples to fill in before each call of `step`.
-    memory : NavigationMemory
-        Estimate and covariance.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from controller import VehicleState
-    >>> from controller.navigation import Navigator, SensorModel
-    >>> state = VehicleState(np.zeros(3), np.zeros(4), np.zeros(6), np.ones(8), np.zeros(12))
-    >>> navigator = Navigator(SensorModel(), state)
-    >>> navigator.measurements.values[:] = [5.0, *[0.0] * 6, -9.81, *[0.0] * 4, 1.0, 2.0, 5.0]
-    >>> for time in (0.0, 1.0):  # a first position is not believed before the second
-    ...     navigator.measurements.times[:] = time
-    ...     navigator.step(time)
-    >>> state.position
-    array([1., 2., 5.])
-    """
+    """Estimate the vehicle's state from samples of its sensors."""
 
     def __init__(self, sensors: SensorModel, state: VehicleState) -> None:
         self.sensors, self.state = sensors, state

@@ -14,47 +14,24 @@ _FACES = ("unit", "packed", "numbers", "bounds")
 
 @dataclass(frozen=True)
 class Entry:
-    """The properties of a shape, which its file in `controller.regions.shapes` defines as ``ENTRY``.
+    """The properties of a shape, which its file in `controller.regions.shapes` defines as ``ENTRY``."""
 
-    Parameters
-    ----------
-    shape : type
-        Frozen dataclass, a `Shape`: its fields are the keys of a scenario.
-    evaluate : callable
-        Compiled function of g, its gradient and the distance, as `Shape` describes it.
-    example : Shape
-        Instance of the shape, for tests and pictures.
-    units : mapping of str to str
-        Unit of each field of the dataclass, "" for none.
-    surface : callable, optional
-        Function that makes the mesh of an instance within a box, which cuts an unbounded shape. Pictures, replay and
-        exports draw it. A shape of attitude has no mesh.
-    of_attitude : bool, optional
-        True if the shape depends on attitude.
-    half_axes : callable, optional
-        Function of an ellipsoid that returns its centre [m, NED], shape (3,), and its half axes as rows [m], shape
-        (3, 3). Pictures then draw the exact ellipse of its outline, not its mesh.
-    planes : callable, optional
-        Function of an unbounded shape that returns a point [m, NED] and the outward unit normal of each bounding plane.
-        Pictures then cut the planes where the picture ends.
-    convex : bool, optional
-        True if every instance is convex. Rays, such as those of a proximity sensor, then step by tangents, otherwise by
-        distances.
-
-    Raises
-    ------
-    TypeError
-        If an entry is missing, or the packed numbers differ from the named ones.
-    """
-
-    shape: type[Shape]
-    evaluate: Callable[..., Any]
-    example: Shape
-    units: Mapping[str, str]
+    shape: type[Shape]  # frozen dataclass, a `Shape`: its fields are the keys of a scenario
+    evaluate: Callable[..., Any]  # compiled function of g, its gradient and the distance, as `Shape` describes it
+    example: Shape  # instance of the shape, for tests and pictures
+    units: Mapping[str, str]  # unit of each field of the dataclass, "" for none
+    # function that makes the mesh of an instance within a box, which cuts an unbounded shape. Pictures, replay and
+    # exports draw it. A shape of attitude has no mesh
     surface: Callable[[Any, Bounds], Mesh] | None = None
+    # function of an ellipsoid that returns its centre [m, NED], shape (3,), and its half axes as rows [m], shape (3,
+    # 3). Pictures then draw the exact ellipse of its outline, not its mesh
     half_axes: Callable[[Any], tuple[Array, Array]] | None = None
+    # function of an unbounded shape that returns a point [m, NED] and the outward unit normal of each bounding plane.
+    # Pictures then cut the planes where the picture ends
     planes: Callable[[Any], Sequence[tuple[Array, Array]]] | None = None
-    of_attitude: bool = False
+    of_attitude: bool = False  # true if the shape depends on attitude
+    # true if every instance is convex. Rays, such as those of a proximity sensor, then step by tangents, otherwise by
+    # distances
     convex: bool = False
 
     def __post_init__(self) -> None:

@@ -38,18 +38,8 @@ def to_world(q: Array, at: int, x: float, y: float, z: float) -> tuple[float, fl
 
 
 def product_distance(first: float, second: float) -> tuple[float, float, float]:
-    """Return the signed distance to the product of two sets in perpendicular directions, and its derivatives.
-
-    Parameters
-    ----------
-    first, second : float
-        Signed distances to either set [m].
-
-    Returns
-    -------
-    tuple of float
-        Signed distance [m], and its derivatives by `first` and by `second`.
-    """
+    """Return the signed distance to the product of two sets in perpendicular directions, and its derivatives."""
+    # with first, second [m], returns [m]
     if math.isnan(first) or math.isnan(second):  # a lost position is not safe
         return math.nan, math.nan, math.nan
     if first > 0.0 and second > 0.0:

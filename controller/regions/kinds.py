@@ -15,10 +15,8 @@ FIRST_OF_ATTITUDE = sum(not entry.of_attitude for entry in ENTRIES.values())  # 
 
 
 def _by_kind(name: str, arguments: str, of_attitude: bool) -> Callable[..., Any]:
-    """Return a function that evaluates the shape of a kind, its first argument, at the `arguments`.
-
-    C has no table of functions that take tuples, so the function is generated: a choice by the number of the kind.
-    """
+    """Return a function that evaluates the shape of a kind, its first argument, at the `arguments`."""
+    # C has no table of functions that take tuples, so the function is generated: a choice by the number of the kind.
     entries = {kind: entry for kind, entry in ENTRIES.items() if entry.of_attitude == of_attitude}
     names: dict[str, Any] = {f"_{kind}": entry.evaluate for kind, entry in entries.items()}
     choices = [f"    if kind == {entry.shape.kind}: return _{kind}({arguments})\n" for kind, entry in entries.items()]

@@ -1,7 +1,6 @@
-"""Triangle meshes of surfaces.
+"""Triangle meshes of surfaces."""
 
-Every corner of every triangle lies on the surface; between corners a round surface is cut short.
-"""
+# Every corner of every triangle lies on the surface; between corners a round surface is cut short.
 
 from __future__ import annotations
 
@@ -30,18 +29,7 @@ class Mesh:
 
 
 def closed_grid(points: Array) -> Mesh:
-    """Return the mesh of a surface that closes in both directions of a grid, such as a ring.
-
-    Parameters
-    ----------
-    points : ndarray, shape (rows, columns, 3)
-        Points on the surface [m, NED]; the product of row and column direction points outward.
-
-    Returns
-    -------
-    Mesh
-        Mesh with two triangles for each point.
-    """
+    """Return the mesh of a surface that closes in both directions of a grid, such as a ring; points [m, NED]."""
     rows, columns = points.shape[:2]
     i, j = (of.ravel() for of in np.mgrid[:rows, :columns])
     a, b = i * columns + j, (i + 1) % rows * columns + j
@@ -50,22 +38,7 @@ def closed_grid(points: Array) -> Mesh:
 
 
 def sector(apex: Sequence[float], axis: Sequence[float], half_angle: float, reach: float) -> Mesh:
-    """Return the mesh of the points within a reach [m] of an apex and a half angle [rad] of an axis.
-
-    Parameters
-    ----------
-    apex, axis : sequence of float
-        Apex [m], and axis of any length above 0.
-    half_angle : float
-        Half angle, up to pi [rad].
-    reach : float
-        Greatest distance from the apex [m].
-
-    Returns
-    -------
-    Mesh
-        Mesh of a cone with a round end.
-    """
+    """Return the mesh of the points within a reach [m] of an apex and a half angle [rad] of an axis."""
     along, *across = frame(np.array(axis, dtype=float))
     steps = max(2, math.ceil(half_angle / (2.0 * math.pi / AROUND)))
     angles = np.linspace(half_angle, 0.0, steps + 1)[:-1]

@@ -28,20 +28,7 @@ ANGLE: Range = ("rad", 0.0, math.pi)
 
 
 def vector(name: str, of: Range) -> tuple[Number, ...]:
-    """Return the three numbers of a vector.
-
-    Parameters
-    ----------
-    name : str
-        Name of the vector.
-    of : tuple of (str, float, float)
-        Unit and range of each number.
-
-    Returns
-    -------
-    tuple of Number
-        The numbers along x, y and z.
-    """
+    """Return the three numbers of a vector."""
     return tuple(Number(f"{name}.{axis}", *of) for axis in "xyz")
 
 
@@ -52,15 +39,7 @@ TURNED = (  # a centre, and a rotation matrix row by row
 
 
 def constraints(numbers: Sequence[Number]) -> Iterator[tuple[str, int, int, str]]:
-    """Yield the constraints among the numbers of a shape, beyond their ranges.
-
-    Yields
-    ------
-    tuple of (str, int, int, str)
-        Constraint: ``"unit"``, the first of numbers whose squares sum to 1, and their count; ``"rotation"``, the first
-        of the nine of a rotation matrix, and 9; or ``"above"``, a number, and the index of the one that it exceeds;
-        each with a text for the error.
-    """
+    """Yield the constraints among the numbers of a shape, beyond their ranges."""
     names = [number.name for number in numbers]
     for i, number in enumerate(numbers):
         if number.above:

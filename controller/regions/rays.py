@@ -25,28 +25,11 @@ _CONVEX = tuple(entry.shape.kind for entry in ENTRIES.values() if entry.convex)
 
 
 def ray_distances(regions: PackedRegions, origin: Array, directions: Array, farthest: float, distances: Array) -> None:
-    """Find the distances along rays at which a region, at its present place, is violated.
-
-    A ray advances by the clearance, which changes by at most one metre a metre (sphere tracing). The
-    clearance of a convex shape that is kept out of is convex along the ray, so that its tangent allows longer steps and
-    shows when a ray passes by (Newton's method, from the side that never oversteps). Pipes are split into capsules.
-
-    Parameters
-    ----------
-    regions : PackedRegions
-        Regions; those that depend on attitude are left out, as they block no position.
-    origin : ndarray, shape (3,)
-        Start of all rays [m, NED].
-    directions : ndarray, shape (m, 3)
-        Unit vectors, NED.
-    farthest : float
-        Range of the rays [m].
-    distances : ndarray, shape (m,)
-        Receives the distances [m]: 0 everywhere if the origin is inside, or on the surface; infinite where no region
-        is nearer than `farthest`; NaN where the numbers of a ray or of a region within reach are lost. Each ends where
-        the clearance is at most `TOUCHING`. Along a shape that is kept within, or a prism that is not convex, a ray
-        ends after `MAX_STEPS` steps: nearer than the surface, never beyond it.
-    """
+    """Find the distances along rays at which a region, at its present place, is violated; origin [m, NED]."""
+    # with farthest [m], distances [m]
+    # A ray advances by the clearance, which changes by at most one metre a metre (sphere tracing). The clearance of a
+    # convex shape that is kept out of is convex along the ray, so that its tangent allows longer steps and shows when a
+    # ray passes by (Newton's method, from the side that never oversteps). Pipes are split into capsules.
     distances[:] = math.inf
     start, piece = zeros(3), zeros(7)
     for i in range(regions.kinds.size):

@@ -1,7 +1,6 @@
-"""Regions of a scene: shapes that are kept within or kept out of, evaluated together.
+"""Regions of a scene: shapes that are kept within or kept out of, evaluated together."""
 
-One sign for the whole project: g <= 0 is satisfied, g > 0 is violated.
-"""
+# One sign for the whole project: g <= 0 is satisfied, g > 0 is violated.
 
 from __future__ import annotations
 
@@ -94,23 +93,7 @@ def deviations_of(deviation: float | Vector3) -> Vector3:
 
 
 def name_of(shape: Shape) -> str:
-    """Return the name of a shape's kind, such as ``"depth_band"``.
-
-    Parameters
-    ----------
-    shape : Shape
-        Shape of a type in `SHAPES`.
-
-    Returns
-    -------
-    str
-        Key of the shape in `SHAPES`.
-
-    Raises
-    ------
-    RegionError
-        If the shape is not in `SHAPES`.
-    """
+    """Return the name of a shape's kind, such as ``"depth_band"``."""
     for name, kind in SHAPES.items():
         if type(shape) is kind:
             return name
@@ -118,20 +101,7 @@ def name_of(shape: Shape) -> str:
 
 
 def surface_of(shape: Shape, limits: Bounds) -> Mesh:
-    """Return the surface of a shape of position.
-
-    Parameters
-    ----------
-    shape : Shape
-        Shape of position.
-    limits : Bounds
-        Box whose size limits the patch of an unbounded shape.
-
-    Raises
-    ------
-    RegionError
-        If the shape is one of attitude.
-    """
+    """Return the surface of a shape of position."""
     surface = shape_entry(shape).surface
     if surface is None:
         raise RegionError(f"shape {name_of(shape)!r} has no surface, expected one of a shape of position")
@@ -149,10 +119,9 @@ def of_attitude(shape: Shape) -> bool:
 
 
 class PackedRegions(NamedTuple):
-    """Regions as arrays, which C reads.
+    """Regions as arrays, which C reads."""
 
-    Only `shifts` and `velocities` change, when regions move.
-    """
+    # Only `shifts` and `velocities` change, when regions move.
 
     kinds: NDArray[np.int64]  # (n,) number of each shape's kind
     signs: Array  # (n,) +1 kept within, -1 kept out of
@@ -174,30 +143,7 @@ class PackedRegions(NamedTuple):
         rotation_gradients: Array,
         clearances: Array,
     ) -> None:
-        """Evaluate every region at a pose, into the given arrays.
-
-        Parameters
-        ----------
-        position : ndarray, shape (3,)
-            Position [m, NED].
-        quaternion : ndarray, shape (4,)
-            Unit quaternion from body to world; shapes of position alone do not use it.
-        values : ndarray, shape (n,)
-            Receives g_i, at most 0 where satisfied, in the unit of the shape.
-        gradients : ndarray, shape (n, 3)
-            Receives dg_i/dp, world frame.
-        rotation_gradients : ndarray, shape (n, 3)
-            Receives dg_i/dtheta [1/rad] for a small rotation theta about the body's axes, which takes the quaternion
-            e to e exp(theta / 2); 0 for shapes of position alone.
-        clearances : ndarray, shape (n,)
-            Receives the distance to the surface [m], or the angle [rad] for shapes of attitude: positive where
-            satisfied, negative where violated.
-
-        Raises
-        ------
-        RegionError
-            If an array is not contiguous.
-        """
+        """Evaluate every region at a pose, into the given arrays; position [m, NED], clearances [m]."""
         for array in (position, quaternion, values, gradients, rotation_gradients, clearances):
             require(array.flags.c_contiguous, "evaluate", "array", "a strided one", "contiguous ones")
         _evaluate(self, position, quaternion, values, gradients, rotation_gradients, clearances)
@@ -271,10 +217,8 @@ def evaluate_packed(
 
 
 def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -> Evaluation:
-    """Evaluate the shape of region `i`, of position alone, where it is now, at a `position`, shape (3,) [m, NED].
-
-    Spheres and bands of depth, the most frequent, need no array; the others use `at`, shape (3,), as scratch space.
-    """
+    """Evaluate the shape of region `i`, of position alone, where it is now, at a `position`, shape (3,) [m, NED]."""
+    # Spheres and bands of depth, the most frequent, need no array; the others use `at`, shape (3,), as scratch space.
     x = position[0] - regions.shifts[i, 0]
     y = position[1] - regions.shifts[i, 1]
     z = position[2] - regions.shifts[i, 2]
@@ -289,10 +233,8 @@ def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -
 
 
 def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at: Array) -> EvaluationOfAttitude:
-    """Evaluate the shape of region `i`, of attitude, where it is now, at a `position`, shape (3,) [m, NED].
-
-    `e` is the unit quaternion of the pose, and `at`, shape (3,), is scratch space.
-    """
+    """Evaluate the shape of region `i`, of attitude, where it is now, at a `position`, shape (3,) [m, NED]."""
+    # `e` is the unit quaternion of the pose, and `at`, shape (3,), is scratch space.
     for axis in range(3):
         at[axis] = position[axis] - regions.shifts[i, axis]
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
@@ -307,20 +249,16 @@ def clearance_of_place(regions: PackedRegions, i: int, position: Array, scratch:
 
 
 def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
-    """Return the clearance [m] of one of the `regions`, `i`, where it is now, at a position, shape (3,) [m, NED].
-
-    Infinite for shapes that depend on attitude: they block no position.
-    """
+    """Return the clearance [m] of one of the `regions`, `i`, where it is now, at a position, shape (3,) [m, NED]."""
+    # Infinite for shapes that depend on attitude: they block no position.
     if regions.kinds[i] >= FIRST_OF_ATTITUDE:
         return math.inf
     return clearance_of_place(regions, i, position, zeros(3))
 
 
 def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternion: Array, scratch: Array) -> float:
-    """Return the clearance of one of the `regions`, `i`, of any kind, [m] or [rad], at a pose.
-
-    The pose is a `position` [m, NED] and a unit `quaternion`; `scratch` has shape (3,).
-    """
+    """Return the clearance of one of the `regions`, `i`, of any kind, [m] or [rad], at a pose."""
+    # The pose is a `position` [m, NED] and a unit `quaternion`; `scratch` has shape (3,).
     if regions.kinds[i] < FIRST_OF_ATTITUDE:
         return clearance_of_place(regions, i, position, scratch)
     clearance: float = -regions.signs[i] * evaluate_pose(regions, i, position, quaternion, scratch)[0]
@@ -338,11 +276,9 @@ def clearance_of_sphere(regions: PackedRegions, i: int, position: Array) -> floa
 
 
 def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaternion: Array, slope: Array) -> float:
-    """Return the clearance [rad] of one of the `regions`, `i`, of attitude.
-
-    The function writes its `slope` by rotation in body axes, shape (3,). The pose is a `position` [m, NED] and a unit
-    `quaternion`.
-    """
+    """Return the clearance [rad] of one of the `regions`, `i`, of attitude."""
+    # The function writes its `slope` by rotation in body axes, shape (3,). The pose is a `position` [m, NED] and a unit
+    # `quaternion`.
     sign = regions.signs[i]
     g, _, _, _, x, y, z = evaluate_pose(regions, i, position, quaternion, zeros(3))
     slope[0], slope[1], slope[2] = -sign * x, -sign * y, -sign * z
@@ -351,10 +287,8 @@ def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaterni
 
 
 def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
-    """Return the clearance [m] of one of the `regions`, `i`, of position alone.
-
-    The function writes its `slope` at the `position`, shape (3,), of length 1 or 0.
-    """
+    """Return the clearance [m] of one of the `regions`, `i`, of position alone."""
+    # The function writes its `slope` at the `position`, shape (3,), of length 1 or 0.
     _, x, y, z, distance = evaluate_place(regions, i, position, zeros(3))
     size, sign = math.sqrt(x * x + y * y + z * z), regions.signs[i]
     scale = -sign / size if size > 0.0 else 0.0
@@ -364,20 +298,7 @@ def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Arra
 
 
 def clearances_at(points: Array, region: Region) -> Array:
-    """Return the clearance of a region at many points, as it is at time 0.
-
-    Parameters
-    ----------
-    points : ndarray, shape (m, 3)
-        Points [m, NED].
-    region : Region
-        Region to evaluate.
-
-    Returns
-    -------
-    ndarray, shape (m,)
-        Clearances [m], as from `clearance_at`.
-    """
+    """Return the clearance of a region at many points, as it is at time 0; points (m, 3) [m, NED], returns (m,) [m]."""
     clearances = np.empty(len(points))
     arguments = pack([region]), np.ascontiguousarray(points, dtype=float), np.empty(3), clearances
     BoundCall(write_clearances, arguments).call()

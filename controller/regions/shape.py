@@ -31,13 +31,12 @@ GREATEST = 1e6  # m, greatest coordinate and length; squares and their sums stay
 
 
 class Shape(Protocol):
-    """A closed set of positions, given as g(p) <= 0, or of poses, given as g(p, e) <= 0.
+    """A closed set of positions, given as g(p) <= 0, or of poses, given as g(p, e) <= 0."""
 
-    The compiled function of a shape takes a position, shape (3,), and the packed numbers, and returns g, its gradient,
-    and the signed distance [m] to the surface, negative inside. The unit of g is the shape's own. That of a shape that
-    depends on attitude takes the quaternion between the two, and returns g [rad] and its derivatives by position and
-    by rotation; -g is its clearance.
-    """
+    # The compiled function of a shape takes a position, shape (3,), and the packed numbers, and returns g, its
+    # gradient, and the signed distance [m] to the surface, negative inside. The unit of g is the shape's own. That of a
+    # shape that depends on attitude takes the quaternion between the two, and returns g [rad] and its derivatives by
+    # position and by rotation; -g is its clearance.
 
     kind: ClassVar[int]  # number of the shape in packed arrays; assigned when the shapes are loaded
     unit: ClassVar[str]  # unit of g
@@ -56,24 +55,7 @@ class Shape(Protocol):
 
 
 def require(good: bool, shape: str, key: str, received: object, expected: str) -> None:
-    """Raise an error that names the key, unless the condition holds.
-
-    Parameters
-    ----------
-    good : bool
-        Condition that must hold.
-    shape, key : str
-        Names of the shape and of the invalid key.
-    received : object
-        The value received.
-    expected : str
-        Description of valid values.
-
-    Raises
-    ------
-    RegionError
-        If `good` is false.
-    """
+    """Raise an error that names the key, unless the condition holds."""
     if not good:
         hint = ""
         if expected.endswith(" rad") and isinstance(received, int | float) and 0.0 < received < math.inf:
@@ -82,45 +64,14 @@ def require(good: bool, shape: str, key: str, received: object, expected: str) -
 
 
 def require_finite(shape: str, **values: float | tuple[float, ...]) -> None:
-    """Require that all values are finite and not too great; name the first that is not.
-
-    Parameters
-    ----------
-    shape : str
-        Name of the shape.
-    **values : float or tuple of float
-        Values by key.
-
-    Raises
-    ------
-    RegionError
-        If one is NaN, infinite, or beyond `GREATEST`.
-    """
+    """Require that all values are finite and not too great; name the first that is not."""
     for key, value in values.items():
         numbers = value if isinstance(value, tuple) else (value,)
         require(all(abs(x) <= GREATEST for x in numbers), shape, key, value, f"finite numbers up to {GREATEST:g}")
 
 
 def unit(shape: str, key: str, vector: tuple[float, ...]) -> tuple[float, ...]:
-    """Return the vector scaled to unit length.
-
-    Parameters
-    ----------
-    shape, key : str
-        Names, for the message.
-    vector : tuple of float
-        Vector of any length above zero.
-
-    Returns
-    -------
-    tuple of float
-        Vector of length 1.
-
-    Raises
-    ------
-    RegionError
-        If the vector has no direction.
-    """
+    """Return the vector scaled to unit length."""
     require_finite(shape, **{key: vector})
     length = math.hypot(*vector)
     require(length > UP_TO_ROUNDING, shape, key, vector, "a direction")
@@ -128,55 +79,18 @@ def unit(shape: str, key: str, vector: tuple[float, ...]) -> tuple[float, ...]:
 
 
 def centered_bounds(centre: Vector3, reach: Sequence[float]) -> Bounds:
-    """Return the bounds about a centre with a reach along each axis.
-
-    Parameters
-    ----------
-    centre : tuple of float
-        Centre [m, NED].
-    reach : sequence of float
-        Half lengths along the three axes [m].
-
-    Returns
-    -------
-    Bounds
-        Lowest and highest corner.
-    """
+    """Return the bounds about a centre with a reach along each axis; centre [m, NED], reach [m]."""
     (x, y, z), (dx, dy, dz) = centre, reach
     return (x - dx, y - dy, z - dz), (x + dx, y + dy, z + dz)
 
 
 def ball_bounds(centre: Vector3, radius: float) -> Bounds:
-    """Return the bounds of a ball.
-
-    Parameters
-    ----------
-    centre : tuple of float
-        Centre [m, NED].
-    radius : float
-        Radius [m].
-
-    Returns
-    -------
-    Bounds
-        Lowest and highest corner.
-    """
+    """Return the bounds of a ball; centre [m, NED], radius [m]."""
     return centered_bounds(centre, (radius, radius, radius))
 
 
 def join(parts: Sequence[Bounds]) -> Bounds:
-    """Return the bounds of several parts together.
-
-    Parameters
-    ----------
-    parts : sequence of Bounds
-        Bounds of the parts, at least one.
-
-    Returns
-    -------
-    Bounds
-        Lowest and highest corner.
-    """
+    """Return the bounds of several parts together."""
     low = tuple(min(part[0][i] for part in parts) for i in range(3))
     high = tuple(max(part[1][i] for part in parts) for i in range(3))
     return (low[0], low[1], low[2]), (high[0], high[1], high[2])

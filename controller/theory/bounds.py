@@ -12,13 +12,7 @@ Array = NDArray[np.float64]
 
 
 def norm_bound(errors: Array) -> float:
-    """Return the upper bound (35) of |e_s|: the sum of the |e_si|.
-
-    Parameters
-    ----------
-    errors : ndarray, shape (n, 3)
-        Error e_si of each region.
-    """
+    """Return the upper bound (35) of |e_s|: the sum of the |e_si|; errors (n, 3)."""
     return float(np.sum(np.linalg.norm(errors, axis=1)))
 
 
@@ -28,21 +22,7 @@ def square_bound(errors: Array) -> float:
 
 
 def decay_bound(model: Model, gains: Gains, y: Array, velocity_body: Array, sigma_c0: float) -> float:
-    """Return the lower bound (44) of W of (41) [W].
-
-    Parameters
-    ----------
-    model : Model
-        True vehicle.
-    gains : Gains
-        Gains of the law.
-    y : ndarray, shape (6,)
-        Error y, as from `mapped_error`.
-    velocity_body : ndarray, shape (6,)
-        Velocity nu [m/s, rad/s], body frame.
-    sigma_c0 : float
-        sigma c_0 of (43) [N s/m, N m s/rad]: `bracket` is at least -sigma_c0 |nu|^2.
-    """
+    """Return the lower bound (44) of W of (41) [W]; velocity_body [m/s, rad/s], sigma_c0 [N s/m, N m s/rad]."""
     least_drag = np.min(damping(model.linear_damping, model.quadratic_damping, velocity_body))
     least_drag += min(gains.k_v1, gains.k_v2)
     least_pull = min(gains.sigma_p * gains.k_p1, gains.sigma_a * gains.k_p2)

@@ -1,8 +1,7 @@
-"""The gain conditions (38) and (45): their validity, margin and range.
+"""The gain conditions (38) and (45): their validity, margin and range."""
 
-lambda_m of (34) is the greatest eigenvalue of M, since J^+ = blkdiag(R^T, I) is orthogonal. sigma_p is in the
-conditions on position, sigma_a in that on attitude.
-"""
+# lambda_m of (34) is the greatest eigenvalue of M, since J^+ = blkdiag(R^T, I) is orthogonal. sigma_p is in the
+# conditions on position, sigma_a in that on attitude.
 
 from __future__ import annotations
 
@@ -43,48 +42,25 @@ def potential_matrix(gradient_norm: float, gains: Gains) -> Array:
 
 
 def least_of_potential_test(mass: Array, gradient_norm: float, gains: Gains) -> float:
-    """Return the least eigenvalue of P - sigma M sigma: (38), first and second condition as one matrix, above 0.
-
-    Parameters
-    ----------
-    mass : ndarray, shape (6, 6)
-        Mass matrix M, in SI units.
-    gradient_norm : float
-        Norm |df/dp|, above 0.
-    gains : Gains
-        Gains of the law.
-    """
+    """Return the least eigenvalue of P - sigma M sigma: (38), first and second condition as one matrix, above 0."""
     sigma = np.diag([gains.sigma_p] * 3 + [gains.sigma_a] * 3)
     return float(np.linalg.eigvalsh(potential_matrix(gradient_norm, gains) - sigma @ mass @ sigma)[0])
 
 
 def potential_fits(mass: Array, gradient_norm: float, gains: Gains) -> tuple[Fit, Fit]:
-    """Return (38), first and second condition, with the scalar lambda_m of the paper.
-
-    Arguments as `least_of_potential_test`.
-
-    The second compares the mass in kilograms with an inertia: lambda_m is 187.7 for ODIN, whose inertia is 8 kg m2. The
-    matrix test `least_of_potential_test` does not.
-    """
+    """Return (38), first and second condition, with the scalar lambda_m of the paper."""
+    # with mass (6, 6) [kg, kg m2]
+    #
+    # The second compares the mass in kilograms with an inertia: lambda_m is 187.7 for ODIN, whose inertia is 8 kg m2.
+    # The matrix test `least_of_potential_test` does not.
     P = potential_matrix(gradient_norm, gains)
     heaviest = greatest_inertia(mass)
     return Fit(float(P[0, 0]), gains.sigma_p**2 * heaviest), Fit(float(P[5, 5]), gains.sigma_a**2 * heaviest)
 
 
 def secondary_fit(mass: Array, gradient_norms: Array, betas: Array, gains: Gains) -> Fit:
-    """Return (38), third condition, over the active regions alone; without any it holds.
-
-    Parameters
-    ----------
-    mass : ndarray, shape (6, 6)
-        Mass matrix M, in SI units.
-    gradient_norms : ndarray, shape (n,)
-        Norms |dg_i/dp| of the active regions.
-    betas : ndarray, shape (n,)
-        Factors beta_i = alpha_i / k_q of these regions, above 0.
-    gains : Gains
-        Gains of the law.
-    """
+    """Return (38), third condition, over the active regions alone; without any it holds."""
+    # with mass (6, 6) [kg, kg m2]
     if not len(betas):
         return Fit(math.inf, 0.0)
     steepest = float(np.max(gradient_norms))
@@ -94,13 +70,11 @@ def secondary_fit(mass: Array, gradient_norms: Array, betas: Array, gains: Gains
 
 
 def greatest_gradient(mass: Array, gains: Gains) -> float:
-    """Return the |df/dp| below which the matrix test of (38) holds; 0 if it holds nowhere, inf if everywhere.
-
-    Arguments as `least_of_potential_test`.
-
-    It follows from the Schur complement: the translation's part of sigma M sigma, plus the effect of the coupling to
-    rotation.
-    """
+    """Return the |df/dp| below which the matrix test of (38) holds; 0 if it holds nowhere, inf if everywhere."""
+    # with mass (6, 6) [kg, kg m2]
+    #
+    # It follows from the Schur complement: the translation's part of sigma M sigma, plus the effect of the coupling to
+    # rotation.
     sigma = np.diag([gains.sigma_p] * 3 + [gains.sigma_a] * 3)
     crossing = sigma @ mass @ sigma
     rotation = (gains.k_p2 + gains.sigma_a * gains.k_v2) * np.eye(3) - crossing[3:, 3:]
@@ -112,35 +86,19 @@ def greatest_gradient(mass: Array, gains: Gains) -> float:
 
 
 def error_jacobian_bound(jacobian: Array) -> float:
-    """Return the greatest eigenvalue of the symmetric part of de_p/dp, `jacobian`, (3, 3): the rate of e_p with p.
-
-    For a sphere it is |df/dp|^2 + 2 f where f > 0.
-    """
+    """Return the greatest eigenvalue of the symmetric part of de_p/dp, `jacobian`, (3, 3): the rate of e_p with p."""
+    # For a sphere it is |df/dp|^2 + 2 f where f > 0.
     return float(np.linalg.eigvalsh(0.5 * (jacobian + jacobian.T))[-1])
 
 
 def damping_fit(
     mass: Array, linear_damping: Array, jacobian_bound: float, gains: Gains, translation_alone: bool = False
 ) -> Fit:
-    """Return (45), first condition: lambda_min[D] + lambda_min[K_v] against sigma c_0.
-
-    The right side is the one term of sigma c_0 with de_p/dt alone, from the translational mass: the other terms of
-    (43) come on top unless they happen to cancel it, so this condition is necessary for the full one in general.
-    (The term with D's linear part is no multiple of |nu|^2 at all; (43) holds for it only together with the errors.)
-
-    Parameters
-    ----------
-    mass : ndarray, shape (6, 6)
-        Mass matrix M, in SI units.
-    linear_damping : ndarray, shape (6,)
-        Diagonal of D at rest, which is its least [N s/m, N m s/rad].
-    jacobian_bound : float
-        Bound, as from `error_jacobian_bound`.
-    gains : Gains
-        Gains of the law.
-    translation_alone : bool
-        True to use D and K_v of translation on the left side: the weakest reading of the condition.
-    """
+    """Return (45), first condition: lambda_min[D] + lambda_min[K_v] against sigma c_0."""
+    # with linear_damping [N s/m, N m s/rad]
+    # The right side is the one term of sigma c_0 with de_p/dt alone, from the translational mass: the other terms of
+    # (43) come on top unless they happen to cancel it, so this condition is necessary for the full one in general. (The
+    # term with D's linear part is no multiple of |nu|^2 at all; (43) holds for it only together with the errors.)
     drag = np.array(linear_damping, dtype=float)
     least = drag[:3].min() + gains.k_v1 if translation_alone else drag.min() + min(gains.k_v1, gains.k_v2)
     translation = float(np.linalg.eigvalsh(mass[:3, :3])[-1])
@@ -148,35 +106,15 @@ def damping_fit(
 
 
 def gain_fits(gains: Gains) -> tuple[Fit, Fit]:
-    """Return (45), second and third condition, of `gains`, with J_v read as blkdiag(R, I).
-
-    That leaves diag(k_p1 I, k_p2 I).
-    """
+    """Return (45), second and third condition, of `gains`, with J_v read as blkdiag(R, I)."""
+    # That leaves diag(k_p1 I, k_p2 I).
     least = min(gains.k_p1, gains.k_p2)
     return Fit(least, 0.0), Fit(gains.k_q, least)
 
 
 def sphere_radii(mass: Array, linear_damping: Array, radius: float, gains: Gains) -> tuple[float, float, float]:
-    """Return the distances from the centre of a spherical goal region within which conditions hold [m].
-
-    Parameters
-    ----------
-    mass : ndarray, shape (6, 6)
-        Mass matrix M, in SI units.
-    linear_damping : ndarray, shape (6,)
-        Diagonal of D at rest [N s/m, N m s/rad].
-    radius : float
-        Radius of the goal region [m].
-    gains : Gains
-        Gains of the law.
-
-    Returns
-    -------
-    tuple of float
-        (38) as a matrix; (45), first condition; the same with translation alone. Within the region itself f <= 0 and
-        e_p = 0, so that (45) holds there: never less than `radius`. The radius of (38) is where |df/dp| is small
-        enough.
-    """
+    """Return the distances from the centre of a spherical goal region within which conditions hold [m]."""
+    # with linear_damping [N s/m, N m s/rad]
     potential = 0.5 * greatest_gradient(mass, gains)
     within = []
     for translation_alone in (False, True):

@@ -1,13 +1,12 @@
-"""V of (31) and its rate -W of (40), (41).
+"""V of (31) and its rate -W of (40), (41)."""
 
-Throughout y = J^+ e_Ts = [R^T (e_p + (k_q/k_p1) e_s); e_e] with J^+ = blkdiag(R^T, I), and sigma = diag(sigma_p I,
-sigma_a I). The lost dots of (39), (41) and (43) are restored: dy/dt is the sum of both terms with M nu.
-
-The last term of V comes in three forms, since (31) and (33) agree with each other, and with the normalized force of
-(22), only where |dg_i/dp| = 1: `printed_secondary` (31), `unit_gradient_secondary` (33), and `normalized_secondary`,
-the true potential of the force. (40) is an identity for the last one alone, with constant weights, in still water,
-and where the wrench (25) acts.
-"""
+# Throughout y = J^+ e_Ts = [R^T (e_p + (k_q/k_p1) e_s); e_e] with J^+ = blkdiag(R^T, I), and sigma = diag(sigma_p I,
+# sigma_a I). The lost dots of (39), (41) and (43) are restored: dy/dt is the sum of both terms with M nu.
+#
+# The last term of V comes in three forms, since (31) and (33) agree with each other, and with the normalized force of
+# (22), only where |dg_i/dp| = 1: `printed_secondary` (31), `unit_gradient_secondary` (33), and `normalized_secondary`,
+# the true potential of the force. (40) is an identity for the last one alone, with constant weights, in still water,
+# and where the wrench (25) acts.
 
 from __future__ import annotations
 
@@ -24,19 +23,7 @@ Array = NDArray[np.float64]
 
 
 def mapped_error(e_p: Array, e_s: Array, e_att: Array, R: Array, gains: Gains) -> Array:
-    """Return y = J^+ e_Ts, shape (6,): (28).
-
-    Parameters
-    ----------
-    e_p, e_s : ndarray, shape (3,)
-        Region errors (20), (21), world frame.
-    e_att : ndarray, shape (3,)
-        Vector part of the error quaternion (23).
-    R : ndarray, shape (3, 3)
-        Rotation matrix from body to world.
-    gains : Gains
-        Gains of the law.
-    """
+    """Return y = J^+ e_Ts, shape (6,): (28); e_p, e_s (3,), e_att (3,), R (3, 3)."""
     y = np.empty(6)
     y[:3] = R.T @ (e_p + (gains.k_q / gains.k_p1) * e_s)
     y[3:] = e_att
@@ -44,21 +31,7 @@ def mapped_error(e_p: Array, e_s: Array, e_att: Array, R: Array, gains: Gains) -
 
 
 def mapped_error_rate(region_rate: Array, y: Array, error_quaternion: Array, R: Array, omega: Array) -> Array:
-    """Return dy/dt, shape (6,): both dotted terms of (39).
-
-    Parameters
-    ----------
-    region_rate : ndarray, shape (3,)
-        Rate d/dt (e_p + (k_q/k_p1) e_s) along the motion, world frame.
-    y : ndarray, shape (6,)
-        Error y, as from `mapped_error`.
-    error_quaternion : ndarray, shape (4,)
-        Error quaternion (23).
-    R : ndarray, shape (3, 3)
-        Rotation matrix from body to world.
-    omega : ndarray, shape (3,)
-        Angular velocity [rad/s], body frame.
-    """
+    """Return dy/dt, shape (6,): both dotted terms of (39); omega [rad/s]."""
     result = np.empty(6)
     result[:3] = R.T @ region_rate - skew(omega) @ y[:3]
     result[3:] = rate(error_quaternion, omega)[1:]  # (24)
@@ -81,25 +54,7 @@ def primary_value(
     velocity_body: Array,
     estimate: Array,
 ) -> float:
-    """Return V [N m] without its last sum: (31), (32).
-
-    Parameters
-    ----------
-    model : Model
-        True vehicle.
-    gains : Gains
-        Gains of the law.
-    goal_value : float
-        Value f of the goal (13).
-    error_quaternion : ndarray, shape (4,)
-        Error quaternion (23), its scalar part at least 0.
-    y : ndarray, shape (6,)
-        Error y, as from `mapped_error`; with e_s = 0 the secondary regions drop out.
-    velocity_body : ndarray, shape (6,)
-        Velocity nu [m/s, rad/s], body frame.
-    estimate : ndarray, shape (4,)
-        Estimate phi-hat [N, N m].
-    """
+    """Return V [N m] without its last sum: (31), (32); velocity_body [m/s, rad/s], estimate [N, N m]."""
     momentum = model.mass @ velocity_body
     wrong = model.phi - estimate
     turned = (1.0 - error_quaternion[0]) ** 2 + np.sum(error_quaternion[1:] ** 2)
@@ -119,19 +74,7 @@ def secondary_gain(gains: Gains) -> float:
 
 
 def printed_secondary(values: Array, gradients: Array, betas: Array, gains: Gains) -> float:
-    """Return the last sum of (31): of (1/beta_i) |e_si|^2 / |dg_i/dp|^2, with the normalized e_si of (22).
-
-    Parameters
-    ----------
-    values : ndarray, shape (n,)
-        Values g_i of the secondary regions.
-    gradients : ndarray, shape (n, 3)
-        Gradients dg_i/dp; a region whose gradient is zero contributes nothing, as in (19).
-    betas : ndarray, shape (n,)
-        Factors beta_i = alpha_i / k_q; a region of weight 0 contributes nothing.
-    gains : Gains
-        Gains of the law.
-    """
+    """Return the last sum of (31): of (1/beta_i) |e_si|^2 / |dg_i/dp|^2, with the normalized e_si of (22)."""
     total = 0.0
     for i in range(values.size):
         square = gradients[i, 0] ** 2 + gradients[i, 1] ** 2 + gradients[i, 2] ** 2
@@ -149,20 +92,11 @@ def unit_gradient_secondary(values: Array, betas: Array, gains: Gains) -> float:
 
 
 def normalized_secondary(values: Array, gradients: Array, clearances: Array, betas: Array, gains: Gains) -> float:
-    """Return the potential of the normalized force (22) in the place of the last sum of (31).
-
-    It is beta_i times the integral of g_i along the normal, from the surface to the vehicle. Where g is at most
-    quadratic in the distance, with g = 0 on the surface, that is d (4 g - |dg/dp| d) / 6 at the distance d: exact for
-    spheres and depth bands, and for all shapes whose g is a distance. The normalized force of an ellipsoid has no
-    potential, because |dg/dp| varies over its level surfaces; for it this is an estimate.
-
-    Parameters
-    ----------
-    values, gradients, betas, gains
-        Values, gradients, factors and gains, as `printed_secondary`.
-    clearances : ndarray, shape (n,)
-        Distances to the surfaces [m], negative where violated.
-    """
+    """Return the potential of the normalized force (22) in the place of the last sum of (31); clearances (n,) [m]."""
+    # It is beta_i times the integral of g_i along the normal, from the surface to the vehicle. Where g is at most
+    # quadratic in the distance, with g = 0 on the surface, that is d (4 g - |dg/dp| d) / 6 at the distance d: exact for
+    # spheres and depth bands, and for all shapes whose g is a distance. The normalized force of an ellipsoid has no
+    # potential, because |dg/dp| varies over its level surfaces; for it this is an estimate.
     total = 0.0
     for i in range(values.size):
         if not values[i] <= 0.0:
@@ -180,19 +114,8 @@ def bracket(model: Model, gains: Gains, y: Array, y_rate: Array, velocity_body: 
 
 
 def value_rate(model: Model, gains: Gains, y: Array, y_rate: Array, velocity_body: Array) -> float:
-    """Return dV/dt = -W [W]: (40), (41), read with the weights constant and J_v^+ K_0 e_T = [k_p1 R^T e_p; k_p2 e_e].
-
-    Parameters
-    ----------
-    model : Model
-        True vehicle, in still water.
-    gains : Gains
-        Gains of the law.
-    y, y_rate : ndarray, shape (6,)
-        Error y and its rate, as from `mapped_error` and `mapped_error_rate`.
-    velocity_body : ndarray, shape (6,)
-        Velocity nu [m/s, rad/s], body frame.
-    """
+    """Return dV/dt = -W [W]; y, y_rate (6,), velocity_body (6,) [m/s, rad/s]."""
+    # (40), (41), read with the weights constant and J_v^+ K_0 e_T = [k_p1 R^T e_p; k_p2 e_e].
     drag = damping(model.linear_damping, model.quadratic_damping, velocity_body)
     drag[:3] += gains.k_v1
     drag[3:] += gains.k_v2
@@ -210,14 +133,12 @@ def lower_bound(
     velocity_body: Array,
     estimate: Array,
 ) -> float:
-    """Return the lower bound (34), (37) of `primary_value` by completing the square, with the matrix sigma.
-
-    V is at least a quarter of nu^T M nu, the terms of potential, attitude and estimate, less (sigma y)^T M sigma y; the
-    difference is (nu + 2 sigma y)^T M (nu + 2 sigma y) / 4. Arguments as `primary_value`.
-
-    From there (34) splits into |e_p|^2 and the |e_si|^2, and so loses the factor k_q/k_p1 of (28) and the
-    product of the two: its last line holds where no secondary region is active.
-    """
+    """Return the lower bound (34), (37) of `primary_value` by completing the square, with the matrix sigma."""
+    # V is at least a quarter of nu^T M nu, the terms of potential, attitude and estimate, less (sigma y)^T M sigma y;
+    # the difference is (nu + 2 sigma y)^T M (nu + 2 sigma y) / 4. Arguments as `primary_value`.
+    #
+    # From there (34) splits into |e_p|^2 and the |e_si|^2, and so loses the factor k_q/k_p1 of (28) and the product of
+    # the two: its last line holds where no secondary region is active.
     crossing = weighted(y, gains)
     still = primary_value(model, gains, goal_value, error_quaternion, y, np.zeros(6), estimate)
     kinetic = np.sum(velocity_body * (model.mass @ velocity_body))

@@ -23,12 +23,12 @@ class Model(NamedTuple):
 
 
 def coriolis(mass: Array, velocity_body: Array) -> Array:
-    """Return C(nu), shape (6, 6), of `mass`, a constant matrix M, and nu, `velocity_body`, in Kirchhoff's form: (11).
-
-    All in SI units, so [kg/s] and the like.
-
-    With the momentum [a; b] = M nu it is [0 -S(a); -S(a) -S(b)], so that C nu = [w x a; v x a + w x b].
-    """
+    """Return C(nu), shape (6, 6), of `mass`, a constant matrix M, and nu, `velocity_body`, in Kirchhoff's form."""
+    # (11).
+    #
+    # All in SI units, so [kg/s] and the like.
+    #
+    # With the momentum [a; b] = M nu it is [0 -S(a); -S(a) -S(b)], so that C nu = [w x a; v x a + w x b].
     momentum = mass @ velocity_body
     C = np.zeros((6, 6))
     S = skew(momentum[:3])
@@ -39,10 +39,8 @@ def coriolis(mass: Array, velocity_body: Array) -> Array:
 
 
 def damping(linear: Array, quadratic: Array, velocity_body: Array) -> Array:
-    """Return the diagonal of D(nu), shape (6,) [N s/m, N m s/rad]: (11), of nu, `velocity_body`, in SI units.
-
-    `linear` is the damping at rest, and `quadratic` its growth with |nu|.
-    """
+    """Return the diagonal of D(nu), shape (6,) [N s/m, N m s/rad]: (11), of nu, `velocity_body`, in SI units."""
+    # `linear` is the damping at rest, and `quadratic` its growth with |nu|.
     return linear + quadratic * np.abs(velocity_body)
 
 
@@ -57,33 +55,17 @@ def asymmetry(matrix: Array) -> float:
 
 
 def skew_defect(mass: Array, velocity_body: Array) -> float:
-    """Return the deviation of dM/dt - 2 C(nu) from skew-symmetry (Property 2), over the greatest element of C [-].
-
-    `mass` and `velocity_body` as for `coriolis`.
-
-    In body coordinates M is constant, so that C alone must be skew-symmetric.
-    """
+    """Return the deviation of dM/dt - 2 C(nu) from skew-symmetry (Property 2), over the greatest element of C [-]."""
+    # `mass` and `velocity_body` as for `coriolis`.
+    #
+    # In body coordinates M is constant, so that C alone must be skew-symmetric.
     C = coriolis(mass, velocity_body)
     return float(np.abs(C + C.T).max() / max(np.abs(C).max(), 1e-300))
 
 
 def restoring_defect(weight: float, buoyancy: float, r_G: Array, r_B: Array, quaternion: Array) -> float:
-    """Return the difference of Z phi of (12) from weight and buoyancy at their centres [N, N m].
-
-    Parameters
-    ----------
-    weight, buoyancy : float
-        Weight and buoyancy [N].
-    r_G, r_B : ndarray, shape (3,)
-        Centres of gravity and buoyancy [m], body frame.
-    quaternion : ndarray, shape (4,)
-        Unit quaternion from body to world.
-
-    Returns
-    -------
-    float
-        Greatest difference of a component [N or N m].
-    """
+    """Return the difference of Z phi of (12) from weight and buoyancy at their centres [N, N m]."""
+    # with weight, buoyancy [N], r_G, r_B [m], returns [N or N m]
     k = down_in_body(quaternion)
     pull, push = weight * k, -buoyancy * k
     g = -np.concatenate([pull + push, np.cross(r_G, pull) + np.cross(r_B, push)])

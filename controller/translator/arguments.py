@@ -13,18 +13,7 @@ _NUMBER = struct.Struct("=d")
 
 
 def words_of(value: Any) -> list[int]:
-    """Return the words of one argument: one for a number, address and shape for an array.
-
-    Parameters
-    ----------
-    value : int, float, bool, ndarray or tuple of such
-        An array is C-contiguous, and must outlast the words.
-
-    Returns
-    -------
-    list of int
-        Words of eight bytes each.
-    """
+    """Return the words of one argument: one for a number, address and shape for an array."""
     if isinstance(value, np.ndarray):
         return [value.ctypes.data, *value.shape]
     if isinstance(value, tuple):

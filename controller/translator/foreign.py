@@ -18,22 +18,7 @@ _TYPES = {
 
 
 def call_c(address: int, kinds: tuple[str, ...], *arguments: Any) -> int:
-    """Call a C function that returns an int, by its address.
-
-    Parameters
-    ----------
-    address : int
-        Address of the function.
-    kinds : tuple of str
-        Types of its arguments; a constant.
-    *arguments : int, float, bool or ndarray
-        One for each type; an address, or an array, for a pointer.
-
-    Returns
-    -------
-    int
-        Result of the function.
-    """
+    """Call a C function that returns an int, by its address."""
     function = ctypes.PYFUNCTYPE(ctypes.c_int, *(_TYPES[kind] for kind in kinds))(int(address))
     returned: int = function(*(getattr(argument, "ctypes", argument) for argument in arguments))
     return returned

@@ -38,17 +38,7 @@ class Functions(Protocol):
 
 
 class Function(Statements):
-    """One function for arguments of some types.
-
-    Parameters
-    ----------
-    program : Functions
-        Program that translates the called functions.
-    function : function
-        Plain Python.
-    arguments : tuple of Type
-        Types of the parameters.
-    """
+    """One function for arguments of some types."""
 
     def __init__(self, program: Functions, function: FunctionType, arguments: tuple[Type, ...]) -> None:
         self._program, self._function = program, function
@@ -68,13 +58,7 @@ class Function(Statements):
         self.result: Type = Nothing()
 
     def fail(self, node: ast.AST, what: str) -> NoReturn:
-        """Refuse a construct, with its place.
-
-        Raises
-        ------
-        TranslationError
-            Always.
-        """
+        """Refuse a construct, with its place."""
         line = self._first + getattr(node, "lineno", 1) - 1
         raise TranslationError(f"{self._file}:{line}: {what}, which is not translated to C")
 

@@ -32,19 +32,7 @@ _HELPERS = {
 
 
 class Program:
-    """Functions in C, each for the argument types of its calls.
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from controller.linear_algebra import norm
-    >>> from controller.translator.program import Program
-    >>> from controller.translator.types import type_of
-    >>> program = Program()
-    >>> program.export("length", norm, (type_of(np.zeros(3)),))
-    >>> "linear_algebra_norm(f64_1 a)" in program.text()
-    True
-    """
+    """Functions in C, each for the argument types of its calls."""
 
     def __init__(self) -> None:
         self._instances: dict[tuple[FunctionType, tuple[Type, ...]], tuple[str, Type]] = {}
@@ -56,22 +44,7 @@ class Program:
         self._exports: list[str] = []
 
     def export(self, name: str, function: Callable[..., None], arguments: tuple[Type, ...]) -> None:
-        """Translate a function, and make it callable by a name, with its arguments as words.
-
-        Parameters
-        ----------
-        name : str
-            Name in C, of ``void name(const void *words)``.
-        function : function
-            Plain Python; it returns nothing.
-        arguments : tuple of Type
-            Types of its arguments.
-
-        Raises
-        ------
-        TranslationError
-            If the function, or one that it calls, is beyond the subset; the message names file and line.
-        """
+        """Translate a function, and make it callable by a name, with its arguments as words."""
         self._reserved.add(name)
         if not isinstance(function, FunctionType):
             raise TranslationError(f"{function!r} is no plain function, which is not translated to C")
@@ -93,13 +66,7 @@ class Program:
         return "\n".join([_HEAD, *code])
 
     def instance(self, function: FunctionType, arguments: tuple[Type, ...]) -> tuple[str, Type]:
-        """Return the C name of a function for some arguments, and the type of what it returns.
-
-        Raises
-        ------
-        TranslationError
-            If the function, or one that it calls, is beyond the subset.
-        """
+        """Return the C name of a function for some arguments, and the type of what it returns."""
         key = (function, arguments)
         if key not in self._instances:
             if function in self._under_way:

@@ -13,27 +13,7 @@ from controller.translator.types import type_of
 
 
 def static_data(program: Program, name: str, arguments: tuple[Any, ...]) -> str:
-    """Return the definition of a function's arguments, with their present numbers.
-
-    Parameters
-    ----------
-    program : Program
-        Program that exports the function.
-    name : str
-        Name of the function; its arguments are called ``name_data``, and are passed to ``name`` by their address.
-    arguments : tuple
-        Arguments of the types that it was exported for.
-
-    Returns
-    -------
-    str
-        C text to put after the program's text. Arrays are static, and may be written.
-
-    Raises
-    ------
-    TypeError
-        If an argument has a type that is not translated to C.
-    """
+    """Return the definition of a function's arguments, with their present numbers."""
     arrays: list[str] = []
 
     def pointer(array: np.ndarray, path: str) -> str:
@@ -48,22 +28,7 @@ def static_data(program: Program, name: str, arguments: tuple[Any, ...]) -> str:
 
 
 def initializer(value: Any, pointer: Callable[[np.ndarray, str], str], path: str = "") -> str:
-    """Return the C initializer of an argument.
-
-    Parameters
-    ----------
-    value : number, ndarray or tuple of such
-        The argument.
-    pointer : callable
-        Returns the C expression of an array's address, from the array and its path.
-    path : str, optional
-        Path of the argument: with the names of fields, a C name for each array.
-
-    Returns
-    -------
-    str
-        Initializer of the struct that a `Program` has for its type.
-    """
+    """Return the C initializer of an argument."""
     if isinstance(value, tuple):
         keys = getattr(value, "_fields", range(len(value)))
         items = [initializer(item, pointer, f"{path}_{key}") for key, item in zip(keys, value, strict=True)]
@@ -74,22 +39,7 @@ def initializer(value: Any, pointer: Callable[[np.ndarray, str], str], path: str
 
 
 def array_data(array: np.ndarray, name: str, qualifier: str = "static") -> str:
-    """Return the C definition of an array with its present numbers.
-
-    Parameters
-    ----------
-    array : ndarray
-        Array, not empty.
-    name : str
-        Name in C.
-    qualifier : str, optional
-        Text before its type.
-
-    Returns
-    -------
-    str
-        Definition in one line.
-    """
+    """Return the C definition of an array with its present numbers."""
     kind = type_of(array)
     numbers = ", ".join(_number(x) for x in array.ravel())
     return f"{qualifier} {kind.item.c} {name}[] = {{{numbers}}};"  # type: ignore[union-attr]

@@ -74,18 +74,7 @@ Type = Scalar | Array | Tuple | Record | Nothing
 
 
 def type_of(value: Any) -> Type:
-    """Return the type of an argument.
-
-    Parameters
-    ----------
-    value : object
-        A number, a C-contiguous array of float64, int64, uint64, uint32 or bool, or a tuple of such.
-
-    Raises
-    ------
-    TypeError
-        If the argument has another type.
-    """
+    """Return the type of an argument."""
     if isinstance(value, np.ndarray):
         item = _ITEMS.get(value.dtype)
         if item is not None and value.flags.c_contiguous:
@@ -102,13 +91,7 @@ def type_of(value: Any) -> Type:
 
 
 def unified(one: Type, other: Type) -> Type:
-    """Return the type that holds values of both: the wider one of two numbers.
-
-    Raises
-    ------
-    TypeError
-        If there is no such type.
-    """
+    """Return the type that holds values of both: the wider one of two numbers."""
     if one == other:
         return one
     rank = [BOOL, INT, DOUBLE]

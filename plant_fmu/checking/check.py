@@ -39,29 +39,10 @@ def check_fmu(
     start: Mapping[str, float] | None = None,
     importers: Sequence[Importer] = IMPORTERS,
 ) -> list[Result]:
-    """Run every importer on an FMU, and compare its outputs at the stop time with those of FMPy's co-simulation.
-
-    A co-simulation that differs from FMPy's has failed. Model exchange has not: it compares the importer's integrator
-    with the one inside the FMU.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the FMU, whose binary is run with the rights of this user.
-    stop_time, step : float, optional
-        End and step [s]. Default: those of the FMU's default experiment, else 10 and 0.01.
-    start : mapping from str to float, optional
-        Start values of parameters, inputs and states, by name.
-    importers : sequence of Importer
-        Importers to run, `REFERENCE` among them.
-
-    Raises
-    ------
-    FmuFileError
-        If the file is no FMU, or is not safe to extract.
-    TaskError
-        If the times do not fit, or the FMU has no such variable.
-    """
+    """Run every importer on an FMU, and compare its outputs at the stop time with those of FMPy's co-simulation."""
+    # with stop_time, step [s]
+    # A co-simulation that differs from FMPy's has failed. Model exchange has not: it compares the importer's integrator
+    # with the one inside the FMU.
     fmu = read_fmu(path)
     task = Task(
         fmu.stop_time if stop_time is None else stop_time, fmu.step if step is None else step, dict(start or {})

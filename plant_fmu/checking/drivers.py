@@ -45,11 +45,9 @@ def simulate_in_fmpy(fmu: FmuFile, task: Task, folder: Path) -> Answer:
 
 
 def resume_in_fmpy(fmu: FmuFile, task: Task, folder: Path) -> Answer:
-    """Save a co-simulation FMU's state at half time, and continue from it in three ways to the same bits.
-
-    They are: without interruption; with the state restored in the same instance; and, where the FMU can serialize its
-    state, in an instance that never was initialized.
-    """
+    """Save a co-simulation FMU's state at half time, and continue from it in three ways to the same bits."""
+    # They are: without interruption; with the state restored in the same instance; and, where the FMU can serialize its
+    # state, in an instance that never was initialized.
     fmpy.extract(fmu.path, folder)
     serializes = fmu.offers("CS", "canSerializeFMUState")
     half = task.steps // 2

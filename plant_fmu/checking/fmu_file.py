@@ -55,13 +55,7 @@ class FmuFile:
 
 
 def read_fmu(path: Path) -> FmuFile:
-    """Read the model description of an FMU.
-
-    Raises
-    ------
-    FmuFileError
-        If there is no such file, it is not safe to extract, or its content is invalid, as in `read_description`.
-    """
+    """Read the model description of an FMU."""
     path = Path(path)
     with open_fmu(path) as archive:
         root = read_description(path, archive, NATIVE)

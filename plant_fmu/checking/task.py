@@ -18,23 +18,11 @@ _ROUNDING = 1e-9  # relative tolerance of a stop time against a whole number of 
 
 @dataclass(frozen=True)
 class Task:
-    """A simulation from time 0 with constant inputs.
+    """A simulation from time 0 with constant inputs; stop_time, step [s]."""
 
-    Parameters
-    ----------
-    stop_time, step : float
-        End and step [s]; the stop time is a whole number of steps.
-    start : mapping from str to float
-        Start values of parameters, inputs and states by name, in the units of the model description.
-
-    Raises
-    ------
-    TaskError
-        If a time is not positive, or the stop time is no whole number of steps.
-    """
-
-    stop_time: float = 10.0
-    step: float = 0.01
+    stop_time: float = 10.0  # end and step [s]; the stop time is a whole number of steps
+    step: float = 0.01  # end and step [s]; the stop time is a whole number of steps
+    # start values of parameters, inputs and states by name, in the units of the model description
     start: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

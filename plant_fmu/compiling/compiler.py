@@ -32,18 +32,7 @@ _ZIGLANG = "ziglang>=0.13"  # the package holds a C compiler
 
 
 def find_compiler() -> list[str]:
-    """Return the command of a C compiler for this machine: ``CC``, else ``cc``, else that of the ziglang package.
-
-    Returns
-    -------
-    list of str
-        The command and its first arguments.
-
-    Raises
-    ------
-    BuildError
-        If there is no compiler.
-    """
+    """Return the command of a C compiler for this machine: ``CC``, else ``cc``, else that of the ziglang package."""
     cc = os.environ.get("CC")
     if cc:
         try:
@@ -61,23 +50,7 @@ def find_compiler() -> list[str]:
 
 
 def cross_compiler(platform: Platform) -> list[str]:
-    """Return the command of the ziglang package's C compiler for a platform.
-
-    Parameters
-    ----------
-    platform : Platform
-        Platform of the libraries.
-
-    Returns
-    -------
-    list of str
-        The command and its first arguments.
-
-    Raises
-    ------
-    BuildError
-        If the package is not installed.
-    """
+    """Return the command of the ziglang package's C compiler for a platform."""
     if importlib.util.find_spec("ziglang") is None:
         hint = install_hint(_ZIGLANG)
         raise BuildError(f"no compiler for other platforms: the ziglang package was not found; {hint}")
@@ -92,28 +65,7 @@ def compile_library(
     library: Path,
     flags: Sequence[str] = (),
 ) -> None:
-    """Compile C files into one shared library without any dependency but the C library.
-
-    Parameters
-    ----------
-    compiler : sequence of str
-        The command and its first arguments.
-    platform : Platform
-        Target of the compiler.
-    sources : sequence of Path
-        The C files.
-    includes : sequence of Path
-        Folders of headers.
-    library : Path
-        File to write.
-    flags : sequence of str, optional
-        Compiler flags after `FLAGS`.
-
-    Raises
-    ------
-    BuildError
-        If the compiler fails; its first complaint is in the message.
-    """
+    """Compile C files into one shared library without any dependency but the C library."""
     link = ["-s"]
     if platform.system == "darwin":
         # Named, for the linker else writes the build folder into the library. Names of functions stay: Apple's
@@ -138,18 +90,7 @@ def _extra_flags(source: Path) -> tuple[str, ...]:
 
 
 def run_compiler(command: Sequence[str]) -> None:
-    """Run a compiler, or another tool of a build.
-
-    Parameters
-    ----------
-    command : sequence of str
-        The command and its arguments.
-
-    Raises
-    ------
-    BuildError
-        If it fails; its first complaint is in the message.
-    """
+    """Run a compiler, or another tool of a build."""
     log.debug("%s", shlex.join(command))
     try:
         process = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603

@@ -115,23 +115,7 @@ _COMPLETED = "  record completed-step-result { enter-event-mode: bool, terminate
 
 
 def wit(model_exchange: bool) -> str:
-    """Return the interfaces of a component, in WIT.
-
-    Parameters
-    ----------
-    model_exchange : bool
-        True for model exchange beside co-simulation.
-
-    Returns
-    -------
-    str
-        The package ``fmi:fmi3@3.0.0`` with one world, ``fmu``.
-
-    Examples
-    --------
-    >>> "resource model-exchange-instance" in wit(model_exchange=False)
-    False
-    """
+    """Return the interfaces of a component, in WIT."""
     interfaces = {"co-simulation": (_DO_STEP, _CO_SIMULATION)}
     if model_exchange:
         interfaces["model-exchange"] = (_COMPLETED, _MODEL_EXCHANGE)

@@ -22,29 +22,7 @@ _COMMENT = re.compile(r"/\*.*?\*/", re.DOTALL)
 def compiled_libraries(
     component: Component, token: str, fmi: int, compilers: Sequence[tuple[Platform, list[str]]]
 ) -> list[tuple[Platform, bytes]]:
-    """Compile a component for some platforms.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the libraries.
-    token : str
-        Token of their description.
-    fmi : int
-        FMI version, 2 or 3.
-    compilers : sequence of (Platform, list of str)
-        Each platform with the command of a compiler for it.
-
-    Returns
-    -------
-    list of (Platform, bytes)
-        Libraries in the order of `compilers`.
-
-    Raises
-    ------
-    BuildError
-        If a compiler fails.
-    """
+    """Compile a component for some platforms."""
     libraries = []
     with temporary_folder("plant_fmu-") as folder:
         for name, data in {**c_sources(component, fmi), component.header: header(component, token).encode()}.items():
@@ -59,22 +37,7 @@ def compiled_libraries(
 
 
 def source_digest(component: Component, token: str, fmi: int) -> str:
-    """Return a digest of the sources, headers and flags of libraries, independent of platform and compiler.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the libraries.
-    token : str
-        Token of their description.
-    fmi : int
-        FMI version, 2 or 3.
-
-    Returns
-    -------
-    str
-        Digest as a hexadecimal text.
-    """
+    """Return a digest of the sources, headers and flags of libraries, independent of platform and compiler."""
     files = {**c_sources(component, fmi), component.header: header(component, token).encode()}
     for file in FMI_HEADERS.glob(f"fmi{fmi}*.h"):
         declared = _COMMENT.sub(" ", file.read_text(encoding="utf-8"))  # without what differs between releases of FMPy
@@ -83,20 +46,7 @@ def source_digest(component: Component, token: str, fmi: int) -> str:
 
 
 def digest(files: dict[str, bytes], *words: str) -> str:
-    """Return a digest of files and words.
-
-    Parameters
-    ----------
-    files : dict of str to bytes
-        Contents by name, in any order.
-    *words : str
-        Further parts of the digest.
-
-    Returns
-    -------
-    str
-        Digest as a hexadecimal text.
-    """
+    """Return a digest of files and words."""
     sha256 = hashlib.sha256(" ".join(words).encode())
     for name, data in sorted(files.items()):
         sha256.update(f"\n{name} {len(data)}\n".encode() + data)

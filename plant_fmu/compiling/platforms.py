@@ -50,18 +50,7 @@ _ARM_WINDOWS = Platform(
 
 
 def native_platform() -> Platform:
-    """Return this machine's platform.
-
-    Returns
-    -------
-    Platform
-        The platform, with the FMI 2.0 name under which importers on this machine look.
-
-    Raises
-    ------
-    BuildError
-        If FMI has no name for this machine.
-    """
+    """Return this machine's platform."""
     machine = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}.get(
         platform.machine().lower()
     )
@@ -76,18 +65,7 @@ def native_platform() -> Platform:
 
 
 def without_wasm(text: str) -> tuple[str | None, bool]:
-    """Remove WebAssembly from a list of platforms, and return True if it was there.
-
-    Parameters
-    ----------
-    text : str
-        Names of platforms, as for `plant_fmu.build_fmu`.
-
-    Returns
-    -------
-    (str or None, bool)
-        The list without ``wasm``, None if nothing else was in it; and whether ``wasm`` was in it.
-    """
+    """Remove WebAssembly from a list of platforms, and return True if it was there."""
     names = [name.strip() for name in text.split(",")]
     if WASM not in names:
         return text, False
@@ -96,23 +74,7 @@ def without_wasm(text: str) -> tuple[str | None, bool]:
 
 
 def cross_platforms(text: str) -> list[Platform]:
-    """Parse a list of platforms.
-
-    Parameters
-    ----------
-    text : str
-        List of platforms: ``all``, or names of FMI 3.0 with commas between them.
-
-    Returns
-    -------
-    list of Platform
-        Platforms, each once, in the order of `PLATFORMS`.
-
-    Raises
-    ------
-    BuildError
-        If a name is not known.
-    """
+    """Parse a list of platforms."""
     if text == ALL:
         return list(PLATFORMS.values())
     names = [name.strip() for name in text.split(",")]

@@ -1,10 +1,9 @@
-"""Libraries that come compiled with the package, so that an FMU can be made where there is no compiler.
+"""Libraries that come compiled with the package, so that an FMU can be made where there is no compiler."""
 
-The library of one vehicle differs from that of another with as many thrusters only in numbers: the start values of its
-variables and the token, which are in one table of the binary. A prebuilt library is compiled with stand-ins there,
-numbers that no vehicle has, and each vehicle's own are written over them. Its file is named by a digest of the exact
-sources, flags and headers that it is compiled from, so that a library of other sources is never used.
-"""
+# The library of one vehicle differs from that of another with as many thrusters only in numbers: the start values of
+# its variables and the token, which are in one table of the binary. A prebuilt library is compiled with stand-ins
+# there, numbers that no vehicle has, and each vehicle's own are written over them. Its file is named by a digest of the
+# exact sources, flags and headers that it is compiled from, so that a library of other sources is never used.
 
 from __future__ import annotations
 
@@ -45,30 +44,7 @@ def prebuilt_files() -> list[str]:
 def prebuilt_libraries(
     component: Component, token: str, fmi: int, platforms: Sequence[Platform]
 ) -> list[tuple[Platform, bytes]] | None:
-    """Return a component's libraries from the prebuilt ones in the package.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the libraries.
-    token : str
-        Token of their description.
-    fmi : int
-        FMI version, 2 or 3.
-    platforms : sequence of Platform
-        Targets of the libraries.
-
-    Returns
-    -------
-    list of (Platform, bytes) or None
-        Libraries in the order of `platforms`; None where the package lacks one from these sources: an installation
-        from a checkout has only this machine's.
-
-    Raises
-    ------
-    BuildError
-        If a prebuilt file is damaged.
-    """
+    """Return a component's libraries from the prebuilt ones in the package."""
     if not FOLDER.is_dir() or not all(map(_can_load, platforms)):
         return None
     general = make_general_component(component)
@@ -86,13 +62,8 @@ def prebuilt_libraries(
 
 
 def shipped_structures() -> list[Component]:
-    """Return the components that prebuilt libraries are compiled from: for the shipped vehicles, and for six thrusters.
-
-    Returns
-    -------
-    list of Component
-        Components, one for each number of thrusters.
-    """
+    """Return the components that prebuilt libraries are compiled from."""
+    # For the shipped vehicles, and for six thrusters.
     vehicles = [load_vehicle(name) for name in shipped_vehicles()]
     structures = [
         make_general_component(make_vehicle_component(v)) for v in (*vehicles, _with_thrusters(vehicles[0], 6))
@@ -101,29 +72,7 @@ def shipped_structures() -> list[Component]:
 
 
 def write_prebuilt(structure: Component, fmi: int, platforms: str, folder: Path) -> Path:
-    """Compile the prebuilt libraries of one structure.
-
-    Parameters
-    ----------
-    structure : Component
-        Component from `shipped_structures`.
-    fmi : int
-        FMI version, 2 or 3.
-    platforms : str
-        Platforms: ``all``, by the compiler of the ziglang package, or ``native``, by any compiler.
-    folder : Path
-        Folder into which the file is written.
-
-    Returns
-    -------
-    Path
-        Path of the file with the libraries of these platforms.
-
-    Raises
-    ------
-    BuildError
-        If there is no such compiler, or it fails, or the file cannot be written.
-    """
+    """Compile the prebuilt libraries of one structure."""
     if platforms == NATIVE:
         compilers = [(native_platform(), find_compiler())]
     else:
@@ -141,18 +90,7 @@ def _with_thrusters(vehicle: Vehicle, n: int) -> Vehicle:
 
 
 def make_general_component(component: Component) -> Component:
-    """Return the component of a prebuilt library: the same with a stand-in for each start value.
-
-    Parameters
-    ----------
-    component : Component
-        Component whose start values are replaced.
-
-    Returns
-    -------
-    Component
-        Component that is equal for all that differ only in numbers, except for its description.
-    """
+    """Return the component of a prebuilt library: the same with a stand-in for each start value."""
     rows = tuple(
         replace(v, start=_stand_in(i)) if v.role in _ROLES_WITH_START else v for i, v in enumerate(component.variables)
     )
@@ -164,20 +102,7 @@ def _stand_in(i: int) -> float:
 
 
 def file_name(general: Component, fmi: int) -> str:
-    """Return the name of the file with prebuilt libraries.
-
-    Parameters
-    ----------
-    general : Component
-        Component from `general_component`.
-    fmi : int
-        FMI version, 2 or 3.
-
-    Returns
-    -------
-    str
-        Name with a digest of everything that the libraries are compiled from.
-    """
+    """Return the name of the file with prebuilt libraries."""
     return f"fmi{fmi}-{source_digest(general, STAND_IN, fmi)[:32]}.zip"
 
 

@@ -1,8 +1,7 @@
-"""Re-sign a library for macOS after bytes of the library have changed.
+"""Re-sign a library for macOS after bytes of the library have changed."""
 
-Macs with ARM processors load no library without a signature. The linker's own is "ad hoc": it has no signer and holds
-a hash of each page, as in Apple's ``cs_blobs.h``.
-"""
+# Macs with ARM processors load no library without a signature. The linker's own is "ad hoc": it has no signer and holds
+# a hash of each page, as in Apple's `cs_blobs.h`.
 
 from __future__ import annotations
 
@@ -19,23 +18,7 @@ _SHA256 = (32, 2)  # bytes of a hash, and its kind
 
 
 def re_sign(library: bytes) -> bytes:
-    """Return a library with a valid signature.
-
-    Parameters
-    ----------
-    library : bytes
-        Library of any platform; one without a signature is returned unchanged.
-
-    Returns
-    -------
-    bytes
-        Library of the same length.
-
-    Raises
-    ------
-    BuildError
-        If the signature is not of the kind that a linker writes.
-    """
+    """Return a library with a valid signature."""
     if not library.startswith(_MACH_O_64):
         return library
     offset = _HEADER

@@ -25,20 +25,7 @@ def plant_sources() -> dict[str, bytes]:
 
 
 def c_sources(component: Component, fmi: int) -> dict[str, bytes]:
-    """Return the C files of a component's FMU, without the generated header and those of FMI.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the FMU.
-    fmi : int
-        FMI version, 2 or 3.
-
-    Returns
-    -------
-    dict of str to bytes
-        Contents by name, in alphabetical order.
-    """
+    """Return the C files of a component's FMU, without the generated header and those of FMI."""
     other = _OTHER_WRAPPER[fmi]
     wrapper = {name: code for name, code in _files("csrc/wrapper").items() if not name.startswith(other)}
     return dict(sorted({**wrapper, **component.sources}.items()))
@@ -57,38 +44,12 @@ def _external_names(headers: Iterable[bytes]) -> list[str]:
 
 
 def compiled_files(component: Component, fmi: int) -> list[str]:
-    """Return the names of the C files that a compiler is given, without headers.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the FMU.
-    fmi : int
-        FMI version, 2 or 3.
-
-    Returns
-    -------
-    list of str
-        Names relative to the FMU's folder ``sources``.
-    """
+    """Return the names of the C files that a compiler is given, without headers."""
     return [name for name in c_sources(component, fmi) if name.endswith(".c")]
 
 
 def header(component: Component, token: str) -> str:
-    """Return the generated header, which holds the table of variables for the C code.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the FMU.
-    token : str
-        The FMU's guid (FMI 2.0) or instantiation token (FMI 3.0).
-
-    Returns
-    -------
-    str
-        C99 text.
-    """
+    """Return the generated header, which holds the table of variables for the C code."""
     rows, name, guard = component.variables, component.name, component.header.upper().replace(".", "_")
     files = _files("csrc/wrapper") | dict(component.sources)
     shared = _external_names(data for file, data in files.items() if file.endswith(".h"))
@@ -122,13 +83,7 @@ def header(component: Component, token: str) -> str:
 
 
 def build_description(component: Component) -> str:
-    """Return FMI 3.0's ``sources/buildDescription.xml``.
-
-    Returns
-    -------
-    str
-        XML text. One configuration is for any platform and links libm; those of Windows, which has none, do not.
-    """
+    """Return FMI 3.0's ``sources/buildDescription.xml``."""
     root = ET.Element("fmiBuildDescription", fmiVersion="3.0")
     for platform in (None, "x86-windows", "x86_64-windows", "aarch64-windows"):
         configuration = ET.SubElement(root, "BuildConfiguration", modelIdentifier=component.name)

@@ -1,8 +1,7 @@
-"""Universal libraries of macOS: one file with a library for each processor, side by side.
+"""Universal libraries of macOS: one file with a library for each processor, side by side."""
 
-The format is that of Apple's ``mach-o/fat.h``: a header, big-endian whatever the processors are, names the processor,
-place and size of each library; the libraries follow, each at the start of a page, untouched.
-"""
+# The format is that of Apple's `mach-o/fat.h`: a header, big-endian whatever the processors are, names the processor,
+# place and size of each library; the libraries follow, each at the start of a page, untouched.
 
 from __future__ import annotations
 
@@ -20,23 +19,7 @@ _PROCESSOR = struct.Struct("<II")  # after the magic of a library
 
 
 def universal_library(libraries: Sequence[bytes]) -> bytes:
-    """Return one library for several processors.
-
-    Parameters
-    ----------
-    libraries : sequence of bytes
-        Libraries (64-bit Mach-O), each for another processor.
-
-    Returns
-    -------
-    bytes
-        The universal library, the same whatever the order of `libraries`.
-
-    Raises
-    ------
-    BuildError
-        If an item is no such library, or two are for one processor.
-    """
+    """Return one library for several processors."""
     by_processor: dict[tuple[int, int], bytes] = {}
     for library in libraries:
         if len(library) < 12 or not library.startswith(_MACH_O_64):

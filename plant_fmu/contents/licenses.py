@@ -16,23 +16,7 @@ The binaries are compiled with the header files of the FMI standard; for those s
 
 
 def licenses(fmi: int) -> dict[str, str]:
-    """Return the files of ``documentation/licenses``, by name.
-
-    Parameters
-    ----------
-    fmi : int
-        FMI version, 2 or 3.
-
-    Returns
-    -------
-    dict of str to str
-        File ``license.txt``, the entry in both FMI versions, and the files that it refers to.
-
-    Raises
-    ------
-    BuildError
-        If the installation lacks its license file.
-    """
+    """Return the files of ``documentation/licenses``, by name."""
     package = resources.files("plant_fmu")
     # a wheel has a copy in the package, a checkout has the one file beside it
     places = [package / "LICENSE", Path(str(package)).parent / "LICENSE"]

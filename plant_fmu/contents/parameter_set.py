@@ -18,46 +18,13 @@ _NAMESPACES = {
 
 
 def ssv(vehicle: Vehicle, rows: Sequence[Variable] | None = None) -> str:
-    """Return the parameter set of a vehicle: every parameter of its FMU, with the vehicle's value.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle of the FMU.
-    rows : sequence of Variable, optional
-        Variables of its FMU, where they start at other values than the vehicle's own.
-
-    Returns
-    -------
-    str
-        XML text. Applied to the FMU of another vehicle with as many thrusters, it makes that one behave as this one.
-
-    Raises
-    ------
-    VehicleError
-        If a number of the vehicle is beyond the range of its parameter.
-    """
+    """Return the parameter set of a vehicle: every parameter of its FMU, with the vehicle's value."""
     values = [(v, v.start) for v in (variables(vehicle) if rows is None else rows) if v.role == "parameter"]
     return parameter_set(vehicle.name, f"{vehicle.title}. {vehicle.source}", values)
 
 
 def parameter_set(name: str, description: str, values: Iterable[tuple[Variable, float]]) -> str:
-    """Return values of variables as a parameter set.
-
-    Parameters
-    ----------
-    name : str
-        Name of the set.
-    description : str
-        Purpose of the set.
-    values : iterable of (Variable, float)
-        The variables, which give name, type and unit, and a value for each in SI units.
-
-    Returns
-    -------
-    str
-        XML text, the same for the same values.
-    """
+    """Return values of variables as a parameter set."""
     root = ET.Element("ssv:ParameterSet", _NAMESPACES, version="1.0", name=name, description=description)
     root.set("license", "BSD-3-Clause")
     root.set("generationTool", f"subreach {metadata.version('subreach')}")

@@ -1,9 +1,9 @@
-"""Reference results: a maneuver of all six degrees of freedom, integrated apart from the FMU.
+"""Reference results: a maneuver of all six degrees of freedom, integrated apart from the FMU."""
 
-The C core is not used; only the vehicle's numbers are shared. Fossen's equations are here in matrix form and in the
-velocity relative to the water, in which a steady current drops out of them (Fossen 2011, Property 8.1); attitude is a
-rotation matrix, C(ν) does not depend on the linear velocity, and the integrator is DOP853 of SciPy with error control.
-"""
+# The C core is not used; only the vehicle's numbers are shared. Fossen's equations are here in matrix form and in the
+# velocity relative to the water, in which a steady current drops out of them (Fossen 2011, Property 8.1); attitude is a
+# rotation matrix, C(ν) does not depend on the linear velocity, and the integrator is DOP853 of SciPy with error
+# control.
 
 from __future__ import annotations
 
@@ -59,13 +59,7 @@ class Reference:
 
 
 def reference(vehicle: Vehicle) -> Reference:
-    """Compute the reference results of a vehicle.
-
-    Returns
-    -------
-    Reference
-        Maneuver of 16 s, from still thrusters, in a steady current, without surface and bottom.
-    """
+    """Compute the reference results of a vehicle."""
     from scipy.integrate import solve_ivp  # half a second, and needed for nothing else
 
     names, commands = _commands(vehicle)

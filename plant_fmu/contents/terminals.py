@@ -45,14 +45,7 @@ class _Terminal:
 
 
 def terminals_and_icons(vehicle: Vehicle) -> str:
-    """Return ``terminalsAndIcons.xml`` of FMI 3.0.
-
-    Returns
-    -------
-    str
-        XML text: each input and output whose name has a group (``velocity.u``) or belongs to a thruster
-        (``thrust[1]``), once; members bear the names of FMI's structured naming, ``<terminal>.<member>``.
-    """
+    """Return ``terminalsAndIcons.xml`` of FMI 3.0."""
     root = _Terminal()
     for v in variables(vehicle):
         location = _locate(v)

@@ -12,20 +12,7 @@ IMAGES = ("png", "svg", "pdf")
 
 
 def image(figure: Figure, suffix: str) -> bytes:
-    """Encode a figure as an image file; equal figures give equal bytes.
-
-    Parameters
-    ----------
-    figure : Figure
-        Picture to encode.
-    suffix : {"png", "svg", "pdf"}
-        Format of the file.
-
-    Returns
-    -------
-    bytes
-        Content of the file.
-    """
+    """Encode a figure as an image file; equal figures give equal bytes."""
     import matplotlib as mpl
     from matplotlib.text import Text
 

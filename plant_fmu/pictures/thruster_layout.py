@@ -62,18 +62,7 @@ _NOTE = (
 
 
 def thrusters(vehicle: Vehicle) -> Figure:
-    """Return a picture of the thrusters' forces.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle to draw.
-
-    Returns
-    -------
-    Figure
-        Three views in meters, body frame.
-    """
+    """Return a picture of the thrusters' forces."""
     from matplotlib.figure import Figure
 
     lines = thruster_lines(vehicle)

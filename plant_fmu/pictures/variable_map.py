@@ -50,18 +50,7 @@ class _Box:
 
 
 def variable_map(vehicle: Vehicle) -> Figure:
-    """Return a map of the variables of a vehicle's FMU.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle to draw.
-
-    Returns
-    -------
-    Figure
-        Inputs, states and outputs from left to right, parameters below.
-    """
+    """Return a map of the variables of a vehicle's FMU."""
     from matplotlib.figure import Figure
 
     table = variables(vehicle)
@@ -108,18 +97,7 @@ def variable_map(vehicle: Vehicle) -> Figure:
 
 
 def group_rows(table: Iterable[Variable]) -> list[Row]:
-    """Group variables into lines; names that differ in an index or a last part share one.
-
-    Parameters
-    ----------
-    table : iterable of Variable
-        Variables in the order of the table.
-
-    Returns
-    -------
-    list of Row
-        Lines; each variable is in one of them.
-    """
+    """Group variables into lines; names that differ in an index or a last part share one."""
     stems: dict[str, list[Variable]] = {}
     for v in table:
         stem = re.sub(r"\[.*", "[", v.name) if "[" in v.name else v.name.partition(".")[0] + "." * ("." in v.name)

@@ -43,28 +43,7 @@ class Channels:
 
 
 class BoundCalls:
-    """The buffers of an instance, and the calls of a step over them.
-
-    Parameters
-    ----------
-    instance : Instance
-        Instance of the FMU; the calls are valid during its life alone.
-    brief : bool
-        True if the calls take microseconds: they keep Python's global lock. Otherwise each call releases it.
-
-    Attributes
-    ----------
-    inputs, outputs, flags : Channels
-        Real inputs, real outputs, Boolean outputs; scalars alone.
-    starts : ndarray, shape (n,)
-        Start values of the inputs.
-    set_inputs, get_outputs, get_flags, do_step : Call
-        Calls, made as ``function(*arguments)``; they take most of the time of a step.
-    now, length : ctypes.c_double
-        Arguments of `do_step` [s].
-    ended : ctypes.c_bool
-        Result of `do_step`: the FMU asks to end the simulation (FMI 3.0).
-    """
+    """The buffers of an instance, and the calls of a step over them."""
 
     def __init__(self, instance: Instance, brief: bool = False) -> None:
         # a call that releases the lock wakes every thread that waits for it, mostly to find it taken again
@@ -82,6 +61,8 @@ class BoundCalls:
         self.outputs = Channels(_make_channels(outputs), _read_only(output_values))
         self.flags = Channels(_make_channels(flags), _read_only(_as_bools(flag_buffer, ctypes.sizeof(flag_type))))
 
+        # length: arguments of `do_step` [s]
+        # now: arguments of `do_step` [s]
         self.now, self.length, self.ended = ctypes.c_double(), ctypes.c_double(), ctypes.c_bool()
         if instance.fmi == 2:
             names = ("fmi2SetReal", "fmi2GetReal", "fmi2GetBoolean")

@@ -23,32 +23,7 @@ _AT_ZERO = Clock(0.0, 0, math.nan)
 
 
 class CoSimulationInstance:
-    """A co-simulation FMU, FMI 2.0 or 3.0, that is stepped from Python.
-
-    Parameters
-    ----------
-    path : Path
-        The FMU file.
-    brief : bool
-        True if a step takes microseconds. Then it keeps Python's global lock: other threads wait no longer than that,
-        and slow it less. Otherwise they run while it steps.
-
-    Attributes
-    ----------
-    inputs : Channels
-        Real scalar inputs. Write into ``inputs.values``; each step sends them.
-    outputs : Channels
-        Real scalar outputs after the last step; ``outputs.values`` cannot be written.
-    flags : Channels
-        Boolean outputs; `read_flags` updates ``flags.values``.
-    time : float
-        Present time [s].
-
-    Raises
-    ------
-    PlantError
-        If the FMU cannot be loaded.
-    """
+    """A co-simulation FMU, FMI 2.0 or 3.0, that is stepped from Python."""
 
     def __init__(self, path: Path, brief: bool = False) -> None:
         self._instance = Instance(path)
@@ -94,18 +69,7 @@ class CoSimulationInstance:
     # ---- values ----
 
     def set(self, values: Mapping[str, Value]) -> None:
-        """Set parameters, inputs or start values by name.
-
-        Parameters
-        ----------
-        values : mapping from str to float, int, bool or str
-            Values by name, in the units of the model description; all of one type are set at once.
-
-        Raises
-        ------
-        PlantError
-            If a name is unknown or cannot be set now, a value is of the wrong type, or the FMU refuses it.
-        """
+        """Set parameters, inputs or start values by name."""
         self._require_open()
         batches: dict[str, tuple[list[Any], list[Value]]] = {}
         for name, value in values.items():
@@ -167,18 +131,7 @@ class CoSimulationInstance:
     # ---- life cycle ----
 
     def initialise(self, time: float = 0.0) -> None:
-        """Initialise the FMU, and read the outputs.
-
-        Parameters
-        ----------
-        time : float
-            Start time [s].
-
-        Raises
-        ------
-        PlantError
-            If the FMU refuses its parameters, or is initialised already; `reset` it first then.
-        """
+        """Initialise the FMU, and read the outputs; time [s]."""
         self._require_open()
         if self.initialised:
             raise PlantError(f"plant {self.name} is initialized already; reset() it first")
@@ -200,13 +153,7 @@ class CoSimulationInstance:
         self._read()
 
     def reset(self) -> None:
-        """Return to the state after loading: start values of the FMU, not initialised, time 0.
-
-        Raises
-        ------
-        PlantError
-            If the FMU cannot.
-        """
+        """Return to the state after loading: start values of the FMU, not initialised, time 0."""
         self._require_open()
         self._instance.do(self._instance.fmu.reset)
         self._instance.messages.take_failures()  # so that a later error does not quote earlier messages
@@ -214,18 +161,7 @@ class CoSimulationInstance:
         self._set_clock(_AT_ZERO, initialised=False)
 
     def step(self, step: float) -> None:
-        """Send the inputs, advance by `step`, and read the outputs.
-
-        Parameters
-        ----------
-        step : float
-            Length of the step [s].
-
-        Raises
-        ------
-        PlantError
-            If the FMU refuses a value or the step, or the plant is not initialised or closed.
-        """
+        """Send the inputs, advance by `step`, and read the outputs; step [s]."""
         if step != self._step:
             self._change_step(step)
         set_inputs, input_arguments, do_step, step_arguments, get_outputs, output_arguments = self._calls
@@ -263,18 +199,7 @@ class CoSimulationInstance:
             raise PlantError(f"the outputs cannot be read: {self._failure_message()}")
 
     def read_flags(self) -> NDArray[np.bool_]:
-        """Read the Boolean outputs after the last step.
-
-        Returns
-        -------
-        ndarray of bool, shape (n,)
-            The array ``flags.values``, which changes in place.
-
-        Raises
-        ------
-        PlantError
-            If the plant is not initialised or closed, or the FMU fails.
-        """
+        """Read the Boolean outputs after the last step; returns (n,)."""
         if not self.initialised:
             self._require_initialised("has no flags")
         get_flags, flag_arguments = self._bound.get_flags

@@ -58,27 +58,7 @@ class Messages:
 
 
 class Instance:
-    """An instantiated FMU in a temporary folder, which is removed with it.
-
-    Parameters
-    ----------
-    path : Path
-        The FMU file.
-
-    Attributes
-    ----------
-    fmi : int
-        FMI version, 2 or 3.
-    variables : dict from str to fmpy.model_description.ScalarVariable
-        Variables by name, in the order of the model description.
-    fmu : FMU2Slave or FMU3Slave
-        FMPy's object for the FMU.
-
-    Raises
-    ------
-    PlantError
-        If the FMU cannot be loaded; no file is left behind.
-    """
+    """An instantiated FMU in a temporary folder, which is removed with it."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -197,10 +177,8 @@ class Instance:
 
 @functools.lru_cache(maxsize=16)
 def _parse_description(xml: bytes) -> Any:
-    """Return FMPy's parsed model description, which is not to be changed; parsing is half of an instance's start.
-
-    FMPy reads FMUs only, so the text is packed into one without other files.
-    """
+    """Return FMPy's parsed model description, which is not to be changed; parsing is half of an instance's start."""
+    # FMPy reads FMUs only, so the text is packed into one without other files.
     return fmpy.read_model_description(io.BytesIO(make_archive({DESCRIPTION: xml})))
 
 

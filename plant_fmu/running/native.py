@@ -14,10 +14,9 @@ from plant_fmu.running.instance import Instance
 
 
 class Native(NamedTuple):
-    """An FMI 3.0 instance for callers in C: addresses of C functions, and the buffers that they read and fill.
+    """An FMI 3.0 instance for callers in C: addresses of C functions, and the buffers that they read and fill."""
 
-    It is valid while the plant is open, and only one caller may step at a time.
-    """
+    # It is valid while the plant is open, and only one caller may step at a time.
 
     instance: int  # first argument of every function
     set_values: int  # fmi3SetFloat64
@@ -31,25 +30,7 @@ class Native(NamedTuple):
 
 
 def native_calls(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Native:
-    """Return the addresses of an instance's C functions, with buffers.
-
-    Parameters
-    ----------
-    instance : Instance
-        Instance of an FMI 3.0 FMU.
-    inputs, outputs : tuple of str
-        Names of real scalar variables, in the order of the buffers.
-
-    Returns
-    -------
-    Native
-        Addresses, with buffers of their own, all zero.
-
-    Raises
-    ------
-    PlantError
-        If the FMU is of another version, or a variable is no real scalar.
-    """
+    """Return the addresses of an instance's C functions, with buffers."""
     if instance.fmi != 3:
         raise PlantError(f"{instance.path}: FMI {instance.fmi}.0, expected 3.0 for compiled stepping")
     library: Any = instance.fmu.dll

@@ -35,17 +35,7 @@ class Clock:
 
 
 class State:
-    """A state from `Plant.save`. `Plant.free` frees it, else its last reference does.
-
-    Attributes
-    ----------
-    clock : Clock
-        Time at which it was saved.
-    initialised : bool
-        True if the plant was initialised then.
-    inputs : ndarray, shape (n,)
-        Inputs at that time, each in its unit.
-    """
+    """A state from `Plant.save`. `Plant.free` frees it, else its last reference does."""
 
     def __init__(
         self, instance: Instance, handle: Any, clock: Clock, initialised: bool, inputs: NDArray[np.float64]
@@ -64,13 +54,7 @@ class State:
         raise PlantError("a state cannot be copied or pickled, expected plant.serialise(state)")
 
     def handle(self, instance: Instance) -> Any:
-        """Return the FMU's handle, for its own `instance`.
-
-        Raises
-        ------
-        PlantError
-            If the state was freed, or is of another plant.
-        """
+        """Return the FMU's handle, for its own `instance`."""
         if self._instance is not instance:
             raise PlantError("the state is of another plant; serialise it there, and deserialise it here")
         if not self._end.alive:
@@ -95,13 +79,7 @@ def to_bytes(state: State, instance: Instance) -> bytes:
 
 
 def from_bytes(data: bytes, instance: Instance) -> State:
-    """Return the state that `to_bytes` wrote.
-
-    Raises
-    ------
-    PlantError
-        If the bytes are no state, a state of another FMU, or damaged.
-    """
+    """Return the state that `to_bytes` wrote."""
     if len(data) < _HEAD.size + _BODY.size or not data.startswith(_MAGIC):
         raise PlantError(f"got {len(data)} bytes, expected a serialised state of a plant")
     _, fmu_digest, checksum = _HEAD.unpack_from(data)

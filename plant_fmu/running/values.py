@@ -22,25 +22,7 @@ _INTEGERS = {  # number of bits of each type of whole numbers, and True if signe
 
 
 def convert_value(variable: Any, value: object) -> Value:
-    """Convert a value to its variable's type.
-
-    Parameters
-    ----------
-    variable : fmpy.model_description.ScalarVariable
-        Variable to set.
-    value : float, int, bool or str
-        Value to convert. Whole numbers may be floats, and Booleans 0 and 1.
-
-    Returns
-    -------
-    float, int, bool or str
-        Argument for FMPy's setter of the variable's type.
-
-    Raises
-    ------
-    PlantError
-        If the value is of another type, NaN, or beyond what the type can hold.
-    """
+    """Convert a value to its variable's type."""
     kind = variable.type
     if variable.dimensions:
         raise PlantError(f"{variable.name} is an array, expected a scalar: arrays cannot be set")
@@ -60,20 +42,7 @@ def convert_value(variable: Any, value: object) -> Value:
 
 
 def require_settable(variable: Any, initialised: bool) -> None:
-    """Require that FMI allows to set a variable now.
-
-    Parameters
-    ----------
-    variable : fmpy.model_description.ScalarVariable
-        Variable to set.
-    initialised : bool
-        True after initialisation.
-
-    Raises
-    ------
-    PlantError
-        If the variable is calculated, constant, or fixed by now.
-    """
+    """Require that FMI allows to set a variable now."""
     if variable.causality == "input":
         return
     calculated = variable.initial == "calculated" or variable.causality in ("calculatedParameter", "independent")

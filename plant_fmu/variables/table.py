@@ -14,26 +14,7 @@ from plant_fmu.vehicle import Vehicle
 
 
 def variables(vehicle: Vehicle, coupled: bool = False) -> list[Variable]:
-    """Return every variable of a vehicle's FMU; the index in this list is the value reference.
-
-    Parameters
-    ----------
-    vehicle : Vehicle
-        Vehicle with the start values and the number of thrusters.
-    coupled : bool, optional
-        True to add the inputs by which other components act on the vehicle.
-
-    Returns
-    -------
-    list of Variable
-        Real variables first, then the Integer and the Boolean ones. The states are consecutive, in the order of their
-        derivatives.
-
-    Raises
-    ------
-    VehicleError
-        If a number of the vehicle is beyond the range of its parameter.
-    """
+    """Return every variable of a vehicle's FMU; the index in this list is the value reference."""
     rows = [
         Variable("time", "time", "time", q.TIME, "Simulated time"),
         *_states(vehicle),

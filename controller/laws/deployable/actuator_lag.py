@@ -1,15 +1,14 @@
-"""Forces and state behind the lag of the thrusters, which the observer estimates.
+"""Forces and state behind the lag of the thrusters, which the observer estimates."""
 
-Forces f follow commands u by tau f' = u - f. They are propagated for the estimated lag, and for a standard deviation
-less and more: the secant between these is the sensitivity of the forces to the lag, and its error at the estimated lag
-is their curvature. When the estimate changes, the forces are interpolated to the new lag, as if it had always been
-that.
-
-Let a be the acceleration without thrust, and G f that of the thrusters. Then p + tau v has the rate v + tau (a + G f),
-and this has the rate a + G u + tau a'. So the point ahead answers to commands at once, and the vehicle follows it: its
-position is a mean of where that point was. The law controls the point ahead, and its commands act at the attitude
-there: G turns with the body while forces follow. Without a lag the point is the vehicle.
-"""
+# Forces f follow commands u by tau f' = u - f. They are propagated for the estimated lag, and for a standard deviation
+# less and more: the secant between these is the sensitivity of the forces to the lag, and its error at the estimated
+# lag is their curvature. When the estimate changes, the forces are interpolated to the new lag, as if it had always
+# been that.
+#
+# Let a be the acceleration without thrust, and G f that of the thrusters. Then p + tau v has the rate v + tau (a + G
+# f), and this has the rate a + G u + tau a'. So the point ahead answers to commands at once, and the vehicle follows
+# it: its position is a mean of where that point was. The law controls the point ahead, and its commands act at the
+# attitude there: G turns with the body while forces follow. Without a lag the point is the vehicle.
 
 from __future__ import annotations
 
@@ -105,23 +104,7 @@ def predict_state(
     acceleration: Array,
     lag: float,
 ) -> None:
-    """Predict the state ahead.
-
-    Parameters
-    ----------
-    predicted : PredictedState
-        Predicted state, updated in place.
-    position, velocity : ndarray, shape (3,)
-        Position [m] and velocity [m/s], NED.
-    quaternion : ndarray, shape (4,)
-        Attitude, from body to world.
-    omega : ndarray, shape (3,)
-        Angular velocity [rad/s], body axes.
-    acceleration : ndarray, shape (6,)
-        Acceleration by the present forces: [m/s2] over ground, NED; [rad/s2], body axes.
-    lag : float
-        Lag of the thrusters [s].
-    """
+    """Predict the state ahead; position, velocity [m], omega [rad/s], acceleration [m/s2], lag [s]."""
     for i in range(3):
         predicted.position[i] = position[i] + lag * velocity[i]
         predicted.velocity[i] = velocity[i] + lag * acceleration[i]

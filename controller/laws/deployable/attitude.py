@@ -1,12 +1,11 @@
-"""Attitude: held by proportional and rate feedback, with the restoring moments adapted from the body rates.
+"""Attitude: held by proportional and rate feedback, with the restoring moments adapted from the body rates."""
 
-Rates are measured well, so that their change over a period gives the acting moment: I omega' = tau - D omega -
-S(k) phi_{2..4} - nu_r x (M nu_r), where the fourth is Munk's moment, which added mass causes in oblique motion. The
-observer estimates from it the three moments of phi (12).
-
-The desired attitude is the preferred one unless a region of attitude requires another: if its clearance would be less
-than `comfort`, the desired attitude turns until it has that much, within the allowed tilt, and returns afterwards.
-"""
+# Rates are measured well, so that their change over a period gives the acting moment: I omega' = tau - D omega - S(k)
+# phi_{2..4} - nu_r x (M nu_r), where the fourth is Munk's moment, which added mass causes in oblique motion. The
+# observer estimates from it the three moments of phi (12).
+#
+# The desired attitude is the preferred one unless a region of attitude requires another: if its clearance would be less
+# than `comfort`, the desired attitude turns until it has that much, within the allowed tilt, and returns afterwards.
 
 from __future__ import annotations
 
@@ -57,28 +56,7 @@ def measure_moment(
     estimate: Estimate,
     period: float,
 ) -> bool:
-    """Measure the moment of thrusters and weight by the change of the rates over the period [s].
-
-    Parameters
-    ----------
-    attitude : Attitude
-        State of the loop; all but the two attitudes is updated.
-    dynamics : Dynamics
-        Dynamics of the vehicle.
-    R : ndarray, shape (3, 3)
-        Rotation from body to world.
-    omega : ndarray, shape (3,)
-        Measured rates [rad/s], body axes.
-    estimate : Estimate
-        Estimate of the velocities of vehicle and water, and of the acceleration in the period.
-    period : float
-        Control period [s].
-
-    Returns
-    -------
-    bool
-        True if `measured_moment` is valid; False if the rates were not measured in the last step.
-    """
+    """Measure the moment of thrusters and weight by the change of the rates over the period [s]; omega [rad/s]."""
     started = bool(attitude.started[0] > 0.0)
     mean, water, known, other, rate = zeros(3), zeros(3), zeros(6), zeros(6), zeros(6)
     loads = Loads(water, zeros(1), zeros(3))  # only the current: weight and buoyancy are the unknowns
@@ -112,21 +90,8 @@ def measure_moment(
 def update_desired(
     attitude: Attitude, regions: PackedRegions, position: Array, gains: DeployableGains, period: float
 ) -> None:
-    """Turn the desired attitude towards the preferred one, or until regions of attitude have their comfort.
-
-    Parameters
-    ----------
-    attitude : Attitude
-        State of the loop; `desired` is updated.
-    regions : PackedRegions
-        Regions; only those of attitude apply, hard or soft.
-    position : ndarray, shape (3,)
-        Position of the vehicle [m, NED].
-    gains : DeployableGains
-        Gains `comfort`, `tilt` and `turning_rate`.
-    period : float
-        Control period [s].
-    """
+    """Turn the desired attitude towards the preferred one, or until regions of attitude have their comfort."""
+    # with position [m, NED], period [s]
     error, omega, gradient, k = zeros(4), zeros(3), zeros(3), zeros(3)
     error[0], error[1], error[2], error[3] = error_parts(attitude.preferred, attitude.desired)
     for axis in range(3):  # desired = preferred * back

@@ -1,21 +1,20 @@
-"""Barriers: linear constraints on the thruster forces that keep every hard region.
+"""Barriers: linear constraints on the thruster forces that keep every hard region."""
 
-The clearance less a margin is h, of relative degree two. Its rate is bounded by what braking can still stop,
-
-    dh/dt >= -phi(h),   phi(h) = sqrt(2 a h + (a / kappa)^2) - a / kappa   (h >= 0),   kappa h   (h < 0),
-
-with a the deceleration that is always available. psi = dh/dt + phi(h) >= 0 is kept by dpsi/dt >= -rate psi, which is
-linear in the thruster forces u:
-
-    n^T A u >= -rate (dh/dt + phi) - phi' dh/dt - n^T a_free - (dn/dt)^T v,
-
-with n the gradient of h over the pose, v the velocity relative to the region, A u the acceleration by the thrusters and
-a_free the acceleration without them. Along psi = 0 this requires a (1 - (a / kappa) / sqrt(2 a h + (a / kappa)^2)),
-which is less than a: never more than is available. A region's own motion enters through dh/dt. Where a region has
-several faces, those that lie ahead have barriers too: `faces.py`. Clearances of regions of position are in m and depend
-on position alone; those of attitude (camera view, heading) are in rad and depend on both. docs/deployable.md states the
-guarantees and their limits.
-"""
+# The clearance less a margin is h, of relative degree two. Its rate is bounded by what braking can still stop,
+#
+#     dh/dt >= -phi(h),   phi(h) = sqrt(2 a h + (a / kappa)^2) - a / kappa   (h >= 0),   kappa h   (h < 0),
+#
+# with a the deceleration that is always available. psi = dh/dt + phi(h) >= 0 is kept by dpsi/dt >= -rate psi, which is
+# linear in the thruster forces u:
+#
+#     n^T A u >= -rate (dh/dt + phi) - phi' dh/dt - n^T a_free - (dn/dt)^T v,
+#
+# with n the gradient of h over the pose, v the velocity relative to the region, A u the acceleration by the thrusters
+# and a_free the acceleration without them. Along psi = 0 this requires a (1 - (a / kappa) / sqrt(2 a h + (a /
+# kappa)^2)), which is less than a: never more than is available. A region's own motion enters through dh/dt. Where a
+# region has several faces, those that lie ahead have barriers too: `faces.py`. Clearances of regions of position are in
+# m and depend on position alone; those of attitude (camera view, heading) are in rad and depend on both.
+# docs/deployable.md states the guarantees and their limits.
 
 from __future__ import annotations
 
@@ -117,10 +116,8 @@ def observe_regions(
 
 
 def pose_gradient(gradients: Array, rotation_gradients: Array, i: int, of_attitude: bool, out: Array) -> bool:
-    """Write the gradient of a clearance over the pose, shape (6,); return False where it vanishes.
-
-    A distance has the direction of g's gradient and length 1, whatever the unit of g; an angle is -g itself.
-    """
+    """Write the gradient of a clearance over the pose, shape (6,); return False where it vanishes."""
+    # A distance has the direction of g's gradient and length 1, whatever the unit of g; an angle is -g itself.
     size = length3(gradients[i, 0], gradients[i, 1], gradients[i, 2])
     turning = length3(rotation_gradients[i, 0], rotation_gradients[i, 1], rotation_gradients[i, 2])
     if not size + turning > 0.0:
@@ -133,12 +130,10 @@ def pose_gradient(gradients: Array, rotation_gradients: Array, i: int, of_attitu
 
 
 def gradient_rate(kind: int, sign: float, n: Array, later: Array, velocity: Array) -> float:
-    """Return (dn/dt)^T v, from a gradient now and later, (6,) each, along a velocity [m/s, rad/s] against the region.
-
-    The gradient of a flat face is constant, and jumps where another face becomes the nearest. So with flat faces only a
-    gradient that turns away applies, as round an edge; with others, jumps towards the vehicle are ignored. Inside a
-    region to stay in (`sign` above 0) a gradient that turns away is a jump, too.
-    """
+    """Return (dn/dt)^T v from a gradient now and later, (6,) each; v [m/s, rad/s] is relative to the region."""
+    # The gradient of a flat face is constant, and jumps where another face becomes the nearest. So with flat faces only
+    # a gradient that turns away applies, as round an edge; with others, jumps towards the vehicle are ignored. Inside a
+    # region to stay in (`sign` above 0) a gradient that turns away is a jump, too.
     turning, alike = 0.0, 0.0
     for axis in range(6):
         turning += (later[axis] - n[axis]) / _AHEAD * velocity[axis]
@@ -151,10 +146,8 @@ def gradient_rate(kind: int, sign: float, n: Array, later: Array, velocity: Arra
 
 
 def _margin(n: Array, motion: Motion, deviations: Array, of_attitude: bool, gains: DeployableGains) -> float:
-    """Return the margin [m, or rad] of a clearance with slope n, from the uncertainty of vehicle and region.
-
-    `deviations`, shape (3,) [m], are standard deviations of the region's position.
-    """
+    """Return the margin [m, or rad] of a clearance with slope n, from the uncertainty of vehicle and region."""
+    # `deviations`, shape (3,) [m], are standard deviations of the region's position.
     variance, along, turned = 0.0, 0.0, 0.0
     for axis in range(3):
         variance += square(n[axis]) * (motion.position_variance[axis] + square(deviations[axis]))
@@ -195,35 +188,10 @@ def write_rows(
     share: float,
     gains: DeployableGains,
 ) -> int:
-    """Write the constraint of each hard region that the thrusters could violate; return the number of rows.
-
-    Also write the lower bound of the clearances [m]: min(0, margin + h, psi / kappa). The `margin` covers an error of
-    the acceleration of rate kappa margin.
-
-    Parameters
-    ----------
-    work : Workspace
-        Receives rows, right sides and inverse prices of slack.
-    observation : RegionObservation
-        Regions as evaluated by `observe_regions`.
-    regions : PackedRegions
-        The n regions.
-    weights : ndarray, shape (n,)
-        Weights of the arbiter: slack of a region of greater weight costs more.
-    motion : Motion
-        Motion of the vehicle.
-    lower, upper : ndarray, shape (m,)
-        Limits of the thruster forces [N].
-    share : float
-        Below 1 while barriers yield: fraction by which each right side moves from its last value to the new one.
-    gains : DeployableGains
-        Margin, slope and rate of barriers.
-
-    Returns
-    -------
-    int
-        Number of rows written, at most (1 + FACES) n.
-    """
+    """Write the constraint of each hard region that the thrusters could violate; return the number of rows."""
+    # with lower, upper [N]
+    # Also write the lower bound of the clearances [m]: min(0, margin + h, psi / kappa). The `margin` covers an error of
+    # the acceleration of rate kappa margin.
     rows, n, later_gradient, relative, path_velocity = 0, zeros(6), zeros(6), zeros(6), zeros(3)
     wanted, bound = zeros(3), 0.0
     _desired_acceleration(motion, work.nominal, wanted)
@@ -291,23 +259,8 @@ def add_row(
     lower: Array,
     upper: Array,
 ) -> int:
-    """Add the constraint n^T A u >= right, unless no forces within the limits violate it; return the number of rows.
-
-    Parameters
-    ----------
-    work : Workspace
-        Receives row, right side and inverse price of slack.
-    rows : int
-        Present number of rows.
-    n : ndarray, shape (6,)
-        Gradient of a clearance over the pose: per metre, NED, and per radian, body axes.
-    thruster_acceleration : ndarray, shape (6, m)
-        A, acceleration by one newton of each thruster [m/s2, rad/s2].
-    right, price : float
-        Right side of the constraint, and inverse price of its slack.
-    lower, upper : ndarray, shape (m,)
-        Limits of the thruster forces u [N].
-    """
+    """Add the constraint n^T A u >= right, unless no forces within the limits violate it; return the number of rows."""
+    # with thruster_acceleration [m/s2, rad/s2], lower, upper [N]
     least = 0.0
     for j in range(lower.size):
         along = 0.0
@@ -322,10 +275,8 @@ def add_row(
 
 
 def vehicle_bound(regions: PackedRegions, position: Array, motion: Motion, gains: DeployableGains) -> float:
-    """Return the lower bound [m] of the vehicle's own clearances now, at most 0: it follows the point with barriers.
-
-    `regions` are at their present positions, and the vehicle at a `position`, shape (3,) [m, NED].
-    """
+    """Return the lower bound [m] of the vehicle's own clearances now, at most 0: it follows the point with barriers."""
+    # `regions` are at their present positions, and the vehicle at a `position`, shape (3,) [m, NED].
     bound, n = 0.0, zeros(6)
     for i in range(regions.kinds.size):
         if regions.hard[i] and regions.kinds[i] < _ATTITUDE:
@@ -335,11 +286,9 @@ def vehicle_bound(regions: PackedRegions, position: Array, motion: Motion, gains
 
 
 def update_promise(promised: Array, bound: float, slack: float) -> None:
-    """Raise the promised lower bound of the clearances, shape (2,) [m], to the bound of this step, if that is higher.
-
-    A falling bound does not lower the promise, which would else follow any violation. The promise is reset if a barrier
-    yields by more than `KEPT`, or if the bound jumps, since then regions or estimate jumped.
-    """
+    """Raise the promised lower bound of the clearances, shape (2,) [m], to a higher bound of this step."""
+    # A falling bound does not lower the promise, which would else follow any violation. The promise is reset if a
+    # barrier yields by more than `KEPT`, or if the bound jumps, since then regions or estimate jumped.
     if slack > KEPT or not bound >= promised[1] - _BOUND_LEAP:
         promised[0] = bound
     promised[0], promised[1] = max(promised[0], bound), bound

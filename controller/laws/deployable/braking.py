@@ -17,27 +17,10 @@ _NEGLIGIBLE = 1e-6  # force that counts as zero, as a fraction of the greatest l
 
 
 def least_forces(vehicle: VehicleModel) -> Array:
-    """Return the greatest force in the worst direction, with each thruster lost and with none.
-
-    Without any moment, over the 26 directions to faces, edges and corners of a cube in body axes: for the shipped
-    vehicles within 2 % of the least over all directions. If the remaining thrusters cannot push in every direction, the
-    force with none lost is returned instead.
-
-    Parameters
-    ----------
-    vehicle : VehicleModel
-        Vehicle with m thrusters.
-
-    Returns
-    -------
-    ndarray, shape (m + 1,)
-        Forces [N]: element j with thruster j lost, the last with all working.
-
-    Raises
-    ------
-    LawError
-        If the thrusters cannot push in every direction without a moment even if all work.
-    """
+    """Return the greatest force in the worst direction, with each thruster lost and with none; returns (m + 1,) [N]."""
+    # Without any moment, over the 26 directions to faces, edges and corners of a cube in body axes: for the shipped
+    # vehicles within 2 % of the least over all directions. If the remaining thrusters cannot push in every direction,
+    # the force with none lost is returned instead.
     B, lower, upper = vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max
     forces = np.array(_least_forces(B.tobytes(), B.shape[1], lower.tobytes(), upper.tobytes()))
     negligible = _NEGLIGIBLE * np.abs(np.r_[lower, upper]).max()

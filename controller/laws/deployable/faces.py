@@ -1,10 +1,9 @@
-"""Faces ahead of the vehicle, of regions with several faces.
+"""Faces ahead of the vehicle, of regions with several faces."""
 
-Inside a box, the clearance is the distance to the nearest face. The face that the vehicle heads for becomes the nearest
-too late to brake. So a line along the velocity is followed to the point where it leaves the region, up to the stopping
-distance; the face found there is a plane with its own barrier. The component of the velocity towards
-faces that have barriers already is removed, so that the next face is found in a corner, too.
-"""
+# Inside a box, the clearance is the distance to the nearest face. The face that the vehicle heads for becomes the
+# nearest too late to brake. So a line along the velocity is followed to the point where it leaves the region, up to the
+# stopping distance; the face found there is a plane with its own barrier. The component of the velocity towards faces
+# that have barriers already is removed, so that the next face is found in a corner, too.
 
 from __future__ import annotations
 
@@ -26,41 +25,17 @@ _HALVINGS = 6  # bisections of the interval in which the line leaves the region
 
 
 def has_faces(kind: int, sign: float) -> bool:
-    """Return True if the clearance of a region has a kink where two faces are equally near.
-
-    Inside a region to stay in (`sign` above 0) this holds for all but a half space: an ellipsoid has the kink along its
-    long axes, a sphere at its center.
-    """
+    """Return True if the clearance of a region has a kink where two faces are equally near."""
+    # Inside a region to stay in (`sign` above 0) this holds for all but a half space: an ellipsoid has the kink along
+    # its long axes, a sphere at its center.
     return kind != _HALF_SPACE and (sign > 0.0 or kind not in _SMOOTH)
 
 
 def face_ahead(
     regions: PackedRegions, i: int, position: Array, nearest: Array, velocity: Array, reach: float, face: Array
 ) -> float:
-    """Find the face of region `i` that the vehicle heads for, beside the nearest one.
-
-    Parameters
-    ----------
-    regions : PackedRegions
-        Regions at their present positions.
-    i : int
-        Index of a region of position.
-    position : ndarray, shape (3,)
-        Position of the vehicle [m, NED], at which the region is satisfied.
-    nearest : ndarray, shape (3,)
-        Gradient of the clearance there, of length 1: the face that has a barrier already.
-    velocity : ndarray, shape (3,)
-        Velocity relative to the region [m/s]; its component towards the nearest face is removed in place.
-    reach : float
-        Length of the line [m].
-    face : ndarray, shape (3,)
-        Receives the gradient of the clearance at the face.
-
-    Returns
-    -------
-    float
-        Distance from the vehicle to the plane of the face [m]; infinite if there is no such face.
-    """
+    """Find the face of region `i` that the vehicle heads for, beside the nearest one; position [m, NED]."""
+    # with velocity [m/s], reach [m], returns [m]
     approach_speed, speed = 0.0, 0.0
     for axis in range(3):
         approach_speed += velocity[axis] * nearest[axis]

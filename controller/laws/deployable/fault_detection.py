@@ -1,24 +1,23 @@
-"""Detection of failed thrusters, by the innovations of the observer.
+"""Detection of failed thrusters, by the innovations of the observer."""
 
-There are two hypotheses about each thruster: it loses its force, or it is stuck at its present force. If one holds, the
-true state deviates from the estimate: at first by the lost effectiveness, or by the force that no longer changes; then
-as the filter propagates any error of its state (Willsky and Jones, 1976). So the deviation includes the filter's false
-adaptation of other states. The log-likelihood ratio of a hypothesis against "no failure" is summed, never below zero:
-Page's test. At zero the hypothesis restarts; that is the supposed time of the failure.
-
-A moment or a velocity that can have other causes has little weight, since the covariance of the innovation includes
-them: an uncertain effectiveness or lag, unknown restoring moments, W - B, current, the height of the center of gravity.
-So a thruster that fails at low thrust is detected when it is used.
-
-While the innovations are biased, the model does not fit, and evidence counts less: by the square of their misfit. A
-thruster that saturates does not count as failed, since its true limit is estimated (`thrust_limit`).
-
-A thruster has failed if its sum exceeds the threshold, and that of every other thruster by a lead. By the likeliest
-loss it is kept with its remaining effectiveness, or isolated. The deviation is added to the state. A thruster isolated
-by a narrow lead is tried again, once, when another one is isolated. If several are isolated, one of them may be a false
-alarm: each is tried again after a while, in turn, while no barrier is active; a failed one is soon isolated again. A
-thruster that is reported as failed is never tried.
-"""
+# There are two hypotheses about each thruster: it loses its force, or it is stuck at its present force. If one holds,
+# the true state deviates from the estimate: at first by the lost effectiveness, or by the force that no longer changes;
+# then as the filter propagates any error of its state (Willsky and Jones, 1976). So the deviation includes the filter's
+# false adaptation of other states. The log-likelihood ratio of a hypothesis against "no failure" is summed, never below
+# zero: Page's test. At zero the hypothesis restarts; that is the supposed time of the failure.
+#
+# A moment or a velocity that can have other causes has little weight, since the covariance of the innovation includes
+# them: an uncertain effectiveness or lag, unknown restoring moments, W - B, current, the height of the center of
+# gravity. So a thruster that fails at low thrust is detected when it is used.
+#
+# While the innovations are biased, the model does not fit, and evidence counts less: by the square of their misfit. A
+# thruster that saturates does not count as failed, since its true limit is estimated (`thrust_limit`).
+#
+# A thruster has failed if its sum exceeds the threshold, and that of every other thruster by a lead. By the likeliest
+# loss it is kept with its remaining effectiveness, or isolated. The deviation is added to the state. A thruster
+# isolated by a narrow lead is tried again, once, when another one is isolated. If several are isolated, one of them may
+# be a false alarm: each is tried again after a while, in turn, while no barrier is active; a failed one is soon
+# isolated again. A thruster that is reported as failed is never tried.
 
 from __future__ import annotations
 
@@ -64,24 +63,7 @@ def empty_fault_state(m: int) -> FaultState:
 
 
 def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, gains: DeployableGains) -> int:
-    """Test the last measurements, isolate a thruster that has failed, and return it, or -1.
-
-    Parameters
-    ----------
-    fault_state : FaultState
-        Hypotheses about the thrusters, updated in place.
-    estimate : Estimate
-        Estimate with the evidence of the last measurements. Its state changes if a thruster has failed.
-    thrusters : Thrusters
-        Thrusters; `health` and `stuck` change if one is isolated. The caller then calls `model.reallocate`.
-    gains : DeployableGains
-        Gain `failure_threshold`.
-
-    Returns
-    -------
-    int
-        Index of the failed thruster, from 0; -1 for none.
-    """
+    """Test the last measurements, isolate a thruster that has failed, and return it, or -1."""
     if gains.failure_threshold <= 0.0:
         return -1
     m, ratio, x = thrusters.health.size, fault_state.ratio, estimate.state
@@ -132,24 +114,7 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
 def try_again(
     fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, reported: Array, quiet: bool, period: float
 ) -> int:
-    """Try one of several isolated thrusters again after a while, and return it, or -1.
-
-    Parameters
-    ----------
-    fault_state, estimate, thrusters : FaultState, Estimate, Thrusters
-        Hypotheses, estimate and thrusters, updated in place.
-    reported : ndarray, shape (m,)
-        Reported health of the thrusters: 0 failed, 1 working. A thruster that is reported as failed is not tried.
-    quiet : bool
-        True if no barrier was active in the last step.
-    period : float
-        Control period [s].
-
-    Returns
-    -------
-    int
-        Index of the thruster, from 0, or -1; the caller calls `model.reallocate`.
-    """
+    """Try one of several isolated thrusters again after a while, and return it, or -1; reported (m,), period [s]."""
     fault_state.waited[0] += period
     isolated, least = 0, -1
     for j in range(thrusters.health.size):

@@ -77,18 +77,7 @@ _MAY_BE_ZERO = {
 
 
 def check_gains(gains: DeployableGains) -> DeployableGains:
-    """Validate the gains, and return them.
-
-    Returns
-    -------
-    DeployableGains
-        The same gains.
-
-    Raises
-    ------
-    LawError
-        If one is negative or not finite, one that divides is zero, or a share is above 1.
-    """
+    """Validate the gains, and return them."""
     validate_gains(gains, above_zero=set(gains._fields) - _MAY_BE_ZERO)
     if gains.braking_share > 1.0:
         raise LawError(f"law.gains.braking_share is {gains.braking_share}, expected at most 1")

@@ -1,7 +1,6 @@
-"""Validation of the law's inputs: measurements, weights, thruster health.
+"""Validation of the law's inputs: measurements, weights, thruster health."""
 
-All outputs are finite, whatever the inputs are.
-"""
+# All outputs are finite, whatever the inputs are.
 
 from __future__ import annotations
 
@@ -31,11 +30,9 @@ _RESTING, _PUSHED = 0.02, 0.05
 
 
 def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], share: float) -> None:
-    """Write the arbiter's weights, shape (2, n), those of hard regions low-pass filtered in two stages by a share.
-
-    The first stage follows the arbiter, the second one the first. The first weights are not filtered. The arbiter's
-    weights are clipped to [0, 1]; NaN becomes 1, the cautious value.
-    """
+    """Write the arbiter's weights, shape (2, n), those of hard regions low-pass filtered in two stages by a share."""
+    # The first stage follows the arbiter, the second one the first. The first weights are not filtered. The arbiter's
+    # weights are clipped to [0, 1]; NaN becomes 1, the cautious value.
     for i in range(weights.size):
         weight = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
         if not hard[i] or np.isnan(smoothed[0, i]):
@@ -45,10 +42,8 @@ def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], sha
 
 
 def reports_change(reported: Array, before: Array, health: Array) -> bool:
-    """Return True if the reported health differs from the last report, or from the assumed health of a failed thruster.
-
-    A health of 0 or below reports a failure; any other value, NaN too, a working thruster.
-    """
+    """Return True if the reported health differs from the last report, or from that of an isolated thruster."""
+    # A health of 0 or below reports a failure; any other value, NaN too, a working thruster.
     changed = False
     for j in range(reported.size):
         working = 0.0 if reported[j] <= 0.0 else 1.0

@@ -1,7 +1,6 @@
-"""The deployable law: one step from measurement to thruster forces, in named stages.
+"""The deployable law: one step from measurement to thruster forces, in named stages."""
 
-estimate -> fault detection -> prediction -> path planner -> bounded attraction -> barriers -> quadratic program.
-"""
+# estimate -> fault detection -> prediction -> path planner -> bounded attraction -> barriers -> quadratic program.
 
 from __future__ import annotations
 
@@ -235,10 +234,8 @@ def _hold_weight(memory: DeployableMemory, R: Array, gains: DeployableGains, for
 
 
 def _limit_speed(estimate: Estimate, spread: float, gains: DeployableGains, desired: Array) -> None:
-    """Limit the desired velocity so that the vehicle can stop before `coast` ends or the position is too uncertain.
-
-    `spread` is the uncertainty of the position [m].
-    """
+    """Limit the desired velocity so that the vehicle can stop before `coast` ends or the position is too uncertain."""
+    # `spread` is the uncertainty of the position [m].
     gap = max(estimate.time_since_measurement[0], estimate.longest_gap[0])
     most = gains.speed
     if gap > _STALE:
@@ -272,12 +269,11 @@ def _soft_forces(
     dynamics: Dynamics,
     wrench: Array,
 ) -> None:
-    """Add the repulsive force of violated soft regions of position (22), -alpha_i g_i grad g_i / |grad g_i|.
-
-    Each is at most the force that the thrusters give in every direction. The path decides what is crossed: on the way,
-    which is as fast as `desired` [m/s, NED], a region pushes aside, but not back. Nor does it outside the goal region,
-    however slow the approach is: `entered` is 0 there, and 1 where the vehicle is as deep in it as the path's end.
-    """
+    """Add the repulsive force of violated soft regions of position (22), -alpha_i g_i grad g_i / |grad g_i|."""
+    # Each is at most the force that the thrusters give in every direction. The path decides what is crossed: on the
+    # way, which is as fast as `desired` [m/s, NED], a region pushes aside, but not back. Nor does it outside the goal
+    # region, however slow the approach is: `entered` is 0 there, and 1 where the vehicle is as deep in it as the path's
+    # end.
     speed, force = length3(desired[0], desired[1], desired[2]), zeros(3)
     most = dynamics.translational_mass[0] * model.smallest(dynamics.braking)
     for i in range(regions.kinds.size):
@@ -300,26 +296,7 @@ def _soft_forces(
 
 
 class DeployableLaw(CompiledLaw):
-    """Reach the goal region and keep every hard region, within the limits of the thrusters.
-
-    Parameters
-    ----------
-    vehicle : VehicleModel
-        Nominal parameters of the vehicle.
-    gains : DeployableGains
-        Gains of the law.
-    desired_quaternion : array_like, shape (4,)
-        Attitude to be kept, from body to world.
-    period : float
-        Control period [s].
-    n_regions : int
-        Number of secondary regions.
-
-    Raises
-    ------
-    LawError
-        If gains, attitude or period are invalid.
-    """
+    """Reach the goal region and keep every hard region, within the limits of the thrusters; period [s]."""
 
     output: ClassVar[Output] = "thrusters"
     function = staticmethod(step)

@@ -30,11 +30,10 @@ class Dynamics(NamedTuple):
 
 
 class Thrusters(NamedTuple):
-    """Thrusters and their allocation.
+    """Thrusters and their allocation."""
 
-    A failed thruster has a column of zeros and limits of zero; a stuck one keeps its column, and its limits are its
-    force.
-    """
+    # A failed thruster has a column of zeros and limits of zero; a stuck one keeps its column, and its limits are its
+    # force.
 
     nominal_matrix: Array  # (6, m) thruster matrix of the vehicle
     matrix: Array  # (6, m) thruster matrix with the columns of failed thrusters zero, unless they are stuck
@@ -55,20 +54,7 @@ class Thrusters(NamedTuple):
 
 
 def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
-    """Return the constants of a vehicle.
-
-    Parameters
-    ----------
-    vehicle : VehicleModel
-        Nominal parameters.
-    braking : ndarray, shape (m + 1,)
-        Greatest force [N] in the worst direction with each thruster lost, and with none.
-
-    Returns
-    -------
-    Dynamics
-        Copies of the vehicle's arrays.
-    """
+    """Return the constants of a vehicle; braking (m + 1,) [N]."""
     mass = vehicle.rigid_mass + vehicle.added_mass
     mean = float(np.trace(mass[:3, :3])) / 3.0
     inverse = 0.5 * (mass + mass.T)
@@ -85,18 +71,7 @@ def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
 
 
 def make_thrusters(vehicle: VehicleModel) -> Thrusters:
-    """Return the thrusters, all working.
-
-    Parameters
-    ----------
-    vehicle : VehicleModel
-        Nominal parameters.
-
-    Returns
-    -------
-    Thrusters
-        Copies of the vehicle's arrays.
-    """
+    """Return the thrusters, all working."""
     B = vehicle.thruster_matrix
     m = B.shape[1]
     arm = np.sqrt(np.sum(B[3:] ** 2) / np.sum(B[:3] ** 2))  # m, typical lever arm of a thruster
@@ -164,26 +139,10 @@ class Loads(NamedTuple):
 
 
 def free_wrench(dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, loads: Loads, out: Array) -> None:
-    """Write the wrench on the body without thrust, shape (6,) [N, N m]: all of (11) but thrust and M nu_r'.
-
-    It has drag against the water, weight and buoyancy, and the rate of the momentum M nu_r in the rotating body axes,
-    which in oblique motion includes Munk's moment.
-
-    Parameters
-    ----------
-    dynamics : Dynamics
-        Constants of the vehicle.
-    R : ndarray, shape (3, 3)
-        Rotation from body to world.
-    velocity : ndarray, shape (3,)
-        Velocity over ground [m/s], world frame.
-    omega_body : ndarray, shape (3,)
-        Angular velocity [rad/s], body axes.
-    loads : Loads
-        Current, net weight and restoring moments.
-    out : ndarray, shape (6,)
-        Receives the wrench, body axes.
-    """
+    """Write the wrench on the body without thrust, shape (6,) [N, N m]: all of (11) but thrust and M nu_r'."""
+    # with velocity [m/s], omega_body [rad/s]
+    # It has drag against the water, weight and buoyancy, and the rate of the momentum M nu_r in the rotating body axes,
+    # which in oblique motion includes Munk's moment.
     relative, momentum = zeros(6), zeros(6)
     _relative_velocity(R, velocity, loads, relative)
     for i in range(3):
@@ -202,25 +161,8 @@ def free_wrench(dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array
 def to_acceleration(
     dynamics: Dynamics, R: Array, velocity: Array, omega_body: Array, loads: Loads, wrench: Array, out: Array
 ) -> None:
-    """Write the acceleration by a wrench, shape (6,) [N, N m], of a moving vehicle.
-
-    Parameters
-    ----------
-    dynamics : Dynamics
-        Constants of the vehicle.
-    R : ndarray, shape (3, 3)
-        Rotation from body to world.
-    velocity : ndarray, shape (3,)
-        Velocity over ground [m/s], world frame.
-    omega_body : ndarray, shape (3,)
-        Angular velocity [rad/s], body axes.
-    loads : Loads
-        Current, net weight and restoring moments.
-    wrench : ndarray, shape (6,)
-        Total wrench, including that of `free_wrench`, body axes [N, N m].
-    out : ndarray, shape (6,)
-        Receives the linear acceleration over ground, NED [m/s2], and the angular one in body axes [rad/s2].
-    """
+    """Write the acceleration by a wrench, shape (6,) [N, N m], of a moving vehicle; velocity [m/s]."""
+    # with omega_body [rad/s], out [m/s2]
     body, relative = zeros(6), zeros(3)
     _relative_velocity(R, velocity, loads, relative)
     product(dynamics.inverse_mass, wrench, body)
@@ -254,10 +196,8 @@ def free_acceleration(
 def write_thruster_acceleration(
     dynamics: Dynamics, thrusters: Thrusters, R: Array, R_ahead: Array, out: Array, ahead: Array
 ) -> None:
-    """Write the acceleration by one newton of each thruster, shape (6, m), at the attitudes `R` and `R_ahead`.
-
-    Linear in NED [m/s2], angular in body axes [rad/s2].
-    """
+    """Write the acceleration by one newton of each thruster, shape (6, m), at the attitudes `R` and `R_ahead`."""
+    # Linear in NED [m/s2], angular in body axes [rad/s2].
     body = zeros(6)
     for j in range(thrusters.health.size):
         for i in range(6):
@@ -272,10 +212,8 @@ def write_thruster_acceleration(
 
 
 def write_given_limits(thrusters: Thrusters, limits: Array) -> None:
-    """Write the true force [N] of each thruster at its lower and upper limit, shape (2, m).
-
-    Both limits of a stuck thruster are its estimated force.
-    """
+    """Write the true force [N] of each thruster at its lower and upper limit, shape (2, m)."""
+    # Both limits of a stuck thruster are its estimated force.
     for j in range(thrusters.health.size):
         if not np.isnan(thrusters.stuck[j]):
             thrusters.lower[j] = thrusters.upper[j] = thrusters.stuck[j] * thrusters.effectiveness[j]
@@ -289,10 +227,8 @@ def write_given_limits(thrusters: Thrusters, limits: Array) -> None:
 
 
 def command_forces(thrusters: Thrusters, forces: Array) -> None:
-    """Convert desired forces of the thrusters [N] to commands [N], divided by their effectiveness.
-
-    A stuck thruster gets zero: if it works after all, it does not produce the force at which it is assumed stuck.
-    """
+    """Convert desired forces of the thrusters [N] to commands [N], divided by their effectiveness."""
+    # A stuck thruster gets zero: if it works after all, it does not produce the force at which it is assumed stuck.
     for j in range(forces.size):
         if not np.isnan(thrusters.stuck[j]):
             forces[j] = 0.0
@@ -312,10 +248,8 @@ def smallest(values: Array) -> float:
 
 
 def available_braking(dynamics: Dynamics, thrusters: Thrusters) -> float:
-    """Return the deceleration [m/s2] in the worst direction with the failed thruster lost, or else any one.
-
-    Each further failure halves it, which is a rule of thumb.
-    """
+    """Return the deceleration [m/s2] in the worst direction with the failed thruster lost, or else any one."""
+    # Each further failure halves it, which is a rule of thumb.
     worst, lost, ceiling = smallest(dynamics.braking), 0, 1.0
     for j in range(thrusters.health.size):
         if thrusters.health[j] == 0.0:

@@ -1,13 +1,12 @@
-"""Observer: one Kalman filter of the motion and of all unknown parameters that affect it.
+"""Observer: one Kalman filter of the motion and of all unknown parameters that affect it."""
 
-The states: position (3), velocity over ground (3), current (2), W - B, the restoring moments phi_2..phi_4 of (12),
-height of the center of gravity below the origin, lag of the thrusters, effectiveness and ceiling (`thrust_limit`) of
-each. The prediction is the model (11) with its coupled mass matrix, under the commanded forces within their estimated
-limits behind the lag, so that a saturated thruster causes no wind-up. The states are corrected by the moment from
-measured rates, and by measured position and velocity. A joint filter attributes each effect to the right state;
-`fault_detection` tests its hypotheses by the innovations of the same filter. Projection keeps all but position,
-velocity and height in bounds.
-"""
+# The states: position (3), velocity over ground (3), current (2), W - B, the restoring moments phi_2..phi_4 of (12),
+# height of the center of gravity below the origin, lag of the thrusters, effectiveness and ceiling (`thrust_limit`) of
+# each. The prediction is the model (11) with its coupled mass matrix, under the commanded forces within their estimated
+# limits behind the lag, so that a saturated thruster causes no wind-up. The states are corrected by the moment from
+# measured rates, and by measured position and velocity. A joint filter attributes each effect to the right state;
+# `fault_detection` tests its hypotheses by the innovations of the same filter. Projection keeps all but position,
+# velocity and height in bounds.
 
 from __future__ import annotations
 
@@ -63,10 +62,8 @@ def predict(
     gains: DeployableGains,
     period: float,
 ) -> None:
-    """Predict the estimate over a period [s] under the forces that acted in it.
-
-    `thruster_acceleration`, shape (6, m), is the acceleration by one newton of each thruster.
-    """
+    """Predict the estimate over a period [s] under the forces that acted in it."""
+    # `thruster_acceleration`, shape (6, m), is the acceleration by one newton of each thruster.
     x, P, F = estimate.state, estimate.covariance, estimate.transition
     mass, T, m = dynamics.translational_mass[0], period, thrusters.acting.size
     free, curvature = zeros(6), zeros(3)
@@ -189,11 +186,9 @@ def correct_by_moment(
     gains: DeployableGains,
     period: float,
 ) -> None:
-    """Correct by the moment [N m] of thrusters and weight, measured by the rates over a period [s], shape (3,).
-
-    `by_current`, shape (3, 2), is the derivative of the modelled moment by the current [N s]; `rate_deviation`, shape
-    (3,), the standard deviation [rad/s] of the rates.
-    """
+    """Correct by the moment [N m] of thrusters and weight, measured by the rates over a period [s], shape (3,)."""
+    # `by_current`, shape (3, 2), is the derivative of the modelled moment by the current [N s]; `rate_deviation`, shape
+    # (3,), the standard deviation [rad/s] of the rates.
     row, x = estimate.row, estimate.state
     k, middle, body = zeros(3), zeros(3), zeros(3)
     k[0], k[1], k[2] = down_parts(quaternion)
@@ -233,26 +228,7 @@ def correct_by_moment(
 
 
 def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:
-    """Correct by a measured position or velocity; components that are NaN are skipped.
-
-    Parameters
-    ----------
-    estimate : Estimate
-        Estimate, corrected in place.
-    first : int
-        Index of the first corrected state: `POSITION` or `VELOCITY`.
-    measured : ndarray, shape (3,)
-        Measurement [m] or [m/s], NED; NaN if not measured.
-    noise : float
-        Standard deviation of one measurement, in the same unit.
-    gains : DeployableGains
-        Gains with the bounds.
-
-    Returns
-    -------
-    bool
-        True if the estimate was corrected; False if all components are NaN, or one is outside the gate.
-    """
+    """Correct by a measured position or velocity; components that are NaN are skipped; measured (3,) [m]."""
     P, x, known = estimate.covariance, estimate.state, False
     for axis in range(3):
         if np.isnan(measured[axis]):
@@ -276,10 +252,8 @@ def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains
 def _correct(
     estimate: Estimate, innovation: float, noise: float, weight: float, channel: int, begin: int, end: int
 ) -> None:
-    """Correct by one number; add weighted evidence of each hypothesis, and propagate its deviation.
-
-    Before the call, set the `row` of the number; it must be 0 outside `begin` to `end` (exclusive).
-    """
+    """Correct by one number; add weighted evidence of each hypothesis, and propagate its deviation."""
+    # Before the call, set the `row` of the number; it must be 0 outside `begin` to `end` (exclusive).
     P, row, gain = estimate.covariance, estimate.row, estimate.gain
     n, variance = row.size, noise
     gain[:] = 0.0

@@ -1,10 +1,9 @@
-"""Forces of thrusters up to their true limits, which the observer estimates.
+"""Forces of thrusters up to their true limits, which the observer estimates."""
 
-The true limit of a thruster is an estimated fraction of the vehicle's, its ceiling, as of a battery that sags. The
-ceiling is uncertain, and taken as uniformly distributed: below that range a command gives its force, above it the
-ceiling, in between the mean over the range. So a command above what a thruster has shown to give says little about its
-effectiveness, and a ceiling that is no longer known is tried again.
-"""
+# The true limit of a thruster is an estimated fraction of the vehicle's, its ceiling, as of a battery that sags. The
+# ceiling is uncertain, and taken as uniformly distributed: below that range a command gives its force, above it the
+# ceiling, in between the mean over the range. So a command above what a thruster has shown to give says little about
+# its effectiveness, and a ceiling that is no longer known is tried again.
 
 from __future__ import annotations
 
@@ -22,10 +21,8 @@ def _range(limit: float, ceiling: float, spread: float) -> tuple[float, float]:
 
 
 def limited_force(command: float, limit: float, ceiling: float, spread: float) -> tuple[float, float]:
-    """Return the mean force [N] of a command [N], and its derivative by the ceiling.
-
-    `limit` is the vehicle's in that direction, of either sign [N]; `spread` the standard deviation of the ceiling.
-    """
+    """Return the mean force [N] of a command [N], and its derivative by the ceiling."""
+    # `limit` is the vehicle's in that direction, of either sign [N]; `spread` the standard deviation of the ceiling.
     least, most = _range(limit, ceiling, spread)
     excess, sign = abs(command) - least, 1.0 if command > 0.0 else -1.0
     if excess <= 0.0:

@@ -79,12 +79,10 @@ def ellipsoid(p: Array, q: Array) -> Evaluation:
 
 
 def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float) -> float:
-    """Return the distance from a point of the first octant to the surface.
-
-    The nearest point is x_i a_i^2 / (t + a_i^2), with t the root of sum (a_i x_i / (t + a_i^2))^2 = 1 above -min a_i^2
-    (Eberly). With s = t + min a_i^2 as unknown, nothing cancels near the centre. The sum falls and is convex: Newton's
-    method from a point left of the root only grows towards it.
-    """
+    """Return the distance from a point of the first octant to the surface."""
+    # The nearest point is x_i a_i^2 / (t + a_i^2), with t the root of sum (a_i x_i / (t + a_i^2))^2 = 1 above -min
+    # a_i^2 (Eberly). With s = t + min a_i^2 as unknown, nothing cancels near the centre. The sum falls and is convex:
+    # Newton's method from a point left of the root only grows towards it.
     least = square(min(a, b, c))
     da, db, dc = a * a - least, b * b - least, c * c - least
     # a point in a plane of symmetry is moved out of it by less than rounding

@@ -89,24 +89,7 @@ def surface(shape: Pipe, limits: Bounds) -> Mesh:
 
 
 def _rings(shape: Pipe, around: int) -> tuple[Array, list[Array], Array]:
-    """Return the surface of a pipe as rings with two end points.
-
-    Parameters
-    ----------
-    shape : Pipe
-        Pipe of the surface.
-    around : int
-        Points of a ring.
-
-    Returns
-    -------
-    ndarray, shape (3,)
-        End point before the first ring [m, NED].
-    list of ndarray, shape (around, 3)
-        Rings, right-handed about the pipe's direction; points of one index are in a line along the pipe.
-    ndarray, shape (3,)
-        End point behind the last ring.
-    """
+    """Return the surface of a pipe as rings with two end points; returns (3,) [m, NED]."""
     points = np.array(shape.points)
     ways = np.diff(points, axis=0)
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)

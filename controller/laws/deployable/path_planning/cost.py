@@ -1,9 +1,8 @@
-"""Cost of a path: its length, and penalties for passing close to hard regions, or through soft ones.
+"""Cost of a path: its length, and penalties for passing close to hard regions, or through soft ones."""
 
-Regions are evaluated along the path, each at its predicted position. A clearance changes by at most the distance
-travelled: so strides are long where clearances are large, and a far region is not evaluated before it could be near. An
-evaluation may take several periods, each with a bounded number of strides.
-"""
+# Regions are evaluated along the path, each at its predicted position. A clearance changes by at most the distance
+# travelled: so strides are long where clearances are large, and a far region is not evaluated before it could be near.
+# An evaluation may take several periods, each with a bounded number of strides.
 
 from __future__ import annotations
 
@@ -70,28 +69,8 @@ def begin_cost(cost: PathCost, start: Array, drift: Array) -> None:
 
 
 def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, limits: PathLimits, most: float) -> bool:
-    """Continue the evaluation of a path; return True once it is complete, or the cost exceeds `most`.
-
-    Parameters
-    ----------
-    cost : PathCost
-        State started by `begin_cost`; updated.
-    path : ndarray, shape (k, 3)
-        Points of the path [m, NED].
-    count : int
-        Number of points in use.
-    regions : PackedRegions
-        The n regions.
-    limits : PathLimits
-        Clearance, margin and speed.
-    most : float
-        Cost [m] above which the evaluation stops.
-
-    Returns
-    -------
-    bool
-        True if the evaluation is complete or stopped, False while strides are left.
-    """
+    """Continue the evaluation of a path; return True once it is complete, or the cost exceeds `most`; path [m, NED]."""
+    # with most [m]
     place = zeros(3)
     for _ in range(_SAMPLES[0]):
         leg, s = cost.counts[0], cost.travelled[1]
@@ -161,10 +140,8 @@ def _evaluate_place(
 
 
 def _depth_cost(depth: float, away: float) -> float:
-    """Return the factor of a soft region's crossing cost at a depth [m] in it, negative outside.
-
-    The part `_ENTERED` starts at a distance `away` [m] outside, and is full `_SHALLOW` deeper.
-    """
+    """Return the factor of a soft region's crossing cost at a depth [m] in it, negative outside."""
+    # The part `_ENTERED` starts at a distance `away` [m] outside, and is full `_SHALLOW` deeper.
     return _ENTERED * min((depth + away) / _SHALLOW, 1.0) + max(depth, 0.0) if depth > -away else 0.0
 
 
@@ -181,11 +158,9 @@ def _near_cost(free: float, limits: PathLimits) -> float:
 
 
 def _stay_cost(end: Array, drift: Array, regions: PackedRegions, limits: PathLimits) -> float:
-    """Return the cost per metre of a stay at the end of a path [m, NED].
-
-    An end that drifts [m/s, NED] with the goal is also evaluated at later positions, and against hard regions, which
-    it may meet there. The cost is the mean over these times.
-    """
+    """Return the cost per metre of a stay at the end of a path [m, NED]."""
+    # An end that drifts [m/s, NED] with the goal is also evaluated at later positions, and against hard regions, which
+    # it may meet there. The cost is the mean over these times.
     drifts = drift[0] != 0.0 or drift[1] != 0.0 or drift[2] != 0.0
     samples, later, total, place, room = _STAY_SAMPLES if drifts else 1, 0.0, 0.0, zeros(3), zeros(3)
     for _ in range(samples):

@@ -1,11 +1,10 @@
-"""Path planner: a polyline from the vehicle into the goal region that keeps clear of the hard regions.
+"""Path planner: a polyline from the vehicle into the goal region that keeps clear of the hard regions."""
 
-A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and tries random
-changes: a corner moved, added or dropped, or another end in the goal region. While the path is blocked, or soft regions
-make it costly, paths found by `search.py` are candidates, too. The path of lower cost by `cost.py` stays. Each period
-does a bounded part of the work. The law has its own random numbers, so that a run repeats bit for bit. The path only
-sets the direction: the barriers keep the vehicle out of hard regions for any path.
-"""
+# A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and tries random
+# changes: a corner moved, added or dropped, or another end in the goal region. While the path is blocked, or soft
+# regions make it costly, paths found by `search.py` are candidates, too. The path of lower cost by `cost.py` stays.
+# Each period does a bounded part of the work. The law has its own random numbers, so that a run repeats bit for bit.
+# The path only sets the direction: the barriers keep the vehicle out of hard regions for any path.
 
 from __future__ import annotations
 
@@ -105,11 +104,9 @@ def _bell_shaped(random: NDArray[np.uint64]) -> float:
 
 
 def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
-    """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep.
-
-    Ascends the gradient of the clearance, and halves the step wherever that gains little. In a shallower region it ends
-    near the center.
-    """
+    """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep."""
+    # Ascends the gradient of the clearance, and halves the step wherever that gains little. In a shallower region it
+    # ends near the center.
     copy(position, end)
     value, gradient, turning, clearance = zeros(1), zeros(1, 3), zeros(1, 3), zeros(1)
     level = zeros(4)  # a goal is a region of position: the attitude has no effect
@@ -187,11 +184,9 @@ def go_straight(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathL
 def _choose_closed(
     plan: PathPlan, blocked: bool, start: Array, end: Array, regions: PackedRegions, margin: float
 ) -> None:
-    """Choose the regions that the trees keep out of; a change of the choice restarts the trees.
-
-    While hard regions block the path, only these are closed. Otherwise the costlier soft ones, or all, are closed too,
-    in turns that grow longer. A soft region near or around start or end of the path stays open.
-    """
+    """Choose the regions that the trees keep out of; a change of the choice restarts the trees."""
+    # While hard regions block the path, only these are closed. Otherwise the costlier soft ones, or all, are closed
+    # too, in turns that grow longer. A soft region near or around start or end of the path stays open.
     turn, room = plan.turn[0], zeros(3)
     if blocked:
         turn = _HARD
@@ -279,23 +274,8 @@ def search_path(
     period: float,
     periods: NDArray[np.int64],
 ) -> None:
-    """Improve a path for some periods, or until it is not blocked, while vehicle and regions rest.
-
-    Parameters
-    ----------
-    plan : PathPlan
-        State of the planner, updated in place.
-    start : ndarray, shape (3,)
-        Position of the vehicle [m, NED].
-    goal, regions : PackedRegions
-        Goal and secondary regions at their present positions.
-    limits : PathLimits
-        Clearance, margin, speed and depth of the path.
-    period : float
-        Control period [s].
-    periods : ndarray, shape (2,)
-        Greatest number of periods; the second element receives the number of periods that it took.
-    """
+    """Improve a path for some periods, or until it is not blocked, while vehicle and regions rest; start [m, NED]."""
+    # with period [s]
     periods[1] = 0
     while periods[1] < periods[0]:
         improve_path(plan, start, goal, regions, limits, period)

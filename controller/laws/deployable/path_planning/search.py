@@ -1,10 +1,9 @@
-"""Tree search out of pockets: two trees of free straight lines, one from the goal and one from the vehicle.
+"""Tree search out of pockets: two trees of free straight lines, one from the goal and one from the vehicle."""
 
-Changing one corner at a time finds no path that needs several changes at once. So while the path is blocked, two trees
-(RRT-Connect: Kuffner and LaValle, ICRA 2000) grow in turn, by at most one node per call. A new node connects to the
-farthest visible one of its ancestors, which saves corners. When it sees the nearest node of the other tree, the two
-chains are a path. The tree of the vehicle gets a new root as the vehicle moves.
-"""
+# Changing one corner at a time finds no path that needs several changes at once. So while the path is blocked, two
+# trees (RRT-Connect: Kuffner and LaValle, ICRA 2000) grow in turn, by at most one node per call. A new node connects to
+# the farthest visible one of its ancestors, which saves corners. When it sees the nearest node of the other tree, the
+# two chains are a path. The tree of the vehicle gets a new root as the vehicle moves.
 
 from __future__ import annotations
 
@@ -104,23 +103,8 @@ def clearance_of_all(point: Array, regions: PackedRegions, room: Array) -> float
 
 
 def free_length(start: Array, end: Array, regions: PackedRegions, margin: float) -> float:
-    """Return the length up to which a straight line keeps a clearance of all hard regions at their present positions.
-
-    Parameters
-    ----------
-    start, end : ndarray, shape (3,)
-        Ends of the line [m, NED].
-    regions : PackedRegions
-        Regions; only the hard ones apply.
-    margin : float
-        Clearance [m].
-
-    Returns
-    -------
-    float
-        Length [m]: the whole if the line is free; -1 if its start is not. It is at most the part that
-        `_LINE_SAMPLES` evaluations cover.
-    """
+    """Return the length to which a line keeps a clearance of all hard regions at their present positions."""
+    # with start, end [m, NED], margin [m], returns [m]
     point, room = zeros(3), zeros(3)
     length = length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
     s, free = 0.0, -1.0
@@ -159,23 +143,8 @@ def look_for_path(
     limits: PathLimits,
     path: Array,
 ) -> int:
-    """Grow one of the trees by at most one node; return the number of points of a path if one is found, else 0.
-
-    Parameters
-    ----------
-    search : Search
-        State of the search; its trees grow in turn.
-    start, end : ndarray, shape (3,)
-        Positions of the vehicle and of the end of the path [m, NED].
-    random_numbers : ndarray, shape (5,)
-        Random numbers in [0, 1).
-    regions : PackedRegions
-        Regions at their present positions.
-    limits : PathLimits
-        Clearance and margin.
-    path : ndarray, shape (k, 3)
-        Receives corners and end, if there are at most k.
-    """
+    """Grow one of the trees by at most one node; return the number of points of a path if one is found, else 0."""
+    # with start, end [m, NED]
     margin, of_goal, of_vehicle, target = line_margin(limits), search.of_goal, search.of_vehicle, zeros(3)
     if clearance_of_all(end, regions, target) < 0.0:  # no path leads there
         return 0
@@ -267,10 +236,8 @@ def nearest_node(tree: Tree, place: Array) -> int:
 
 
 def extend_tree(tree: Tree, target: Array, reach: float, regions: PackedRegions, margin: float) -> int:
-    """Add a node on the line from the nearest node to a target, and return its index; -1 if the line is blocked.
-
-    `reach` is the longest edge, and `margin` the clearance of edges, both in m.
-    """
+    """Add a node on the line from the nearest node to a target, and return its index; -1 if the line is blocked."""
+    # `reach` is the longest edge, and `margin` the clearance of edges, both in m.
     nodes, parents, new = tree.nodes, tree.parents, zeros(3)
     nearest = nearest_node(tree, target)
     before = nodes[nearest]
@@ -303,11 +270,9 @@ def extend_tree(tree: Tree, target: Array, reach: float, regions: PackedRegions,
 def _write_path(
     search: Search, of_goal: int, of_vehicle: int, start: Array, regions: PackedRegions, margin: float, path: Array
 ) -> int:
-    """Write the path through two nodes with a free line between them, without redundant corners.
-
-    A corner is redundant if the line from the one before it, or from the `start`, to the one after it is free. Return
-    the number of points, 0 if there are too many.
-    """
+    """Write the path through two nodes with a free line between them, without redundant corners."""
+    # A corner is redundant if the line from the one before it, or from the `start`, to the one after it is free. Return
+    # the number of points, 0 if there are too many.
     chain, tree = search.chain, search.of_vehicle
     count, node = 0, of_vehicle
     while node != tree.root[0]:
