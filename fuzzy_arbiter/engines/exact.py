@@ -13,7 +13,7 @@ from fuzzy_arbiter.engines.bands import centroids
 from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.firing import Array, slots_of
 from fuzzy_arbiter.engines.plain import curved
-from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature
+from fuzzy_arbiter.engines.quadrature import Quadrature
 from fuzzy_arbiter.engines.sweep import LARGER, TINY, Outline, centroid, outline
 from fuzzy_arbiter.engines.weighted import Weighted
 
@@ -51,11 +51,7 @@ class ExactEngine(Engine):
             else:
                 way = Quadrature(output, slots)
                 self._ways.append(way)
-                self.methods[output.name] = (
-                    "integrals of polynomials, to rounding"
-                    if way.exact
-                    else f"adaptive quadrature, within {BOUND:g} of the universe's width"
-                )
+                self.methods[output.name] = way.method
         super().__init__(system)
 
     def quadrature(self, name: str) -> bool:
@@ -77,7 +73,7 @@ class ExactEngine(Engine):
         """Return the values of an output for many samples, with the error bound in `methods`."""
         way = self._ways[k]
         if isinstance(way, Quadrature):
-            return np.array([way.value(column) for column in cuts.T.tolist()])
+            return way.values(cuts)
         assert not isinstance(way, Weighted)
         cuts = np.where(cuts.max(axis=0) < TINY, cuts * LARGER, cuts)
         result = np.empty(cuts.shape[1])
