@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import ClassVar
 
 import numpy as np
@@ -16,6 +17,7 @@ from fuzzy_arbiter.engines.plain import curved
 from fuzzy_arbiter.engines.quadrature import Quadrature
 from fuzzy_arbiter.engines.sweep import LARGER, TINY, Outline, centroid, outline
 from fuzzy_arbiter.engines.weighted import Weighted
+from fuzzy_arbiter.errors import EngineError
 
 EXACTLY = "exact integrals, to rounding"
 _BLOCK = 8192  # number of samples evaluated at a time
@@ -45,13 +47,15 @@ class ExactEngine(Engine):
             if output.weighted:
                 self._ways.append(Weighted(output, inputs, variable_names(system.outputs[:k])))
                 self.methods[output.name] = "weighted values, to rounding"
-            elif straight and (output.defuzzifier, output.aggregation) == ("centroid", "max"):
-                self._ways.append(outline(output))
-                self.methods[output.name] = EXACTLY
-            else:
-                way = Quadrature(output, slots)
-                self._ways.append(way)
-                self.methods[output.name] = way.method
+                continue
+            if straight and (output.defuzzifier, output.aggregation) == ("centroid", "max"):
+                with suppress(EngineError):  # more lines than a sweep should have
+                    self._ways.append(outline(output))
+                    self.methods[output.name] = EXACTLY
+                    continue
+            way = Quadrature(output, slots)
+            self._ways.append(way)
+            self.methods[output.name] = way.method
         super().__init__(system)
 
     def quadrature(self, name: str) -> bool:
@@ -95,10 +99,13 @@ class ExactEngine(Engine):
 
 def _centroids(cuts: Array, shape: Outline) -> Array:
     """Return the centroids of scaled terms for many samples: `sweep.scaled` for each column of `cuts`, shape (n,)."""
-    terms, n = cuts.shape
+    every, n = cuts, cuts.shape[1]
     area, moment = np.zeros(n), np.zeros(n)
-    left, right = (np.reshape(side, (-1, terms, 1)) for side in (shape.left, shape.right))
-    for piece, (a, b) in enumerate(zip(left, right, strict=True)):
+    for piece in range(len(shape.places) - 1):
+        lines = slice(shape.first[piece], shape.first[piece + 1])
+        a, b = (np.reshape(side[lines], (-1, 1)) for side in (shape.left, shape.right))
+        cuts = every[list(shape.term[lines])]
+        terms = len(cuts)
         start, width = shape.places[piece] - shape.places[0], shape.places[piece + 1] - shape.places[piece]
         start_at, end_at = a * cuts, b * cuts
         # each against those before it

@@ -140,8 +140,8 @@ def _options(v: Variable) -> Iterator[tuple[str, Any]]:
     """Yield the options of an output that differ from their defaults."""
     if isinstance(v, Output):
         for key in ("default", "defuzzifier", "aggregation", "lock_range", "lock_previous"):
-            plain = next(field.default for field in fields(Output) if field.name == key) or v.usual_aggregation
-            if getattr(v, key) != plain:
+            plain = next(field.default for field in fields(Output) if field.name == key)
+            if getattr(v, key) != (v.usual_aggregation if key == "aggregation" else plain):
                 yield key, getattr(v, key)
 
 
