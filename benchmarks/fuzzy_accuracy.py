@@ -144,9 +144,7 @@ class Reference:
                 break
             done.append(np.array([starts, ends, left + right, first + second])[:, ~rough])
             starts, ends = (np.concatenate(x) for x in ((starts[rough], middles[rough]), (middles[rough], ends[rough])))
-            areas, moments = (
-                np.concatenate([x[rough], y[rough]]) for x, y in ((left, right), (first, second))
-            )
+            areas, moments = (np.concatenate([x[rough], y[rough]]) for x, y in ((left, right), (first, second)))
         done.append(np.array([starts, ends, areas, moments]))
         columns = np.concatenate(done, axis=1)
         self.starts, self.ends, self.areas, self.moments = columns[:, np.argsort(columns[0])]

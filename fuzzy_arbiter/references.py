@@ -54,7 +54,7 @@ def _require_rule(rule: Rule, inputs: _Terms, outputs: _Terms, before: set[str])
     for statement in rule.conclusions:
         _require_known(statement, outputs, "output")
     if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):
-        raise DefinitionError(f"two conclusions on one output, expected each output once")
+        raise DefinitionError("two conclusions on one output, expected each output once")
 
 
 def require_values(system: System) -> None:
@@ -90,6 +90,4 @@ def _require_known(statement: Is, known: _Terms, kind: str) -> None:
         raise DefinitionError(f"no {kind} {statement.variable!r}, expected one of {', '.join(known)}")
     if statement.term not in known[statement.variable]:
         expected = ", ".join(sorted(known[statement.variable]))
-        raise DefinitionError(
-            f"{statement.variable!r} has no term {statement.term!r}, expected one of {expected}"
-        )
+        raise DefinitionError(f"{statement.variable!r} has no term {statement.term!r}, expected one of {expected}")

@@ -59,7 +59,7 @@ def bisectors(samples: Samples, panels: Panels, totals: Array) -> Array:
         row = inside[which]
         start = starts[chosen[row]]
         heights = samples.heights(points_of(start, x, NODES), row).height
-        return (heights * WEIGHTS).sum(axis=-1) * (x - start) / 2 - missing[row]
+        return np.asarray((heights * WEIGHTS).sum(axis=-1) * (x - start) / 2 - missing[row])
 
     at, found = roots(lacking, starts[chosen[inside]], ends[chosen[inside]], samples.of.precision)
     result[inside[found]] = at[found]
@@ -75,8 +75,9 @@ def of_maximum(samples: Samples, panels: Panels, kind: str) -> Array:
     found = [(np.repeat(np.arange(n), len(of.edges)), edges)]
     high = np.flatnonzero(~panels.flat & (panels.heights.max(axis=1) >= _LIKELY * greatest[panels.rows]))
     if len(high):
-        some = type(panels)(*(column[high] for column in panels))
-        highest = points_of(some.starts, some.ends)[np.arange(len(high)), some.heights.argmax(axis=1)]
+        some = panels.chosen(high)
+        best = some.heights[:, INNER].argmax(axis=1)
+        highest = points_of(some.starts, some.ends, NODES)[np.arange(len(high)), best]
         found += [(some.rows, x) for x in (some.starts, some.ends, highest)]
         found.append(_turning(samples, some))
     rows, places = (np.concatenate(column) for column in zip(*found, strict=True))

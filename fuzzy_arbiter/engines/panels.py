@@ -117,7 +117,9 @@ def lowest_between(values: Array) -> tuple[Mask, Array]:
     return near.any(axis=1), np.take_along_axis(turn, best[:, None], axis=1)[:, 0]
 
 
-def roots(function: Callable[[Array, Indices], Array], starts: Array, ends: Array, tolerance: float) -> tuple[Array, Mask]:
+def roots(
+    function: Callable[[Array, Indices], Array], starts: Array, ends: Array, tolerance: float
+) -> tuple[Array, Mask]:
     """Find a root of each of many functions between two places, by Chandrupatla's method.
 
     Parameters

@@ -58,6 +58,18 @@ class Panels(NamedTuple):
     areas: Array
     moments: Array  # about the universe's start
 
+    def chosen(self, which: Mask | Indices) -> Panels:
+        """Return some of the panels."""
+        return Panels(
+            self.rows[which],
+            self.starts[which],
+            self.ends[which],
+            self.heights[which],
+            self.flat[which],
+            self.areas[which],
+            self.moments[which],
+        )
+
 
 class Events(NamedTuple):
     """Places to be found, each between two points, where the joined terms bend."""
@@ -118,7 +130,9 @@ class Quadrature:
                 f"panels of a product of at most {_MAX_TABLE // len(POINTS)}"
             )
         middles = (self.edges[:-1] + self.edges[1:]) / 2
-        self._constant = [_constant(shape, middles, shape.of_many(places.ravel()).reshape(places.shape)) for shape in self._shapes]
+        self._constant = [
+            _constant(shape, middles, shape.of_many(places.ravel()).reshape(places.shape)) for shape in self._shapes
+        ]
         self._drastic = output.aggregation == "drastic_sum" or any(s.implication == "drastic_product" for s in slots)
         self._table = [self._degrees(t, places.ravel()).reshape(places.shape) for t in range(len(self._shapes))]
         # slot and True for its cut, False for 1 less its cut: levels of its term's degree at which its height bends
@@ -179,9 +193,7 @@ class Quadrature:
 
     def joined(self, degrees: list[Array], cuts: Array) -> Joined:
         """Return heights of the slots and of their join, for degrees of the terms and cuts of the slots."""
-        implied = [
-            of(cut, degrees[t]) for of, cut, t in zip(self._implications, cuts, self._term, strict=True)
-        ]
+        implied = [of(cut, degrees[t]) for of, cut, t in zip(self._implications, cuts, self._term, strict=True)]
         height, before = np.zeros(degrees[0].shape), []
         for one in implied:
             before += [height] if self._sums else []
@@ -190,7 +202,9 @@ class Quadrature:
 
     def heights(self, places: Array, cuts: Array) -> Joined:
         """Return heights at places of any shape, for cuts that fit it."""
-        return self.joined([self._degrees(t, places.ravel()).reshape(places.shape) for t in range(len(self._shapes))], cuts)
+        return self.joined(
+            [self._degrees(t, places.ravel()).reshape(places.shape) for t in range(len(self._shapes))], cuts
+        )
 
     def _degrees(self, t: int, places: Array) -> Array:
         """Return degrees of a term; where operators jump at 0 and 1, those that only round to these are within them."""
@@ -225,7 +239,7 @@ class Quadrature:
             result[kinds == _PASSED] = (second - first)[kinds == _PASSED]
         return result
 
-    def flat(self, of: Joined, cuts: Array, panels: Indices, greatest: Array) -> Mask:
+    def flat(self, of: Joined, cuts: Array, panels: Indices, greatest: Indices) -> Mask:
         """Return True for panels of constant height; `greatest` is the slot of the greatest height in the middle."""
         if not self._max:
             return np.asarray(np.ptp(of.height, axis=1) <= 4e-16 * of.height.max(axis=1))
@@ -233,7 +247,7 @@ class Quadrature:
         for i, t in enumerate(self._term):
             constant = self._constant[t][panels]
             if i in self._clip:
-                constant = constant | (of.degrees[t][:, 4] >= self.level(self._clip[i], cuts)[:, 0])
+                constant = constant | (of.degrees[t][:, 4] > self.level(self._clip[i], cuts)[:, 0])
             result |= constant & (greatest == i)
         return result
 
@@ -267,13 +281,15 @@ class Samples:
         panels, kind, low = self.panels(), self.of.output.defuzzifier, self.of.low
         if kind in ("mom", "som", "lom"):
             return defuzzification.of_maximum(self, panels, kind)
-        areas = np.bincount(panels.rows, panels.areas, self.n)
+        areas = np.bincount(panels.rows, panels.areas, self.n).astype(np.float64)
         some = areas > 0.0
         if kind == "bisector":
             result = defuzzification.bisectors(self, panels, areas)
         else:
             moments = np.bincount(panels.rows, panels.moments, self.n)
-            result = np.clip(low + np.divide(moments, areas, out=np.zeros(self.n), where=some), *self.of.output.universe)
+            result = np.clip(
+                low + np.divide(moments, areas, out=np.zeros(self.n), where=some), *self.of.output.universe
+            )
         for row in np.flatnonzero(~some).tolist():
             result[row] = defuzzification.of_points(self.of, self.cuts[:, row])
         return result
@@ -309,8 +325,7 @@ class Samples:
             kept = np.ones(len(rows), dtype=bool)
             kept[items] = False
             flat = of.flat(joined, self.cuts[:, rows][..., None], own, greatest)
-            columns = (rows, starts, ends, joined.height, flat, areas, moments)
-            done.append(Panels(*(column[kept] for column in columns)))
+            done.append(Panels(rows, starts, ends, joined.height, flat, areas, moments).chosen(kept))
             total = total + np.bincount(rows[kept], areas[kept], self.n)
             if len(items) == 0:
                 break
@@ -323,7 +338,9 @@ class Samples:
             rows, own = rows[parents], own[parents]
         return Panels(*map(np.concatenate, zip(*done, strict=True)))
 
-    def _bends(self, joined: Joined, rows: Indices, starts: Array, ends: Array, places: Array) -> tuple[Indices, Array, Indices]:
+    def _bends(
+        self, joined: Joined, rows: Indices, starts: Array, ends: Array, places: Array
+    ) -> tuple[Indices, Array, Indices]:
         """Return panels and the places in them where the joined terms bend, and the greatest slot of each panel."""
         of, cuts = self.of, self.cuts[:, rows][..., None]
         wide = ends - starts > NARROWEST * 10 * of.width
@@ -338,7 +355,7 @@ class Samples:
             self._passes(joined, who, wide, found)
         for event, (i, clips) in enumerate(of._levels):
             margin = joined.degrees[of._term[i]] - of.level(event, cuts)
-            above = margin >= 0.0
+            above = margin > 0.0  # not where it rounds to its cut, as a curve at its top does
             change = (above[:, 1:] != above[:, :-1]) & (wide & (cuts[i, :, 0] > 0.0))[:, None]
             if of._max:
                 mine = who == i

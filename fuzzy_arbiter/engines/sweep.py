@@ -75,7 +75,8 @@ def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outli
         If the terms overlap in so many places that the outline has more than `MAX_LINES` lines.
     """
     knots = tuple(map(number, variable.knots))
-    places, first, term, left, right, order = [knots[0]], [0], [], [], [], []
+    places, first, left, right = [knots[0]], [0], list[Any](), list[Any]()
+    term, order = list[int](), list[int]()
     for a, b, lines in zip(knots, knots[1:], _lines(variable, knots, number), strict=False):
         terms, starts, ends = ([line[k] for line in lines] for k in range(3))
         # parts in which no two lines meet
@@ -84,7 +85,9 @@ def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outli
         for s0, s1 in zip(shares, shares[1:], strict=False):
             at, to = _between(starts, ends, s0), _between(starts, ends, s1)
             places.append(b if s1 == 1 else a + s1 * (b - a))
-            order += sorted(range(len(left), len(left) + len(at)), key=lambda i: -(at[i - first[-1]] + to[i - first[-1]]))
+            order += sorted(
+                range(len(left), len(left) + len(at)), key=lambda i: -(at[i - first[-1]] + to[i - first[-1]])
+            )
             term += terms
             left += at
             right += to
@@ -99,7 +102,7 @@ def _lines(variable: Variable, knots: Numbers, number: Callable[[float], Any]) -
     count = 0
     for t, each in enumerate(variable.terms):
         points = [(number(x), number(y)) for x, y in each.straight.points]
-        # between two points, so that at a jump each interval sees its own side; constant before the first, after the last
+        # between two points, so that at a jump each interval sees its own side; constant before and after them
         parts = [(points[0], points[0]), *zip(points, points[1:], strict=False), (points[-1], points[-1])]
         for i, ((x0, y0), (x1, y1)) in enumerate(parts):
             if y0 == 0 and y1 == 0:

@@ -55,7 +55,10 @@ def write(system: System) -> str:
         lines += [f"RuleBlock: rules{k + 1 if k else ''}", "  enabled: true"]
         lines += [f"  conjunction: {word_of('fll', 'conjunction', operators.conjunction, T_NORMS)}"]
         lines += [f"  disjunction: {word_of('fll', 'disjunction', operators.disjunction, S_NORMS)}"]
-        lines += [f"  implication: {word_of('fll', 'implication', operators.implication, T_NORMS)}", "  activation: General"]
+        lines += [
+            f"  implication: {word_of('fll', 'implication', operators.implication, T_NORMS)}",
+            "  activation: General",
+        ]
         lines += [f"  rule: {_rule(i, rule)}" for i, rule in rules]
     return "\n".join([*lines, ""])
 
