@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.polynomial import legendre
 
-from fuzzy_arbiter.engines.panels import ANALYSIS, INNER, NODES, WEIGHTS, Indices, points_of, roots
+from fuzzy_arbiter.engines.panels import ANALYSIS, INNER, NODES, WEIGHTS, Indices, Panels, points_of, roots
 from fuzzy_arbiter.shapes import Array
 from fuzzy_arbiter.terms.curves import Curve
 
 if TYPE_CHECKING:
-    from fuzzy_arbiter.engines.quadrature import Panels, Quadrature, Samples
+    from fuzzy_arbiter.engines.quadrature import Quadrature, Samples
 
 _EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
 _APART = 1e-9  # places count as one within this fraction of the universe
@@ -47,7 +47,7 @@ def bisectors(samples: Samples, panels: Panels, totals: Array) -> Array:
     every = np.arange(samples.n)
     chosen = first + index
     missing = half - (sums[every, index] - areas[chosen])
-    result = ends[chosen].copy()
+    result: Array = ends[chosen].copy()
     at_end = np.abs(missing - areas[chosen]) <= 1e-14 * half  # perhaps of a gap, whose end is the next start
     for row in np.flatnonzero(at_end).tolist():
         after = np.flatnonzero(table[row, index[row] + 1 : counts[row]] > 0.0)

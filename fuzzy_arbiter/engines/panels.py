@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from fuzzy_arbiter.shapes import Array, Membership
+from fuzzy_arbiter.terms.curves import Curve
 
 Mask = NDArray[np.bool_]
 Indices = NDArray[np.intp]
@@ -25,6 +27,30 @@ _STATIC = 1e-13  # tolerance of a panel of one term, as a fraction of the term's
 _ENDS = 1e-3  # tolerance of the series at a panel's ends, as a fraction of the term's height
 _MAX_PANELS = 4096
 _MAX_HALVINGS = 60
+
+
+class Panels(NamedTuple):
+    """Panels of many samples, in each of which the joined terms are smooth."""
+
+    rows: Indices  # sample of each panel
+    starts: Array
+    ends: Array
+    heights: Array  # at the points of each panel
+    flat: Mask  # True where the height is constant
+    areas: Array
+    moments: Array  # about the universe's start
+
+    def chosen(self, which: Mask | Indices) -> Panels:
+        """Return some of the panels."""
+        return Panels(
+            self.rows[which],
+            self.starts[which],
+            self.ends[which],
+            self.heights[which],
+            self.flat[which],
+            self.areas[which],
+            self.moments[which],
+        )
 
 
 def points_of(starts: Array, ends: Array, at: Array = POINTS) -> Array:
@@ -71,6 +97,14 @@ def smooth_panels(universe: tuple[float, float], shapes: Sequence[Membership]) -
         edges = np.concatenate([edges, middles])
         starts, ends = np.concatenate([starts[rough], middles]), np.concatenate([middles, ends[rough]])
     return np.unique(edges)
+
+
+def constant_panels(shape: Membership, middles: Array, degrees: Array) -> Mask:
+    """Return True for panels in which a term is constant; a curve that only rounds to 1 is not."""
+    if isinstance(shape, Curve):
+        pieces = [isinstance(tree, float) for tree in shape.trees]
+        return np.array(pieces)[np.searchsorted(shape.ends, middles)]
+    return np.asarray(np.ptp(degrees, axis=1) == 0.0)
 
 
 def dividing(items: Indices, places: Array, starts: Array, ends: Array) -> tuple[Indices, Array, Array]:

@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fuzzy_arbiter.definition import Output
+from fuzzy_arbiter.engines import defuzzification
 from fuzzy_arbiter.engines.firing import Slot
 from fuzzy_arbiter.engines.panels import (
     INNER,
@@ -22,6 +23,8 @@ from fuzzy_arbiter.engines.panels import (
     WEIGHTS,
     Indices,
     Mask,
+    Panels,
+    constant_panels,
     dividing,
     lowest_between,
     mean_errors,
@@ -31,7 +34,6 @@ from fuzzy_arbiter.engines.panels import (
 )
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.shapes import Array, Membership
-from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.terms.values import Formula
 
@@ -45,30 +47,6 @@ _TIED = 1e-12  # heights count as equal if their quotient differs from 1 by less
 _NOISE = 4e-16  # error of a height by rounding, as a fraction of it, or of 1 where it is a difference from 1
 _CLOSE = 0.2  # distance below the greatest height at which a slot may pass it between two points
 _LEVEL, _PAIR, _FULL, _PASSED = range(4)  # a slot meets a level, another slot; it and those before sum to 1, are equal
-
-
-class Panels(NamedTuple):
-    """Panels of many samples, in each of which the joined terms are smooth."""
-
-    rows: Indices  # sample of each panel
-    starts: Array
-    ends: Array
-    heights: Array  # at the points of each panel
-    flat: Mask  # True where the height is constant
-    areas: Array
-    moments: Array  # about the universe's start
-
-    def chosen(self, which: Mask | Indices) -> Panels:
-        """Return some of the panels."""
-        return Panels(
-            self.rows[which],
-            self.starts[which],
-            self.ends[which],
-            self.heights[which],
-            self.flat[which],
-            self.areas[which],
-            self.moments[which],
-        )
 
 
 class Events(NamedTuple):
@@ -131,7 +109,8 @@ class Quadrature:
             )
         middles = (self.edges[:-1] + self.edges[1:]) / 2
         self._constant = [
-            _constant(shape, middles, shape.of_many(places.ravel()).reshape(places.shape)) for shape in self._shapes
+            constant_panels(shape, middles, shape.of_many(places.ravel()).reshape(places.shape))
+            for shape in self._shapes
         ]
         self._drastic = output.aggregation == "drastic_sum" or any(s.implication == "drastic_product" for s in slots)
         self._table = [self._degrees(t, places.ravel()).reshape(places.shape) for t in range(len(self._shapes))]
@@ -252,14 +231,6 @@ class Quadrature:
         return result
 
 
-def _constant(shape: Membership, middles: Array, degrees: Array) -> Mask:
-    """Return True for panels in which a term is constant; a curve that only rounds to 1 is not."""
-    if isinstance(shape, Curve):
-        pieces = [isinstance(tree, float) for tree in shape.trees]
-        return np.array(pieces)[np.searchsorted(shape.ends, middles)]
-    return np.asarray(np.ptp(degrees, axis=1) == 0.0)
-
-
 class Samples:
     """The joined terms of some samples.
 
@@ -276,8 +247,6 @@ class Samples:
 
     def values(self) -> Array:
         """Return the value of each sample, shape (n,)."""
-        from fuzzy_arbiter.engines import defuzzification
-
         panels, kind, low = self.panels(), self.of.output.defuzzifier, self.of.low
         if kind in ("mom", "som", "lom"):
             return defuzzification.of_maximum(self, panels, kind)
