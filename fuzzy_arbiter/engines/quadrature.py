@@ -232,15 +232,7 @@ class Quadrature:
 
 
 class Samples:
-    """The joined terms of some samples.
-
-    Parameters
-    ----------
-    of : Quadrature
-        The output.
-    cuts : ndarray, shape (slots, n)
-        Strengths of the slots.
-    """
+    """The joined terms of n samples, for strengths of an output's slots of the shape (slots, n)."""
 
     def __init__(self, of: Quadrature, cuts: Array) -> None:
         self.of, self.cuts, self.n = of, cuts, cuts.shape[1]
