@@ -24,7 +24,8 @@ INNER = slice(1, -1)  # the nodes among the points
 ANALYSIS = (np.arange(ORDER)[:, None] + 0.5) * legendre.legvander(NODES, ORDER - 1).T * WEIGHTS
 NARROWEST = 1e-14  # least width of a panel that is divided, as a fraction of the universe's greatest number
 _STATIC = 1e-13  # tolerance of a panel of one term, as a fraction of the term's area
-_ENDS = 1e-3  # tolerance of the series at a panel's ends, as a fraction of the term's height
+_AT_ENDS = legendre.legvander(np.array([-1.0, 1.0]), ORDER - 1).T  # the series' polynomials at a panel's ends
+_REST = 8.0  # greatest rest of a smooth function's series at an end, as a multiple of its last terms
 _MAX_PANELS = 4096
 _MAX_HALVINGS = 60
 
@@ -59,16 +60,20 @@ def points_of(starts: Array, ends: Array, at: Array = POINTS) -> Array:
 
 
 def mean_errors(values: Array) -> Array:
-    """Estimate the error of each panel's mean from the decay of the Legendre series, for values at the nodes.
+    """Estimate the error of each panel's mean, for values at `POINTS`, by the Legendre series through the nodes.
 
     A series whose terms fall by r from the degrees 4 and 5 to 6 and 7 falls by r^5 until degree 16, the first that the
-    nodes do not integrate.
+    nodes do not integrate. A series that does not reach the values at the ends hides a steep part between an end and
+    the node beside it.
     """
-    series = np.abs(np.einsum("pj,kj->pk", values, ANALYSIS[4:]))
-    before, last = series[:, 0] + series[:, 1], series[:, 2] + series[:, 3]
+    series = np.einsum("pj,kj->pk", np.ascontiguousarray(values[:, INNER]), ANALYSIS)
+    sizes = np.abs(series[:, 4:])
+    before, last = sizes[:, 0] + sizes[:, 1], sizes[:, 2] + sizes[:, 3]
     with np.errstate(divide="ignore", invalid="ignore"):
         decay = np.where(last < before, last / before, 1.0)
-    return np.asarray(last * decay**5)
+    off = np.abs(series @ _AT_ENDS - values[:, [0, -1]]).max(axis=1)
+    hidden = np.where(off > _REST * last, off * (1.0 - NODES[-1]) / 2, 0.0)
+    return np.asarray(np.maximum(last * decay**5, hidden))
 
 
 def smooth_panels(universe: tuple[float, float], shapes: Sequence[Membership]) -> Array:
@@ -76,20 +81,16 @@ def smooth_panels(universe: tuple[float, float], shapes: Sequence[Membership]) -
     low, high = universe
     edges = np.unique([low, *(x for shape in shapes for x in shape.features(universe)), high])
     narrowest = NARROWEST * max(abs(low), abs(high), high - low)
-    ends_of_series = legendre.legvander(np.array([-1.0, 1.0]), ORDER - 1)
     starts, ends = edges[:-1], edges[1:]
-    heights, areas = np.zeros((2, len(shapes)))
+    areas = np.zeros(len(shapes))
     for _ in range(_MAX_HALVINGS):
         places = points_of(starts, ends)
         rough = np.zeros(len(starts), dtype=bool)
         for k, shape in enumerate(shapes):
             values = shape.of_many(places.ravel()).reshape(places.shape)
-            inner, widths = np.ascontiguousarray(values[:, INNER]), ends - starts
-            heights[k] = max(heights[k], values.max())
-            areas[k] = max(areas[k], float(((inner * WEIGHTS).sum(axis=-1) * widths).sum()) / 2)
-            at_ends = np.einsum("pj,kj,ek->pe", inner, ANALYSIS, ends_of_series)
-            rough |= mean_errors(inner) * widths > _STATIC * areas[k]
-            rough |= np.abs(at_ends - values[:, [0, -1]]).max(axis=1) > _ENDS * heights[k]
+            widths = ends - starts
+            areas[k] = max(areas[k], float(((values[:, INNER] * WEIGHTS).sum(axis=-1) * widths).sum()) / 2)
+            rough |= mean_errors(values) * widths > _STATIC * areas[k]
         rough &= ends - starts > narrowest
         if not rough.any() or len(edges) + rough.sum() > _MAX_PANELS:
             break

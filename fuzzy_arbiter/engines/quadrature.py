@@ -274,7 +274,7 @@ class Samples:
             moments = (inner * WEIGHTS * (places[:, INNER] - of.low)).sum(axis=-1) * half
             whole = total + np.bincount(rows, areas, self.n)
             items, at, greatest = self._bends(joined, rows, starts, ends, places)
-            errors = mean_errors(inner)
+            errors = mean_errors(joined.height)
             good = errors * 2 * half <= _TOLERANCE * whole[rows]
             good |= (errors <= _NOISE * inner.max(axis=1)) | (errors <= of.noise) | (ends - starts <= narrowest)
             good |= errors * half <= np.ptp(inner, axis=1) * of.precision  # rounding of places
