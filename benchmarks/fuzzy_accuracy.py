@@ -173,12 +173,25 @@ class Reference:
             part = self._integrals(self.starts[i : i + 1], np.array([min(value, self.ends[i])]))[0][0]
             return float(abs((self.areas[:i].sum() + part) / area - 0.5))
         places = np.unique(np.concatenate([self.edges, self.starts, self.ends, (self.starts + self.ends) / 2]))
-        heights = self.height(places)
+        places, heights = self._with_tops(places)
         if defuzzifier != "mom":
             around = value + self.width * np.array([-1e-12, 0.0, 1e-12])
             around = around[(around >= self.low) & (around <= self.low + self.width)]
             return float(1.0 - self.height(around).max() / heights.max())
         return self._off_mean(value, places, heights)
+
+    def _with_tops(self, places: Array) -> tuple[Array, Array]:
+        """Return places with those between them where the height turns, by thirds, and their heights."""
+        heights = self.height(places)
+        middle = heights[1:-1]
+        likely = (middle >= heights.max() * (1.0 - 1e-3)) & (middle >= heights[:-2]) & (middle > heights[2:])
+        low, high = places[:-2][likely], places[2:][likely]
+        for _ in range(80):
+            left, right = low + (high - low) / 3, high - (high - low) / 3
+            rises = self.height(left) < self.height(right)
+            low, high = np.where(rises, left, low), np.where(rises, high, right)
+        places = np.unique(np.concatenate([places, low, high]))
+        return places, self.height(places)
 
     def _off_mean(self, value: float, places: Array, heights: Array) -> float:
         """Return the error of a mean of the places of the greatest height."""

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
 _EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
 _APART = 1e-9  # places count as one within this fraction of the universe
+_CLOSER = 2  # times that many points narrow the search for a maximum
+_DENSE = np.linspace(-1.0, 1.0, 33)  # these points in a panel
 _LIKELY = 0.95  # least height at the points around a maximum, as a fraction of the greatest at any point
 
 
@@ -69,23 +71,26 @@ def bisectors(samples: Samples, panels: Panels, totals: Array) -> Array:
 def of_maximum(samples: Samples, panels: Panels, kind: str) -> Array:
     """Return for each sample the mean, the smallest or the largest of the places where the height is greatest."""
     of, n = samples.of, samples.n
+    tops = panels.heights.max(axis=1)
     greatest = np.zeros(n)
-    np.maximum.at(greatest, panels.rows, panels.heights.max(axis=1))
-    edges = np.tile(of.edges, n)
-    found = [(np.repeat(np.arange(n), len(of.edges)), edges)]
-    high = np.flatnonzero(~panels.flat & (panels.heights.max(axis=1) >= _LIKELY * greatest[panels.rows]))
+    np.maximum.at(greatest, panels.rows, tops)
+    found = [(np.repeat(np.arange(n), len(of.edges)), np.tile(of.edges, n))]
+    high = np.flatnonzero(~panels.flat & (tops >= _LIKELY * greatest[panels.rows]))
     if len(high):
         some = panels.chosen(high)
-        best = some.heights[:, INNER].argmax(axis=1)
-        highest = points_of(some.starts, some.ends, NODES)[np.arange(len(high)), best]
-        found += [(some.rows, x) for x in (some.starts, some.ends, highest)]
-        found.append(_turning(samples, some))
+        best = points_of(some.starts, some.ends, NODES)[np.arange(len(high)), some.heights[:, INNER].argmax(axis=1)]
+        # a height that jumps at an end is greatest beside it
+        beside = np.minimum(4.0 * of.precision, (some.ends - some.starts) * 1e-3)
+        ends = (some.starts, some.ends, some.starts + beside, some.ends - beside)
+        found += [*((some.rows, x) for x in (*ends, best)), *_turning(samples, some)]
     rows, places = (np.concatenate(column) for column in zip(*found, strict=True))
     heights = samples.heights(places, rows).height
+    greatest = np.zeros(n)
     np.maximum.at(greatest, rows, heights)
+    np.maximum.at(greatest, panels.rows[panels.flat], tops[panels.flat])
     top = (heights >= greatest[rows] * _EQUAL) & (heights > 0.0)
     rows, places = rows[top], places[top]
-    level = panels.flat & (panels.heights[:, 4] >= greatest[panels.rows] * _EQUAL) & (panels.heights[:, 4] > 0.0)
+    level = panels.flat & (tops >= greatest[panels.rows] * _EQUAL) & (tops > 0.0)
     flat, left, right = panels.rows[level], panels.starts[level], panels.ends[level]
     result = np.full(n, math.nan)
     if kind == "mom":
@@ -107,26 +112,23 @@ def of_maximum(samples: Samples, panels: Panels, kind: str) -> Array:
     return result
 
 
-def _turning(samples: Samples, panels: Panels) -> tuple[Indices, Array]:
-    """Return samples and places where the height within a panel turns from rising to falling."""
-    rows, starts, ends, heights = panels.rows, panels.starts, panels.ends, panels.heights[:, INNER]
-    first, last = starts, ends
-    for closer in (True, False):
-        series = np.einsum("pj,kj->kp", heights, ANALYSIS)
-        slope = legendre.legder(series)
-        bend = legendre.legder(slope)
-        values = legendre.legval(np.linspace(-1.0, 1.0, 33), slope)
-        items, at = np.nonzero((values[:, :-1] > 0.0) & (values[:, 1:] <= 0.0))
-        x = -1.0 + (at + 0.5) / 16
-        for _ in range(6):  # Newton's method
-            with np.errstate(divide="ignore", invalid="ignore"):
-                step = legendre.legval(x, slope[:, items], tensor=False) / legendre.legval(
-                    x, bend[:, items], tensor=False
-                )
-            x = np.clip(np.where(np.isfinite(step), x - step, x), -1.0, 1.0)
-        half = (ends - starts)[items] / 2
-        rows, places, first, last = rows[items], (starts + ends)[items] / 2 + x * half, first[items], last[items]
-        if closer:
-            starts, ends = np.maximum(places - half / 50, first), np.minimum(places + half / 50, last)
-            heights = samples.heights(points_of(starts, ends, NODES), rows).height
-    return rows, places
+def _turning(samples: Samples, panels: Panels) -> list[tuple[Indices, Array]]:
+    """Return samples and places where the height within a panel turns from rising to falling, each nearer to it."""
+    rows, starts, ends = panels.rows, panels.starts, panels.ends
+    found: list[tuple[Indices, Array]] = []
+    for _ in range(_CLOSER):
+        places = points_of(starts, ends, _DENSE)
+        heights = samples.heights(places, rows).height
+        middle = heights[:, 1:-1]
+        items, at = np.nonzero((middle >= heights[:, :-2]) & (middle > heights[:, 2:]))
+        rows, starts, ends = rows[items], places[items, at], places[items, at + 2]
+        found.append((rows, places[items, at + 1]))
+    heights = samples.heights(points_of(starts, ends, NODES), rows).height
+    slope = legendre.legder(np.einsum("pj,kj->kp", heights, ANALYSIS))
+    bend = legendre.legder(slope)
+    x = np.zeros(len(rows))
+    for _ in range(6):  # Newton's method
+        with np.errstate(divide="ignore", invalid="ignore"):
+            step = legendre.legval(x, slope, tensor=False) / legendre.legval(x, bend, tensor=False)
+        x = np.clip(np.where(np.isfinite(step), x - step, x), -1.0, 1.0)
+    return [*found, (rows, points_of(starts, ends, x[:, None])[:, 0])]

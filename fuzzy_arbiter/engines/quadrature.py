@@ -131,16 +131,17 @@ class Quadrature:
         if any(isinstance(shape, Formula) for shape in self._shapes):
             return "adaptive quadrature, without a bound, as nothing is known of a formula between its points"
         if defuzzifier == "bisector":
-            return f"adaptive quadrature, halves of the area within {BOUND:g} of it"
+            return f"adaptive quadrature, halves of the area within {BOUND:g} of it, and to the rounding of the place"
         if defuzzifier != "centroid":
-            return f"search for the greatest height, within {_TIED:g} of it"
+            return "search for the greatest height, without a bound: a small error of the height may move its place far"
         if (
             all(shape.polynomial for shape in self._shapes)
             and set(words) <= {"min", "prod"}
             and self.output.aggregation in ("max", "probor", "sum", "bounded_sum")
         ):
             return "integrals of polynomials, to rounding"
-        return f"adaptive quadrature, within {BOUND:g} of the universe's width"
+        bound = max(BOUND, 4 * self.precision / self.width)  # places far from 0 are rounded more
+        return f"adaptive quadrature, within {bound:g} of the universe's width"
 
     def value(self, cuts: Sequence[float]) -> float:
         """Return the output's value for the strengths of the slots of one sample, as `values` does."""

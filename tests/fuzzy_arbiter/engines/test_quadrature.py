@@ -168,6 +168,35 @@ def test_a_narrow_difference_of_sigmoids_is_not_missed():
     assert ExactEngine(made).centroids([1.0, 0.25])[0] == pytest.approx(expected, abs=1e-9)
 
 
+def test_the_steep_end_of_a_tail_is_not_missed():
+    """The bisector of a symmetric curve is its middle, however its tail lies in a wide panel."""
+    a, d, slope = 100.83920572947113, 100.87231839689323, 155.88537267578596
+    output = Output("y", (100, 110), (Term("a", curve("sigmoid_product", a, slope, -slope, d)),), None, "bisector")
+    assert ExactEngine(system(output)).centroids([1.0])[0] == pytest.approx((a + d) / 2, abs=1e-12)
+
+
+@pytest.mark.parametrize("aggregation", ["probor", "sum", "einstein_sum", "normalized_sum"])
+@pytest.mark.parametrize("defuzzifier", ["som", "lom", "mom"])
+def test_a_height_may_be_greatest_beside_an_open_jump(defuzzifier, aggregation):
+    """The first term is 0 up to 5 and 0.5 beyond; the second falls from 0.8 there."""
+    terms = (Term("a", rising(0, 10)), Term("b", triangle(0, 4, 9)))
+    output = Output("y", (0, 10), terms, None, defuzzifier, aggregation)
+    value = ExactEngine(system(output, "nilpotent_minimum")).centroids([0.5, 0.85])[0]
+    # a normalized sum is 1 until the second term is 0.5
+    expected = {"som": 5.0, "lom": 6.5, "mom": 5.75}[defuzzifier] if aggregation == "normalized_sum" else 5.0
+    assert value == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_place_of_a_nearly_flat_maximum_is_as_high_as_any():
+    kinds = (("sigmoid", 1.1461360732, -660.435), ("gaussian", 1.414048125, 0.0667271548))
+    terms = {f"t{i}": curve(*parameters) for i, parameters in enumerate(kinds)}
+    output = Output("y", (-3, 7), terms, None, "lom", "normalized_sum")
+    value = ExactEngine(system(output, "prod")).centroids([1e-9, 1e-9])[0]
+    x = np.concatenate([[value], np.linspace(-3, 7, 1_000_001)])
+    heights = sum(term.shape.of_many(x) for term in output.terms)
+    assert heights[0] == pytest.approx(heights.max(), rel=1e-12, abs=0.0) or heights[0] > heights.max()
+
+
 def test_no_bound_is_printed_for_a_formula():
     output = Output("y", (0, 10), (Term("a", Formula("max(0, 1 - abs(x - 3.001) * 50)")), Term("b", triangle(4, 5, 6))))
     assert "without a bound" in ExactEngine(system(output)).methods["y"]
