@@ -186,7 +186,7 @@ class Reference:
         middle = heights[1:-1]
         likely = (middle >= heights.max() * (1.0 - 1e-3)) & (middle >= heights[:-2]) & (middle > heights[2:])
         low, high = places[:-2][likely], places[2:][likely]
-        for _ in range(80):
+        for _ in range(50):
             left, right = low + (high - low) / 3, high - (high - low) / 3
             rises = self.height(left) < self.height(right)
             low, high = np.where(rises, left, low), np.where(rises, high, right)

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
 _APART = 1e-9  # places count as one within this fraction of the universe
 _CLOSER = 2  # times that many points narrow the search for a maximum
-_DENSE = np.linspace(-1.0, 1.0, 33)  # these points in a panel
+_DENSE = np.linspace(-1.0 + 1e-12, 1.0 - 1e-12, 33)  # these points in a panel, on its side of a jump
 _LIKELY = 0.95  # least height at the points around a maximum, as a fraction of the greatest at any point
 
 
@@ -82,7 +82,7 @@ def of_maximum(samples: Samples, panels: Panels, kind: str) -> Array:
         # a height that jumps at an end is greatest beside it
         beside = np.minimum(4.0 * of.precision, (some.ends - some.starts) * 1e-3)
         ends = (some.starts, some.ends, some.starts + beside, some.ends - beside)
-        found += [*((some.rows, x) for x in (*ends, best)), *_turning(samples, some)]
+        found += [*((some.rows, x) for x in (*ends, best)), _turning(samples, some)]
     rows, places = (np.concatenate(column) for column in zip(*found, strict=True))
     heights = samples.heights(places, rows).height
     greatest = np.zeros(n)
@@ -112,23 +112,24 @@ def of_maximum(samples: Samples, panels: Panels, kind: str) -> Array:
     return result
 
 
-def _turning(samples: Samples, panels: Panels) -> list[tuple[Indices, Array]]:
-    """Return samples and places where the height within a panel turns from rising to falling, each nearer to it."""
+def _turning(samples: Samples, panels: Panels) -> tuple[Indices, Array]:
+    """Return samples and places where the height within a panel turns from rising to falling."""
     rows, starts, ends = panels.rows, panels.starts, panels.ends
-    found: list[tuple[Indices, Array]] = []
     for _ in range(_CLOSER):
         places = points_of(starts, ends, _DENSE)
         heights = samples.heights(places, rows).height
-        middle = heights[:, 1:-1]
-        items, at = np.nonzero((middle >= heights[:, :-2]) & (middle > heights[:, 2:]))
-        rows, starts, ends = rows[items], places[items, at], places[items, at + 2]
-        found.append((rows, places[items, at + 1]))
-    heights = samples.heights(points_of(starts, ends, NODES), rows).height
-    slope = legendre.legder(np.einsum("pj,kj->kp", heights, ANALYSIS))
+        around = np.pad(heights, ((0, 0), (1, 1)))
+        items, at = np.nonzero((heights >= around[:, :-2]) & (heights > around[:, 2:]))
+        rows, starts, ends = rows[items], places[items, np.maximum(at - 1, 0)], places[items, np.minimum(at + 1, 32)]
+        best, height = places[items, at], heights[items, at]
+    slope = legendre.legder(
+        np.einsum("pj,kj->kp", samples.heights(points_of(starts, ends, NODES), rows).height, ANALYSIS)
+    )
     bend = legendre.legder(slope)
     x = np.zeros(len(rows))
     for _ in range(6):  # Newton's method
         with np.errstate(divide="ignore", invalid="ignore"):
             step = legendre.legval(x, slope, tensor=False) / legendre.legval(x, bend, tensor=False)
         x = np.clip(np.where(np.isfinite(step), x - step, x), -1.0, 1.0)
-    return [*found, (rows, points_of(starts, ends, x[:, None])[:, 0])]
+    places = points_of(starts, ends, x[:, None])[:, 0]
+    return rows, np.where(samples.heights(places, rows).height >= height * _EQUAL, places, best)
