@@ -187,14 +187,22 @@ def test_a_height_may_be_greatest_beside_an_open_jump(defuzzifier, aggregation):
     assert value == pytest.approx(expected, abs=1e-9)
 
 
-def test_the_place_of_a_nearly_flat_maximum_is_as_high_as_any():
-    kinds = (("sigmoid", 1.1461360732, -660.435), ("gaussian", 1.414048125, 0.0667271548))
+@pytest.mark.parametrize(
+    ("kinds", "universe", "aggregation", "cuts"),
+    [
+        ((("sigmoid", 1.146, -660.435), ("gaussian", 1.414, 0.0667)), (-3, 7), "normalized_sum", (1e-9, 1e-9)),
+        ((("s_shape", 85.0, 125.0), ("z_shape", 109.414, 109.602)), (100, 125), "probor", (0.5, 0.7)),
+    ],
+    ids=["flat", "close to the end of a panel"],
+)
+def test_the_place_of_a_maximum_is_as_high_as_any(kinds, universe, aggregation, cuts):
     terms = {f"t{i}": curve(*parameters) for i, parameters in enumerate(kinds)}
-    output = Output("y", (-3, 7), terms, None, "lom", "normalized_sum")
-    value = ExactEngine(system(output, "prod")).centroids([1e-9, 1e-9])[0]
-    x = np.concatenate([[value], np.linspace(-3, 7, 1_000_001)])
-    heights = sum(term.shape.of_many(x) for term in output.terms)
-    assert heights[0] == pytest.approx(heights.max(), rel=1e-12, abs=0.0) or heights[0] > heights.max()
+    output = Output("y", universe, terms, None, "lom", aggregation)
+    value = ExactEngine(system(output, "prod")).centroids(cuts)[0]
+    x = np.concatenate([[value], np.linspace(*universe, 1_000_001)])
+    implied = [cut * term.shape.of_many(x) for cut, term in zip(cuts, output.terms, strict=True)]
+    heights = AGGREGATIONS[aggregation].array(*implied)
+    assert heights[0] >= heights.max() * (1 - 1e-12)
 
 
 def test_no_bound_is_printed_for_a_formula():
