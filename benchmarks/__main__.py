@@ -14,6 +14,7 @@ from benchmarks import (
     everything,
     fmu,
     fuzzy,
+    fuzzy_accuracy,
     law,
     long_record,
     mavlink,
@@ -68,6 +69,9 @@ def _parser() -> argparse.ArgumentParser:
         if benchmark is mavlink:
             verb.add_argument("--datagrams", type=int, help="hostile ones a flood (default: ten a step)")
 
+    verb = verbs.add_parser("fuzzy-accuracy", help=(fuzzy_accuracy.__doc__ or "").splitlines()[0])
+    verb.add_argument("--systems", type=int, default=fuzzy_accuracy.SYSTEMS, help="default: %(default)s")
+    verb.add_argument("--seed", type=int, default=0, help="of the draws (default: %(default)s)")
     verb = verbs.add_parser("baselines", help=(baselines.__doc__ or "").splitlines()[0])
     verb.add_argument("laws", nargs="*", metavar="LAW", help=f"of {', '.join(baselines.RANGES)} (default: all)")
     verb.add_argument(
@@ -150,6 +154,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     match options.name:
         case "long-record":
             long_record.print_table(options.rows, options.work, options.scenario, options.folder)
+        case "fuzzy-accuracy":
+            fuzzy_accuracy.print_worst(options.systems, options.seed)
         case "baselines":
             _baselines(parser, options)
         case "nmpc":

@@ -11,7 +11,7 @@ from typing import Literal, TypeVar, get_args
 from fuzzy_arbiter.checks import all_of, finite, require_name, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import Is
-from fuzzy_arbiter.references import require_rule, require_values
+from fuzzy_arbiter.references import require_rules, require_values
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import parse_rule
 from fuzzy_arbiter.shapes import Membership
@@ -142,7 +142,7 @@ class Output(Variable):
         fall (Tsukamoto), the mean of the values, weighted by strength, or their sum.
     aggregation : str
         Operator that joins the rules' conclusions, one of `fuzzy_arbiter.terms.norms.AGGREGATIONS`. For values, it
-        joins the strengths of the rules that conclude one term.
+        joins the strengths of the rules that conclude one term. Default: ``sum`` for values, else ``max``.
     lock_range : bool
         True if the value is held within the universe.
     lock_previous : bool
@@ -164,7 +164,7 @@ class Output(Variable):
 
     default: float | None = None
     defuzzifier: Defuzzifier = "centroid"
-    aggregation: str = "max"
+    aggregation: str = ""
     lock_range: bool = False
     lock_previous: bool = False
 
@@ -172,6 +172,8 @@ class Output(Variable):
         # not super(): the decorator makes the class anew for its slots, and the method keeps the old one
         Variable.__post_init__(self)
         what = f"output {self.name!r}"
+        if self.aggregation == "":
+            object.__setattr__(self, "aggregation", self.usual_aggregation)
         if not self.weighted and not WIDTHS[0] <= self.universe[1] - self.universe[0] <= WIDTHS[1]:
             raise DefinitionError(f"{what}: universe is [{_span(self)}], expected a width from 1e-100 to 1e+100")
         for key, known in (("defuzzifier", get_args(Defuzzifier)), ("aggregation", tuple(AGGREGATIONS))):
@@ -216,6 +218,11 @@ class Output(Variable):
     def weighted(self) -> bool:
         """True if its terms are values, weighted by strength, and not sets that are joined."""
         return self.defuzzifier in WEIGHTED
+
+    @property
+    def usual_aggregation(self) -> str:
+        """Aggregation unless another is given: a value that two rules conclude counts twice."""
+        return "sum" if self.weighted else "max"
 
 
 @dataclass(frozen=True, slots=True)
@@ -298,8 +305,7 @@ class System:
         twice = _repeated(v.name for v in (*self.inputs, *self.outputs))
         if twice is not None:
             raise DefinitionError(f"variables: two are named {twice!r}, expected each name once")
-        for i, rule in enumerate(self.rules):
-            require_rule(self, i, rule)
+        require_rules(self)
         require_values(self)
 
     def _require_names_of_weights(self) -> None:

@@ -12,42 +12,49 @@ if TYPE_CHECKING:
     from fuzzy_arbiter.definition import System
     from fuzzy_arbiter.rule import Rule
 
+_Terms = dict[str, frozenset[str]]  # names of each variable's terms
 
-def require_rule(system: System, i: int, rule: Rule) -> None:
-    """Require that a rule refers only to variables and terms of the system.
+
+def require_rules(system: System) -> None:
+    """Require that the rules refer only to variables and terms of the system.
 
     Parameters
     ----------
     system : System
-        System with the variables.
-    i : int
-        Index of the rule; it may use outputs on which earlier rules conclude.
-    rule : Rule
-        Rule to check.
+        System to check.
 
     Raises
     ------
     DefinitionError
-        If a variable or a term does not exist, or two conclusions are on one output.
+        If a variable or a term does not exist, a rule has two conclusions on one output, or a condition is on an output
+        on which no earlier rule concludes.
     """
     inputs = {v.name: frozenset(v.term_names) for v in system.inputs}
     outputs = {v.name: frozenset(v.term_names) for v in system.outputs}
-    where = f"R{i + 1} {str(rule)!r}"
-    before = {c.variable for earlier in system.rules[:i] for c in earlier.conclusions}
+    before: set[str] = set()
+    for i, rule in enumerate(system.rules):
+        try:
+            _require_rule(rule, inputs, outputs, before)
+        except DefinitionError as error:
+            raise DefinitionError(f"R{i + 1} {str(rule)!r}: {error}") from None
+        before |= {c.variable for c in rule.conclusions}
+
+
+def _require_rule(rule: Rule, inputs: _Terms, outputs: _Terms, before: set[str]) -> None:
     for statement in rule.condition.terms():
         if statement.variable not in outputs:
-            _require_known(statement, inputs, "input", where)
+            _require_known(statement, inputs, "input")
             continue
-        _require_known(statement, outputs, "output", where)
+        _require_known(statement, outputs, "output")
         if statement.variable not in before:
-            raise DefinitionError(f"{where}: asks for output {statement.variable!r}, on which no rule before concludes")
+            raise DefinitionError(f"asks for output {statement.variable!r}, on which no rule before concludes")
     for name in anything(rule.condition):
         if name not in inputs:
-            raise DefinitionError(f"{where}: no input {name!r}, expected one of {', '.join(inputs)}")
+            raise DefinitionError(f"no input {name!r}, expected one of {', '.join(inputs)}")
     for statement in rule.conclusions:
-        _require_known(statement, outputs, "output", where)
+        _require_known(statement, outputs, "output")
     if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):
-        raise DefinitionError(f"{where}: two conclusions on one output, expected each output once")
+        raise DefinitionError("two conclusions on one output, expected each output once")
 
 
 def require_values(system: System) -> None:
@@ -78,11 +85,9 @@ def require_values(system: System) -> None:
             raise DefinitionError(f"variable {variable.name!r}: no terms came, expected at least one")
 
 
-def _require_known(statement: Is, known: dict[str, frozenset[str]], kind: str, where: str) -> None:
+def _require_known(statement: Is, known: _Terms, kind: str) -> None:
     if statement.variable not in known:
-        raise DefinitionError(f"{where}: no {kind} {statement.variable!r}, expected one of {', '.join(known)}")
+        raise DefinitionError(f"no {kind} {statement.variable!r}, expected one of {', '.join(known)}")
     if statement.term not in known[statement.variable]:
         expected = ", ".join(sorted(known[statement.variable]))
-        raise DefinitionError(
-            f"{where}: {statement.variable!r} has no term {statement.term!r}, expected one of {expected}"
-        )
+        raise DefinitionError(f"{statement.variable!r} has no term {statement.term!r}, expected one of {expected}")

@@ -26,10 +26,13 @@ class Membership(ABC):
     ----------
     polynomial : bool
         True if it is a polynomial between its breaks, so that it can be integrated exactly.
+    monotonic : bool
+        True if it only rises or only falls between its features.
     """
 
     __slots__ = ()
     polynomial: ClassVar[bool] = False
+    monotonic: ClassVar[bool] = False
 
     @abstractmethod
     def __call__(self, x: float) -> float:
@@ -43,6 +46,10 @@ class Membership(ABC):
     def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
         """Return the places within a universe where it bends or jumps, in rising order; between them it is smooth."""
 
+    def features(self, universe: tuple[float, float]) -> tuple[float, ...]:
+        """Return the places within a universe around which it changes, in rising order; by default its breaks."""
+        return self.breaks(universe)
+
     def within(self, universe: tuple[float, float]) -> Membership:
         """Return the same function without parts that do not matter in a universe; by default the function itself."""
         return self
@@ -50,7 +57,7 @@ class Membership(ABC):
     def area(self, universe: tuple[float, float]) -> float:
         """Return the integral of the degree over a universe, by quadrature."""
         low, high = universe
-        places = np.unique([*np.linspace(low, high, 65), *self.breaks(universe)])
+        places = np.unique([*np.linspace(low, high, 65), *self.features(universe)])
         nodes, weights = np.polynomial.legendre.leggauss(8)
         middle, half = (places[:-1] + places[1:]) / 2, np.diff(places) / 2
         degrees = self.of_many((middle + nodes[:, None] * half).ravel()).reshape(len(nodes), -1)
@@ -83,6 +90,7 @@ class Shape(Membership):
 
     points: tuple[Point, ...]
     polynomial: ClassVar[bool] = True
+    monotonic: ClassVar[bool] = True
 
     def __post_init__(self) -> None:
         points = list(self._pairs())

@@ -23,23 +23,21 @@ def centroids(cuts: Array, shape: Outline) -> Array:
     ndarray, shape (n,)
         Centroids, in the universe.
     """
-    terms, n = cuts.shape
+    n = cuts.shape[1]
     area, moment = np.zeros(n), np.zeros(n)
     for piece in range(len(shape.places) - 1):
-        first = piece * terms
         width = shape.places[piece + 1] - shape.places[piece]
         start = shape.places[piece] - shape.places[0]
         below: Array | None = None  # the greatest cut of the lines above; None where there are none
-        for t in shape.order[first : first + terms]:
-            a, b = shape.left[first + t], shape.right[first + t]
-            if max(a, b) > 0.0:
-                band, lever = _band(a, b, below, cuts[t])
-                area += width * band
-                lever *= width
-                if start:
-                    lever += start * band
-                lever *= width
-                moment += lever
+        for line in shape.order[shape.first[piece] : shape.first[piece + 1]]:
+            t = shape.term[line]
+            band, lever = _band(shape.left[line], shape.right[line], below, cuts[t])
+            area += width * band
+            lever *= width
+            if start:
+                lever += start * band
+            lever *= width
+            moment += lever
             below = cuts[t] if below is None else np.maximum(below, cuts[t])
     return np.asarray(shape.places[0] + moment / area)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import ClassVar
 
 import numpy as np
@@ -13,9 +14,10 @@ from fuzzy_arbiter.engines.bands import centroids
 from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.firing import Array, slots_of
 from fuzzy_arbiter.engines.plain import curved
-from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature
+from fuzzy_arbiter.engines.quadrature import Quadrature
 from fuzzy_arbiter.engines.sweep import LARGER, TINY, Outline, centroid, outline
 from fuzzy_arbiter.engines.weighted import Weighted
+from fuzzy_arbiter.errors import EngineError
 
 EXACTLY = "exact integrals, to rounding"
 _BLOCK = 8192  # number of samples evaluated at a time
@@ -45,17 +47,15 @@ class ExactEngine(Engine):
             if output.weighted:
                 self._ways.append(Weighted(output, inputs, variable_names(system.outputs[:k])))
                 self.methods[output.name] = "weighted values, to rounding"
-            elif straight and (output.defuzzifier, output.aggregation) == ("centroid", "max"):
-                self._ways.append(outline(output))
-                self.methods[output.name] = EXACTLY
-            else:
-                way = Quadrature(output, slots)
-                self._ways.append(way)
-                self.methods[output.name] = (
-                    "integrals of polynomials, to rounding"
-                    if way.exact
-                    else f"adaptive quadrature, within {BOUND:g} of the universe's width"
-                )
+                continue
+            if straight and (output.defuzzifier, output.aggregation) == ("centroid", "max"):
+                with suppress(EngineError):  # more lines than a sweep should have
+                    self._ways.append(outline(output))
+                    self.methods[output.name] = EXACTLY
+                    continue
+            way = Quadrature(output, slots)
+            self._ways.append(way)
+            self.methods[output.name] = way.method
         super().__init__(system)
 
     def quadrature(self, name: str) -> bool:
@@ -77,7 +77,7 @@ class ExactEngine(Engine):
         """Return the values of an output for many samples, with the error bound in `methods`."""
         way = self._ways[k]
         if isinstance(way, Quadrature):
-            return np.array([way.value(column) for column in cuts.T.tolist()])
+            return way.values(cuts)
         assert not isinstance(way, Weighted)
         cuts = np.where(cuts.max(axis=0) < TINY, cuts * LARGER, cuts)
         result = np.empty(cuts.shape[1])
@@ -99,10 +99,13 @@ class ExactEngine(Engine):
 
 def _centroids(cuts: Array, shape: Outline) -> Array:
     """Return the centroids of scaled terms for many samples: `sweep.scaled` for each column of `cuts`, shape (n,)."""
-    terms, n = cuts.shape
+    every, n = cuts, cuts.shape[1]
     area, moment = np.zeros(n), np.zeros(n)
-    left, right = (np.reshape(side, (-1, terms, 1)) for side in (shape.left, shape.right))
-    for piece, (a, b) in enumerate(zip(left, right, strict=True)):
+    for piece in range(len(shape.places) - 1):
+        lines = slice(shape.first[piece], shape.first[piece + 1])
+        a, b = (np.reshape(side[lines], (-1, 1)) for side in (shape.left, shape.right))
+        cuts = every[list(shape.term[lines])]
+        terms = len(cuts)
         start, width = shape.places[piece] - shape.places[0], shape.places[piece + 1] - shape.places[piece]
         start_at, end_at = a * cuts, b * cuts
         # each against those before it

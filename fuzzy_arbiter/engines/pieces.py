@@ -126,9 +126,7 @@ def _not_below(start: Fraction) -> float:
 def _events(shape: Outline) -> list[Fraction]:
     """Return 0, 1, and all h between at which two breakpoints of the envelope may meet, or one a knot."""
     levels = {Fraction(0), Fraction(1, 2)}
-    for i in range(0, len(shape.left), 2):
-        (a, c), (b, d) = shape.left[i : i + 2], shape.right[i : i + 2]
-        levels |= {Fraction(y) for y in (a, b, c, d)}
+    levels |= {Fraction(y) for y in (*shape.left, *shape.right)}
     return sorted({h for level in levels for h in (level, 1 - level)})
 
 

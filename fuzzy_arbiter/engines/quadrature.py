@@ -1,9 +1,9 @@
-"""Outputs of any terms, norms and defuzzifiers: joined at places, and integrated between the places where they bend.
+"""Outputs of any terms, norms and defuzzifiers, for many samples at once.
 
-The joined terms bend where a term does, where one meets its cut, or where two change places. The first are known; the
-others are looked for on a grid and then found to rounding. Between them the joined terms are smooth, so that Gauss'
-rule is exact for polynomials, and otherwise nearly so; a part where two halves give another integral than the whole is
-halved until they do not.
+The joined terms of a sample bend where a term does, where one meets its cut, and where two change places. Between these
+places they are smooth, and Gauss-Legendre quadrature of one order integrates them. The ends of the panels that suit the
+terms are known before; a panel in which the joined terms of a sample bend is divided there, and one that is too rough
+in its middle, until the error of all panels is within the tolerance.
 """
 
 from __future__ import annotations
@@ -14,32 +14,58 @@ from typing import NamedTuple
 import numpy as np
 
 from fuzzy_arbiter.definition import Output
+from fuzzy_arbiter.engines import defuzzification
 from fuzzy_arbiter.engines.firing import Slot
+from fuzzy_arbiter.engines.panels import (
+    INNER,
+    NARROWEST,
+    POINTS,
+    WEIGHTS,
+    Indices,
+    Mask,
+    Panels,
+    constant_panels,
+    dividing,
+    lowest_between,
+    mean_errors,
+    points_of,
+    roots,
+    smooth_panels,
+)
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.shapes import Array, Membership
-from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
+from fuzzy_arbiter.terms.values import Formula
 
 BOUND = 1e-9  # bound of a centroid's error, as a fraction of the universe's width
-_TOLERANCE = 1e-13  # tolerance of each part, as a fraction of the area
-_NODES, _WEIGHTS = (x.reshape(-1, 1) for x in np.polynomial.legendre.leggauss(16))
-_SCAN = 16  # number of intervals in each smooth part of the terms, in which bends are searched
-_BESIDE = 1e-9  # distance of the first and the last interval from the part's ends, as a fraction of its width
-_HALVINGS = 45  # greatest number of halvings of a part
-_MAX_PARTS = 20_000  # greatest number of parts
-# a slot meets its cut; it and its cut sum to 1; it and those before it sum to 1; it passes those before it
-_CUT, _REST, _FULL, _PASSED = -1, -2, -3, -4
-_NEAR = 1e-11  # tolerance of a bend's place, as a fraction of the universe: the error of the integral is its square
-_EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
+_TOLERANCE = 1e-12  # tolerance of each panel, as a fraction of the area
+_ROUNDS = 60  # greatest number of divisions of a panel
+_MAX_PANELS = 4000  # greatest number of panels of a sample that are divided at a time
+_MAX_TABLE = 2**25  # greatest number of degrees at the points of the terms' panels
+_BLOCK = 2**17  # number of degrees that are computed at a time
+_TIED = 1e-12  # heights count as equal if their quotient differs from 1 by less
+_NOISE = 4e-16  # error of a height by rounding, as a fraction of it, or of 1 where it is a difference from 1
+_CLOSE = 0.2  # distance below the greatest height at which a slot may pass it between two points
+_LEVEL, _PAIR, _FULL, _PASSED = range(4)  # a slot meets a level, another slot; it and those before sum to 1, are equal
 
 
-class Parts(NamedTuple):
-    """Parts of a universe, from left to right, and area and moment of each."""
+class Events(NamedTuple):
+    """Places to be found, each between two points, where the joined terms bend."""
 
-    starts: Array
-    ends: Array
-    areas: Array
-    moments: Array  # moment of each part about the universe's start
+    items: Indices  # panel of each
+    first: Indices  # the point before it
+    kinds: Indices  # `_LEVEL`, `_PAIR`, `_FULL` or `_PASSED`
+    one: Indices  # its level, or its slot
+    other: Indices  # the other slot of a pair
+
+
+class Joined(NamedTuple):
+    """Heights at some places of the slots, and of their join."""
+
+    degrees: list[Array]  # of each term
+    implied: list[Array]  # of each slot
+    before: list[Array]  # join of the slots before each; for operators that bend where sums reach 1
+    height: Array
 
 
 class Quadrature:
@@ -54,256 +80,316 @@ class Quadrature:
 
     Attributes
     ----------
-    exact : bool
-        True if the integrals are exact to rounding: the joined terms are polynomials between their bends.
+    method : str
+        Method and error bound.
+
+    Raises
+    ------
+    EngineError
+        If there are too many terms for the number of panels that they need.
     """
 
     def __init__(self, output: Output, slots: Sequence[Slot]) -> None:
-        self._output = output
-        self._slots = slots
-        shapes = [output.terms[slot.term].shape for slot in slots]
-        self._shapes = [shape for shape in shapes if isinstance(shape, Membership)]
+        self.output = output
+        used = sorted({slot.term for slot in slots})
+        self._term = [used.index(slot.term) for slot in slots]
+        self._shapes = [s for j in used if isinstance(s := output.terms[j].shape, Membership)]
         self._implications = [T_NORMS[slot.implication].array for slot in slots]
         self._join = AGGREGATIONS[output.aggregation].array
-        self._low, self._width = output.universe[0], output.universe[1] - output.universe[0]
-        self._knots = np.array(output.knots)
-        self.exact = (
+        self._max = output.aggregation == "max"
+        self._sums = output.aggregation in ("bounded_sum", "normalized_sum", "nilpotent_maximum")
+        self.low, self.width = output.universe[0], output.universe[1] - output.universe[0]
+        self.precision = 4e-16 * max(abs(self.low), abs(output.universe[1]))
+        self.edges = smooth_panels(output.universe, self._shapes)
+        places = points_of(self.edges[:-1], self.edges[1:])
+        if places.size * len(self._shapes) > _MAX_TABLE:
+            raise EngineError(
+                f"output {output.name!r}: its {len(self._shapes)} terms need {len(places)} panels, expected terms and "
+                f"panels of a product of at most {_MAX_TABLE // len(POINTS)}"
+            )
+        middles = (self.edges[:-1] + self.edges[1:]) / 2
+        self._constant = [
+            constant_panels(shape, middles, shape.of_many(places.ravel()).reshape(places.shape))
+            for shape in self._shapes
+        ]
+        self._drastic = output.aggregation == "drastic_sum" or any(s.implication == "drastic_product" for s in slots)
+        self._table = [self._degrees(t, places.ravel()).reshape(places.shape) for t in range(len(self._shapes))]
+        # slot and True for its cut, False for 1 less its cut: levels of its term's degree at which its height bends
+        words = [slot.implication for slot in slots]
+        self._levels = [
+            *((i, True) for i, word in enumerate(words) if word in ("min", "nilpotent_minimum")),
+            *((i, False) for i, word in enumerate(words) if word in ("bounded_difference", "nilpotent_minimum")),
+        ]
+        self._jumps = "nilpotent_minimum" in words
+        self.noise = _NOISE if "bounded_difference" in words else 0.0
+        self._clip = {i: e for e, (i, cuts) in enumerate(self._levels) if cuts}
+        self._turning = [not self._shapes[self._term[i]].monotonic for i, _ in self._levels]
+        self.method = self._method(words)
+
+    def _method(self, words: Sequence[str]) -> str:
+        defuzzifier = self.output.defuzzifier
+        if any(isinstance(shape, Formula) for shape in self._shapes):
+            return "adaptive quadrature, without a bound, as nothing is known of a formula between its points"
+        if defuzzifier == "bisector":
+            return f"adaptive quadrature, halves of the area within {BOUND:g} of it, and to the rounding of the place"
+        if defuzzifier != "centroid":
+            return "search for the greatest height, without a bound: a small error of the height may move its place far"
+        if (
             all(shape.polynomial for shape in self._shapes)
-            and all(slot.implication in ("min", "prod") for slot in slots)
-            and output.aggregation in ("max", "probor", "sum", "bounded_sum")
-        )
-        shares = np.concatenate([[_BESIDE], np.linspace(0.0, 1.0, _SCAN + 1)[1:-1], [1.0 - _BESIDE]])
-        starts, widths = self._knots[:-1, None], np.diff(self._knots)[:, None]
-        self._scan = starts + shares * widths  # shape (parts, places)
-        self._scanned = np.array([s.of_many(self._scan.ravel()).reshape(self._scan.shape) for s in self._shapes])
+            and set(words) <= {"min", "prod"}
+            and self.output.aggregation in ("max", "probor", "sum", "bounded_sum")
+        ):
+            return "integrals of polynomials, to rounding"
+        bound = max(BOUND, 4 * self.precision / self.width)  # places far from 0 are rounded more
+        return f"adaptive quadrature, within {bound:g} of the universe's width"
 
     def value(self, cuts: Sequence[float]) -> float:
-        """Return the output's value.
+        """Return the output's value for the strengths of the slots of one sample, as `values` does."""
+        return float(self.values(np.array(cuts, dtype=np.float64)[:, None])[0])
+
+    def values(self, cuts: Array) -> Array:
+        """Return the output's values for many samples.
 
         Parameters
         ----------
-        cuts : sequence of float, length slots
-            Strength of each slot, in [0, 1]; not all are 0.
+        cuts : ndarray, shape (slots, n)
+            Strength of each slot, in [0, 1]; not all of one sample are 0.
 
         Returns
         -------
-        float
-            Value in the universe; NaN if the joined terms have no area.
+        ndarray, shape (n,)
+            Values in the universe; NaN if the joined terms have no area.
 
         Raises
         ------
         EngineError
             If the joined terms are so rough that they cannot be integrated to the bound.
         """
-        joined = _Joined(self, cuts)
-        if self._output.defuzzifier in ("mom", "som", "lom"):
-            return joined.of_maximum(self._output.defuzzifier)
-        parts = joined.parts()
-        area = parts.areas.sum()
-        if not area > 0.0:
-            return joined.of_points()
-        if self._output.defuzzifier == "bisector":
-            return joined.bisector(parts)
-        return float(min(max(self._low + parts.moments.sum() / area, self._low), self._low + self._width))
+        count = max(1, _BLOCK // (len(POINTS) * len(self.edges) * max(1, len(cuts))))
+        result = np.empty(cuts.shape[1])
+        for start in range(0, len(result), count):
+            result[start : start + count] = Samples(self, cuts[:, start : start + count]).values()
+        return result
+
+    def joined(self, degrees: list[Array], cuts: Array) -> Joined:
+        """Return heights of the slots and of their join, for degrees of the terms and cuts of the slots."""
+        implied = [of(cut, degrees[t]) for of, cut, t in zip(self._implications, cuts, self._term, strict=True)]
+        height, before = np.zeros(degrees[0].shape), []
+        for one in implied:
+            before += [height] if self._sums else []
+            height = np.asarray(self._join(height, one))
+        return Joined(degrees, implied, before, height)
+
+    def heights(self, places: Array, cuts: Array) -> Joined:
+        """Return heights at places of any shape, for cuts that fit it."""
+        return self.joined(
+            [self._degrees(t, places.ravel()).reshape(places.shape) for t in range(len(self._shapes))], cuts
+        )
+
+    def _degrees(self, t: int, places: Array) -> Array:
+        """Return degrees of a term; where operators jump at 0 and 1, those that only round to these are within them."""
+        degrees = self._shapes[t].of_many(places)
+        if not self._drastic:
+            return degrees
+        panels = np.clip(np.searchsorted(self.edges, places) - 1, 0, len(self.edges) - 2)
+        within = ~self._constant[t][panels] & (self.edges[panels + 1] != places) & (places != self.low)
+        return np.where(within, np.clip(degrees, 1e-300, 1.0 - 2.0**-53), degrees)
+
+    def tabled(self, rows: Indices, panels: Indices, cuts: Array) -> Joined:
+        """Return heights at the points of the terms' own panels."""
+        return self.joined([table[panels] for table in self._table], cuts[:, rows][..., None])
+
+    def level(self, event: int, cuts: Array) -> Array:
+        """Return the degree at which a slot's height bends."""
+        i, is_cut = self._levels[event]
+        return np.asarray(cuts[i] if is_cut else 1.0 - cuts[i])
+
+    def margins(self, of: Joined, cuts: Array, kinds: Indices, one: Indices, other: Indices) -> Array:
+        """Return for each place a value whose sign changes at its event, for heights of the shape (places,)."""
+        result, places = np.empty(len(kinds)), np.arange(len(kinds))
+        implied = np.array(of.implied)
+        for event in range(len(self._levels)):
+            mine = (kinds == _LEVEL) & (one == event)
+            result[mine] = (of.degrees[self._term[self._levels[event][0]]] - self.level(event, cuts))[mine]
+        pairs, slots = kinds == _PAIR, np.where(kinds == _LEVEL, 0, one)
+        result[pairs] = (implied[slots, places] - implied[other, places])[pairs]
+        if self._sums:
+            first, second = np.array(of.before)[slots, places], implied[slots, places]
+            result[kinds == _FULL] = (first + second - 1.0)[kinds == _FULL]
+            result[kinds == _PASSED] = (second - first)[kinds == _PASSED]
+        return result
+
+    def flat(self, of: Joined, cuts: Array, panels: Indices, greatest: Indices) -> Mask:
+        """Return True for panels of constant height; `greatest` is the slot of the greatest height in the middle."""
+        if not self._max:
+            return np.asarray(np.ptp(of.height, axis=1) <= 4e-16 * of.height.max(axis=1))
+        result = np.zeros(len(panels), dtype=bool)
+        for i, t in enumerate(self._term):
+            constant = self._constant[t][panels]
+            if i in self._clip:
+                constant = constant | (of.degrees[t][:, 4] > self.level(self._clip[i], cuts)[:, 0])
+            result |= constant & (greatest == i)
+        return result
 
 
-class _Joined:
-    """The joined terms of one sample, as a function of the place."""
+class Samples:
+    """The joined terms of n samples, for strengths of an output's slots of the shape (slots, n)."""
 
-    def __init__(self, of: Quadrature, cuts: Sequence[float]) -> None:
-        self.of = of
-        self.active = [i for i, cut in enumerate(cuts) if cut > 0.0]
-        self.cuts = [cuts[i] for i in self.active]
-        self.breaks = self._breaks()
+    def __init__(self, of: Quadrature, cuts: Array) -> None:
+        self.of, self.cuts, self.n = of, cuts, cuts.shape[1]
 
-    def implied(self, degrees: Array) -> Array:
-        """Return the heights of the active slots, each bounded by its cut, shape (slots, ..)."""
-        bounded = [
-            self.of._implications[i](np.full(d.shape, cut), d)
-            for i, cut, d in zip(self.active, self.cuts, degrees, strict=True)
-        ]
-        return np.array(bounded)
-
-    def heights(self, places: Array) -> Array:
-        """Return the joined height at many places, shape (n,)."""
-        height = np.zeros(len(places))
-        for i, cut in zip(self.active, self.cuts, strict=True):
-            height = self.of._join(
-                height, self.of._implications[i](np.full(len(places), cut), self.of._shapes[i].of_many(places))
+    def values(self) -> Array:
+        """Return the value of each sample, shape (n,)."""
+        panels, kind, low = self.panels(), self.of.output.defuzzifier, self.of.low
+        if kind in ("mom", "som", "lom"):
+            return defuzzification.of_maximum(self, panels, kind)
+        areas = np.bincount(panels.rows, panels.areas, self.n).astype(np.float64)
+        some = areas > 0.0
+        if kind == "bisector":
+            result = defuzzification.bisectors(self, panels, areas)
+        else:
+            moments = np.bincount(panels.rows, panels.moments, self.n)
+            result = np.clip(
+                low + np.divide(moments, areas, out=np.zeros(self.n), where=some), *self.of.output.universe
             )
-        return height
+        for row in np.flatnonzero(~some).tolist():
+            result[row] = defuzzification.of_points(self.of, self.cuts[:, row])
+        return result
 
-    def _signs(self) -> list[tuple[int, int]]:
-        """Return the events that can bend the joined terms: (slot, slot or `_CUT`, `_REST`, `_FULL`, `_PASSED`)."""
-        signs: list[tuple[int, int]] = []
-        for a, i in enumerate(self.active):
-            implication = self.of._slots[i].implication
-            signs += [(a, _CUT)] if implication in ("min", "nilpotent_minimum") else []
-            signs += [(a, _REST)] if implication in ("bounded_difference", "nilpotent_minimum") else []
-        aggregation = self.of._output.aggregation
-        for a in range(1, len(self.active)):
-            signs += [(a, b) for b in range(a)] if aggregation == "max" else []
-            signs += [(a, _FULL)] if aggregation in ("bounded_sum", "normalized_sum", "nilpotent_maximum") else []
-            signs += [(a, _PASSED)] if aggregation == "nilpotent_maximum" else []
-        return signs
+    def heights(self, places: Array, rows: Indices) -> Joined:
+        """Return heights at places of some samples, shape (rows,) or (rows, points)."""
+        cuts = self.cuts[:, rows]
+        return self.of.heights(places, cuts if places.ndim == 1 else cuts[..., None])
 
-    def _bends(self, signs: Sequence[tuple[int, int]], degrees: Array, implied: Array) -> Array:
-        """Return values whose sign changes where the joined terms bend, one for each event, shape (signs, ..)."""
-        bends = np.empty((len(signs), *degrees.shape[1:]))
-        before = [np.zeros(degrees.shape[1:])]  # joined height of the slots before each
-        if any(b in (_FULL, _PASSED) for _, b in signs):
-            for height in implied[:-1]:
-                before.append(self.of._join(before[-1], height))
-        for row, (a, b) in zip(bends, signs, strict=True):
-            if b == _CUT:
-                row[...] = degrees[a] - self.cuts[a]
-            elif b == _REST:
-                row[...] = degrees[a] + self.cuts[a] - 1.0
-            elif b == _FULL:
-                row[...] = before[a] + implied[a] - 1.0
-            else:
-                row[...] = implied[a] - (before[a] if b == _PASSED else implied[b])
-        return bends
-
-    def _breaks(self) -> Array:
-        of = self.of
-        scanned, signs = of._scanned[self.active], self._signs()
-        implied = self.implied(scanned)
-        bends = self._bends(signs, scanned, implied)
-        above = bends >= 0.0
-        changes = above[..., 1:] != above[..., :-1]
-        if of._output.aggregation == "max":  # slots below the greatest do not matter
-            top = implied >= implied.max(axis=0) * _EQUAL
-            seen = top[..., 1:] | top[..., :-1]
-            changes &= np.array([seen[a] | seen[b if b >= 0 else a] for a, b in signs]).reshape(changes.shape)
-        which, part, at = np.nonzero(changes)
-        if len(which) == 0:
-            return of._knots
-        asked = [signs[i] for i in np.unique(which)]
-        rows = np.searchsorted(np.unique(which), which)
-        x0, x1 = of._scan[part, at], of._scan[part, at + 1]
-        f0, f1 = bends[which, part, at], bends[which, part, at + 1]
-        x = x0
-        for _ in range(60):  # regula falsi, in which an end that stays counts half
-            x, before = (x0 * f1 - x1 * f0) / (f1 - f0), x
-            x = np.where((x0 <= x) & (x <= x1), x, (x0 + x1) / 2)
-            if np.abs(x - before).max() <= _NEAR * of._width:
+    def panels(self) -> Panels:
+        """Return panels in which the joined terms are smooth."""
+        of, done, total = self.of, [], np.zeros(self.n)
+        rows, own = np.divmod(np.arange(self.n * (len(of.edges) - 1)), len(of.edges) - 1)
+        starts, ends = of.edges[own], of.edges[own + 1]
+        narrowest = NARROWEST * max(abs(of.low), abs(of.low + of.width), of.width)
+        for turn in range(_ROUNDS + 1):
+            places = points_of(starts, ends)
+            joined = self.heights(places, rows) if turn else of.tabled(rows, own, self.cuts)
+            inner, half = np.ascontiguousarray(joined.height[:, INNER]), (ends - starts) / 2
+            areas = (inner * WEIGHTS).sum(axis=-1) * half
+            moments = (inner * WEIGHTS * (places[:, INNER] - of.low)).sum(axis=-1) * half
+            whole = total + np.bincount(rows, areas, self.n)
+            items, at, greatest = self._bends(joined, rows, starts, ends, places)
+            errors = mean_errors(joined.height)
+            good = errors * 2 * half <= _TOLERANCE * whole[rows]
+            good |= (errors <= _NOISE * inner.max(axis=1)) | (errors <= of.noise) | (ends - starts <= narrowest)
+            good |= errors * half <= np.ptp(inner, axis=1) * of.precision  # rounding of places
+            good[items] = True
+            rough = np.flatnonzero(~good)
+            items, at = np.concatenate([items, rough]), np.concatenate([at, (starts[rough] + ends[rough]) / 2])
+            if turn == _ROUNDS:
+                items, at = items[:0], at[:0]
+            kept = np.ones(len(rows), dtype=bool)
+            kept[items] = False
+            flat = of.flat(joined, self.cuts[:, rows][..., None], own, greatest)
+            done.append(Panels(rows, starts, ends, joined.height, flat, areas, moments).chosen(kept))
+            total = total + np.bincount(rows[kept], areas[kept], self.n)
+            if len(items) == 0:
                 break
-            degrees = np.array([of._shapes[i].of_many(x) for i in self.active])
-            f = self._bends(asked, degrees, self.implied(degrees))[rows, np.arange(len(x))]
-            right = (f >= 0.0) == (f1 >= 0.0)
-            f0, f1 = np.where(right, f0 / 2, f), np.where(right, f, f1 / 2)
-            x0, x1 = np.where(right, x0, x), np.where(right, x, x1)
-        return np.unique(np.concatenate([of._knots, x]))
-
-    def _integrals(self, starts: Array, ends: Array) -> tuple[Array, Array]:
-        middle, half = (starts + ends) / 2, (ends - starts) / 2
-        places = middle + _NODES * half
-        heights = self.heights(places.ravel()).reshape(places.shape) * _WEIGHTS
-        return heights.sum(axis=0) * half, (heights * (places - self.of._low)).sum(axis=0) * half
-
-    def parts(self) -> Parts:
-        """Return area and moment of each part, halved until their sum is within the tolerance."""
-        starts, ends = self.breaks[:-1], self.breaks[1:]
-        areas, moments = self._integrals(starts, ends)
-        done: list[Parts] = []
-        whole, count = areas.sum(), 0
-        for _ in range(_HALVINGS):
-            middles = (starts + ends) / 2
-            left, right = self._integrals(starts, middles), self._integrals(middles, ends)
-            off = np.abs(left[0] + right[0] - areas) * self.of._width + np.abs(left[1] + right[1] - moments)
-            good = off <= _TOLERANCE * whole * self.of._width
-            halves = Parts(
-                *(
-                    np.concatenate(pair)
-                    for pair in ((starts, middles), (middles, ends), (left[0], right[0]), (left[1], right[1]))
-                )
-            )
-            twice = np.concatenate([good, good])
-            done.append(Parts(*(column[twice] for column in halves)))
-            starts, ends, areas, moments = (column[~twice] for column in halves)
-            count += len(starts)
-            if len(starts) == 0:
-                break
-            if count > _MAX_PARTS:
+            if len(items) > _MAX_PANELS * self.n:
                 raise EngineError(
-                    f"output {self.of._output.name!r}: its joined terms are too rough to be integrated to {BOUND:g} of "
+                    f"output {of.output.name!r}: its joined terms are too rough to be integrated to {BOUND:g} of "
                     "its universe; expected smoother terms"
                 )
-        done.append(Parts(starts, ends, areas, moments))
-        joined = Parts(*map(np.concatenate, zip(*done, strict=True)))
-        order = np.argsort(joined.starts)
-        return Parts(*(column[order] for column in joined))
+            parents, starts, ends = dividing(items, at, starts, ends)
+            rows, own = rows[parents], own[parents]
+        return Panels(*map(np.concatenate, zip(*done, strict=True)))
 
-    def of_points(self) -> float:
-        """Return the mean of the singletons, weighted by their heights: what very narrow terms of one width tend to."""
-        found = [
-            (shape.parameters[0], float(self.of._implications[i](np.array([cut]), np.array([shape.height]))[0]))
-            for i, cut in zip(self.active, self.cuts, strict=True)
-            if isinstance(shape := self.of._shapes[i], Curve) and shape.kind == "singleton"
-        ]
-        weight = sum(height for _, height in found)
-        return sum(place * height for place, height in found) / weight if weight > 0.0 else float("nan")
+    def _bends(
+        self, joined: Joined, rows: Indices, starts: Array, ends: Array, places: Array
+    ) -> tuple[Indices, Array, Indices]:
+        """Return panels and the places in them where the joined terms bend, and the greatest slot of each panel."""
+        of, cuts = self.of, self.cuts[:, rows][..., None]
+        wide = ends - starts > NARROWEST * 10 * of.width
+        found: list[Events] = []
+        near: list[tuple[Indices, Array]] = []
+        who = np.zeros(joined.height.shape, dtype=np.intp)
+        if of._max:
+            top = np.zeros(joined.height.shape)
+            for i, height in enumerate(joined.implied):
+                np.copyto(who, i, where=height > top)
+                np.maximum(top, height, out=top)
+            self._passes(joined, who, wide, found)
+        for event, (i, clips) in enumerate(of._levels):
+            margin = joined.degrees[of._term[i]] - of.level(event, cuts)
+            above = margin > 0.0  # not where it rounds to its cut, as a curve at its top does
+            change = (above[:, 1:] != above[:, :-1]) & (wide & (cuts[i, :, 0] > 0.0))[:, None]
+            if of._max:
+                mine = who == i
+                # below a level other than its cut a slot is 0, so that none is the greatest
+                change &= mine[:, 1:] & mine[:, :-1] if clips and not of._jumps else mine[:, 1:] | mine[:, :-1]
+            self._add(found, change, _LEVEL, event)
+            if of._turning[event]:
+                near.append(self._nearing(np.abs(margin), wide & ~change.any(axis=1), 1.0))
+        for i in range(1, len(joined.before)):
+            before, one = joined.before[i], joined.implied[i]
+            for kind, margin in ((_FULL, before + one - 1.0), (_PASSED, one - before)):
+                if kind == _FULL or of.output.aggregation == "nilpotent_maximum":
+                    above = margin >= 0.0
+                    change = (above[:, 1:] != above[:, :-1]) & (wide & (cuts[i, :, 0] > 0.0))[:, None]
+                    self._add(found, change, kind, i)
+                    near.append(self._nearing(np.abs(margin), wide & ~change.any(axis=1), 1.0))
+        if of._max and len(joined.implied) > 1:
+            scale = joined.height.max(axis=1)
+            for i, height in enumerate(joined.implied):
+                below = joined.height - height
+                apart = wide & (who != i).all(axis=1) & (below.min(axis=1) < _CLOSE * scale) & (cuts[i, :, 0] > 0.0)
+                near.append(self._nearing(below, apart, scale))
+        items, at = self._located(found, rows, places)
+        inside = (at > starts[items]) & (at < ends[items])
+        items, at = items[inside], at[inside]
+        for panels, share in near:
+            items = np.concatenate([items, panels])
+            at = np.concatenate([at, (starts[panels] + ends[panels]) / 2 + share * (ends[panels] - starts[panels]) / 2])
+        return items, at, who[:, 4]
 
-    def bisector(self, parts: Parts) -> float:
-        """Return the place that halves the area; of several the middle one."""
-        sums = np.cumsum(parts.areas)
-        half = sums[-1] / 2
-        i = int(np.searchsorted(sums, half * (1.0 - 1e-14)))
-        start, end = parts.starts[i], parts.ends[i]
-        missing = half - (sums[i] - parts.areas[i])
-        if abs(missing - parts.areas[i]) <= 1e-14 * half:  # at its end, perhaps of a gap
-            after = parts.starts[i + 1 :][parts.areas[i + 1 :] > 0.0]
-            return float((end + after[0]) / 2) if len(after) else float(end)
-        x0, x1, f0, f1 = start, end, -missing, parts.areas[i] - missing
-        x = start
-        for _ in range(100):
-            x, before = (x0 * f1 - x1 * f0) / (f1 - f0), x
-            if abs(x - before) <= 1e-15 * self.of._width:
-                break
-            f = self._integrals(np.array([start]), np.array([x]))[0][0] - missing
-            if f > 0.0:
-                x1, f1, f0 = x, f, f0 / 2
-            else:
-                x0, f0, f1 = x, f, f1 / 2
-        return float(x)
+    def _passes(self, joined: Joined, who: Indices, wide: Mask, found: list[Events]) -> None:
+        """Find the points after which another slot is the greatest."""
+        items, first = np.nonzero((who[:, 1:] != who[:, :-1]) & wide[:, None])
+        if len(items) == 0:
+            return
+        a, b = who[items, first], who[items, first + 1]
+        implied = np.array([height[items] for height in joined.implied])
+        order = np.arange(len(items))
+        p = implied[a, order, first], implied[b, order, first]
+        q = implied[a, order, first + 1], implied[b, order, first + 1]
+        apart = (p[1] < p[0] * (1.0 - _TIED)) & (q[0] < q[1] * (1.0 - _TIED))
+        items, first, a, b = items[apart], first[apart], a[apart], b[apart]
+        found.append(Events(items, first, np.full(len(items), _PAIR), a, b))
 
-    def of_maximum(self, kind: str) -> float:
-        """Return the mean, the smallest or the largest of the places where the height is greatest."""
-        starts, ends = self.breaks[:-1], self.breaks[1:]
-        shares = np.linspace(_BESIDE, 1.0 - _BESIDE, 33)
-        places = starts + shares[:, None] * (ends - starts)
-        heights = self.heights(places.ravel()).reshape(places.shape)
-        at_breaks = self.heights(self.breaks)
-        greatest = max(heights.max(), at_breaks.max())
-        if not greatest > 0.0:
-            return float("nan")
-        flat = heights.min(axis=0) >= heights.max(axis=0) * _EQUAL
-        points, tops = [self.breaks], [at_breaks]
-        a, b = starts[~flat], ends[~flat]
-        if len(a):
-            for _ in range(14):  # each closes in on the greatest of 17 places
-                near = a + np.linspace(0.0, 1.0, 17)[:, None] * (b - a)
-                found = self.heights(near.ravel()).reshape(near.shape)
-                top = found >= found.max(axis=0) * (1.0 - 1e-15)
-                order = np.arange(17)[:, None]
-                first = np.where(top, order, 17).min(axis=0)
-                last = np.where(top, order, -1).max(axis=0)
-                columns = np.arange(len(a))
-                a, b = near[np.maximum(first - 1, 0), columns], near[np.minimum(last + 1, 16), columns]
-            points.append((a + b) / 2)
-            tops.append(self.heights(points[-1]))
-            greatest = max(greatest, tops[-1].max())
-        places, heights_found = np.concatenate(points), np.concatenate(tops)
-        singles = np.unique(places[heights_found >= greatest * _EQUAL])
-        level = flat & (heights.max(axis=0) >= greatest * _EQUAL)
-        left, right = starts[level], ends[level]
-        if kind == "som":
-            return float(min([*singles, *left]))
-        if kind == "lom":
-            return float(max([*singles, *right]))
-        length = (right - left).sum()
-        if length > 1e-9 * self.of._width:
-            return float(((left + right) / 2 * (right - left)).sum() / length)
-        apart = np.diff(singles, prepend=-np.inf) > 1e-9 * self.of._width
-        return float(singles[apart].mean())
+    @staticmethod
+    def _add(found: list[Events], change: Mask, kind: int, one: int) -> None:
+        items, first = np.nonzero(change)
+        if len(items):
+            found.append(Events(items, first, *(np.full(len(items), x) for x in (kind, one, 0))))
+
+    @staticmethod
+    def _nearing(values: Array, chosen: Mask, scale: Array | float) -> tuple[Indices, Array]:
+        """Return the panels, of some, where values may come to 0 between two points, and the places from -1 to 1."""
+        chosen = chosen & (values.min(axis=1) < _CLOSE * scale)
+        items = np.flatnonzero(chosen)
+        if len(items) == 0:
+            return items, np.zeros(0)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            near, share = lowest_between(values[items] / np.broadcast_to(scale, len(values))[items][:, None])
+        return items[near], share[near]
+
+    def _located(self, found: Sequence[Events], rows: Indices, places: Array) -> tuple[Indices, Array]:
+        """Return the panels of events, and their places."""
+        if not found:
+            return np.zeros(0, dtype=np.intp), np.zeros(0)
+        events = Events(*map(np.concatenate, zip(*found, strict=True)))
+
+        def margin(x: Array, which: Indices) -> Array:
+            cuts = self.cuts[:, rows[events.items[which]]]
+            joined = self.of.heights(x, cuts)
+            return self.of.margins(joined, cuts, events.kinds[which], events.one[which], events.other[which])
+
+        x0, x1 = places[events.items, events.first], places[events.items, events.first + 1]
+        at, ok = roots(margin, x0, x1, self.of.precision)
+        return events.items[ok], at[ok]

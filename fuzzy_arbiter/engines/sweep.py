@@ -16,14 +16,17 @@ The functions work on floats and on fractions alike; Numba compiles them as they
 
 from __future__ import annotations
 
+from bisect import bisect_left, bisect_right, insort
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from fuzzy_arbiter.definition import Variable
+from fuzzy_arbiter.errors import EngineError
 
 Numbers = Sequence[Any]  # all floats, or all fractions
 TINY = 1e-120  # if no cut is greater, all are scaled up alike: the centroid stays, and nothing underflows
 LARGER = 2.0**266  # factor of that scaling
+MAX_LINES = 200_000  # greatest number of lines of an outline
 
 
 class Outline(NamedTuple):
@@ -33,13 +36,19 @@ class Outline(NamedTuple):
     ----------
     places : tuple of float, length pieces + 1
         Knots of the variable.
-    left, right : tuple of float, length pieces * terms
-        Degree of each term just right of each piece's start, and just left of its end; by piece.
-    order : tuple of int, length pieces * terms
-        The terms of each piece, the highest first.
+    first : tuple of int, length pieces + 1
+        Index of each piece's first line, and the number of lines; a term that is 0 in a piece has no line there.
+    term : tuple of int, length lines
+        Term of each line, in rising order within a piece.
+    left, right : tuple of float, length lines
+        Degree just right of the piece's start, and just left of its end.
+    order : tuple of int, length lines
+        Indices of each piece's lines, the highest first.
     """
 
     places: tuple[Any, ...]
+    first: tuple[int, ...]
+    term: tuple[int, ...]
     left: tuple[Any, ...]
     right: tuple[Any, ...]
     order: tuple[int, ...]
@@ -59,30 +68,73 @@ def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outli
     -------
     Outline
         Outline in numbers of that type.
+
+    Raises
+    ------
+    EngineError
+        If the terms overlap in so many places that the outline has more than `MAX_LINES` lines.
     """
     knots = tuple(map(number, variable.knots))
-    shapes = [[(number(x), number(y)) for x, y in term.straight.points] for term in variable.terms]
-    places, left, right, order = [knots[0]], [], [], []
-    for a, b in zip(knots, knots[1:], strict=False):
-        starts, ends = [], []
-        for points in shapes:
-            # the last point before and the first one after, so that at a jump each piece sees its own side
-            before = [p for p in points if p[0] <= a] or points[:1]
-            after = [p for p in points if p[0] >= b] or points[-1:]
-            (x0, y0), (x1, y1) = before[-1], after[0]
-            slope = (y1 - y0) / (x1 - x0) if x0 < x1 else y1 - y1
-            starts.append(y0 + slope * (a - x0) if x0 < a else y0)
-            ends.append(y1 + slope * (b - x1) if b < x1 else y1)
+    places, first, left, right = [knots[0]], [0], list[Any](), list[Any]()
+    term, order = list[int](), list[int]()
+    for a, b, lines in zip(knots, knots[1:], _lines(variable, knots, number), strict=False):
+        terms, starts, ends = ([line[k] for line in lines] for k in range(3))
         # parts in which no two lines meet
-        meet = (_meeting(starts, ends, t, u) for t in range(len(starts)) for u in range(t))
-        shares = sorted({starts[0] * 0, starts[0] * 0 + 1, *(share for share in meet if share is not None)})
+        meet = (_meeting(starts, ends, t, u) for t, u in _passing(starts, ends, variable.name))
+        shares = sorted({knots[0] * 0, knots[0] * 0 + 1, *(share for share in meet if share is not None)})
         for s0, s1 in zip(shares, shares[1:], strict=False):
             at, to = _between(starts, ends, s0), _between(starts, ends, s1)
             places.append(b if s1 == 1 else a + s1 * (b - a))
+            order += sorted(
+                range(len(left), len(left) + len(at)), key=lambda i: -(at[i - first[-1]] + to[i - first[-1]])
+            )
+            term += terms
             left += at
             right += to
-            order += sorted(range(len(at)), key=lambda t: -(at[t] + to[t]))
-    return Outline(tuple(places), tuple(left), tuple(right), tuple(order))
+            first.append(len(left))
+            _require_few(len(left), variable.name)
+    return Outline(*map(tuple, (places, first, term, left, right, order)))
+
+
+def _lines(variable: Variable, knots: Numbers, number: Callable[[float], Any]) -> list[list[tuple[int, Any, Any]]]:
+    """Return for each interval between knots the terms that are not 0 there, and their degrees at its ends."""
+    result: list[list[tuple[int, Any, Any]]] = [[] for _ in knots[1:]]
+    count = 0
+    for t, each in enumerate(variable.terms):
+        points = [(number(x), number(y)) for x, y in each.straight.points]
+        # between two points, so that at a jump each interval sees its own side; constant before and after them
+        parts = [(points[0], points[0]), *zip(points, points[1:], strict=False), (points[-1], points[-1])]
+        for i, ((x0, y0), (x1, y1)) in enumerate(parts):
+            if y0 == 0 and y1 == 0:
+                continue
+            low = bisect_left(knots, x0) if i else 0
+            high = bisect_left(knots, x1) if i < len(parts) - 1 else len(knots)
+            slope = (y1 - y0) / (x1 - x0) if x0 < x1 else y1 - y1
+            for k in range(low, min(high, len(knots) - 1)):
+                a, b = knots[k], knots[k + 1]
+                start, end = y0 + slope * (a - x0) if x0 < a else y0, y1 + slope * (b - x1) if b < x1 else y1
+                if start != 0 or end != 0:
+                    result[k].append((t, start, end))
+                    count += 1
+        _require_few(count, variable.name)
+    return result
+
+
+def _passing(starts: Numbers, ends: Numbers, name: str) -> list[tuple[int, int]]:
+    """Return the pairs of lines, the later first, of which one is higher at the start and the other at the end."""
+    result: list[tuple[int, int]] = []
+    seen: list[tuple[Any, int]] = []  # ends of the lines that start lower, in rising order
+    for t in sorted(range(len(starts)), key=lambda t: (starts[t], ends[t])):
+        passed = seen[bisect_right(seen, (ends[t], len(starts))) :]
+        result += [(max(t, u), min(t, u)) for _, u in passed]
+        insort(seen, (ends[t], t))
+        _require_few(len(result), name)
+    return result
+
+
+def _require_few(lines: int, name: str) -> None:
+    if lines > MAX_LINES:
+        raise EngineError(f"output {name!r}: its terms overlap in {lines} places or more, expected at most {MAX_LINES}")
 
 
 def _meeting(starts: Numbers, ends: Numbers, t: int, u: int) -> Any:
@@ -98,14 +150,22 @@ def _between(starts: Numbers, ends: Numbers, share: Any) -> list[Any]:
     return [b if share == 1 else a + share * (b - a) for a, b in zip(starts, ends, strict=True)]
 
 
-def clipped(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, order: Sequence[int]) -> tuple[Any, Any]:
+def clipped(
+    cuts: Numbers,
+    places: Numbers,
+    first: Sequence[int],
+    term: Sequence[int],
+    left: Numbers,
+    right: Numbers,
+    order: Sequence[int],
+) -> tuple[Any, Any]:
     """Return the area under the envelope of clipped terms, and its moment.
 
     Parameters
     ----------
     cuts : sequence of float, length terms
         Degree at which each term is clipped.
-    places, left, right, order
+    places, first, term, left, right, order
         Parts of an `Outline`.
 
     Returns
@@ -117,17 +177,16 @@ def clipped(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, order
     """
     zero = cuts[0] * 0
     one = zero + 1
-    terms = len(cuts)
     area = moment = zero
     for piece in range(len(places) - 1):
-        first = piece * terms
         width = places[piece + 1] - places[piece]
         start = places[piece] - places[0]
         below = zero  # the greatest cut of the lines above
-        for i in range(terms):
-            t = order[first + i]
+        for i in range(first[piece], first[piece + 1]):
+            line = order[i]
+            t = term[line]
             if cuts[t] > below:
-                a, b = left[first + t], right[first + t]
+                a, b = left[line], right[line]
                 low, high = min(a, b), max(a, b)  # a falling line is treated as the mirrored rising one
                 y0 = max(min(cuts[t], low), below)
                 y1 = max(min(cuts[t], high), below)
@@ -145,14 +204,16 @@ def clipped(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, order
     return area, moment
 
 
-def scaled(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers) -> tuple[Any, Any]:
+def scaled(
+    cuts: Numbers, places: Numbers, first: Sequence[int], term: Sequence[int], left: Numbers, right: Numbers
+) -> tuple[Any, Any]:
     """Return the area under the envelope of scaled terms, and its moment.
 
     Parameters
     ----------
     cuts : sequence of float, length terms
         Degree by which each term is scaled.
-    places, left, right
+    places, first, term, left, right
         Parts of an `Outline`.
 
     Returns
@@ -162,18 +223,16 @@ def scaled(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers) -> tup
     """
     zero = cuts[0] * 0
     one = zero + 1
-    terms = len(cuts)
     area = moment = zero
     for piece in range(len(places) - 1):
-        first = piece * terms
         width = places[piece + 1] - places[piece]
         start = places[piece] - places[0]
         # where the envelope may break, in shares of the piece
         breaks = [zero, one]
-        for t in range(terms):
-            for u in range(t):
-                a, b = left[first + t] * cuts[t], right[first + t] * cuts[t]
-                c, d = left[first + u] * cuts[u], right[first + u] * cuts[u]
+        for i in range(first[piece], first[piece + 1]):
+            for j in range(first[piece], i):
+                a, b = left[i] * cuts[term[i]], right[i] * cuts[term[i]]
+                c, d = left[j] * cuts[term[j]], right[j] * cuts[term[j]]
                 if (a < c) != (b < d):  # so that the two differences have not one sign, nor are both 0
                     breaks.append((a - c) / ((a - c) - (b - d)))
         breaks.sort()
@@ -182,8 +241,8 @@ def scaled(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers) -> tup
             if x0 < x1:
                 # the middle shows which line is the greatest; at an end it would be lost to rounding
                 height = y0 = y1 = zero
-                for t in range(terms):
-                    a, rise, cut = left[first + t], right[first + t] - left[first + t], cuts[t]
+                for i in range(first[piece], first[piece + 1]):
+                    a, rise, cut = left[i], right[i] - left[i], cuts[term[i]]
                     degree = (a + rise * ((x0 + x1) / 2)) * cut
                     if degree > height:
                         height, y0, y1 = degree, (a + rise * x0) * cut, (a + rise * x1) * cut
@@ -194,14 +253,23 @@ def scaled(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers) -> tup
     return area, moment
 
 
-def centroid(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, order: Sequence[int], scales: bool) -> Any:
+def centroid(
+    cuts: Numbers,
+    places: Numbers,
+    first: Sequence[int],
+    term: Sequence[int],
+    left: Numbers,
+    right: Numbers,
+    order: Sequence[int],
+    scales: bool,
+) -> Any:
     """Return the centroid of clipped (or scaled) terms, joined by their maximum.
 
     Parameters
     ----------
     cuts : sequence of float, length terms
         Degree at which each term is clipped; not all are 0.
-    places, left, right, order
+    places, first, term, left, right, order
         Parts of an `Outline`.
     scales : bool
         True if a cut scales its term, False if it clips it.
@@ -217,13 +285,13 @@ def centroid(cuts: Numbers, places: Numbers, left: Numbers, right: Numbers, orde
     if largest < TINY:
         larger = [cut * LARGER for cut in cuts]
         if scales:
-            area, moment = scaled(larger, places, left, right)
+            area, moment = scaled(larger, places, first, term, left, right)
         else:
-            area, moment = clipped(larger, places, left, right, order)
+            area, moment = clipped(larger, places, first, term, left, right, order)
     elif scales:
-        area, moment = scaled(cuts, places, left, right)
+        area, moment = scaled(cuts, places, first, term, left, right)
     else:
-        area, moment = clipped(cuts, places, left, right, order)
+        area, moment = clipped(cuts, places, first, term, left, right, order)
     return places[0] + moment / area
 
 

@@ -8,7 +8,7 @@ from importlib.resources import files
 
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.export.functions import in_c
-from fuzzy_arbiter.export.program import Assign, Choose, Program, Return, Statement, Sweep, program
+from fuzzy_arbiter.export.program import TABLES, Assign, Choose, Program, Return, Statement, Sweep, program
 
 
 def to_c(system: System) -> str:
@@ -61,8 +61,8 @@ def _file(code: Program) -> Iterator[str]:
                 continue
             name = _safe(system.outputs[k - 1].name)
             yield f"\n/* knots of the terms of {name}, and degrees right and left of them */"
-            for table, side in zip(("PLACES", "LEFT", "RIGHT", "ORDER"), shape, strict=True):
-                kind = "int" if table == "ORDER" else "double"
+            for table, side in zip(TABLES, shape, strict=True):
+                kind = "int" if table in ("FIRST", "TERM", "ORDER") else "double"
                 yield f"static const {kind} {table}_{k}[] = {{{', '.join(map(repr, side))}}};"
         terms = max(len(output.terms) for output in system.outputs)
         if "centroid_of_scaled(" in text:
@@ -106,7 +106,7 @@ def _block(
                 yield f"{indent}{kind}{name} = {expression};" + (f" /* {_safe(words)} */" if words else "")
             case Sweep(name, k, cuts, scales):
                 pieces = f"sizeof PLACES_{k} / sizeof *PLACES_{k} - 1"
-                tables = f"{pieces}, PLACES_{k}, LEFT_{k}, RIGHT_{k}, ORDER_{k}"
+                tables = f"{pieces}, {', '.join(f'{table}_{k}' for table in TABLES)}"
                 yield f"{indent}const double cuts_{k}[] = {{{', '.join(cuts)}}};"
                 function = f"centroid_of_{'scaled' if scales else 'clipped'}"
                 yield f"{indent}{name} = {function}(cuts_{k}, {len(cuts)}, {tables});"

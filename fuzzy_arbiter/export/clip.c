@@ -2,7 +2,8 @@
 /* Returns the centroid of clipped terms, aggregated by maximum; not all cuts are 0. In each piece the lines of the terms
    have one order, the highest first; each adds the area between the cuts of those before it and its own. */
 static double centroid_of_clipped(const double *cuts, int terms, int pieces, const double *places,
-                                  const double *left, const double *right, const int *order)
+                                  const int *first, const int *term, const double *left, const double *right,
+                                  const int *order)
 {
     double largest = 0.0, larger = 1.0, area = 0.0, moment = 0.0;
     for (int t = 0; t < terms; t++) {
@@ -11,10 +12,10 @@ static double centroid_of_clipped(const double *cuts, int terms, int pieces, con
     if (largest < 1e-120) {
         larger = 0x1p266; /* scales all cuts if the greatest is tiny: the centroid stays, nothing underflows */
     }
-    for (int piece = 0; piece < pieces; piece++, left += terms, right += terms, order += terms) {
+    for (int piece = 0; piece < pieces; piece++) {
         double width = places[piece + 1] - places[piece], start = places[piece] - places[0], below = 0.0;
-        for (int i = 0; i < terms; i++) {
-            double cut = cuts[order[i]] * larger, a = left[order[i]], b = right[order[i]];
+        for (int i = first[piece]; i < first[piece + 1]; i++) {
+            double cut = cuts[term[order[i]]] * larger, a = left[order[i]], b = right[order[i]];
             if (cut > below) {
                 double low = a < b ? a : b, high = a > b ? a : b, s0 = 0.0, s1 = 0.0;
                 double y0 = cut < low ? cut : low, y1 = cut < high ? cut : high;

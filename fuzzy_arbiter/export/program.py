@@ -32,6 +32,7 @@ from fuzzy_arbiter.terms.values import Formula, Value
 
 _JOINS = {name: norm.code for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
 _DEEPEST = 20  # greatest number of nested parentheses; parsers accept some hundred
+TABLES = tuple(map(str.upper, Outline._fields))  # names of an outline's tables in code
 _LONGEST = 16  # greatest number of branches of one choice; parsers accept some hundred
 
 

@@ -8,9 +8,8 @@ from collections.abc import Iterator, Sequence
 from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.engines import sweep
 from fuzzy_arbiter.export.functions import in_python
-from fuzzy_arbiter.export.program import Assign, Choose, Program, Return, Statement, Sweep, program
+from fuzzy_arbiter.export.program import TABLES, Assign, Choose, Program, Return, Statement, Sweep, program
 
-_TABLES = ("PLACES", "LEFT", "RIGHT", "ORDER")
 _MATH = """
 import math
 from math import inf as INFINITY
@@ -78,7 +77,7 @@ def _module(code: Program) -> Iterator[str]:
             if shape is None:
                 continue
             yield f"\n# knots of the terms of {system.outputs[k - 1].name}, and degrees right and left of them"
-            yield from (f"{name}_{k} = {side!r}" for name, side in zip(_TABLES, shape, strict=True))
+            yield from (f"{name}_{k} = {side!r}" for name, side in zip(TABLES, shape, strict=True))
         for function in (sweep.clipped, sweep.scaled, sweep.centroid):
             yield f"\n\n{inspect.getsource(function).rstrip()}"
     yield "\n\ndef evaluate(inputs, outputs):"
@@ -96,7 +95,7 @@ def _block(statements: Sequence[Statement], system: System, indent: str) -> Iter
             case Assign(name, expression, words):
                 yield f"{indent}{name} = {expression}" + (f"  # {words}" if words else "")
             case Sweep(name, k, cuts, scales):
-                tables = f"{', '.join(f'{table}_{k}' for table in _TABLES)}, {scales}"
+                tables = f"{', '.join(f'{table}_{k}' for table in TABLES)}, {scales}"
                 yield f"{indent}{name} = centroid(({', '.join(cuts)},), {tables})"
             case Return(status):
                 yield f"{indent}return {status}"

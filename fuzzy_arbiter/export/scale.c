@@ -11,7 +11,8 @@ static void insert(double *breaks, int n, double place)
 
 /* Returns the centroid of scaled terms, aggregated by maximum; not all cuts are 0. */
 static double centroid_of_scaled(const double *given, int terms, int pieces, const double *places,
-                                 const double *left, const double *right, const int *order)
+                                 const int *first, const int *term, const double *left, const double *right,
+                                 const int *order)
 {
     double cuts[TERMS], largest = 0.0, area = 0.0, moment = 0.0;
     (void)order;
@@ -22,14 +23,15 @@ static double centroid_of_scaled(const double *given, int terms, int pieces, con
         /* scales all cuts if the greatest is tiny: the centroid stays, nothing underflows */
         cuts[t] = largest < 1e-120 ? given[t] * 0x1p266 : given[t];
     }
-    for (int piece = 0; piece < pieces; piece++, left += terms, right += terms) {
+    for (int piece = 0; piece < pieces; piece++) {
         double width = places[piece + 1] - places[piece], start = places[piece] - places[0];
         /* possible kinks of the envelope, as fractions of the piece */
         double breaks[2 + TERMS * TERMS] = {0.0, 1.0};
         int n = 2;
-        for (int t = 0; t < terms; t++) {
-            for (int u = 0; u < t; u++) {
-                double a = left[t] * cuts[t], b = right[t] * cuts[t], c = left[u] * cuts[u], d = right[u] * cuts[u];
+        for (int t = first[piece]; t < first[piece + 1]; t++) {
+            for (int u = first[piece]; u < t; u++) {
+                double a = left[t] * cuts[term[t]], b = right[t] * cuts[term[t]];
+                double c = left[u] * cuts[term[u]], d = right[u] * cuts[term[u]];
                 if ((a < c) != (b < d)) {
                     insert(breaks, n++, (a - c) / ((a - c) - (b - d)));
                 }
@@ -41,12 +43,13 @@ static double centroid_of_scaled(const double *given, int terms, int pieces, con
             if (x0 < x1) {
                 /* the greatest line is that of the middle; at an end rounding would hide it */
                 double height = 0.0, y0 = 0.0, y1 = 0.0, w = (x1 - x0) * width;
-                for (int t = 0; t < terms; t++) {
-                    double rise = right[t] - left[t], degree = (left[t] + rise * ((x0 + x1) / 2)) * cuts[t];
+                for (int t = first[piece]; t < first[piece + 1]; t++) {
+                    double cut = cuts[term[t]], rise = right[t] - left[t];
+                    double degree = (left[t] + rise * ((x0 + x1) / 2)) * cut;
                     if (degree > height) {
                         height = degree;
-                        y0 = (left[t] + rise * x0) * cuts[t];
-                        y1 = (left[t] + rise * x1) * cuts[t];
+                        y0 = (left[t] + rise * x0) * cut;
+                        y1 = (left[t] + rise * x1) * cut;
                     }
                 }
                 area += w * (y0 + y1) / 2;

@@ -10,7 +10,7 @@ from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fcl_reader import system_of
 from fuzzy_arbiter.formats.fcl_terms import say_shape, universe_of
 from fuzzy_arbiter.formats.fcl_words import METHODS, RESERVED, chosen_block, cut
-from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_word, require_words, say_number
+from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_word, require_words, say_number, word_of
 from fuzzy_arbiter.formats.settings import read_settings, say_settings
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Shape
@@ -60,10 +60,12 @@ def write(system: System) -> str:
             "END_DEFUZZIFY",
             "",
         ]
-    accumulations = {AGGREGATIONS[output.aggregation].fcl for output in system.outputs}
+    accumulations = {word_of("fcl", "aggregation", o.aggregation, AGGREGATIONS) for o in system.outputs}
     for k, (operators, rules) in enumerate(blocks(system)):
-        lines += [f"RULEBLOCK rules{k + 1 if k else ''}", f"  AND : {T_NORMS[operators.conjunction].fcl};"]
-        lines += [f"  OR : {S_NORMS[operators.disjunction].fcl};", f"  ACT : {T_NORMS[operators.implication].fcl};"]
+        lines.append(f"RULEBLOCK rules{k + 1 if k else ''}")
+        lines.append(f"  AND : {word_of('fcl', 'conjunction', operators.conjunction, T_NORMS)};")
+        lines.append(f"  OR : {word_of('fcl', 'disjunction', operators.disjunction, S_NORMS)};")
+        lines.append(f"  ACT : {word_of('fcl', 'implication', operators.implication, T_NORMS)};")
         lines += [f"  ACCU : {word};" for word in accumulations if len(accumulations) == 1]
         lines += [f"  RULE {i + 1} : {_say_rule(i, rule)};" for i, rule in rules]
         lines += ["END_RULEBLOCK", ""]
@@ -87,7 +89,7 @@ def _say_output(output: Output, system: System) -> list[str]:
     lines = [f"  METHOD : {method};"]
     # an aggregation that is not that of all outputs is said here, as fuzzylite does
     if len({other.aggregation for other in system.outputs}) > 1:
-        lines.append(f"  ACCU : {AGGREGATIONS[output.aggregation].fcl};")
+        lines.append(f"  ACCU : {word_of('fcl', 'aggregation', output.aggregation, AGGREGATIONS)};")
     lines.append(f"  DEFAULT := {'NC' if output.default is None else say_number(output.default)};")
     locks = [word for word, on in (("PREVIOUS", output.lock_previous), ("RANGE", output.lock_range)) if on]
     return [*lines, *([f"  LOCK : {' | '.join(locks)};"] if locks else []), f"  {_say_range(output)}"]

@@ -8,7 +8,7 @@ from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable, variabl
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fis_reader import read
 from fuzzy_arbiter.formats.fis_words import DEFUZZIFIERS, MATLAB, SETTINGS
-from fuzzy_arbiter.formats.notation import cannot_say, say_number, say_numbers
+from fuzzy_arbiter.formats.notation import cannot_say, say_number, say_numbers, word_of
 from fuzzy_arbiter.formats.settings import say_settings
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 from fuzzy_arbiter.shapes import Shape
@@ -47,21 +47,15 @@ def write(system: System) -> str:
     lines = [f"% {text}" for text in say_settings(system, SETTINGS)]
     lines += ["[System]", f"Name='{system.name}'", f"Type='{kind}'", "Version=2.0"]
     lines += [f"NumInputs={len(system.inputs)}", f"NumOutputs={len(system.outputs)}", f"NumRules={len(system.rules)}"]
-    lines += [f"AndMethod='{T_NORMS[system.conjunction].fis}'", f"OrMethod='{_or(system)}'"]
-    lines += [f"ImpMethod='{T_NORMS[system.implication].fis}'", f"AggMethod='{aggregation}'"]
+    lines += [f"AndMethod='{word_of('fis', 'conjunction', system.conjunction, T_NORMS)}'"]
+    lines += [f"OrMethod='{word_of('fis', 'disjunction', system.disjunction, S_NORMS)}'"]
+    lines += [f"ImpMethod='{word_of('fis', 'implication', system.implication, T_NORMS)}'", f"AggMethod='{aggregation}'"]
     lines += [f"DefuzzMethod='{method}'", ""]
     for kind, variables in (("Input", system.inputs), ("Output", system.outputs)):
         for k, v in enumerate(variables):
             lines += [f"[{kind}{k + 1}]", *_variable(v, system), ""]
     lines += ["[Rules]", *(_rule(system, i) for i in range(len(system.rules)))]
     return "\n".join([*lines, ""])
-
-
-def _or(system: System) -> str:
-    word = S_NORMS[system.disjunction].fis
-    if not word:
-        raise UnsupportedError(f"fis cannot say the disjunction {system.disjunction!r}")
-    return word
 
 
 def _method(system: System) -> tuple[str, str, str]:
@@ -73,7 +67,7 @@ def _method(system: System) -> tuple[str, str, str]:
     ((defuzzifier, aggregation),) = pairs
     method = next(word for word, name in DEFUZZIFIERS.items() if name == defuzzifier)
     if defuzzifier not in WEIGHTED:
-        return "mamdani", method, AGGREGATIONS[aggregation].fis
+        return "mamdani", method, word_of("fis", "aggregation", aggregation, AGGREGATIONS)
     if aggregation != "sum":
         raise UnsupportedError(f"fis cannot say the aggregation {aggregation!r} of values: expected 'sum'")
     values = all(isinstance(term.shape, Value) for output in system.outputs for term in output.terms)

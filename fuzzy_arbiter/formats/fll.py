@@ -7,7 +7,7 @@ from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fll_reader import read
 from fuzzy_arbiter.formats.fll_terms import RESERVED, say_shape
 from fuzzy_arbiter.formats.fll_words import DEFUZZIFIERS, settings_of
-from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_words, say_number, say_numbers
+from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_words, say_number, say_numbers, word_of
 from fuzzy_arbiter.formats.settings import say_settings
 from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
@@ -47,15 +47,18 @@ def write(system: System) -> str:
         lines += [f"OutputVariable: {output.name}", "  enabled: true", f"  range: {say_numbers(output.universe)}"]
         lines += [f"  lock-range: {_truth(output.lock_range)}"]
         lines += [
-            f"  aggregation: {AGGREGATIONS[output.aggregation].fll}",
+            f"  aggregation: {word_of('fll', 'aggregation', output.aggregation, AGGREGATIONS)}",
             f"  defuzzifier: {_defuzzifier(output, system)}",
         ]
         lines += [f"  default: {_default(output)}", f"  lock-previous: {_truth(output.lock_previous)}", *_terms(output)]
     for k, (operators, rules) in enumerate(blocks(system)):
         lines += [f"RuleBlock: rules{k + 1 if k else ''}", "  enabled: true"]
-        lines += [f"  conjunction: {T_NORMS[operators.conjunction].fll}"]
-        lines += [f"  disjunction: {S_NORMS[operators.disjunction].fll}"]
-        lines += [f"  implication: {T_NORMS[operators.implication].fll}", "  activation: General"]
+        lines += [f"  conjunction: {word_of('fll', 'conjunction', operators.conjunction, T_NORMS)}"]
+        lines += [f"  disjunction: {word_of('fll', 'disjunction', operators.disjunction, S_NORMS)}"]
+        lines += [
+            f"  implication: {word_of('fll', 'implication', operators.implication, T_NORMS)}",
+            "  activation: General",
+        ]
         lines += [f"  rule: {_rule(i, rule)}" for i, rule in rules]
     return "\n".join([*lines, ""])
 

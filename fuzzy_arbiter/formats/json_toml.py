@@ -141,7 +141,7 @@ def _options(v: Variable) -> Iterator[tuple[str, Any]]:
     if isinstance(v, Output):
         for key in ("default", "defuzzifier", "aggregation", "lock_range", "lock_previous"):
             plain = next(field.default for field in fields(Output) if field.name == key)
-            if getattr(v, key) != plain:
+            if getattr(v, key) != (v.usual_aggregation if key == "aggregation" else plain):
                 yield key, getattr(v, key)
 
 

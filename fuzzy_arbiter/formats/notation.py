@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
@@ -12,6 +12,7 @@ from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.rule import Operators, Rule
+from fuzzy_arbiter.terms.norms import Norm
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
@@ -212,6 +213,37 @@ def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
         raise UnsupportedError(f"{format} cannot say the name {name!r}: expected letters, digits and _, a letter first")
     if name.lower() in reserved:
         raise UnsupportedError(f"{format} cannot say the name {name!r}: it is a word of the language")
+
+
+def word_of(format: str, what: str, name: str, norms: Mapping[str, Norm]) -> str:
+    """Return a format's word for a norm.
+
+    Parameters
+    ----------
+    format : str
+        Name of the format.
+    what : str
+        Use of the norm, such as ``conjunction``.
+    name : str
+        Name of the norm.
+    norms : mapping from str to Norm
+        Norms that the system may use.
+
+    Returns
+    -------
+    str
+        The word.
+
+    Raises
+    ------
+    UnsupportedError
+        If the format has none.
+    """
+    word: str = getattr(norms[name], format)
+    if not word:
+        known = ", ".join(other for other, norm in norms.items() if getattr(norm, format))
+        raise UnsupportedError(f"{format} cannot say the {what} {name!r}: expected one of {known}")
+    return word
 
 
 def cannot_say(format: str, i: int, rule: Rule, expected: str, what: str = "condition") -> UnsupportedError:

@@ -128,6 +128,16 @@ class Curve(Membership):
         """Return the ends of its pieces within a universe."""
         return tuple(sorted({end for end in self.ends if universe[0] < end < universe[1]}))
 
+    def features(self, universe: tuple[float, float]) -> tuple[float, ...]:
+        """Return its breaks and the places within a universe around which it changes."""
+        places = {*self.ends, *KINDS[self.kind].features(*self.parameters)}
+        return tuple(sorted(x for x in places if universe[0] < x < universe[1]))
+
+    @property
+    def monotonic(self) -> bool:  # type: ignore[override]  # depends on the kind
+        """True if it only rises or only falls between its features."""
+        return KINDS[self.kind].monotonic
+
     def place_of(self, degree: float) -> float:
         """Return the place at which a monotonic curve has a degree, for Tsukamoto's method.
 

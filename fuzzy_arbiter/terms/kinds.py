@@ -33,6 +33,11 @@ class CurveKind:
     inverse : callable, optional
         Function for a kind that only rises or only falls: from the parameters to pieces over the degree ``w``, which
         give the place.
+    features : callable
+        Function from the parameters to places around which the curve changes: between these, and beyond the first and
+        the last, it only rises or only falls, unless `monotonic` is False. Places that are not finite do not count.
+    monotonic : bool
+        False if the curve may turn at places that `features` does not give.
     """
 
     parameters: tuple[str, ...]
@@ -44,6 +49,8 @@ class CurveKind:
     fcl: Word | None = None
     polynomial: bool = False
     inverse: Callable[..., Pieces] | None = None
+    features: Callable[..., list[float]] = lambda *parameters: list(parameters)
+    monotonic: bool = True
 
 
 def _same(count: int) -> tuple[int, ...]:
@@ -113,6 +120,26 @@ def _ellipse(start: float, end: float) -> Pieces:
     return [(min(start, end), "0"), (max(start, end), curve), (_END, "0")]
 
 
+def _around(center: float, scale: float) -> list[float]:
+    """Return places on both sides of a center at which a curve of that scale has changed."""
+    return [center + share * scale for share in (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0)]
+
+
+def _inflection(inflection: float, slope: float) -> list[float]:
+    return _around(inflection, 3.0 / slope) if slope else []
+
+
+def _two_inflections(left: float, rising: float, falling: float, right: float) -> list[float]:
+    return [*_inflection(left, rising), *_inflection(right, falling)]
+
+
+def _product_of_gaussians(mean1: float, deviation1: float, mean2: float, deviation2: float) -> list[float]:
+    """Return the features of both, and the top of their product, which counts where the first mean is the greater."""
+    first, second = deviation1**2, deviation2**2
+    top = (mean1 * second + mean2 * first) / (first + second) if first + second else mean1
+    return [*_around(mean1, deviation1), *_around(mean2, deviation2), top]
+
+
 KINDS: dict[str, CurveKind] = {
     "gaussian": CurveKind(
         ("mean", "deviation"),
@@ -122,6 +149,7 @@ KINDS: dict[str, CurveKind] = {
         fll=("Gaussian", (0, 1)),
         fis=("gaussmf", (1, 0)),
         fcl=("GAUSS", (0, 1)),
+        features=_around,
     ),
     "gaussian2": CurveKind(
         ("mean1", "deviation1", "mean2", "deviation2"),
@@ -134,6 +162,7 @@ KINDS: dict[str, CurveKind] = {
         fll=("GaussianProduct", (0, 1, 2, 3)),
         fis=("gauss2mf", (1, 0, 3, 2)),
         fcl=("GAUSS2", (0, 1, 2, 3)),
+        features=_product_of_gaussians,
     ),
     "bell": CurveKind(
         ("center", "width", "slope"),
@@ -146,6 +175,11 @@ KINDS: dict[str, CurveKind] = {
         fll=("Bell", (0, 1, 2)),
         fis=("gbellmf", (1, 2, 0)),
         fcl=("GBELL", (1, 2, 0)),
+        features=lambda center, width, slope: [
+            center,
+            *_around(center - width, width / (4.0 * max(abs(slope), 1.0))),
+            *_around(center + width, width / (4.0 * max(abs(slope), 1.0))),
+        ],
     ),
     "sigmoid": CurveKind(
         ("inflection", "slope"),
@@ -156,6 +190,7 @@ KINDS: dict[str, CurveKind] = {
         fis=("sigmf", (1, 0)),
         fcl=("SIGM", (1, 0)),
         inverse=lambda inflection, slope: [(_END, "inflection - log(1 / w - 1) / slope")],
+        features=_inflection,
     ),
     "sigmoid_difference": CurveKind(
         ("left", "rising", "falling", "right"),
@@ -165,6 +200,8 @@ KINDS: dict[str, CurveKind] = {
         fll=("SigmoidDifference", (0, 1, 2, 3)),
         fis=("dsigmf", (1, 0, 2, 3)),
         fcl=("DSIGM", (1, 0, 2, 3)),
+        features=_two_inflections,
+        monotonic=False,
     ),
     "sigmoid_product": CurveKind(
         ("left", "rising", "falling", "right"),
@@ -175,6 +212,8 @@ KINDS: dict[str, CurveKind] = {
         "four numbers",
         fll=("SigmoidProduct", (0, 1, 2, 3)),
         fis=("psigmf", (1, 0, 2, 3)),
+        features=_two_inflections,
+        monotonic=False,
     ),
     "z_shape": CurveKind(
         ("start", "end"),
@@ -212,6 +251,7 @@ KINDS: dict[str, CurveKind] = {
         fll=("PiShape", (0, 1, 2, 3)),
         fis=("pimf", (0, 1, 2, 3)),
         polynomial=True,
+        monotonic=False,  # where its tops overlap
     ),
     "cosine": CurveKind(
         ("center", "width"),
@@ -224,6 +264,7 @@ KINDS: dict[str, CurveKind] = {
         "a width above 0",
         fll=("Cosine", (0, 1)),
         fis=("cosinemf", (0, 1)),
+        features=lambda center, width: [center],
     ),
     "spike": CurveKind(
         ("center", "width"),
@@ -235,6 +276,7 @@ KINDS: dict[str, CurveKind] = {
         "a width other than 0",
         fll=("Spike", (0, 1)),
         fis=("spikemf", (0, 1)),
+        features=lambda center, width: _around(center, width / 10.0),
     ),
     "concave": CurveKind(
         ("inflection", "end"),
@@ -244,6 +286,7 @@ KINDS: dict[str, CurveKind] = {
         fll=("Concave", (0, 1)),
         fis=("concavemf", (0, 1)),
         inverse=lambda inflection, end: [(_END, "(inflection - end) / w + 2 * end - inflection")],
+        features=lambda inflection, end: [end],
     ),
     "arc": CurveKind(
         ("start", "end"),
@@ -271,6 +314,7 @@ KINDS: dict[str, CurveKind] = {
         "two places",
         fll=("SemiEllipse", (0, 1)),
         fis=("semiellipsemf", (0, 1)),
+        features=lambda start, end: [(start + end) / 2.0],
     ),
 }
 """All kinds, by name."""

@@ -33,6 +33,7 @@ from fuzzy_arbiter.verification.search import Answer, Goal
 
 EFFORT = 4_000_000_000  # greatest number of statements, some seconds; forty prioritised criteria need 1/500 of it
 MAX_ROWS = 256
+MAX_TERMS = 200  # greatest number of terms of a variable, as the time grows with its square
 NAMED_ROWS = 8
 _ALL = "for all real inputs"
 _WORST_FIRST = {"fault": 0, "warning": 1, "note": 2}
@@ -69,6 +70,11 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
     """
     if reason := beyond_plain(system):
         raise UnsupportedError(f"verify: {reason}")
+    for variable in (*system.inputs, *system.outputs):
+        if len(variable.terms) > MAX_TERMS:
+            raise UnsupportedError(
+                f"verify: {variable.name!r} has {len(variable.terms)} terms, expected at most {MAX_TERMS}"
+            )
     checks = _Checks(system, effort)
     checks.rows()
     checks.support()

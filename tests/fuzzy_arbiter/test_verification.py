@@ -23,6 +23,7 @@ from fuzzy_arbiter import (
     trapezoid,
     triangle,
 )
+from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.verification import verify
 from fuzzy_arbiter.verification.cells import stretches
@@ -391,3 +392,11 @@ def test_undecided_check_is_not_ok(name):
     v = Arbiter().verify()
     checks = tuple(replace(check, holds=None) if check.name == name else check for check in v.checks)
     assert not replace(v, checks=checks).ok
+
+
+def test_a_variable_of_very_many_terms_is_not_verified():
+    terms = {f"t{j}": triangle(j - 1.0, float(j), j + 1.0) for j in range(1000)}
+    x, y = Variable("x", (0.0, 999.0), terms), Output("y", (0.0, 999.0), terms)
+    made = System((x,), (y,), tuple(f"if x is t{j} then y is t{j}" for j in range(1000)))
+    with pytest.raises(UnsupportedError, match="verify: 'x' has 1000 terms, expected at most 200"):
+        Arbiter(system=made).verify()

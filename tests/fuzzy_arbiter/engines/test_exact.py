@@ -151,3 +151,29 @@ def test_discontinuous_shapes_are_integrated_exactly():
     inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
     system = System(inputs, (output,), ("if x is on then y is box",), normalization="none")
     assert Arbiter(system=system)([0.5]) == pytest.approx([3.5])
+
+
+def test_an_outline_grows_with_the_number_of_terms():
+    """Of triangles side by side two meet in each interval between knots, however many there are."""
+    for n in (10, 1000):
+        terms = {f"t{j}": triangle(j - 1.0, float(j), j + 1.0) for j in range(n)}
+        shape = outline(Output("y", (0.0, n - 1.0), terms))
+        assert len(shape.places) == 2 * n - 1
+        assert len(shape.term) == 4 * (n - 1)
+
+
+def test_terms_that_overlap_in_too_many_places_are_integrated_by_quadrature():
+    n = 90
+    terms = {f"t{j}": triangle(-1.0 - j / n, j / n, 2.0 + j / n) for j in range(n)}
+    rules = tuple(f"if x is t{j} then y is t{j}" for j in range(0, n, 9))
+    made = System((Variable("x", (0.0, 1.0), terms),), (Output("y", (0.0, 1.0), terms),), rules)
+    with pytest.raises(EngineError, match="output 'y': its terms overlap in 200"):
+        outline(made.outputs[0])
+    engine = ExactEngine(made)
+    assert engine.methods["y"] == "integrals of polynomials, to rounding"
+    x = (np.arange(100_000) + 0.5) / 100_000
+    (cuts,) = engine.firing.cuts(engine.firing.strengths([0.3]))
+    height = np.max(
+        [np.minimum(c, t.shape.of_many(x)) for c, t in zip(cuts, made.outputs[0].terms, strict=True)], axis=0
+    )
+    assert engine.centroids([0.3])[0] == pytest.approx((x * height).sum() / height.sum(), abs=1e-8)

@@ -11,6 +11,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import quad
 
+from benchmarks.fuzzy_accuracy import BOUND as ACCURACY
+from benchmarks.fuzzy_accuracy import errors, random_cases
 from fuzzy_arbiter import Arbiter, Output, Rule, System, Term, Variable, falling, rising, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.quadrature import BOUND, Quadrature
@@ -66,6 +68,146 @@ def test_centroid_is_the_limit_of_dense_sampling(implication, aggregation):
     assert engine.centroids(cuts)[0] == pytest.approx((x * y).sum() / y.sum(), abs=2e-9)
     assert BOUND == 1e-9
     assert "within 1e-09" in engine.methods["y"]
+
+
+@pytest.mark.medium(fast=1)
+@pytest.mark.parametrize("seed", range(12))
+def test_no_random_system_fails_or_is_beyond_its_bound(seed):
+    """All implications, aggregations, defuzzifiers and kinds of terms; none, one, two or all rules fire."""
+    for case in random_cases(25, 100 + seed):
+        error, _ = errors(case)
+        assert not error > ACCURACY, (error, case)
+
+
+def gaussians(*parameters, universe=(0, 25), **options):
+    return Output("y", universe, {f"t{i}": curve("gaussian", *p) for i, p in enumerate(parameters)}, **options)
+
+
+@pytest.mark.parametrize("deviation", [6.0, 0.5, 0.05, 1e-3, 1e-6])
+@pytest.mark.parametrize("implication", T_NORMS)
+def test_a_lone_gaussian_has_its_mean_for_all_values(deviation, implication):
+    for defuzzifier in ("centroid", "bisector", "mom"):
+        output = gaussians((9.7, deviation), universe=(9.7 - 10, 9.7 + 10), defuzzifier=defuzzifier)
+        for cut in (1.0, 0.6):
+            if implication == "drastic_product" and cut < 1.0 and defuzzifier != "mom":
+                continue  # a single place, which has no area
+            value = ExactEngine(system(output, implication)).centroids([cut])[0]
+            assert value == pytest.approx(9.7, abs=1e-9), (defuzzifier, cut)
+
+
+def gaussian_integrals(mean, deviation, cut, start, end):
+    """Area of a clipped Gaussian from start to end, and its moment, by the error function."""
+    reach = deviation * math.sqrt(-2.0 * math.log(cut))
+    ends = sorted({start, end, *(x for x in (mean - reach, mean + reach) if start < x < end)})
+    area = moment = 0.0
+    for a, b in itertools.pairwise(ends):
+        if abs((a + b) / 2 - mean) < reach:
+            area, moment = area + cut * (b - a), moment + cut * (b * b - a * a) / 2
+            continue
+        u, v = ((x - mean) / deviation / math.sqrt(2.0) for x in (a, b))
+        # by the complement, where the error function is near 1
+        tail = math.erfc(u) - math.erfc(v) if u > 0.0 else math.erfc(-v) - math.erfc(-u)
+        own = deviation * math.sqrt(math.pi / 2.0) * tail
+        area += own
+        moment += mean * own + deviation**2 * (math.exp(-u * u) - math.exp(-v * v))
+    return area, moment
+
+
+@pytest.mark.parametrize(
+    ("parameters", "cuts"),
+    [
+        (((17.9, 0.05), (2.0, 6.0)), (1.0, 0.4)),
+        (((17.9, 0.05), (2.0, 6.0)), (0.8, 0.8)),
+        (((2.0, 4.0), (12.0, 4.0), (22.0, 4.0)), (0.0051, 0.99646, 0.91242)),
+        (((3.0, 2e-4), (20.0, 0.3)), (0.9, 0.01)),
+    ],
+)
+def test_clipped_gaussians_match_the_error_function(parameters, cuts):
+    def clipped_at(x, p, cut):
+        return min(cut, math.exp(-((x - p[0]) ** 2) / (2 * p[1] ** 2)))
+
+    # the greatest one changes where two of them are equal; found by bisection between many places
+    near = [m + s * k / 20 for m, s in parameters for k in range(-200, 201)]
+    places = sorted({0.0, 25.0, *(x for x in near if 0 < x < 25), *(25 * k / 2000 for k in range(2001))})
+
+    def top(x):
+        heights = [clipped_at(x, p, cut) for p, cut in zip(parameters, cuts, strict=True)]
+        return heights.index(max(heights))
+
+    area = moment = 0.0
+    for a, b in itertools.pairwise(places):
+        ends = [a, b]
+        if top(a) != top(b):
+            low, high = a, b
+            while (middle := (low + high) / 2) not in (low, high):
+                low, high = (middle, high) if top(middle) == top(a) else (low, middle)
+            ends = [a, low, b]
+        for start, end in itertools.pairwise(ends):
+            i = top((start + end) / 2)
+            own = gaussian_integrals(*parameters[i], cuts[i], start, end)
+            area, moment = area + own[0], moment + own[1]
+    value = ExactEngine(system(gaussians(*parameters))).centroids(cuts)[0]
+    assert value == pytest.approx(moment / area, abs=1e-9 * 25)
+
+
+def test_the_mean_of_maxima_of_a_narrow_term_is_its_own():
+    output = gaussians((17.9, 0.05), (2.0, 6.0), defuzzifier="mom")
+    assert ExactEngine(system(output)).centroids([1.0, 0.5])[0] == pytest.approx(17.9, abs=1e-9)
+    # clipped alike, both are level: the wider one from the universe's start
+    alike = replace(output, defuzzifier="som")
+    assert ExactEngine(system(alike)).centroids([0.5, 0.5])[0] == 0.0
+
+
+def test_a_narrow_difference_of_sigmoids_is_not_missed():
+    """By the antiderivative of the logistic function."""
+    left, right, slope = 11.0, 11.2, 80.0
+    shape = curve("sigmoid_difference", left, slope, slope, right)
+    made = system(Output("y", (0, 25), {"a": shape, "b": triangle(0, 2, 4)}), "prod")
+    area = right - left  # of the whole line, of which the universe lacks nothing that a float shows
+    expected = (0.25 * 2 * 2 + area * (left + right) / 2) / (0.25 * 2 + area)
+    assert ExactEngine(made).centroids([1.0, 0.25])[0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_the_steep_end_of_a_tail_is_not_missed():
+    """The bisector of a symmetric curve is its middle, however its tail lies in a wide panel."""
+    a, d, slope = 100.83920572947113, 100.87231839689323, 155.88537267578596
+    output = Output("y", (100, 110), (Term("a", curve("sigmoid_product", a, slope, -slope, d)),), None, "bisector")
+    assert ExactEngine(system(output)).centroids([1.0])[0] == pytest.approx((a + d) / 2, abs=1e-12)
+
+
+@pytest.mark.parametrize("aggregation", ["probor", "sum", "einstein_sum", "normalized_sum"])
+@pytest.mark.parametrize("defuzzifier", ["som", "lom", "mom"])
+def test_a_height_may_be_greatest_beside_an_open_jump(defuzzifier, aggregation):
+    """The first term is 0 up to 5 and 0.5 beyond; the second falls from 0.8 there."""
+    terms = (Term("a", rising(0, 10)), Term("b", triangle(0, 4, 9)))
+    output = Output("y", (0, 10), terms, None, defuzzifier, aggregation)
+    value = ExactEngine(system(output, "nilpotent_minimum")).centroids([0.5, 0.85])[0]
+    # a normalized sum is 1 until the second term is 0.5
+    expected = {"som": 5.0, "lom": 6.5, "mom": 5.75}[defuzzifier] if aggregation == "normalized_sum" else 5.0
+    assert value == pytest.approx(expected, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("kinds", "universe", "aggregation", "cuts"),
+    [
+        ((("sigmoid", 1.146, -660.435), ("gaussian", 1.414, 0.0667)), (-3, 7), "normalized_sum", (1e-9, 1e-9)),
+        ((("s_shape", 85.0, 125.0), ("z_shape", 109.414, 109.602)), (100, 125), "probor", (0.5, 0.7)),
+    ],
+    ids=["flat", "close to the end of a panel"],
+)
+def test_the_place_of_a_maximum_is_as_high_as_any(kinds, universe, aggregation, cuts):
+    terms = {f"t{i}": curve(*parameters) for i, parameters in enumerate(kinds)}
+    output = Output("y", universe, terms, None, "lom", aggregation)
+    value = ExactEngine(system(output, "prod")).centroids(cuts)[0]
+    x = np.concatenate([[value], np.linspace(*universe, 1_000_001)])
+    implied = [cut * term.shape.of_many(x) for cut, term in zip(cuts, output.terms, strict=True)]
+    heights = AGGREGATIONS[aggregation].array(*implied)
+    assert heights[0] >= heights.max() * (1 - 1e-12)
+
+
+def test_no_bound_is_printed_for_a_formula():
+    output = Output("y", (0, 10), (Term("a", Formula("max(0, 1 - abs(x - 3.001) * 50)")), Term("b", triangle(4, 5, 6))))
+    assert "without a bound" in ExactEngine(system(output)).methods["y"]
 
 
 def test_centroid_matches_scipy_quadrature():

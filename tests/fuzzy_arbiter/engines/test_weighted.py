@@ -164,3 +164,19 @@ def test_engines_and_verification_reject_weighted_systems():
     with pytest.raises(UnsupportedError, match="verify: output 'y' has the defuzzifier average"):
         Arbiter(system=made).verify()
     assert np.isfinite(Arbiter(system=made).explain([1.0, 0.0]).weights).all()
+
+
+@pytest.mark.parametrize("defuzzifier", ["average", "sum"])
+def test_two_rules_on_one_value_count_twice(defuzzifier, tmp_path):
+    """As in MATLAB, pyfuzzylite and simpful; in Python as in a file."""
+    terms = {"one": Constant(1.0), "none": Constant(0.0)}
+    made = Output("y", (0, 1), terms, defuzzifier=defuzzifier)
+    rules = ("if x is low then y is one", "if x is high then y is none", "if z is near then y is one with 0.6")
+    written = System((X, Z), (made,), rules)
+    # strengths of 0.6 and 0.6 for the one value, and of 0.4 for the other
+    assert Arbiter(system=written)([4.0, 0.0])["y"] == pytest.approx(1.2 if defuzzifier == "sum" else 0.75)
+    for suffix in ("json", "toml", "fll", "fis"):
+        file = tmp_path / f"system.{suffix}"
+        Arbiter(system=written).save(file)
+        read = Arbiter.load(file).system
+        assert (read.outputs, read.rules) == (written.outputs, written.rules)

@@ -1,0 +1,200 @@
+"""Panels for Gauss-Legendre quadrature: their points, their error, and the panels in which all terms are smooth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+from fuzzy_arbiter.shapes import Array, Membership
+from fuzzy_arbiter.terms.curves import Curve
+
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.intp]
+
+ORDER = 8
+NODES, WEIGHTS = legendre.leggauss(ORDER)
+_BESIDE = 1e-9  # distance of the outer points from the panel's ends, as a fraction of its half, on its side of a jump
+POINTS = np.array([-1.0 + _BESIDE, *NODES, 1.0 - _BESIDE])
+INNER = slice(1, -1)  # the nodes among the points
+# coefficients of the Legendre series through the values at the nodes, a row for each degree
+ANALYSIS = (np.arange(ORDER)[:, None] + 0.5) * legendre.legvander(NODES, ORDER - 1).T * WEIGHTS
+NARROWEST = 1e-14  # least width of a panel that is divided, as a fraction of the universe's greatest number
+_STATIC = 1e-13  # tolerance of a panel of one term, as a fraction of the term's area
+_AT_ENDS = legendre.legvander(np.array([-1.0, 1.0]), ORDER - 1).T  # the series' polynomials at a panel's ends
+_REST = 8.0  # greatest rest of a smooth function's series at an end, as a multiple of its last terms
+_MAX_PANELS = 4096
+_MAX_HALVINGS = 60
+
+
+class Panels(NamedTuple):
+    """Panels of many samples, in each of which the joined terms are smooth."""
+
+    rows: Indices  # sample of each panel
+    starts: Array
+    ends: Array
+    heights: Array  # at the points of each panel
+    flat: Mask  # True where the height is constant
+    areas: Array
+    moments: Array  # about the universe's start
+
+    def chosen(self, which: Mask | Indices) -> Panels:
+        """Return some of the panels."""
+        return Panels(
+            self.rows[which],
+            self.starts[which],
+            self.ends[which],
+            self.heights[which],
+            self.flat[which],
+            self.areas[which],
+            self.moments[which],
+        )
+
+
+def points_of(starts: Array, ends: Array, at: Array = POINTS) -> Array:
+    """Return the points of each panel, shape (panels, points)."""
+    return np.asarray(((starts + ends) / 2)[:, None] + ((ends - starts) / 2)[:, None] * at)
+
+
+def mean_errors(values: Array) -> Array:
+    """Estimate the error of each panel's mean, for values at `POINTS`, by the Legendre series through the nodes.
+
+    A series whose terms fall by r from the degrees 4 and 5 to 6 and 7 falls by r^5 until degree 16, the first that the
+    nodes do not integrate. A series that does not reach the values at the ends hides a steep part between an end and
+    the node beside it.
+    """
+    series = np.einsum("pj,kj->pk", np.ascontiguousarray(values[:, INNER]), ANALYSIS)
+    sizes = np.abs(series[:, 4:])
+    before, last = sizes[:, 0] + sizes[:, 1], sizes[:, 2] + sizes[:, 3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        decay = np.where(last < before, last / before, 1.0)
+    off = np.abs(series @ _AT_ENDS - values[:, [0, -1]]).max(axis=1)
+    hidden = np.where(off > _REST * last, off * (1.0 - NODES[-1]) / 2, 0.0)
+    return np.asarray(np.maximum(last * decay**5, hidden))
+
+
+def smooth_panels(universe: tuple[float, float], shapes: Sequence[Membership]) -> Array:
+    """Return the ends of panels in which each of some terms is smooth enough for the quadrature, in rising order."""
+    low, high = universe
+    edges = np.unique([low, *(x for shape in shapes for x in shape.features(universe)), high])
+    narrowest = NARROWEST * max(abs(low), abs(high), high - low)
+    starts, ends = edges[:-1], edges[1:]
+    areas = np.zeros(len(shapes))
+    for _ in range(_MAX_HALVINGS):
+        places = points_of(starts, ends)
+        rough = np.zeros(len(starts), dtype=bool)
+        for k, shape in enumerate(shapes):
+            values = shape.of_many(places.ravel()).reshape(places.shape)
+            widths = ends - starts
+            areas[k] = max(areas[k], float(((values[:, INNER] * WEIGHTS).sum(axis=-1) * widths).sum()) / 2)
+            rough |= mean_errors(values) * widths > _STATIC * areas[k]
+        rough &= ends - starts > narrowest
+        if not rough.any() or len(edges) + rough.sum() > _MAX_PANELS:
+            break
+        middles = (starts[rough] + ends[rough]) / 2
+        edges = np.concatenate([edges, middles])
+        starts, ends = np.concatenate([starts[rough], middles]), np.concatenate([middles, ends[rough]])
+    return np.unique(edges)
+
+
+def constant_panels(shape: Membership, middles: Array, degrees: Array) -> Mask:
+    """Return True for panels in which a term is constant; a curve that only rounds to 1 is not."""
+    if isinstance(shape, Curve):
+        pieces = [isinstance(tree, float) for tree in shape.trees]
+        return np.array(pieces)[np.searchsorted(shape.ends, middles)]
+    return np.asarray(np.ptp(degrees, axis=1) == 0.0)
+
+
+def dividing(items: Indices, places: Array, starts: Array, ends: Array) -> tuple[Indices, Array, Array]:
+    """Divide some panels at places within them; return the panel of each part, its start and its end."""
+    whole = np.unique(items)
+    items, places = np.concatenate([whole, items]), np.concatenate([starts[whole], places])
+    order = np.lexsort((places, items))
+    items, places = items[order], places[order]
+    until = np.append(places[1:], 0.0)
+    last = np.append(items[1:] != items[:-1], True)
+    until[last] = ends[items[last]]
+    wide = until > places
+    return items[wide], places[wide], until[wide]
+
+
+def lowest_between(values: Array) -> tuple[Mask, Array]:
+    """Find panels where a positive function may fall to 0 between its points; return where it comes closest to 0.
+
+    A parabola through each three neighboring points shows where the function turns, and how far below the points.
+
+    Parameters
+    ----------
+    values : ndarray, shape (panels, points)
+        Values at `POINTS`.
+
+    Returns
+    -------
+    near : ndarray of bool, shape (panels,)
+        True where it may fall to 0.
+    places : ndarray, shape (panels,)
+        Place of the least value, from -1 to 1.
+    """
+    x0, x1, x2 = POINTS[:-2], POINTS[1:-1], POINTS[2:]
+    v0, v1, v2 = values[:, :-2], values[:, 1:-1], values[:, 2:]
+    slope = (v1 - v0) / (x1 - x0)
+    bend = ((v2 - v1) / (x2 - x1) - slope) / (x2 - x0)
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        turn = (x0 + x1) / 2 - slope / (2 * bend)
+        least = v0 + slope * (turn - x0) + bend * (turn - x0) * (turn - x1)
+        rise = np.maximum(v0, v2) - least
+        near = (bend > 0.0) & (x0 < turn) & (turn < x2) & (least < rise / 2) & (rise > 1e-12)
+    least = np.where(near, least, np.inf)
+    best = least.argmin(axis=1)
+    return near.any(axis=1), np.take_along_axis(turn, best[:, None], axis=1)[:, 0]
+
+
+def roots(
+    function: Callable[[Array, Indices], Array], starts: Array, ends: Array, tolerance: float
+) -> tuple[Array, Mask]:
+    """Find a root of each of many functions between two places, by Chandrupatla's method.
+
+    Parameters
+    ----------
+    function : callable
+        Values for places, and the index of each place's function.
+    starts, ends : ndarray, shape (n,)
+        Ends of the search.
+    tolerance : float
+        Greatest distance of the ends of what is left of it.
+
+    Returns
+    -------
+    places : ndarray, shape (n,)
+        Roots.
+    found : ndarray of bool, shape (n,)
+        False where the values at both ends have one sign.
+    """
+    which = np.arange(len(starts))
+    f1, f2 = function(starts, which), function(ends, which)
+    found = (f1 >= 0.0) != (f2 >= 0.0)
+    result = np.where(found, starts, np.nan)
+    which = which[found]
+    x1, x2, f1, f2 = starts[found], ends[found], f1[found], f2[found]
+    share = f1 / (f1 - f2)
+    while len(which):
+        x = x1 + share * (x2 - x1)
+        f = function(x, which)
+        same = (f >= 0.0) == (f1 >= 0.0)
+        x3, f3 = np.where(same, x1, x2), np.where(same, f1, f2)
+        x2, f2 = np.where(same, x2, x1), np.where(same, f2, f1)
+        x1, f1 = x, f
+        result[which] = np.where(np.abs(f1) < np.abs(f2), x1, x2)
+        with np.errstate(all="ignore"):
+            least = tolerance / np.abs(x2 - x1)
+            place, value = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
+            quadratic = (1.0 - np.sqrt(1.0 - place) < value) & (value < np.sqrt(place))
+            share = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
+        share = np.clip(np.where(quadratic, share, 0.5), least, 1.0 - least)
+        go = (least < 0.5) & (f1 != 0.0)
+        which, share = which[go], share[go]
+        x1, x2, f1, f2 = x1[go], x2[go], f1[go], f2[go]
+    return result, found
