@@ -146,19 +146,7 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Words of the command line; default: those of the process.
-
-    Returns
-    -------
-    int
-        Exit code: 0; 1 if `verify` found a defect; 2 if the input or an option is wrong; 130 if interrupted; 141 if the
-        reader of the output closed it.
-    """
+    """Run the command line."""
     if sys.stdout is None:  # closed by the parent process: the next file that is opened would take its place
         return _fault("standard output is closed; expected it open, such as on /dev/null")
     try:

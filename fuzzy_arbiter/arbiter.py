@@ -100,31 +100,7 @@ class Arbiter:
         return self._samples
 
     def __call__(self, inputs: Sample | None = None, /, **named: float) -> Result[float]:
-        """Return the value of each output for one sample.
-
-        Parameters
-        ----------
-        inputs : sequence of float, array of shape (inputs,), mapping from input's name to float, or row of a data frame
-            One value for each input; for plain criteria the degree in [0, 1] to which each asks for attention.
-        **named : float
-            Values by keywords, in place of `inputs`.
-
-        Returns
-        -------
-        Result of float
-            Values by position and by name; NaN for an output without default if no rule fires for it.
-
-        Raises
-        ------
-        InputError
-            If an input is missing, unknown, masked, not a number, or outside its universe (unless that clips).
-
-        Examples
-        --------
-        >>> from fuzzy_arbiter import Arbiter
-        >>> Arbiter()({"obstacle": 0.5, "shape": 1.0, "depth": 0.0})["shape"]
-        0.5
-        """
+        """Return the value of each output for one sample; inputs (inputs,)."""
         if named:
             inputs = named if inputs is None else _one_of(inputs, named)
         if self._shortcut is not None:

@@ -15,13 +15,7 @@ MAX_NAME = 200  # greatest number of characters of a name
 
 
 def finite(value: object) -> float | None:
-    """Return a number as a float.
-
-    Returns
-    -------
-    float or None
-        Number; None for a value that is not a finite real number. Booleans and texts are not numbers here.
-    """
+    """Return a number as a float."""
     try:
         x = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
     except OverflowError:
@@ -30,29 +24,7 @@ def finite(value: object) -> float | None:
 
 
 def all_of(kind: type[_T] | tuple[type[_T], ...], values: object, where: object, expected: str) -> tuple[_T, ...]:
-    """Return the members of an iterable as a tuple, and check the type of each.
-
-    Parameters
-    ----------
-    kind : type or tuple of type
-        Type that each member must have.
-    values : object
-        Iterable to check.
-    where : object
-        Name of the definition's part; the error quotes its text.
-    expected : str
-        Description of the expected members, for the error.
-
-    Returns
-    -------
-    tuple
-        The members in their order.
-
-    Raises
-    ------
-    DefinitionError
-        If `values` cannot be iterated, or a member has another type.
-    """
+    """Return the members of an iterable as a tuple, and check the type of each."""
     if isinstance(values, str) or not isinstance(values, Iterable):
         raise DefinitionError(f"{where}: {shown(values)} came, expected {expected}")
     members = tuple(values)
@@ -63,20 +35,7 @@ def all_of(kind: type[_T] | tuple[type[_T], ...], values: object, where: object,
 
 
 def require_name(name: object, what: str) -> None:
-    """Require that a value is a valid name.
-
-    Parameters
-    ----------
-    name : object
-        Name to check.
-    what : str
-        Description of what is named, for the error.
-
-    Raises
-    ------
-    DefinitionError
-        Unless it is printable text of at most `MAX_NAME` characters, without double quotes or outer spaces.
-    """
+    """Require that a value is a valid name."""
     if isinstance(name, str) and len(name) > MAX_NAME:
         raise DefinitionError(f"{what} name is {shown(name)}, expected at most {MAX_NAME} characters")
     if not isinstance(name, str) or not name or name != name.strip() or not name.isprintable() or '"' in name:
@@ -86,18 +45,7 @@ def require_name(name: object, what: str) -> None:
 
 
 def shown(value: object) -> str:
-    """Format a value for an error message.
-
-    Parameters
-    ----------
-    value : object
-        Value to quote.
-
-    Returns
-    -------
-    str
-        Representation on one line, cut if it is long.
-    """
+    """Format a value for an error message."""
     try:
         text = " ".join(repr(value).split())
     except ValueError:  # a whole number of more digits than Python writes

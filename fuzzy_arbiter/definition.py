@@ -103,13 +103,7 @@ class Variable:
             raise DefinitionError(f"variable {self.name!r}: term {term.name!r}: {error}") from None
 
     def __getitem__(self, term: str) -> Is:
-        """Return the proposition that this variable is in a term; called with a value, it gives the term's degree.
-
-        Raises
-        ------
-        DefinitionError
-            If there is no such term.
-        """
+        """Return the proposition that this variable is in a term; called with a value, it gives the term's degree."""
         for known in self.terms:
             if known.name == term:
                 return Is(self.name, term, known.shape if isinstance(known.shape, Membership) else None)
@@ -324,13 +318,7 @@ class System:
         return self.weights_of or variable_names(self.outputs)
 
     def __getitem__(self, variable: str) -> Variable:
-        """Return the input or output of a name.
-
-        Raises
-        ------
-        DefinitionError
-            If there is none.
-        """
+        """Return the input or output of a name."""
         for known in (*self.inputs, *self.outputs):
             if known.name == variable:
                 return known
@@ -374,11 +362,5 @@ def _span(variable: Variable) -> str:
 
 
 def variable_names(variables: Sequence[Variable]) -> tuple[str, ...]:
-    """Return the variables' names in their order.
-
-    Parameters
-    ----------
-    variables : sequence of Variable
-        Inputs or outputs.
-    """
+    """Return the variables' names in their order."""
     return tuple(variable.name for variable in variables)

@@ -46,38 +46,21 @@ class InputError(ArbiterError):
     """Raised for an input that is missing, unknown, not a number, or outside its universe."""
 
 
-def one_line(said: object) -> str:
-    """Format a message as one printable line, and cut the middle out of long quotations.
-
-    Parameters
-    ----------
-    said : object
-        Message, such as ``FILE: key is VALUE, expected ...``.
-
-    Returns
-    -------
-    str
-        The line; a file's name before the first colon is kept, unless it is very long.
-    """
-    line = _QUOTED.sub(lambda quoted: _cut(quoted[0], MAX_QUOTED), printable(said))
-    where, colon, what = line.partition(": ")
-    if not (colon and _FILE.fullmatch(where)):
+def one_line(message: object) -> str:
+    """Format a message as one printable line, and cut the middle out of long quotations."""
+    line = _QUOTED.sub(lambda quoted: _cut(quoted[0], MAX_QUOTED), printable(message))
+    file, colon, rest = line.partition(": ")
+    if not (colon and _FILE.fullmatch(file)):
         return _cut(line, MAX_WORDS)
-    return _cut(where, MAX_WHERE) + colon + _cut(what, MAX_WORDS)
+    return _cut(file, MAX_WHERE) + colon + _cut(rest, MAX_WORDS)
 
 
-def printable(said: object) -> str:
-    """Format a message as one line without control characters.
-
-    Returns
-    -------
-    str
-        The line; characters that are not printable, such as terminal escapes, are written as Python escapes.
-    """
-    line = " ".join(str(said).splitlines())
+def printable(message: object) -> str:
+    """Format a message as one line without control characters."""
+    line = " ".join(str(message).splitlines())
     return line if line.isprintable() else "".join(c if c.isprintable() else ascii(c)[1:-1] for c in line)
 
 
-def _cut(text: str, most: int) -> str:
-    half = (most - 5) // 2
-    return text if len(text) <= most else f"{text[:half]} ... {text[-half:]}"
+def _cut(text: str, max_length: int) -> str:
+    half = (max_length - 5) // 2
+    return text if len(text) <= max_length else f"{text[:half]} ... {text[-half:]}"

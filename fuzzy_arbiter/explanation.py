@@ -26,24 +26,12 @@ class InputDegrees:
 
 @dataclass(frozen=True, slots=True)
 class FiredRule:
-    """Result of one rule.
+    """Result of one rule."""
 
-    Attributes
-    ----------
-    label : str
-        Label of the rule; ``R1`` for the first.
-    text : str
-        Text of the rule.
-    strength : float
-        Degree of its condition times its weight.
-    conclusions : dict from str to str
-        Concluded term of each output that the rule concludes on.
-    """
-
-    label: str
-    text: str
-    strength: float
-    conclusions: dict[str, str]
+    label: str  # label of the rule; ``R1`` for the first
+    text: str  # text of the rule
+    strength: float  # degree of its condition times its weight
+    conclusions: dict[str, str]  # concluded term of each output that the rule concludes on
 
     @property
     def fired(self) -> bool:
@@ -53,71 +41,32 @@ class FiredRule:
 
 @dataclass(frozen=True, slots=True)
 class OutputDecision:
-    """Derivation of one output's weight.
+    """Derivation of one output's weight."""
 
-    Attributes
-    ----------
-    name : str
-        Name in results: that of the criterion whose weight the output is, else the output's own.
-    variable : str
-        Name of the output in the rules.
-    cuts : dict from str to float
-        Greatest strength of the rules that conclude each term.
-    centroid : float
-        Value in the universe, before it is normalized.
-    weight : float
-        Weight from the arbiter; NaN if no rule fired and there is no default.
-    decided_by : str or None
-        Label of the rule that gives the greatest cut, of several the first; None if no rule fired.
-    runner_up : str or None
-        Label of the strongest rule for another term; None if none fired.
-    margin : float
-        Strength of the deciding rule less that of the runner-up; 0 is a tie.
-    default_used : bool
-        True if no rule fired, so that the centroid is the output's default, or NaN if it has none.
-    """
-
-    name: str
-    variable: str
-    cuts: dict[str, float]
-    centroid: float
-    weight: float
-    decided_by: str | None
-    runner_up: str | None
-    margin: float
-    default_used: bool
+    name: str  # name in results: that of the criterion whose weight the output is, else the output's own
+    variable: str  # name of the output in the rules
+    cuts: dict[str, float]  # greatest strength of the rules that conclude each term
+    centroid: float  # value in the universe, before it is normalized
+    weight: float  # weight from the arbiter; NaN if no rule fired and there is no default
+    decided_by: str | None  # label of the rule that gives the greatest cut, of several the first; None if no rule fired
+    runner_up: str | None  # label of the strongest rule for another term; None if none fired
+    margin: float  # strength of the deciding rule less that of the runner-up; 0 is a tie
+    default_used: bool  # true if no rule fired, so that the centroid is the output's default, or NaN if it has none
 
 
 @dataclass(frozen=True, slots=True)
 class Explanation:
-    """Derivation of the weights of one sample.
+    """Derivation of the weights of one sample."""
 
-    Attributes
-    ----------
-    inputs : tuple of InputDegrees
-        Inputs in the system's order.
-    rules : tuple of FiredRule
-        All rules, also those that did not fire.
-    outputs : tuple of OutputDecision
-        Outputs in the system's order.
-    winner : str or None
-        The output with the greatest weight, by its name in results; None if that is shared, or all weights are 0. An
-        output that is NaN takes no part.
-    runner_up : str or None
-        The output with the next weight; None without a winner, or if there is no other output.
-    margin : float
-        Greatest weight less the next, or the weight of the only output.
-    tied : tuple of str
-        The outputs that share the greatest weight, if it is not 0; none if there is a winner.
-    """
-
-    inputs: tuple[InputDegrees, ...]
-    rules: tuple[FiredRule, ...]
-    outputs: tuple[OutputDecision, ...]
+    inputs: tuple[InputDegrees, ...]  # inputs in the system's order
+    rules: tuple[FiredRule, ...]  # all rules, also those that did not fire
+    outputs: tuple[OutputDecision, ...]  # outputs in the system's order
+    # the output with the greatest weight, by its name in results; None if that is shared, or all weights are 0. An
+    # output that is NaN takes no part
     winner: str | None
-    runner_up: str | None
-    margin: float
-    tied: tuple[str, ...]
+    runner_up: str | None  # the output with the next weight; None without a winner, or if there is no other output
+    margin: float  # greatest weight less the next, or the weight of the only output
+    tied: tuple[str, ...]  # the outputs that share the greatest weight, if it is not 0; none if there is a winner
 
     @property
     def weights(self) -> Result[float]:
@@ -125,13 +74,7 @@ class Explanation:
         return tuple.__new__(result_class([o.name for o in self.outputs]), [o.weight for o in self.outputs])
 
     def as_dict(self) -> dict[str, Any]:
-        """Convert the explanation to values that JSON can represent.
-
-        Returns
-        -------
-        dict
-            Texts, numbers, Booleans, lists and dicts; None for NaN.
-        """
+        """Convert the explanation to values that JSON can represent."""
         whole = asdict(self)
         for item in whole["outputs"]:
             item |= {key: None for key in ("centroid", "weight") if item[key] != item[key]}
@@ -160,20 +103,7 @@ class Explanation:
 
 
 def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
-    """Explain the weights for one sample.
-
-    Parameters
-    ----------
-    engine : Engine
-        Engine that computes the weights.
-    inputs : sequence of float
-        One value in its universe for each input.
-
-    Returns
-    -------
-    Explanation
-        Explanation as data; its `str` is a text for people.
-    """
+    """Explain the weights for one sample."""
     system, firing = engine.system, engine.firing
     weights, centroids = engine.weights(inputs), engine.centroids(inputs)
     strengths = firing.strengths(inputs)

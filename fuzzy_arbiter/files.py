@@ -10,20 +10,7 @@ from fuzzy_arbiter.errors import FormatError
 
 
 def write_atomic(path: str | Path, data: bytes) -> None:
-    """Write a file atomically, and replace an older one.
-
-    Parameters
-    ----------
-    path : str or Path
-        Path of the file; a link is followed.
-    data : bytes
-        Content of the file.
-
-    Raises
-    ------
-    FormatError
-        If it cannot be written.
-    """
+    """Write a file atomically, and replace an older one."""
     scratch = None
     try:
         out = Path(path).resolve()

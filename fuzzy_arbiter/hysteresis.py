@@ -124,26 +124,7 @@ class HysteresisArbiter:
         return dict(zip(self._names, self._closed, strict=True))
 
     def __call__(self, inputs: Sample, time: float | None = None) -> Result[float]:
-        """Return the weights for the next sample.
-
-        Parameters
-        ----------
-        inputs : sequence of float, or mapping from input's name to float
-            Sample, as for an arbiter.
-        time : float, optional
-            Time of the measurement [s]; it never decreases. Only a dwell needs it.
-
-        Returns
-        -------
-        Result of float
-            Weight of each output, by position and by name.
-
-        Raises
-        ------
-        InputError
-            If the time is missing and needed, is not finite or decreases, or an input is missing, unknown, not a
-            number, or outside its universe; the state is then as before.
-        """
+        """Return the weights for the next sample; time [s]."""
         now = self._time if time is None and not any(self._dwell) else _validate_time(time, self._time)
         values = self.arbiter.samples.one(inputs)
         degrees = [shape(x) for shape, x in zip(self._shapes, values, strict=True)]

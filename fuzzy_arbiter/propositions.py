@@ -17,45 +17,17 @@ _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 
 
 def is_identifier(name: str) -> bool:
-    """Return True if a name needs no quotes in a rule, nor in any format.
-
-    Parameters
-    ----------
-    name : str
-        Name of a variable or of a term.
-
-    Returns
-    -------
-    bool
-        True for letters, digits and underscores that do not begin with a digit, except the words of rules.
-    """
+    """Return True if a name needs no quotes in a rule, nor in any format."""
     return _PLAIN.fullmatch(name) is not None and name.lower() not in KEYWORDS
 
 
 def quoted(name: str) -> str:
-    """Format a name for a rule's text.
-
-    Parameters
-    ----------
-    name : str
-        Name of a variable or of a term.
-
-    Returns
-    -------
-    str
-        The name, in double quotes unless it is an identifier.
-    """
+    """Format a name for a rule's text."""
     return name if is_identifier(name) else f'"{name}"'
 
 
 class Proposition:
-    """A condition that holds to a degree; ``&``, ``|`` and ``~`` combine propositions.
-
-    Raises
-    ------
-    DefinitionError
-        If a part is not a proposition, or the text nests deeper than 100.
-    """
+    """A condition that holds to a degree; ``&``, ``|`` and ``~`` combine propositions."""
 
     __slots__ = ()
     nesting: int = 0  # number of nested parentheses and negations in the text
@@ -90,13 +62,7 @@ class Is(Proposition):
             raise DefinitionError(f"{shown(self.variable)} is {shown(self.term)}: expected the names of both")
 
     def __call__(self, value: float) -> float:
-        """Return the degree to which a value is in the term.
-
-        Raises
-        ------
-        DefinitionError
-            If the statement was made of names alone, without a shape.
-        """
+        """Return the degree to which a value is in the term."""
         if self.shape is None:
             raise DefinitionError(f"{self}: made of names alone, expected such as variable['term'], to be called")
         return self.shape(value)
@@ -193,18 +159,10 @@ class Anything(Proposition):
 
 @dataclass(frozen=True, slots=True)
 class Hedged(Proposition):
-    """A statement or a whole condition, bent by a hedge: ``service is very poor``, ``very (a is b or c is d)``.
+    """A statement or a whole condition, bent by a hedge: ``service is very poor``, ``very (a is b or c is d)``."""
 
-    Attributes
-    ----------
-    hedge : {"very", "somewhat", "extremely", "seldom", "cubed", "cube_root"}
-        Name of the hedge, of `fuzzy_arbiter.terms.norms.HEDGES`.
-    part : Proposition
-        Proposition that the hedge modifies.
-    """
-
-    hedge: str
-    part: Proposition
+    hedge: str  # name of the hedge, of `fuzzy_arbiter.terms.norms.HEDGES`
+    part: Proposition  # proposition that the hedge modifies
     nesting: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -226,18 +184,7 @@ class Hedged(Proposition):
 
 
 def anything(p: Proposition) -> Iterator[str]:
-    """Yield the variables that a proposition accepts in any term.
-
-    Parameters
-    ----------
-    p : Proposition
-        Condition of a rule.
-
-    Yields
-    ------
-    str
-        Names, from left to right.
-    """
+    """Yield the variables that a proposition accepts in any term."""
     if isinstance(p, Anything):
         yield p.variable
     elif isinstance(p, Not | Hedged):

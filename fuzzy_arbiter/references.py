@@ -16,19 +16,7 @@ _Terms = dict[str, frozenset[str]]  # names of each variable's terms
 
 
 def require_rules(system: System) -> None:
-    """Require that the rules refer only to variables and terms of the system.
-
-    Parameters
-    ----------
-    system : System
-        System to check.
-
-    Raises
-    ------
-    DefinitionError
-        If a variable or a term does not exist, a rule has two conclusions on one output, or a condition is on an output
-        on which no earlier rule concludes.
-    """
+    """Require that the rules refer only to variables and terms of the system."""
     inputs = {v.name: frozenset(v.term_names) for v in system.inputs}
     outputs = {v.name: frozenset(v.term_names) for v in system.outputs}
     before: set[str] = set()
@@ -58,18 +46,7 @@ def _require_rule(rule: Rule, inputs: _Terms, outputs: _Terms, before: set[str])
 
 
 def require_values(system: System) -> None:
-    """Require that values refer only to existing variables, and that every input is used.
-
-    Parameters
-    ----------
-    system : System
-        System to check; its outputs may have terms that are values.
-
-    Raises
-    ------
-    DefinitionError
-        If a value is no function of inputs and outputs before its own, or an input has no terms and no value uses it.
-    """
+    """Require that values refer only to existing variables, and that every input is used."""
     inputs, outputs = ([v.name for v in variables] for variables in (system.inputs, system.outputs))
     used: set[str] = set()
     for k, output in enumerate(system.outputs):

@@ -29,13 +29,7 @@ class Result(tuple[T, ...]):
     _places: ClassVar[dict[str, int]] = {}
 
     def __getitem__(self, key: Any) -> Any:
-        """Return the value of an output.
-
-        Raises
-        ------
-        DefinitionError
-            If there is no output of this name.
-        """
+        """Return the value of an output."""
         if isinstance(key, str):
             if key not in self._places:
                 raise DefinitionError(f"no output {key!r}, expected one of {', '.join(self._fields)}")
@@ -59,18 +53,7 @@ class Result(tuple[T, ...]):
 
 
 def result_class(names: Sequence[str]) -> type[Result[Any]]:
-    """Return the class of results with these names, so that a result stores only its values.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the outputs, in their order.
-
-    Returns
-    -------
-    type
-        A subclass of `Result`.
-    """
+    """Return the class of results with these names, so that a result stores only its values."""
     places = {name: k for k, name in enumerate(names)}
     return type("Result", (Result,), {"__slots__": (), "_fields": tuple(names), "_places": places})
 

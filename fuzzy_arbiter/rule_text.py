@@ -22,42 +22,17 @@ _SIGNS = {"&": "and", "|": "or", "~": "not", ",": ","}
 
 
 def parse_rules(text: str) -> list[Rule]:
-    """Parse a text whose conclusions may have hedges as rules, in the way of fuzzylite.
-
-    A hedge in a conclusion bends the strength of that conclusion and of those after it, as one on the whole
-    condition does. So conclusions with other hedges become a rule of their own.
-
-    Returns
-    -------
-    list of Rule
-        Rules in the order of their first conclusions.
-
-    Raises
-    ------
-    DefinitionError
-        If the text is no rule; or a weight other than 1 meets a hedge, which would bend it too.
-    """
+    """Parse a text whose conclusions may have hedges as rules, in the way of fuzzylite."""
+    # A hedge in a conclusion bends the strength of that conclusion and of those after it, as one on the whole condition
+    # does. So conclusions with other hedges become a rule of their own.
     return _Parser(text).bent_rules()
 
 
 def parse_rule(text: str) -> Rule:
-    """Parse a text as a rule.
-
-    Words of rules may be in any case. The hedges very, somewhat, extremely, seldom, cubed and cube_root are written
-    before a term. ``&``,
-    ``|``, ``~`` are *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are no
-    identifiers stand in double quotes.
-
-    Returns
-    -------
-    Rule
-        The rule; its text parses as the same rule.
-
-    Raises
-    ------
-    DefinitionError
-        If the text is no rule, or nests deeper than 100; it is quoted.
-    """
+    """Parse a text as a rule."""
+    # Words of rules may be in any case. The hedges very, somewhat, extremely, seldom, cubed and cube_root are written
+    # before a term. `&`, `|`, `~` are *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are
+    # no identifiers stand in double quotes.
     return _Parser(text).rule()
 
 
@@ -217,24 +192,7 @@ class _Parser:
 def bent_rules(
     condition: Proposition, conclusions: Sequence[tuple[tuple[str, ...], Is]], weight: float, carry: bool = True
 ) -> list[Rule]:
-    """Return a rule whose conclusions have hedges as rules whose conclusions have none.
-
-    Parameters
-    ----------
-    condition : Proposition
-        Condition of the rule.
-    conclusions : sequence of (tuple of str, Is)
-        The hedges of each conclusion, *not* among them, and the conclusion.
-    weight : float
-        Weight of the rule.
-    carry : bool
-        True if hedges also bend the conclusions after theirs, as in fuzzylite.
-
-    Returns
-    -------
-    list of Rule
-        One for each row of hedges, each bending the condition.
-    """
+    """Return a rule whose conclusions have hedges as rules whose conclusions have none."""
     rows: dict[tuple[tuple[str, ...], int], list[Is]] = {}
     carried: tuple[str, ...] = ()
     for k, (hedges, conclusion) in enumerate(conclusions):

@@ -34,13 +34,7 @@ Columns = Mapping[str, ArrayLike] | Frame | NDArray[np.void]
 
 
 class Samples:
-    """Validate samples, and clip them if the system does.
-
-    Parameters
-    ----------
-    system : System
-        System with the inputs.
-    """
+    """Validate samples, and clip them if the system does."""
 
     def __init__(self, system: System) -> None:
         self._clips = system.outside == "clip"
@@ -49,18 +43,7 @@ class Samples:
         self._by_name = itemgetter(*self._names)
 
     def plain(self, inputs: Any) -> Sequence[float] | None:
-        """Return the values of a dict or a one-dimensional array without validation.
-
-        Parameters
-        ----------
-        inputs : object
-            Sample of any type.
-
-        Returns
-        -------
-        sequence, or None
-            Values in the order of the inputs; None for other names or another type.
-        """
+        """Return the values of a dict or a one-dimensional array without validation."""
         kind = type(inputs)
         if kind is dict and len(inputs) == len(self._names):
             try:
@@ -71,23 +54,7 @@ class Samples:
         return inputs.tolist() if kind is np.ndarray and inputs.ndim == 1 else None
 
     def one(self, inputs: Sample) -> Sequence[float]:
-        """Return the values of one sample.
-
-        Parameters
-        ----------
-        inputs : sequence of float, array, or mapping from input's name to float
-            One value for each input.
-
-        Returns
-        -------
-        sequence of float
-            Values in the order of the inputs, in their universes.
-
-        Raises
-        ------
-        InputError
-            If an input is missing, unknown, not a number, or outside its universe (unless that clips).
-        """
+        """Return the values of one sample."""
         try:
             values = inputs if type(inputs) is list or type(inputs) is tuple else self._in_order(inputs)
             for x, (low, high) in zip(values, self._limits, strict=True):
@@ -98,49 +65,14 @@ class Samples:
         return values
 
     def many(self, inputs: ArrayLike) -> Array:
-        """Return the values of many samples.
-
-        Parameters
-        ----------
-        inputs : array_like, shape (n, inputs)
-            One sample in each row.
-
-        Returns
-        -------
-        ndarray, shape (n, inputs)
-            Values in the inputs' universes.
-
-        Raises
-        ------
-        InputError
-            If the shape is another, or a value is masked, not a number or outside its universe (unless that clips); the
-            first such row is named.
-        """
+        """Return the values of many samples; inputs (n, inputs), returns (n, inputs)."""
         values, masked = self.rows(inputs)
         if masked is not None and masked.any():
             raise InputError(f"row {int(np.argmax(masked))}: a value is masked, expected none")
         return values
 
     def rows(self, inputs: ArrayLike) -> tuple[Array, NDArray[np.bool_] | None]:
-        """Return the values of many samples, and a mask of the rows with masked values.
-
-        Parameters
-        ----------
-        inputs : array_like, shape (n, inputs)
-            One sample in each row, in a masked array too.
-
-        Returns
-        -------
-        values : ndarray, shape (n, inputs)
-            Values in the inputs' universes; in masked rows the universes' least ends.
-        masked : ndarray of bool, shape (n,), or None
-            True for rows with a masked value; None unless the array is masked.
-
-        Raises
-        ------
-        InputError
-            If the inputs are invalid, as for `many`; masked values are valid.
-        """
+        """Return the values of many samples, and a mask of the rows with masked values."""
         try:
             received = np.asarray(inputs)
             if received.dtype.kind not in "biufO":  # NumPy would read numbers from texts, too
@@ -167,24 +99,7 @@ class Samples:
         return np.clip(values, low, high) if self._clips else values, masked
 
     def columns(self, inputs: Columns) -> Array:
-        """Return columns by name as rows, in a masked array if one of them is masked.
-
-        Parameters
-        ----------
-        inputs : mapping from input's name to array_like, data frame, or array of named fields
-            A column for each input, all of one length; single values count for all rows. Other columns of a data frame
-            or an array are passed over.
-
-        Returns
-        -------
-        ndarray or masked array, shape (n, inputs)
-            Values that are not validated; an argument for `rows`.
-
-        Raises
-        ------
-        InputError
-            If a column is missing or unknown, or has another length than the others.
-        """
+        """Return columns by name as rows, in a masked array if one of them is masked; returns (n, inputs)."""
         if isinstance(inputs, Mapping):
             self._require_names(inputs)
         else:

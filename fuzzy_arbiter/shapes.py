@@ -20,19 +20,12 @@ Point = tuple[float, float]
 
 
 class Membership(ABC):
-    """A membership function: to what degree each place belongs to a term.
-
-    Attributes
-    ----------
-    polynomial : bool
-        True if it is a polynomial between its breaks, so that it can be integrated exactly.
-    monotonic : bool
-        True if it only rises or only falls between its features.
-    """
+    """A membership function: to what degree each place belongs to a term."""
 
     __slots__ = ()
+    # true if it is a polynomial between its breaks, so that it can be integrated exactly
     polynomial: ClassVar[bool] = False
-    monotonic: ClassVar[bool] = False
+    monotonic: ClassVar[bool] = False  # true if it only rises or only falls between its features
 
     @abstractmethod
     def __call__(self, x: float) -> float:
@@ -124,18 +117,7 @@ class Shape(Membership):
             yield place, height
 
     def __call__(self, x: float) -> float:
-        """Return the degree at a place.
-
-        Parameters
-        ----------
-        x : float
-            Place, within the points or beyond.
-
-        Returns
-        -------
-        float
-            Degree in [0, 1]; NaN for a place that is NaN.
-        """
+        """Return the degree at a place."""
         if x != x:
             return x
         points = self.points

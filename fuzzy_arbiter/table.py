@@ -6,17 +6,6 @@ from collections.abc import Sequence
 
 
 def aligned(table: Sequence[tuple[str, ...]]) -> list[str]:
-    """Format a table with indented columns of equal width.
-
-    Parameters
-    ----------
-    table : sequence of tuple of str
-        Rows of one length.
-
-    Returns
-    -------
-    list of str
-        Lines without spaces at their ends.
-    """
+    """Format a table with indented columns of equal width."""
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]
     return ["  " + "  ".join(map(str.ljust, row, widths)).rstrip() for row in table]

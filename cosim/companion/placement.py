@@ -40,7 +40,7 @@ class Placement:
         return float(np.min(self._environment.clearances(position, quaternion)[self.hard], initial=math.inf))
 
     def describe(self, position: Array, quaternion: Array) -> str:
-        """Describe a pose by its position, and its distances to the goal and the nearest hard region."""
+        """Describe a pose by its position [m, NED], and its distances to the goal and the nearest hard region."""
         north, east, down = position.tolist()
         clearances = self._environment.clearances(position, quaternion)
         parts = [f"in the scene: {north:.2f} m north, {east:.2f} m east, {down:.2f} m down"]

@@ -20,7 +20,7 @@ class Isolations:
         self._isolated: list[int] = []  # in the order of their isolation
 
     def add(self, time: Array, isolated: Array) -> None:
-        """Add the next rows of `ISOLATED`."""
+        """Add the next rows of `ISOLATED`; time [s]."""
         known = np.isfinite(isolated)
         time, numbers = time[known], isolated[known].astype(int)
         before = self._isolated[-1] if self._isolated else 0

@@ -23,45 +23,19 @@ _MOST_ROWS = 100_000
 
 @dataclass(frozen=True, slots=True)
 class Cost:
-    """Times of one engine for one system.
+    """Times of one engine for one system."""
 
-    Attributes
-    ----------
-    engine : str
-        Name of the engine.
-    call, row : float or None
-        Median time of a call and of a row of a batch [us]; None if the engine cannot evaluate the system.
-    rows : int
-        Rows of the batch.
-    reason : str
-        Reason why there are no times.
-    """
-
-    engine: str
+    engine: str  # name of the engine
+    # median time of a call and of a row of a batch [us]; None if the engine cannot evaluate the system
     call: float | None
+    # median time of a call and of a row of a batch [us]; None if the engine cannot evaluate the system
     row: float | None
-    rows: int = 0
-    reason: str = ""
+    rows: int = 0  # rows of the batch
+    reason: str = ""  # reason why there are no times
 
 
 def bench(system: System) -> list[Cost]:
-    """Measure the time of every engine for a system, over random samples that do not repeat in a row.
-
-    Parameters
-    ----------
-    system : System
-        System to evaluate.
-
-    Returns
-    -------
-    list of Cost
-        Cost of each engine.
-
-    Raises
-    ------
-    ArbiterError
-        If no sample was found at which all outputs are defined.
-    """
+    """Measure the time of every engine for a system, over random samples that do not repeat in a row."""
     samples = _samples(system)
     if len(samples) == 0:
         raise ArbiterError("bench: at all random samples some output is undefined")
@@ -123,18 +97,7 @@ def _timed(work: Callable[[int], object], n: int) -> float:
 
 
 def table(costs: list[Cost]) -> str:
-    """Return costs as a table, with ratios to the engine that takes the least.
-
-    Parameters
-    ----------
-    costs : list of Cost
-        Costs, as from `bench`.
-
-    Returns
-    -------
-    str
-        Lines, without a last newline.
-    """
+    """Return costs as a table, with ratios to the engine that takes the least."""
     calls = [cost.call for cost in costs if cost.call is not None]
     rows = [cost.row for cost in costs if cost.row is not None]
     lines = [f"{'engine':8} {'call [us]':>12} {'ratio':>9}   {'batch [us a row]':>16} {'ratio':>9} {'rows':>8}"]

@@ -19,25 +19,7 @@ EXPORTS = ("c", "py")
 
 
 def load_system(file: str, block: str | None = None) -> System:
-    """Return the system of a file, or the built-in one.
-
-    Parameters
-    ----------
-    file : str
-        Path, or ``section-vi``.
-    block : str, optional
-        Name of the FUNCTION_BLOCK in a FCL file.
-
-    Returns
-    -------
-    System
-        System that the file defines.
-
-    Raises
-    ------
-    FormatError, DefinitionError
-        If the file is not a valid definition.
-    """
+    """Return the system of a file, or the built-in one."""
     if file == BUILT_IN:
         return prioritised()
     from fuzzy_arbiter.formats import load
@@ -46,18 +28,7 @@ def load_system(file: str, block: str | None = None) -> System:
 
 
 def described(arbiter: Arbiter) -> str:
-    """Return a system in words: variables, terms, rules, norms, engine.
-
-    Parameters
-    ----------
-    arbiter : Arbiter
-        Arbiter to describe.
-
-    Returns
-    -------
-    str
-        Text of several lines.
-    """
+    """Return a system in words: variables, terms, rules, norms, engine."""
     system = arbiter.system
     lines = [system.name, ""]
     for heading, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
@@ -97,26 +68,7 @@ def _numbers(term: Term) -> str:
 
 
 def convert(file: str, out: str, native: bool, block: str | None = None) -> None:
-    """Write a system in another format, or as source code.
-
-    Parameters
-    ----------
-    file : str
-        Path of the system, or ``section-vi``.
-    out : str
-        File to write; its suffix selects the format.
-    native : bool
-        True to make the centroids the weights, so that other tools give them without a normalization.
-    block : str, optional
-        Name of the block, as for `load_system`.
-
-    Raises
-    ------
-    FormatError
-        If the suffix is unknown, or the file cannot be read or written.
-    UnsupportedError
-        If the format cannot represent the system; nothing is written then.
-    """
+    """Write a system in another format, or as source code."""
     from fuzzy_arbiter.formats import FORMATS, fold_normalization, save
 
     suffix = Path(out).suffix[1:].lower()

@@ -33,33 +33,7 @@ def draw(
     at: Sequence[str],
     relief: bool,
 ) -> Figure:
-    """Draw a picture.
-
-    Parameters
-    ----------
-    arbiter : Arbiter
-        Arbiter to draw.
-    kind : {"terms", "rules", "profile", "surface", "decisions"}
-        Kind of picture.
-    inputs, outputs : sequence of str
-        Names; without any, as many of the first as the picture needs, and for ``terms`` all.
-    at : sequence of str
-        Values of inputs, as ``name=value``.
-    relief : bool
-        True to draw a surface in three dimensions.
-
-    Returns
-    -------
-    Figure
-        Figure of the picture alone.
-
-    Raises
-    ------
-    DefinitionError
-        If a name is unknown.
-    InputError
-        If a value is refused, the number of inputs or outputs does not fit, or the picture has no such option.
-    """
+    """Draw a picture."""
     from fuzzy_arbiter import pictures
     from fuzzy_arbiter.pictures.style import new_axes, require_matplotlib
 
@@ -93,20 +67,7 @@ def draw(
 
 
 def middles(at: Sequence[str], system: System) -> list[str]:
-    """Return the middle of each input that a sample of names leaves open.
-
-    Parameters
-    ----------
-    at : sequence of str
-        Values as ``name=value``; nothing is added to values without names.
-    system : System
-        System whose inputs these are.
-
-    Returns
-    -------
-    list of str
-        Values as ``name=value``.
-    """
+    """Return the middle of each input that a sample of names leaves open."""
     if not all("=" in word for word in at):
         return []
     named = {word.rpartition("=")[0] for word in at}
@@ -139,20 +100,7 @@ def _figure(ax: Any) -> Figure:
 
 
 def image(figure: Figure, suffix: str) -> bytes:
-    """Encode a figure as an image file; equal figures give equal bytes.
-
-    Parameters
-    ----------
-    figure : Figure
-        Picture to encode.
-    suffix : {"png", "svg", "pdf"}
-        Format of the file.
-
-    Returns
-    -------
-    bytes
-        Content of the file.
-    """
+    """Encode a figure as an image file; equal figures give equal bytes."""
     import matplotlib as mpl
     from matplotlib.text import Text
 

@@ -10,25 +10,7 @@ from fuzzy_arbiter.errors import FormatError, InputError
 
 
 def read_text(path: str, stdin: TextIO | None) -> tuple[str, str]:
-    """Read a text from a file or from standard input.
-
-    Parameters
-    ----------
-    path : str
-        Path of the file, or ``-`` for standard input.
-    stdin : text stream or None
-        Standard input; None if it is closed.
-
-    Returns
-    -------
-    text, where : str
-        The content, and its name for errors.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, or is no text.
-    """
+    """Read a text from a file or from standard input."""
     where = "standard input" if path == "-" else path
     try:
         if path != "-":
@@ -43,19 +25,6 @@ def read_text(path: str, stdin: TextIO | None) -> tuple[str, str]:
 
 
 def require_suffix(out: str, expected: Sequence[str]) -> None:
-    """Require that a file has one of the known suffixes.
-
-    Parameters
-    ----------
-    out : str
-        Path of the output.
-    expected : sequence of str
-        Suffixes, without the dot.
-
-    Raises
-    ------
-    FormatError
-        If it has none of them.
-    """
+    """Require that a file has one of the known suffixes."""
     if Path(out).suffix[1:].lower() not in expected:
         raise FormatError(f"{out}: suffix is {Path(out).suffix!r}, expected .{', .'.join(expected)}")

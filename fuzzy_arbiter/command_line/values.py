@@ -15,25 +15,7 @@ from fuzzy_arbiter.errors import ArbiterError, InputError
 
 
 def sample(words: Sequence[str], system: System) -> list[float] | dict[str, float]:
-    """Parse words of the command line as a sample.
-
-    Parameters
-    ----------
-    words : sequence of str
-        Words of the command line: all as ``name=value``, or all values in the order of the inputs.
-    system : System
-        System whose inputs these are.
-
-    Returns
-    -------
-    list or dict of float
-        Sample for a call of an arbiter.
-
-    Raises
-    ------
-    InputError
-        If a word is neither, or a name is given twice.
-    """
+    """Parse words of the command line as a sample."""
     if not words:
         raise InputError(f"no values came, expected {', '.join(variable_names(system.inputs))}")
     named = ["=" in word for word in words]
@@ -51,25 +33,7 @@ def sample(words: Sequence[str], system: System) -> list[float] | dict[str, floa
 
 
 def number(text: str, where: str) -> float:
-    """Parse a text as a number.
-
-    Parameters
-    ----------
-    text : str
-        Number in Python's notation.
-    where : str
-        Name of the value, which starts the error.
-
-    Returns
-    -------
-    float
-        The number; infinity and NaN are accepted.
-
-    Raises
-    ------
-    InputError
-        If the text is not a number.
-    """
+    """Parse a text as a number."""
     try:
         return float(text)
     except ValueError:
@@ -77,22 +41,7 @@ def number(text: str, where: str) -> float:
 
 
 def evaluated(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], as_json: bool) -> str:
-    """Return the weights for one sample.
-
-    Parameters
-    ----------
-    arbiter : Arbiter
-        Arbiter to evaluate.
-    inputs : sequence or mapping of float
-        Sample of the inputs.
-    as_json : bool
-        True for one JSON object instead of a line for each output.
-
-    Returns
-    -------
-    str
-        Weights, in all digits; one that is undefined is nan, in JSON null.
-    """
+    """Return the weights for one sample."""
     weights = arbiter(inputs)._asdict()
     if as_json:
         return json.dumps({name: _or_null(weight) for name, weight in weights.items()}, ensure_ascii=False)
@@ -100,29 +49,7 @@ def evaluated(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], a
 
 
 def evaluated_table(arbiter: Arbiter, text: str, where: str, as_json: bool) -> str:
-    """Return the weights for the rows of a CSV table.
-
-    Parameters
-    ----------
-    arbiter : Arbiter
-        Arbiter to evaluate.
-    text : str
-        Table in CSV; its first line names the columns. Columns that are no inputs are ignored.
-    where : str
-        Name of the table for errors.
-    as_json : bool
-        True for a JSON list of objects instead of a table.
-
-    Returns
-    -------
-    str
-        Table with a column for each output and a row for each row; undefined weights are nan, in JSON null.
-
-    Raises
-    ------
-    InputError
-        If a column is missing or there twice, or a line has a value that the arbiter refuses; the line is named.
-    """
+    """Return the weights for the rows of a CSV table."""
     lines, rows = _rows(text, where, variable_names(arbiter.system.inputs))
     names = arbiter.system.result_names
     weights: list[list[float]] = []

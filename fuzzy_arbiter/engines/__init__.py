@@ -18,27 +18,7 @@ ENGINES: tuple[str, ...] = get_args(EngineName)
 
 
 def choose(system: System, engine: str) -> tuple[Engine, str]:
-    """Return the engine that evaluates a system, and the reason for the choice.
-
-    Parameters
-    ----------
-    system : System
-        System to evaluate.
-    engine : {"auto", "closed", "exact", "grid", "skfuzzy"}
-        Name of the engine; ``auto`` selects one.
-
-    Returns
-    -------
-    Engine
-        Engine of the system.
-    str
-        The reason, in words.
-
-    Raises
-    ------
-    EngineError
-        If there is no such engine, or it cannot evaluate this system.
-    """
+    """Return the engine that evaluates a system, and the reason for the choice."""
     if engine == "auto":
         try:
             return ClosedEngine(

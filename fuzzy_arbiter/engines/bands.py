@@ -9,20 +9,7 @@ from fuzzy_arbiter.shapes import Array
 
 
 def centroids(cuts: Array, shape: Outline) -> Array:
-    """Return the centroids of clipped terms, joined by their maximum, for many samples.
-
-    Parameters
-    ----------
-    cuts : ndarray, shape (terms, n)
-        Degree at which each term is clipped; not all of one sample are 0.
-    shape : Outline
-        Outline of the output.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        Centroids, in the universe.
-    """
+    """Return the centroids of clipped terms, joined by their maximum, for many samples."""
     n = cuts.shape[1]
     area, moment = np.zeros(n), np.zeros(n)
     for piece in range(len(shape.places) - 1):

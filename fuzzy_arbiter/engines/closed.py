@@ -1,16 +1,15 @@
-"""The closed form: exact, and thousands of times faster than sampling.
+"""The closed form: exact, and thousands of times faster than sampling."""
 
-If the cuts of an output's two terms are 1 - h and h for all inputs, its centroid is a function C(h) alone, piecewise
-cubic over quadratic. For prioritised criteria, with m the degree to which each asks for attention,
-
-    h_k = min(1 - m_1, ..., 1 - m_(k-1), m_k),
-
-and for low = triangle (0, 0, 1), high = triangle (0, 1, 1) the joined area is 1/2 for every h and
-
-    C(h) = 1/3 + h^2 - 2/3 h^3,
-
-which scaled to [0, 1] is the smoothstep 3 h^2 - 2 h^3.
-"""
+# If the cuts of an output's two terms are 1 - h and h for all inputs, its centroid is a function C(h) alone, piecewise
+# cubic over quadratic. For prioritised criteria, with m the degree to which each asks for attention,
+#
+#     h_k = min(1 - m_1, 1 - m_2 ... 1 - m_(k-1), m_k),
+#
+# and for low = triangle (0, 0, 1), high = triangle (0, 1, 1) the joined area is 1/2 for every h and
+#
+#     C(h) = 1/3 + h^2 - 2/3 h^3,
+#
+# which scaled to [0, 1] is the smoothstep 3 h^2 - 2 h^3.
 
 from __future__ import annotations
 
@@ -35,13 +34,7 @@ _BLOCK = 8192  # number of samples evaluated at a time; longer arrays leave the 
 
 
 class NoClosedFormError(EngineError):
-    """Raised for a system that this engine cannot evaluate.
-
-    Attributes
-    ----------
-    reason : str
-        Reason, in words.
-    """
+    """Raised for a system that this engine cannot evaluate."""
 
     def __init__(self, reason: str) -> None:
         super().__init__(f"engine 'closed': {reason}")
@@ -49,24 +42,7 @@ class NoClosedFormError(EngineError):
 
 
 class ClosedEngine(Engine):
-    """Evaluate C(h) for outputs of two terms whose cuts are 1 - h and h, which is proved from the rules.
-
-    Attributes
-    ----------
-    clauses : tuple of tuple of frozenset
-        Clauses of each output: h is the greatest over its clauses of the least degree of a clause's literals.
-    ladder : tuple, or None
-        Literals m_1, m_2, .. if the rules are those of prioritised criteria, else None.
-    raw, scaled : tuple of tuple of Piece
-        C(h) of each output, and the weight that it becomes.
-    clips : bool
-        True if such weights are then clipped to [0, 1]: between h = 0 and 1 a C(h) may lie beyond C(0) and C(1).
-
-    Raises
-    ------
-    NoClosedFormError
-        If an output has not two terms, or the proof fails.
-    """
+    """Evaluate C(h) for outputs of two terms whose cuts are 1 - h and h, which is proved from the rules."""
 
     name: ClassVar[str] = "closed"
 
@@ -82,6 +58,7 @@ class ClosedEngine(Engine):
         self._index = {v.name: i for i, v in enumerate(system.inputs)}
         self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
         self._cubic = _one_cubic(self.scaled)
+        # true if such weights are then clipped to [0, 1]: between h = 0 and 1 a C(h) may lie beyond C(0) and C(1)
         self.clips = system.normalization != "none" and self._cubic != SMOOTHSTEP
         # prioritised criteria in the order of the inputs, which are the degrees themselves: nothing to look up
         self._plain = self._cubic is not None and self.ladder is not None and len(self.ladder) == len(system.inputs)

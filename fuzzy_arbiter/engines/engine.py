@@ -22,25 +22,9 @@ _EACH_BY_ITSELF = ("range", "none")  # normalizations that use one output at a t
 
 
 class Engine(ABC):
-    """A way to evaluate a system; it never changes, so that threads may share it.
+    """A way to evaluate a system; it never changes, so that threads may share it."""
 
-    Subclasses compute the centroid of one output from the cuts of its terms; this class does the rest.
-
-    Parameters
-    ----------
-    system : System
-        System to evaluate.
-
-    Attributes
-    ----------
-    scale : list of (float, float)
-        Centroids of each output that become 0 and 1; empty without a normalization.
-
-    Raises
-    ------
-    EngineError
-        If this engine cannot evaluate this system, or an output's range is a single value, so that it has no scale.
-    """
+    # Subclasses compute the centroid of one output from the cuts of its terms; this class does the rest.
 
     name: ClassVar[str]
 
@@ -51,51 +35,14 @@ class Engine(ABC):
 
     @abstractmethod
     def centroid(self, k: int, cuts: Sequence[float]) -> float:
-        """Return the centroid of an output.
-
-        Parameters
-        ----------
-        k : int
-            Index of the output.
-        cuts : sequence of float
-            Degree in [0, 1] at which each of its terms is cut; not all are 0.
-
-        Returns
-        -------
-        float
-            Centroid in the output's universe.
-        """
+        """Return the centroid of an output."""
 
     @abstractmethod
     def centroid_of_many(self, k: int, cuts: Array) -> Array:
-        """Return the centroids of an output for many samples.
-
-        Parameters
-        ----------
-        k : int
-            Index of the output.
-        cuts : ndarray, shape (terms, n)
-            Degrees in [0, 1] at which its terms are cut; not all of one sample are 0.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Centroids in the output's universe.
-        """
+        """Return the centroids of an output for many samples; cuts (terms, n), returns (n,)."""
 
     def centroids(self, inputs: Sequence[float]) -> list[float]:
-        """Return the raw value of each output for one sample.
-
-        Parameters
-        ----------
-        inputs : sequence of float
-            One value in its universe for each input.
-
-        Returns
-        -------
-        list of float
-            Centroids; where no rule fires the output's default, or NaN.
-        """
+        """Return the raw value of each output for one sample."""
         cuts = self.firing.cuts(self.firing.strengths(inputs))
         result: list[float] = []
         for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True)):
@@ -106,52 +53,15 @@ class Engine(ABC):
         return result
 
     def value(self, k: int, cuts: Sequence[float], inputs: Sequence[float]) -> float:
-        """Return the raw value of an output for one sample.
-
-        Parameters
-        ----------
-        k, cuts
-            Output and cuts, as for `centroid`.
-        inputs : sequence of float
-            The sample, and the values of the outputs before, on both of which terms of the output may depend.
-
-        Returns
-        -------
-        float
-            The centroid; not finite where there is none.
-        """
+        """Return the raw value of an output for one sample."""
         return self.centroid(k, cuts)
 
     def values(self, k: int, cuts: Array, inputs: Array) -> Array:
-        """Return the raw values of an output for many samples.
-
-        Parameters
-        ----------
-        k, cuts
-            Output and cuts, as for `centroid_of_many`.
-        inputs : ndarray, shape (n, inputs and k outputs)
-            The samples, and the values of the outputs before.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Raw values, as from `value`.
-        """
+        """Return the raw values of an output for many samples; inputs (n, inputs and k outputs), returns (n,)."""
         return self.centroid_of_many(k, cuts)
 
     def centroids_of_many(self, inputs: Array) -> Array:
-        """Return the raw value of each output for many samples.
-
-        Parameters
-        ----------
-        inputs : ndarray, shape (n, inputs)
-            Values in their universes.
-
-        Returns
-        -------
-        ndarray, shape (n, outputs)
-            Centroids; where no rule fires the output's default, or NaN.
-        """
+        """Return the raw value of each output for many samples; inputs (n, inputs), returns (n, outputs)."""
         outputs = self.system.outputs
         if not any(output.weighted for output in outputs):  # whose values may depend on those before
             result = np.empty((len(inputs), len(outputs)))
@@ -190,18 +100,7 @@ class Engine(ABC):
             np.clip(values, *output.universe, out=values)
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
-        """Return the normalized value of each output for one sample.
-
-        Parameters
-        ----------
-        inputs : sequence of float
-            One value in its universe for each input.
-
-        Returns
-        -------
-        tuple of float
-            Values after the system's normalization; NaN for an output without default if no rule fires for it.
-        """
+        """Return the normalized value of each output for one sample."""
         raw = self.centroids(inputs)
         if not self.scale:
             return tuple(raw)
@@ -209,18 +108,7 @@ class Engine(ABC):
         return normalize_weights(scaled, self.system.normalization)
 
     def weights_of_many(self, inputs: Array) -> Array:
-        """Return the normalized value of each output for many samples.
-
-        Parameters
-        ----------
-        inputs : ndarray, shape (n, inputs)
-            Values in their universes.
-
-        Returns
-        -------
-        ndarray, shape (n, outputs)
-            Values after the system's normalization; NaN where no rule fires for an output without default.
-        """
+        """Return the normalized value of each output for many samples; inputs (n, inputs), returns (n, outputs)."""
         raw = self.centroids_of_many(inputs)
         if not self.scale:
             return raw
@@ -228,14 +116,7 @@ class Engine(ABC):
         return normalize_weights_of_many(np.clip((raw - low) / (high - low), 0.0, 1.0), self.system.normalization)
 
     def shortcut(self) -> Shortcut | None:
-        """Return a faster function for `weights` that evaluates samples of plain numbers, if there is one.
-
-        Returns
-        -------
-        callable, or None
-            Function from any object to its weights; it returns None unless the object is a sequence with a number for
-            each input, in its universe.
-        """
+        """Return a faster function for `weights` that evaluates samples of plain numbers, if there is one."""
         return None
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -264,20 +145,7 @@ class Engine(ABC):
 
 
 def normalize_weights(weights: Sequence[float], normalization: str) -> tuple[float, ...]:
-    """Apply a normalization over all outputs to range-normalized weights.
-
-    Parameters
-    ----------
-    weights : sequence of float
-        Weights in [0, 1], or NaN, which stays and counts for nothing.
-    normalization : {"none", "range", "sum", "max"}
-        ``none`` and ``range`` leave the weights unchanged.
-
-    Returns
-    -------
-    tuple of float
-        Weights divided by their sum or their greatest; all 0 if that is 0.
-    """
+    """Apply a normalization over all outputs to range-normalized weights."""
     if normalization in _EACH_BY_ITSELF:
         return tuple(weights)
     known = [w for w in weights if w == w] or [0.0]
@@ -287,20 +155,7 @@ def normalize_weights(weights: Sequence[float], normalization: str) -> tuple[flo
 
 
 def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
-    """Apply a normalization over all outputs to range-normalized weights of many samples.
-
-    Parameters
-    ----------
-    weights : ndarray, shape (n, outputs)
-        Weights in [0, 1], or NaN, which stays and counts for nothing.
-    normalization : {"none", "range", "sum", "max"}
-        ``none`` and ``range`` leave the weights unchanged.
-
-    Returns
-    -------
-    ndarray, shape (n, outputs)
-        Weights, each row divided by its sum or its greatest; all 0 if that is 0.
-    """
+    """Apply a normalization over all outputs to range-normalized weights of many samples."""
     if normalization in _EACH_BY_ITSELF:
         return weights
     known = np.where(np.isnan(weights), 0.0, weights)
@@ -309,16 +164,5 @@ def normalize_weights_of_many(weights: Array, normalization: str) -> Array:
 
 
 def default_of(output: Output) -> float:
-    """Return the value of an output for which no rule fires, or whose conclusion is not a number.
-
-    Parameters
-    ----------
-    output : Output
-        Output of the system.
-
-    Returns
-    -------
-    float
-        Default of the output; NaN if it has none.
-    """
+    """Return the value of an output for which no rule fires, or whose conclusion is not a number."""
     return math.nan if output.default is None else output.default

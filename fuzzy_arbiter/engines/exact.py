@@ -24,13 +24,9 @@ _BLOCK = 8192  # number of samples evaluated at a time
 
 
 class ExactEngine(Engine):
-    """Evaluate any system: straight terms exactly, over all their breakpoints; values as they are; else by quadrature.
+    """Evaluate any system."""
 
-    Attributes
-    ----------
-    methods : dict from str to str
-        Method and error bound of each output.
-    """
+    # Straight terms exactly, over all their breakpoints; values as they are; else by quadrature.
 
     name: ClassVar[str] = "exact"
 

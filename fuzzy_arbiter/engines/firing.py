@@ -30,15 +30,7 @@ class Logic(Generic[D]):
     certain: Callable[[], D] | None = None
 
     def degree(self, proposition: Proposition, of: Callable[[Is], D]) -> D:
-        """Return the degree to which a proposition holds.
-
-        Parameters
-        ----------
-        proposition : Proposition
-            Proposition on terms of the system's inputs.
-        of : callable
-            Returns the degree of each statement in it.
-        """
+        """Return the degree to which a proposition holds."""
         if isinstance(proposition, Is):
             return of(proposition)
         if isinstance(proposition, Not):
@@ -55,18 +47,7 @@ class Logic(Generic[D]):
 
 
 def number_logic(operators: System | Operators) -> Logic[float]:
-    """Return the logic of single degrees.
-
-    Parameters
-    ----------
-    operators : System or Operators
-        System or rule that defines the norms.
-
-    Returns
-    -------
-    Logic of float
-        Operators on degrees in [0, 1].
-    """
+    """Return the logic of single degrees."""
     conjunction, disjunction = T_NORMS[operators.conjunction], S_NORMS[operators.disjunction]
     return Logic(
         conjunction.number, disjunction.number, lambda a: 1.0 - a, lambda word, a: HEDGES[word].number(a), lambda: 1.0
@@ -74,20 +55,7 @@ def number_logic(operators: System | Operators) -> Logic[float]:
 
 
 def array_logic(operators: System | Operators, n: int = 1) -> Logic[Array]:
-    """Return the logic of arrays of degrees.
-
-    Parameters
-    ----------
-    operators : System or Operators
-        System or rule that defines the norms.
-    n : int
-        Length of the arrays.
-
-    Returns
-    -------
-    Logic of ndarray
-        Operators on arrays of one shape, of degrees in [0, 1].
-    """
+    """Return the logic of arrays of degrees."""
     conjunction, disjunction = T_NORMS[operators.conjunction], S_NORMS[operators.disjunction]
     return Logic(
         conjunction.array,
@@ -100,38 +68,15 @@ def array_logic(operators: System | Operators, n: int = 1) -> Logic[Array]:
 
 @dataclass(frozen=True, slots=True)
 class Slot:
-    """One of the sets or values that are joined to an output.
+    """One of the sets or values that are joined to an output."""
 
-    Attributes
-    ----------
-    term : int
-        Index of the output's term.
-    rules : tuple of int
-        The rules that conclude it, of which the joined strength is the slot's degree.
-    implication : str
-        Implication of these rules.
-    """
-
-    term: int
-    rules: tuple[int, ...]
-    implication: str
+    term: int  # index of the output's term
+    rules: tuple[int, ...]  # the rules that conclude it, of which the joined strength is the slot's degree
+    implication: str  # implication of these rules
 
 
 def slots_of(system: System, output: Output) -> tuple[Slot, ...]:
-    """Return the slots of an output: one for each term where the result is the same, else one for each conclusion.
-
-    Parameters
-    ----------
-    system : System
-        System with the rules.
-    output : Output
-        One of its outputs.
-
-    Returns
-    -------
-    tuple of Slot
-        Slots in the order of the terms, or of the rules.
-    """
+    """Return the slots of an output: one for each term where the result is the same, else one for each conclusion."""
     names = output.term_names
     concluded = [
         (i, names.index(c.term), (rule.operators or system).implication)
@@ -147,13 +92,7 @@ def slots_of(system: System, output: Output) -> tuple[Slot, ...]:
 
 
 class Firing:
-    """The first half of every engine: degrees of input terms, strengths of rules, cuts of output terms.
-
-    Parameters
-    ----------
-    system : System
-        System with the rules.
-    """
+    """The first half of every engine: degrees of input terms, strengths of rules, cuts of output terms."""
 
     def __init__(self, system: System) -> None:
         self.system = system
@@ -165,18 +104,7 @@ class Firing:
         self._joins = [AGGREGATIONS[output.aggregation] for output in system.outputs]
 
     def strengths(self, inputs: Sequence[float]) -> list[float]:
-        """Return the firing strength of each rule for one sample.
-
-        Parameters
-        ----------
-        inputs : sequence of float
-            One value in its universe for each input.
-
-        Returns
-        -------
-        list of float
-            Degree of each rule's condition times its weight, in the order of the rules.
-        """
+        """Return the firing strength of each rule for one sample."""
 
         def of(statement: Is) -> float:
             place = self._inputs.get(statement.variable)
@@ -198,18 +126,7 @@ class Firing:
         return functools.reduce(self._joins[k].number if number else self._joins[k].array, found)
 
     def strengths_of_many(self, inputs: Array) -> list[Array]:
-        """Return the firing strength of each rule for many samples.
-
-        Parameters
-        ----------
-        inputs : ndarray, shape (n, inputs)
-            Values in their universes.
-
-        Returns
-        -------
-        list of ndarray, shape (n,)
-            Strengths of each rule, in the order of the rules.
-        """
+        """Return the firing strength of each rule for many samples; inputs (n, inputs), returns (n,)."""
         known: dict[tuple[str, str], Array] = {}
 
         def of(statement: Is) -> Array:
@@ -227,19 +144,7 @@ class Firing:
         return result
 
     def cuts(self, strengths: Sequence[float]) -> list[list[float]]:
-        """Return the strength of each slot of each output.
-
-        Parameters
-        ----------
-        strengths : sequence of float
-            Strength of each rule, as from `strengths`.
-
-        Returns
-        -------
-        list of list of float
-            Strength of each slot of each output; a slot is a term if terms are joined by their maximum. 0 where no rule
-            fires.
-        """
+        """Return the strength of each slot of each output."""
         result = []
         for slots, norm in zip(self.slots, self._joins, strict=True):
             join = norm.number
@@ -249,18 +154,7 @@ class Firing:
         return result
 
     def cuts_of_many(self, strengths: Sequence[Array]) -> list[Array]:
-        """Return the strength of each slot of each output, for each of many samples.
-
-        Parameters
-        ----------
-        strengths : sequence of ndarray, shape (n,)
-            Strength of each rule, as from `strengths_of_many`.
-
-        Returns
-        -------
-        list of ndarray, shape (slots, n)
-            Strengths of the slots of each output.
-        """
+        """Return the strength of each slot of each output, for each of many samples."""
         result = []
         for slots, norm in zip(self.slots, self._joins, strict=True):
             cuts = np.zeros((len(slots), len(strengths[0])))
@@ -271,20 +165,7 @@ class Firing:
         return result
 
     def term_cuts(self, k: int, strengths: Sequence[float]) -> list[float]:
-        """Return the greatest strength with which each term of an output is concluded.
-
-        Parameters
-        ----------
-        k : int
-            Index of the output.
-        strengths : sequence of float
-            Strength of each rule, as from `strengths`.
-
-        Returns
-        -------
-        list of float
-            Strengths in the order of its terms; 0 where no rule fires.
-        """
+        """Return the greatest strength with which each term of an output is concluded."""
         result = [0.0] * len(self.system.outputs[k].terms)
         for slot in self.slots[k]:
             result[slot.term] = max([result[slot.term], *(strengths[i] for i in slot.rules)])

@@ -1,11 +1,10 @@
-"""The values of scikit-fuzzy's sampling, at a cost that does not grow with the number of points.
+"""The values of scikit-fuzzy's sampling, at a cost that does not grow with the number of points."""
 
-scikit-fuzzy samples the terms of an output on a grid. It adds the places where a term crosses its own cut, joins the
-clipped terms at all these places by the maximum, and integrates the straight lines between them exactly. So its
-centroid is that of the exact outline of the *sampled* terms, except in cells of the grid in which that outline breaks
-elsewhere, where a term crosses the cut of another, or another term: there it is a chord. All these places are known
-without the grid: the grid places around each break, and the own crossings.
-"""
+# scikit-fuzzy samples the terms of an output on a grid. It adds the places where a term crosses its own cut, joins the
+# clipped terms at all these places by the maximum, and integrates the straight lines between them exactly. So its
+# centroid is that of the exact outline of the *sampled* terms, except in cells of the grid in which that outline breaks
+# elsewhere, where a term crosses the cut of another, or another term: there it is a chord. All these places are known
+# without the grid: the grid places around each break, and the own crossings.
 
 from __future__ import annotations
 
@@ -29,19 +28,14 @@ _ROUNDING = 4 * LEAST_AREA  # tolerance of degrees
 
 
 class GridEngine(Engine):
-    """Compute the centroid that scikit-fuzzy gives on `System.points` points, to rounding.
+    """Compute the centroid that scikit-fuzzy gives on `System.points` points, to rounding."""
 
-    For the two triangles of section VI, with D the distance of two points as a part of the universe, the centroid is at
-    most D^2/6 of the universe off the exact one, and a range-normalized weight D^2/2: 1.7e-5 and 5e-5 at 101 points.
-
-    As in sampling, a jump of an output's term becomes a slope over one cell, and a knot between two points is cut
-    off. Terms of inputs are not sampled. Areas below 2.2e-16 count as that much, as they do in scikit-fuzzy.
-
-    Raises
-    ------
-    EngineError
-        If the implication is not the minimum, or a term of an output is 0 at all points.
-    """
+    # For the two triangles of section VI, with D the distance of two points as a part of the universe, the centroid is
+    # at most D^2/6 of the universe off the exact one, and a range-normalized weight D^2/2: 1.7e-5 and 5e-5 at 101
+    # points.
+    #
+    # As in sampling, a jump of an output's term becomes a slope over one cell, and a knot between two points is cut
+    # off. Terms of inputs are not sampled. Areas below 2.2e-16 count as that much, as they do in scikit-fuzzy.
 
     name: ClassVar[str] = "grid"
 
@@ -103,10 +97,9 @@ Line = tuple[int, float, float]  # a cut's index, a term's degree where the piec
 
 @dataclass(frozen=True, slots=True)
 class _Piece:
-    """A part of a universe, from one grid place to another, in which every sampled term is a straight line.
+    """A part of a universe, from one grid place to another, in which every sampled term is a straight line."""
 
-    If it has more than one cell, no two of the terms cross in it.
-    """
+    # If it has more than one cell, no two of the terms cross in it.
 
     start: float  # distance of its start from the universe's least place
     width: float
@@ -117,22 +110,7 @@ class _Piece:
 
 
 def require_plain(system: System, engine: str, curved_inputs: bool) -> None:
-    """Require that scikit-fuzzy supports a system.
-
-    Parameters
-    ----------
-    system : System
-        System to evaluate.
-    engine : str
-        Name of the engine, for the message.
-    curved_inputs : bool
-        True if terms of inputs may be any membership functions.
-
-    Raises
-    ------
-    EngineError
-        If the implication is not the minimum, or there are norms, terms or defuzzifiers beyond the plain ones.
-    """
+    """Require that scikit-fuzzy supports a system."""
     if system.implication != "min":
         raise EngineError(
             f"engine {engine!r}: implication is {system.implication!r}, which scikit-fuzzy does not know; "
@@ -143,27 +121,7 @@ def require_plain(system: System, engine: str, curved_inputs: bool) -> None:
 
 
 def sampled(output: Output, points: int) -> tuple[Array, Array]:
-    """Return the places at which scikit-fuzzy samples an output, and the terms there.
-
-    Parameters
-    ----------
-    output : Output
-        Output to sample.
-    points : int
-        Number of places, evenly over the universe.
-
-    Returns
-    -------
-    grid : ndarray, shape (points,)
-        Places, which increase.
-    samples : ndarray, shape (terms, points)
-        Degree of each term at each place.
-
-    Raises
-    ------
-    EngineError
-        If a term is 0 at all places, or the universe is too narrow for so many.
-    """
+    """Return the places at which scikit-fuzzy samples an output, and the terms there; returns (points,)."""
     grid = np.linspace(*output.universe, points)
     if not (np.diff(grid) > 0.0).all():
         raise EngineError(f"output {output.name!r}: {points} points do not fit in {output.universe}")

@@ -1,11 +1,10 @@
-"""Proofs that an output's two terms are cut at h and 1 - h for all inputs, in the algebra of min, max and 1 - x.
+"""Proofs that an output's two terms are cut at h and 1 - h for all inputs, in the algebra of min, max and 1 - x."""
 
-A condition is brought to its disjunctive normal form, a set of clauses, each a set of literals, in which no clause
-contains another. Conditions with one form have one degree, always, and by De Morgan the form of a negation is found in
-the same way. If the negation of all conditions for one term has the clauses of the conditions for the other, then the
-cuts are h and 1 - h. The converse is not quite so: what follows only from "a and not a" never being above "b or not b"
-is not seen, and such systems are swept.
-"""
+# A condition is brought to its disjunctive normal form, a set of clauses, each a set of literals, in which no clause
+# contains another. Conditions with one form have one degree, always, and by De Morgan the form of a negation is found
+# in the same way. If the negation of all conditions for one term has the clauses of the conditions for the other, then
+# the cuts are h and 1 - h. The converse is not quite so: what follows only from "a and not a" never being above "b or
+# not b" is not seen, and such systems are swept.
 
 from __future__ import annotations
 
@@ -22,20 +21,7 @@ MAX_CLAUSES = 512  # a form with more is not computed
 
 
 def ladder(system: System, clauses: Sequence[Sequence[Clause]]) -> tuple[Literal, ...] | None:
-    """Return the literals of prioritised criteria, if the clauses have this form.
-
-    Parameters
-    ----------
-    system : System
-        System with the rules.
-    clauses : sequence of sequence of frozenset
-        Clauses of each output, as from `high_clauses`.
-
-    Returns
-    -------
-    tuple, or None
-        Literal of each output that makes it high if none of those before it holds.
-    """
+    """Return the literals of prioritised criteria, if the clauses have this form."""
     complements = _complements(system)
     steps: list[Literal] = []
     above: set[Literal] = set()  # literals by which the criteria before do not hold
@@ -49,19 +35,7 @@ def ladder(system: System, clauses: Sequence[Sequence[Clause]]) -> tuple[Literal
 
 
 def high_clauses(system: System) -> list[tuple[Clause, ...]] | str:
-    """Return, for each output, the clauses of the condition under which its second term is concluded.
-
-    Parameters
-    ----------
-    system : System
-        System with conjunction min and disjunction max.
-
-    Returns
-    -------
-    list of tuple of frozenset, or str
-        Clauses of each output, such that the cut of its second term is the greatest of the clauses' least degrees, and
-        that of its first term one minus this; or the reason why there are no such clauses.
-    """
+    """Return, for each output, the clauses of the condition under which its second term is concluded."""
     complements = _complements(system)
     result = []
     for output in system.outputs:

@@ -60,12 +60,10 @@ def points_of(starts: Array, ends: Array, at: Array = POINTS) -> Array:
 
 
 def mean_errors(values: Array) -> Array:
-    """Estimate the error of each panel's mean, for values at `POINTS`, by the Legendre series through the nodes.
-
-    A series whose terms fall by r from the degrees 4 and 5 to 6 and 7 falls by r^5 until degree 16, the first that the
-    nodes do not integrate. A series that does not reach the values at the ends hides a steep part between an end and
-    the node beside it.
-    """
+    """Estimate the error of each panel's mean, for values at `POINTS`, by the Legendre series through the nodes."""
+    # A series whose terms fall by r from the degrees 4 and 5 to 6 and 7 falls by r^5 until degree 16, the first that
+    # the nodes do not integrate. A series that does not reach the values at the ends hides a steep part between an end
+    # and the node beside it.
     series = np.einsum("pj,kj->pk", np.ascontiguousarray(values[:, INNER]), ANALYSIS)
     sizes = np.abs(series[:, 4:])
     before, last = sizes[:, 0] + sizes[:, 1], sizes[:, 2] + sizes[:, 3]
@@ -122,22 +120,8 @@ def dividing(items: Indices, places: Array, starts: Array, ends: Array) -> tuple
 
 
 def lowest_between(values: Array) -> tuple[Mask, Array]:
-    """Find panels where a positive function may fall to 0 between its points; return where it comes closest to 0.
-
-    A parabola through each three neighboring points shows where the function turns, and how far below the points.
-
-    Parameters
-    ----------
-    values : ndarray, shape (panels, points)
-        Values at `POINTS`.
-
-    Returns
-    -------
-    near : ndarray of bool, shape (panels,)
-        True where it may fall to 0.
-    places : ndarray, shape (panels,)
-        Place of the least value, from -1 to 1.
-    """
+    """Find panels where a positive function may fall to 0 between its points; return where it comes closest to 0."""
+    # A parabola through each three neighboring points shows where the function turns, and how far below the points.
     x0, x1, x2 = POINTS[:-2], POINTS[1:-1], POINTS[2:]
     v0, v1, v2 = values[:, :-2], values[:, 1:-1], values[:, 2:]
     slope = (v1 - v0) / (x1 - x0)
@@ -155,24 +139,7 @@ def lowest_between(values: Array) -> tuple[Mask, Array]:
 def roots(
     function: Callable[[Array, Indices], Array], starts: Array, ends: Array, tolerance: float
 ) -> tuple[Array, Mask]:
-    """Find a root of each of many functions between two places, by Chandrupatla's method.
-
-    Parameters
-    ----------
-    function : callable
-        Values for places, and the index of each place's function.
-    starts, ends : ndarray, shape (n,)
-        Ends of the search.
-    tolerance : float
-        Greatest distance of the ends of what is left of it.
-
-    Returns
-    -------
-    places : ndarray, shape (n,)
-        Roots.
-    found : ndarray of bool, shape (n,)
-        False where the values at both ends have one sign.
-    """
+    """Find a root of each of many functions between two places, by Chandrupatla's method."""
     which = np.arange(len(starts))
     f1, f2 = function(starts, which), function(ends, which)
     found = (f1 >= 0.0) != (f2 >= 0.0)

@@ -1,9 +1,8 @@
-"""The centroid of an output of two terms, cut at 1 - h and h, as a function of h: cubic over quadratic, in pieces.
+"""The centroid of an output of two terms, cut at 1 - h and h, as a function of h: cubic over quadratic, in pieces."""
 
-The places where the envelope of the two clipped terms breaks move linearly with h, so that its area is a quadratic and
-its moment a cubic of h as long as no two of them meet and none passes a knot. Between these values of h both
-polynomials are fitted to exact values, in fractions.
-"""
+# The places where the envelope of the two clipped terms breaks move linearly with h, so that its area is a quadratic
+# and its moment a cubic of h as long as no two of them meet and none passes a knot. Between these values of h both
+# polynomials are fitted to exact values, in fractions.
 
 from __future__ import annotations
 
@@ -20,35 +19,14 @@ Polynomial = tuple[Fraction, ...]  # coefficients of t^0, t^1, ..
 
 @dataclass(frozen=True, slots=True)
 class Piece:
-    """A piece of C(h): a cubic over a quadratic of t = h - start.
+    """A piece of C(h): a cubic over a quadratic of t = h - start."""
 
-    Attributes
-    ----------
-    start : float
-        Start of the piece; its end is the start of the next one, and that of the last one 1.
-    numerator : tuple of 4 float
-        Coefficients of t^0 to t^3.
-    denominator : tuple of 3 float
-        Coefficients of t^0 to t^2; (1, 0, 0) if it is constant.
-    """
-
-    start: float
-    numerator: tuple[float, ...]
-    denominator: tuple[float, ...]
+    start: float  # start of the piece; its end is the start of the next one, and that of the last one 1
+    numerator: tuple[float, ...]  # coefficients of t^0 to t^3
+    denominator: tuple[float, ...]  # coefficients of t^0 to t^2; (1, 0, 0) if it is constant
 
     def __call__(self, h: float) -> float:
-        """Return C(h).
-
-        Parameters
-        ----------
-        h : float
-            Cut of the second term, within this piece.
-
-        Returns
-        -------
-        float
-            Centroid, or the weight that it is scaled to.
-        """
+        """Return C(h)."""
         t = h - self.start
         n0, n1, n2, n3 = self.numerator
         d0, d1, d2 = self.denominator
@@ -56,20 +34,7 @@ class Piece:
 
 
 def pieces(output: Output) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
-    """Return an output's centroid as a function of the cut h of its second term, if that of its first is 1 - h.
-
-    Parameters
-    ----------
-    output : Output
-        Output with two terms.
-
-    Returns
-    -------
-    raw : tuple of Piece
-        C(h), from h = 0 to 1.
-    scaled : tuple of Piece
-        The same, such that the lesser of C(0) and C(1) becomes 0 and the greater one 1; empty if they are equal.
-    """
+    """Return an output's centroid as a function of the cut h of its second term, if that of its first is 1 - h."""
     shape = outline(output, Fraction)
     fits: list[tuple[Fraction, Polynomial, Polynomial]] = []  # start, area, moment
     events = _events(shape)

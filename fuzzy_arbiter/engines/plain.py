@@ -11,20 +11,7 @@ PLAIN = {"conjunction": ("min", "prod"), "disjunction": ("max", "probor"), "impl
 
 
 def beyond_plain(system: System, curved_inputs: bool = False) -> str:
-    """Return the first reason why a system is not of the plain kind, which some engines and checks require.
-
-    Parameters
-    ----------
-    system : System
-        System to check.
-    curved_inputs : bool
-        True if terms of inputs may be any membership functions.
-
-    Returns
-    -------
-    str
-        The first reason; empty if it is plain.
-    """
+    """Return the first reason why a system is not of the plain kind, which some engines and checks require."""
     for key, known in PLAIN.items():
         if getattr(system, key) not in known:
             return f"the {key} is {getattr(system, key)}, expected {' or '.join(known)}"
@@ -52,18 +39,7 @@ def beyond_plain(system: System, curved_inputs: bool = False) -> str:
 
 
 def curved(variable: Variable) -> str:
-    """Describe the first term of a variable that is not piecewise linear.
-
-    Parameters
-    ----------
-    variable : Variable
-        An input or output.
-
-    Returns
-    -------
-    str
-        Description in words; empty if all terms are piecewise linear.
-    """
+    """Describe the first term of a variable that is not piecewise linear."""
     for term in variable.terms:
         if not isinstance(term.shape, Shape):
             kind = term.shape.kind if isinstance(term.shape, Curve) else type(term.shape).__name__.lower()
@@ -72,13 +48,7 @@ def curved(variable: Variable) -> str:
 
 
 def bent(p: Proposition) -> bool:
-    """Return True if a condition has hedges or the term *any*.
-
-    Returns
-    -------
-    bool
-        True if the condition has one.
-    """
+    """Return True if a condition has hedges or the term *any*."""
     if isinstance(p, Not):
         return bent(p.part)
     if isinstance(p, And | Or):

@@ -1,10 +1,9 @@
-"""Outputs of any terms, norms and defuzzifiers, for many samples at once.
+"""Outputs of any terms, norms and defuzzifiers, for many samples at once."""
 
-The joined terms of a sample bend where a term does, where one meets its cut, and where two change places. Between these
-places they are smooth, and Gauss-Legendre quadrature of one order integrates them. The ends of the panels that suit the
-terms are known before; a panel in which the joined terms of a sample bend is divided there, and one that is too rough
-in its middle, until the error of all panels is within the tolerance.
-"""
+# The joined terms of a sample bend where a term does, where one meets its cut, and where two change places. Between
+# these places they are smooth, and Gauss-Legendre quadrature of one order integrates them. The ends of the panels that
+# suit the terms are known before; a panel in which the joined terms of a sample bend is divided there, and one that is
+# too rough in its middle, until the error of all panels is within the tolerance.
 
 from __future__ import annotations
 
@@ -69,25 +68,7 @@ class Joined(NamedTuple):
 
 
 class Quadrature:
-    """The value of one output whose terms are joined.
-
-    Parameters
-    ----------
-    output : Output
-        Output whose terms are membership functions.
-    slots : sequence of Slot
-        Sets that are joined.
-
-    Attributes
-    ----------
-    method : str
-        Method and error bound.
-
-    Raises
-    ------
-    EngineError
-        If there are too many terms for the number of panels that they need.
-    """
+    """The value of one output whose terms are joined."""
 
     def __init__(self, output: Output, slots: Sequence[Slot]) -> None:
         self.output = output
@@ -148,23 +129,7 @@ class Quadrature:
         return float(self.values(np.array(cuts, dtype=np.float64)[:, None])[0])
 
     def values(self, cuts: Array) -> Array:
-        """Return the output's values for many samples.
-
-        Parameters
-        ----------
-        cuts : ndarray, shape (slots, n)
-            Strength of each slot, in [0, 1]; not all of one sample are 0.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Values in the universe; NaN if the joined terms have no area.
-
-        Raises
-        ------
-        EngineError
-            If the joined terms are so rough that they cannot be integrated to the bound.
-        """
+        """Return the output's values for many samples; cuts (slots, n), returns (n,)."""
         count = max(1, _BLOCK // (len(POINTS) * len(self.edges) * max(1, len(cuts))))
         result = np.empty(cuts.shape[1])
         for start in range(0, len(result), count):

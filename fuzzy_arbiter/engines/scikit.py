@@ -29,16 +29,10 @@ _DISJUNCTIONS: dict[str, Callable[..., Any]] = {"max": np.fmax, "probor": lambda
 
 
 class ScikitEngine(Engine):
-    """Run the rules in scikit-fuzzy, with one system a thread.
+    """Run the rules in scikit-fuzzy, with one system a thread."""
 
-    Inputs are sampled at the knots of their terms, which is exact, outputs at `System.points` places. For the error
-    against the exact centroid see `GridEngine`, which gives the same values.
-
-    Raises
-    ------
-    EngineError
-        If the implication is not the minimum, an input's term jumps, or an output's term is 0 at all points.
-    """
+    # Inputs are sampled at the knots of their terms, which is exact, outputs at `System.points` places. For the error
+    # against the exact centroid see `GridEngine`, which gives the same values.
 
     name: ClassVar[str] = "skfuzzy"
 
@@ -112,11 +106,10 @@ class _Runner:
 
 
 class _ControlSystem(control.ControlSystem):  # type: ignore[misc]
-    """A control system whose rules are in one fixed order, since none needs another's result.
+    """A control system whose rules are in one fixed order, since none needs another's result."""
 
-    scikit-fuzzy works the order out at each run, and again at each rule that is added, from a graph that also links
-    terms and rules.
-    """
+    # scikit-fuzzy works the order out at each run, and again at each rule that is added, from a graph that also links
+    # terms and rules.
 
     def __init__(self, variables: Iterable[Any], rules: Iterable[control.Rule]) -> None:
         super().__init__()
@@ -129,10 +122,9 @@ class _ControlSystem(control.ControlSystem):  # type: ignore[misc]
 
 
 class _Simulation(control.ControlSystemSimulation):  # type: ignore[misc]
-    """A simulation that gives no value where no rule fires, and uses nothing that NumPy is about to withdraw.
+    """A simulation that gives no value where no rule fires, and uses nothing that NumPy is about to withdraw."""
 
-    scikit-fuzzy's own way to join terms passes NumPy's `maximum` its result by position, which warns since NumPy 2.4.
-    """
+    # scikit-fuzzy's own way to join terms passes NumPy's `maximum` its result by position, which warns since NumPy 2.4.
 
     def defuzz_consequents(self) -> dict[str, float]:
         results = {}

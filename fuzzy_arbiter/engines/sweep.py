@@ -1,18 +1,17 @@
-"""The exact centroid of one output: a sweep over the straight pieces of its joined terms.
+"""The exact centroid of one output: a sweep over the straight pieces of its joined terms."""
 
-Between two neighbouring knots, or places where two terms' lines meet, the lines l_1, l_2, .. have one order, the
-highest first. Clipped at their cuts c_1, c_2, .. and joined by the maximum they are a sum of single clipped lines: with
-C_t the greatest of the first t cuts,
-
-    max_t min(c_t, l_t) = sum_t (clip(l_t, C_(t-1), C_t) - C_(t-1)),
-
-for what fills the heights from C_(t-1) to C_t is line t, or a lower one; the higher ones are cut below them. Each of
-these bands is integrated by itself.
-
-Scaled by their cuts the lines have no order. They are joined where two of them meet, and integrated as trapezoids.
-
-The functions work on floats and on fractions alike; Numba compiles them as they are.
-"""
+# Between two neighbouring knots, or places where two terms' lines meet, the lines l_1, l_2, .. have one order, the
+# highest first. Clipped at their cuts c_1, c_2, .. and joined by the maximum they are a sum of single clipped lines:
+# with C_t the greatest of the first t cuts,
+#
+#     max_t min(c_t, l_t) = sum_t (clip(l_t, C_(t-1), C_t) - C_(t-1)),
+#
+# for what fills the heights from C_(t-1) to C_t is line t, or a lower one; the higher ones are cut below them. Each of
+# these bands is integrated by itself.
+#
+# Scaled by their cuts the lines have no order. They are joined where two of them meet, and integrated as trapezoids.
+#
+# The functions work on floats and on fractions alike; Numba compiles them as they are.
 
 from __future__ import annotations
 
@@ -30,50 +29,19 @@ MAX_LINES = 200_000  # greatest number of lines of an outline
 
 
 class Outline(NamedTuple):
-    """The straight pieces of a variable's terms over its universe.
+    """The straight pieces of a variable's terms over its universe."""
 
-    Attributes
-    ----------
-    places : tuple of float, length pieces + 1
-        Knots of the variable.
-    first : tuple of int, length pieces + 1
-        Index of each piece's first line, and the number of lines; a term that is 0 in a piece has no line there.
-    term : tuple of int, length lines
-        Term of each line, in rising order within a piece.
-    left, right : tuple of float, length lines
-        Degree just right of the piece's start, and just left of its end.
-    order : tuple of int, length lines
-        Indices of each piece's lines, the highest first.
-    """
-
-    places: tuple[Any, ...]
+    places: tuple[Any, ...]  # knots of the variable
+    # index of each piece's first line, and the number of lines; a term that is 0 in a piece has no line there
     first: tuple[int, ...]
-    term: tuple[int, ...]
-    left: tuple[Any, ...]
-    right: tuple[Any, ...]
-    order: tuple[int, ...]
+    term: tuple[int, ...]  # term of each line, in rising order within a piece
+    left: tuple[Any, ...]  # degree just right of the piece's start, and just left of its end
+    right: tuple[Any, ...]  # degree just right of the piece's start, and just left of its end
+    order: tuple[int, ...]  # indices of each piece's lines, the highest first
 
 
 def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outline:
-    """Return the straight pieces of a variable's terms over its universe.
-
-    Parameters
-    ----------
-    variable : Variable
-        Output whose terms are joined.
-    number : callable
-        Type of the results: `float`, or `fractions.Fraction` for exact ones.
-
-    Returns
-    -------
-    Outline
-        Outline in numbers of that type.
-
-    Raises
-    ------
-    EngineError
-        If the terms overlap in so many places that the outline has more than `MAX_LINES` lines.
-    """
+    """Return the straight pieces of a variable's terms over its universe."""
     knots = tuple(map(number, variable.knots))
     places, first, left, right = [knots[0]], [0], list[Any](), list[Any]()
     term, order = list[int](), list[int]()
@@ -159,22 +127,7 @@ def clipped(
     right: Numbers,
     order: Sequence[int],
 ) -> tuple[Any, Any]:
-    """Return the area under the envelope of clipped terms, and its moment.
-
-    Parameters
-    ----------
-    cuts : sequence of float, length terms
-        Degree at which each term is clipped.
-    places, first, term, left, right, order
-        Parts of an `Outline`.
-
-    Returns
-    -------
-    area : float
-        Integral of the envelope over the universe.
-    moment : float
-        Integral of the envelope times the place's distance from the start of the universe.
-    """
+    """Return the area under the envelope of clipped terms, and its moment."""
     zero = cuts[0] * 0
     one = zero + 1
     area = moment = zero
@@ -207,20 +160,7 @@ def clipped(
 def scaled(
     cuts: Numbers, places: Numbers, first: Sequence[int], term: Sequence[int], left: Numbers, right: Numbers
 ) -> tuple[Any, Any]:
-    """Return the area under the envelope of scaled terms, and its moment.
-
-    Parameters
-    ----------
-    cuts : sequence of float, length terms
-        Degree by which each term is scaled.
-    places, first, term, left, right
-        Parts of an `Outline`.
-
-    Returns
-    -------
-    area, moment : float
-        Area and moment, as from `clipped`.
-    """
+    """Return the area under the envelope of scaled terms, and its moment."""
     zero = cuts[0] * 0
     one = zero + 1
     area = moment = zero
@@ -263,22 +203,7 @@ def centroid(
     order: Sequence[int],
     scales: bool,
 ) -> Any:
-    """Return the centroid of clipped (or scaled) terms, joined by their maximum.
-
-    Parameters
-    ----------
-    cuts : sequence of float, length terms
-        Degree at which each term is clipped; not all are 0.
-    places, first, term, left, right, order
-        Parts of an `Outline`.
-    scales : bool
-        True if a cut scales its term, False if it clips it.
-
-    Returns
-    -------
-    float
-        Centroid, in the universe.
-    """
+    """Return the centroid of clipped (or scaled) terms, joined by their maximum."""
     largest = cuts[0]
     for cut in cuts:
         largest = max(largest, cut)
@@ -296,20 +221,7 @@ def centroid(
 
 
 def alone(output: Variable, number: Callable[[float], Any] = float) -> list[Any]:
-    """Return the centroid of each of an output's terms, alone and whole.
-
-    Parameters
-    ----------
-    output : Variable
-        Output whose terms are joined.
-    number : callable
-        Type of the results: `float`, or `fractions.Fraction` for exact ones.
-
-    Returns
-    -------
-    list of float
-        Centroids in the order of the terms.
-    """
+    """Return the centroid of each of an output's terms, alone and whole."""
     shape = outline(output, number)
     n = len(output.terms)
     return [centroid([number(i == j) for i in range(n)], *shape, False) for j in range(n)]

@@ -1,8 +1,7 @@
-"""Outputs of values: the mean of what the rules conclude, weighted by their strengths, or the sum.
+"""Outputs of values: the mean of what the rules conclude, weighted by their strengths, or the sum."""
 
-Sugeno's terms are values that may depend on the inputs. Tsukamoto's only rise or only fall, and their value is the
-place where they have the rule's strength.
-"""
+# Sugeno's terms are values that may depend on the inputs. Tsukamoto's only rise or only fall, and their value is the
+# place where they have the rule's strength.
 
 from __future__ import annotations
 
@@ -16,15 +15,7 @@ from fuzzy_arbiter.terms.values import Constant, Value, place_of
 
 
 class Weighted:
-    """The value of one output whose terms are values.
-
-    Parameters
-    ----------
-    output : Output
-        Output with the defuzzifier ``average`` or ``sum``.
-    inputs, outputs : sequence of str
-        Names of the system's inputs, and of the outputs before this one, in order.
-    """
+    """The value of one output whose terms are values."""
 
     def __init__(self, output: Output, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         self._mean = output.defuzzifier == "average"
@@ -33,20 +24,7 @@ class Weighted:
         self._arrays = [_array(shape, inputs, outputs) for shape in shapes]
 
     def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
-        """Return the output's value for one sample.
-
-        Parameters
-        ----------
-        cuts : sequence of float, length terms
-            Strength of each term; not all are 0.
-        inputs : sequence of float
-            The sample, and the values of the outputs before this one.
-
-        Returns
-        -------
-        float
-            Value of the output; NaN or infinite if that of a term is.
-        """
+        """Return the output's value for one sample."""
         total = weight = 0.0
         for cut, number in zip(cuts, self._numbers, strict=True):
             if cut > 0.0:
@@ -55,20 +33,7 @@ class Weighted:
         return total / weight if self._mean else total
 
     def values(self, cuts: Array, inputs: Array) -> Array:
-        """Return the output's values for many samples.
-
-        Parameters
-        ----------
-        cuts : ndarray, shape (terms, n)
-            Strengths of the terms; not all of one sample are 0.
-        inputs : ndarray, shape (n, inputs and outputs)
-            The samples, and the values of the outputs before this one.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Values, each as from `value`, to rounding.
-        """
+        """Return the output's values for many samples."""
         total, weight = np.zeros((2, cuts.shape[1]))
         for cut, array in zip(cuts, self._arrays, strict=True):
             fires = cut > 0.0

@@ -11,23 +11,7 @@ from fuzzy_arbiter.export.python import to_python
 
 
 def compiled(system: System) -> Any:
-    """Return a compiled function ``evaluate(inputs, outputs) -> int``.
-
-    Parameters
-    ----------
-    system : System
-        System to compile.
-
-    Returns
-    -------
-    numba dispatcher
-        The function of `to_python`; arrays of float64 in, and filled.
-
-    Raises
-    ------
-    EngineError
-        If Numba is not installed.
-    """
+    """Return a compiled function ``evaluate(inputs, outputs) -> int``."""
     try:
         import numba
     except ImportError:

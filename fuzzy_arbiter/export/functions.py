@@ -67,23 +67,7 @@ _CALL = re.compile(r"\b([a-z_][a-z_0-9]*)\(")
 
 
 def called(texts: Iterable[str]) -> list[str]:
-    """Return the functions that some expressions call.
-
-    Parameters
-    ----------
-    texts : iterable of str
-        Expressions of exported code.
-
-    Returns
-    -------
-    list of str
-        Names of the functions, each once, in alphabetical order.
-
-    Raises
-    ------
-    UnsupportedError
-        If a function is not exported.
-    """
+    """Return the functions that some expressions call."""
     found = {name for text in texts for name in _CALL.findall(text) if name not in ("or", "and", "not")}
     found |= {name for norm in found & _C_NORMS.keys() for name in _CALL.findall(_C_NORMS[norm]) if name in _C_NORMS}
     names = sorted(found)  # a norm calls those before it
@@ -94,18 +78,7 @@ def called(texts: Iterable[str]) -> list[str]:
 
 
 def in_python(name: str) -> str:
-    """Return a function as a definition in Python.
-
-    Parameters
-    ----------
-    name : str
-        Name from `called`.
-
-    Returns
-    -------
-    str
-        Lines of the definition.
-    """
+    """Return a function as a definition in Python."""
     if name in _PYTHON:
         return f"def {name}(a, b):\n    " + _PYTHON[name].replace("|", "\n    ")
     if name in _PYTHON_OF_ONE:
@@ -118,18 +91,7 @@ def in_python(name: str) -> str:
 
 
 def in_c(name: str) -> str:
-    """Return a function as a definition in C.
-
-    Parameters
-    ----------
-    name : str
-        Name from `called`.
-
-    Returns
-    -------
-    str
-        Line of the definition; empty for one of ``math.h``.
-    """
+    """Return a function as a definition in C."""
     if name in _C_NORMS:
         return f"static inline double {name}(double a, double b) {{ return {_C_NORMS[name]}; }}"
     if name in _C_HEDGES:

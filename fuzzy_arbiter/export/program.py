@@ -1,7 +1,6 @@
-"""Exported code as statements, before they are written in a language; C and Python share the expressions.
+"""Exported code as statements, before they are written in a language; C and Python share the expressions."""
 
-``least``, ``greatest`` and ``either`` are functions of two degrees: their minimum, maximum and probabilistic sum.
-"""
+# `least`, `greatest` and `either` are functions of two degrees: their minimum, maximum and probabilistic sum.
 
 from __future__ import annotations
 
@@ -74,24 +73,13 @@ Statement = Assign | Choose | Sweep | Return
 
 @dataclass(frozen=True, slots=True)
 class Program:
-    """The statements of a system, in their order.
+    """The statements of a system, in their order."""
 
-    Attributes
-    ----------
-    system : System
-        System that the program evaluates.
-    statements : tuple of Statement
-        Statements from the inputs ``x1``, ``x2``, .. to the outputs ``y1``, ``y2``, ..
-    outlines : tuple of Outline or None
-        Outlines of the outputs, if they are swept; None for one of values; empty where there is a closed form.
-    functions : tuple of str
-        Names of the functions that the statements call.
-    """
-
-    system: System
-    statements: tuple[Statement, ...]
+    system: System  # system that the program evaluates
+    statements: tuple[Statement, ...]  # statements from the inputs ``x1``, ``x2``, .. to the outputs ``y1``, ``y2``,
+    # outlines of the outputs, if they are swept; None for one of values; empty where there is a closed form
     outlines: tuple[Outline | None, ...]
-    functions: tuple[str, ...]
+    functions: tuple[str, ...]  # names of the functions that the statements call
 
     @property
     def mathematical(self) -> bool:
@@ -101,25 +89,7 @@ class Program:
 
 
 def program(system: System) -> Program:
-    """Return the program of a system: the closed form where it exists, else the sweep.
-
-    Parameters
-    ----------
-    system : System
-        System to evaluate.
-
-    Returns
-    -------
-    Program
-        Program with the results of the engine that ``auto`` selects, to the last bit.
-
-    Raises
-    ------
-    DefinitionError
-        If `system` is not a `System`.
-    UnsupportedError
-        If an output needs quadrature or its previous value, or a condition uses an output.
-    """
+    """Return the program of a system: the closed form where it exists, else the sweep."""
     if not isinstance(system, System):
         raise DefinitionError(f"system is {shown(system)}, expected a System, such as arbiter.system")
     engine, _ = choose(system, "auto")

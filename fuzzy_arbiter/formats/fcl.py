@@ -21,23 +21,7 @@ _SETTINGS = ("normalization", "outside", "points")
 
 
 def write(system: System) -> str:
-    """Format a system as a function block.
-
-    Parameters
-    ----------
-    system : System
-        A system that the language can represent.
-
-    Returns
-    -------
-    str
-        Content of a file; settings that the language cannot represent are in a comment.
-
-    Raises
-    ------
-    UnsupportedError
-        If a name is no word of the language, or it has none for a term, a hedge or a defuzzifier.
-    """
+    """Format a system as a function block."""
     require_word(system.name, "fcl", RESERVED)
     require_words(system, "fcl", RESERVED)
     _require_one_case(system)
@@ -116,30 +100,9 @@ def _require_one_case(system: System) -> None:
 
 
 def read(text: str, block: str | None = None) -> System:
-    """Parse a function block as a system.
-
-    A variable without RANGE has the universe of its points. NC becomes a missing default. Missing statements have
-    jFuzzyLogic's defaults: ACT is MIN, ACCU is MAX, METHOD is COG; where fuzzylite wrote the text, values are added.
-
-    Parameters
-    ----------
-    text : str
-        One function block, or several.
-    block : str, optional
-        Name of the block; needed where there are several.
-
-    Returns
-    -------
-    System
-        System of any kind.
-
-    Raises
-    ------
-    FormatError
-        If the text is no FCL, has no such block, or uses an unsupported part of FCL; the line is named.
-    DefinitionError
-        If the definition is invalid.
-    """
+    """Parse a function block as a system."""
+    # A variable without RANGE has the universe of its points. NC becomes a missing default. Missing statements have
+    # jFuzzyLogic's defaults: ACT is MIN, ACCU is MAX, METHOD is COG; where fuzzylite wrote the text, values are added.
     tokens, comments = cut(text)
     fuzzylite = any("generated with fuzzylite" in text for _, text in comments)
     return system_of(chosen_block(tokens, block), fuzzylite, read_settings(comments, _SETTINGS))

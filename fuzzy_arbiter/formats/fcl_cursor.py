@@ -19,21 +19,11 @@ _T = TypeVar("_T")
 
 @dataclass
 class Cursor:
-    """A position among the tokens of a text.
+    """A position among the tokens of a text."""
 
-    Attributes
-    ----------
-    tokens : list of Token
-        All tokens of the text.
-    at : int
-        Index of the next token.
-    fuzzylite : bool
-        True if a construct so far is one of fuzzylite's, and not of the standard or jFuzzyLogic.
-    """
-
-    tokens: list[Token]
-    at: int = 0
-    fuzzylite: bool = False
+    tokens: list[Token]  # all tokens of the text
+    at: int = 0  # index of the next token
+    fuzzylite: bool = False  # true if a construct so far is one of fuzzylite's, and not of the standard or jFuzzyLogic
 
     @property
     def here(self) -> Token:
@@ -107,20 +97,7 @@ class Cursor:
         return " ".join(token.text for token in self.tokens[start : self.at])
 
     def shape(self, inputs: int | None) -> tuple[Membership | Value, list[float]]:
-        """Take a term's shape, and the least and greatest place in it.
-
-        Parameters
-        ----------
-        inputs : int or None
-            Number of inputs; None for a term of an input, which cannot be a value.
-
-        Returns
-        -------
-        Membership or Value
-            Shape of the term.
-        list of float
-            Places for the default universe of a variable without RANGE.
-        """
+        """Take a term's shape, and the least and greatest place in it."""
         if self.here.kind == "number":
             value = self.number("a value")
             return Constant(value) if inputs is not None else Curve("singleton", (value,)), [value]

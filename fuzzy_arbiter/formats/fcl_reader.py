@@ -30,27 +30,7 @@ _RULE_WORDS = frozenset(("if", "then", "and", "or", "not", "is", "with"))
 
 
 def system_of(tokens: list[Token], fuzzylite: bool, settings: dict[str, Any]) -> System:
-    """Build the system of one function block.
-
-    Parameters
-    ----------
-    tokens : list of Token
-        All tokens of the text.
-    fuzzylite : bool
-        True if a comment names fuzzylite as the writer.
-    settings : dict
-        Further attributes of `System`, from the comment.
-
-    Returns
-    -------
-    System
-        The system; missing statements have jFuzzyLogic's defaults, or fuzzylite's where the text is fuzzylite's.
-
-    Raises
-    ------
-    FormatError, DefinitionError
-        If the text or the definition is invalid, as in `fuzzy_arbiter.formats.reads`.
-    """
+    """Build the system of one function block."""
     return _Reader(tokens, fuzzylite=fuzzylite).system(settings)
 
 

@@ -17,27 +17,7 @@ COUNTS = {"TRIAN": 3, "TRAPE": 4, "COSINE": 2, **{word: len(order) for word, (_,
 
 
 def read_curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[float]]:
-    """Return the shape of one of jFuzzyLogic's functions and its numbers, and its default universe.
-
-    Parameters
-    ----------
-    word : str
-        Name of the function, one of `COUNTS`.
-    numbers : sequence of float
-        Numbers of the function; their count is checked before.
-
-    Returns
-    -------
-    Membership
-        Membership function.
-    list of float
-        Least and greatest place of jFuzzyLogic's default universe.
-
-    Raises
-    ------
-    DefinitionError
-        If the numbers are invalid for the function.
-    """
+    """Return the shape of one of jFuzzyLogic's functions and its numbers, and its default universe."""
     if word in ("TRIAN", "TRAPE"):
         places = [numbers[0], numbers[-1]]
         if len(set(numbers)) == 1:
@@ -79,27 +59,7 @@ def _extent(name: str, p: Sequence[float]) -> list[float]:
 
 
 def say_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) -> str:
-    """Format a term's shape in the words of the standard and jFuzzyLogic.
-
-    Parameters
-    ----------
-    shape : Membership or Value
-        Shape to write.
-    term : str
-        Name of the term, for the error.
-    inputs : sequence of str
-        Names of the system's inputs.
-
-    Returns
-    -------
-    str
-        Points, a number, or a function with its numbers.
-
-    Raises
-    ------
-    UnsupportedError
-        If the language has no word for it.
-    """
+    """Format a term's shape in the words of the standard and jFuzzyLogic."""
     if isinstance(shape, Shape):
         return " ".join(f"({say_number(x)}, {say_number(degree)})" for x, degree in shape.points)
     if isinstance(shape, Constant):
@@ -129,17 +89,6 @@ def say_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) -> st
 
 
 def universe_of(places: Sequence[float]) -> tuple[float, float] | None:
-    """Return the universe from a term's points, for a variable without RANGE.
-
-    Parameters
-    ----------
-    places : sequence of float
-        Places of all terms of a variable.
-
-    Returns
-    -------
-    (float, float) or None
-        Least and greatest; None if they are not two.
-    """
+    """Return the universe from a term's points, for a variable without RANGE."""
     low, high = min(places, default=0.0), max(places, default=0.0)
     return (low, high) if low < high else None

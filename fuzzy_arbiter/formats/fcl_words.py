@@ -74,20 +74,7 @@ class Token(NamedTuple):
 
 
 def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
-    """Split a text into tokens and comments.
-
-    Returns
-    -------
-    list of Token
-        Tokens without spaces and comments; the last one is the end.
-    list of (int, str)
-        Line and text of each comment, without its signs.
-
-    Raises
-    ------
-    FormatError
-        If there is a sign that the language has not, or a comment without end.
-    """
+    """Split a text into tokens and comments."""
     tokens: list[Token] = []
     comments: list[tuple[int, str]] = []
     line, spaced = 1, False
@@ -108,18 +95,7 @@ def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
 
 
 def block_name(tokens: Sequence[Token]) -> str:
-    """Return the name that begins a function block: all tokens of its line, up to a word of the language.
-
-    Parameters
-    ----------
-    tokens : sequence of Token
-        Tokens after ``FUNCTION_BLOCK``.
-
-    Returns
-    -------
-    str
-        Name of the block; empty if there is none.
-    """
+    """Return the name that begins a function block: all tokens of its line, up to a word of the language."""
     words: list[str] = []
     for token in tokens:
         if token.line != tokens[0].line or token.text.upper() in SECTIONS or token.kind == "end":
@@ -129,25 +105,7 @@ def block_name(tokens: Sequence[Token]) -> str:
 
 
 def chosen_block(tokens: list[Token], name: str | None) -> list[Token]:
-    """Return the tokens of one function block.
-
-    Parameters
-    ----------
-    tokens : list of Token
-        All tokens of a text.
-    name : str or None
-        Name of the block; None if there is only one.
-
-    Returns
-    -------
-    list of Token
-        Tokens of the block; all tokens if the text does not consist of function blocks and `name` is None.
-
-    Raises
-    ------
-    FormatError
-        If there is no such block, or several and no name; it lists all names.
-    """
+    """Return the tokens of one function block."""
     starts = [i for i, token in enumerate(tokens) if token.text.upper() == "FUNCTION_BLOCK"]
     if name is None and len(starts) < 2:
         return tokens

@@ -24,24 +24,7 @@ _SIGNS = "'=:,"  # characters at which MATLAB's reader splits lines
 
 
 def write(system: System) -> str:
-    """Format a system as MATLAB's text.
-
-    Parameters
-    ----------
-    system : System
-        A system that the format can represent: triangles, trapezoids or their halves, MATLAB's curves, constants
-        and linear values, at most one connective in a rule, no hedges, no defaults.
-
-    Returns
-    -------
-    str
-        Content of a file; settings that the format cannot represent are in a comment.
-
-    Raises
-    ------
-    UnsupportedError
-        If the format cannot represent a name, a term, a rule or a default; it is quoted.
-    """
+    """Format a system as MATLAB's text."""
     _require_names(system)
     kind, method, aggregation = _method(system)
     lines = [f"% {text}" for text in say_settings(system, SETTINGS)]

@@ -63,25 +63,11 @@ class _Section:
 
 
 def read(text: str) -> System:
-    """Parse MATLAB's text as a system.
-
-    Terms of one name are numbered, as rules speak of them by their place. Where a rule concludes that an output is not
-    in a term, its complement becomes a term of its own. The strengths of rules that conclude one value are added,
-    whatever AggMethod says, as MATLAB does it; where a comment names the fuzzy-logic-toolkit, they are joined as
-    AggMethod defines, as in Octave.
-
-    Returns
-    -------
-    System
-        The system; it has defaults and locks only where the keys of fuzzylite's versions 3 to 5 define them.
-
-    Raises
-    ------
-    FormatError
-        If the text is not of this format, or uses an unsupported part of it; the line is named.
-    DefinitionError
-        If the definition is invalid.
-    """
+    """Parse MATLAB's text as a system."""
+    # Terms of one name are numbered, as rules speak of them by their place. Where a rule concludes that an output is
+    # not in a term, its complement becomes a term of its own. The strengths of rules that conclude one value are added,
+    # whatever AggMethod says, as MATLAB does it; where a comment names the fuzzy-logic-toolkit, they are joined as
+    # AggMethod defines, as in Octave.
     sections, comments = _sections(text)
     settings = read_settings(comments, SETTINGS)
     if "System" not in sections or "Rules" not in sections:

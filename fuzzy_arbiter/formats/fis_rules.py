@@ -21,29 +21,7 @@ _RULE = re.compile(r"([^,()]*),([^,()]*)\(([^()]*)\)\s*:\s*(\S+)")
 def read_rules(
     line: int, row: str, inputs: Sequence[Variable], outputs: Sequence[Output], fuzzylite: bool
 ) -> list[Rule]:
-    """Parse a row of [Rules].
-
-    Parameters
-    ----------
-    line : int
-        Line number, for the error.
-    row : str
-        Numbers of terms, weight and connective.
-    inputs, outputs : sequence
-        Variables that the numbers refer to, in their order.
-    fuzzylite : bool
-        True for fuzzylite's hedges, False for Octave's.
-
-    Returns
-    -------
-    list of Rule
-        Several if it concludes with several hedges.
-
-    Raises
-    ------
-    FormatError
-        If the row is invalid, or uses an unsupported part of the format.
-    """
+    """Parse a row of [Rules]."""
     match = _RULE.fullmatch(row)
     if not match:
         refuse(line, f"{row!r}, expected a rule such as 1 -2, 1 (1) : 1")
@@ -106,25 +84,7 @@ def _indices(
 
 
 def with_complements(output: Output, rules: Sequence[tuple[int, Rule]]) -> Output:
-    """Return an output with the complement of each term that a rule concludes negated.
-
-    Parameters
-    ----------
-    output : Output
-        Output as the text defines it.
-    rules : sequence of (int, Rule)
-        Rules from `read_rules`, each with its line.
-
-    Returns
-    -------
-    Output
-        The same output, if no rule does.
-
-    Raises
-    ------
-    DefinitionError
-        If the complement of such a term is not known.
-    """
+    """Return an output with the complement of each term that a rule concludes negated."""
     added: dict[str, Term] = {}
     for line, rule in rules:
         for c in rule.conclusions:

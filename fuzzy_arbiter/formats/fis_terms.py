@@ -17,33 +17,7 @@ from fuzzy_arbiter.terms.values import Formula, Value
 
 
 def read_function(function: str, text: str, line: int, term: str, inputs: int | None) -> Membership | Value:
-    """Return the membership function or value of a function's name and numbers.
-
-    Parameters
-    ----------
-    function : str
-        Name of the function, such as ``trimf``.
-    text : str
-        Text in its brackets.
-    line : int
-        Line number, for the error.
-    term : str
-        Name of the term.
-    inputs : int or None
-        Number of inputs; None for a term of an input, which cannot be a value.
-
-    Returns
-    -------
-    Membership or Value
-        Shape of the term.
-
-    Raises
-    ------
-    FormatError
-        If the function is unknown, or has the wrong number of parameters.
-    DefinitionError
-        If the numbers are invalid for the function.
-    """
+    """Return the membership function or value of a function's name and numbers."""
     if function not in FUNCTIONS:
         refuse(line, f"term {term!r} is {function!r}, which is not known here; expected {', '.join(FUNCTIONS)}")
     if function == "function":
@@ -69,23 +43,7 @@ def read_function(function: str, text: str, line: int, term: str, inputs: int | 
 
 
 def complement(shape: Membership) -> Membership:
-    """Return the function that is 1 less another.
-
-    Parameters
-    ----------
-    shape : Membership
-        Function of straight pieces, or a curve in one piece.
-
-    Returns
-    -------
-    Membership
-        Exact for straight pieces, a formula for a curve.
-
-    Raises
-    ------
-    DefinitionError
-        If the curve has several pieces.
-    """
+    """Return the function that is 1 less another."""
     if isinstance(shape, Shape):
         return Shape(tuple((x, 1.0 - degree) for x, degree in shape.points))
     if isinstance(shape, Curve) and len(shape.trees) == 1:
@@ -94,18 +52,7 @@ def complement(shape: Membership) -> Membership:
 
 
 def with_unique_names(terms: Sequence[Term]) -> tuple[Term, ...]:
-    """Append a number to each repeated name, so that all terms have different names.
-
-    Parameters
-    ----------
-    terms : sequence of Term
-        Terms of one variable; rules refer to their positions, so that names may repeat in the file.
-
-    Returns
-    -------
-    tuple of Term
-        Terms with different names.
-    """
+    """Append a number to each repeated name, so that all terms have different names."""
     found: list[Term] = []
     for term in terms:
         name, names = term.name, {other.name for other in found}
@@ -118,27 +65,7 @@ def with_unique_names(terms: Sequence[Term]) -> tuple[Term, ...]:
 
 
 def numbers_of(text: str, line: int, what: str) -> list[float]:
-    """Parse the numbers in brackets; each may be an expression such as ``-pi/4``.
-
-    Parameters
-    ----------
-    text : str
-        Numbers with spaces, commas or semicolons between them.
-    line : int
-        Line number, for the error.
-    what : str
-        Description of the numbers, for the error.
-
-    Returns
-    -------
-    list of float
-        Finite numbers.
-
-    Raises
-    ------
-    FormatError
-        If one is not a finite number.
-    """
+    """Parse the numbers in brackets; each may be an expression such as ``-pi/4``."""
     return [_number(part, line, what) for part in re.split(r"[\s,;]+", text.strip()) if part]
 
 

@@ -17,23 +17,7 @@ __all__ = ["read", "write"]
 
 
 def write(system: System) -> str:
-    """Format a system in the FuzzyLite Language.
-
-    Parameters
-    ----------
-    system : System
-        System that the language can represent: only single terms are negated.
-
-    Returns
-    -------
-    str
-        Content of a file; the normalization, for which the language has no word, is in a comment.
-
-    Raises
-    ------
-    UnsupportedError
-        If the language cannot represent a name or a rule; it is quoted.
-    """
+    """Format a system in the FuzzyLite Language."""
     if "#" in system.name:
         raise UnsupportedError(f"fll cannot say the name {system.name!r}: what follows # is a comment")
     require_words(system, "fll", RESERVED)

@@ -52,29 +52,10 @@ class _Block:
 
 
 def read(text: str) -> System:
-    """Parse a text in the FuzzyLite Language as a system.
-
-    `points` is the greatest resolution of any output's defuzzifier; a default of ``nan`` is none; locked ranges clip
-    inputs. An aggregation of ``none`` adds the strengths of values, as fuzzylite does. Terms of one name are
-    refused, for rules mean the first in fuzzylite and the last in pyfuzzylite.
-
-    Parameters
-    ----------
-    text : str
-        One engine.
-
-    Returns
-    -------
-    System
-        System of any kind.
-
-    Raises
-    ------
-    FormatError
-        If the text is not of this language, or uses an unsupported part of it; the line is named.
-    DefinitionError
-        If the definition is invalid.
-    """
+    """Parse a text in the FuzzyLite Language as a system."""
+    # `points` is the greatest resolution of any output's defuzzifier; a default of `nan` is none; locked ranges clip
+    # inputs. An aggregation of `none` adds the strengths of values, as fuzzylite does. Terms of one name are refused,
+    # for rules mean the first in fuzzylite and the last in pyfuzzylite.
     blocks, comments = _blocks(text)
     engines = [b for b in blocks if b.kind == "Engine"]
     if len(engines) != 1:

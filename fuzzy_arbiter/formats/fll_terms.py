@@ -26,23 +26,7 @@ TYPES = (*_PLACES, "Discrete", *CURVES, *VALUES)
 
 
 def say_shape(shape: Membership | Value) -> str:
-    """Format a term's shape as its type and numbers.
-
-    Parameters
-    ----------
-    shape : Membership or Value
-        Shape to write.
-
-    Returns
-    -------
-    str
-        A triangle, a trapezoid or a ramp where it is one, else its points.
-
-    Raises
-    ------
-    UnsupportedError
-        If the language cannot represent it.
-    """
+    """Format a term's shape as its type and numbers."""
     if isinstance(shape, Curve):
         word, order = ("Triangle", (0, 0, 0)) if shape.kind == "singleton" else KINDS[shape.kind].fll
         height = "" if shape.height == 1.0 else f" {say_number(shape.height)}"
@@ -69,31 +53,7 @@ def say_shape(shape: Membership | Value) -> str:
 
 
 def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Membership | Value:
-    """Return the membership function or value of a term's type and numbers.
-
-    Parameters
-    ----------
-    kind : str
-        Type of the term.
-    text : str
-        Numbers of the term, or the expression of a function.
-    line : int
-        Line number, for the error.
-    inputs : int, optional
-        Number of inputs; only terms of outputs can be values.
-
-    Returns
-    -------
-    Membership or Value
-        Shape with degrees up to the term's height.
-
-    Raises
-    ------
-    FormatError
-        If the type is unknown, or has the wrong number of parameters.
-    DefinitionError
-        If the numbers are invalid for the type.
-    """
+    """Return the membership function or value of a term's type and numbers."""
     if kind not in TYPES:
         refuse(line, f"term type {kind!r} is not known here, expected one of {', '.join(TYPES)}")
     if kind == "Function":
@@ -121,24 +81,7 @@ def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Me
 
 
 def read_value(kind: str, numbers: Sequence[float], line: int, inputs: int | None) -> Value:
-    """Return the value of a constant's or linear term's numbers.
-
-    Parameters
-    ----------
-    kind : str
-        Type of the term, such as ``Constant``.
-    numbers : sequence of float
-        The number; or a coefficient for each input, and perhaps a constant.
-    line : int
-        Line number, for the error.
-    inputs : int or None
-        Number of inputs; None for a term of an input.
-
-    Raises
-    ------
-    FormatError
-        If the count of the numbers is wrong.
-    """
+    """Return the value of a constant's or linear term's numbers."""
     if inputs is None:
         refuse(line, f"an input's term is {kind}, which is a value, expected a membership function")
     if kind.lower() == "constant":
@@ -151,33 +94,7 @@ def read_value(kind: str, numbers: Sequence[float], line: int, inputs: int | Non
 
 
 def curve_of(name: str, order: Sequence[int], numbers: Sequence[float], line: int, word: str) -> Curve:
-    """Return the curve of a format's word and numbers.
-
-    Parameters
-    ----------
-    name : str
-        Kind of the curve.
-    order : sequence of int
-        Index of the curve's parameter for each number.
-    numbers : sequence of float
-        Parameters, and perhaps a height.
-    line : int
-        Line number, for the error.
-    word : str
-        The format's word for the curve.
-
-    Returns
-    -------
-    Curve
-        Curve of that kind.
-
-    Raises
-    ------
-    FormatError
-        If the count of the numbers is wrong.
-    DefinitionError
-        If the numbers are invalid for the curve.
-    """
+    """Return the curve of a format's word and numbers."""
     count = len(order)
     if len(numbers) not in (count, count + 1):
         refuse(line, f"{word} has {len(numbers)} numbers, expected {count}, and perhaps a height")

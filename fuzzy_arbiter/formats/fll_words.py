@@ -35,16 +35,5 @@ OLD = {"accumulation": "aggregation"}  # keys of fuzzylite 5
 
 
 def settings_of(outputs: Sequence[Output]) -> tuple[str, ...]:
-    """Return the settings of a system that the language cannot represent.
-
-    Parameters
-    ----------
-    outputs : sequence of Output
-        Outputs of the system; where all are of values, none has points.
-
-    Returns
-    -------
-    tuple of str
-        Names of attributes of `System`.
-    """
+    """Return the settings of a system that the language cannot represent."""
     return ("normalization", "points") if all(output.weighted for output in outputs) else ("normalization",)

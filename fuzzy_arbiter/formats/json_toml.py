@@ -22,25 +22,7 @@ _SETTINGS = ("name", "conjunction", "disjunction", "implication", "normalization
 
 
 def read_json(text: str) -> System:
-    """Parse a JSON text as a system.
-
-    Parameters
-    ----------
-    text : str
-        Text of one JSON object.
-
-    Returns
-    -------
-    System
-        System, as from `fuzzy_arbiter.formats.schema.system_of`.
-
-    Raises
-    ------
-    FormatError
-        If the text is no JSON, repeats a key, or is not of the schema.
-    DefinitionError
-        If the definition is invalid.
-    """
+    """Parse a JSON text as a system."""
     try:
         data = json.loads(text, object_pairs_hook=_unique, parse_constant=_no_constant)
     except json.JSONDecodeError as error:
@@ -51,20 +33,7 @@ def read_json(text: str) -> System:
 
 
 def read_toml(text: str) -> System:
-    """Parse a TOML text as a system.
-
-    Returns
-    -------
-    System
-        System, as from `fuzzy_arbiter.formats.schema.system_of`.
-
-    Raises
-    ------
-    FormatError
-        If the text is no TOML, or is not of the schema.
-    DefinitionError
-        If the definition is invalid.
-    """
+    """Parse a TOML text as a system."""
     try:
         data = tomllib.loads(text)
     except (ValueError, RecursionError) as error:
@@ -86,13 +55,7 @@ def _no_constant(word: str) -> NoReturn:
 
 
 def write_json(system: System) -> str:
-    """Format a system as JSON.
-
-    Returns
-    -------
-    str
-        Indented JSON text, with the points of a term on one line.
-    """
+    """Format a system as JSON."""
     lines = [f"  {_text(key)}: {_text(value)}," for key, value in _settings(system)]
     for key, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
         lines += [f'  "{key}": [', ",\n".join(map(_json_variable, variables)), "  ],"]
@@ -113,13 +76,7 @@ def _json_variable(v: Variable) -> str:
 
 
 def write_toml(system: System) -> str:
-    """Format a system as TOML.
-
-    Returns
-    -------
-    str
-        TOML text with a table for each variable, and the points of a term on one line.
-    """
+    """Format a system as TOML."""
     # formatted here, since tomli_w writes each number of a list on its own line: 14 lines for a triangle
     lines = [f"{key} = {_text(value)}" for key, value in _settings(system)]
     lines += ["rules = [", *(f"  {_rule(rule, ' = ', str)}," for rule in system.rules), "]"]

@@ -58,18 +58,7 @@ def fold_normalization(system: System) -> System:
 
 
 def range_ends(output: Output) -> tuple[Fraction, Fraction]:
-    """Return the centroids that range normalization maps to 0 and 1.
-
-    Parameters
-    ----------
-    output : Output
-        Output to scale.
-
-    Returns
-    -------
-    tuple of Fraction
-        Exact centroids of its least and its greatest term, each alone and whole.
-    """
+    """Return the centroids that range normalization maps to 0 and 1."""
     centroids = alone(output, Fraction)
     return min(centroids), max(centroids)
 

@@ -18,18 +18,7 @@ _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
 def say_number(x: float) -> str:
-    """Format a number as the shortest text that parses as the same number.
-
-    Parameters
-    ----------
-    x : float
-        Finite number.
-
-    Returns
-    -------
-    str
-        Text with a point or an exponent unless it is a whole number; an exponent follows a point, as in IEC 61131-3.
-    """
+    """Format a number as the shortest text that parses as the same number."""
     text = repr(float(x))
     if "e" in text and "." not in text:
         return text.replace("e", ".0e")
@@ -37,43 +26,12 @@ def say_number(x: float) -> str:
 
 
 def say_numbers(xs: Iterable[float]) -> str:
-    """Format numbers with spaces between them.
-
-    Parameters
-    ----------
-    xs : iterable of float
-        Finite numbers.
-
-    Returns
-    -------
-    str
-        Numbers, each as from `say_number`.
-    """
+    """Format numbers with spaces between them."""
     return " ".join(map(say_number, xs))
 
 
 def read_number(text: str, line: int, what: str) -> float:
-    """Parse a text as a finite number.
-
-    Parameters
-    ----------
-    text : str
-        Digits, with or without sign, point and exponent.
-    line : int
-        Line number, for the error.
-    what : str
-        Description of the number, for the error.
-
-    Returns
-    -------
-    float
-        Finite number.
-
-    Raises
-    ------
-    FormatError
-        If it is no number, or not finite.
-    """
+    """Parse a text as a finite number."""
     x = float(text) if _NUMBER.fullmatch(text) else math.nan
     if not math.isfinite(x):
         refuse(line, f"{what} is {text!r}, expected a finite number")
@@ -81,53 +39,18 @@ def read_number(text: str, line: int, what: str) -> float:
 
 
 def refuse(line: int, what: str) -> NoReturn:
-    """Raise the error of a line.
-
-    Parameters
-    ----------
-    line : int
-        Line number, from 1.
-    what : str
-        The offending text, and what was expected.
-
-    Raises
-    ------
-    FormatError
-        Always.
-    """
+    """Raise the error of a line."""
     raise FormatError(f"line {line}: {shortened(what)}")
 
 
 def shortened(text: str) -> str:
-    """Cut the middle out of a long text.
-
-    Parameters
-    ----------
-    text : str
-        Part of an error, which may quote a long line.
-
-    Returns
-    -------
-    str
-        Text of at most 400 characters.
-    """
+    """Cut the middle out of a long text."""
     return text if len(text) <= 400 else f"{text[:250]} ... {text[-140:]}"
 
 
 @contextmanager
 def located(where: str) -> Iterator[None]:
-    """Add the place in the file to the text of a `DefinitionError`.
-
-    Parameters
-    ----------
-    where : str
-        Place, such as ``line 7`` or a key's path.
-
-    Raises
-    ------
-    DefinitionError
-        The same error, with the place before its text.
-    """
+    """Add the place in the file to the text of a `DefinitionError`."""
     try:
         yield
     except DefinitionError as error:
@@ -141,29 +64,7 @@ def assembled(
     rules: Sequence[tuple[int, Rule]],
     **options: Any,
 ) -> System:
-    """Build the system of a file.
-
-    Parameters
-    ----------
-    line : int
-        Line where the system begins.
-    inputs, outputs
-        Inputs and outputs, as for `System`.
-    rules : sequence of (int, Rule)
-        Rules, each with its line.
-    **options
-        The other attributes of `System`.
-
-    Returns
-    -------
-    System
-        System of these parts.
-
-    Raises
-    ------
-    DefinitionError
-        If the system is invalid; the line is named, for a rule its own.
-    """
+    """Build the system of a file."""
     try:
         return System(tuple(inputs), tuple(outputs), tuple(rule for _, rule in rules), **options)
     except DefinitionError as error:
@@ -173,42 +74,14 @@ def assembled(
 
 
 def require_words(system: System, format: str, reserved: frozenset[str]) -> None:
-    """Require that a format accepts the names of a system.
-
-    Parameters
-    ----------
-    system : System
-        System to write.
-    format : str
-        Name of the format.
-    reserved : frozenset of str
-        Words, in lower case, that are reserved in the format.
-
-    Raises
-    ------
-    UnsupportedError
-        If a name of a variable or term is no identifier, or is reserved.
-    """
+    """Require that a format accepts the names of a system."""
     for variable in (*system.inputs, *system.outputs):
         for name in (variable.name, *variable.term_names):
             require_word(name, format, reserved)
 
 
 def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
-    """Require that a format accepts a name.
-
-    Parameters
-    ----------
-    name : str
-        Name of a system, variable or term.
-    format, reserved
-        Format and reserved words, as for `require_words`.
-
-    Raises
-    ------
-    UnsupportedError
-        If it is no identifier, or is reserved.
-    """
+    """Require that a format accepts a name."""
     if not is_identifier(name) or name.startswith("_"):
         raise UnsupportedError(f"{format} cannot say the name {name!r}: expected letters, digits and _, a letter first")
     if name.lower() in reserved:
@@ -216,29 +89,7 @@ def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
 
 
 def word_of(format: str, what: str, name: str, norms: Mapping[str, Norm]) -> str:
-    """Return a format's word for a norm.
-
-    Parameters
-    ----------
-    format : str
-        Name of the format.
-    what : str
-        Use of the norm, such as ``conjunction``.
-    name : str
-        Name of the norm.
-    norms : mapping from str to Norm
-        Norms that the system may use.
-
-    Returns
-    -------
-    str
-        The word.
-
-    Raises
-    ------
-    UnsupportedError
-        If the format has none.
-    """
+    """Return a format's word for a norm."""
     word: str = getattr(norms[name], format)
     if not word:
         known = ", ".join(other for other, norm in norms.items() if getattr(norm, format))
@@ -247,42 +98,12 @@ def word_of(format: str, what: str, name: str, norms: Mapping[str, Norm]) -> str
 
 
 def cannot_say(format: str, i: int, rule: Rule, expected: str, what: str = "condition") -> UnsupportedError:
-    """Return the error for a rule that a format cannot represent.
-
-    Parameters
-    ----------
-    format : str
-        Name of the format.
-    i : int
-        Number of the rule, from 0.
-    rule : Rule
-        The rule, which is quoted.
-    expected : str
-        Supported form, for the error.
-    what : str
-        Part of the rule that is unsupported.
-
-    Returns
-    -------
-    UnsupportedError
-        The error, to be raised.
-    """
+    """Return the error for a rule that a format cannot represent."""
     return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {expected}")
 
 
 def blocks(system: System) -> list[tuple[Operators, list[tuple[int, Rule]]]]:
-    """Group a system's rules into blocks with the same operators.
-
-    Parameters
-    ----------
-    system : System
-        System to write.
-
-    Returns
-    -------
-    list of (Operators, list of (int, Rule))
-        Operators and their rules, in the rules' order; each rule with its number from 0.
-    """
+    """Group a system's rules into blocks with the same operators."""
     own = Operators(system.conjunction, system.disjunction, system.implication)
     result: list[tuple[Operators, list[tuple[int, Rule]]]] = []
     for i, rule in enumerate(system.rules):

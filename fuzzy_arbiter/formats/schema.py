@@ -39,31 +39,12 @@ _KINDS = (*_SHAPES, *KINDS, *_VALUES)
 
 
 def system_of(data: object) -> System:
-    """Build the system that the values of a file define.
-
-    Either ``inputs``, ``outputs`` and ``rules`` are given, with the keys of `System`; or, in short, ``criteria`` in
-    order of priority, with the keys of `prioritised`. Terms are given by their points; as one of ``triangle``,
-    ``trapezoid``, ``rising`` and ``falling`` with its places; as a curve with its parameters, such as ``gaussian``,
-    and perhaps a ``height``; or, of an output, as a ``constant``, as ``linear`` with a coefficient for each input and
-    a constant, or as a ``formula``. A rule is a text, or a table with the text and the operators of its block.
-
-    Parameters
-    ----------
-    data : object
-        Values as JSON or TOML reads them.
-
-    Returns
-    -------
-    System
-        The system, with the defaults of `System` for missing keys.
-
-    Raises
-    ------
-    FormatError
-        If a key is unknown or missing, or a value has another type; the key is named.
-    DefinitionError
-        If the definition is invalid.
-    """
+    """Build the system that the values of a file define."""
+    # Either `inputs`, `outputs` and `rules` are given, with the keys of `System`; or, in short, `criteria` in order of
+    # priority, with the keys of `prioritised`. Terms are given by their points; as one of `triangle`, `trapezoid`,
+    # `rising` and `falling` with its places; as a curve with its parameters, such as `gaussian`, and perhaps a
+    # `height`; or, of an output, as a `constant`, as `linear` with a coefficient for each input and a constant, or as a
+    # `formula`. A rule is a text, or a table with the text and the operators of its block.
     table = _table(data, "", _SHORT if isinstance(data, dict) and "criteria" in data else _LONG)
     settings = {key: table[key] for key in ("name", *_SETTINGS) if key in table}
     for key, value in settings.items():

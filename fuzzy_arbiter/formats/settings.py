@@ -20,21 +20,7 @@ _PART = re.compile(r'(?:[^,"]|"[^"]*"|")+')  # between commas outside of quotes
 
 
 def say_settings(system: System, keys: Sequence[str]) -> list[str]:
-    """Format the comments that a system needs.
-
-    Parameters
-    ----------
-    system : System
-        System to write.
-    keys : sequence of str
-        Settings that the format cannot represent.
-
-    Returns
-    -------
-    list of str
-        First the one that `read_settings` reads, if a setting differs from its default; then, for people, the map from
-        the raw centroids of other tools to weights.
-    """
+    """Format the comments that a system needs."""
     said = [f"{key} = {getattr(system, key)}" for key in keys if getattr(system, key) != PLAIN[key]]
     if system.weights_of:
         said.append(f"{_NAMES} = {' '.join(map(_quoted, system.weights_of))}")
@@ -53,25 +39,7 @@ def say_settings(system: System, keys: Sequence[str]) -> list[str]:
 
 
 def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str]) -> dict[str, Any]:
-    """Parse the settings in the comments of a file.
-
-    Parameters
-    ----------
-    comments : iterable of (int, str)
-        Line and text of each comment, without its delimiters.
-    keys : sequence of str
-        Settings that the format cannot represent.
-
-    Returns
-    -------
-    dict
-        A value for each key, and the names of the criteria whose weights the outputs are.
-
-    Raises
-    ------
-    FormatError
-        If a comment that begins as ours, or almost so, has an unknown setting, or there are two such comments.
-    """
+    """Parse the settings in the comments of a file."""
     settings = {**{key: PLAIN[key] for key in keys}, _NAMES: ()}
     first: int | None = None
     for line, text in comments:

@@ -94,20 +94,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
 
 
 def corners(term: Term, universe: tuple[float, float]) -> tuple[list[float], list[float]]:
-    """Return the corners of a term's line, both ends of a jump among them.
-
-    Parameters
-    ----------
-    term : Term
-        Term of a variable.
-    universe : (float, float)
-        Universe of that variable.
-
-    Returns
-    -------
-    places, degrees : list of float
-        Places and degrees from one end of the universe to the other.
-    """
+    """Return the corners of a term's line, both ends of a jump among them."""
     low, high = universe
     if not isinstance(term.shape, Shape):  # as many corners as make it look smooth
         places = np.unique([*np.linspace(low, high, 401), *term.membership.breaks((low, high))])

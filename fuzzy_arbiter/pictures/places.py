@@ -13,22 +13,7 @@ from fuzzy_arbiter.errors import DefinitionError
 
 
 def one_of(variables: Sequence[Variable], name: str, kind: str) -> int:
-    """Return the index of a variable by name.
-
-    Parameters
-    ----------
-    variables : sequence of Variable
-        Inputs or outputs.
-    name : str
-        Name of the variable.
-    kind : str
-        Kind of the variables, for the error.
-
-    Raises
-    ------
-    DefinitionError
-        If there is no such variable; the known ones are listed.
-    """
+    """Return the index of a variable by name."""
     names = variable_names(variables)
     if name not in names:
         raise DefinitionError(f"no {kind} {name!r}, expected one of {', '.join(names)}")
@@ -36,20 +21,7 @@ def one_of(variables: Sequence[Variable], name: str, kind: str) -> int:
 
 
 def output_place(system: System, name: str) -> int:
-    """Return the index of an output by name.
-
-    Parameters
-    ----------
-    system : System
-        System with the outputs.
-    name : str
-        Name of the output, or of its criterion as results carry it.
-
-    Raises
-    ------
-    DefinitionError
-        If there is no such output; the known ones are listed.
-    """
+    """Return the index of an output by name."""
     for names in (system.result_names, variable_names(system.outputs)):
         if name in names:
             return names.index(name)
@@ -57,29 +29,7 @@ def output_place(system: System, name: str) -> int:
 
 
 def fixed_inputs(arbiter: Arbiter, over: Sequence[str], at: Mapping[str, float] | None) -> dict[str, float]:
-    """Return the values of the inputs that are not axes of a picture.
-
-    Parameters
-    ----------
-    arbiter : Arbiter
-        Arbiter with the inputs.
-    over : sequence of str
-        Inputs along the axes of the picture.
-    at : mapping from str to float, optional
-        Values of others.
-
-    Returns
-    -------
-    dict of float by str
-        Values of all others, by default the middle of the universe, in the order of the inputs.
-
-    Raises
-    ------
-    DefinitionError
-        If an input does not exist, or is both fixed and an axis.
-    InputError
-        If a value is not a number in its universe.
-    """
+    """Return the values of the inputs that are not axes of a picture."""
     inputs = arbiter.system.inputs
     at = dict(at or {})
     for name in (*over, *at):
@@ -95,22 +45,7 @@ def fixed_inputs(arbiter: Arbiter, over: Sequence[str], at: Mapping[str, float] 
 
 
 def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, Array]) -> Array:
-    """Return the weights at many places, NaN where an output is undefined.
-
-    Parameters
-    ----------
-    arbiter : Arbiter
-        Arbiter to draw.
-    fixed : mapping from str to float
-        Inputs with one value.
-    over : mapping from str to ndarray, shape (n,)
-        Values of all other inputs, by name.
-
-    Returns
-    -------
-    ndarray, shape (n, outputs)
-        Weights of the outputs at each place.
-    """
+    """Return the weights at many places, NaN where an output is undefined; over (n,), returns (n, outputs)."""
     system = arbiter.system
     n = len(next(iter(over.values())))
     samples = np.empty((n, len(system.inputs)))
@@ -120,31 +55,12 @@ def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, 
 
 
 def said(values: Mapping[str, float]) -> str:
-    """Format values as text.
-
-    Returns
-    -------
-    str
-        Text such as ``a = 1, b = 0.5``.
-    """
+    """Format values as text."""
     return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
 
 
 def places_in(variable: Variable, count: int) -> Array:
-    """Return places close enough for a line, with both sides of every break of the variable's terms.
-
-    Parameters
-    ----------
-    variable : Variable
-        Variable along the axis.
-    count : int
-        Number of equally spaced places.
-
-    Returns
-    -------
-    ndarray, shape (count or more,)
-        Increasing, from one end of the universe to the other.
-    """
+    """Return places close enough for a line, with both sides of every break of the variable's terms."""
     low, high = variable.universe
     knots = np.array(variable.knots)
     beside = (high - low) * 1e-9

@@ -21,32 +21,13 @@ _LETTERS = 14  # number of letters of a legend or title in an inch of the axes
 
 
 def require_matplotlib() -> None:
-    """Require that Matplotlib is installed.
-
-    Raises
-    ------
-    PictureError
-        If Matplotlib is not installed; the message names the extra that installs it.
-    """
+    """Require that Matplotlib is installed."""
     if find_spec("matplotlib") is None:
         raise PictureError("pictures: Matplotlib is not installed, expected the extra fuzzy-arbiter[plot]")
 
 
 def new_axes(width: float, height: float, **keywords: Any) -> Axes:
-    """Return the axes of a new figure.
-
-    Parameters
-    ----------
-    width, height : float
-        Size of the figure [in].
-    **keywords
-        Options of the axes, such as ``projection``.
-
-    Returns
-    -------
-    Axes
-        Axes, the only ones of their figure.
-    """
+    """Return the axes of a new figure; width, height [in]."""
     require_matplotlib()
     from matplotlib.figure import Figure
 
@@ -55,79 +36,30 @@ def new_axes(width: float, height: float, **keywords: Any) -> Axes:
 
 
 def colour(i: int) -> str:
-    """Return the colour of the i-th line or area.
-
-    Parameters
-    ----------
-    i : int
-        Index, from 0.
-
-    Returns
-    -------
-    str
-        Colour; the six colours repeat.
-    """
+    """Return the colour of the i-th line or area."""
     return COLOURS[i % len(COLOURS)]
 
 
 def hatch(i: int) -> str:
-    """Return the hatching of the i-th area.
-
-    Parameters
-    ----------
-    i : int
-        Index, from 0.
-
-    Returns
-    -------
-    str
-        Hatching; it differs where the colour repeats.
-    """
+    """Return the hatching of the i-th area."""
     return HATCHES[(i + i // len(COLOURS)) % len(HATCHES)]
 
 
 def line_style(i: int) -> dict[str, Any]:
-    """Return the style of the i-th line, which differs in colour and dashes, and is narrower than the line below.
-
-    Parameters
-    ----------
-    i : int
-        Index, from 0.
-
-    Returns
-    -------
-    dict
-        Keywords of ``Axes.plot``; the dashes differ where the colour repeats.
-    """
+    """Return the style of the i-th line, which differs in colour and dashes, and is narrower than the line below."""
     dashes = DASHES[(i + i // len(COLOURS)) % len(DASHES)]
     return {"color": colour(i), "linestyle": dashes, "linewidth": max(1.8, 2.8 - 0.25 * i)}
 
 
 def tidy(ax: Axes) -> None:
-    """Remove the frame's upper and right sides, and draw a faint grid.
-
-    Parameters
-    ----------
-    ax : Axes
-        Axes to change.
-    """
+    """Remove the frame's upper and right sides, and draw a faint grid."""
     ax.spines[["top", "right"]].set_visible(False)
     ax.grid(color="#e4e4e4", linewidth=0.6)
     ax.set_axisbelow(True)
 
 
 def legend_above(ax: Axes, names: Sequence[str], title: str = "") -> None:
-    """Set the legend above the axes, where it covers nothing, in as many columns as fit.
-
-    Parameters
-    ----------
-    ax : Axes
-        Axes with labelled lines.
-    names : sequence of str
-        Labels of these lines.
-    title : str
-        Title of the legend.
-    """
+    """Set the legend above the axes, where it covers nothing, in as many columns as fit."""
     ax.legend(
         loc="lower left",
         bbox_to_anchor=(0.0, 1.0),
@@ -140,22 +72,7 @@ def legend_above(ax: Axes, names: Sequence[str], title: str = "") -> None:
 
 
 def legend_style(names: Sequence[str], title: str, letters: int) -> dict[str, Any]:
-    """Return the layout of a legend that is at most a number of letters wide.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Labels of the legend.
-    title : str
-        Title of the legend.
-    letters : int
-        Letters in a line.
-
-    Returns
-    -------
-    dict
-        Keywords of a legend.
-    """
+    """Return the layout of a legend that is at most a number of letters wide."""
     columns = max(1, min(len(names), letters // (max(map(len, names)) + 8)))
     return {
         "ncols": columns,
@@ -167,28 +84,11 @@ def legend_style(names: Sequence[str], title: str, letters: int) -> dict[str, An
 
 
 def room(ax: Axes) -> int:
-    """Return the number of letters that fit in a line above some axes.
-
-    Parameters
-    ----------
-    ax : Axes
-        Axes, whose width before the layout is used; the layout changes little.
-
-    Returns
-    -------
-    int
-        Number of letters in a line, 20 or more.
-    """
+    """Return the number of letters that fit in a line above some axes."""
     return max(20, int(_LETTERS * ax.bbox.width / ax.figure.dpi))
 
 
 def wrapped(text: str, width: int) -> str:
-    """Break a text into lines of at most some letters, between words where that is possible.
-
-    Returns
-    -------
-    str
-        Lines, of which none begins or ends with an equals sign.
-    """
+    """Break a text into lines of at most some letters, between words where that is possible."""
     lines = textwrap.wrap(text.replace(" = ", "\xa0=\xa0"), width, break_on_hyphens=False)
     return "\n".join(lines).replace("\xa0", " ")

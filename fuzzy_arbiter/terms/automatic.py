@@ -24,18 +24,7 @@ class AutomaticTerms:
     names: tuple[str, ...]
 
     def over(self, universe: tuple[float, float]) -> dict[str, Shape]:
-        """Return the shapes over a universe.
-
-        Parameters
-        ----------
-        universe : (float, float)
-            Least and greatest value.
-
-        Returns
-        -------
-        dict from str to Shape
-            Triangles whose feet are the peaks of their neighbours, the first and the last peak at the ends.
-        """
+        """Return the shapes over a universe."""
         low, high = map(Fraction, universe)
         step = (high - low) / (len(self.names) - 1)
         peaks = [float(low + i * step) for i in range(-1, len(self.names) + 1)]

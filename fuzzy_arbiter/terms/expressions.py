@@ -1,7 +1,6 @@
-"""Arithmetic expressions of files and terms: read by a parser of their own, never run as Python.
+"""Arithmetic expressions of files and terms: read by a parser of their own, never run as Python."""
 
-One tree is evaluated on numbers and on arrays, and written as text, or as C and Python.
-"""
+# One tree is evaluated on numbers and on arrays, and written as text, or as C and Python.
 
 from __future__ import annotations
 
@@ -20,25 +19,9 @@ _BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "%": 2, "~": 3, "^": 4}  # precedence 
 
 @dataclass(frozen=True, slots=True)
 class Expression:
-    """Arithmetic on named numbers.
+    """Arithmetic on named numbers."""
 
-    Attributes
-    ----------
-    text : str
-        Text with ``+ - * / % ^``, parentheses, names, and functions such as ``sin(x)``; texts with one tree are equal.
-
-    Raises
-    ------
-    DefinitionError
-        If the text is no expression, is longer than 2000 characters, or nests deeper than 50 parentheses.
-
-    Examples
-    --------
-    >>> from fuzzy_arbiter.terms.expressions import Expression
-    >>> Expression("2 * speed ^ 2 + 1")({"speed": 3.0})
-    19.0
-    """
-
+    # text with ``+ - * / % ^``, parentheses, names, and functions such as ``sin(x)``; texts with one tree are equal
     text: str
     tree: Node = None  # type: ignore[assignment]  # read from the text
     _number: Callable[[Mapping[str, float]], float] = field(init=False, repr=False, compare=False)
@@ -91,13 +74,7 @@ def _bound(node: Node, values: Mapping[str, float]) -> Node:
 
 
 def number_function(node: Node) -> Callable[[Mapping[str, float]], float]:
-    """Return a function that evaluates a tree on numbers.
-
-    Parameters
-    ----------
-    node : Node
-        Tree of an `Expression`.
-    """
+    """Return a function that evaluates a tree on numbers."""
     if isinstance(node, float):
         return lambda values: node
     if isinstance(node, str):
@@ -111,18 +88,7 @@ def number_function(node: Node) -> Callable[[Mapping[str, float]], float]:
 
 
 def array_function(node: Node) -> Callable[[Mapping[str, Any]], Any]:
-    """Return a function that evaluates a tree on arrays.
-
-    Parameters
-    ----------
-    node : Node
-        Tree of an `Expression`.
-
-    Returns
-    -------
-    callable
-        Function from a mapping of names to arrays; it returns an array, or a number where nothing depends on the names.
-    """
+    """Return a function that evaluates a tree on arrays."""
     if isinstance(node, float):
         return lambda values: node
     if isinstance(node, str):
@@ -132,18 +98,7 @@ def array_function(node: Node) -> Callable[[Mapping[str, Any]], Any]:
 
 
 def said(node: Node) -> str:
-    """Format a tree as text that parses as the same tree.
-
-    Parameters
-    ----------
-    node : Node
-        Tree of an `Expression`.
-
-    Returns
-    -------
-    str
-        Text with no more parentheses than are needed.
-    """
+    """Format a tree as text that parses as the same tree."""
     return _said(node)[0]
 
 
@@ -180,21 +135,7 @@ def _within(part: tuple[str, int], binds: int) -> str:
 
 
 def code(node: Node, names: Mapping[str, str]) -> str:
-    """Format a tree as code that is valid in C and in Python.
-
-    Parameters
-    ----------
-    node : Node
-        Tree of an `Expression`.
-    names : mapping from name to str
-        Name of each variable in the code.
-
-    Returns
-    -------
-    str
-        Calls of functions of C's ``math.h``, of which Python's ``math`` has the same; comparisons and ``quotient`` and
-        ``power`` are functions that the exported code brings along.
-    """
+    """Format a tree as code that is valid in C and in Python."""
     if isinstance(node, float):
         return repr(node) if math.isfinite(node) else "INFINITY" if node > 0 else "-INFINITY" if node < 0 else "NAN"
     if isinstance(node, str):

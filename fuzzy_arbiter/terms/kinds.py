@@ -14,43 +14,24 @@ _END = math.inf
 
 @dataclass(frozen=True, slots=True)
 class CurveKind:
-    """A kind of membership function, with its words in all formats.
+    """A kind of membership function, with its words in all formats."""
 
-    Attributes
-    ----------
-    parameters : tuple of str
-        Names of the parameters, in the order of `Curve.parameters`.
-    pieces : callable
-        Function from the parameters to the smooth pieces, whose expressions use ``x`` and the parameters' names.
-    good : callable
-        Predicate: True if the parameters are valid.
-    expected : str
-        Valid parameters, in words.
-    fll, fis, fcl : Word, optional
-        Word of fuzzylite, of MATLAB or fuzzylite, and of jFuzzyLogic; empty if there is none.
-    polynomial : bool
-        True if the pieces are polynomials.
-    inverse : callable, optional
-        Function for a kind that only rises or only falls: from the parameters to pieces over the degree ``w``, which
-        give the place.
-    features : callable
-        Function from the parameters to places around which the curve changes: between these, and beyond the first and
-        the last, it only rises or only falls, unless `monotonic` is False. Places that are not finite do not count.
-    monotonic : bool
-        False if the curve may turn at places that `features` does not give.
-    """
-
-    parameters: tuple[str, ...]
+    parameters: tuple[str, ...]  # names of the parameters, in the order of `Curve.parameters`
+    # function from the parameters to the smooth pieces, whose expressions use ``x`` and the parameters' names
     pieces: Callable[..., Pieces]
-    good: Callable[..., bool]
-    expected: str
-    fll: Word
-    fis: Word
-    fcl: Word | None = None
-    polynomial: bool = False
+    good: Callable[..., bool]  # predicate: True if the parameters are valid
+    expected: str  # valid parameters, in words
+    fll: Word  # word of fuzzylite, of MATLAB or fuzzylite, and of jFuzzyLogic; empty if there is none
+    fis: Word  # word of fuzzylite, of MATLAB or fuzzylite, and of jFuzzyLogic; empty if there is none
+    fcl: Word | None = None  # word of fuzzylite, of MATLAB or fuzzylite, and of jFuzzyLogic; empty if there is none
+    polynomial: bool = False  # true if the pieces are polynomials
+    # function for a kind that only rises or only falls: from the parameters to pieces over the degree ``w``, which
+    # give the place
     inverse: Callable[..., Pieces] | None = None
+    # function from the parameters to places around which the curve changes: between these, and beyond the first and
+    # the last, it only rises or only falls, unless `monotonic` is False. Places that are not finite do not count
     features: Callable[..., list[float]] = lambda *parameters: list(parameters)
-    monotonic: bool = True
+    monotonic: bool = True  # false if the curve may turn at places that `features` does not give
 
 
 def _same(count: int) -> tuple[int, ...]:

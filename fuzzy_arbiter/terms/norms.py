@@ -14,25 +14,15 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Norm:
-    """An operator that joins two degrees, with its words in all formats.
+    """An operator that joins two degrees, with its words in all formats."""
 
-    Attributes
-    ----------
-    number : callable
-        Joins two floats.
-    array : callable
-        Joins two arrays, or an array and a float, each pair as `number` does.
-    code : str
-        Expression in C and in Python of the degrees ``{0}`` and ``{1}``.
-    fll, fcl, fis : str
-        Word in the format; empty where there is none. That of FIS is Octave's, and MATLAB's where it has one.
-    """
-
-    number: Callable[[float, float], float]
-    array: Callable[[Array, Array], Array]
-    code: str
-    fll: str
+    number: Callable[[float, float], float]  # joins two floats
+    array: Callable[[Array, Array], Array]  # joins two arrays, or an array and a float, each pair as `number` does
+    code: str  # expression in C and in Python of the degrees ``{0}`` and ``{1}``
+    fll: str  # word in the format; empty where there is none. That of FIS is Octave's, and MATLAB's where it has one
+    # word in the format; empty where there is none. That of FIS is Octave's, and MATLAB's where it has one
     fcl: str = ""
+    # word in the format; empty where there is none. That of FIS is Octave's, and MATLAB's where it has one
     fis: str = ""
 
 
@@ -191,19 +181,11 @@ AGGREGATIONS: dict[str, Norm] = {**S_NORMS, "sum": SUM}
 
 @dataclass(frozen=True, slots=True)
 class HedgeKind:
-    """A word that bends a degree: *very* cold.
+    """A word that bends a degree: *very* cold."""
 
-    Attributes
-    ----------
-    number, array : callable
-        Bends a float, or each of an array.
-    fll : bool
-        True if fuzzylite has the hedge.
-    """
-
-    number: Callable[[float], float]
-    array: Callable[[Array], Array]
-    fll: bool = True
+    number: Callable[[float], float]  # bends a float, or each of an array
+    array: Callable[[Array], Array]  # bends a float, or each of an array
+    fll: bool = True  # true if fuzzylite has the hedge
 
 
 def very(a: float) -> float:

@@ -21,18 +21,7 @@ Node = float | str | tuple[Any, ...]  # a number, a name, or (function, argument
 
 
 def parsed(text: str) -> Node:
-    """Parse a text as an expression's tree.
-
-    Returns
-    -------
-    Node
-        Tree of numbers, names, functions and operators.
-
-    Raises
-    ------
-    DefinitionError
-        If the text is no expression, is longer than 2000 characters, or nests deeper than 50 parentheses.
-    """
+    """Parse a text as an expression's tree."""
     return _Parser(text).all()
 
 

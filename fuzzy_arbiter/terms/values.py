@@ -24,20 +24,7 @@ class Value(ABC):
 
     @abstractmethod
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
-        """Return the value as an expression of the inputs and of earlier outputs.
-
-        Parameters
-        ----------
-        inputs : sequence of str
-            Names of the system's inputs.
-        outputs : sequence of str
-            Names of the outputs before this one.
-
-        Raises
-        ------
-        DefinitionError
-            If the value does not fit these inputs.
-        """
+        """Return the value as an expression of the inputs and of earlier outputs."""
 
     def number(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Sequence[float]], float]:
         """Return a function from one sample, (inputs and outputs,), to the number."""
@@ -260,18 +247,7 @@ class Formula(Value, Membership):
 
 
 def invertible(shape: object) -> bool:
-    """Return True if a term only rises or only falls, so that each degree has a place, for Tsukamoto's method.
-
-    Parameters
-    ----------
-    shape : object
-        Shape of a term.
-
-    Returns
-    -------
-    bool
-        True for curves such as sigmoids, and for ramps.
-    """
+    """Return True if a term only rises or only falls, so that each degree has a place, for Tsukamoto's method."""
     return (isinstance(shape, Curve) and shape.invertible) or (isinstance(shape, Shape) and _is_ramp(shape))
 
 
@@ -280,20 +256,7 @@ def _is_ramp(shape: Shape) -> bool:
 
 
 def place_of(shape: Curve | Shape, degree: float) -> float:
-    """Return the place at which a monotonic term has a degree.
-
-    Parameters
-    ----------
-    shape : Curve or Shape
-        Shape for which `invertible` is true.
-    degree : float
-        Degree above 0. Above the term's height a line is extended, while a curve may have no place.
-
-    Returns
-    -------
-    float
-        The place; NaN or infinite where there is none.
-    """
+    """Return the place at which a monotonic term has a degree."""
     if isinstance(shape, Curve):
         return shape.place_of(degree)
     (a, left), (b, right) = shape.points

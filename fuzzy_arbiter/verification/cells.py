@@ -21,52 +21,27 @@ ROUNDING = Fraction(1, 2**50)  # a sum of degrees that is nearer to 1 than this 
 
 @dataclass(frozen=True, slots=True)
 class Domain:
-    """The finite domain of an input: one place for each pattern of degrees that rules can distinguish.
+    """The finite domain of an input: one place for each pattern of degrees that rules can distinguish."""
 
-    Attributes
-    ----------
-    variable : str
-        Name of the input.
-    terms : tuple of str
-        Names of its terms.
-    places : tuple of float or str
-        One for each pattern: a place where it is found, or the term that is taken as a label.
-    ranks : ndarray of int32, shape (patterns, terms)
-        Degrees as ranks, see `rank`.
-    """
-
-    variable: str
-    terms: tuple[str, ...]
+    variable: str  # name of the input
+    terms: tuple[str, ...]  # names of its terms
+    # one for each pattern: a place where it is found, or the term that is taken as a label
     places: tuple[float | str, ...]
-    ranks: Ranks
+    ranks: Ranks  # (patterns, terms) Degrees as ranks, see `rank`
 
 
 @dataclass(frozen=True, slots=True)
 class Stretch:
-    """A part of a universe where degrees do not sum to 1.
+    """A part of a universe where degrees do not sum to 1."""
 
-    Attributes
-    ----------
-    variable : str
-        Name of the input.
-    kind : {"gap", "below", "above"}
-        No term has a degree above 0; the sum is below 1 (gaps are part of that); the sum is above 1.
-    start, end : float
-        Ends of the stretch.
-    start_in, end_in : bool
-        True if this end belongs to the stretch.
-    least, greatest : float
-        Bounds of the sum in it, reached or approached.
-    """
-
-    variable: str
-    kind: Kind
-    start: float
-    end: float
-    start_in: bool
-    end_in: bool
-    least: float
-    greatest: float
+    variable: str  # name of the input
+    kind: Kind  # no term has a degree above 0; the sum is below 1 (gaps are part of that); the sum is above 1
+    start: float  # ends of the stretch
+    end: float  # ends of the stretch
+    start_in: bool  # true if this end belongs to the stretch
+    end_in: bool  # true if this end belongs to the stretch
+    least: float  # bounds of the sum in it, reached or approached
+    greatest: float  # bounds of the sum in it, reached or approached
 
     @property
     def place(self) -> str:
@@ -77,42 +52,15 @@ class Stretch:
 
 
 def rank(degree: Fraction, levels: Sequence[Fraction]) -> int:
-    """Return the rank of a degree among levels.
-
-    Minimum and maximum of degrees have the minimum and maximum of their ranks; if with each level one minus it is a
-    level too, then one minus a degree has the rank 2 L - r. So rules can be evaluated on ranks instead of degrees.
-
-    Parameters
-    ----------
-    degree : Fraction
-        Degree in [0, 1].
-    levels : sequence of Fraction, length L
-        Levels, which increase.
-
-    Returns
-    -------
-    int
-        Rank: 2 i + 1 at level i, 2 i below it and above the level before.
-    """
+    """Return the rank of a degree among levels."""
+    # Minimum and maximum of degrees have the minimum and maximum of their ranks; if with each level one minus it is a
+    # level too, then one minus a degree has the rank 2 L - r. So rules can be evaluated on ranks instead of degrees.
     i = bisect_left(levels, degree)
     return 2 * i + (i < len(levels) and levels[i] == degree)
 
 
 def crisp(variable: Variable, levels: Sequence[Fraction]) -> Domain:
-    """Return the domain of an input whose terms are labels: one holds fully, the others do not.
-
-    Parameters
-    ----------
-    variable : Variable
-        Input of the system.
-    levels : sequence of Fraction
-        Levels, as for `rank`.
-
-    Returns
-    -------
-    Domain
-        Domain, the last term first.
-    """
+    """Return the domain of an input whose terms are labels: one holds fully, the others do not."""
     names = variable.term_names
     degrees = [[Fraction(a == b) for b in names] for a in reversed(names)]
     ranks = np.array([[rank(d, levels) for d in row] for row in degrees], dtype=np.int32)
@@ -120,20 +68,7 @@ def crisp(variable: Variable, levels: Sequence[Fraction]) -> Domain:
 
 
 def graded(variable: Variable, levels: Sequence[Fraction]) -> Domain:
-    """Return the domain of an input that may be any real number in its universe.
-
-    Parameters
-    ----------
-    variable : Variable
-        Input of the system.
-    levels : sequence of Fraction
-        Levels, as for `rank`.
-
-    Returns
-    -------
-    Domain
-        Domain with every pattern of ranks that occurs, once.
-    """
+    """Return the domain of an input that may be any real number in its universe."""
     degrees = _exact(variable)
     places = list(map(Fraction, variable.knots))
     crossings = {
@@ -155,18 +90,7 @@ def graded(variable: Variable, levels: Sequence[Fraction]) -> Domain:
 
 
 def stretches(variable: Variable) -> tuple[Stretch, ...]:
-    """Return the stretches of an input's universe on which the degrees do not sum to 1.
-
-    Parameters
-    ----------
-    variable : Variable
-        Input of the system.
-
-    Returns
-    -------
-    tuple of Stretch
-        Gaps first, then the others; each as long as it can be. None if the terms are a Ruspini partition.
-    """
+    """Return the stretches of an input's universe on which the degrees do not sum to 1."""
     degrees = _exact(variable)
     places = list(map(Fraction, variable.knots))
 

@@ -26,15 +26,7 @@ SAMPLES = 4096  # greatest number of sampled combinations
 
 
 class Effort:
-    """The statements that searches may evaluate in all; a search leaves its unused part to the next ones.
-
-    Parameters
-    ----------
-    limit : int
-        Greatest number of statements in all.
-    searches : int
-        Number of searches.
-    """
+    """The statements that searches may evaluate in all; a search leaves its unused part to the next ones."""
 
     def __init__(self, limit: int, searches: int) -> None:
         self.limit = limit
@@ -53,54 +45,18 @@ class Effort:
 
 
 def greatest_term(output: Output) -> str:
-    """Return the term of an output with the greatest centroid.
-
-    Parameters
-    ----------
-    output : Output
-        Output of the system.
-
-    Returns
-    -------
-    str
-        The term whose own centroid is greatest; of several the last.
-    """
+    """Return the term of an output with the greatest centroid."""
     centroids = alone(output)
     return output.term_names[max(range(len(centroids)), key=lambda j: (centroids[j], j))]
 
 
 def rules_on(system: System, statement: Is) -> tuple[Rule, ...]:
-    """Return the rules that conclude a statement.
-
-    Parameters
-    ----------
-    system : System
-        System to verify.
-    statement : Is
-        Statement about an output.
-
-    Returns
-    -------
-    tuple of Rule
-        Rules in their order.
-    """
+    """Return the rules that conclude a statement."""
     return tuple(rule for rule in system.rules if statement in rule.conclusions)
 
 
 class Questions:
-    """Questions on one kind of inputs, crisp rows or graded inputs.
-
-    Parameters
-    ----------
-    system : System
-        System to verify.
-    domains : sequence of Domain
-        Domain of each input.
-    levels : sequence of Fraction
-        Levels of the domains.
-    effort : Effort
-        Budget of all questions.
-    """
+    """Questions on one kind of inputs, crisp rows or graded inputs."""
 
     def __init__(self, system: System, domains: Sequence[Domain], levels: Sequence[Fraction], effort: Effort) -> None:
         self._system = system
@@ -142,20 +98,7 @@ class Questions:
         )
 
     def ask(self, goals: Sequence[Goal], wanted: int = 1) -> list[Answer]:
-        """Search for the goals; goals with the same inputs share a search.
-
-        Parameters
-        ----------
-        goals : sequence of Goal
-            Combinations to search for.
-        wanted : int
-            Boxes to find; with more than one for one goal only.
-
-        Returns
-        -------
-        list of Answer
-            Answer to each goal.
-        """
+        """Search for the goals; goals with the same inputs share a search."""
         together: dict[frozenset[str], list[int]] = {}
         for i, goal in enumerate(goals):
             together.setdefault(goal.inputs(), []).append(i)
@@ -188,21 +131,7 @@ class Questions:
 
 
 def reach(system: System, conditions: Sequence[Proposition]) -> Reach:
-    """Return the strength of a proof by ranks at 1/2 for a system's *and* and *or*.
-
-    Parameters
-    ----------
-    system : System
-        System to verify.
-    conditions : sequence of Proposition
-        Conditions in question.
-
-    Returns
-    -------
-    {"exact", "bound", "samples"}
-        ``exact``: all, with ``min`` and ``max``. ``bound``: only impossibility, as ``prod`` is never above ``min`` if
-        only statements are negated. ``samples``: nothing.
-    """
+    """Return the strength of a proof by ranks at 1/2 for a system's *and* and *or*."""
     parts = [part for condition in conditions for part in _parts(condition)]
     if system.disjunction != "max" and any(isinstance(part, Or) for part in parts):
         return "samples"
@@ -219,22 +148,7 @@ def _parts(proposition: Proposition) -> list[Proposition]:
 
 
 def sampled(system: System, questions: Questions, statements: Sequence[Is]) -> dict[str, float | str] | None:
-    """Return a sample at which two of some statements are concluded above 1/2.
-
-    Parameters
-    ----------
-    system : System
-        System to verify.
-    questions : Questions
-        Questions of `Questions.of_halves`.
-    statements : sequence of Is
-        Statements about outputs.
-
-    Returns
-    -------
-    dict from str to float, or None
-        Inputs; None if no sample was found.
-    """
+    """Return a sample at which two of some statements are concluded above 1/2."""
     samples = questions.samples()
     firing = Firing(system)
     cuts = firing.cuts_of_many(firing.strengths_of_many(samples))

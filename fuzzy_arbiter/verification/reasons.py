@@ -10,20 +10,7 @@ from fuzzy_arbiter.propositions import Is
 
 
 def row_strengths(system: System, place: Mapping[str, float | str]) -> list[float]:
-    """Return the firing strength of each rule in a crisp row.
-
-    Parameters
-    ----------
-    system : System
-        System to verify.
-    place : mapping from str to str
-        Term of each input, or of those that matter.
-
-    Returns
-    -------
-    list of float
-        Strengths in the order of the rules.
-    """
+    """Return the firing strength of each rule in a crisp row."""
     row = {v.name: place.get(v.name, v.term_names[-1]) for v in system.inputs}
     logic = number_logic(system)
     return [
@@ -32,24 +19,7 @@ def row_strengths(system: System, place: Mapping[str, float | str]) -> list[floa
 
 
 def reasons(system: System, strengths: Sequence[float], statements: Sequence[Is], above: float) -> str:
-    """Name the rules that conclude statements above a strength.
-
-    Parameters
-    ----------
-    system : System
-        System to verify.
-    strengths : sequence of float
-        Strength of each rule.
-    statements : sequence of Is
-        Statements about outputs.
-    above : float
-        Threshold of the strength; 1 includes rules of exactly 1.
-
-    Returns
-    -------
-    str
-        Text such as ``alpha_1 is low by R2, alpha_1 is high by R1``.
-    """
+    """Name the rules that conclude statements above a strength."""
     parts = []
     for statement in dict.fromkeys(statements):
         rules = [

@@ -14,62 +14,31 @@ SHOWN_ROWS = 32  # greatest number of crisp rows in the text
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """A finding about a system.
+    """A finding about a system."""
 
-    Attributes
-    ----------
-    severity : {"fault", "warning", "note"}
-        ``fault``: a check fails; ``warning``: perhaps a mistake; ``note``: information.
-    about : str
-        Name of the check, or ``terms`` or ``rules``.
-    text : str
-        Description, with rule, term and place.
-    place : dict from str to float or str, or None
-        Inputs at which it occurs: numbers, or for crisp rows terms. An input that is not in it can have any value.
-    """
-
-    severity: Severity
-    about: str
-    text: str
+    severity: Severity  # ``fault``: a check fails; ``warning``: perhaps a mistake; ``note``: information
+    about: str  # name of the check, or ``terms`` or ``rules``
+    text: str  # description, with rule, term and place
+    # inputs at which it occurs: numbers, or for crisp rows terms. An input that is not in it can have any value
     place: dict[str, float | str] | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """The answer to one question.
+    """The answer to one question."""
 
-    Attributes
-    ----------
-    name : str
-        ``complete``, ``consistent`` or ``exclusive``, and each of them with ``graded_`` in front.
-    holds : bool or None
-        True if the check holds; None if that was not decided.
-    how : str
-        Method of the check, and the range of its answer.
-    """
-
-    name: str
-    holds: bool | None
-    how: str
+    name: str  # ``complete``, ``consistent`` or ``exclusive``, and each of them with ``graded_`` in front
+    holds: bool | None  # true if the check holds; None if that was not decided
+    how: str  # method of the check, and the range of its answer
 
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """The conclusions of the rules where every input is in one term.
+    """The conclusions of the rules where every input is in one term."""
 
-    Attributes
-    ----------
-    terms : tuple of str, length inputs
-        Term of each input.
-    concluded : tuple of tuple of str, length outputs
-        Terms that each output is in, at any strength.
-    rules : tuple of str
-        Labels of the rules that fire.
-    """
-
-    terms: tuple[str, ...]
-    concluded: tuple[tuple[str, ...], ...]
-    rules: tuple[str, ...]
+    terms: tuple[str, ...]  # term of each input
+    concluded: tuple[tuple[str, ...], ...]  # terms that each output is in, at any strength
+    rules: tuple[str, ...]  # labels of the rules that fire
 
 
 @dataclass(frozen=True, slots=True)

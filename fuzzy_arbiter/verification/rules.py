@@ -14,18 +14,7 @@ MAX_COMPARED = 100  # greatest number of rules with one conclusion that are comp
 
 
 def unused(system: System) -> Iterator[Finding]:
-    """Yield the inputs and terms that no rule uses.
-
-    Parameters
-    ----------
-    system : System
-        System to verify.
-
-    Yields
-    ------
-    Finding
-        One for each input or term.
-    """
+    """Yield the inputs and terms that no rule uses."""
     stated = {s for rule in system.rules for s in rule.condition.terms()}
     concluded = {s for rule in system.rules for s in rule.conclusions}
     for variable in system.inputs:
@@ -45,20 +34,8 @@ def unused(system: System) -> Iterator[Finding]:
 
 
 def redundant(system: System) -> Iterator[Finding]:
-    """Yield the rules whose conclusion another rule always draws at least as strongly.
-
-    The check uses the form of conditions: ``a and b`` is never above ``a``, nor ``a`` above ``a or b``.
-
-    Parameters
-    ----------
-    system : System
-        System to verify.
-
-    Yields
-    ------
-    Finding
-        One for each rule; of two equal rules the later.
-    """
+    """Yield the rules whose conclusion another rule always draws at least as strongly."""
+    # The check uses the form of conditions: `a and b` is never above `a`, nor `a` above `a or b`.
     lattice = system.conjunction == "min" and system.disjunction == "max"
     by_conclusion: dict[Is, list[tuple[int, Rule]]] = defaultdict(list)
     for i, rule in enumerate(system.rules):
@@ -106,18 +83,7 @@ def _below(p: Proposition, q: Proposition, lattice: bool) -> bool:
 
 
 def labels(system: System) -> dict[Proposition, str]:
-    """Return the labels of the rules with each condition.
-
-    Parameters
-    ----------
-    system : System
-        System to verify.
-
-    Returns
-    -------
-    dict from Proposition to str
-        Labels such as ``R1, R4``, by condition.
-    """
+    """Return the labels of the rules with each condition."""
     result: dict[Proposition, str] = {}
     for i, rule in enumerate(system.rules):
         label = f"R{i + 1}"

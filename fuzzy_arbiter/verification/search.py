@@ -1,10 +1,9 @@
-"""Search all combinations of inputs' patterns exhaustively, without those that bounds refute.
+"""Search all combinations of inputs' patterns exhaustively, without those that bounds refute."""
 
-Inputs are settled one after the other. As long as one is open, a statement about it has bounds, the least and the
-greatest rank of its term. *and*, *or* and *not* take bounds to bounds, so a question is often answered for a whole box
-of combinations at once: for prioritised criteria the work grows with a power of their number, not with two to the
-power of it.
-"""
+# Inputs are settled one after the other. As long as one is open, a statement about it has bounds, the least and the
+# greatest rank of its term. *and*, *or* and *not* take bounds to bounds, so a question is often answered for a whole
+# box of combinations at once: for prioritised criteria the work grows with a power of their number, not with two to the
+# power of it.
 
 from __future__ import annotations
 
@@ -29,19 +28,11 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """A combination to look for.
+    """A combination to look for."""
 
-    Attributes
-    ----------
-    groups : tuple of tuple of (Proposition, int)
-        A group fires where any of its propositions has a rank above the number beside it.
-    least, most : int
-        Least and greatest number of groups that fire.
-    """
-
-    groups: tuple[Group, ...]
-    least: int
-    most: int
+    groups: tuple[Group, ...]  # A group fires where any of its propositions has a rank above the number beside it
+    least: int  # least and greatest number of groups that fire
+    most: int  # least and greatest number of groups that fire
 
     def inputs(self) -> frozenset[str]:
         """Return the names of the inputs that the groups speak of."""
@@ -50,35 +41,15 @@ class Goal:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The result of a search.
+    """The result of a search."""
 
-    Attributes
-    ----------
-    boxes : tuple of dict from str to int
-        Pattern of each input that matters; the goal is met whatever the others are.
-    all_found : bool
-        True if the search went through all combinations, so that there are no more boxes.
-    combinations : int
-        Number of combinations of the goal's inputs.
-    """
-
-    boxes: tuple[Box, ...]
-    all_found: bool
-    combinations: int
+    boxes: tuple[Box, ...]  # pattern of each input that matters; the goal is met whatever the others are
+    all_found: bool  # true if the search went through all combinations, so that there are no more boxes
+    combinations: int  # number of combinations of the goal's inputs
 
 
 class Search:
-    """One search for several goals that speak of the same inputs.
-
-    Parameters
-    ----------
-    goals : sequence of Goal
-        Combinations to search for.
-    domains : mapping from str to Domain
-        Domain of each input.
-    top : int
-        Greatest rank: one minus a degree has the rank `top` less the degree's rank.
-    """
+    """One search for several goals that speak of the same inputs."""
 
     def __init__(self, goals: Sequence[Goal], domains: Mapping[str, Domain], top: int) -> None:
         self._goals = goals
@@ -112,22 +83,7 @@ class Search:
         self.combinations = math.prod(map(len, self._patterns))
 
     def run(self, limit: int, wanted: int = 1) -> tuple[list[Answer], int]:
-        """Search for boxes that meet the goals.
-
-        Parameters
-        ----------
-        limit : int
-            Greatest number of statements to evaluate.
-        wanted : int
-            Boxes to find; with more than one for one goal only.
-
-        Returns
-        -------
-        list of Answer
-            Answer to each goal.
-        int
-            Number of statements that were evaluated.
-        """
+        """Search for boxes that meet the goals."""
         found: list[list[Box]] = [[] for _ in self._goals]
         wanting = list(range(len(self._goals)))
         stack = [np.zeros((1, 0), dtype=np.int32)]
