@@ -63,17 +63,17 @@ def _columns(
         ),
         *(Column(f"estimate.phi{i + 1}", "N.m" if i else "N", f"Estimate of phi {i + 1} in (12)") for i in range(4)),
         *(
-            Column(f"command.{name}", unit, "Wrench that the law asks for, body frame")
+            Column(f"command.{name}", unit, "Commanded wrench, body frame")
             for name, unit in zip("XYZKMN", _FORCE_UNITS, strict=True)
         ),
-        Column("allocation_saturated", "", "The thrusters' limits cut the wrench that the law asks for"),
+        Column("allocation_saturated", "", "Commanded wrench clipped by the thrusters' limits"),
         *_as_columns(inputs),
         *(
-            Column(f"{name}.shift.{axis}", "m", f"How far {name} has moved {where} from where the scenario has it")
+            Column(f"{name}.shift.{axis}", "m", f"Displacement of {name}, {where}")
             for name in scenario.moving
             for axis, where in zip("xyz", ("north", "east", "down"), strict=True)
         ),
-        *([Column("goal.place", "", "Which of the goal's places it is at, from 0")] if scenario.goal_then else []),
+        *([Column("goal.place", "", "Index of the goal's present place, from 0")] if scenario.goal_then else []),
         *_sensing_columns(scenario),
         *_command_columns(scenario),
         *(Column(f"law.{d.name}", d.unit, d.description) for d in diagnostics),
@@ -93,13 +93,13 @@ def _sensing_columns(scenario: Scenario) -> Iterator[Column]:
     if scenario.sensing.exact:
         return
     for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
-        yield Column(f"sensed.{axis}", "m", f"Position {where} for the law")
+        yield Column(f"sensed.{axis}", "m", f"Sensed position, {where}")
     for i, name in enumerate("uvwpqr"):
-        yield Column(f"sensed.{name}", "m/s" if i < 3 else "rad/s", f"Velocity {name} for the law, body frame")
+        yield Column(f"sensed.{name}", "m/s" if i < 3 else "rad/s", f"Sensed velocity {name}, body frame")
     if scenario.sensing.through == "state":
         return
     for i in range(4):
-        yield Column(f"sensed.e{i}", "", f"Attitude for the law, unit quaternion, part {i}")
+        yield Column(f"sensed.e{i}", "", f"Sensed attitude, unit quaternion, component {i}")
     for name, unit in (("position", "m"), ("velocity", "m/s"), ("attitude", "rad")):
         for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
             yield Column(f"deviation.{name}.{axis}", unit, f"Standard deviation of the sensed {name}, {where}")
@@ -110,11 +110,11 @@ def _sensing_columns(scenario: Scenario) -> Iterator[Column]:
 def _command_columns(scenario: Scenario) -> Iterator[Column]:
     if not scenario.commands.enabled:
         return
-    yield Column("commands.armed", "", "The thrusters may work")
-    yield Column("commands.mode", "", f"Who steers: {', '.join(f'{i} {mode}' for i, mode in enumerate(MODES))}")
+    yield Column("commands.armed", "", "Armed: the thrusters may give force")
+    yield Column("commands.mode", "", f"Control mode: {', '.join(f'{i} {mode}' for i, mode in enumerate(MODES))}")
     yield Column("commands.item", "", "Item of the mission, from 0; -1 for none")
     for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
-        yield Column(f"target.{axis}", "m", f"Middle of the target region, {where}")
+        yield Column(f"target.{axis}", "m", f"Center of the target region, {where}")
     yield Column("target.radius", "m", "Radius of the target region if it is a sphere of its own, 0 if it is the goal")
 
 
