@@ -113,12 +113,13 @@ def slow_commands(log: Log) -> str:
         period = float(np.median(np.diff(log.times)))
         if period < _SLOW_SAMPLES:
             return ""
-        wanting = " At this rate they determine damping and weight less buoyancy, not added mass, lag or delays."
+        logged = f"Servo outputs of {log.name} are logged at {1.0 / period:.2g} Hz"
+        if period > _SLOW:
+            return f"{logged}: they determine damping and weight less buoyancy, not added mass, lag or delays."
         return (
-            f"Servo outputs of {log.name} are logged at {1.0 / period:.2g} Hz. They are joined by straight lines, and "
-            f"what thrust did within {period:.2g} s counts as noise, which makes the intervals as wide as they are. "
+            f"{logged}. What thrust did in between counts as noise, which makes the intervals as wide as they are. "
             "Telemetry with SERVO_OUTPUT_RAW at 50 Hz makes them smaller: an ArduSub's .BIN has 10 Hz, which no "
-            f"parameter changes.{wanting if period > _SLOW else ''}"
+            "parameter changes."
         )
     period = command_period(log)
     if period < _SLOW:

@@ -259,5 +259,4 @@ def _inside(parameters: Sequence[Parameter]) -> Array:
 def _nothing_left(rejected: Counter[str]) -> str:
     if not rejected:
         return f"no run is long enough, expected {STAGES[-1]:g} s of commands with samples"
-    reason, count = rejected.most_common(1)[0]
-    return f"no window is left: {count} of {rejected.total()} rejected, since {reason}"
+    return f"no window is left: {'; '.join(f'{n} since {reason}' for reason, n in rejected.most_common())}"
