@@ -35,10 +35,9 @@ _MAVLINK_TESTS = (
     "messages",
     "mission",
     "modes",
-    "obstacles",
     "parameters",
 )
-_MAVLINK_TESTS += ("signing", "streams", "targets")
+_MAVLINK_TESTS += ("received_obstacles", "signing", "streams", "targets")
 
 PARTS = (
     Part("fuzzy_arbiter", 98, ("tests/fuzzy_arbiter",), ("fuzzy_arbiter/*",)),

@@ -5,7 +5,7 @@ import subprocess
 
 import pytest
 
-from tests.architecture import banned, counts
+from tests.architecture import banned, counts, coverage
 from tests.architecture.modules import ROOT
 
 
@@ -53,3 +53,7 @@ def test_generated_pages_do_not_count_as_handwritten():
     for page in ("docs/performance.md", "docs/scenarios.md"):
         assert counts.words_of(ROOT / page) - counts.words_by_hand(ROOT / page) > 500
     assert counts.words_of(ROOT / "README.md") == counts.words_by_hand(ROOT / "README.md")
+
+
+def test_coverage_is_measured_by_tests_that_exist():
+    assert [test for part in coverage.PARTS for test in part.tests if not (ROOT / test).exists()] == []
