@@ -3,7 +3,7 @@
 ``python -m benchmarks.identification N [--seed K] [--duration S] [--noise F] [--nuisance NAME ... [--unknown]] [--dive]
 [--out FILE]``. With a file each vehicle is a line of it, and those that it has are not flown again.
 Each is a BlueROV2 Heavy with other damping, added mass (all 21 elements), buoyancy, its center and thruster lag, in a
-current. It gets the sticks of ``cosim excite`` in a box of 10 m, which know the shipped numbers alone. Sensors are
+current. It gets the sticks of ``identify --excite`` in a box of 10 m, which know the shipped numbers alone. Sensors are
 white: DVL 5 mm/s at 6.7 Hz, gyro 2 mrad/s with biases, attitude 5 mrad and depth 3 mm at 20 Hz. The search starts from
 the shipped numbers. A nuisance is one of: ``force``, random of 0.2 to 0.5 N that changes within 5 to 10 s; ``bias`` of
 the gyro, up to 20 mrad/s; ``scale`` of the DVL, 1 %; ``thrusters`` that give 90 to 110 %; ``asymmetric``, and less
@@ -292,7 +292,7 @@ def main() -> None:
     parser.add_argument("--noise", type=float, default=1.0, help="factor of all noise")
     parser.add_argument("--nuisance", choices=tuple(ESTIMATED), nargs="+", default=["none"])
     parser.add_argument("--unknown", action="store_true", help="nuisances are not estimated")
-    parser.add_argument("--dive", action="store_true", help="an ordinary dive in the place of cosim excite")
+    parser.add_argument("--dive", action="store_true", help="an ordinary dive in the place of cosim identify --excite")
     parser.add_argument("--out", type=Path, help="file of lines, by which an interrupted measurement goes on")
     options = parser.parse_args()
     started = time.perf_counter()

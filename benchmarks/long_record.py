@@ -28,8 +28,8 @@ WORK = {
     "record": ("write",),
     "summary": ("summary",),
     "report": ("report",),
-    "report as PDF and PNG": ("report", "--format", "pdf,png"),
-    "replay": ("replay",),
+    "report as PNG": ("report", "--format", "png"),
+    "replay": ("report", "--replay"),
     "watch": ("watch", "--once"),
     **{f"export {name}": ("export", "--to", name) for name in _EXPORTS},
 }

@@ -73,6 +73,6 @@ def test_custom_law_is_compared_over_scenes(copy):
 
 
 def test_law_without_c_code_is_rejected_by_name(copy):
-    done = cosim(copy, "package", "paper", "--set", "law.name=sliding_mode", "--to", "ssp", "--out", "x.ssp")
+    done = cosim(copy, "export", "paper", "--set", "law.name=sliding_mode", "--to", "ssp", "--out", "x.ssp")
     assert done.returncode == 2, done.stdout + done.stderr
     assert "sliding_mode" in done.stderr and done.stderr.count("\n") == 1

@@ -117,7 +117,7 @@ def test_documented_torus_region_is_avoided(copy):
 def test_report_replay_exports_and_check_draw_the_torus(copy):
     for command in (
         ["run", "struck.toml", "--out", "struck"],
-        ["replay", "struck", "--out", "struck.html"],
+        ["report", "--replay", "struck", "--out", "struck.html"],
         ["export", "struck", "--to", "mcap", "--out", "struck.mcap"],
         ["export", "struck", "--to", "rrd", "--out", "struck.rrd"],
     ):
@@ -131,7 +131,7 @@ def test_report_replay_exports_and_check_draw_the_torus(copy):
 
 @pytest.mark.slow
 def test_torus_is_packaged_and_swept(copy):
-    done = python(copy, "-m", "cosim", "package", "struck.toml", "--to", "ssp", "--out", "struck.ssp")
+    done = python(copy, "-m", "cosim", "export", "struck.toml", "--to", "ssp", "--out", "struck.ssp")
     assert done.returncode == 0, done.stderr
     vary = ["--vary", "initial.position.1=-0.05,0,-1", "--design", "grid", "--out", "swept", "--replays", "0"]
     done = python(copy, "-m", "cosim", "sweep", "struck.toml", *vary)

@@ -74,7 +74,7 @@ class _Package:
                 sys.executable,
                 "-m",
                 "cosim",
-                "package",
+                "export",
                 SCENARIO,
                 *sets,
                 "--to",
@@ -84,7 +84,7 @@ class _Package:
             ]
             done = subprocess.run(command, capture_output=True, text=True, check=False)
             if done.returncode:
-                raise NotMeasuredError(f"cosim package: {' '.join(done.stderr.split())[-200:]}")
+                raise NotMeasuredError(f"cosim export --to ssp: {' '.join(done.stderr.split())[-200:]}")
             self._made = True
         return self._path
 

@@ -1,4 +1,4 @@
-"""``cosim campaign``, ``cosim compare`` and ``cosim ablate``."""
+"""``cosim campaign`` and ``cosim compare``."""
 
 from __future__ import annotations
 
@@ -10,73 +10,75 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.numbers import whole
-from cosim.command_line.process import say_if_interrupted
-from cosim.command_line.results import say
+from cosim.command_line.flags import add_changes, add_verb, flag, refuse_flags, whole
+from cosim.command_line.process import say, say_if_interrupted
 from cosim.errors import RunError
 
-WORKERS = whole(1, 1024)
+_WORKERS = whole(1, 1024)
 
 
 def add_verbs(verbs: Any) -> None:
     """Add the verbs to the subparsers of the command."""
-    campaign = verbs.add_parser("campaign", help="fly many scenes by one law")
-    _add_scenes(campaign, cluster=True)
-    campaign.add_argument("--law", required=True, help="such as ismail_dunnigan")
-    campaign.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="set a gain of the law, such as k_p1=10; may be repeated",
+    verb = add_verb(
+        verbs, "campaign", campaign, "fly many scenes by one law", "campaigns",
+        ("campaign scenes.jsonl --law deployable --out campaigns/mine --workers 2",
+         "campaign scenes.jsonl --law ismail_dunnigan --set k_p1=10 --out campaigns/stiff"),
     )  # fmt: skip
+    flag(verb, "--law NAME", "such as ismail_dunnigan", required=True)
+    add_changes(verb, "a gain of the law, such as k_p1=10")
+    _add_scenes(verb)
+    add_cluster(verb)
 
-    compare = verbs.add_parser("compare", help="fly the same scenes by several laws, and put them side by side")
-    _add_scenes(compare)
-    compare.add_argument("--laws", required=True, metavar="A,B[,C]", help="two or more, with commas between them")
-    compare.add_argument(
-        "--set", action="append", default=[], metavar="LAW.KEY=VALUE", dest="settings",
-        help="set a gain of a law, such as ismail_dunnigan.k_p1=10; may be repeated",
+    verb = add_verb(
+        verbs, "compare", compare, "fly the same scenes by several laws, or by one without a part each", "campaigns",
+        ("compare scenes.jsonl --laws deployable,pd --out comparisons/mine",
+         "compare scenes.jsonl --ablate --variants net-weight,arbiter-reversed --out ablations/mine"),
     )  # fmt: skip
+    compared = verb.add_mutually_exclusive_group(required=True)
+    flag(compared, "--laws A,B[,C]", "two or more, with commas between them")
+    flag(compared, "--ablate", "compare the deployable law with itself without one part each")
+    flag(verb, "--variants A[,B]", "with --ablate: such as net-weight,arbiter-reversed (default: all)")
+    add_changes(
+        verb, "a gain of a law, such as ismail_dunnigan.k_p1=10; with --ablate of all variants, such as speed=0.8"
+    )
+    _add_scenes(verb)
+    add_workers(verb)
 
-    ablate = verbs.add_parser("ablate", help="fly the same scenes by the deployable law, and without one part each")
-    _add_scenes(ablate, arbiter=False)
-    ablate.add_argument("--variants", metavar="A[,B]", help="such as net-weight,arbiter-reversed (default: all)")
-    ablate.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="set a gain of all variants, such as speed=0.8; may be repeated",
-    )  # fmt: skip
 
-
-def _add_scenes(verb: argparse.ArgumentParser, arbiter: bool = True, cluster: bool = False) -> None:
+def _add_scenes(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("scenes", type=Path, metavar="SCENES.jsonl", help="a scene a line; - for standard input")
-    verb.add_argument(
-        "--out", type=Path, required=True, metavar="DIR",
-        help="a new folder, or one that this command began: it goes on with what is left",
+    add_campaign_folder(verb)
+    flag(verb, "--report-failures", "report failing thrusters to the law")
+    flag(
+        verb, "--sensing", "input of the law: the state with the scenes' noise, or a navigation filter's estimate from "
+        "IMU, DVL, compass, pressure sensor and USBL", default="state", choices=("state", "sensors"),
     )  # fmt: skip
-    if cluster:
-        add_cluster(verb)
-    else:
-        verb.add_argument("--workers", type=WORKERS, default=1, metavar="N", help="processes (default: 1)")
-    add_replays(verb)
-    verb.add_argument("--report-failures", action="store_true", help="report failing thrusters to the law")
-    verb.add_argument(
-        "--sensing", choices=("state", "sensors"), default="state",
-        help="input of the law: the state with the scenes' noise, or a navigation filter's estimate from IMU, DVL, "
-        "compass, pressure sensor and USBL (default: state)",
+    flag(
+        verb, "--arbiter ordered|reversed|crisp|none|FILE", "weigh criteria by their order (default), in reversed "
+        "order, by memberships of 0 or 1, all with 1, or by rules of a file with the criteria as inputs",
     )  # fmt: skip
 
-    if arbiter:
-        verb.add_argument(
-            "--arbiter", default="ordered", metavar="ordered|reversed|crisp|none|FILE",
-            help="weigh criteria by their order (default), in reversed order, by memberships of 0 or 1, all with 1, or "
-            "by the rules of a file, whose inputs are named as the criteria",
-        )  # fmt: skip
+
+def add_campaign_folder(verb: argparse.ArgumentParser) -> None:
+    """Add the flags for the folder of a campaign, and for the replays of its worst flights."""
+    flag(
+        verb, "--out DIR", "a new folder, or one that this command began: it goes on with what is left", Path,
+        required=True,
+    )  # fmt: skip
+    flag(verb, "--replays N", "worst flights, of each law, that are repeated with a replay", whole(0, 1000), 3)
+
+
+def add_workers(verb: argparse.ArgumentParser) -> None:
+    """Add the flag for the number of processes that fly."""
+    flag(verb, "--workers N", "processes", _WORKERS, 1)
 
 
 def add_cluster(verb: argparse.ArgumentParser) -> None:
     """Add the flags for the processes that fly: on this machine or in a Dask cluster."""
-    verb.add_argument("--workers", type=WORKERS, metavar="N", help="processes (default: 1; with --dask: one a core)")
+    flag(verb, "--workers N", "processes (default: 1; with --dask: one a core)", _WORKERS)
     where = verb.add_mutually_exclusive_group()
-    where.add_argument("--dask", action="store_true", help="start a Dask cluster on this machine")
-    where.add_argument("--scheduler", metavar="tcp://HOST:PORT", help="use an existing Dask cluster")
+    flag(where, "--dask", "start a Dask cluster on this machine")
+    flag(where, "--scheduler tcp://HOST:PORT", "use an existing Dask cluster")
 
 
 def require_one_count(options: argparse.Namespace) -> None:
@@ -97,18 +99,10 @@ def executor_of(options: argparse.Namespace) -> Iterator[Executor | None]:
         yield executor
 
 
-def add_replays(verb: argparse.ArgumentParser) -> None:
-    """Add the flag for the number of worst flights that get a replay."""
-    verb.add_argument(
-        "--replays", type=whole(0, 1000), default=3, metavar="N",
-        help="number of worst flights that are repeated with a replay (default: 3; for each law that is compared)",
-    )  # fmt: skip
-
-
 def _conditions(options: argparse.Namespace) -> Any:
     from cosim.campaigns.scenes.conditions import Conditions
 
-    arbiter = getattr(options, "arbiter", "ordered")
+    arbiter = options.arbiter or "ordered"
     return Conditions.by_arbiter(arbiter, report_failures=options.report_failures, sensing=options.sensing)
 
 
@@ -119,7 +113,7 @@ def campaign(options: argparse.Namespace) -> int:
     from cosim.campaigns.scenes.law_gains import gains_from
 
     require_one_count(options)
-    gains = gains_from(options.law, options.settings)
+    gains = gains_from(options.law, options.set)
     conditions = _conditions(options)
 
     def run() -> None:
@@ -142,8 +136,11 @@ def compare(options: argparse.Namespace) -> int:
     from cosim.campaigns.pages.comparison_page import write_comparison_page
     from cosim.campaigns.scenes.law_gains import gains_by_law
 
+    if options.ablate:
+        return _ablate(options)
+    refuse_flags(options, ["variants"], "--ablate with it")
     laws = [law.strip() for law in options.laws.split(",") if law.strip()]
-    gains = gains_by_law(laws, options.settings)
+    gains = gains_by_law(laws, options.set)
     conditions = _conditions(options)
 
     def run() -> None:
@@ -157,19 +154,16 @@ def compare(options: argparse.Namespace) -> int:
     return resumable(run, options.out)
 
 
-def ablate(options: argparse.Namespace) -> int:
-    """Run ``cosim ablate``."""
-    from cosim.campaigns.ablation import VARIANTS
-    from cosim.campaigns.ablation import ablate as fly_variants
+def _ablate(options: argparse.Namespace) -> int:
+    from cosim.campaigns.ablation import VARIANTS, ablate
     from cosim.campaigns.pages.ablation_page import write_ablation_page
 
+    refuse_flags(options, ["arbiter"], "no --ablate with it")
     names = list(VARIANTS) if options.variants is None else [name.strip() for name in options.variants.split(",")]
     conditions = _conditions(options)
 
     def run() -> None:
-        done = fly_variants(
-            options.scenes, options.out, names, conditions, options.settings, options.workers, not options.quiet
-        )
+        done = ablate(options.scenes, options.out, names, conditions, options.set, options.workers, not options.quiet)
         for name, result in done.numbers["variants"].items():
             violated = result["weighted_violation"]["other"]
             weighted = "" if violated is None else f", weighted violation {violated:.4g} m s on average"

@@ -7,25 +7,25 @@ from __future__ import annotations
 import argparse
 import contextlib
 import importlib
-import json
 import logging
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NoReturn
 
 from cosim.command_line import (
     campaigns,
     companion,
-    completion,
     export,
     falsify,
+    help,
     identify,
     import_log,
     mavlink,
     report,
     run,
     scenes,
+    show,
     sitl,
     sweep,
     watch,
@@ -34,9 +34,11 @@ from cosim.command_line.process import FAULT, print_status, run_guarded, signals
 from plant_fmu.errors import one_line, printable
 
 _EPILOG = """examples:
-  cosim run paper
+  cosim show
+  cosim run docking --out runs/docking
   cosim run paper --set arbiter.engine=closed --set regions.SR1.gain=5000 --out runs/strong
-  cosim run my-scene.toml --mavlink udpout:127.0.0.1:14550 --profile ardusub --commands
+  cosim report runs/docking runs/strong --replay --out both.html
+  cosim run mine.toml --mavlink udpout:127.0.0.1:14550 --profile ardusub --commands
   cosim scenes --count 200 --seed 0 --out scenes.jsonl
   cosim campaign scenes.jsonl --law ismail_dunnigan --out campaigns/ismail_dunnigan --workers 2
   cosim sweep docking --vary initial.position.1=-4:-2 --samples 1000 --out sweeps/start --workers 2
@@ -99,44 +101,25 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     verbs = parser.add_subparsers(dest="verb", required=True, metavar="VERB")
 
-    run.add_verb(verbs)
-    watch.add_verb(verbs)
-
-    report.add_verbs(verbs)
-
-    listing = verbs.add_parser("list", help="list the shipped scenarios")
-    listing.add_argument("--json", action="store_true", help="print it as JSON")
-
-    show = verbs.add_parser("show", help="print a scenario with every default filled in and every key explained")
-    show.add_argument("scenario", help="a shipped name, or a TOML file")
-    show.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
-
-    check = verbs.add_parser("check", help="find problems of a scenario before it is run; exit code 1 if there are any")
-    check.add_argument("scenario", help="a shipped name, or a TOML file")
-    check.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
-    check.add_argument("--json", action="store_true", help="print it as JSON")
-
-    import_log.add_verb(verbs)
-    export.add_verbs(verbs)
-    scenes.add_verb(verbs)
-    campaigns.add_verbs(verbs)
-    sweep.add_verbs(verbs)
-    falsify.add_verb(verbs)
-    identify.add_verbs(verbs)
-    mavlink.add_verbs(verbs)
-    sitl.add_verbs(verbs)
-    companion.add_verb(verbs)
-    completion.add_verb(verbs, parser)
-
-    about = verbs.add_parser("help", help="print this help, or that of a verb")
-    about.add_argument("about", nargs="?", choices=tuple(verbs.choices), metavar="VERB", help="such as run")
-    about.set_defaults(parser=parser, verbs=verbs.choices)
+    for module in (show, run, watch, report, import_log, export, scenes, campaigns, sweep, falsify, identify, mavlink,
+                   sitl, companion):  # fmt: skip
+        module.add_verbs(verbs)
+    help.add_verbs(verbs, parser)
 
     for flags, meaning in _EVERYWHERE.items():
         parser.add_argument(*flags, action="store_true", help=meaning)
-        for verb in verbs.choices.values():
+        for _, verb in all_verbs(parser):
             verb.add_argument(*flags, action="store_true", default=argparse.SUPPRESS, help=meaning)
     return parser
+
+
+def all_verbs(parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse.ArgumentParser]]:
+    """Yield the name and the parser of each verb, such as ``mavlink`` and ``mavlink listen``."""
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for name, verb in action.choices.items():
+                yield name, verb
+                yield from ((f"{name} {inner}", parser) for inner, parser in all_verbs(verb))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -150,13 +133,11 @@ def _run(arguments: Sequence[str]) -> int:
     if not arguments:
         parser.print_help(sys.stderr)
         parser.exit(FAULT)
-    verb = next((word for word in arguments if not word.startswith("-")), "")
-    if verb in _REMOVED:
-        parser.error(f"{verb} no longer exists; {_REMOVED[verb]}")
-    options = parser.parse_args(arguments)
+    options = parser.parse_args(_present_spelling(parser, [*arguments]))
     _log(options.verbose)
     with contextlib.ExitStack() as stack:
-        if options.verb not in _LIGHT:
+        # the light verbs load no library that is slow to load
+        if not (options.verb in ("help", "scenes") or (options.verb == "show" and options.scenario is None)):
             with signals_held():
                 for package in _ERRORS:
                     importlib.import_module(package)
@@ -164,10 +145,28 @@ def _run(arguments: Sequence[str]) -> int:
             if not options.quiet:
                 stack.enter_context(announce_compilation(print_status))
         try:
-            return _VERBS[options.verb](options)
+            status: int = options.call(options)
         except _user_errors() as error:
             print_status(str(error))
             return FAULT
+        return status
+
+
+def _present_spelling(parser: argparse.ArgumentParser, words: list[str]) -> list[str]:
+    """Replace a renamed verb, and print the new spelling; refuse a removed one by name."""
+    index = next((i for i, word in enumerate(words) if not word.startswith("-")), len(words))
+    verb, *values = words[index:] or [""]
+    if verb in _REMOVED:
+        parser.error(f"{verb} no longer exists; {_REMOVED[verb]}")
+    if verb == "help" and values and values[0] in _RENAMED:
+        index, verb = index + 1, values[0]
+        words[index] = _RENAMED[verb].split()[0]
+    elif verb in _RENAMED:
+        words[index : index + 1] = _RENAMED[verb].split()
+    else:
+        return words
+    print_status(f"{verb} is now: cosim {_RENAMED[verb]}")
+    return words
 
 
 def _user_errors() -> tuple[type[Exception], ...]:
@@ -187,79 +186,24 @@ def _log(verbose: bool) -> None:
         logging.getLogger(name).setLevel(logging.DEBUG if verbose else logging.WARNING)
 
 
-def _list(options: argparse.Namespace) -> int:
-    from cosim.scenario.toml_file import shipped_titles
-
-    titles = shipped_titles()
-    if options.json:
-        print(json.dumps([{"name": name, "title": title} for name, title in titles.items()], indent=2))
-        return 0
-    for name, title in titles.items():
-        print(f"{name:20} {title}")
-    return 0
-
-
-def _help(options: argparse.Namespace) -> int:
-    (options.verbs[options.about] if options.about else options.parser).print_help()
-    return 0
-
-
-def _show(options: argparse.Namespace) -> int:
-    from cosim.scenario.scenario import load_scenario
-
-    scenario = load_scenario(options.scenario, options.overrides)
-    file = scenario.vehicle_file
-    vehicle = str(file.resolve()) if file else None  # found from wherever the output goes
-    print(scenario.toml(vehicle, commented=True), end="")
-    return 0
-
-
-def _check(options: argparse.Namespace) -> int:
-    from cosim.precheck.output import check_json, check_text
-    from cosim.precheck.precheck import check_scenario
-    from cosim.scenario.scenario import load_scenario
-
-    found = check_scenario(load_scenario(options.scenario, options.overrides))
-    print(check_json(found) if options.json else check_text(found))
-    return 0 if found.holds else 1
-
-
 _ERRORS = {
     "controller": "ControllerError",
     "cosim": "CosimError",
     "fuzzy_arbiter": "ArbiterError",
     "plant_fmu": "PlantFmuError",
 }
-# verbs of earlier versions, and what replaces them
+# verbs that no longer exist, and what replaces them
 _REMOVED = {
     "calibrate": "python -m benchmarks calibration repeats the fit of paper-calibrated",
-    "mavlink-check": "cosim listen shows what a vehicle sends",
+    "mavlink-check": "cosim mavlink listen shows what a vehicle sends",
 }
-_LIGHT = {"completion", "help", "list", "scenes"}  # verbs without slow imports
-_VERBS = {
-    "run": run.run,
-    "watch": watch.watch,
-    "report": report.report,
-    "replay": report.replay,
-    "list": _list,
-    "help": _help,
-    "completion": completion.completion,
-    "show": _show,
-    "check": _check,
-    "import": import_log.import_,
-    "export": export.export,
-    "package": export.package,
-    "scenes": scenes.scenes,
-    "ablate": campaigns.ablate,
-    "campaign": campaigns.campaign,
-    "compare": campaigns.compare,
-    "sweep": sweep.sweep,
-    "rerun": sweep.rerun,
-    "falsify": falsify.falsify,
-    "excite": identify.excite,
-    "identify": identify.identify,
-    "listen": mavlink.listen,
-    "stream": mavlink.stream,
-    "sitl": sitl.sitl,
-    "companion": companion.companion,
+_RENAMED = {
+    "list": "show",
+    "replay": "report --replay",
+    "package": "export --to ssp --force",
+    "ablate": "compare --ablate",
+    "excite": "identify --excite",
+    "listen": "mavlink listen",
+    "stream": "mavlink stream",
+    "completion": "help --completion",
 }

@@ -4,103 +4,86 @@ from __future__ import annotations
 
 import argparse
 import contextlib
-from pathlib import Path
 from typing import Any
 
+from cosim.command_line.flags import add_changes, add_remote, add_run_folder, add_verb, flag, number, whole
 from cosim.command_line.link_flags import add_live_flag, open_live, origin
-from cosim.command_line.numbers import number, whole
-from cosim.command_line.process import INTERRUPTED, print_status
-from cosim.command_line.results import print_run
+from cosim.command_line.process import INTERRUPTED, print_run, print_status
 from cosim.mavlink.wire.options import PROFILES
 
 _COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 _STEER_BY, _STICKS_BY = ("sticks", "wrench", "velocity", "attitude"), ("manual-control", "rc-override")
 
 
-def add_verb(verbs: Any) -> None:
+def add_verbs(verbs: Any) -> None:
     """Add the verb to the subparsers of the command."""
-    verb = verbs.add_parser("companion", help="steer a real autopilot by a scenario's regions, arbiter and law")
-    verb.add_argument(
-        "endpoint",
-        metavar="ENDPOINT",
-        help="where the autopilot is, such as udpin:127.0.0.1:14550 or serial:/dev/ttyACM0",
-    )
-    verb.add_argument("--scenario", required=True, help="a shipped name, or a TOML file")
-    verb.add_argument("--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides", help="as for run")
-    verb.add_argument("--profile", choices=PROFILES, default="ardusub", help="type of the autopilot (default: ardusub)")
-    verb.add_argument(
-        "--steer-by", choices=_STEER_BY, default="sticks",
-        help="sticks: surge, sway, heave and yaw while the autopilot keeps level; wrench: all six axes in manual mode; "
-        "velocity: set-points; attitude: set-points, with forces (default: sticks)",
+    verb = add_verb(
+        verbs, "companion", companion, "steer a real autopilot by a scenario's regions, arbiter and law",
+        "howto/companion",
+        ("companion udpin:127.0.0.1:14550 --scenario mine.toml --scene-origin 55.9097000,-3.3203000 --dry-run",
+         "companion serial:/dev/ttyACM0 --scenario mine.toml --surveyed-origin 1.5,-2,0 --live"),
     )  # fmt: skip
     verb.add_argument(
-        "--sticks-by", choices=_STICKS_BY, default="manual-control",
-        help="message that carries sticks; the pilot gain does not scale rc-override (default: manual-control)",
+        "endpoint", metavar="ENDPOINT",
+        help="where the autopilot is, such as udpin:127.0.0.1:14550 or serial:/dev/ttyACM0",
+    )  # fmt: skip
+    flag(verb, "--scenario NAME", "a shipped name, or a TOML file", required=True)
+    add_changes(verb)
+    flag(verb, "--profile", "type of the autopilot", default="ardusub", choices=PROFILES)
+    flag(
+        verb, "--steer-by", "sticks: surge, sway, heave and yaw while the autopilot keeps level; wrench: all six axes "
+        "in manual mode; velocity: set-points; attitude: set-points, with forces", default="sticks", choices=_STEER_BY,
+    )  # fmt: skip
+    flag(
+        verb, "--sticks-by", "message that carries sticks; the pilot gain does not scale rc-override",
+        default="manual-control", choices=_STICKS_BY,
     )  # fmt: skip
     where = verb.add_mutually_exclusive_group()
-    where.add_argument(
-        "--scene-origin",
-        type=origin,
-        metavar="LAT,LON",
-        help="latitude and longitude of the scene's origin, in degrees with seven decimals: the fourth is 11 m",
-    )
-    where.add_argument(
-        "--surveyed-origin", type=_position, metavar="N,E,D",
-        help="position of the autopilot's local origin in the scene, in meters",
+    flag(
+        where, "--scene-origin LAT,LON",
+        "latitude and longitude of the scene's origin, in degrees with seven decimals: the fourth is 11 m", origin,
     )  # fmt: skip
-    verb.add_argument(
-        "--surface-pressure", type=number(500.0, 1200.0), default=1013.25, metavar="HPA",
-        help="pressure of the air, from which depth is measured (default: 1013.25)",
+    flag(where, "--surveyed-origin N,E,D", "position of the autopilot's local origin in the scene [m]", _position)
+    flag(
+        verb, "--surface-pressure HPA", "pressure of the air, from which depth is measured", number(500.0, 1200.0),
+        1013.25,
     )  # fmt: skip
-    verb.add_argument(
-        "--water-density", type=number(900.0, 1200.0), default=1000.0, metavar="KG/M3", help="default: 1000; sea: 1025"
-    )
+    flag(verb, "--water-density KG/M3", "sea: 1025", number(900.0, 1200.0), 1000.0)
     arming = verb.add_mutually_exclusive_group()
-    arming.add_argument(
-        "--dry-run", action="store_true", help="compute and record, and send neither sticks nor commands"
-    )
-    arming.add_argument("--await-arm", action="store_true", help="wait for somebody to arm the vehicle (the default)")
-    arming.add_argument("--arm", action="store_true", help="arm the vehicle")
-    verb.add_argument(
-        "--pilot-gain", type=number(0.05, 1.0), default=0.5, metavar="N",
-        help="part of the greatest wrench that full sticks give: ArduSub's JS_GAIN_DEFAULT (default: 0.5)",
+    flag(arming, "--dry-run", "compute and record, and send neither sticks nor commands")
+    flag(arming, "--await-arm", "wait for somebody to arm the vehicle (the default)")
+    flag(arming, "--arm", "arm the vehicle")
+    flag(
+        verb, "--pilot-gain N", "part of the greatest wrench that full sticks give: ArduSub's JS_GAIN_DEFAULT",
+        number(0.05, 1.0), 0.5,
     )  # fmt: skip
-    verb.add_argument(
-        "--velocity-lag", type=number(0.01, 10.0), default=2.0, metavar="S",
-        help="time constant of the autopilot's horizontal velocity loop (default: 2)",
+    lag = number(0.01, 10.0)
+    flag(verb, "--velocity-lag S", "time constant of the autopilot's horizontal velocity loop", lag, 2.0)
+    flag(verb, "--vertical-lag S", "time constant of the autopilot's vertical velocity loop", lag, 0.5)
+    flag(
+        verb, "--reckoning-error PART",
+        "position error while the autopilot has no fix, as a part of the distance covered", number(0.0, 1.0), 0.03,
     )  # fmt: skip
-    verb.add_argument(
-        "--vertical-lag", type=number(0.01, 10.0), default=0.5, metavar="S",
-        help="time constant of the autopilot's vertical velocity loop (default: 0.5)",
+    flag(
+        verb, "--level-dive M", "depth by which an ArduSub dives after arming, to align its heading; 0 for none",
+        number(0.0, 10.0), 0.6,
     )  # fmt: skip
-    verb.add_argument(
-        "--reckoning-error", type=number(0.0, 1.0), default=0.03, metavar="PART",
-        help="position error while the autopilot has no fix, as a part of the distance covered (default: 0.03)",
+    flag(
+        verb, "--least-battery PERCENT", "charge below which the vehicle holds its position; 0 for never",
+        number(0.0, 100.0), 0.0,
     )  # fmt: skip
-    verb.add_argument(
-        "--level-dive", type=number(0.0, 10.0), default=0.6, metavar="M",
-        help="depth by which an ArduSub dives after arming, to align its heading; 0 for none (default: 0.6)",
+    flag(
+        verb, "--system-id N", "system id of the companion; an ArduSub takes sticks from its SYSID_MYGCS alone",
+        whole(1, 255), 255,
     )  # fmt: skip
-    verb.add_argument(
-        "--least-battery", type=number(0.0, 100.0), default=0.0, metavar="PERCENT",
-        help="charge below which the vehicle holds its position (default: 0, never)",
+    flag(verb, "--timeout S", "end if steering cannot begin in so many seconds", number(0.1, 1e6))
+    flag(
+        verb, "--speedup N", "speed of a simulated autopilot: its seconds per second of the wall clock",
+        number(0.01, 100.0), 1.0,
     )  # fmt: skip
-    verb.add_argument(
-        "--system-id", type=whole(1, 255), default=255, metavar="N",
-        help="system id of the companion; an ArduSub takes sticks from its SYSID_MYGCS alone (default: 255)",
-    )  # fmt: skip
-    verb.add_argument(
-        "--timeout", type=number(0.1, 1e6), metavar="S", help="end if steering cannot begin in so many seconds"
-    )
-    verb.add_argument(
-        "--speedup", type=number(0.01, 100.0), default=1.0, metavar="N",
-        help="speed of a simulated autopilot: its seconds per second of the wall clock (default: 1)",
-    )  # fmt: skip
-    verb.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
-    verb.add_argument("--signing-key", type=Path, metavar="FILE", help="sign with the key in this file")
+    add_remote(verb)
     add_live_flag(verb, "show the flight in browsers while it goes on")
-    verb.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
-    verb.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
+    add_run_folder(verb)
 
 
 def companion(options: argparse.Namespace) -> int:
@@ -123,7 +106,7 @@ def companion(options: argparse.Namespace) -> int:
         options.velocity_lag, options.vertical_lag, options.reckoning_error, options.level_dive, options.least_battery,
         options.timeout,
     )  # fmt: skip
-    scenario = load_scenario(options.scenario, options.overrides)
+    scenario = load_scenario(options.scenario, options.set)
     key = load_key(options.signing_key) if options.signing_key else None
     with contextlib.ExitStack() as stack:
         link = stack.enter_context(NetworkLink(endpoint, key, (options.system_id, _COMPONENT), options.speedup))

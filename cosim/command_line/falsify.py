@@ -3,57 +3,46 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
-from cosim.command_line.campaigns import WORKERS, add_replays, resumable
-from cosim.command_line.results import say
+from cosim.command_line.campaigns import add_campaign_folder, add_workers, resumable
+from cosim.command_line.flags import add_changes, add_verb, flag, refuse_flags
+from cosim.command_line.process import say
 from cosim.errors import RunError
 
-_EPILOG = """examples:
-  cosim falsify hard --law pd --budget 2000 --out falsified/pd
-  cosim falsify conflict --law deployable --objective violation --out falsified/conflict
-  cosim falsify hard --law deployable --rare-event --out falsified/rate
-  cosim falsify docking --vary initial.position.1=-4:-2 plant.current.1=-0.2:0.2 --objective arrival \\
-      --out falsified/dock
-"""
 
-
-def add_verb(verbs: Any) -> None:
+def add_verbs(verbs: Any) -> None:
     """Add the verb to the subparsers of the command."""
-    falsify = verbs.add_parser(
-        "falsify", help="search for the worst flight, or estimate the probability of a violation",
-        epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
+    verb = add_verb(
+        verbs, "falsify", falsify, "search for the worst flight, or estimate the probability of a violation",
+        "campaigns",
+        ("falsify hard --law pd --budget 2000 --out falsified/pd",
+         "falsify conflict --law deployable --objective violation --out falsified/conflict",
+         "falsify hard --law deployable --rare-event --out falsified/rate",
+         "falsify docking --vary initial.position.1=-4:-2 plant.current.1=-0.2:0.2 --objective arrival --out f/dock"),
     )  # fmt: skip
-    falsify.add_argument(
+    verb.add_argument(
         "what", metavar="FAMILY|SCENARIO",
         help="plain, hard, conflict or tour, as cosim scenes makes them; or a shipped name or TOML file, before --vary",
     )  # fmt: skip
-    falsify.add_argument("--law", help="law such as pd; instead of a scenario's own")
-    falsify.add_argument(
-        "--vary", nargs="+", action="extend", default=[], metavar="KEY=LOW:HIGH[:log]",
-        help="a key of the scenario and the range to search; or KEY=A,B,C",
+    flag(verb, "--law NAME", "law such as pd; instead of a scenario's own")
+    flag(
+        verb, "--vary KEY=LOW:HIGH[:log]", "a key of the scenario and the range to search; or KEY=A,B,C",
+        nargs="+", action="extend", default=[],
     )  # fmt: skip
-    falsify.add_argument(
-        "--objective", default="clearance", metavar="clearance|violation|arrival",
-        help="the least clearance (default), the greatest violation weighted by priority, or the latest arrival",
+    flag(
+        verb, "--objective clearance|violation|arrival", "the least clearance, the greatest violation weighted by "
+        "priority, or the latest arrival", default="clearance",
     )  # fmt: skip
-    falsify.add_argument("--budget", type=int, default=2000, metavar="N", help="number of flights (default: 2000)")
-    falsify.add_argument(
-        "--rare-event", action="store_true",
-        help="estimate the probability of a violation with an interval, instead of searching for the worst flight",
+    flag(verb, "--budget N", "number of flights", int, 2000)
+    flag(
+        verb, "--rare-event",
+        "estimate the probability of a violation with an interval, instead of searching for the worst flight",
     )  # fmt: skip
-    falsify.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the search (default: 0)")
-    falsify.add_argument(
-        "--out", type=Path, required=True, metavar="DIR",
-        help="a new folder, or one that this command began: it goes on with what is left",
-    )  # fmt: skip
-    falsify.add_argument("--workers", type=WORKERS, default=1, metavar="N", help="processes (default: 1)")
-    add_replays(falsify)
-    falsify.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="settings",
-        help="set a gain of the law, or a key of the scenario; may be repeated",
-    )  # fmt: skip
+    flag(verb, "--seed S", "seed of the search", int, 0)
+    add_campaign_folder(verb)
+    add_workers(verb)
+    add_changes(verb, "a gain of the law, or a key of the scenario")
 
 
 def falsify(options: argparse.Namespace) -> int:
@@ -85,18 +74,15 @@ def _search(options: argparse.Namespace) -> Any:
 
     what, settings = options.what, SearchSettings(options.objective, options.budget, options.seed, options.rare_event)
     if what in FAMILIES:
-        if options.vary:
-            raise RunError(f"--vary: expected none with the family {what}: its generator says what varies")
+        refuse_flags(options, ["vary"], f"none with the family {what}: its generator says what varies")
         if not options.law:
             raise RunError(f"--law is missing: who flies the scenes of the family {what}")
-        return SceneSearch(
-            what, SceneTask(options.law, gains_from(options.law, options.settings), Conditions()), settings
-        )
+        return SceneSearch(what, SceneTask(options.law, gains_from(options.law, options.set), Conditions()), settings)
     if what.endswith(".jsonl"):
         raise RunError(f"{what}: is a file of scenes, expected a family ({', '.join(FAMILIES)}) or a scenario")
     vary = vary_from(options.vary)
-    both = {key.key for key in vary} & {split_change(text)[0] for text in options.settings}
+    both = {key.key for key in vary} & {split_change(text)[0] for text in options.set}
     if both:
         raise RunError(f"{min(both)} is set and varies, expected either")
     law = [f"law.name={options.law}"] if options.law else []
-    return ScenarioSearch(load_scenario(what, [*law, *options.settings]), vary, settings)
+    return ScenarioSearch(load_scenario(what, [*law, *options.set]), vary, settings)

@@ -5,12 +5,10 @@ from __future__ import annotations
 import argparse
 import contextlib
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING
 
-from cosim.command_line.numbers import number, whole
+from cosim.command_line.flags import add_remote, flag, number, refuse_flags, whole
 from cosim.command_line.process import print_status
-from cosim.errors import TelemetryError
 from cosim.live.address import HOST, PORT, parse_live
 from cosim.mavlink.wire.options import LOSS_ACTIONS, PROFILES, MavlinkOptions
 
@@ -22,53 +20,33 @@ _MAX_TIMEOUT = 3600.0  # s
 _SYSTEM = whole(1, 255)
 
 
-def add_link_flags(parser: argparse.ArgumentParser, commands: bool = False, required: bool = False) -> None:
-    """Add the flags to a verb."""
+def add_link_flags(verb: argparse.ArgumentParser, commands: bool = False, required: bool = False) -> None:
+    """Add the flags of a vehicle on links to a verb, with those for commands if it takes any."""
     usual = MavlinkOptions()
-    parser.add_argument(
-        "--mavlink", action="append", default=[], metavar="ENDPOINT", required=required,
-        help="be a MAVLink vehicle there, such as udpout:127.0.0.1:14550, tcp:127.0.0.1:5760 or a file ending in "
-        ".tlog; may be repeated",
+    flag(
+        verb, "--mavlink ENDPOINT", "be a MAVLink vehicle there, such as udpout:127.0.0.1:14550, tcp:127.0.0.1:5760 or "
+        "a file ending in .tlog; may be repeated", action="append", default=[], required=required,
     )  # fmt: skip
-    parser.add_argument(
-        "--profile", choices=PROFILES, default=usual.profile,
-        help=f"type of vehicle that the link imitates (default: {usual.profile})",
+    flag(verb, "--profile", "type of vehicle that the link imitates", default=usual.profile, choices=PROFILES)
+    add_remote(verb)
+    flag(verb, "--allow-system ID[,ID]", "accept these system ids alone (default: all)", _systems)
+    flag(verb, "--system-id N", "system id of the vehicle", _SYSTEM, usual.system_id)
+    flag(
+        verb, "--origin LAT,LON", "latitude and longitude of position 0, in degrees with seven decimals (default: "
+        "{:.7f},{:.7f})".format(*usual.origin), origin,
     )  # fmt: skip
-    parser.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
-    parser.add_argument(
-        "--signing-key", type=Path, metavar="FILE",
-        help="sign with the key in this file, and accept only messages signed with it",
+    verb.set_defaults(commands=False, await_arm=False, link_loss=None, link_timeout=None)
+    if not commands:
+        return
+    flag(verb, "--commands", "accept commands; without it, the link only sends telemetry")
+    flag(verb, "--await-arm", "nothing moves before the vehicle is armed")
+    flag(
+        verb, "--link-loss", "action when the ground station that commands falls silent (default: "
+        f"{usual.loss_action})", choices=LOSS_ACTIONS,
     )  # fmt: skip
-    parser.add_argument(
-        "--allow-system", type=_systems, metavar="ID[,ID]", help="accept these system ids alone (default: all)"
-    )
-    parser.add_argument(
-        "--system-id", type=_SYSTEM, default=usual.system_id, metavar="N",
-        help=f"system id of the vehicle (default: {usual.system_id})",
-    )  # fmt: skip
-    parser.add_argument(
-        "--origin", type=origin, default=usual.origin, metavar="LAT,LON",
-        help="latitude and longitude of position 0, in degrees with seven decimals (default: {:.7f},{:.7f})".format(
-            *usual.origin
-        ),
-    )  # fmt: skip
-    parser.set_defaults(commands=False, await_arm=False, link_loss=None, link_timeout=None)
-    if commands:
-        _add_command_flags(parser, usual)
-
-
-def _add_command_flags(parser: argparse.ArgumentParser, usual: MavlinkOptions) -> None:
-    parser.add_argument(
-        "--commands", action="store_true", help="accept commands; without it, the link only sends telemetry"
-    )
-    parser.add_argument("--await-arm", action="store_true", help="nothing moves before the vehicle is armed")
-    parser.add_argument(
-        "--link-loss", choices=LOSS_ACTIONS,
-        help=f"action when the ground station that commands falls silent (default: {usual.loss_action})",
-    )  # fmt: skip
-    parser.add_argument(
-        "--link-timeout", type=number(0.1, _MAX_TIMEOUT), metavar="S",
-        help=f"seconds of the wall clock that count as silence (default: {usual.loss_timeout:g})",
+    flag(
+        verb, "--link-timeout S", "seconds of the wall clock that count as silence (default: "
+        f"{usual.loss_timeout:g})", number(0.1, _MAX_TIMEOUT),
     )  # fmt: skip
 
 
@@ -77,9 +55,8 @@ def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOpti
     from cosim.mavlink.wire.endpoint import parse_endpoint
     from cosim.mavlink.wire.signing import load_key
 
-    for name in ("await_arm", "link_loss", "link_timeout"):
-        if getattr(options, name) and not options.commands:
-            raise TelemetryError(f"--{name.replace('_', '-')}: expected --commands with it")
+    if not options.commands:
+        refuse_flags(options, ["await_arm", "link_loss", "link_timeout"], "--commands with it")
     usual = MavlinkOptions()
     return [parse_endpoint(text, options.allow_remote) for text in options.mavlink], MavlinkOptions(
         profile=options.profile,
@@ -87,7 +64,7 @@ def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOpti
         key=load_key(options.signing_key) if options.signing_key else None,
         allowed_systems=options.allow_system,
         system_id=options.system_id,
-        origin=options.origin,
+        origin=options.origin or usual.origin,
         loss_action=options.link_loss or usual.loss_action,
         loss_timeout=options.link_timeout or usual.loss_timeout,
     )
@@ -110,12 +87,10 @@ def origin(text: str) -> tuple[float, float]:
     return latitude, longitude
 
 
-def add_live_flag(parser: argparse.ArgumentParser, what: str) -> None:
+def add_live_flag(verb: argparse.ArgumentParser, what: str) -> None:
     """Add the flag to a verb; `what` is the beginning of its help."""
-    parser.add_argument(
-        "--live", nargs="?", const="", metavar="[HOST:]PORT",
-        help=f"{what} (default: {HOST}:{PORT}, or another port if that is taken)",
-    )  # fmt: skip
+    meaning = f"{what} (default: {HOST}:{PORT}, or another port if that is taken)"
+    flag(verb, "--live [HOST:]PORT", meaning, nargs="?", const="")
 
 
 def open_live(options: argparse.Namespace, stack: contextlib.ExitStack) -> LiveView | None:

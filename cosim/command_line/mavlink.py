@@ -1,4 +1,4 @@
-"""``cosim listen`` and ``cosim stream``."""
+"""``cosim mavlink listen`` and ``cosim mavlink stream``."""
 
 from __future__ import annotations
 
@@ -11,10 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+from cosim.command_line.flags import add_remote, add_verb, flag, number, rate, whole
 from cosim.command_line.link_flags import add_link_flags, links_from
-from cosim.command_line.numbers import number, rate, whole
-from cosim.command_line.process import print_status
-from cosim.command_line.results import say
+from cosim.command_line.process import print_status, say
 
 _REDRAW, _SNAPSHOT = 0.25, 1.0  # s between pictures, on a terminal and elsewhere
 _ONCE = 2.0  # s of listening, for one picture
@@ -23,24 +22,30 @@ _HIDE, _SHOW, _CLEAR, _HOME, _END_OF_LINE, _BELOW = "\x1b[?25l", "\x1b[?25h", "\
 
 
 def add_verbs(verbs: Any) -> None:
-    """Add the verbs to the subparsers of the command."""
-    listen = verbs.add_parser("listen", help="show any vehicle's MAVLink telemetry as a live table")
-    listen.add_argument("endpoint", metavar="ENDPOINT", help="such as udpin:127.0.0.1:14550 or tcp:127.0.0.1:5760")
-    listen.add_argument("--allow-remote", action="store_true", help="let the link leave this machine")
-    listen.add_argument(
-        "--signing-key", type=Path, metavar="FILE",
-        help="sign with the key in this file, and accept only messages signed with it",
+    """Add the verb, with its two verbs, to the subparsers of the command."""
+    mavlink = add_verb(
+        verbs, "mavlink", listen, "show the MAVLink telemetry of any vehicle, or stream a recorded run", "mavlink",
+        ("mavlink listen udpin:127.0.0.1:14550", "mavlink stream runs/docking --mavlink docking.tlog --rate max"),
     )  # fmt: skip
-    listen.add_argument("--once", action="store_true", help=f"print one picture, after {_ONCE:g} s, and end")
-    listen.add_argument("--seconds", type=number(1e-9, 1e9), metavar="S", help="end after so many seconds")
-    listen.add_argument("--count", type=whole(1, 10**12), metavar="N", help="end after so many messages")
+    inner = mavlink.add_subparsers(required=True, metavar="listen|stream")
 
-    stream = verbs.add_parser("stream", help="be a recorded run's vehicle on MAVLink links, or write it as a .tlog")
-    stream.add_argument("folder", type=Path, metavar="RUN", help="the run folder")
-    add_link_flags(stream, required=True)
-    stream.add_argument(
-        "--rate", type=rate, default=1.0, metavar="N|max", help="simulated seconds a second (default: 1)"
-    )
+    verb = add_verb(
+        inner, "listen", listen, "show any vehicle's MAVLink telemetry as a live table", "mavlink",
+        ("mavlink listen udpin:127.0.0.1:14550", "mavlink listen tcp:127.0.0.1:5760 --once"),
+    )  # fmt: skip
+    verb.add_argument("endpoint", metavar="ENDPOINT", help="such as udpin:127.0.0.1:14550 or tcp:127.0.0.1:5760")
+    add_remote(verb)
+    flag(verb, "--once", f"print one picture, after {_ONCE:g} s, and end")
+    flag(verb, "--seconds S", "end after so many seconds", number(1e-9, 1e9))
+    flag(verb, "--count N", "end after so many messages", whole(1, 10**12))
+
+    verb = add_verb(
+        inner, "stream", stream, "be a recorded run's vehicle on MAVLink links, or write it as a .tlog", "mavlink",
+        ("mavlink stream runs/docking --mavlink udpout:127.0.0.1:14550 --profile ardusub",),
+    )  # fmt: skip
+    verb.add_argument("folder", type=Path, metavar="RUN", help="the run folder")
+    add_link_flags(verb, required=True)
+    flag(verb, "--rate N|max", "simulated seconds per second", rate, 1.0)
 
 
 def _ground_link(options: argparse.Namespace) -> Any:
@@ -59,7 +64,7 @@ def _ground_link(options: argparse.Namespace) -> Any:
 
 
 def listen(options: argparse.Namespace) -> int:
-    """Run ``cosim listen``."""
+    """Run ``cosim mavlink listen``."""
     from cosim.mavlink.listening import TelemetryTable, follow, format_table
 
     watch = TelemetryTable()
@@ -104,7 +109,7 @@ def _redraw(lines: Sequence[str]) -> None:
 
 
 def stream(options: argparse.Namespace) -> int:
-    """Run ``cosim stream``."""
+    """Run ``cosim mavlink stream``."""
     from cosim.mavlink.replay import replay
 
     endpoints, mavlink = links_from(options)

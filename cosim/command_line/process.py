@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import contextlib
 import os
 import select
@@ -10,9 +11,12 @@ import sys
 from collections.abc import Callable, Iterator
 from threading import current_thread, main_thread
 from types import FrameType
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from plant_fmu.errors import one_line
+
+if TYPE_CHECKING:
+    from cosim.results.run_result import Run
 
 FAULT, INTERRUPTED, NO_READER = 2, 130, 141  # exit statuses; the last two as in shells for SIGINT and SIGPIPE
 
@@ -51,6 +55,22 @@ def say_if_interrupted(run: Callable[[], None], what: str) -> int:
         print_status(f"interrupted; {what}")
         return INTERRUPTED
     return 0
+
+
+def say(options: argparse.Namespace, *lines: str) -> None:
+    """Print lines unless ``--quiet`` is given."""
+    if not options.quiet:
+        for line in lines:
+            print(line, flush=True)
+
+
+def print_run(options: argparse.Namespace, run: Run, report: bool = True) -> None:
+    """Print the outcome of a run, and the paths of its report and replay."""
+    from cosim.results.wording import verdict
+
+    say(options, verdict(run.summary))
+    for path in ("report", "replay") if report else ("summary",):
+        print(run.files()[path])
 
 
 def print_status(what: str) -> None:

@@ -8,10 +8,9 @@ import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from cosim.command_line.flags import add_changes, add_run_folder, add_scenario, add_verb, flag, rate, refuse_flags
 from cosim.command_line.link_flags import add_link_flags, add_live_flag, links_from, open_live
-from cosim.command_line.numbers import rate
-from cosim.command_line.process import INTERRUPTED
-from cosim.command_line.results import print_run
+from cosim.command_line.process import INTERRUPTED, print_run
 from cosim.errors import TelemetryError
 
 if TYPE_CHECKING:
@@ -19,27 +18,27 @@ if TYPE_CHECKING:
     from cosim.results.run_result import Run
 
 
-def add_verb(verbs: Any) -> None:
+def add_verbs(verbs: Any) -> None:
     """Add the verb to the subparsers of the command."""
-    run = verbs.add_parser("run", help="run a scenario and write its folder")
-    run.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file")
-    run.add_argument("--out", type=Path, metavar="DIR", help="run folder (default: runs/SCENARIO-TIME)")
-    run.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
-        help="change a key of the scenario, such as law.gains.k_p1=10 or regions.SR1.shape.radius=0.7; may be repeated",
+    verb = add_verb(
+        verbs, "run", run, "run a scenario and write its folder", "tutorial",
+        ("run docking --out runs/docking", "run paper --set arbiter.engine=closed --set regions.SR1.gain=5000",
+         "run mine.toml --mavlink udpout:127.0.0.1:14550 --commands", "run harbour --live --commands"),
     )  # fmt: skip
-    run.add_argument(
-        "--rate", type=rate, metavar="N|max",
-        help="greatest number of simulated seconds per second (default: 1 with --commands or --live, else max)",
+    add_scenario(verb)
+    add_run_folder(verb)
+    add_changes(verb, "a key of the scenario, such as law.gains.k_p1=10 or regions.SR1.shape.radius=0.7")
+    flag(
+        verb, "--rate N|max", "greatest number of simulated seconds per second (default: 1 with --commands or --live, "
+        "else max)", rate,
     )  # fmt: skip
-    run.add_argument("--json", action="store_true", help="print the outcome, and the paths of the files, as JSON")
-    run.add_argument("--no-report", action="store_true", help="leave out the report, its figures and the replay")
-    run.add_argument(
-        "--replay-commands", dest="commands_log", type=Path, metavar="FILE",
-        help="repeat the commands of an earlier run from its commands.jsonl, with its scenario.toml",
+    flag(verb, "--json", "print the outcome, and the paths of the files, as JSON")
+    flag(
+        verb, "--replay-commands FILE", "repeat the commands of an earlier run from its commands.jsonl, with its "
+        "scenario.toml", Path,
     )  # fmt: skip
-    add_live_flag(run, "show the run in browsers while it goes on, and take their commands with --commands")
-    add_link_flags(run, commands=True)
+    add_live_flag(verb, "show the run in browsers while it goes on, and take their commands with --commands")
+    add_link_flags(verb, commands=True)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -47,10 +46,9 @@ def run(options: argparse.Namespace) -> int:
     from cosim.run.run import run_scenario
     from cosim.scenario.scenario import load_scenario
 
-    overrides = [*options.overrides]
+    overrides = [*options.set]
     if options.commands:
-        if options.commands_log is not None:
-            raise TelemetryError("--replay-commands: expected no --commands with it: the commands are those of the log")
+        refuse_flags(options, ["replay_commands"], "no --commands with it: the commands are those of the log")
         overrides.append("commands.enabled=true")
     if options.await_arm:
         overrides.append("commands.await_arm=true")
@@ -63,7 +61,7 @@ def run(options: argparse.Namespace) -> int:
         done = run_scenario(
             scenario, options.out, mavlink, None if max_rate == math.inf else max_rate,
             progress=not options.quiet,
-            report=not options.no_report, commands_log=options.commands_log, live=live,
+            report=not options.no_report, commands_log=options.replay_commands, live=live,
         )  # fmt: skip
     if options.json:
         print(_json(done), end="")
@@ -85,9 +83,7 @@ def _json(run: Run) -> str:
 def _mavlink(options: argparse.Namespace) -> Mavlink | None:
     """Return the MAVLink setup from the flags; None without endpoints."""
     if not options.mavlink:
-        for flag in ("signing_key", "allow_system"):
-            if getattr(options, flag):
-                raise TelemetryError(f"--{flag.replace('_', '-')}: expected --mavlink with it")
+        refuse_flags(options, ["signing_key", "allow_system"], "--mavlink with it")
         if options.commands and options.live is None:
             raise TelemetryError("--commands: expected --mavlink or --live with it")
     endpoints, link = links_from(options)

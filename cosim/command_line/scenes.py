@@ -6,27 +6,29 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.numbers import whole
+from cosim.command_line.flags import add_verb, flag, whole
 from cosim.errors import ScenarioError
 
 _MAX_COUNT = 10**7  # scenes, whose flights take more than a month
 
 
-def add_verb(verbs: Any) -> None:
+def add_verbs(verbs: Any) -> None:
     """Add the verb to the subparsers of the command."""
-    scenes = verbs.add_parser("scenes", help="generate random scenes for campaigns, one JSON object a line")
-    scenes.add_argument("--count", type=whole(1, _MAX_COUNT), default=100, metavar="N", help="scenes (default: 100)")
-    scenes.add_argument(
-        "--seed", type=whole(0, 2**63 - 1 - _MAX_COUNT), default=0, metavar="S",
-        help="seed of the first scene, which the next ones count up (default: 0); the same seed gives the same scene",
+    verb = add_verb(
+        verbs, "scenes", scenes, "generate random scenes for campaigns, one JSON object a line", "campaigns",
+        ("scenes --count 200 --seed 0 --out scenes.jsonl", "scenes --kind hard --count 3"),
     )  # fmt: skip
-    scenes.add_argument(
-        "--kind", choices=("plain", "hard", "conflict", "tour", "trial"), default="plain",
-        help="hard: more obstacles, drift, a stronger current, noise, a thruster that fails; conflict: regions that "
-        "exclude each other, on three vehicles; tour: the same with goals in turn; trial: scenes that each test one "
-        "part of a law (default: plain)",
+    flag(verb, "--count N", "scenes", whole(1, _MAX_COUNT), 100)
+    flag(
+        verb, "--seed S", "seed of the first scene, which the next ones count up; the same seed gives the same scene",
+        whole(0, 2**63 - 1 - _MAX_COUNT), 0,
     )  # fmt: skip
-    scenes.add_argument("--out", type=Path, metavar="FILE", help="file to write (default: standard output)")
+    flag(
+        verb, "--kind", "hard: more obstacles, drift, a stronger current, noise, a thruster that fails; conflict: "
+        "regions that exclude each other, on three vehicles; tour: the same with goals in turn; trial: scenes that "
+        "each test one part of a law", default="plain", choices=("plain", "hard", "conflict", "tour", "trial"),
+    )  # fmt: skip
+    flag(verb, "--out FILE", "file to write (default: standard output)", Path)
 
 
 def scenes(options: argparse.Namespace) -> int:

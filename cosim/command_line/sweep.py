@@ -6,59 +6,46 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.campaigns import add_cluster, add_replays, executor_of, require_one_count, resumable
-from cosim.command_line.process import INTERRUPTED, print_status
-from cosim.command_line.results import print_run, say
+from cosim.command_line.campaigns import add_campaign_folder, add_cluster, executor_of, require_one_count, resumable
+from cosim.command_line.flags import add_changes, add_verb, flag
+from cosim.command_line.process import INTERRUPTED, print_run, print_status, say
 from cosim.errors import RunError
-
-_EPILOG = """examples:
-  cosim sweep docking --vary initial.position.1=-4:-2 law.gains.speed=0.3:1.5:log --samples 1000 --out sweeps/start
-  cosim sweep paper --set arbiter.engine=closed --vary law.gains.k_p1=10:30:5 law.gains.k_q=5,10,20 --design grid \\
-      --workers 2 --out sweeps/gains
-  cosim sweep pool.toml --set arbiter.engine=closed --vehicles mine.posterior.jsonl --out sweeps/mine
-  cosim rerun sweeps/start 17 --out runs/worst
-"""
 
 
 def add_verbs(verbs: Any) -> None:
     """Add the verbs to the subparsers of the command."""
-    sweep = verbs.add_parser(
-        "sweep", help="fly a scenario many times with varied numbers",
-        epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
+    verb = add_verb(
+        verbs, "sweep", sweep, "fly a scenario many times with varied numbers", "campaigns",
+        ("sweep docking --vary initial.position.1=-4:-2 law.gains.speed=0.3:1.5:log --samples 1000 --out sweeps/start",
+         "sweep paper-limited --vary law.gains.k_p1=10:30:5 law.gains.k_q=5,10,20 --design grid --out sweeps/gains",
+         "sweep pool.toml --vehicles mine.posterior.jsonl --out sweeps/mine"),
     )  # fmt: skip
-    sweep.add_argument("scenario", help="a shipped name (see cosim list), or a TOML file; it stands before --vary")
-    varied = sweep.add_mutually_exclusive_group(required=True)
-    varied.add_argument(
-        "--vary", nargs="+", action="extend", metavar="KEY=LOW:HIGH[:N][:log]",
-        help="a key of the scenario and its range, with the number of points on a grid; or KEY=A,B,C",
-    )  # fmt: skip
-    varied.add_argument(
-        "--vehicles", type=Path, metavar="FILE.jsonl",
-        help="vehicles that cosim identify has drawn: each is the plant of a row, and the law knows the scenario's own",
-    )  # fmt: skip
-    sweep.add_argument("--samples", type=int, metavar="N", help="number of rows, unless the design is a grid")
-    sweep.add_argument(
-        "--design",
-        metavar="grid|random|sobol|lhs|paired",
-        help="how rows are spread (default: random; of --vehicles: paired)",
+    verb.add_argument(
+        "scenario", help="a shipped name (cosim show lists them), or a TOML file; it stands before --vary"
     )
-    sweep.add_argument("--seed", type=int, default=0, metavar="S", help="seed of the design and the rows (default: 0)")
-    sweep.add_argument(
-        "--out", type=Path, required=True, metavar="DIR",
-        help="a new folder, or one that this command began: it goes on with what is left",
+    varied = verb.add_mutually_exclusive_group(required=True)
+    flag(
+        varied, "--vary KEY=LOW:HIGH[:N][:log]", "a key of the scenario and its range, with the number of points on a "
+        "grid; or KEY=A,B,C", nargs="+", action="extend",
     )  # fmt: skip
-    sweep.add_argument("--engine", default="fused", help=argparse.SUPPRESS)
-    add_cluster(sweep)
-    add_replays(sweep)
-    sweep.add_argument(
-        "--set", action="append", default=[], metavar="KEY=VALUE", dest="overrides",
-        help="change a key of the scenario in all rows; may be repeated",
+    flag(
+        varied, "--vehicles FILE.jsonl", "vehicles that cosim identify has drawn: each is the plant of a row, and the "
+        "law knows the scenario's own", Path,
     )  # fmt: skip
+    flag(verb, "--samples N", "number of rows, unless the design is a grid", int)
+    flag(verb, "--design grid|random|sobol|lhs|paired", "how rows are spread (default: random; of --vehicles: paired)")
+    flag(verb, "--seed S", "seed of the design and the rows", int, 0)
+    add_campaign_folder(verb)
+    add_cluster(verb)
+    add_changes(verb, "a key of the scenario in all rows")
 
-    rerun = verbs.add_parser("rerun", help="repeat a row of a campaign, to the last bit and with full record")
-    rerun.add_argument("folder", type=Path, metavar="DIR", help="the folder of a sweep or campaign")
-    rerun.add_argument("row", type=int, metavar="ROW", help="number of the row; of a campaign, the seed of the scene")
-    rerun.add_argument("--out", type=Path, metavar="RUN", help="run folder (default: runs/SCENARIO-row-ROW-TIME)")
+    verb = add_verb(
+        verbs, "rerun", rerun, "repeat a row of a campaign, to the last bit and with full record", "campaigns",
+        ("rerun sweeps/start 17 --out runs/worst",),
+    )  # fmt: skip
+    verb.add_argument("folder", type=Path, metavar="DIR", help="the folder of a sweep or campaign")
+    verb.add_argument("row", type=int, metavar="ROW", help="number of the row; of a campaign, the seed of the scene")
+    flag(verb, "--out RUN", "run folder (default: runs/SCENARIO-row-ROW-TIME)", Path)
 
 
 def sweep(options: argparse.Namespace) -> int:
@@ -73,15 +60,15 @@ def sweep(options: argparse.Namespace) -> int:
     vary = vary_vehicles(options.vehicles) if options.vehicles else vary_from(options.vary)
     kind: Any = options.design or ("paired" if options.vehicles else "random")
     design = Design(vary, kind, options.samples, options.seed)
-    both = {vary.key for vary in design.vary} & {split_change(text)[0] for text in options.overrides}
+    both = {vary.key for vary in design.vary} & {split_change(text)[0] for text in options.set}
     if both:
         raise RunError(f"{min(both)} is set and varies, expected either")
-    scenario = load_scenario(options.scenario, options.overrides)
+    scenario = load_scenario(options.scenario, options.set)
 
     def run() -> None:
         with executor_of(options) as executor:
             n = options.workers or 1
-            done = run_sweep(scenario, design, options.out, options.engine, n, executor, progress=not options.quiet)
+            done = run_sweep(scenario, design, options.out, workers=n, executor=executor, progress=not options.quiet)
         if not done.flown:
             say(options, f"{options.out}: was complete already")
         say(options, *sweep_lines(done.summary))

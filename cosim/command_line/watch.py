@@ -8,23 +8,23 @@ import math
 import sys
 from typing import Any
 
-from cosim.command_line.numbers import rate
+from cosim.command_line.flags import add_verb, flag, rate
 
 _WIDE = 120  # characters of a line without a terminal
 
 
-def add_verb(verbs: Any) -> None:
+def add_verbs(verbs: Any) -> None:
     """Add the verb to the subparsers of the command."""
-    watch = verbs.add_parser("watch", help="show a run in the terminal: live, while it is written, or played back")
-    watch.add_argument(
+    verb = add_verb(
+        verbs, "watch", watch, "show a run in the terminal: live, while it is written, or played back", "live",
+        ("watch 8765", "watch runs/docking --rate 4", "watch runs/docking --once"),
+    )  # fmt: skip
+    verb.add_argument(
         "run", metavar="RUN|URL",
         help="a run folder, finished or not; or the address of a live view, such as ws://127.0.0.1:8765, or its port",
     )  # fmt: skip
-    watch.add_argument(
-        "--rate", type=rate, default=1.0, metavar="N|max",
-        help="simulated seconds per second in the playback of a finished run (default: 1)",
-    )  # fmt: skip
-    watch.add_argument("--once", action="store_true", help="print one picture of the newest row, and end")
+    flag(verb, "--rate N|max", "simulated seconds per second in the playback of a finished run", rate, 1.0)
+    flag(verb, "--once", "print one picture of the newest row, and end")
 
 
 def watch(options: argparse.Namespace) -> int:

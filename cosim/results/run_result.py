@@ -130,7 +130,7 @@ class Run:
             If the run has no replay.
         """
         if "replay" not in self.files():
-            raise RunError(f"{self.folder}: has no {REPLAY}; `cosim replay {self.folder}` writes it")
+            raise RunError(f"{self.folder}: has no {REPLAY}; `cosim report --replay {self.folder}` writes it")
         return self.folder / REPLAY
 
     def __repr__(self) -> str:

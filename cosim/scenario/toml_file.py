@@ -52,7 +52,7 @@ class ScenarioTable(NamedTuple):
 
 def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | None = None) -> ScenarioTable:
     """Read the table of a scenario, and merge it into that of its ``base``."""
-    from plant_fmu.toml_tables import hint, read_toml  # imports NumPy and FMPy, which `cosim list` does not need
+    from plant_fmu.toml_tables import hint, read_toml  # imports NumPy and FMPy, which `cosim show` does not need
 
     path = Path(name_or_file)
     if path.suffix == ".toml":

@@ -22,8 +22,8 @@ Exit codes: 0; 1 where a check fails; 2 where the user must mend something, said
 after Ctrl-C, SIGTERM or SIGHUP (a closed terminal), which leave a readable run; 141 where whoever reads the output goes
 away, as `head` does. `-v` and `-q` of `cosim` may stand behind the verb, too.
 
-`cosim completion bash`, `zsh` or `fish` prints a script by which the shell completes verbs, flags, shipped scenarios
-and files; `cosim completion --help` says where each shell looks for it.
+`cosim help --completion bash`, `zsh` or `fish` prints a script by which the shell completes verbs, flags, shipped
+scenarios and files; `cosim help --help` says where each shell looks for it.
 """
 _EVERYWHERE = {"verbose", "quiet"}
 _EXAMPLES = """<!-- not run: excerpt of the help, whose examples a test parses -->
@@ -37,22 +37,32 @@ def page() -> str:
     parts = [_HEAD]
     for parser in (cosim(), plant_fmu(), fuzzy_arbiter()):
         parts += [f"## {parser.prog}", parser.description or "", _table(parser)]
-        if parser.epilog:
-            notes, _, examples = parser.epilog.partition("examples:\n")
-            parts += [notes.strip(), _EXAMPLES.format("\n".join(map(str.strip, examples.strip().splitlines())))]
+        parts += _epilog(parser)
         for name, verb, what in verbs(parser):
             said = (verb.description or what).strip().rstrip(".")
-            parts += [f"### {parser.prog} {name}", f"{said[0].upper()}{said[1:]}.", _table(verb)]
+            parts += [f"### {parser.prog} {name}", f"{said[0].upper()}{said[1:]}.", _table(verb), *_epilog(verb)]
     return "\n\n".join(part.strip("\n") for part in parts if part) + "\n"
 
 
-def verbs(parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse.ArgumentParser, str]]:
-    """Return each verb: its name, its parser, and what it is for."""
+def _epilog(parser: argparse.ArgumentParser) -> list[str]:
+    """Return the notes, the examples, and the link to the page, of the end of a help text."""
+    notes, _, rest = (parser.epilog or "").partition("examples:\n")
+    examples, _, page = rest.partition("more: docs/")
+    lines = [line.strip() for line in examples.strip().splitlines()]
+    if not page:
+        return [notes.strip(), _EXAMPLES.format("\n".join(lines)) if lines else ""]
+    link = "" if page == f"reference/{PAGE.name}" else f"More: [{page}](../{page})."
+    return ["Examples:\n\n" + "\n".join(f"- `{line}`" for line in lines), link]
+
+
+def verbs(parser: argparse.ArgumentParser, before: str = "") -> Iterator[tuple[str, argparse.ArgumentParser, str]]:
+    """Return each verb, and those within it: its name, its parser, and what it is for."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             said = {choice.dest: choice.help or "" for choice in action._choices_actions}
             for name, verb in action.choices.items():
-                yield name, verb, said[name]
+                yield f"{before}{name}", verb, said[name]
+                yield from verbs(verb, f"{before}{name} ")
 
 
 def _own(parser: argparse.ArgumentParser) -> list[argparse.Action]:

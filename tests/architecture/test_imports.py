@@ -39,7 +39,7 @@ ONE_PLACE = {
     "rerun": {"cosim.export.rrd_writer"},
     "rosbags": {"cosim.logs.bag_storage", "cosim.logs.formats.bag", "cosim.logs.message_definitions"},
     "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.terminal_view"},
-    "shtab": {"cosim.command_line.completion"},
+    "shtab": {"cosim.command_line.help"},
     "skfuzzy": {"fuzzy_arbiter.engines.scikit"},
     "threadpoolctl": {"cosim.identification.fit"},
     "tomli_w": {"cosim.scenario.toml_text"},

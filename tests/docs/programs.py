@@ -98,8 +98,20 @@ def flags(name: str) -> dict[str, set[str]]:
     found = {"": set(parser._option_string_actions)}
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
-            found |= {verb: set(sub._option_string_actions) for verb, sub in action.choices.items()}
+            found |= {verb: _flags_within(sub) for verb, sub in action.choices.items()}
     return found
+
+
+def _flags_within(parser: argparse.ArgumentParser) -> set[str]:
+    """Return the flags of a verb, and of the verbs within it."""
+    inner = [
+        flag
+        for action in parser._actions
+        if isinstance(action, argparse._SubParsersAction)
+        for verb in action.choices.values()
+        for flag in _flags_within(verb)
+    ]
+    return {*parser._option_string_actions, *inner}
 
 
 def check_foreign(words: list[str]) -> bool:

@@ -47,7 +47,7 @@ class Endless:
 
 ENDLESS = (
     Endless("cosim run harbour", 10.0, writes="runs/harbour-*/record.parts/*.parquet"),  # ten minutes, at real time
-    Endless("cosim listen", 5.0, says="no vehicle found"),
+    Endless("cosim mavlink listen", 5.0, says="no vehicle found"),
     Endless("cosim sitl", 5.0, says="waiting for ArduPilot"),
 )
 INTERRUPTED = 130  # docs/reference/command-line.md

@@ -61,4 +61,4 @@ def test_missing_extra_is_named(bare):
 
 def test_missing_compiler_is_named(bare):
     with pytest.raises(AssertionError, match=r'python -m pip install "ziglang>='):
-        bare("cosim", "package", "paper-limited", "--set", "arbiter.engine=closed", "--out", "x.ssp")
+        bare("cosim", "export", "--to", "ssp", "paper-limited", "--set", "arbiter.engine=closed", "--out", "x.ssp")

@@ -1,4 +1,4 @@
-"""TLOG: the run as a vehicle's telemetry, as `cosim stream` sends it."""
+"""TLOG: the run as a vehicle's telemetry, as `cosim mavlink stream` sends it."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ from plant_fmu.archive import temporary_folder
 
 ROW = 0.05  # s, period of the record's rows and of the law
 
-_TEXT = """# Stick inputs for identification, made by cosim excite. The law brings the vehicle back between segments.
+_TEXT = """# Stick inputs made by cosim identify --excite; between segments the law brings the vehicle back.
 title = "Excitation of {name}"
 vehicle = {vehicle}
 

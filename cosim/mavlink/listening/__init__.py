@@ -1,6 +1,6 @@
 """Live table of a vehicle's telemetry.
 
-The ground's side of a link, for `cosim listen`.
+The ground's side of a link, for `cosim mavlink listen`.
 
 Imports: mavlink.vehicle, mavlink.wire.
 """

@@ -1,7 +1,7 @@
 // Entry point: show the runs of the page; without runs, connect to a live run on the page's own host.
 
 const NO_RUN =
-  "This page holds no run. A run folder has its replay.html; “cosim replay RUN” writes one, of several runs too.";
+  "This page holds no run. A run folder has its replay.html; “cosim report --replay RUN” writes one, of several runs too.";
 const OLD_BROWSER =
   "This browser cannot unpack the numbers of the run: it has no DecompressionStream. Any browser since 2023 has it.";
 

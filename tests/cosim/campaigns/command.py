@@ -22,7 +22,7 @@ from cosim.run import progress
 from cosim.campaigns.sweeps import rows
 from cosim.command_line.cli import main
 from tests.cosim.campaigns.fake import ENGINES
-rows.ENGINES.update(ENGINES)
+rows.ENGINES.update(ENGINES, fused=ENGINES["slow"])
 progress._Notice.emit = lambda *_: None  # whether anything is compiled depends on what earlier runs kept
 sys.exit(main(sys.argv[1:]))
 """

@@ -89,6 +89,11 @@ def fakes(monkeypatch):
         monkeypatch.setitem(rows.ENGINES, name, where)
 
 
+def sweep_by(monkeypatch, name):
+    """Let the command line sweep by one of these engines."""
+    monkeypatch.setitem(rows.ENGINES, "fused", ENGINES[name])
+
+
 def design(n=50, kind="random", seed=3, vary=VARY):
     return Design(vary_from(vary), kind, n, seed)
 

@@ -88,7 +88,17 @@ def test_foreign_folder_is_rejected_and_unchanged(tmp_path, scenes):
 
 @pytest.mark.medium
 def test_command_prints_the_ablation_result(tmp_path, scenes, capsys):
-    arguments = ["ablate", str(scenes), "--out", str(tmp_path / "out"), "--variants", "lag", "--replays", "0"]
+    arguments = [
+        "compare",
+        "--ablate",
+        str(scenes),
+        "--out",
+        str(tmp_path / "out"),
+        "--variants",
+        "lag",
+        "--replays",
+        "0",
+    ]
     assert main(arguments) == 0
     said = capsys.readouterr().out.splitlines()
     assert re.fullmatch(

@@ -22,7 +22,7 @@ from cosim.campaigns.sweeps.rows import schema_of
 from cosim.command_line.cli import main
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario.scenario import load_scenario
-from tests.cosim.campaigns.fake import KEYS, VARY, Fake, design, fakes, flown, paper
+from tests.cosim.campaigns.fake import KEYS, VARY, Fake, design, fakes, flown, paper, sweep_by
 from tests.cosim.campaigns.scene_data import batches_of
 
 ROOT = Path(__file__).parents[3]
@@ -58,9 +58,10 @@ def test_one_row_per_design_point_in_order(tmp_path, fakes):
 
 
 @pytest.mark.slow
-def test_extreme_numbers_are_blamed_on_the_results(tmp_path, fakes, capsys):
+def test_extreme_numbers_are_blamed_on_the_results(tmp_path, fakes, capsys, monkeypatch):
     """Their statistics overflow: the file that holds them is named, whichever column it is, and not the summary."""
-    words = [*WORDS, "--engine", "fake", "--replays", "0", "--out", str(tmp_path / "out")]
+    sweep_by(monkeypatch, "fake")
+    words = [*WORDS, "--replays", "0", "--out", str(tmp_path / "out")]
     assert main(words) == 0
     file = tmp_path / "out" / RESULTS
     table = pq.read_table(file)
@@ -275,7 +276,6 @@ def test_the_summary_of_a_single_row_and_of_none_flown(tmp_path, fakes):
         (["--vary", "law.gains.k_p1=nan:2", "--samples", "3"], "no finite number"),
         (["--vary", "law.gains.k_p1=1:2", "--samples", "10000001"], "expected up to 10000000"),
         (["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--design", "sobl"], "expected one of grid"),
-        (["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--engine", "fuse"], "did you mean 'fused'"),
         (
             ["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--scheduler", "x", "--workers", "2"],
             "expected none with",
@@ -290,9 +290,9 @@ def test_user_errors_are_one_line(tmp_path, capsys, words, said):
 
 
 @pytest.mark.slow
-def test_command_prints_the_sweep_result(tmp_path, fakes, capsys):
-    out = tmp_path / "out"
-    words = [*WORDS, "--engine", "fake", "--replays", "0"]
+def test_command_prints_the_sweep_result(tmp_path, fakes, capsys, monkeypatch):
+    sweep_by(monkeypatch, "fake")
+    out, words = tmp_path / "out", [*WORDS, "--replays", "0"]
     assert main([*words, "--out", str(out)]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "paper: 50 of 50 rows flown, 0 refused, 0 stopped early"

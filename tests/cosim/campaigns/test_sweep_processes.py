@@ -21,14 +21,14 @@ from cosim.campaigns.workers.dispatch import KILLED
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from tests.cosim.campaigns.command import ROOT, command, command_cache, needs_posix
-from tests.cosim.campaigns.fake import KEYS, VARY, design, fakes, paper
+from tests.cosim.campaigns.fake import KEYS, VARY, design, fakes, paper, sweep_by
 from tests.cosim.campaigns.scene_data import batches_of, many, rows, write
 from tests.cosim.campaigns.test_sweep import expected
 
 __all__ = ["command", "command_cache", "fakes"]
 
 N = 500  # of 10 ms each: parts enough to come in between, whatever the machine does
-SLOW = ["sweep", "paper", "--vary", *VARY, "--samples", N, "--seed", 3, "--engine", "slow"]
+SLOW = ["sweep", "paper", "--vary", *VARY, "--samples", N, "--seed", 3]
 
 
 def rows_of(folder):
@@ -119,10 +119,11 @@ def cluster():
 
 
 @pytest.mark.slow
-def test_dask_gives_the_same_rows(tmp_path, fakes, cluster, capfd):
+def test_dask_gives_the_same_rows(tmp_path, fakes, cluster, capfd, monkeypatch):
+    sweep_by(monkeypatch, "fake")
     run_sweep(paper(), design(), tmp_path / "one", "fake", executor=cluster)
     assert rows_of(tmp_path / "one") == expected()
-    words = ["sweep", "paper", "--vary", *VARY, "--samples", "50", "--seed", "3", "--engine", "fake"]
+    words = ["sweep", "paper", "--vary", *VARY, "--samples", "50", "--seed", "3"]
     address = cluster._client.scheduler.address
     capfd.readouterr()
     assert main([*words, "--scheduler", address, "--replays", "0", "--out", str(tmp_path / "two")]) == 0
@@ -157,6 +158,7 @@ def test_sweep_ends_after_the_last_dask_worker_is_killed(tmp_path, fakes, monkey
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr("cosim.campaigns.workers.cluster._WORKER_TIMEOUT", 5.0)
     monkeypatch.setattr("cosim.campaigns.workers.dispatch._CHECK_PERIOD", 0.2)
+    sweep_by(monkeypatch, "slow")
     out, said = tmp_path / "out", []
     with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster, contextlib.ExitStack() as stack:
         address = cluster.scheduler_address
@@ -173,13 +175,13 @@ def test_sweep_ends_after_the_last_dask_worker_is_killed(tmp_path, fakes, monkey
             return worker
 
         def run_verb():
-            said.append(main(["sweep", "paper", "--vary", *VARY, "--samples", f"{N}", "--seed", "3", "--engine", "slow",
+            said.append(main(["sweep", "paper", "--vary", *VARY, "--samples", f"{N}", "--seed", "3",
                               "--scheduler", address, "--replays", "0", "--out", str(out)]))  # fmt: skip
 
         def run_python():
             with distributed.Client(address) as client, client.get_executor() as executor:
                 try:
-                    run_sweep(paper(), design(N), out, "slow", executor=executor)
+                    run_sweep(paper(), design(N), out, executor=executor)
                 except RunError as error:
                     said.append(str(error))
 

@@ -101,14 +101,16 @@ def test_segment_is_made_smaller_until_other_vehicles_stay_inside():
     ],
 )
 def test_invalid_limits_are_rejected_by_name(arguments, said, tmp_path, capsys):
-    assert main(["excite", "--vehicle", "bluerov2_heavy", "--out", str(tmp_path / "pool"), *arguments]) == 2
+    assert (
+        main(["identify", "--excite", "--vehicle", "bluerov2_heavy", "--out", str(tmp_path / "pool"), *arguments]) == 2
+    )
     assert said in capsys.readouterr().err
     assert not (tmp_path / "pool").exists()
 
 
 def test_nonempty_folder_is_rejected(tmp_path, capsys):
     (tmp_path / "mine").write_text("")
-    assert main(["excite", "--vehicle", "bluerov2_heavy", "--out", str(tmp_path)]) == 2
+    assert main(["identify", "--excite", "--vehicle", "bluerov2_heavy", "--out", str(tmp_path)]) == 2
     assert "is not empty" in capsys.readouterr().err
 
 
@@ -119,7 +121,7 @@ def test_identification_recovers_the_plant_from_an_excitation_run(tmp_path, monk
     pool, run, mine = tmp_path / "pool", tmp_path / "run", tmp_path / "mine.toml"
     box = ["--box", "8", "8", "4", "--depth", "4"]
     start = ["--vehicle", "bluerov2_heavy"]
-    assert main(["excite", *start, *box, "--time", "55", "--free", *FREE, "--out", str(pool)]) == 0
+    assert main(["identify", "--excite", *start, *box, "--time", "55", "--free", *FREE, "--out", str(pool)]) == 0
     assert "they determine all 3 free numbers" in capsys.readouterr().out
     page = (pool / "excite.html").read_text()
     assert "What to expect" in page and "<svg" in page

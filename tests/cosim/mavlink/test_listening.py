@@ -1,4 +1,4 @@
-"""``cosim listen``: known vehicles, their display, bounded memory, and terminal safety."""
+"""``cosim mavlink listen``: known vehicles, their display, bounded memory, and terminal safety."""
 
 import os
 import pty
@@ -226,7 +226,8 @@ def test_listen_command_prints_the_display():
     with (
         Vehicle(port) as vehicle,
         subprocess.Popen(
-            [sys.executable, "-m", "cosim", "listen", f"udpin:127.0.0.1:{port}", "--count", "3"], stdout=subprocess.PIPE
+            [sys.executable, "-m", "cosim", "mavlink", "listen", f"udpin:127.0.0.1:{port}", "--count", "3"],
+            stdout=subprocess.PIPE,
         ) as process,
     ):
         while process.poll() is None:
@@ -238,7 +239,7 @@ def test_listen_command_prints_the_display():
 
 
 def test_receiving_no_vehicle_exits_with_1(capsys):
-    assert main(["listen", f"udpin:127.0.0.1:{free_port()}", "--seconds", "0.2"]) == 1
+    assert main(["mavlink", "listen", f"udpin:127.0.0.1:{free_port()}", "--seconds", "0.2"]) == 1
     assert "no vehicle found" in capsys.readouterr().out
 
 
@@ -251,7 +252,7 @@ def test_receiving_no_vehicle_exits_with_1(capsys):
     ],
 )
 def test_invalid_endpoint_gives_one_line_error(arguments, text, capsys):
-    assert main(["listen", *arguments]) == 2
+    assert main(["mavlink", "listen", *arguments]) == 2
     error = capsys.readouterr().err
     assert text in error and error.count("\n") == 1
 
@@ -261,7 +262,7 @@ def test_terminal_display_redraws_in_place_and_ctrl_c_restores_the_cursor():
     port = free_port()
     leader, follower = pty.openpty()
     with Vehicle(port) as vehicle, subprocess.Popen(
-        [sys.executable, "-m", "cosim", "listen", f"udpin:127.0.0.1:{port}"],
+        [sys.executable, "-m", "cosim", "mavlink", "listen", f"udpin:127.0.0.1:{port}"],
         stdin=follower, stdout=follower, stderr=follower,
     ) as process:  # fmt: skip
         os.close(follower)

@@ -113,13 +113,13 @@ def test_streaming_over_udp_answers_requests_and_rejects_commands(recorded, tmp_
 
 def test_stream_command_writes_a_log_and_reports_it(recorded, tmp_path, capsys):
     log = tmp_path / "run.tlog"
-    assert main(["stream", str(recorded), "--mavlink", str(log), "--rate", "max"]) == 0
+    assert main(["mavlink", "stream", str(recorded), "--mavlink", str(log), "--rate", "max"]) == 0
     assert "4.0 s streamed" in capsys.readouterr().out
     assert log.stat().st_size > 10_000
 
 
 def test_missing_run_gives_one_line_error(recorded, tmp_path, capsys):
-    assert main(["stream", str(tmp_path), "--mavlink", str(tmp_path / "a.tlog")]) == 2
+    assert main(["mavlink", "stream", str(tmp_path), "--mavlink", str(tmp_path / "a.tlog")]) == 2
     assert "holds no run (scenario.toml is missing)" in capsys.readouterr().err
     shutil.copy(recorded / "scenario.toml", tmp_path)
     with pytest.raises(RunError, match="holds no record"):

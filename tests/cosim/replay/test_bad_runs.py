@@ -117,7 +117,7 @@ def test_invalid_run_gives_one_line_error_and_keeps_the_page(spoilt, text, docki
     before = sorted(folder.rglob("*"))
     with pytest.raises(CosimError):
         load_run(folder)
-    assert main(["replay", str(folder)]) == 2
+    assert main(["report", "--replay", str(folder)]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert text in line and str(folder) in line
     assert sorted(folder.rglob("*")) == before
@@ -138,7 +138,7 @@ def test_replay_writes_the_page_into_the_run_folder(docking, copy_of, capsys):
     folder = copy_of(docking)
     (folder / "replay.html").unlink(missing_ok=True)
     for _ in range(2):
-        assert main(["replay", str(folder)]) == 0
+        assert main(["report", "--replay", str(folder)]) == 0
         assert capsys.readouterr().out.strip() == str(folder / "replay.html")
     reader, [(header, _)] = read_page((folder / "replay.html").read_text())
     assert reader.title == docking.scenario.title and header["name"] == "docking"
@@ -148,7 +148,7 @@ def test_replay_writes_the_page_into_the_run_folder(docking, copy_of, capsys):
 def test_several_runs_get_distinct_names(docking, copy_of, tmp_path, monkeypatch, capsys):
     here, there, other = copy_of(docking, "a/run"), copy_of(docking, "b/run"), copy_of(docking, "c")
     monkeypatch.chdir(tmp_path)
-    assert main(["replay", str(here), str(there), str(other), "--title", "Three <dockings>"]) == 0
+    assert main(["report", "--replay", str(here), str(there), str(other), "--title", "Three <dockings>"]) == 0
     assert capsys.readouterr().out.strip() == "replay.html"
     reader, runs = read_page((tmp_path / "replay.html").read_text())
     assert [header["name"] for header, _ in runs] == ["a/run", "b/run", f"{other.parent.name}/c"]
@@ -158,7 +158,7 @@ def test_several_runs_get_distinct_names(docking, copy_of, tmp_path, monkeypatch
 @pytest.mark.skipif(os.name != "posix", reason="pipes have names on POSIX alone")
 def test_named_pipe_is_not_overwritten(docking, tmp_path, capsys):
     os.mkfifo(tmp_path / "x.html")
-    assert main(["replay", str(docking.folder), "--out", str(tmp_path / "x.html")]) == 2
+    assert main(["report", "--replay", str(docking.folder), "--out", str(tmp_path / "x.html")]) == 2
     assert "exists and is no replay" in capsys.readouterr().err
     assert (tmp_path / "x.html").is_fifo()
 
@@ -166,13 +166,15 @@ def test_named_pipe_is_not_overwritten(docking, tmp_path, capsys):
 def test_foreign_file_is_not_overwritten(docking, tmp_path, capsys):
     file = tmp_path / "thesis.html"
     file.write_text("years of work")
-    assert main(["replay", str(docking.folder), "--out", str(file)]) == 2
+    assert main(["report", "--replay", str(docking.folder), "--out", str(file)]) == 2
     assert capsys.readouterr().err == f"cosim: {file}: exists and is no replay; expected a new file\n"
     assert file.read_text() == "years of work"
-    assert main(["replay", str(docking.folder), str(docking.folder), "--out", str(tmp_path / "x.html")]) == 2
+    assert (
+        main(["report", "--replay", str(docking.folder), str(docking.folder), "--out", str(tmp_path / "x.html")]) == 2
+    )
     assert "is given twice" in capsys.readouterr().err
     for out in (tmp_path, tmp_path / "nowhere" / "x.html", file / "x.html"):
-        assert main(["replay", str(docking.folder), "--out", str(out)]) == 2
+        assert main(["report", "--replay", str(docking.folder), "--out", str(out)]) == 2
         assert capsys.readouterr().err.count("\n") == 1
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.html"]
 

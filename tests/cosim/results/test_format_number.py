@@ -10,7 +10,11 @@ from cosim.campaigns.store.folder import read_plan
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 
-VERBS = [["report", "{run}"], ["export", "{run}", "--to", "csv"], ["replay", "{run}", "--out", "replay.html"]]
+VERBS = [
+    ["report", "{run}"],
+    ["export", "{run}", "--to", "csv"],
+    ["report", "--replay", "{run}", "--out", "replay.html"],
+]
 
 
 @pytest.mark.medium(fast=4)

@@ -100,7 +100,17 @@ def test_run_of_a_custom_law_is_exported_and_streamed(kind, tmp_path, capsys):
     for form in EXPORTS:
         assert main(["export", str(run.folder), "--to", form, "--out", str(tmp_path / f"run.{form}")]) == 0
     for profile in PROFILES:
-        words = ["stream", str(run.folder), "--mavlink", "udpout:127.0.0.1:9", "--rate", "max", "--profile", profile]
+        words = [
+            "mavlink",
+            "stream",
+            str(run.folder),
+            "--mavlink",
+            "udpout:127.0.0.1:9",
+            "--rate",
+            "max",
+            "--profile",
+            profile,
+        ]
         assert main(words) == 0
     assert main(["check", str(run.folder / "scenario.toml")]) in (0, 1)
     capsys.readouterr()
@@ -122,8 +132,8 @@ REFUSED = {  # by Python
 }
 REFUSED_OF_A_RUN = {  # by the command line, of the folder of such a run
     "run": ["run", "{run}/scenario.toml"],
-    "package": ["package", "{run}/scenario.toml", "--out", "{out}"],
-    "interactive replay": ["replay", "{run}", "--interactive", "--out", "{out}"],
+    "package": ["export", "--to", "ssp", "{run}/scenario.toml", "--out", "{out}"],
+    "interactive replay": ["report", "--replay", "{run}", "--interactive", "--out", "{out}"],
     "companion": ["companion", "udpout:127.0.0.1:9", "--scenario", "{run}/scenario.toml", "--timeout", "0.1"],
     "sweep": ["sweep", "{run}/scenario.toml", "--vary", "initial.position.1=0:1", "--samples", "2", "--out", "{out}"],
 }

@@ -71,6 +71,6 @@ def test_no_progress_bar_without_a_terminal(capsys):
 
 @pytest.mark.parametrize(("flags", "said"), [([], f"cosim: {COMPILING_NOTICE}\n"), (["-q"], "")])
 def test_every_verb_announces_compilation_unless_quiet(flags, said, capsys, monkeypatch):
-    monkeypatch.setitem(cli._VERBS, "show", lambda options: compiles() or 0)
+    monkeypatch.setattr("cosim.command_line.show.show", lambda options: compiles() or 0)
     assert cli.main([*flags, "show", "paper"]) == 0
     assert capsys.readouterr() == ("", said)

@@ -279,7 +279,7 @@ def test_unsupported_scenario_is_rejected_by_key(name, changes, said, tmp_path):
 
 def test_step_that_does_not_divide_a_period_is_rejected(tmp_path, capsys):
     out = tmp_path / "s.ssp"
-    assert main(["package", str(ALL_SHAPES), "--set", "time.step=0.02", "--out", str(out)]) == 2
+    assert main(["export", "--to", "ssp", str(ALL_SHAPES), "--set", "time.step=0.02", "--out", str(out)]) == 2
     said = capsys.readouterr().err
     assert "time.control" in said and "a whole multiple of time.step (0.02 s)" in said and said.count("\n") == 1
     assert not out.exists()
@@ -290,16 +290,16 @@ def test_step_that_does_not_divide_a_period_is_rejected(tmp_path, capsys):
 
 def test_package_command_writes_the_system(tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert main(["package", str(ALL_SHAPES), "--to", "ssp"]) == 0
+    assert main(["export", str(ALL_SHAPES), "--to", "ssp"]) == 0
     assert capsys.readouterr().out == "all-shapes.ssp\n"
     assert zipfile.is_zipfile("all-shapes.ssp")
 
 
 def test_package_command_reports_errors_in_one_line(tmp_path, capsys):
     out = tmp_path / "nowhere" / "s.ssp"
-    assert main(["package", str(ALL_SHAPES), "--out", str(out)]) == 2
+    assert main(["export", "--to", "ssp", str(ALL_SHAPES), "--out", str(out)]) == 2
     assert "nowhere" in capsys.readouterr().err
-    assert main(["package", "paper", "--out", str(tmp_path / "s.ssp")]) == 2
+    assert main(["export", "--to", "ssp", "paper", "--out", str(tmp_path / "s.ssp")]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1 and "arbiter.engine" in said
     assert not list(tmp_path.iterdir())

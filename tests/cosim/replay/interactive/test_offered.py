@@ -156,7 +156,7 @@ def test_unsupported_scenarios_are_rejected_by_key(name, changes, said):
 
 
 def test_several_runs_are_rejected_without_a_file(tmp_path, capsys):
-    assert main(["replay", "one", "other", "--interactive", "--out", str(tmp_path / "page.html")]) != 0
+    assert main(["report", "--replay", "one", "other", "--interactive", "--out", str(tmp_path / "page.html")]) != 0
     assert "2 runs, expected one for a page that flies" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 

@@ -1,4 +1,4 @@
-"""``cosim completion``: verbs, flags, scenarios and files, completed by the shell."""
+"""``cosim help``: the help of verbs, and the scripts by which shells complete them."""
 
 from __future__ import annotations
 
@@ -6,13 +6,10 @@ import argparse
 from collections.abc import Iterator
 from typing import Any
 
+from cosim.command_line.flags import add_verb, flag
+
 SHELLS = ("bash", "zsh", "fish")
 
-_EPILOG = """to keep it:
-  cosim completion bash > ~/.local/share/bash-completion/completions/cosim
-  cosim completion zsh > ~/.zfunc/_cosim    # a folder of fpath
-  cosim completion fish > ~/.config/fish/completions/cosim.fish
-"""
 _FOLDERS = {"DIR", "RUN", "RUN|URL"}  # metavars of folders
 _SCENARIOS = {
     "bash": """_cosim_scenarios() {{
@@ -31,18 +28,32 @@ end""",
 }
 
 
-def add_verb(verbs: Any, parser: argparse.ArgumentParser) -> None:
-    """Add the verb to the parser."""
-    completion = verbs.add_parser(
-        "completion", help="print a script that lets a shell complete this command",
-        epilog=_EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter,
+def add_verbs(verbs: Any, parser: argparse.ArgumentParser) -> None:
+    """Add the verb to the subparsers of the command."""
+    verb = add_verb(
+        verbs, "help", help_, "print this help, that of a verb, or a script that lets a shell complete this command",
+        "reference/command-line",
+        ("help run", "help --completion bash > ~/.local/share/bash-completion/completions/cosim",
+         "help --completion zsh > ~/.zfunc/_cosim    # a folder of fpath",
+         "help --completion fish > ~/.config/fish/completions/cosim.fish"),
     )  # fmt: skip
-    completion.add_argument("shell", choices=SHELLS, metavar="SHELL", help=", ".join(SHELLS))
-    completion.set_defaults(completed=parser)
+    either = verb.add_mutually_exclusive_group()
+    either.add_argument("about", nargs="?", choices=tuple(verbs.choices), metavar="VERB", help="such as run")
+    flag(either, "--completion SHELL", f"print the script for a shell: {', '.join(SHELLS)}", choices=SHELLS)
+    verb.set_defaults(parser=parser, verbs=verbs.choices)
 
 
-def completion(options: argparse.Namespace) -> int:
-    """Run ``cosim completion``."""
+def help_(options: argparse.Namespace) -> int:
+    """Run ``cosim help``."""
+    if options.completion:
+        print(_completion(options.parser, options.completion))
+    else:
+        (options.verbs[options.about] if options.about else options.parser).print_help()
+    return 0
+
+
+def _completion(parser: argparse.ArgumentParser, shell: str) -> str:
+    """Return the script by which a shell completes verbs, flags, scenarios and files."""
     import shtab
 
     from cosim.scenario.toml_file import list_scenarios
@@ -52,15 +63,15 @@ def completion(options: argparse.Namespace) -> int:
         "fish": "(_cosim_scenarios)",
         "preamble": {shell: text.format(names=names) for shell, text in _SCENARIOS.items()},
     }
-    for action in _actions(options.completed):
-        if action.dest in ("scenario", "scenarios"):
+    for action in _actions(parser):
+        if action.dest in ("scenario", "source"):
             action.complete = scenarios  # type: ignore[attr-defined]
         elif action.metavar in _FOLDERS:
             action.complete = shtab.DIRECTORY  # type: ignore[attr-defined]
         elif action.dest in ("scenes", "signing_key", "commands", "out", "vehicle"):
             action.complete = shtab.FILE  # type: ignore[attr-defined]
-    print(shtab.complete(options.completed, options.shell))
-    return 0
+    script: str = shtab.complete(parser, shell)
+    return script
 
 
 def _actions(parser: argparse.ArgumentParser) -> Iterator[argparse.Action]:
