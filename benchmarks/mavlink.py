@@ -26,7 +26,6 @@ from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.framing import FrameFilter, RxStats
 from cosim.mavlink.wire.link import Link, Signer
-from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
 from cosim.mavlink.wire.signing import SigningClock
 from cosim.scenario.scenario import load_scenario
@@ -62,7 +61,7 @@ class Seventeen:
         self._began = time.monotonic()
         self.busy = 0.0
 
-    def attach(self, link: MessageSink) -> None:
+    def attach(self, link: Link) -> None:
         """Start to send on a link."""
         self._context.links.append(link)
 
@@ -70,7 +69,7 @@ class Seventeen:
         """Store the row for the next messages."""
         self._row = row
 
-    def receive(self, link: MessageSink, message: Any, now: float) -> None:
+    def receive(self, link: Link, message: Any, now: float) -> None:
         """Send a message in answer to a received one."""
         self._send(_SENT[0])
 
@@ -78,7 +77,7 @@ class Seventeen:
         """Send the messages that are due."""
         while self._row is not None and self._rounds < (now - self._began) * _ROUNDS:
             self._rounds += 1
-            self._context.look(self._row)
+            self._context.update(self._row)
             for number in _SENT:
                 self._send(number)
 

@@ -25,6 +25,10 @@ class Autopilot:
     pwm_dead_band: int = 25  # us, distance to either side of neutral within which there is no force
     curve: Literal["linear", "quadratic"] = "quadratic"  # force over the part of the span
 
+    def sign_of_each(self, n_thrusters: int) -> tuple[int, ...]:
+        """Return a sign for each of n thrusters."""
+        return self.signs if isinstance(self.signs, tuple) else (self.signs,) * n_thrusters
+
 
 def validate_autopilot(
     autopilot: Autopilot, n_thrusters: int, require: Callable[[bool, str, object, str], None]
@@ -32,7 +36,7 @@ def validate_autopilot(
     """Return the table with a channel and a sign for each thruster."""
     table = autopilot
     channels = table.channels or tuple(range(1, n_thrusters + 1))
-    signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * n_thrusters
+    signs = table.sign_of_each(n_thrusters)
     require(bool(table.frame) and table.frame.isprintable(), "autopilot.frame", repr(table.frame), "a name")
     for key, values in (("channels", channels), ("signs", signs)):
         require(len(values) == n_thrusters, f"autopilot.{key}", f"{len(values)} numbers", f"{n_thrusters}")

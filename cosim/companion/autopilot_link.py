@@ -64,14 +64,11 @@ class NetworkLink(GroundLink):
         super().__init__(endpoint, key, identity)
         self._speedup = speedup
 
-    def __enter__(self) -> NetworkLink:
-        return self
-
     def clock(self) -> float:
         """Return `time.monotonic()` times the speedup [s]."""
         return self._speedup * time.monotonic()
 
     def receive(self, timeout: float) -> list[ReceivedMessage]:
         """Return the received messages, stamped with times of this clock; wait at most `timeout` [s] of it."""
-        heard = super().receive(timeout / self._speedup)
-        return [one._replace(time=self._speedup * one.time) for one in heard]
+        messages = super().receive(timeout / self._speedup)
+        return [message._replace(time=self._speedup * message.time) for message in messages]

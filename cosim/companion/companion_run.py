@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -21,6 +20,7 @@ from cosim.companion.session import AutopilotSession
 from cosim.companion.set_points import MAX_LAW_SPEED
 from cosim.companion.warm_up import warm_up
 from cosim.errors import RunError
+from cosim.mavlink.vehicle.speed import drag_limited_speed
 from cosim.mavlink.wire.options import ProfileName
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import Run
@@ -97,10 +97,8 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile:
 
 def _speed_with_reserve(vehicle: Vehicle) -> float:
     """Return the forward speed [m/s] whose drag takes 70 % of the thrusters' force; the rest is for moments."""
-    force = (1.0 - _RESERVE) * greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)[0]
-    linear, quadratic = float(vehicle.linear_damping[0]), float(vehicle.quadratic_damping[0])
-    slope = linear + math.sqrt(linear**2 + 4.0 * quadratic * force)
-    return 2.0 * float(force) / slope if slope > 0.0 else math.inf
+    max_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+    return drag_limited_speed(vehicle, 0, (1.0 - _RESERVE) * float(max_wrench[0]))
 
 
 class Companion:
@@ -228,15 +226,10 @@ class Companion:
             now = session.clock()
             session.exchange(np.zeros(6), now, now + period)
             self._report(on_state)
-            self._require_accepted_sticks()
+            if reason := session.stick_rejection():
+                raise RunError(reason)
             if self._options.timeout is not None and now - start > self._options.timeout:
                 raise RunError(f"{self._options.timeout:g} s have passed while waiting for {session.missing()}")
-
-    def _require_accepted_sticks(self) -> None:
-        """Raise `RunError` if the autopilot would ignore or misread the sticks."""
-        reason = self.session.stick_rejection()
-        if reason:
-            raise RunError(reason)
 
     def _steer(self, master: Master, observers: Sequence[Observer], on_state: Callable[[State, str], None]) -> str:
         session = self.session

@@ -59,9 +59,12 @@ class RemoteVehicle:
         self._index = {channel.name: i for i, channel in enumerate(self.outputs.channels)}
         # the vehicle's table ``autopilot`` describes an ArduSub's servo outputs, not a PX4's
         table = scenario.vehicle.autopilot if session.profile.name != "px4" else None
-        self._channels = () if table is None else table.channels
-        signs = () if table is None else np.broadcast_to(table.signs, len(self._channels)).tolist()
-        self._efforts = [] if table is None else [effort_of_pulse(table, sign) for sign in signs]
+        signs = () if table is None else table.sign_of_each(scenario.vehicle.n_thrusters)
+        self._efforts = (
+            [(channel, effort_of_pulse(table, sign)) for channel, sign in zip(table.channels, signs, strict=True)]
+            if table
+            else []
+        )
         self._updates = -1
         self._position: Array = np.full(3, math.nan)
         self._quaternion: Array = np.array([1.0, 0.0, 0.0, 0.0])
@@ -133,7 +136,7 @@ class RemoteVehicle:
         if not self._efforts or not pulses:
             return
         forces = np.zeros(vehicle.n_thrusters)
-        for i, (channel, effort) in enumerate(zip(self._channels, self._efforts, strict=True)):
+        for i, (channel, effort) in enumerate(self._efforts):
             fraction = effort(pulses[channel - 1]) if 0 < channel <= len(pulses) else 0.0
             forces[i] = fraction * (vehicle.thrust_max[i] if fraction >= 0.0 else -vehicle.thrust_min[i])
         self._write("thruster_force[1]", forces)

@@ -71,11 +71,6 @@ class AutopilotSession:
         """Return the link's time [s]."""
         return self._link.clock()
 
-    @property
-    def identity(self) -> tuple[int, int]:
-        """The companion's own system id and component id."""
-        return self._link.identity
-
     def take(self, k: int) -> Sequence[Command]:
         """Return the command that starts or stops the law, if `supervisor.is_steering` has changed."""
         if self._is_law_active == self.supervisor.is_steering:
@@ -157,7 +152,7 @@ class AutopilotSession:
         o = self._options
         if o.dry_run or not uses_sticks(o.profile, o.steer_by):
             return ""
-        ignored = self.failsafes.ignored_sticks(self.identity[0])
+        ignored = self.failsafes.ignored_sticks(self._link.identity[0])
         if ignored:
             return f"{ignored}; expected the same number, or --steer-by velocity"
         if self._gain_error() > GAIN_TOLERANCE:
@@ -304,7 +299,7 @@ class AutopilotSession:
         if message.get_type() == "COMMAND_LONG":
             self._handle_command(system, component, message)
             return
-        if message.get_type() == "HEARTBEAT" and system == self.identity[0]:
+        if message.get_type() == "HEARTBEAT" and system == self._link.identity[0]:
             self._warn_of_shared_id(component)
         if message.get_type() == "PARAM_VALUE" and (system, component) == (self.reported.system, 1):
             self.failsafes.receive(message)
@@ -315,7 +310,7 @@ class AutopilotSession:
 
     def _warn_of_shared_id(self, component: int) -> None:
         """Warn once of another station that shares our system id: an ArduSub accepts its sticks as well as ours."""
-        system, ours = self.identity
+        system, ours = self._link.identity
         if component != ours and component not in self._shared_ids:
             self._shared_ids.add(component)
             log.warning(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -47,11 +46,10 @@ class ReportedState:
         self.autopilot = 0
         # position [m] and velocity [m/s], NED, in the autopilot's own local frame
         self.position: Array = np.full(3, math.nan)
-        # position [m] and velocity [m/s], NED, in the autopilot's own local frame
         self.velocity: Array = np.full(3, math.nan)
         # attitude from body to world, scalar first; body rates [rad/s]
         self.quaternion: Array = np.array([1.0, 0.0, 0.0, 0.0])
-        self.rates: Array = np.zeros(3)  # attitude from body to world, scalar first; body rates [rad/s]
+        self.rates: Array = np.zeros(3)
         self.mode, self.is_armed, self.in_failsafe = -1, False, False
         # latitude and longitude [deg] and altitude above home [m]
         self.global_position: tuple[float, float, float] | None = None
@@ -68,25 +66,6 @@ class ReportedState:
         self.sync = ClockSync()
         self._position_boot = self.attitude_boot = math.nan
         self._position_at = self._attitude_at = -math.inf  # our time [s]
-        self._handlers: dict[str, Callable[[Any, float], None]] = {
-            "HEARTBEAT": self._heartbeat,
-            "CURRENT_MODE": self._current_mode,
-            "LOCAL_POSITION_NED": self._local_position,
-            "ATTITUDE_QUATERNION": self._attitude_quaternion,
-            "ODOMETRY": self._odometry,
-            "GLOBAL_POSITION_INT": self._global_position,
-            "SCALED_PRESSURE": self._first_pressure,
-            "SCALED_PRESSURE2": self._second_pressure,
-            "DISTANCE_SENSOR": self._distance,
-            "SERVO_OUTPUT_RAW": self._servos,
-            "SYS_STATUS": self._status,
-            "NAMED_VALUE_FLOAT": self._named,
-            "EKF_STATUS_REPORT": self._estimator,
-            "ESTIMATOR_STATUS": self._estimator,
-            "STATUSTEXT": self._text,
-            "COMMAND_ACK": self._acknowledge,
-            "TIMESYNC": lambda m, now: self.sync.add_answer(m.tc1, m.ts1, now),
-        }
         self._second = False  # True if SCALED_PRESSURE2 is received: the sensor outside the hull
 
     def receive(self, system: int, component: int, message: Any, now: float) -> None:
@@ -98,11 +77,12 @@ class ReportedState:
             return
         if self.system is None and name == "HEARTBEAT" and component == 1 and message.autopilot != 8:
             self.system = system
-        if system != self.system or component != 1 or name not in self._handlers:
+        handler = getattr(self, f"_receive_{name.lower()}", None)
+        if system != self.system or component != 1 or handler is None:
             return
         self.received_at = now
         self.message_counts[name] += 1
-        self._handlers[name](message, now)
+        handler(message, now)
 
     def age(self, now: float) -> float:
         """Return the age of the older one of position and attitude [s]; infinite before both were received."""
@@ -136,26 +116,25 @@ class ReportedState:
         linear: Array = rotation_matrix(self.quaternion).T @ self.velocity
         return np.concatenate([linear, self.rates])
 
-    # ---- handlers of messages ----
+    # ---- handlers of messages, by their names ----
 
-    def _heartbeat(self, m: Any, now: float) -> None:
+    def _receive_heartbeat(self, m: Any, now: float) -> None:
         self.autopilot, self.mode = m.autopilot, m.custom_mode
         self.is_armed, self.in_failsafe = bool(m.base_mode & _ARMED), m.system_status >= _CRITICAL
 
-    def _current_mode(self, m: Any, now: float) -> None:
+    def _receive_current_mode(self, m: Any, now: float) -> None:
         self.mode = m.custom_mode
 
-    def _local_position(self, m: Any, now: float) -> None:
+    def _receive_local_position_ned(self, m: Any, now: float) -> None:
         self._set_position((m.x, m.y, m.z), (m.vx, m.vy, m.vz), m.time_boot_ms * _MILLI, now)
 
     def _set_position(self, position: Any, velocity: Any, boot: float, now: float) -> None:
         self.position[:], self.velocity[:] = position, velocity
         self._position_boot, self._position_at = boot, now
 
-    def _attitude_quaternion(self, m: Any, now: float) -> None:
-        self._set_attitude(
-            (m.q1, m.q2, m.q3, m.q4), (m.rollspeed, m.pitchspeed, m.yawspeed), m.time_boot_ms * _MILLI, now
-        )
+    def _receive_attitude_quaternion(self, m: Any, now: float) -> None:
+        rates = m.rollspeed, m.pitchspeed, m.yawspeed
+        self._set_attitude((m.q1, m.q2, m.q3, m.q4), rates, m.time_boot_ms * _MILLI, now)
 
     def _set_attitude(self, quaternion: Any, rates: Any, boot: float, now: float) -> None:
         length = math.hypot(*quaternion)
@@ -163,7 +142,7 @@ class ReportedState:
             self.quaternion[:], self.rates[:] = np.divide(quaternion, length), rates
             self.attitude_boot, self._attitude_at = boot, now
 
-    def _odometry(self, m: Any, now: float) -> None:
+    def _receive_odometry(self, m: Any, now: float) -> None:
         if (m.frame_id, m.child_frame_id) != (_LOCAL_NED, _BODY_FRD):
             return
         boot = m.time_usec * _MICRO
@@ -171,41 +150,46 @@ class ReportedState:
         self._set_position((m.x, m.y, m.z), rotation_matrix(self.quaternion) @ (m.vx, m.vy, m.vz), boot, now)
         self.resets = m.reset_counter
 
-    def _global_position(self, m: Any, now: float) -> None:
+    def _receive_global_position_int(self, m: Any, now: float) -> None:
         if m.lat or m.lon:
             self.global_position = m.lat * 1e-7, m.lon * 1e-7, m.relative_alt * _MILLI
 
-    def _first_pressure(self, m: Any, now: float) -> None:
+    def _receive_scaled_pressure(self, m: Any, now: float) -> None:
         if not self._second:
             self.pressure = m.press_abs
 
-    def _second_pressure(self, m: Any, now: float) -> None:
+    def _receive_scaled_pressure2(self, m: Any, now: float) -> None:
         self._second, self.pressure = True, m.press_abs
 
-    def _distance(self, m: Any, now: float) -> None:
+    def _receive_distance_sensor(self, m: Any, now: float) -> None:
         if m.orientation == _DOWNWARDS:
             self.altitude = m.current_distance * 0.01
 
-    def _servos(self, m: Any, now: float) -> None:
+    def _receive_servo_output_raw(self, m: Any, now: float) -> None:
         if m.port == 0:
             self.pulses = tuple(getattr(m, f"servo{i}_raw") for i in range(1, 17))
 
-    def _status(self, m: Any, now: float) -> None:
+    def _receive_sys_status(self, m: Any, now: float) -> None:
         self.battery = float(m.battery_remaining) if m.battery_remaining >= 0 else math.nan
 
-    def _named(self, m: Any, now: float) -> None:
+    def _receive_named_value_float(self, m: Any, now: float) -> None:
         if m.name == "PilotGain":
             self.pilot_gain = m.value
 
-    def _estimator(self, m: Any, now: float) -> None:
+    def _receive_ekf_status_report(self, m: Any, now: float) -> None:
         self.is_reckoned = bool(m.flags & _RELATIVE) and not m.flags & _ABSOLUTE
 
-    def _text(self, m: Any, now: float) -> None:
+    _receive_estimator_status = _receive_ekf_status_report
+
+    def _receive_statustext(self, m: Any, now: float) -> None:
         self.texts.append(m.text)
         self.is_leaking |= "leak detected" in m.text.lower()
 
-    def _acknowledge(self, m: Any, now: float) -> None:
+    def _receive_command_ack(self, m: Any, now: float) -> None:
         self.results[m.command] = m.result
+
+    def _receive_timesync(self, m: Any, now: float) -> None:
+        self.sync.add_answer(m.tc1, m.ts1, now)
 
 
 def _is_deflected(message: Any, autopilot: int) -> bool:

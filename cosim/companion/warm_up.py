@@ -12,7 +12,8 @@ from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.session import AutopilotSession
 from cosim.mavlink.wire.ground_end import ReceivedMessage
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.commands.commands import Arm, Command
+from cosim.simulation.commands.commands import Arm
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.master import Master
 
 _STEPS = 3
@@ -37,22 +38,15 @@ class _NoLink:
         return True
 
 
-class _ArmAtFirst:
-    """Source of one command: it starts the law at the first step."""
-
-    exhausted = False
-
-    def take(self, k: int) -> Sequence[Command]:
-        return (Arm(True),) if k == 0 else ()
-
-
 def warm_up(scenario: Scenario, options: CompanionOptions) -> None:
     """Run three steps of a scenario with a vehicle that rests at its initial position."""
     session = AutopilotSession(_NoLink(), scenario.vehicle, options)
     session.reported.position[:] = scenario.initial.position
     session.reported.velocity[:] = 0.0
     session.alignment.offset = np.zeros(3)
+    commands = CommandQueue()
+    commands.submit(Arm(True))  # starts the law
     with Master(scenario, plant=RemoteVehicle(scenario, session)) as master:
         master.plant.initialise()
         for k in range(_STEPS):
-            master.step(k, _ArmAtFirst())
+            master.step(k, commands)

@@ -7,24 +7,23 @@ from collections.abc import Sequence
 from typing import Any
 
 from cosim.mavlink.event_texts import EventTexts
-from cosim.mavlink.messages import status
+from cosim.mavlink.messages.message_table import build_messages
 from cosim.mavlink.messages.streams import Streams
 from cosim.mavlink.services.attitude_targets import AttitudeTargets
 from cosim.mavlink.services.command_protocol import CommandProtocol
 from cosim.mavlink.services.ftp import FileServer
 from cosim.mavlink.services.gcs_failsafe import GcsFailsafe
-from cosim.mavlink.services.logs import LogProtocol
 from cosim.mavlink.services.manual import ManualControlService
 from cosim.mavlink.services.mission import MissionProtocol
 from cosim.mavlink.services.mode_commands import ModeCommands
 from cosim.mavlink.services.origin import Origin
 from cosim.mavlink.services.parameter_protocol import ParameterProtocol
 from cosim.mavlink.services.received_obstacles import ReceivedObstacles
-from cosim.mavlink.services.requests import Requests, Timing, banner
+from cosim.mavlink.services.requests import LogProtocol, Requests, Timing, banner
 from cosim.mavlink.services.service import Handler, Service
 from cosim.mavlink.services.targets import Targets
 from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
-from cosim.mavlink.wire.message_sink import MessageSink
+from cosim.mavlink.wire.link import Link
 from cosim.mavlink.wire.options import COMPONENT_ID, MavlinkOptions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.sources import CommandQueue
@@ -53,7 +52,7 @@ class Autopilot:
         live: bool = True,
     ) -> None:
         self._context = context = VehicleContext(scenario, columns, options, commands, live)
-        self._streams: dict[MessageSink, Streams] = {}
+        self._streams: dict[Link, Streams] = {}
         self._events = EventTexts(context)
         parameters = ParameterProtocol(context)
         targets = Targets(context, parameters)
@@ -81,16 +80,15 @@ class Autopilot:
         self._awaits_arming = False  # True while the run waits for arming: simulated time is still 0
         self._has_advanced = False  # True if simulated time has advanced since the last tick
         self._advanced_at = -math.inf
-        self._heartbeat_at: dict[MessageSink, float] = {}
+        self._heartbeat_at: dict[Link, float] = {}
         self._last_tick: float | None = None
 
-    def attach(self, link: MessageSink) -> None:
+    def attach(self, link: Link) -> None:
         """Start streaming on a link."""
         self._context.links.append(link)
         self._streams[link] = Streams(self._context, link, self._clock_us)
-        for line in banner(self._context):
-            for message in self._context.make_text(line):
-                link.send(message)
+        for message in banner(self._context):
+            link.send(message)
 
     def observe(self, row: Array) -> None:
         """Update from the next snapshot, and send the messages that are due by simulated time; row (n,) [s]."""
@@ -121,7 +119,7 @@ class Autopilot:
         for streams in list(self._streams.values()):
             streams.advance(self._clock_us)
 
-    def receive(self, link: MessageSink, message: Any, now: float) -> None:
+    def receive(self, link: Link, message: Any, now: float) -> None:
         """Pass a message to its handler, if it comes from an allowed system and targets this vehicle; now [s]."""
         context = self._context
         context.now = now
@@ -167,4 +165,6 @@ class Autopilot:
         context.send_text(
             f"The {'run' if context.live else 'recording'} has ended", context.mavlink.MAV_SEVERITY_NOTICE
         )
-        context.send(status.heartbeat_message(context, context.mavlink.MAV_STATE_STANDBY))
+        context.has_ended = True
+        for message in build_messages(context, "HEARTBEAT"):
+            context.send(message)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from controller.regions.region_set import of_attitude
-from cosim.mavlink.messages import status
+from cosim.mavlink.messages.message_table import build_messages
 from cosim.mavlink.vehicle.profile import MODE_TABLE
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.vehicle.view import View
@@ -49,7 +49,7 @@ class EventTexts:
         if view.mode != before.mode:
             context.send_text(f"Mode: {MODE_TABLE[view.mode].name}", m.MAV_SEVERITY_NOTICE)
         if (view.armed, view.mode) != (before.armed, before.mode):
-            for message in (*status.heartbeat(context), *status.current_mode(context)):
+            for message in build_messages(context, "HEARTBEAT", "CURRENT_MODE"):
                 context.send(message)
         if view.mode == before.mode == "mission" and view.item != before.item:
             self._watch_mission(before.item, view.item)

@@ -12,11 +12,11 @@ import threading
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Sequence
-from typing import Any, Protocol
+from typing import Any
 
+from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.channels.tlog_file import Tlog
 from cosim.mavlink.wire.link import Link
-from cosim.mavlink.wire.message_sink import MessageSink
 from cosim.simulation.signals import Array
 
 log = logging.getLogger(__name__)
@@ -37,34 +37,10 @@ _DRAINING = 2.0  # s for which closing waits for the queue
 _CLOSING = 4.0  # s for which closing waits in total
 
 
-class Vehicle(Protocol):
-    """The vehicle's side of the protocol, without input or output of its own."""
-
-    def attach(self, link: MessageSink) -> None:
-        """Start streaming on a link."""
-        ...
-
-    def observe(self, row: Array) -> None:
-        """Update from the next snapshot, a row of the run's signals, and send messages due by its time."""
-        ...
-
-    def receive(self, link: MessageSink, message: Any, now: float) -> None:
-        """Handle a message received on a link, at monotonic time `now` [s]."""
-        ...
-
-    def tick(self, now: float) -> None:
-        """Send messages due by the wall clock."""
-        ...
-
-    def close(self, now: float) -> None:
-        """Send the last messages."""
-        ...
-
-
 class LinkThread:
     """Observer that streams the run on links, from its own thread, started by `start`; step [s], lead [s]."""
 
-    def __init__(self, vehicle: Vehicle, links: Sequence[Link], step: float, lead: float = 0.0) -> None:
+    def __init__(self, vehicle: Autopilot, links: Sequence[Link], step: float, lead: float = 0.0) -> None:
         self._vehicle, self._links = vehicle, list(links)
         self._logs = [link.channel for link in links if isinstance(link.channel, Tlog)]
         for tlog in self._logs:

@@ -2,28 +2,23 @@
 
 from __future__ import annotations
 
-import logging
 import socket
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from cosim.errors import RunError
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.simulation.pace import Pace
 from cosim.sitl.hil_messages import RATE, hil_messages
 from cosim.sitl.motion import Motion, at_rest
 from cosim.sitl.sitl_flight import Flight
-from cosim.sitl.sitl_session import FrameCounts, Outcome, SitlSession
-
-log = logging.getLogger(__name__)
+from cosim.sitl.sitl_session import POLL, LockstepServer, SitlSession
 
 LEFT = "ended: the autopilot left"
 SYSTEM_ID, COMPONENT_ID = 254, 25  # identity of the simulator, unlike those of vehicles and ground stations
 
 _GPS_EVERY, _HEARTBEAT_EVERY = RATE // 10, RATE
-_POLL = 0.25  # s of the wall clock
 _ARMED = 128  # bit of HIL_ACTUATOR_CONTROLS.mode
 _SEND_TIMEOUT = 5.0  # s of the wall clock, timeout of sending a frame
 _CHANNELS = 16
@@ -37,11 +32,13 @@ class _SilentError(Exception):
     """The autopilot has sent nothing for longer than the timeout."""
 
 
-class HilServer:
+class HilServer(LockstepServer):
     """Fly the plant in lockstep with a PX4."""
 
     # PX4 starts up by the wall clock; meanwhile the vehicle is held at its start, and then until it is armed. The run
     # begins with the first actuator controls of an armed vehicle, and each one from then on makes one step.
+
+    kind = socket.SOCK_STREAM
 
     def __init__(
         self,
@@ -51,35 +48,15 @@ class HilServer:
         report: Callable[[str], None] | None = None,
         speedup: float | None = None,
     ) -> None:
+        super().__init__(flights, address, timeout, report)
         self._mavlink, self._speedup = dialect(), speedup
-        self._flights, self._timeout, self._report = flights, timeout, report or log.info
-        self.counts = FrameCounts()
-        self._listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        try:
-            self._listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            self._listener.bind(address)
-            self._listener.listen(1)
-        except OSError as error:
-            self._listener.close()
-            raise RunError(f"TCP {address[0]}:{address[1]}: {error.strerror or error}") from error
-        self._listener.settimeout(_POLL if timeout is None else min(_POLL, timeout))
-        self.address: tuple[str, int] = self._listener.getsockname()
-        self._received = time.monotonic()
 
-    def serve(self) -> Outcome:
-        """Fly until the scenario's end, a timeout, or Ctrl-C, as `SitlSession.fly`."""
-        try:
-            return self._flights.fly(self._serve_connections, self.counts)
-        finally:
-            self._listener.close()
-
-    def _serve_connections(self) -> str:
-        """Serve one connection after the other; return the status of the last run."""
+    def _serve(self) -> str:
         while True:
             try:
                 connection, peer = self._accept()
-            except _SilentError:
-                return f"ended: silence for {self._timeout:g} s"
+            except _SilentError as error:
+                return str(error)
             with connection:
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 flight = self._flights.begin(RATE)
@@ -88,15 +65,15 @@ class HilServer:
                     self._fly(flight, connection)
                 except _DisconnectedError:
                     self._flights.end(LEFT)
-                except _SilentError:
-                    return f"ended: silence for {self._timeout:g} s"
+                except _SilentError as error:
+                    return str(error)
                 else:
                     return "completed"
 
     def _accept(self) -> tuple[socket.socket, tuple[str, int]]:
         while True:
             try:
-                accepted = self._listener.accept()
+                accepted = self._socket.accept()
             except TimeoutError:
                 self._check_timeout()
             else:
@@ -150,7 +127,7 @@ class HilServer:
 
     def _receive(self, connection: socket.socket, *, waits: bool) -> bytes | None:
         """Receive bytes; return None if `waits` is False and none arrive within a frame's time of the wall clock."""
-        connection.settimeout(_POLL if waits else 1.0 / RATE)
+        connection.settimeout(POLL if waits else 1.0 / RATE)
         while True:
             try:
                 data = connection.recv(4096)
@@ -179,5 +156,5 @@ class HilServer:
         return controls
 
     def _check_timeout(self) -> None:
-        if self._timeout is not None and time.monotonic() - self._received > self._timeout:
-            raise _SilentError
+        if silence := self._silence():
+            raise _SilentError(silence)

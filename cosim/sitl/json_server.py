@@ -6,24 +6,45 @@ import logging
 import socket
 import time
 from collections.abc import Callable
+from typing import Literal
 
-from cosim.errors import RunError
 from cosim.sitl import json_protocol
-from cosim.sitl.lockstep import Lockstep
-from cosim.sitl.sitl_scenario import MIN_RATE
-from cosim.sitl.sitl_session import RESTARTED, FrameCounts, Outcome, SitlSession
+from cosim.sitl.sitl_session import MIN_RATE, RESTARTED, LockstepServer, SitlSession
 
 log = logging.getLogger(__name__)
 
 Sender = tuple[str, int]
+Frame = Literal["first", "next", "resent", "gap", "restart"]
 
-_POLL = 0.25  # s of the wall clock, timeout of the socket, after which the silence is checked
 _SENDER_TIMEOUT = 1.0  # s of the wall clock without frames, after which another sender is accepted
 _WARNING_PERIOD = 10.0  # s of the wall clock, between two warnings of one kind
 
 
-class JsonServer:
+class Lockstep:
+    """Tracks the frame count of one autopilot, which increases by one with each answer that it has received."""
+
+    def __init__(self) -> None:
+        self.count: int | None = None
+        self.missed = 0
+
+    def classify(self, count: int) -> Frame:
+        """Classify a frame, and store its count."""
+        last, self.count = self.count, count
+        self.missed = 0
+        if last is None:
+            return "first"
+        if count == last:
+            return "resent"
+        if count < last:
+            return "restart"
+        self.missed = count - last - 1
+        return "gap" if self.missed else "next"
+
+
+class JsonServer(LockstepServer):
     """Fly the plant in lockstep with an ArduPilot."""
+
+    kind = socket.SOCK_DGRAM
 
     def __init__(
         self,
@@ -32,32 +53,14 @@ class JsonServer:
         timeout: float | None = None,
         report: Callable[[str], None] | None = None,
     ) -> None:
-        self._flights, self._timeout, self._report = flights, timeout, report or log.info
-        self.counts = FrameCounts()
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind(address)
-        except OSError as error:
-            self._socket.close()
-            raise RunError(f"UDP {address[0]}:{address[1]}: {error.strerror or error}") from error
+        super().__init__(flights, address, timeout, report)
         self._receive = self._socket.recvfrom
-        self._socket.settimeout(_POLL if timeout is None else min(_POLL, timeout))
-        self.address: tuple[str, int] = self._socket.getsockname()
         self._lockstep = Lockstep()
         self._sender: Sender | None = None
-        self._received = time.monotonic()
         self._answer = b""
         self._warned: dict[str, float] = {}
 
-    def serve(self) -> Outcome:
-        """Answer frames until the scenario's end, a timeout, or Ctrl-C."""
-        try:
-            return self._flights.fly(self._answer_frames, self.counts)
-        finally:
-            self.close()
-
-    def _answer_frames(self) -> str:
-        """Answer frame by frame; return the status of the last run."""
+    def _serve(self) -> str:
         while not (status := self.poll()):
             pass
         return status
@@ -73,13 +76,8 @@ class JsonServer:
             self._received = now
             if self._flights.flight is not None and self._flights.flight.done:
                 return "completed"
-        elif self._timeout is not None and now - self._received > self._timeout:
-            return f"ended: silence for {self._timeout:g} s"
-        return ""
-
-    def close(self) -> None:
-        """Close the socket. May be called twice."""
-        self._socket.close()
+            return ""
+        return self._silence()
 
     def _accept(self, data: bytes, sender: Sender, now: float) -> bool:
         """Process a datagram; return True if it is a valid one of the autopilot."""

@@ -97,8 +97,7 @@ def make_pwm_law(vehicle: Vehicle, link: SitlLink | None = None) -> AutopilotLaw
     if vehicle.autopilot is None:
         raise RunError(f"vehicle {vehicle.name!r} has no table [autopilot], expected frame, channels and signs in it")
     table = vehicle.autopilot
-    signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * vehicle.n_thrusters
-    efforts = [effort_of_pulse(table, sign) for sign in signs]
+    efforts = [effort_of_pulse(table, sign) for sign in table.sign_of_each(vehicle.n_thrusters)]
     return AutopilotLaw(table.channels, efforts, vehicle, "pwm", "us", table.pwm_neutral, link)
 
 

@@ -21,7 +21,7 @@ from cosim.simulation.commands.commands import ManualControl, SetTarget
 from cosim.simulation.commands.sources import ScheduledCommands, read_log
 from cosim.sitl.law import make_pwm_law
 from cosim.sitl.sitl_flight import Flight
-from cosim.sitl.sitl_scenario import scenario_to_fly
+from cosim.sitl.sitl_session import scenario_to_fly
 from tests.faults import FAIL_ON, FAIL_ONCE, arm, call_with_faults, count, needs_faults
 
 ROOM = 4096  # bytes: for the scenario, and no record

@@ -23,16 +23,47 @@ _SEND_ERRORS = "datagrams not taken by the kernel"
 _MAX_PACKET = 1000  # bytes of frames in a datagram: the limit of small receivers
 
 
-class UdpOut:
-    """One fixed peer; the kernel drops datagrams of others."""
+class _Udp:
+    """A socket whose queued frames are sent together."""
 
     datagrams = True
 
-    def __init__(self, host: str, port: int) -> None:
+    def __init__(self, name: str, prepare: Callable[[socket.socket], None]) -> None:
         self.losses: dict[str, int] = Counter()
-        self._packet = b""  # frames of the next datagram
+        self._packets = {1: b"", 2: b""}  # frames of the next datagram, by version
+        self._socket = _open_socket(name, prepare)
+
+    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
+        """Queue a frame for the next datagram to each peer; having no listener is no failure."""
+        if len(self._packets[2]) + len(frame) > _MAX_PACKET:
+            self._send_packets()
+        self._packets[2] += frame
+        self._packets[1] += frame_v1 or b""  # about the same length: fewer messages, whose trailing zeros are not cut
+        return True
+
+    def poll(self, now: float) -> None:
+        """Send the queued datagrams."""
+        self._send_packets()
+
+    def close(self) -> None:
+        """Send the queued datagrams, and close the socket."""
+        self._send_packets()
+        self._socket.close()
+
+    def _send_packets(self) -> None:
+        packets, self._packets = self._packets, {1: b"", 2: b""}
+        self._write(packets)
+
+    def _write(self, packets: dict[int, bytes]) -> None:
+        raise NotImplementedError
+
+
+class UdpOut(_Udp):
+    """One fixed peer; the kernel drops datagrams of others."""
+
+    def __init__(self, host: str, port: int) -> None:
+        super().__init__(f"udpout:{host}:{port}", lambda s: s.connect((host, port)))
         self._version = 0  # the greatest received; 0 for none yet
-        self._socket = _open_socket(f"udpout:{host}:{port}", lambda s: s.connect((host, port)))
 
     def receive(self) -> tuple[Hashable, bytes] | None:
         """Return a datagram, or None if there is none."""
@@ -45,25 +76,8 @@ class UdpOut:
         """Record the MAVLink version of the peer."""
         self._version = max(self._version, version)
 
-    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
-        """Queue a frame for the next datagram; a missing listener is no failure."""
-        frame = (frame_v1 or b"") if self._version == 1 else frame
-        if len(self._packet) + len(frame) > _MAX_PACKET:
-            self._flush()
-        self._packet += frame
-        return True
-
-    def poll(self, now: float) -> None:
-        """Send the queued datagram."""
-        self._flush()
-
-    def close(self) -> None:
-        """Send the queued datagram, and close the socket."""
-        self._flush()
-        self._socket.close()
-
-    def _flush(self) -> None:
-        packet, self._packet = self._packet, b""
+    def _write(self, packets: dict[int, bytes]) -> None:
+        packet = packets[1 if self._version == 1 else 2]
         for _ in range(2 if packet else 0):
             try:
                 self._socket.send(packet)
@@ -84,19 +98,15 @@ class _Peer:
     version: int
 
 
-class UdpIn:
+class UdpIn(_Udp):
     """A server. Each address that sent an accepted frame within the last 10 s is a peer, up to 8 of them."""
 
     # A silent peer is kept until a new address replaces it; the one active for longest is always kept. So frames from
     # many addresses cannot displace a ground station.
 
-    datagrams = True
-
     def __init__(self, host: str, port: int) -> None:
-        self.losses: dict[str, int] = Counter()
-        self._socket = _open_socket(f"udpin:{host}:{port}", lambda s: s.bind((host, port)))
+        super().__init__(f"udpin:{host}:{port}", lambda s: s.bind((host, port)))
         self.port: int = self._socket.getsockname()[1]
-        self._packets = {1: b"", 2: b""}  # by version
         self._peers: dict[tuple[str, int], _Peer] = {}
         self._now = -math.inf  # s, monotonic, time of the last `poll`
 
@@ -124,23 +134,10 @@ class UdpIn:
         else:
             self.losses["frames of peers beyond 8"] += 1
 
-    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
-        """Queue a frame for the next datagram to each peer; having no peers is no failure."""
-        if len(self._packets[2]) + len(frame) > _MAX_PACKET:
-            self._flush()
-        self._packets[2] += frame
-        self._packets[1] += frame_v1 or b""  # about the same length: fewer messages, whose trailing zeros are not cut
-        return True
-
     def poll(self, now: float) -> None:
-        """Send the queued datagrams."""
+        """Send the queued datagrams to the peers that are not silent now [s]."""
         self._now = now
-        self._flush()
-
-    def close(self) -> None:
-        """Send the queued datagrams, and close the socket."""
-        self._flush()
-        self._socket.close()
+        super().poll(now)
 
     def _drop_silent_peer(self, now: float) -> bool:
         """Remove the silent peer that was active for the shortest time, but never the one active for longest."""
@@ -154,8 +151,7 @@ class UdpIn:
         del self._peers[min(silent, key=ages.__getitem__)]
         return True
 
-    def _flush(self) -> None:
-        packets, self._packets = self._packets, {1: b"", 2: b""}
+    def _write(self, packets: dict[int, bytes]) -> None:
         for address in self.peers:
             try:
                 if packet := packets[self._peers[address].version]:

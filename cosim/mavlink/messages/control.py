@@ -1,19 +1,18 @@
-"""Messages about law, arbiter and thrusters. Each function returns the messages of one kind."""
+"""Messages about law, arbiter and thrusters. Each function yields the fields of each message of one kind."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 from cosim.mavlink.messages.pose import degrees
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import wrap_time
+from cosim.mavlink.wire.encode import Fields
 
 _CENTER, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
 _MAX_SERVOS, _MAX_OUTPUTS = 16, 32
 _MAX_NAME = 10  # characters of a named value
-_POSITION_AND_VELOCITY = 0b110111000000  # type_mask: all but these is ignored
+_POSITION_ALONE = 0b110111111000  # type_mask: all else is ignored
 
 # reports of laws that are sent as named values
 _NAMED_REPORTS = {
@@ -24,68 +23,57 @@ _NAMED_REPORTS = {
     "law.failed_thruster": "failed_thr",
 }
 
-# DEBUG_FLOAT_ARRAY: what an array_id holds
-WEIGHTS, VALUES, CLEARANCES, THRUSTS, REPORTS = 1, 2, 3, 4, 5
 
-
-def nav_controller_output(context: VehicleContext) -> list[Any]:
+def nav_controller_output(context: VehicleContext) -> Iterator[Fields]:
     """NAV_CONTROLLER_OUTPUT: bearing and distance of the target's center; the altitude error is that of its depth."""
     view = context.view
     north, east, down = (a - b for a, b in zip(view.target, view.position_ned, strict=True))
     bearing = degrees(math.atan2(east, north))
-    heading = degrees(view.euler[2])
-    roll, pitch = degrees(view.euler[0]), degrees(view.euler[1])
-    values = roll, pitch, heading, bearing, math.hypot(north, east), -down, 0.0, 0.0
-    return [context.make("NAV_CONTROLLER_OUTPUT", *values)]
+    roll, pitch, heading = map(degrees, view.euler)
+    yield roll, pitch, heading, bearing, math.hypot(north, east), -down, 0.0, 0.0
 
 
-def servo_output_raw(context: VehicleContext) -> list[Any]:
+def servo_output_raw(context: VehicleContext) -> Iterator[Fields]:
     """SERVO_OUTPUT_RAW: thruster commands as pulses [µs], 0 for unused outputs; its time wraps."""
     pulses = (context.servo_pulses() + [0] * _MAX_SERVOS)[:_MAX_SERVOS]
-    return [context.make("SERVO_OUTPUT_RAW", wrap_time(context.view.boot_us, 1), 0, *pulses)]
+    yield context.view.boot_us & 0xFFFFFFFF, 0, *pulses
 
 
-def actuator_output_status(context: VehicleContext) -> list[Any]:
+def actuator_output_status(context: VehicleContext) -> Iterator[Fields]:
     """ACTUATOR_OUTPUT_STATUS: force of each thruster as a fraction of its limit, from -1 to 1."""
     fractions = context.thrust_fractions()[:_MAX_OUTPUTS]
-    return [context.make("ACTUATOR_OUTPUT_STATUS", context.view.boot_us, (1 << len(fractions)) - 1, fractions)]
+    yield context.view.boot_us, (1 << len(fractions)) - 1, fractions
 
 
-def rc_channels(context: VehicleContext) -> list[Any]:
+def rc_channels(context: VehicleContext) -> Iterator[Fields]:
     """RC_CHANNELS: the last applied sticks, in the order of ArduSub: pitch roll up yaw forward lateral."""
     surge, sway, heave, roll, pitch, yaw = context.sticks
     order = pitch, roll, -heave, yaw, surge, sway
     pulses = [_CENTER + _SWING * stick for stick in order] + [0xFFFF] * 12
-    return [context.make("RC_CHANNELS", wrap_time(context.view.boot_us), len(order), *pulses, 0xFF)]
+    yield context.view.boot_ms, len(order), *pulses, 0xFF
 
 
-def position_target_local_ned(context: VehicleContext) -> list[Any]:
+def position_target_local_ned(context: VehicleContext) -> Iterator[Fields]:
     """POSITION_TARGET_LOCAL_NED: the center of the target region."""
-    m, view = context.mavlink, context.view
-    none = (0.0,) * 8
-    mask = _POSITION_AND_VELOCITY | 0b111000
-    return [
-        context.make(
-            "POSITION_TARGET_LOCAL_NED", wrap_time(view.boot_us), m.MAV_FRAME_LOCAL_NED, mask, *view.target, *none
-        )
-    ]
+    view = context.view
+    yield view.boot_ms, context.mavlink.MAV_FRAME_LOCAL_NED, _POSITION_ALONE, *view.target, *(0.0,) * 8
 
 
 def named_values(context: VehicleContext) -> list[tuple[str, float]]:
     """Return names of up to ten characters and values of the main quantities."""
     view = context.view
-    values = list(zip(weight_names(view.criteria), view.weights, strict=True))
-    values += [(f"phi{i}", phi) for i, phi in enumerate(view.estimate, 1)]
-    clearances = view.clearances
-    values.append(("g_goal", view.region_values[0]))
-    values.append(("goal_clear", clearances[0]))
-    nearest = min((c for c in clearances[1:] if not math.isnan(c)), default=math.nan)
-    values.append(("clearance", nearest))  # the minimum of all regions
-    values.append(("thrust", max(map(abs, context.thrust_fractions()), default=0.0)))
-    values.append(("force", math.hypot(*view.wrench[:3])))
-    values.append(("saturated", float(view.saturated)))
-    values += [(_NAMED_REPORTS[name], value) for name, value in view.reports() if name in _NAMED_REPORTS]
-    return values
+    goal_clearance, *clearances = view.clearances
+    return [
+        *zip(weight_names(view.criteria), view.weights, strict=True),
+        *((f"phi{i}", phi) for i, phi in enumerate(view.estimate, 1)),
+        ("g_goal", view.region_values[0]),
+        ("goal_clear", goal_clearance),
+        ("clearance", min((c for c in clearances if not math.isnan(c)), default=math.nan)),  # of all regions
+        ("thrust", max(map(abs, context.thrust_fractions()), default=0.0)),
+        ("force", math.hypot(*view.wrench[:3])),
+        ("saturated", float(view.saturated)),
+        *((_NAMED_REPORTS[name], value) for name, value in view.reports() if name in _NAMED_REPORTS),
+    ]
 
 
 def weight_names(criteria: Sequence[str]) -> list[str]:
@@ -100,25 +88,25 @@ def weight_names(criteria: Sequence[str]) -> list[str]:
     return names
 
 
-def named_value_float(context: VehicleContext) -> list[Any]:
+def named_value_float(context: VehicleContext) -> Iterator[Fields]:
     """NAMED_VALUE_FLOAT: one for each of `named_values`."""
-    time = wrap_time(context.view.boot_us)
-    return [context.make("NAMED_VALUE_FLOAT", time, name, value) for name, value in named_values(context)]
+    for name, value in named_values(context):
+        yield context.view.boot_ms, name, value
 
 
-def debug_float_array(context: VehicleContext) -> list[Any]:
+def debug_float_array(context: VehicleContext) -> Iterator[Fields]:
     """DEBUG_FLOAT_ARRAY: all outputs and reports of law and arbiter, by array_id."""
     # 1, `weights`: memberships, then weights, in the order of the criteria. 2, `values`: g of the goal, then of each
     # region of the scenario. 3, `clearances`: in the same order. 4, `thrusts`: the force of each thruster [N], then its
     # command. 5, `law`: reports of the law, in the order of the columns. Each has 58 numbers at most.
     view = context.view
-    arrays: list[tuple[int, str, Sequence[float]]] = [
-        (WEIGHTS, "weights", [*view.memberships, *view.weights]),
-        (VALUES, "values", view.region_values),
-        (CLEARANCES, "clearances", view.clearances),
-        (THRUSTS, "thrusts", [*view.thruster_forces, *view.thruster_commands]),
-    ]
-    reports = [value for _, value in view.reports()]
-    if reports:
-        arrays.append((REPORTS, "law", reports))
-    return [context.make("DEBUG_FLOAT_ARRAY", view.boot_us, name, number, data) for number, name, data in arrays]
+    arrays = {
+        "weights": [*view.memberships, *view.weights],
+        "values": view.region_values,
+        "clearances": view.clearances,
+        "thrusts": [*view.thruster_forces, *view.thruster_commands],
+        "law": [value for _, value in view.reports()],
+    }
+    for number, (name, data) in enumerate(arrays.items(), 1):
+        if data:
+            yield view.boot_us, name, number, data

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
-from cosim.mavlink.messages import control, obstacle_distance, pose, sensors, status
+from cosim.mavlink.messages import control, pose, sensors, status
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.encode import Fields
 from cosim.mavlink.wire.options import PROFILES, ProfileName
 
 # MAV_DATA_STREAM
@@ -21,7 +22,7 @@ class Spec:
     """A message that the vehicle streams, or sends on request."""
 
     name: str
-    build: Callable[[VehicleContext], list[Any]]
+    fields: Callable[[VehicleContext], Iterable[Fields]]  # of each message
     rate: float  # Hz, in simulated time; 0: on request only
     group: int = 0  # MAV_DATA_STREAM of REQUEST_DATA_STREAM; 0: no group
     profiles: tuple[ProfileName, ...] = PROFILES  # profiles that stream it by default
@@ -31,6 +32,10 @@ class Spec:
     def id(self) -> int:
         """Id of the message in the dialect."""
         return int(getattr(dialect(), f"MAVLINK_MSG_ID_{self.name}"))
+
+    def build(self, context: VehicleContext) -> list[Any]:
+        """Return the messages to send now: none, one, or several."""
+        return [context.make(self.name, *fields) for fields in self.fields(context)]
 
     def default_rate(self, profile: ProfileName) -> float:
         """Return the default rate [Hz] of a `profile`; 0 for none."""
@@ -68,16 +73,21 @@ _TABLE = (
     Spec("HOME_POSITION", pose.home_position, 1.0),
     Spec("EXTENDED_SYS_STATE", status.extended_sys_state, 1.0),
     Spec("NAMED_VALUE_FLOAT", control.named_value_float, 2.0, EXTENDED_STATUS, count=18),
-    Spec("OBSTACLE_DISTANCE", obstacle_distance.obstacle_distance, 1.0),
+    Spec("OBSTACLE_DISTANCE", sensors.obstacle_distance, 1.0),
     Spec("ODOMETRY", pose.odometry, 0.0),
     Spec("DEBUG_FLOAT_ARRAY", control.debug_float_array, 1.0, count=5),
     Spec("ACTUATOR_OUTPUT_STATUS", control.actuator_output_status, 0.0),
     Spec("AVAILABLE_MODES", status.available_modes, 0.0),
     Spec("CURRENT_MODE", status.current_mode, 0.5),
     Spec("AVAILABLE_MODES_MONITOR", status.available_modes_monitor, 0.2),
-    Spec("OBSTACLE_DISTANCE_3D", obstacle_distance.obstacle_distance_3d, 1.0, count=8),
+    Spec("OBSTACLE_DISTANCE_3D", sensors.obstacle_distance_3d, 1.0, count=8),
     Spec("WATER_DEPTH", sensors.water_depth, 2.0, EXTRA3),
 )
+
+
+def build_messages(context: VehicleContext, *names: str) -> list[Any]:
+    """Return the messages of these names."""
+    return [message for name in names for spec in _TABLE if spec.name == name for message in spec.build(context)]
 
 
 @cache

@@ -1,12 +1,12 @@
-"""Messages about position, attitude and motion. Each function returns the messages of one kind."""
+"""Messages about position, attitude and motion. Each function yields the fields of each message of one kind."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Iterator
 
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import wrap_time
+from cosim.mavlink.wire.encode import Fields
 from cosim.scenario.tables import Vector3
 
 _E7 = 1e7  # in a degree
@@ -26,97 +26,86 @@ def degrees(angle: float) -> float:
     return angle * 180.0 / math.pi
 
 
-def attitude(context: VehicleContext) -> list[Any]:
+def attitude(context: VehicleContext) -> Iterator[Fields]:
     """ATTITUDE."""
     view = context.view
-    return [context.make("ATTITUDE", wrap_time(view.boot_us), *view.euler, *view.rates)]
+    yield view.boot_ms, *view.euler, *view.rates
 
 
-def attitude_quaternion(context: VehicleContext) -> list[Any]:
+def attitude_quaternion(context: VehicleContext) -> Iterator[Fields]:
     """ATTITUDE_QUATERNION: from body, forward right down, to north east down."""
     view = context.view
-    return [context.make("ATTITUDE_QUATERNION", wrap_time(view.boot_us), *view.quaternion, *view.rates)]
+    yield view.boot_ms, *view.quaternion, *view.rates
 
 
-def local_position_ned(context: VehicleContext) -> list[Any]:
+def local_position_ned(context: VehicleContext) -> Iterator[Fields]:
     """LOCAL_POSITION_NED."""
     view = context.view
-    return [context.make("LOCAL_POSITION_NED", wrap_time(view.boot_us), *view.position_ned, *view.velocity_ned)]
+    yield view.boot_ms, *view.position_ned, *view.velocity_ned
 
 
-def global_position_int(context: VehicleContext) -> list[Any]:
+def global_position_int(context: VehicleContext) -> Iterator[Fields]:
     """GLOBAL_POSITION_INT: its relative altitude is the negative depth."""
     view = context.view
     latitude, longitude, altitude = to_lat_lon_alt(context, view.position_ned)
     speeds = [v * _CM for v in view.velocity_ned]
     heading = round(degrees(view.heading) * _CM) % 36000 if math.isfinite(view.heading) else math.nan
-    values = latitude, longitude, altitude, -view.position_ned[2] * _MM, *speeds, heading
-    return [context.make("GLOBAL_POSITION_INT", wrap_time(view.boot_us), *values)]
+    yield view.boot_ms, latitude, longitude, altitude, -view.position_ned[2] * _MM, *speeds, heading
 
 
-def vfr_hud(context: VehicleContext) -> list[Any]:
+def vfr_hud(context: VehicleContext) -> Iterator[Fields]:
     """VFR_HUD: throttle is the greatest ratio of a thruster's force to its limit."""
     view = context.view
     north, east, down = view.velocity_ned
     speed = math.hypot(*view.velocity_body)
     heading = round(degrees(view.heading)) % 360 if math.isfinite(view.heading) else math.nan
     throttle = max(map(abs, context.thrust_fractions()), default=0.0)
-    values = speed, math.hypot(north, east), heading, 100.0 * throttle, -view.position_ned[2], -down
-    return [context.make("VFR_HUD", *values)]
+    yield speed, math.hypot(north, east), heading, 100.0 * throttle, -view.position_ned[2], -down
 
 
-def gps_raw_int(context: VehicleContext) -> list[Any]:
+def gps_raw_int(context: VehicleContext) -> Iterator[Fields]:
     """GPS_RAW_INT: the position as a fix, for stations that read no other message; accuracy unknown."""
     view = context.view
     latitude, longitude, altitude = to_lat_lon_alt(context, view.position_ned)
     north, east, _ = view.velocity_ned
     course = degrees(math.atan2(east, north)) % 360.0
     fix = context.mavlink.GPS_FIX_TYPE_3D_FIX if all(map(math.isfinite, view.position_ned)) else 1
-    unknown = 0xFFFF
-    speed, satellites = math.hypot(north, east) * _CM, 10
-    values = view.boot_us, fix, latitude, longitude, altitude, unknown, unknown, speed, course * _CM, satellites
-    return [context.make("GPS_RAW_INT", *values)]
+    speed, unknown, satellites = math.hypot(north, east) * _CM, 0xFFFF, 10
+    yield view.boot_us, fix, latitude, longitude, altitude, unknown, unknown, speed, course * _CM, satellites
 
 
-def home_position(context: VehicleContext) -> list[Any]:
+def home_position(context: VehicleContext) -> Iterator[Fields]:
     """HOME_POSITION: at the surface."""
     home = context.home_ned()
-    level = (1.0, 0.0, 0.0, 0.0)
-    return [
-        context.make(
-            "HOME_POSITION", *to_lat_lon_alt(context, home), *home, level, 0.0, 0.0, -1.0, context.view.boot_us
-        )
-    ]
+    yield *to_lat_lon_alt(context, home), *home, (1.0, 0.0, 0.0, 0.0), 0.0, 0.0, -1.0, context.view.boot_us
 
 
-def gps_global_origin(context: VehicleContext) -> list[Any]:
+def gps_global_origin(context: VehicleContext) -> Iterator[Fields]:
     """GPS_GLOBAL_ORIGIN: global position of the local origin."""
-    return [context.make("GPS_GLOBAL_ORIGIN", *to_lat_lon_alt(context, (0.0, 0.0, 0.0)), context.view.boot_us)]
+    yield *to_lat_lon_alt(context, (0.0, 0.0, 0.0)), context.view.boot_us
 
 
-def odometry(context: VehicleContext) -> list[Any]:
+def odometry(context: VehicleContext) -> Iterator[Fields]:
     """ODOMETRY: pose and twist; covariances unknown."""
     m, view = context.mavlink, context.view
     frames = m.MAV_FRAME_LOCAL_NED, m.MAV_FRAME_BODY_FRD
     covariances = _COVARIANCE_UNKNOWN, _COVARIANCE_UNKNOWN
     pose = *view.position_ned, view.quaternion
     twist = *view.velocity_body, *view.rates
-    return [
-        context.make("ODOMETRY", view.boot_us, *frames, *pose, *twist, *covariances, 0, m.MAV_ESTIMATOR_TYPE_AUTOPILOT)
-    ]
+    yield view.boot_us, *frames, *pose, *twist, *covariances, 0, m.MAV_ESTIMATOR_TYPE_AUTOPILOT
 
 
-def altitude(context: VehicleContext) -> list[Any]:
+def altitude(context: VehicleContext) -> Iterator[Fields]:
     """ALTITUDE: above the surface, and above the bottom if there is one."""
     view = context.view
     up = -view.position_ned[2]
     above_bottom = view.altitude if view.altitude < 1e5 else math.nan
     amsl = context.frame.altitude + up
-    return [context.make("ALTITUDE", view.boot_us, up, amsl, up, up, math.nan, above_bottom)]
+    yield view.boot_us, up, amsl, up, up, math.nan, above_bottom
 
 
-def ahrs2(context: VehicleContext) -> list[Any]:
+def ahrs2(context: VehicleContext) -> Iterator[Fields]:
     """AHRS2: Cockpit reads the altitude from it."""
     view = context.view
     latitude, longitude, altitude_mm = to_lat_lon_alt(context, view.position_ned)
-    return [context.make("AHRS2", *view.euler, altitude_mm / _MM, latitude, longitude)]
+    yield *view.euler, altitude_mm / _MM, latitude, longitude

@@ -1,8 +1,9 @@
-"""Messages about identity and status. Each function returns the messages of one kind."""
+"""Messages about identity and status. Each function yields the fields of each message of one kind."""
 
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
 from importlib import metadata
 from typing import Any
 
@@ -11,28 +12,23 @@ from packaging.version import Version
 from cosim.mavlink.messages.sensors import has_bottom
 from cosim.mavlink.vehicle.profile import MODE_TABLE, SUBMARINE
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import wrap_time
+from cosim.mavlink.wire.encode import Fields
 from cosim.simulation.commands.commands import MODES
 
 _PROTOCOL = 3  # value of HEARTBEAT.mavlink_version, for MAVLink 2 as for 1
 _OFFICIAL, _DEVELOPMENT = 255, 0  # FIRMWARE_VERSION_TYPE
 
 
-def heartbeat(context: VehicleContext) -> list[Any]:
+def heartbeat(context: VehicleContext) -> Iterator[Fields]:
     """HEARTBEAT."""
-    m = context.mavlink
-    state = m.MAV_STATE_ACTIVE if context.armed else m.MAV_STATE_STANDBY
-    return [heartbeat_message(context, m.MAV_STATE_CRITICAL if context.failsafe else state)]
-
-
-def heartbeat_message(context: VehicleContext, state: int) -> Any:
-    """Return a HEARTBEAT with a MAV_STATE."""
-    profile, mode = context.profile, context.mode
+    m, profile, mode = context.mavlink, context.profile, context.mode
+    state = m.MAV_STATE_ACTIVE if context.armed and not context.has_ended else m.MAV_STATE_STANDBY
+    state = m.MAV_STATE_CRITICAL if context.failsafe and not context.has_ended else state
     base = profile.base_mode(mode, context.armed)
-    return context.make("HEARTBEAT", SUBMARINE, profile.autopilot, base, profile.custom_modes[mode], state, _PROTOCOL)
+    yield SUBMARINE, profile.autopilot, base, profile.custom_modes[mode], state, _PROTOCOL
 
 
-def sys_status(context: VehicleContext) -> list[Any]:
+def sys_status(context: VehicleContext) -> Iterator[Fields]:
     """SYS_STATUS: the fence and all present sensors are healthy; the battery is unknown."""
     m = context.mavlink
     sensors = "3D_GYRO 3D_ACCEL 3D_MAG ABSOLUTE_PRESSURE GPS ATTITUDE_STABILIZATION YAW_POSITION Z_ALTITUDE_CONTROL"
@@ -43,44 +39,41 @@ def sys_status(context: VehicleContext) -> list[Any]:
     motors = m.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
     enabled = present | (motors if context.armed else 0)
     healthy = present | motors | m.MAV_SYS_STATUS_GEOFENCE
-    return [context.make("SYS_STATUS", present | motors, enabled, healthy, 0, 0xFFFF, -1, -1, 0, 0, 0, 0, 0, 0)]
+    yield present | motors, enabled, healthy, 0, 0xFFFF, -1, -1, 0, 0, 0, 0, 0, 0
 
 
-def system_time(context: VehicleContext) -> list[Any]:
+def system_time(context: VehicleContext) -> Iterator[Fields]:
     """SYSTEM_TIME: the date at the start plus simulated time."""
     boot = context.view.boot_us
-    return [context.make("SYSTEM_TIME", context.unix_start_us + boot, wrap_time(boot))]
+    yield context.unix_start_us + boot, context.view.boot_ms
 
 
-def extended_sys_state(context: VehicleContext) -> list[Any]:
+def extended_sys_state(context: VehicleContext) -> Iterator[Fields]:
     """EXTENDED_SYS_STATE: in the air while armed, else on the ground."""
     # QGroundControl selects its actions by it: in the air it offers neither disarming nor the start of a mission, on
     # the ground neither pause nor go-to. Contact with the bottom does not count as on the ground.
     m = context.mavlink
     landed = m.MAV_LANDED_STATE_IN_AIR if context.armed else m.MAV_LANDED_STATE_ON_GROUND
-    return [context.make("EXTENDED_SYS_STATE", 0, landed)]
+    yield 0, landed
 
 
-def current_mode(context: VehicleContext) -> list[Any]:
+def current_mode(context: VehicleContext) -> Iterator[Fields]:
     """CURRENT_MODE: the current mode and the commanded one."""
     numbers, mode = context.profile.custom_modes, context.mode
-    return [context.make("CURRENT_MODE", MODE_TABLE[mode].standard, numbers[mode], numbers[context.mode_ahead])]
+    yield MODE_TABLE[mode].standard, numbers[mode], numbers[context.mode_ahead]
 
 
-def available_modes(context: VehicleContext, index: int = 0) -> list[Any]:
+def available_modes(context: VehicleContext, index: int = 0) -> Iterator[Fields]:
     """AVAILABLE_MODES: the mode of an index from 1, or all for index 0; none for an unknown index."""
     chosen = range(1, len(MODES) + 1) if index == 0 else [index] if 1 <= index <= len(MODES) else []
-    messages = []
     for i in chosen:
         mode = MODES[i - 1]
-        values = MODE_TABLE[mode].standard, context.profile.custom_modes[mode], 0, MODE_TABLE[mode].name
-        messages.append(context.make("AVAILABLE_MODES", len(MODES), i, *values))
-    return messages
+        yield len(MODES), i, MODE_TABLE[mode].standard, context.profile.custom_modes[mode], 0, MODE_TABLE[mode].name
 
 
-def available_modes_monitor(context: VehicleContext) -> list[Any]:
+def available_modes_monitor(context: VehicleContext) -> Iterator[Fields]:
     """AVAILABLE_MODES_MONITOR: constant, since the modes never change."""
-    return [context.make("AVAILABLE_MODES_MONITOR", 0)]
+    yield (0,)
 
 
 def capabilities(context: VehicleContext) -> int:
@@ -95,7 +88,7 @@ def combine_flags(mavlink: Any, prefix: str, names: str) -> int:
     return sum(getattr(mavlink, prefix + name) for name in names.split())
 
 
-def autopilot_version(context: VehicleContext) -> list[Any]:
+def autopilot_version(context: VehicleContext) -> Iterator[Fields]:
     """AUTOPILOT_VERSION: this package's version as middleware; the unique id follows from vehicle and system id."""
     # The flight software's version is the same, or, if the profile imitates an autopilot, a development version of that
     # autopilot. QGroundControl selects views and warnings by it, and compares only official versions with the newest.
@@ -111,7 +104,7 @@ def autopilot_version(context: VehicleContext) -> list[Any]:
     none = (0,) * 8
     uid = int.from_bytes(digest[:8], "little")
     versions = flight, middleware, 0, 0, custom, none, none
-    return [context.make("AUTOPILOT_VERSION", capabilities(context), *versions, 0, 0, uid, list(digest[:18]))]
+    yield capabilities(context), *versions, 0, 0, uid, list(digest[:18])
 
 
 def _version_number(version: tuple[int, int, int], kind: int) -> int:
@@ -119,7 +112,7 @@ def _version_number(version: tuple[int, int, int], kind: int) -> int:
     return major << 24 | minor << 16 | micro << 8 | kind
 
 
-def mission_current(context: VehicleContext) -> list[Any]:
+def mission_current(context: VehicleContext) -> Iterator[Fields]:
     """MISSION_CURRENT."""
     m, view, total = context.mavlink, context.view, len(context.plan)
     first = int(context.profile.has_home_item)
@@ -133,4 +126,4 @@ def mission_current(context: VehicleContext) -> list[Any]:
         last_reached = view.item == total - 1 and view.clearances[0] >= 0.0
         state = m.MISSION_STATE_COMPLETE if last_reached else m.MISSION_STATE_ACTIVE
     under_way = 1 if view.mode == "mission" else 2
-    return [context.make("MISSION_CURRENT", max(view.item + first, 0), total, state, under_way)]
+    yield max(view.item + first, 0), total, state, under_way

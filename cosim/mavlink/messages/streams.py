@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from cosim.mavlink.messages.message_table import Spec, message_specs
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.message_sink import MessageSink
+from cosim.mavlink.wire.link import Link
 
 MIN_INTERVAL_US = 10_000
 _MAX_INTERVAL_US = 3_600_000_000
@@ -18,7 +18,7 @@ _SECOND = 1_000_000
 class Streams:
     """The schedule of a link, in whole microseconds of a monotonic clock, without drift; clock_us [µs]."""
 
-    def __init__(self, context: VehicleContext, link: MessageSink, clock_us: int) -> None:
+    def __init__(self, context: VehicleContext, link: Link, clock_us: int) -> None:
         self._context, self._link, self._clock = context, link, clock_us
         self._specs = message_specs()
         self._intervals: dict[int, int] = {}

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, get_thrust_body
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import Mode, SetAttitude, SetTarget
@@ -30,7 +30,6 @@ class AttitudeTargets(Service):
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
-        self.messages = {"SET_ATTITUDE_TARGET": self._attitude}
         self._last: SetAttitude | None = None
         self._received_at = self._waits_since = -math.inf
 
@@ -58,7 +57,7 @@ class AttitudeTargets(Service):
         )
         context.send_text(text, context.mavlink.MAV_SEVERITY_WARNING)
 
-    def _attitude(self, sender: Sender, message: Any) -> None:
+    def _receive_set_attitude_target(self, sender: Sender, message: Any) -> None:
         context = self.context
         if not self.accept_control(sender):
             return
@@ -71,7 +70,7 @@ class AttitudeTargets(Service):
             return
         self._waits_since, self._received_at = -math.inf, context.now
         command = self._command(message)
-        if command != self._last and context.submit(command) == context.mavlink.MAV_RESULT_ACCEPTED:
+        if command != self._last and context.submit(command) == Result.ACCEPTED:
             self._last = command
 
     def _unsupported_reason(self, message: Any) -> str:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from cosim.mavlink.services.service import CommandHandler, CommandRequest, Service, unscale_position
-from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 
 _NO_POSITION = 0x7FFFFFFF  # x or y of a COMMAND_INT without a position
 
@@ -17,16 +17,15 @@ class CommandProtocol(Service):
 
     def __init__(self, context: VehicleContext, services: Iterable[Service]) -> None:
         super().__init__(context)
-        self.messages = {"COMMAND_LONG": self._long, "COMMAND_INT": self._int}
         self._handlers: dict[int, CommandHandler] = {}
         for service in services:
             self._handlers.update(service.commands)
 
-    def _long(self, sender: Sender, message: Any) -> None:
+    def _receive_command_long(self, sender: Sender, message: Any) -> None:
         params = tuple(float(getattr(message, f"param{i}")) for i in range(1, 8))
         self._answer(CommandRequest(sender, message.command, params, self.context.mavlink.MAV_FRAME_GLOBAL))
 
-    def _int(self, sender: Sender, message: Any) -> None:
+    def _receive_command_int(self, sender: Sender, message: Any) -> None:
         params = tuple(float(getattr(message, f"param{i}")) for i in range(1, 5))
         x, y = unscale_position(message.frame, message.x, message.y)
         x = math.nan if message.x == _NO_POSITION else x
@@ -34,7 +33,6 @@ class CommandProtocol(Service):
         self._answer(CommandRequest(sender, message.command, (*params, x, y, float(message.z)), message.frame))
 
     def _answer(self, request: CommandRequest) -> None:
-        context = self.context
         handler, sender = self._handlers.get(request.command), request.sender
-        result = context.mavlink.MAV_RESULT_UNSUPPORTED if handler is None else handler(request)
-        sender.link.send(context.make("COMMAND_ACK", request.command, result, 0, 0, sender.system, sender.component))
+        result = Result.UNSUPPORTED if handler is None else handler(request)
+        sender.link.send(self.context.make("COMMAND_ACK", request.command, result, 0, 0, *sender.address))

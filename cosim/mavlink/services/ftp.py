@@ -64,9 +64,8 @@ class FileServer(Service):
         super().__init__(context)
         self._parameters = parameters
         self._clients: OrderedDict[tuple[str, int, int], _Client] = OrderedDict()
-        self.messages = {"FILE_TRANSFER_PROTOCOL": self._request}
 
-    def _request(self, sender: Sender, message: Any) -> None:
+    def _receive_file_transfer_protocol(self, sender: Sender, message: Any) -> None:
         raw = bytes(message.payload[:_PAYLOAD]).ljust(_PAYLOAD, b"\0")
         seq, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(raw)
         if opcode in (_ACK, _NAK):
@@ -78,9 +77,7 @@ class FileServer(Service):
             request = _Request(seq, session, opcode, size, offset, raw[_HEADER.size : _HEADER.size + size])
             replies = self._replies(client, request)
             client.last_request, client.last_replies = raw, replies
-        for reply in replies:
-            to = sender.system, sender.component
-            sender.link.send(self.context.make("FILE_TRANSFER_PROTOCOL", 0, *to, reply))
+        self.reply(sender, [self.context.make("FILE_TRANSFER_PROTOCOL", 0, *sender.address, data) for data in replies])
 
     def _client_of(self, sender: Sender) -> _Client:
         key = sender.link.name, sender.system, sender.component

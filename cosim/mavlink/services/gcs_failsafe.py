@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 from cosim.simulation.commands.commands import Arm, Command, SetMode
 
 _REPORT_PERIOD = 30.0  # s
@@ -18,9 +18,8 @@ class GcsFailsafe(Service):
         super().__init__(context)
         self._reported_at = 0.0
         self._is_applied = True
-        self.messages = {"HEARTBEAT": self._heartbeat}
 
-    def _heartbeat(self, sender: Sender, message: Any) -> None:
+    def _receive_heartbeat(self, sender: Sender, message: Any) -> None:
         self.context.active_gcs.record_heartbeat(sender.system, self.context.now)
 
     def tick(self) -> None:
@@ -62,4 +61,4 @@ class GcsFailsafe(Service):
                 command = SetMode(mode)
             case _:
                 return True
-        return bool(context.submit(command) != context.mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
+        return context.submit(command) != Result.TEMPORARILY_REJECTED

@@ -15,7 +15,7 @@ from cosim.mavlink.vehicle.ardusub_sticks import (
     MotorMixer,
     apply_dead_zone,
 )
-from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 from cosim.scenario.tables import Vector6
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.commands import STICK_MODES, ManualControl, Mode
@@ -38,7 +38,6 @@ class ManualControlService(Service):
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
-        self.messages = {"MANUAL_CONTROL": self._manual_control, "RC_CHANNELS_OVERRIDE": self._override}
         vehicle = context.scenario.vehicle
         max_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._mixer = None if vehicle.autopilot is None else MotorMixer(vehicle)
@@ -66,11 +65,11 @@ class ManualControlService(Service):
             self._submit(_NEUTRAL, by_gain=True)
             context.send_text("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
 
-    def _manual_control(self, sender: Sender, message: Any) -> None:
+    def _receive_manual_control(self, sender: Sender, message: Any) -> None:
         if message.target == self.context.options.system_id:
             self._apply(sender, self._wrench(message), by_gain=True)
 
-    def _override(self, sender: Sender, message: Any) -> None:
+    def _receive_rc_channels_override(self, sender: Sender, message: Any) -> None:
         pulses = [getattr(message, f"chan{i}_raw") for i in range(1, _CHANNELS + 1)]
         surge, sway, heave, roll, pitch, yaw = self.context.sticks
         before = pitch, roll, -heave, yaw, surge, sway
@@ -94,7 +93,7 @@ class ManualControlService(Service):
         if sticks == context.sticks:
             return
         command = ManualControl(self._wrench_fractions(sticks, by_gain), by_gain)
-        if context.submit(command) == context.mavlink.MAV_RESULT_ACCEPTED:
+        if context.submit(command) == Result.ACCEPTED:
             context.sticks = sticks
 
     def _wrench_fractions(self, sticks: Vector6, by_gain: bool) -> Vector6:

@@ -9,8 +9,7 @@ from cosim.mavlink.services.mission_items import ItemError, decode_mission_item,
 from cosim.mavlink.services.parameter_protocol import ParameterProtocol
 from cosim.mavlink.services.service import CommandRequest, Service, to_local_position, unscale_position
 from cosim.mavlink.services.targets import Targets
-from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
-from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.vehicle.vehicle_context import ReceivedMissionItem, Result, Sender, VehicleContext
 from cosim.mavlink.wire.encode import round_finite
 from cosim.simulation.commands.commands import ChangeSetting, Command, MissionItem, SetCurrentItem, SetMission, SetMode
 from cosim.simulation.commands.mission_executor import passed_items
@@ -42,23 +41,10 @@ class MissionProtocol(Service):
 
     def __init__(self, context: VehicleContext, targets: Targets, parameters: ParameterProtocol) -> None:
         super().__init__(context)
-        m = context.mavlink
         self._targets, self._parameters = targets, parameters
         self._current_item = -1  # item of the last snapshot
         self._upload: _Upload | None = None
         self._first = int(context.profile.has_home_item)
-        self.messages = {
-            "MISSION_REQUEST_LIST": self._count,
-            "MISSION_REQUEST": self._item,
-            "MISSION_REQUEST_INT": self._item,
-            "MISSION_COUNT": self._begin_upload,
-            "MISSION_ITEM_INT": self._receive_item,
-            "MISSION_ITEM": self._receive_item,
-            "MISSION_ACK": self._end_transfer,
-            "MISSION_CLEAR_ALL": self._clear,
-            "MISSION_SET_CURRENT": self._set_current,
-        }
-        self.commands = {m.MAV_CMD_MISSION_START: self._start, m.MAV_CMD_DO_SET_MISSION_CURRENT: self._command_current}
 
     def restart(self) -> None:
         """Cancel an upload under way."""
@@ -81,15 +67,15 @@ class MissionProtocol(Service):
         plan = self.context.plan
         return (home_item(self.context), *plan) if plan and self._first else plan
 
-    def _count(self, sender: Sender, message: Any) -> None:
+    def _receive_mission_request_list(self, sender: Sender, message: Any) -> None:
         mission_type = message.mission_type
         if mission_type not in _SUPPORTED_TYPES:
             self._ack(sender, self.context.mavlink.MAV_MISSION_UNSUPPORTED, mission_type)
             return
         count = len(self._all_items()) if mission_type == _MISSION else 0
-        sender.link.send(self.context.make("MISSION_COUNT", sender.system, sender.component, count, mission_type))
+        sender.link.send(self.context.make("MISSION_COUNT", *sender.address, count, mission_type))
 
-    def _item(self, sender: Sender, message: Any) -> None:
+    def _receive_mission_request(self, sender: Sender, message: Any) -> None:
         context, m = self.context, self.context.mavlink
         seq, mission_type = message.seq, message.mission_type
         items = self._all_items() if mission_type == _MISSION else ()
@@ -98,7 +84,7 @@ class MissionProtocol(Service):
             return
         item = items[seq]
         current = int(context.mode == "mission" and context.view.item + self._first == seq)
-        head = sender.system, sender.component, seq, item.frame, item.command, current, item.autocontinue
+        head = *sender.address, seq, item.frame, item.command, current, item.autocontinue
         numbers = item.param1, item.param2, item.param3, item.param4
         if message.get_type() == "MISSION_REQUEST_INT":
             reply = context.make("MISSION_ITEM_INT", *head, *numbers, item.x, item.y, item.z, mission_type)
@@ -107,16 +93,17 @@ class MissionProtocol(Service):
             reply = context.make("MISSION_ITEM", *head, *numbers, item.x / scale, item.y / scale, item.z, mission_type)
         sender.link.send(reply)
 
+    _receive_mission_request_int = _receive_mission_request
+
     def _ack(self, sender: Sender, result: int, mission_type: int) -> None:
-        sender.link.send(self.context.make("MISSION_ACK", sender.system, sender.component, result, mission_type))
+        sender.link.send(self.context.make("MISSION_ACK", *sender.address, result, mission_type))
 
     # ---- upload ----
 
-    def _begin_upload(self, sender: Sender, message: Any) -> None:
+    def _receive_mission_count(self, sender: Sender, message: Any) -> None:
         context, m, mission_type = self.context, self.context.mavlink, message.mission_type
         upload = self._upload
-        if not context.accepts_commands:
-            context.submit()
+        if self.is_read_only():
             self._ack(sender, m.MAV_MISSION_DENIED, mission_type)
         elif mission_type != _MISSION:
             self._ack(sender, m.MAV_MISSION_UNSUPPORTED if message.count else m.MAV_MISSION_ACCEPTED, mission_type)
@@ -133,21 +120,19 @@ class MissionProtocol(Service):
         context, sender = self.context, upload.sender
         upload.requested = context.now
         if len(upload.items) < upload.count:
-            to = sender.system, sender.component
-            sender.link.send(context.make("MISSION_REQUEST_INT", *to, len(upload.items), _MISSION))
+            sender.link.send(context.make("MISSION_REQUEST_INT", *sender.address, len(upload.items), _MISSION))
             return
         self._upload = None
         self._ack(sender, self._submit_mission(sender, upload.items[self._first :], upload.decoded), _MISSION)
 
-    def _receive_item(self, sender: Sender, message: Any) -> None:
+    def _receive_mission_item(self, sender: Sender, message: Any) -> None:
         m, upload, mission_type = self.context.mavlink, self._upload, message.mission_type
         if message.current in (_GO_TO, _CHANGE_DEPTH) and mission_type == _MISSION:
-            self._ack(sender, self._execute_guided(sender, message), mission_type)
+            self._ack(sender, self._apply_guided_item(sender, message), mission_type)
             return
         if upload is None or upload.sender != sender or mission_type != _MISSION:
-            self._ack(
-                sender, m.MAV_MISSION_DENIED if not self.context.accepts_commands else m.MAV_MISSION_ERROR, mission_type
-            )
+            result = m.MAV_MISSION_ERROR if self.context.accepts_commands else m.MAV_MISSION_DENIED
+            self._ack(sender, result, mission_type)
             return
         if message.seq != len(upload.items):  # a repeated item, or one out of order
             return
@@ -158,6 +143,8 @@ class MissionProtocol(Service):
             return
         upload.retries = 0
         self._request_next(upload)
+
+    _receive_mission_item_int = _receive_mission_item
 
     def _add(self, upload: _Upload, message: Any) -> int:
         """Add an item to an upload, and return MAV_MISSION_RESULT."""
@@ -174,7 +161,7 @@ class MissionProtocol(Service):
         upload.items.append(item)
         return int(m.MAV_MISSION_ACCEPTED)
 
-    def _execute_guided(self, sender: Sender, message: Any) -> int:
+    def _apply_guided_item(self, sender: Sender, message: Any) -> int:
         """Execute a guided item at once, as of QGroundControl's go-to for ArduPilot; return MAV_MISSION_RESULT."""
         context, m = self.context, self.context.mavlink
         if message.command != m.MAV_CMD_NAV_WAYPOINT:
@@ -186,24 +173,23 @@ class MissionProtocol(Service):
             return int(m.MAV_MISSION_INVALID if item is None else m.MAV_MISSION_UNSUPPORTED_FRAME)
         if message.current == _CHANGE_DEPTH:
             position = *context.view.target[:2], position[2]
-        accepted = self._targets.go(sender, position) == m.MAV_RESULT_ACCEPTED
+        accepted = self._targets.go(sender, position) == Result.ACCEPTED
         return int(m.MAV_MISSION_ACCEPTED if accepted else m.MAV_MISSION_DENIED)
 
     def _submit_mission(self, sender: Sender, items: list[ReceivedMissionItem], decoded: list[MissionItem]) -> int:
         """Submit a mission, and return MAV_MISSION_RESULT."""
         context, m = self.context, self.context.mavlink
-        result = context.submit(SetMission(tuple(decoded)))
-        if result == m.MAV_RESULT_ACCEPTED:
+        result = self.submit(sender, SetMission(tuple(decoded)))
+        if result == Result.ACCEPTED:
             context.plan, context.mission_items = tuple(items), tuple(decoded)
             for number, item in enumerate(decoded, self._first):
                 if item.position is not None:
                     self._targets.warn_about(item.position, f"mission item {number}")
-            context.active_gcs.record_command(sender.system)
             return int(m.MAV_MISSION_ACCEPTED)
-        return int(m.MAV_MISSION_DENIED if result == m.MAV_RESULT_DENIED else m.MAV_MISSION_ERROR)
+        return int(m.MAV_MISSION_DENIED if result == Result.DENIED else m.MAV_MISSION_ERROR)
 
-    def _end_transfer(self, sender: Sender, message: Any) -> None:
-        """MISSION_ACK: the end of a download, or of an upload that its sender cancels."""
+    def _receive_mission_ack(self, sender: Sender, message: Any) -> None:
+        """End a download, or an upload that its sender cancels."""
         if self._upload is not None and self._upload.sender == sender:
             self._upload = None
 
@@ -219,12 +205,11 @@ class MissionProtocol(Service):
             self._upload = None
             self._ack(upload.sender, context.mavlink.MAV_MISSION_OPERATION_CANCELLED, _MISSION)
 
-    def _clear(self, sender: Sender, message: Any) -> None:
+    def _receive_mission_clear_all(self, sender: Sender, message: Any) -> None:
         m, mission_type = self.context.mavlink, message.mission_type
         if mission_type not in (*_SUPPORTED_TYPES, _ALL):
             self._ack(sender, m.MAV_MISSION_UNSUPPORTED, mission_type)
-        elif not self.context.accepts_commands:
-            self.context.submit()
+        elif self.is_read_only():
             self._ack(sender, m.MAV_MISSION_DENIED, mission_type)
         elif mission_type in (_MISSION, _ALL):
             self._upload = None
@@ -234,27 +219,25 @@ class MissionProtocol(Service):
 
     # ---- current item ----
 
-    def _begin(self, sender: Sender, seq: int | None, *more: Command) -> int:
-        context, m = self.context, self.context.mavlink
+    def _begin(self, sender: Sender, seq: int | None, *more: Command) -> Result:
+        context = self.context
         if not context.accepts_commands:
             return context.submit()
         item = None if seq is None else max(seq - self._first, 0)
         if item is None or item >= len(context.plan):
             context.reject(f"mission item {seq}: there are {len(self._all_items())}", "item")
-            return int(m.MAV_RESULT_DENIED if context.plan else m.MAV_RESULT_FAILED)
-        result = context.submit(SetCurrentItem(item), *more)
-        if result == m.MAV_RESULT_ACCEPTED:
-            context.active_gcs.record_command(sender.system)
-        return result
+            return Result.DENIED if context.plan else Result.FAILED
+        return self.submit(sender, SetCurrentItem(item), *more)
 
-    def _set_current(self, sender: Sender, message: Any) -> None:
+    def _receive_mission_set_current(self, sender: Sender, message: Any) -> None:
         self._begin(sender, message.seq)
 
-    def _command_current(self, request: CommandRequest) -> int:
+    def _execute_do_set_mission_current(self, request: CommandRequest) -> Result:
+        """Continue with another item; -1 is the present one."""
         seq = request.int_param(1)
         return self._begin(request.sender, seq if seq is None or seq >= 0 else self.context.view.item + self._first)
 
-    def _start(self, request: CommandRequest) -> int:
+    def _execute_mission_start(self, request: CommandRequest) -> Result:
         return self._begin(request.sender, max(request.int_param(1) or 0, 0), SetMode("mission"))
 
 

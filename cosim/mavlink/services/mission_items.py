@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from cosim.errors import CommandError
 from cosim.mavlink.services.parameter_protocol import shorten_float32
 from cosim.mavlink.services.service import to_local_position, unscale_position
-from cosim.mavlink.services.speed import SPEED, resolve_speed
-from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
-from cosim.mavlink.vehicle.vehicle_context import VehicleContext
+from cosim.mavlink.vehicle.speed import SPEED, resolve_speed
+from cosim.mavlink.vehicle.vehicle_context import ReceivedMissionItem, VehicleContext
 from cosim.mavlink.wire.encode import round_finite
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import ChangeSetting, MissionItem, SetHeading

@@ -7,8 +7,8 @@ from typing import Any
 
 from cosim.mavlink.services.service import CommandRequest, Service
 from cosim.mavlink.vehicle.profile import MODE_TABLE, is_custom
-from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
-from cosim.simulation.commands.commands import Arm, Command, Mode, Reset, SetMode, SetTarget
+from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
+from cosim.simulation.commands.commands import Arm, Mode, Reset, SetMode, SetTarget
 
 _FORCE = 20190226  # PREFLIGHT_REBOOT_SHUTDOWN, parameter 6
 _MODES_BY_STANDARD: dict[int, Mode] = {entry.standard: mode for mode, entry in MODE_TABLE.items() if entry.standard}
@@ -19,34 +19,23 @@ class ModeCommands(Service):
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
-        m = context.mavlink
         self._paused_from: Mode = "reach"
-        self.messages = {"SET_MODE": self._set_mode}
-        self.commands = {
-            m.MAV_CMD_COMPONENT_ARM_DISARM: self._arm,
-            m.MAV_CMD_DO_SET_MODE: self._command_mode,
-            m.MAV_CMD_DO_SET_STANDARD_MODE: self._standard_mode,
-            m.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN: self._reboot,
-            m.MAV_CMD_NAV_LOITER_UNLIM: lambda request: self._steer(request.sender, "hold"),
-            m.MAV_CMD_NAV_LAND: lambda request: self._steer(request.sender, "surface"),
-            m.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda request: self._return_home(request.sender),
-            m.MAV_CMD_OVERRIDE_GOTO: self._goto,
-            m.MAV_CMD_DO_PAUSE_CONTINUE: self._pause,
-        }
 
-    def _submit(self, sender: Sender, *commands: Command) -> int:
-        result = self.context.submit(*commands)
-        if result == self.context.mavlink.MAV_RESULT_ACCEPTED:
-            self.context.active_gcs.record_command(sender.system)
-        return result
+    def _execute_component_arm_disarm(self, request: CommandRequest) -> Result:
+        if request[1] not in (0.0, 1.0):
+            return Result.DENIED
+        return self.submit(request.sender, Arm(request[1] == 1.0))
 
-    def _arm(self, request: CommandRequest) -> int:
-        wanted = request[1]
-        if wanted not in (0.0, 1.0):
-            return int(self.context.mavlink.MAV_RESULT_DENIED)
-        return self._submit(request.sender, Arm(wanted == 1.0))
+    def _execute_nav_loiter_unlim(self, request: CommandRequest) -> Result:
+        return self._steer(request.sender, "hold")
 
-    def _set_mode(self, sender: Sender, message: Any) -> None:
+    def _execute_nav_land(self, request: CommandRequest) -> Result:
+        return self._steer(request.sender, "surface")
+
+    def _execute_nav_return_to_launch(self, request: CommandRequest) -> Result:
+        return self._return_home(request.sender)
+
+    def _receive_set_mode(self, sender: Sender, message: Any) -> None:
         if is_custom(message.base_mode) and self.context.profile.is_return(message.custom_mode):
             self._return_home(sender)
         elif is_custom(message.base_mode):
@@ -54,7 +43,8 @@ class ModeCommands(Service):
         else:
             self._mode(sender, None, f"of base mode {message.base_mode}")
 
-    def _command_mode(self, request: CommandRequest) -> int:
+    def _execute_do_set_mode(self, request: CommandRequest) -> Result:
+        """Change to a mode by its numbers."""
         base, first, second = request.int_param(1), request.int_param(2), request.int_param(3) or 0
         if base is None or first is None or not is_custom(base):
             return self._mode(request.sender, None, "without a number")
@@ -63,55 +53,54 @@ class ModeCommands(Service):
         named = f"{first}" if not second else f"{first}, {second}"
         return self._mode(request.sender, self.context.profile.find_commanded_mode(first, second), named)
 
-    def _standard_mode(self, request: CommandRequest) -> int:
+    def _execute_do_set_standard_mode(self, request: CommandRequest) -> Result:
+        """Change to a MAV_STANDARD_MODE."""
         number = request.int_param(1)
-        return self._mode(
-            request.sender, None if number is None else _MODES_BY_STANDARD.get(number), f"standard {number}"
-        )
+        return self._mode(request.sender, _MODES_BY_STANDARD.get(number or 0), f"standard {number}")
 
-    def _mode(self, sender: Sender, mode: Mode | None, named: str) -> int:
+    def _mode(self, sender: Sender, mode: Mode | None, named: str) -> Result:
         context = self.context
         if mode is None:
             numbers = context.profile.custom_modes
             known = ", ".join(f"{MODE_TABLE[mode].name.lower()} {number}" for mode, number in numbers.items())
             context.reject(f"no such mode: {named}; profile {context.profile.name} has {known}", "mode")
-            return int(context.mavlink.MAV_RESULT_FAILED)
+            return Result.FAILED
         return self._steer(sender, mode)
 
-    def _steer(self, sender: Sender, mode: Mode) -> int:
+    def _steer(self, sender: Sender, mode: Mode) -> Result:
         context = self.context
         if mode == "mission" and not context.plan and context.accepts_commands:
             context.reject("there is no mission", "mission")
-            return int(context.mavlink.MAV_RESULT_FAILED)
-        return self._submit(sender, SetMode(mode))
+            return Result.FAILED
+        return self.submit(sender, SetMode(mode))
 
-    def _return_home(self, sender: Sender) -> int:
+    def _return_home(self, sender: Sender) -> Result:
         north, east, _ = self.context.home_ned()
         settings = self.context.settings
         if not self.context.accepts_commands:
             return self.context.submit()
         depth, radius = settings["commands.surface_depth"], settings["commands.hold_radius"]
-        return self._submit(sender, SetTarget((north, east, depth), radius))
+        return self.submit(sender, SetTarget((north, east, depth), radius))
 
     # ---- pause ----
 
-    def _goto(self, request: CommandRequest) -> int:
+    def _execute_override_goto(self, request: CommandRequest) -> Result:
         m = self.context.mavlink
         here = request.int_param(2) in (None, 0, m.MAV_GOTO_HOLD_AT_CURRENT_POSITION)
         if request.int_param(1) == m.MAV_GOTO_DO_HOLD and here:
             return self._hold(request.sender)
         if request.int_param(1) == m.MAV_GOTO_DO_CONTINUE:
             return self._steer(request.sender, self._paused_from)
-        return int(m.MAV_RESULT_UNSUPPORTED)
+        return Result.UNSUPPORTED
 
-    def _pause(self, request: CommandRequest) -> int:
+    def _execute_do_pause_continue(self, request: CommandRequest) -> Result:
         if request[1] == 0.0:
             return self._hold(request.sender)
         if request[1] == 1.0:
             return self._steer(request.sender, self._paused_from)
-        return int(self.context.mavlink.MAV_RESULT_DENIED)
+        return Result.DENIED
 
-    def _hold(self, sender: Sender) -> int:
+    def _hold(self, sender: Sender) -> Result:
         mode = self.context.mode_ahead
         if mode != "hold":
             self._paused_from = mode
@@ -119,11 +108,11 @@ class ModeCommands(Service):
 
     # ---- restart ----
 
-    def _reboot(self, request: CommandRequest) -> int:
-        m, context = self.context.mavlink, self.context
+    def _execute_preflight_reboot_shutdown(self, request: CommandRequest) -> Result:
+        context = self.context
         if request[1] != 1.0:
-            return int(m.MAV_RESULT_UNSUPPORTED if math.isfinite(request[1]) else m.MAV_RESULT_DENIED)
+            return Result.UNSUPPORTED if math.isfinite(request[1]) else Result.DENIED
         if context.armed and request[6] != _FORCE and context.accepts_commands:
             context.reject("armed: disarm before a restart", "restart")
-            return int(m.MAV_RESULT_DENIED)
-        return self._submit(request.sender, Reset())
+            return Result.DENIED
+        return self.submit(request.sender, Reset())

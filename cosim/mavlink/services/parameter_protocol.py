@@ -14,9 +14,9 @@ from cosim.mavlink.services.packed_parameters import hash_parameters
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.services.station_parameters import station_parameters
-from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 from cosim.mavlink.wire.encode import clip_to_float32
-from cosim.mavlink.wire.message_sink import MessageSink
+from cosim.mavlink.wire.link import Link
 from cosim.mavlink.wire.options import LossAction
 from cosim.simulation.commands.commands import ChangeSetting
 
@@ -44,16 +44,11 @@ class ParameterProtocol(Service):
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
-        self.messages = {
-            "PARAM_REQUEST_LIST": self._list,
-            "PARAM_REQUEST_READ": self._read,
-            "PARAM_SET": self._set,
-        }
         self._keys = {name: key for key, name in parameter_names(s.key for s in context.settings).items()}
         self._link_parameters = self._make_link_parameters()
         self.names = sorted({*self._keys, *self._link_parameters})
         self._index = {name: i for i, name in enumerate(self.names)}
-        self._bursts: dict[MessageSink, tuple[int, int]] = {}  # next index, and number left, by link
+        self._bursts: dict[Link, tuple[int, int]] = {}  # next index, and number left, by link
         self.restart()
 
     def _make_link_parameters(self) -> dict[str, _LinkParameter]:
@@ -97,8 +92,8 @@ class ParameterProtocol(Service):
         """Return True if there is a setting with a key."""
         return key in self._values
 
-    def change(self, key: str, value: float) -> int:
-        """Submit a new value of a setting, and return MAV_RESULT; an invalid value is denied with the reason."""
+    def change(self, key: str, value: float) -> Result:
+        """Submit a new value of a setting; an invalid value is denied with the reason."""
         context, before = self.context, self._values[key]
         if not context.accepts_commands:
             return context.submit()
@@ -106,9 +101,9 @@ class ParameterProtocol(Service):
             context.settings.change(key, value)
         except CommandError as error:
             context.reject(str(error), "value")
-            return int(context.mavlink.MAV_RESULT_DENIED)
+            return Result.DENIED
         result = context.submit(ChangeSetting(key, value))
-        if result != context.mavlink.MAV_RESULT_ACCEPTED:
+        if result != Result.ACCEPTED:
             context.settings.change(key, before)
             return result
         self._values[key] = value
@@ -122,7 +117,7 @@ class ParameterProtocol(Service):
 
     # ---- the list ----
 
-    def _list(self, sender: Sender, message: Any) -> None:
+    def _receive_param_request_list(self, sender: Sender, message: Any) -> None:
         index, left = self._bursts.get(sender.link, (0, 0))
         if not left and self.context.profile.has_parameter_hash:
             self._send_hash(sender.link)
@@ -135,7 +130,7 @@ class ParameterProtocol(Service):
         for link in list(self._bursts):
             self._send_slice(link)
 
-    def _send_slice(self, link: MessageSink) -> None:
+    def _send_slice(self, link: Link) -> None:
         index, left = self._bursts[link]
         for _ in range(min(left, _VALUES_PER_TICK)):
             if not link.has_room():
@@ -147,12 +142,12 @@ class ParameterProtocol(Service):
         else:
             del self._bursts[link]
 
-    def _send_value(self, link: MessageSink, name: str) -> None:
+    def _send_value(self, link: Link, name: str) -> None:
         m = self.context.mavlink
         kind = m.MAV_PARAM_TYPE_REAL32, len(self.names), self._index[name]
         link.send(self.context.make("PARAM_VALUE", name, self.value(name), *kind))
 
-    def _send_hash(self, link: MessageSink) -> None:
+    def _send_hash(self, link: Link) -> None:
         m = self.context.mavlink
         (bits,) = struct.unpack("<f", struct.pack("<I", hash_parameters(dict(self.list_values()))))
         link.send(
@@ -161,7 +156,7 @@ class ParameterProtocol(Service):
 
     # ---- single parameters ----
 
-    def _read(self, sender: Sender, message: Any) -> None:
+    def _receive_param_request_read(self, sender: Sender, message: Any) -> None:
         m, index, name = self.context.mavlink, message.param_index, message.param_id
         if index >= 0:
             name = self.names[index] if index < len(self.names) else ""
@@ -174,10 +169,9 @@ class ParameterProtocol(Service):
             self._send_error(sender, message.param_id, index, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
     def _send_error(self, sender: Sender, name: str, index: int, error: int) -> None:
-        to = sender.system, sender.component
-        sender.link.send(self.context.make("PARAM_ERROR", *to, name, index, error))
+        sender.link.send(self.context.make("PARAM_ERROR", *sender.address, name, index, error))
 
-    def _set(self, sender: Sender, message: Any) -> None:
+    def _receive_param_set(self, sender: Sender, message: Any) -> None:
         m, name, value = self.context.mavlink, message.param_id, message.param_value
         if name == _HASH:  # the station has the list already
             self._bursts.pop(sender.link, None)
@@ -196,8 +190,7 @@ class ParameterProtocol(Service):
         parameter = self._link_parameters.get(name)
         if parameter is not None and parameter.write is None:
             return int(m.MAV_PARAM_ERROR_READ_ONLY)
-        if not context.accepts_commands:
-            context.submit()
+        if self.is_read_only():
             return int(m.MAV_PARAM_ERROR_PERMISSION_DENIED)
         if kind != m.MAV_PARAM_TYPE_REAL32 and not context.profile.casts_parameters:
             context.reject(f"{name} has type {kind}, expected REAL32 ({m.MAV_PARAM_TYPE_REAL32})", "value")
@@ -214,12 +207,8 @@ class ParameterProtocol(Service):
                 context.reject(f"{name} is {value:g}, expected {expected}", "value")
                 return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
             return int(m.MAV_PARAM_ERROR_NO_ERROR)
-        result = self.change(self._keys[name], value)
-        if result == m.MAV_RESULT_ACCEPTED:
-            return int(m.MAV_PARAM_ERROR_NO_ERROR)
-        if result == m.MAV_RESULT_DENIED:
-            return int(m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
-        return int(m.MAV_PARAM_ERROR_PERMISSION_DENIED)
+        errors = {Result.ACCEPTED: m.MAV_PARAM_ERROR_NO_ERROR, Result.DENIED: m.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE}
+        return int(errors.get(self.change(self._keys[name], value), m.MAV_PARAM_ERROR_PERMISSION_DENIED))
 
 
 def _as_float32(value: float) -> float:

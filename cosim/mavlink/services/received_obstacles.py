@@ -8,7 +8,7 @@ from typing import Any
 
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
-from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import AddObstacle, RemoveObstacle
 
@@ -34,7 +34,6 @@ class ReceivedObstacles(Service):
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
-        self.messages = {"OBSTACLE_DISTANCE_3D": self._obstacle}
         self._first_yaw = quaternion_to_euler(context.scenario.initial.quaternion)[2]
         self.restart()
 
@@ -42,10 +41,9 @@ class ReceivedObstacles(Service):
         """Forget all obstacles."""
         self._added: dict[int, _AddedObstacle] = {}
 
-    def _obstacle(self, sender: Sender, message: Any) -> None:
+    def _receive_obstacle_distance_3d(self, sender: Sender, message: Any) -> None:
         context = self.context
-        if not context.accepts_commands:
-            context.submit()
+        if self.is_read_only():
             return
         position = self._position(message.frame, (message.x, message.y, message.z))
         if position is None:
@@ -61,7 +59,7 @@ class ReceivedObstacles(Service):
         if added is None and not self._has_room():
             context.reject(f"no room for obstacle {number}: there are {len(self._added)} already", "obstacle")
             return
-        if context.submit(AddObstacle(number, position, radius)) == context.mavlink.MAV_RESULT_ACCEPTED:
+        if context.submit(AddObstacle(number, position, radius)) == Result.ACCEPTED:
             self._added[number] = _AddedObstacle(position, radius, context.now)
 
     def _position(self, frame: int, point: Vector3) -> Vector3 | None:
@@ -87,7 +85,7 @@ class ReceivedObstacles(Service):
         oldest = min(self._added, key=lambda number: self._added[number].received)
         if context.now - self._added[oldest].received < _REPLACE_TIMEOUT:
             return False
-        if context.submit(RemoveObstacle(oldest)) != context.mavlink.MAV_RESULT_ACCEPTED:
+        if context.submit(RemoveObstacle(oldest)) != Result.ACCEPTED:
             return False
         del self._added[oldest]
         return True

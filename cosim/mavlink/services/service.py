@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 from cosim.mavlink.wire.encode import round_finite
 from cosim.scenario.tables import Vector3
+from cosim.simulation.commands.commands import Command
 
 Handler = Callable[[Sender, Any], None]
 
@@ -37,28 +38,48 @@ class CommandRequest:
         return round_finite(self.params[i - 1])
 
 
-CommandHandler = Callable[[CommandRequest], int]  # returns MAV_RESULT
+CommandHandler = Callable[[CommandRequest], Result]
 
 
 class Service:
-    """A micro-service."""
-
-    messages: Mapping[str, Handler]  # handlers by the name of the message
-    commands: Mapping[int, CommandHandler]  # handlers by MAV_CMD
+    """A micro-service: ``_receive_x`` handles messages X, ``_execute_x`` executes commands MAV_CMD_X."""
 
     def __init__(self, context: VehicleContext) -> None:
         self.context = context
-        self.messages = {}
-        self.commands = {}
+        self.messages: dict[str, Handler] = self._methods("_receive_")  # by the name of the message
+        commands: dict[str, CommandHandler] = self._methods("_execute_")
+        self.commands = {getattr(context.mavlink, f"MAV_CMD_{name}"): method for name, method in commands.items()}
+
+    def _methods(self, prefix: str) -> dict[str, Any]:
+        return {name.removeprefix(prefix).upper(): getattr(self, name) for name in dir(self) if name.startswith(prefix)}
 
     def tick(self) -> None:
         """Run periodic work at wall clock `context.now`."""
 
+    def reply(self, sender: Sender, messages: Iterable[Any]) -> Result:
+        """Send messages to one station."""
+        for message in messages:
+            sender.link.send(message)
+        return Result.ACCEPTED
+
+    def submit(self, sender: Sender, *commands: Command) -> Result:
+        """Submit commands of a station, which then is the commanding one."""
+        result = self.context.submit(*commands)
+        if result == Result.ACCEPTED:
+            self.context.active_gcs.record_command(sender.system)
+        return result
+
+    def is_read_only(self) -> bool:
+        """Return True if commands are off, and report the refusal."""
+        if self.context.accepts_commands:
+            return False
+        self.context.submit()
+        return True
+
     def accept_control(self, sender: Sender) -> bool:
         """Return True if the vehicle accepts set-points and sticks of a sender; report a refusal."""
         context = self.context
-        if not context.accepts_commands:
-            context.submit()
+        if self.is_read_only():
             return False
         if not context.active_gcs.request_control(sender.system, context.now):
             context.reject("another station controls the vehicle", "active gcs")

@@ -9,10 +9,10 @@ from typing import Any
 from cosim.errors import CommandError
 from cosim.mavlink.services.parameter_protocol import ParameterProtocol, shorten_float32
 from cosim.mavlink.services.service import CommandRequest, Service, to_local_position, unscale_position
-from cosim.mavlink.services.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.keep_in_regions import KeepInRegions
 from cosim.mavlink.vehicle.profile import MODE_TABLE
-from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
+from cosim.mavlink.vehicle.speed import SPEED, resolve_speed
+from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import Command, SetHeading, SetMode, SetTarget
 
@@ -40,20 +40,10 @@ class Targets(Service):
     def __init__(self, context: VehicleContext, parameters: ParameterProtocol) -> None:
         super().__init__(context)
         self._parameters, self._keep_in = parameters, KeepInRegions(context.scenario)
-        m = context.mavlink
         self._last: tuple[object, ...] = ()
         self._last_at = -math.inf
         self._drift_velocity: Vector3 | None = None  # velocity [m/s, NED] of a set-point without a position
         self._early: tuple[float, float, Callable[[], None]] | None = None  # times of first and last, action
-        self.messages = {
-            "SET_POSITION_TARGET_LOCAL_NED": self._local,
-            "SET_POSITION_TARGET_GLOBAL_INT": self._global,
-        }
-        self.commands = {
-            m.MAV_CMD_DO_REPOSITION: self._reposition,
-            m.MAV_CMD_CONDITION_YAW: self._turn,
-            m.MAV_CMD_DO_CHANGE_SPEED: self._speed,
-        }
 
     def on_snapshot(self) -> None:
         """Clear the last set-point in another mode; apply one that was received before its mode."""
@@ -87,7 +77,7 @@ class Targets(Service):
 
     # ---- set-points ----
 
-    def _local(self, sender: Sender, message: Any) -> None:
+    def _receive_set_position_target_local_ned(self, sender: Sender, message: Any) -> None:
         frame = message.coordinate_frame
         if frame not in (_LOCAL, *_RELATIVE_FRAMES):
             self.context.reject(f"set-point in frame {frame}; expected 1, 7, 8, 9 or 12", "frame")
@@ -95,7 +85,7 @@ class Targets(Service):
         raw = message.x, message.y, message.z
         self._set_point(sender, message, frame, self._from_local(frame, raw), raw)
 
-    def _global(self, sender: Sender, message: Any) -> None:
+    def _receive_set_position_target_global_int(self, sender: Sender, message: Any) -> None:
         frame = message.coordinate_frame
         position = None
         if frame != _LOCAL:
@@ -165,7 +155,7 @@ class Targets(Service):
             return
         if yaw is not None and self._last[-1:] != (yaw,):
             commands.append(SetHeading(yaw + (context.view.euler[2] if frame in _BODY_FRAMES else 0.0)))
-        if context.submit(*commands) == context.mavlink.MAV_RESULT_ACCEPTED:
+        if context.submit(*commands) == Result.ACCEPTED:
             self._last = set_point
             self._drift_velocity = velocity if set_point[0] == "velocity" else None
             if self._drift_velocity is None:
@@ -181,54 +171,55 @@ class Targets(Service):
 
     # ---- commands ----
 
-    def _reposition(self, request: CommandRequest) -> int:
-        m, context = self.context.mavlink, self.context
+    def _execute_do_reposition(self, request: CommandRequest) -> Result:
+        context = self.context
         position = to_local_position(context, request.frame, request[5], request[6], request[7])
         if position is None:
             context.reject(f"frame {request.frame} of a position", "frame")
-            return int(m.MAV_RESULT_UNSUPPORTED)
+            return Result.UNSUPPORTED
         return self.go(request.sender, position, request[4])
 
-    def go(self, sender: Sender, position: Vector3, yaw: float = math.nan) -> int:
+    def go(self, sender: Sender, position: Vector3, yaw: float = math.nan) -> Result:
         """Move the target region, and reach it; without a finite coordinate, hold, as QGroundControl pauses PX4."""
         # with position [m, NED], yaw [rad]
         context = self.context
         if not self.accept_control(sender):
-            return int(context.mavlink.MAV_RESULT_DENIED)
+            return Result.DENIED
         x, y, z = (a if math.isfinite(a) else b for a, b in zip(position, context.view.position_ned, strict=True))
         commands: list[Command] = [SetTarget((x, y, z)) if any(map(math.isfinite, position)) else SetMode("hold")]
         if math.isfinite(yaw):
             commands.append(SetHeading(yaw))
         self._last, self._drift_velocity = (), None
         result = context.submit(*commands)
-        if result == context.mavlink.MAV_RESULT_ACCEPTED and isinstance(commands[0], SetTarget):
+        if result == Result.ACCEPTED and isinstance(commands[0], SetTarget):
             self.warn_about((x, y, z))
         return result
 
-    def _turn(self, request: CommandRequest) -> int:
+    def _execute_condition_yaw(self, request: CommandRequest) -> Result:
+        """Turn to a heading, from north or from the present one."""
         context = self.context
         angle = math.radians(request[1])
         if not math.isfinite(angle) or not math.isfinite(request[4]):
-            return int(context.mavlink.MAV_RESULT_DENIED)
+            return Result.DENIED
         if request[4] == 1.0:
             angle = context.view.euler[2] + math.copysign(1.0, -1.0 if request[3] < 0.0 else 1.0) * angle
         if not self.accept_control(request.sender):
-            return int(context.mavlink.MAV_RESULT_DENIED)
+            return Result.DENIED
         return context.submit(SetHeading(angle))
 
-    def _speed(self, request: CommandRequest) -> int:
-        m, context = self.context.mavlink, self.context
+    def _execute_do_change_speed(self, request: CommandRequest) -> Result:
+        context = self.context
         if not self._parameters.has_setting(SPEED):
-            return int(m.MAV_RESULT_UNSUPPORTED)
+            return Result.UNSUPPORTED
         try:
             speed = resolve_speed(context, shorten_float32(request[2]) if math.isfinite(request[2]) else request[2])
         except CommandError as error:
             context.reject(str(error), "speed")
-            return int(m.MAV_RESULT_DENIED)
+            return Result.DENIED
         if speed is None:
-            return int(m.MAV_RESULT_ACCEPTED)
+            return Result.ACCEPTED
         if not self.accept_control(request.sender):
-            return int(m.MAV_RESULT_DENIED)
+            return Result.DENIED
         return self._parameters.change(SPEED, speed)
 
 

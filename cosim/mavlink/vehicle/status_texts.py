@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from cosim.mavlink.wire.encode import Encoder
-from cosim.mavlink.wire.message_sink import MessageSink
+from cosim.mavlink.wire.link import Link
 
 _CHUNK = 50  # characters of a STATUSTEXT
 _MAX_TEXT = 200  # characters
@@ -21,7 +21,7 @@ _MAX_REASONS = 8  # different reasons of a kind that are stored; further ones ar
 class StatusTexts:
     """Send texts on every link; clock [s]."""
 
-    def __init__(self, mavlink: Any, make: Encoder, links: Sequence[MessageSink], clock: Callable[[], float]) -> None:
+    def __init__(self, mavlink: Any, make: Encoder, links: Sequence[Link], clock: Callable[[], float]) -> None:
         self._mavlink, self._make, self._links, self._clock = mavlink, make, links, clock
         self._last_sent: dict[str, float] = {}  # time of the last text, by key
         self._sent_at: deque[float] = deque(maxlen=_MAX_TEXTS)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any
 
 from cosim.errors import CommandError
 from cosim.mavlink.vehicle.active_gcs import ActiveGcs
 from cosim.mavlink.vehicle.geodesy import LocalFrame
-from cosim.mavlink.vehicle.mission_item import ReceivedMissionItem
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.vehicle.proximity import Proximity
 from cosim.mavlink.vehicle.row_layout import RowLayout
@@ -18,7 +18,7 @@ from cosim.mavlink.vehicle.status_texts import StatusTexts
 from cosim.mavlink.vehicle.view import View
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.encode import Encoder
-from cosim.mavlink.wire.message_sink import MessageSink
+from cosim.mavlink.wire.link import Link
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.tables import Vector3, Vector6
@@ -31,13 +31,44 @@ from plant_fmu.autopilot import Autopilot, pulse_of_effort
 _PREDICTION_TIME = 0.5  # s, within which a snapshot shows the effect of a command
 
 
+class Result(IntEnum):
+    """Result of a command: MAV_RESULT."""
+
+    ACCEPTED = 0
+    TEMPORARILY_REJECTED = 1
+    DENIED = 2
+    UNSUPPORTED = 3
+    FAILED = 4
+
+
 @dataclass(frozen=True)
 class Sender:
     """Link, system and component of the sender of a message."""
 
-    link: MessageSink
+    link: Link
     system: int
     component: int
+
+    @property
+    def address(self) -> tuple[int, int]:
+        """Target system and component of a reply."""
+        return self.system, self.component
+
+
+@dataclass(frozen=True)
+class ReceivedMissionItem:
+    """The fields of MISSION_ITEM_INT; a station reads back what it wrote."""
+
+    frame: int
+    command: int
+    autocontinue: int
+    param1: float
+    param2: float
+    param3: float
+    param4: float
+    x: int  # 1e-7 deg, or 1e-4 m
+    y: int
+    z: float  # m
 
 
 class VehicleContext:
@@ -57,11 +88,10 @@ class VehicleContext:
         self.profile = PROFILES[options.profile]
         self.layout = RowLayout(scenario, columns)
         self.active_gcs = ActiveGcs()
-        self.links: list[MessageSink] = []
+        self.links: list[Link] = []
         self.now = 0.0  # wall clock at the last call of the autopilot [s]
-        self.failsafe = False
-        # loss_action: silence of the commanding station [s] after which the action is taken, and the action
-        # loss_timeout: silence of the commanding station [s] after which the action is taken, and the action
+        self.failsafe = self.has_ended = False
+        # silence of the commanding station [s] after which the action is taken, and the action
         self.loss_timeout, self.loss_action = options.loss_timeout, options.loss_action
         self.proximity = Proximity(scenario)
         self.frame = LocalFrame(*options.origin)
@@ -70,8 +100,8 @@ class VehicleContext:
         self._limits = tuple(zip((-vehicle.thrust_min).tolist(), vehicle.thrust_max.tolist(), strict=True))
         table = vehicle.autopilot if options.profile != "px4" else None
         table = table or Autopilot("", tuple(range(1, vehicle.n_thrusters + 1)), curve="linear")
-        signs = table.signs if isinstance(table.signs, tuple) else (table.signs,) * vehicle.n_thrusters
-        self._outputs, self._curves = table.channels, [pulse_of_effort(table, sign) for sign in signs]
+        self._outputs = table.channels
+        self._curves = [pulse_of_effort(table, sign) for sign in table.sign_of_each(vehicle.n_thrusters)]
         self._commands = commands if options.commands and live and scenario.commands.enabled else None
         self.status_texts = StatusTexts(self.mavlink, self.make, self.links, lambda: self.now)
         self.send_text, self.reject = self.status_texts.send_text, self.status_texts.reject
@@ -156,22 +186,21 @@ class VehicleContext:
 
     # ---- commands ----
 
-    def submit(self, *commands: Command) -> int:
+    def submit(self, *commands: Command) -> Result:
         """Submit commands, which are applied at the next step."""
-        m = self.mavlink
         if self._commands is None:
             self.reject("commands are off: start with --commands" if self.live else "this is a recorded run", "off")
-            return int(m.MAV_RESULT_DENIED)
+            return Result.DENIED
         for command in commands:
             try:
                 if not self._commands.submit(command, self._run):
                     self.reject(self._commands.refusal(command, self._run) or "too many commands at once", "full")
-                    return int(m.MAV_RESULT_TEMPORARILY_REJECTED)
+                    return Result.TEMPORARILY_REJECTED
             except CommandError as error:
                 self.reject(str(error), "command")
-                return int(m.MAV_RESULT_DENIED)
+                return Result.DENIED
             self._predict(command)
-        return int(m.MAV_RESULT_ACCEPTED)
+        return Result.ACCEPTED
 
     def _predict(self, command: Command) -> None:
         match command:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cached_property
 
 from controller.quaternion import rotation_rows
@@ -26,20 +27,30 @@ class _Vector:
         return view.vector(self._first)
 
 
+class _Numbers:
+    """Property of the values from a column on, as many as a quantity of the layout has."""
+
+    def __init__(self, first: str, count: Callable[[RowLayout], int]) -> None:
+        self._first, self._count = first, count
+
+    def __get__(self, view: View, owner: type[View]) -> list[float]:
+        return view.numbers(self._first, self._count(view.layout))
+
+
 class View:
     """One row, by named quantities; no property raises for any numbers; row (n,), waited_us [µs]."""
 
     def __init__(self, layout: RowLayout, row: Array, waited_us: int = 0) -> None:
-        self._layout, self._row, self._waited_us = layout, row.tolist(), waited_us
+        self.layout, self._row, self._waited_us = layout, row.tolist(), waited_us
 
     def number(self, name: str, default: float = 0.0) -> float:
         """Return a column's value, or `default` if the row has no such column."""
-        index = self._layout.index.get(name)
+        index = self.layout.index.get(name)
         return default if index is None else self._row[index]
 
     def numbers(self, first: str, n: int) -> list[float]:
         """Return n values from a column on; zeros if the row has no such column."""
-        index = self._layout.index.get(first)
+        index = self.layout.index.get(first)
         return [0.0] * n if index is None else self._row[index : index + n]
 
     def vector(self, first: str) -> Vector3:
@@ -52,6 +63,11 @@ class View:
         """Time since boot [µs]: time of waiting plus simulated time."""
         return self._waited_us + self.simulated_us
 
+    @property
+    def boot_ms(self) -> int:
+        """Time since boot [ms], modulo 2**32."""
+        return self.boot_us // 1000 & 0xFFFFFFFF
+
     @cached_property
     def simulated_us(self) -> int:
         """Simulated time [µs]; 0 if it is NaN, negative or above 1e12 s."""
@@ -63,10 +79,8 @@ class View:
     position_ned = _Vector("position.x")
     """Position of the body origin [m]."""
 
-    @property
-    def quaternion(self) -> list[float]:
-        """Unit quaternion from body to world, scalar first."""
-        return self.numbers("quaternion.e0", 4)
+    quaternion = _Numbers("quaternion.e0", lambda layout: 4)
+    """Unit quaternion from body to world, scalar first."""
 
     euler = _Vector("attitude.roll")
     """Roll, pitch and yaw [rad]."""
@@ -130,42 +144,32 @@ class View:
 
     # ---- forces ----
 
-    @property
-    def thruster_forces(self) -> list[float]:
-        """Force of each thruster [N]."""
-        return self.numbers("thruster_force[1]", self._layout.thrusters)
+    thruster_forces = _Numbers("thruster_force[1]", lambda layout: layout.thrusters)
+    """Force of each thruster [N]."""
 
-    @property
-    def thruster_commands(self) -> list[float]:
-        """Commanded force of each thruster [N]."""
-        return self.numbers("thrust[1]", self._layout.thrusters)
+    thruster_commands = _Numbers("thrust[1]", lambda layout: layout.thrusters)
+    """Commanded force of each thruster [N]."""
 
-    @property
-    def wrench(self) -> list[float]:
-        """Commanded wrench of the law, body frame [N, N m], shape (6,)."""
-        return self.numbers("command.X", 6)
+    wrench = _Numbers("command.X", lambda layout: 6)
+    """Commanded wrench of the law, body frame [N, N m], shape (6,)."""
 
     @property
     def saturated(self) -> bool:
         """True if a limit is active."""
-        return any(self._row[i] > 0.0 for i in self._layout.saturations)
+        return any(self._row[i] > 0.0 for i in self.layout.saturations)
 
     # ---- law and arbiter ----
 
-    @property
-    def region_values(self) -> list[float]:
-        """Region function g of the goal, then of each region: above 0 where violated."""
-        return self.numbers("goal.value", 1 + len(self._layout.regions))
+    region_values = _Numbers("goal.value", lambda layout: 1 + len(layout.regions))
+    """Region function g of the goal, then of each region: above 0 where violated."""
 
-    @property
-    def clearances(self) -> list[float]:
-        """Clearance of the goal, then of each region: 0 or above where satisfied [m or rad]."""
-        return self.numbers("goal.clearance", 1 + len(self._layout.regions))
+    clearances = _Numbers("goal.clearance", lambda layout: 1 + len(layout.regions))
+    """Clearance of the goal, then of each region: 0 or above where satisfied [m or rad]."""
 
     @property
     def criteria(self) -> tuple[str, ...]:
         """Names of the criteria, in order of priority."""
-        return self._layout.criteria
+        return self.layout.criteria
 
     @property
     def memberships(self) -> list[float]:
@@ -177,14 +181,12 @@ class View:
         """Weights of the criteria, in order of priority."""
         return self.numbers(f"weight.{self.criteria[0]}", len(self.criteria))
 
-    @property
-    def estimate(self) -> list[float]:
-        """Estimate of phi in (12) [N, N m], shape (4,)."""
-        return self.numbers("estimate.phi1", 4)
+    estimate = _Numbers("estimate.phi1", lambda layout: 4)
+    """Estimate of phi in (12) [N, N m], shape (4,)."""
 
     def reports(self) -> list[tuple[str, float]]:
         """Return the law's reports as pairs of column name and value."""
-        return [(name, self.number(name)) for name in self._layout.reports]
+        return [(name, self.number(name)) for name in self.layout.reports]
 
     def shift(self, region: str) -> Vector3:
         """Return the displacement of a region, or ``"goal"``, from its position in the scenario [m, NED]."""
@@ -212,8 +214,8 @@ class View:
     @property
     def target(self) -> Vector3:
         """Center of the target region [m, NED]."""
-        if "target.x" in self._layout.index:
+        if "target.x" in self.layout.index:
             return self.vector("target.x")
-        x, y, z = self._layout.goal_center
+        x, y, z = self.layout.goal_center
         dx, dy, dz = self.shift("goal")
         return x + dx, y + dy, z + dz

@@ -23,6 +23,7 @@ _UNKNOWN: dict[tuple[str, str], int] = {
 }
 
 Encode = Callable[[Any], Any]
+Fields = tuple[Any, ...]  # values of a message's fields, in the dialect's order; extensions may be left out
 
 
 def clip_to_float32(x: float) -> float:
@@ -35,11 +36,6 @@ def clip_to_float32(x: float) -> float:
 def round_finite(x: float) -> int | None:
     """Round a received number to an integer; None if it is not finite, as clients fill unused ones with NaN."""
     return round(x) if math.isfinite(x) else None
-
-
-def wrap_time(microseconds: int, per_unit: int = 1000) -> int:
-    """Convert a time since boot to units of `per_unit` microseconds, modulo 2**32."""
-    return microseconds // per_unit & 0xFFFFFFFF
 
 
 class Encoder:

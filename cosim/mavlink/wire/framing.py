@@ -238,7 +238,7 @@ class FrameFilter:
         if self._verifier is not None:
             rejection = self._verifier.check(frame, header.system, header.component, header.is_signed)
             if rejection is not None:
-                stats.count(rejection.value)
+                stats.count(rejection)
                 return
         if header.message_id == _SETUP_SIGNING:
             stats.setup_signing += 1

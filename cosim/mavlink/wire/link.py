@@ -73,24 +73,16 @@ class Budget:
         return True
 
 
-class Signer:
-    """Sign the frames of one link."""
+class Signer(NamedTuple):
+    """Key, timestamps and link id, with which the frames of one link are signed."""
 
-    def __init__(self, key: bytes, clock: SigningClock, link: int) -> None:
-        self._clock = clock
-        self._key, self._link = key, link % 256
-
-    def enable(self, signing: Any) -> None:
-        """Enable signing in a codec of pymavlink."""
-        signing.secret_key, signing.link_id, signing.sign_outgoing = self._key, self._link, True
-
-    def stamp(self, signing: Any) -> None:
-        """Set the timestamp of the next frame."""
-        signing.timestamp = self._clock.next()
+    key: bytes
+    clock: SigningClock
+    link: int
 
 
 class Link:
-    """An endpoint with its peers; a `MessageSink`."""
+    """An endpoint with its peers."""
 
     def __init__(
         self,
@@ -111,7 +103,8 @@ class Link:
         self._framer = Framer(source)
         self._codec = dialect().MAVLink(None, *source)
         if signer is not None:
-            signer.enable(self._codec.signing)
+            signing = self._codec.signing
+            signing.secret_key, signing.link_id, signing.sign_outgoing = signer.key, signer.link % 256, True
         self._readers: WeakKeyDictionary[Any, StreamReader] = WeakKeyDictionary()
         self._frames: Iterator[tuple[bytes, Any]] = iter(())  # of the last received bytes
         self._peer: Any = None  # their sender
@@ -150,7 +143,7 @@ class Link:
         return was_sent
 
     def _sign(self, message: Any, signer: Signer) -> bytes:
-        signer.stamp(self._codec.signing)
+        self._codec.signing.timestamp = signer.clock.next()
         self._codec.seq = self._framer.seq
         frame: bytes = message.pack(self._codec)
         return frame

@@ -7,9 +7,8 @@ import hmac
 import logging
 import os
 import time
-from enum import Enum
 from pathlib import Path
-from typing import Final
+from typing import Final, Literal
 
 import platformdirs
 
@@ -30,18 +29,8 @@ _MIN_WRITE_AHEAD = (
 )  # by which it is ahead of the last one at least: a peer's clock may be ahead of ours
 _REMEDY = "remove the file, after which earlier frames are accepted again"
 _MAX_TIMESTAMP = (1 << 48) - 1
+Rejection = Literal["unsigned", "forged", "replayed", "old", "ahead", "crowded"]  # names in `RxStats`
 _SIGNATURE_SIZE, _STAMP_SIZE, _HASH_SIZE = 13, 6, 6  # bytes of a signature, its timestamp, its hash
-
-
-class Rejection(Enum):
-    """Reasons to reject a frame; the values are names in `RxStats`."""
-
-    UNSIGNED = "unsigned"
-    FORGED = "forged"
-    REPLAYED = "replayed"
-    OLD = "old"
-    AHEAD = "ahead"
-    CROWDED = "crowded"
 
 
 def load_key(path: Path) -> bytes:
@@ -164,23 +153,23 @@ class Verifier:
         """Return the reason to reject a frame, or None to accept it."""
         # Only a frame with a valid signature updates the sender's last timestamp.
         if not is_signed:
-            return Rejection.UNSIGNED
+            return "unsigned"
         digest = hashlib.sha256(self._key + frame[:-_HASH_SIZE]).digest()
         if not hmac.compare_digest(digest[:_HASH_SIZE], frame[-_HASH_SIZE:]):
-            return Rejection.FORGED
+            return "forged"
         link = frame[-_SIGNATURE_SIZE]
         stamp = int.from_bytes(frame[-_HASH_SIZE - _STAMP_SIZE : -_HASH_SIZE], "little")
         sender = (system, component, link)
         latest = self._latest.get(sender)
         if latest is not None and stamp <= latest:
-            return Rejection.REPLAYED
+            return "replayed"
         if stamp > self._clock.latest_accepted:  # it would make later valid frames look old
-            return Rejection.AHEAD
+            return "ahead"
         oldest = self._clock.now - _MINUTE
         if latest is None and (stamp < oldest or stamp <= self._clock.floor):
-            return Rejection.OLD
+            return "old"
         if latest is None and len(self._latest) >= MAX_STREAMS and not self._drop_stale_sender(oldest):
-            return Rejection.CROWDED
+            return "crowded"
         self._latest[sender] = stamp
         self._clock.advance_to(stamp)
         return None

@@ -136,7 +136,7 @@ def test_wrong_surveyed_origin_misses_the_goal(tmp_path):
 
 @pytest.mark.medium
 def test_no_setpoints_are_sent_before_frame_alignment(tmp_path):
-    with pytest.raises(RunError, match="where the scene's origin is"):
+    with pytest.raises(RunError, match="waiting for the scene's origin"):
         Flight(tmp_path, origin=SceneOrigin())
     link = StandIn(profile="generic", silent=["GLOBAL_POSITION_INT"])
     with pytest.raises(RunError, match="the autopilot has no global position"):
@@ -245,7 +245,7 @@ FAULTS = {
     "frame jump": lambda link: position_off(link, 1.0),
     "heading leap": lambda link: heading_off(link, 8.0),
     "battery": lambda link: changed(link, "SYS_STATUS", battery_remaining=12),
-    "leak": lambda link: link.autopilot._context.say("Leak Detected"),
+    "leak": lambda link: link.autopilot._context.send_text("Leak Detected"),
     "pilot gain": lambda link: says_the_pilot_gain(link, 1.0),
     "takeover": lambda link: command(link, 193, 0.0, system=IDENTITY[0], component=IDENTITY[1]),
 }
@@ -265,7 +265,7 @@ def test_fault_holds_the_vehicle_within_one_second(tmp_path, reason):
 def test_rejected_mode_holds_within_one_second(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
     link.refused_commands.add(176)
-    with pytest.raises(RunError, match="somebody to resume after: refused mode"):
+    with pytest.raises(RunError, match="a command to resume after: refused mode"):
         Flight(tmp_path, link=link)
     first = min(at for at, m in link.sent if m.get_type() == "COMMAND_LONG" and m.command == 176)
     texts = [(at, m.text) for at, m in link.sent if m.get_type() == "STATUSTEXT"]
@@ -276,7 +276,7 @@ def test_rejected_mode_holds_within_one_second(tmp_path):
 @pytest.mark.medium
 def test_a_dive_that_does_not_end_holds_the_vehicle(tmp_path):
     link = StandIn(profile="ardusub", shift=SHIFT, armed=False, overrides=["commands.pilot_gain=0.01"])
-    with pytest.raises(RunError, match="somebody to resume after: unfinished dive"):
+    with pytest.raises(RunError, match="a command to resume after: unfinished dive"):
         Flight(tmp_path, link=link, profile="ardusub", arm=True, timeout=40.0)
 
 
@@ -285,7 +285,7 @@ def test_a_dive_that_does_not_end_holds_the_vehicle(tmp_path):
 def test_a_pilot_takes_over_while_it_dives(tmp_path, reason, event):
     link, dived = StandIn(profile="ardusub", shift=SHIFT, armed=False), 6.0
     link.events = [(dived, lambda: command(link, 400, 0.0) if event is None else command(link, 176, 1.0, event))]
-    with pytest.raises(RunError, match=f"somebody to resume after: {reason}"):
+    with pytest.raises(RunError, match=f"a command to resume after: {reason}"):
         Flight(tmp_path, link=link, profile="ardusub", arm=True, timeout=8.0)
     texts = [(at - 100.0, m.text) for at, m in link.sent if m.get_type() == "STATUSTEXT"]
     (begun,) = [at for at, text in texts if text == "Companion diving"]

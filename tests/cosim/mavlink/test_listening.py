@@ -16,8 +16,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from cosim.command_line.cli import main
 from cosim.mavlink.listening import TelemetryTable, follow, format_table
 from cosim.mavlink.listening.fields import format_values
+from cosim.mavlink.listening.table_text import mode_name
 from cosim.mavlink.listening.telemetry_table import MAX_ROWS, MAX_TEXTS
-from cosim.mavlink.vehicle.mode_names import mode_name
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink, ReceivedMessage
 

@@ -7,8 +7,8 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from controller.quaternion import from_axis_angle
-from cosim.mavlink.services.speed import terminal_speed
 from cosim.mavlink.vehicle.geodesy import LocalFrame
+from cosim.mavlink.vehicle.speed import terminal_speed
 from cosim.simulation.commands.commands import (
     AddObstacle,
     ManualControl,

@@ -20,7 +20,7 @@ from cosim.run.run_folder import report_again
 from cosim.scenario.law_factory import with_custom_law
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios
-from cosim.sitl.sitl_scenario import scenario_to_fly
+from cosim.sitl.sitl_session import scenario_to_fly
 from tests.cosim.campaigns.fake import design, fakes
 from tests.cosim.replay.decoding import read_page
 

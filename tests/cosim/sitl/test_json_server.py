@@ -13,11 +13,9 @@ from cosim.errors import RunError
 from cosim.results.record import load_record
 from cosim.simulation.master import Master
 from cosim.sitl import motion
-from cosim.sitl.json_server import JsonServer
+from cosim.sitl.json_server import JsonServer, Lockstep
 from cosim.sitl.law import make_pwm_law
-from cosim.sitl.lockstep import Lockstep
-from cosim.sitl.sitl_scenario import scenario_to_fly
-from cosim.sitl.sitl_session import RESTARTED, FlightOptions, SitlSession
+from cosim.sitl.sitl_session import RESTARTED, FlightOptions, SitlSession, scenario_to_fly
 from plant_fmu import load_vehicle
 from tests.cosim.sitl.stand_in import DISARMED, NEUTRAL, StandIn, frame, heave, newest_line, parse
 

@@ -133,7 +133,12 @@ def _frames() -> bytes:
 _FRAMING = ("cosim.mavlink.wire.framing:FrameFilter._decode", "cosim.mavlink.wire.framing:parse_header")
 
 
-@reader("MAVLink frames, to a vehicle", "bytes", *_FRAMING, "cosim.mavlink.services.ftp:FileServer._request")
+@reader(
+    "MAVLink frames, to a vehicle",
+    "bytes",
+    *_FRAMING,
+    "cosim.mavlink.services.ftp:FileServer._receive_file_transfer_protocol",
+)
 def to_vehicle(seeds: Seeds) -> Case:
     station = Station()
     station.look()

@@ -1,4 +1,4 @@
-"""Validate the speed of DO_CHANGE_SPEED, as a command and as a mission item."""
+"""Speeds of a vehicle: the one that DO_CHANGE_SPEED commands, and those that its thrusters reach."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ def resolve_speed(context: VehicleContext, speed: float) -> float | None:
 def terminal_speed(vehicle: Vehicle) -> float:
     """Return the greatest speed in still water at full thrust along a body axis, where drag equals thrust [m/s]."""
     thrust = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)[:3].tolist()
-    speeds = []
-    for axis, force in enumerate(thrust):
-        linear, quadratic = float(vehicle.linear_damping[axis]), float(vehicle.quadratic_damping[axis])
-        if quadratic > 0.0:
-            speeds.append((math.sqrt(linear * linear + 4.0 * quadratic * force) - linear) / (2.0 * quadratic))
-        else:
-            speeds.append(force / linear if linear > 0.0 else math.inf)
-    return max(speeds)
+    return max(drag_limited_speed(vehicle, axis, force) for axis, force in enumerate(thrust))
+
+
+def drag_limited_speed(vehicle: Vehicle, axis: int, force: float) -> float:
+    """Return the speed [m/s] along a body axis at which the drag in still water equals a force [N]."""
+    linear, quadratic = float(vehicle.linear_damping[axis]), float(vehicle.quadratic_damping[axis])
+    slope = linear + math.sqrt(linear**2 + 4.0 * quadratic * force)
+    return 2.0 * force / slope if slope > 0.0 else math.inf
