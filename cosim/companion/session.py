@@ -18,7 +18,7 @@ from cosim.companion.outputs import Output, steering_mode, uses_sticks
 from cosim.companion.safety import GAIN_TOLERANCE, Observation, State, Supervisor
 from cosim.companion.vehicle_state import RATES, ReportedState
 from cosim.mavlink.vehicle.profile import PROFILES
-from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.dialect import dialect, make_heartbeat
 from cosim.simulation.commands.commands import Arm, Command, Mode
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
@@ -219,11 +219,7 @@ class AutopilotSession:
         """Send the messages of every state: heartbeat, clock, and requests of parameters and message rates."""
         m = self._mavlink
         if self._is_due("heartbeat", _HEARTBEAT_PERIOD, now):
-            self._link.send(
-                m.MAVLink_heartbeat_message(
-                    m.MAV_TYPE_ONBOARD_CONTROLLER, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3
-                )
-            )
+            self._link.send(make_heartbeat(m, m.MAV_TYPE_ONBOARD_CONTROLLER, m.MAV_STATE_ACTIVE))
         if self.reported.system is None:
             return
         if self._is_due("sync", _SYNC_PERIOD, now):

@@ -113,7 +113,7 @@ class Autopilot:
         self._events.restart()
         for service in self._services:
             service.restart()
-        context.send_text("The run has restarted", context.mavlink.MAV_SEVERITY_NOTICE)
+        context.send_text("The run has restarted", "NOTICE")
 
     def _advance(self) -> None:
         for streams in list(self._streams.values()):
@@ -162,9 +162,7 @@ class Autopilot:
         """Send a status text that the run has ended, and a last heartbeat in standby."""
         context = self._context
         context.now = now
-        context.send_text(
-            f"The {'run' if context.live else 'recording'} has ended", context.mavlink.MAV_SEVERITY_NOTICE
-        )
+        context.send_text(f"The {'run' if context.live else 'recording'} has ended", "NOTICE")
         context.has_ended = True
         for message in build_messages(context, "HEARTBEAT"):
             context.send(message)

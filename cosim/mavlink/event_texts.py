@@ -40,14 +40,14 @@ class EventTexts:
         self._watch_regions(view)
         self._watch_limits(view)
         if view.touches_bottom and not before.touches_bottom:
-            context.send_text("Bottom touched", context.mavlink.MAV_SEVERITY_WARNING, "bottom", _EVERY)
+            context.send_text("Bottom touched", "WARNING", "bottom", _EVERY)
 
     def _watch_commands(self, before: View, view: View) -> None:
-        context, m = self._context, self._context.mavlink
+        context = self._context
         if view.armed != before.armed:
-            context.send_text("Armed" if view.armed else "Disarmed", m.MAV_SEVERITY_NOTICE)
+            context.send_text("Armed" if view.armed else "Disarmed", "NOTICE")
         if view.mode != before.mode:
-            context.send_text(f"Mode: {MODE_TABLE[view.mode].name}", m.MAV_SEVERITY_NOTICE)
+            context.send_text(f"Mode: {MODE_TABLE[view.mode].name}", "NOTICE")
         if (view.armed, view.mode) != (before.armed, before.mode):
             for message in build_messages(context, "HEARTBEAT", "CURRENT_MODE"):
                 context.send(message)
@@ -69,7 +69,6 @@ class EventTexts:
         context.send_text(f"Reached mission item {number}")
 
     def _watch_regions(self, view: View) -> None:
-        m = self._context.mavlink
         for i, clearance in enumerate(view.clearances):
             satisfied = self._satisfied[i]
             # hysteresis of a margin about the surface; NaN changes nothing
@@ -84,13 +83,13 @@ class EventTexts:
             what = "Attitude" if of_attitude(region.shape) else "Region"
             inside = now_satisfied == (region.keep == "in")
             text = f"{what} {region.name} {'entered' if inside else 'left'}"
-            severity = m.MAV_SEVERITY_INFO if now_satisfied else m.MAV_SEVERITY_WARNING
+            severity = "INFO" if now_satisfied else "WARNING"
             self._context.send_text(text if now_satisfied else f"{text}: keep {region.keep}", severity, text, _EVERY)
 
     def _report_target(self, view: View, inside: bool) -> None:
         context = self._context
         last = view.item == len(context.plan) - 1 and view.mode == "mission"
-        context.send_text("Target reached" if inside else "Target left", None, f"target {inside}", _EVERY)
+        context.send_text("Target reached" if inside else "Target left", "INFO", f"target {inside}", _EVERY)
         if inside and last:
             self._reached_item(view.item)
 
@@ -99,8 +98,8 @@ class EventTexts:
         if view.saturated:
             self._saturated_us = view.boot_us
             if not self._saturated:
-                context.send_text("Thrust saturated", context.mavlink.MAV_SEVERITY_WARNING, "saturated", _EVERY)
+                context.send_text("Thrust saturated", "WARNING", "saturated", _EVERY)
             self._saturated = True
         elif self._saturated and view.boot_us - self._saturated_us >= _RELEASED:
             self._saturated = False
-            context.send_text("Thrust no longer saturated", None, "released", _EVERY)
+            context.send_text("Thrust no longer saturated", "INFO", "released", _EVERY)

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.dialect import dialect, make_heartbeat
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.simulation.pace import Pace
 from cosim.sitl.hil_messages import RATE, hil_messages
@@ -114,7 +114,7 @@ class HilServer(LockstepServer):
         time_us = (frame + 1) * 1_000_000 // RATE
         messages = hil_messages(m, motion, time_us, ORIGIN, frame % _GPS_EVERY == 0)
         if frame % _HEARTBEAT_EVERY == 0:
-            messages.insert(0, m.MAVLink_heartbeat_message(m.MAV_TYPE_GENERIC, m.MAV_AUTOPILOT_INVALID, 0, 0, 0, 3))
+            messages.insert(0, make_heartbeat(m, m.MAV_TYPE_GENERIC, m.MAV_STATE_UNINIT))
         data = b""
         for message in messages:
             data += message.pack(codec)

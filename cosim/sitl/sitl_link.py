@@ -14,7 +14,7 @@ from controller.law import Diagnostic
 from cosim.companion.vehicle_state import ReportedState
 from cosim.errors import TelemetryError
 from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
-from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.dialect import dialect, make_heartbeat
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.ground_end import GroundLink, Identity
 from cosim.simulation.signals import Array
@@ -118,7 +118,7 @@ class SitlLink:
         m, system = self._mavlink, self._reported.system
         if now - self._heartbeat_at >= _HEARTBEAT_PERIOD:
             self._heartbeat_at = now
-            self._link.send(m.MAVLink_heartbeat_message(m.MAV_TYPE_ONBOARD_CONTROLLER, 8, 0, 0, m.MAV_STATE_ACTIVE, 3))
+            self._link.send(make_heartbeat(m, m.MAV_TYPE_ONBOARD_CONTROLLER, m.MAV_STATE_ACTIVE))
         if system is not None and now - self._requested_at >= _REQUEST_PERIOD:
             self._requested_at = now
             for name, rate in _RATES.items():

@@ -2,7 +2,7 @@
 
 The ground's side of a link, for `cosim mavlink listen`.
 
-Imports: mavlink.vehicle, mavlink.wire.
+Imports: mavlink.wire.
 """
 
 from cosim.mavlink.listening.follow import follow

@@ -55,7 +55,7 @@ class AttitudeTargets(Service):
         text = (
             f"No attitude for {_TIMEOUTS[mode]:g} s: {'the vehicle stays' if mode == 'reach' else 'the sticks apply'}"
         )
-        context.send_text(text, context.mavlink.MAV_SEVERITY_WARNING)
+        context.send_text(text, "WARNING")
 
     def _receive_set_attitude_target(self, sender: Sender, message: Any) -> None:
         context = self.context
@@ -100,7 +100,7 @@ class AttitudeTargets(Service):
         if context.now - self._waits_since >= _REPORT_DELAY:
             modes = "ALT_HOLD without thrust, in GUIDED with it" if context.profile.name == "ardusub" else "offboard"
             text = f"Attitude set-points wait: they apply in {modes}"
-            context.send_text(text, context.mavlink.MAV_SEVERITY_NOTICE, "early attitude", _REPORT_PERIOD)
+            context.send_text(text, "NOTICE", "early attitude", _REPORT_PERIOD)
 
     def _command(self, message: Any) -> SetAttitude:
         q0, q1, q2, q3 = message.q

@@ -89,45 +89,29 @@ class FileServer(Service):
         return self._clients[key]
 
     def _replies(self, client: _Client, request: _Request) -> list[bytes]:
+        is_burst = request.opcode == _BURST_READ
         try:
-            if request.opcode == _BURST_READ:
-                return self._burst(client, request)
-            data = self._answer(client, request)
+            parts = _burst(client, request) if is_burst else [(request.offset, self._answer(client, request))]
         except FtpError as error:
             return [_packet(request, 1, _NAK, bytes([error.code]), request.offset)]
-        return [_packet(request, 1, _ACK, data, request.offset)]
+        last = len(parts) if is_burst else 0
+        return [_packet(request, i, _ACK, data, offset, i == last) for i, (offset, data) in enumerate(parts, 1)]
 
     def _answer(self, client: _Client, request: _Request) -> bytes:
-        match request.opcode:
-            case opcode if opcode == _NONE:
-                return b""
-            case opcode if opcode in (_TERMINATE, _RESET):
-                client.content = None
-                return b""
-            case opcode if opcode == _LIST:
-                return self._listing(_path(request), request.offset)
-            case opcode if opcode == _OPEN:
-                client.session, client.content = request.session, self._content(_path(request))
-                return struct.pack("<I", len(client.content))
-            case opcode if opcode == _READ:
-                return _read_part(_get_content(client, request), request.offset, request.size)
-            case opcode if opcode == _CRC:
-                return struct.pack("<I", compute_crc32(self._content(_path(request))))
-        raise FtpError(_PROTECTED if request.opcode in _WRITING else _UNKNOWN)
-
-    def _burst(self, client: _Client, request: _Request) -> list[bytes]:
-        try:
-            content = _get_content(client, request)
-            parts = [(request.offset, _read_part(content, request.offset, request.size))]
-        except FtpError as error:
-            return [_packet(request, 1, _NAK, bytes([error.code]), request.offset)]
-        while len(parts) < _BURST and parts[-1][0] + len(parts[-1][1]) < len(content):
-            offset = parts[-1][0] + len(parts[-1][1])
-            parts.append((offset, _read_part(content, offset, request.size)))
-        last = len(parts)
-        return [
-            _packet(request, i, _ACK, data, offset, complete=i == last) for i, (offset, data) in enumerate(parts, 1)
-        ]
+        opcode = request.opcode
+        if opcode in (_NONE, _TERMINATE, _RESET):
+            client.content = client.content if opcode == _NONE else None
+            return b""
+        if opcode == _LIST:
+            return self._listing(_path(request), request.offset)
+        if opcode == _OPEN:
+            client.session, client.content = request.session, self._content(_path(request))
+            return struct.pack("<I", len(client.content))
+        if opcode == _READ:
+            return _read_part(_get_content(client, request), request.offset, request.size)
+        if opcode == _CRC:
+            return struct.pack("<I", compute_crc32(self._content(_path(request))))
+        raise FtpError(_PROTECTED if opcode in _WRITING else _UNKNOWN)
 
     # ---- files ----
 
@@ -168,6 +152,15 @@ def _get_content(client: _Client, request: _Request) -> bytes:
     if client.content is None or request.session != client.session:
         raise FtpError(_INVALID_SESSION)
     return client.content
+
+
+def _burst(client: _Client, request: _Request) -> list[tuple[int, bytes]]:
+    """Return the parts of a burst, each with its offset."""
+    content, offset = _get_content(client, request), request.offset
+    parts = [(offset, _read_part(content, offset, request.size))]
+    while len(parts) < _BURST and (offset := offset + len(parts[-1][1])) < len(content):
+        parts.append((offset, _read_part(content, offset, request.size)))
+    return parts
 
 
 def _read_part(content: bytes, offset: int, size: int) -> bytes:

@@ -37,9 +37,7 @@ class GcsFailsafe(Service):
         elif context.failsafe and not is_lost:
             context.failsafe = False
             self._is_applied = True
-            context.send_text(
-                f"Link to station {context.active_gcs.commander} regained", context.mavlink.MAV_SEVERITY_NOTICE
-            )
+            context.send_text(f"Link to station {context.active_gcs.commander} regained", "NOTICE")
         if not self._is_applied:
             self._is_applied = self._apply_action()
 
@@ -48,7 +46,7 @@ class GcsFailsafe(Service):
         action = context.loss_action
         then = "" if action == "warn" else f": {action}"
         text = f"Link to station {context.active_gcs.commander} lost for {silence:.0f} s{then}"
-        context.send_text(text, context.mavlink.MAV_SEVERITY_CRITICAL)
+        context.send_text(text, "CRITICAL")
 
     def _apply_action(self) -> bool:
         """Submit the command of the loss action; return False if the queue was full."""

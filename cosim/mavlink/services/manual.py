@@ -63,7 +63,7 @@ class ManualControlService(Service):
         self._received_at = None
         if context.mode_ahead in STICK_MODES:
             self._submit(_NEUTRAL, by_gain=True)
-            context.send_text("Lost manual control", context.mavlink.MAV_SEVERITY_CRITICAL, "sticks", _TIMEOUT)
+            context.send_text("Lost manual control", "CRITICAL", "sticks", _TIMEOUT)
 
     def _receive_manual_control(self, sender: Sender, message: Any) -> None:
         if message.target == self.context.options.system_id:

@@ -157,7 +157,7 @@ class MissionProtocol(Service):
                 upload.decoded.append(decode_mission_item(context, item, upload.decoded, upload.count - first))
             except ItemError as error:
                 context.reject(f"mission item {message.seq}: {error}", "item")
-                return error.result
+                return int(getattr(m, f"MAV_MISSION_{error.result}"))
         upload.items.append(item)
         return int(m.MAV_MISSION_ACCEPTED)
 

@@ -19,9 +19,9 @@ _MAX_POSITION = 1e5  # m
 
 
 class ItemError(Exception):
-    """Raised for an invalid item; `result` is its MAV_MISSION_RESULT."""
+    """Raised for an invalid item; `result` is the name of its MAV_MISSION_RESULT."""
 
-    def __init__(self, result: int, reason: str) -> None:
+    def __init__(self, result: str, reason: str) -> None:
         super().__init__(reason)
         self.result = result
 
@@ -43,9 +43,9 @@ def decode_mission_item(
     radius, surface = settings["commands.hold_radius"], settings["commands.surface_depth"]
     match item.command:
         case m.MAV_CMD_NAV_WAYPOINT:
-            return MissionItem(_position(context, item), _acceptance(context, item), _stay(context, item))
+            return MissionItem(_position(context, item), _acceptance(item), _stay(item))
         case m.MAV_CMD_NAV_SPLINE_WAYPOINT | m.MAV_CMD_NAV_LOITER_TIME:
-            return MissionItem(_position(context, item), None, _stay(context, item))
+            return MissionItem(_position(context, item), None, _stay(item))
         case m.MAV_CMD_NAV_LOITER_UNLIM:
             return MissionItem(_position(context, item), None, None)
         case m.MAV_CMD_NAV_LAND:
@@ -57,83 +57,76 @@ def decode_mission_item(
             north, east, _ = context.home_ned()
             return MissionItem((north, east, surface), radius, None)
         case m.MAV_CMD_NAV_DELAY | m.MAV_CMD_CONDITION_DELAY:
-            return MissionItem(None, stay=_stay(context, item))
+            return MissionItem(None, stay=_stay(item))
         case m.MAV_CMD_DO_CHANGE_SPEED:
             return _change_speed(context, item)
         case m.MAV_CMD_CONDITION_YAW:
-            return _change_heading(context, item)
+            return _change_heading(item)
         case m.MAV_CMD_DO_JUMP:
             return _jump(context, item, count)
     entry = m.enums["MAV_CMD"].get(item.command)
     name = f" {entry.name.removeprefix('MAV_CMD_')}" if entry else ""
-    raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"command {item.command}{name} is not known in a mission")
+    raise ItemError("UNSUPPORTED", f"command {item.command}{name} is not known in a mission")
 
 
 def _change_speed(context: VehicleContext, item: ReceivedMissionItem) -> MissionItem:
-    m = context.mavlink
     before = getattr(context.settings.gains, "speed", math.nan)
     if math.isnan(before) and item.param2 != -1.0:
-        raise ItemError(m.MAV_MISSION_UNSUPPORTED, f"law {context.scenario.law.name} has no speed")
+        raise ItemError("UNSUPPORTED", f"law {context.scenario.law.name} has no speed")
     try:
         speed = resolve_speed(context, shorten_float32(item.param2))
         if speed is None:
             return MissionItem(None)
         context.settings.change(SPEED, speed)
     except CommandError as error:
-        raise ItemError(m.MAV_MISSION_INVALID_PARAM2, str(error)) from error
+        raise ItemError("INVALID_PARAM2", str(error)) from error
     context.settings.change(SPEED, before)
     return MissionItem(None, commands=(ChangeSetting(SPEED, speed),))
 
 
-def _change_heading(context: VehicleContext, item: ReceivedMissionItem) -> MissionItem:
-    m = context.mavlink
+def _change_heading(item: ReceivedMissionItem) -> MissionItem:
     if item.param4 != 0.0 and not math.isnan(item.param4):
-        raise ItemError(
-            m.MAV_MISSION_INVALID_PARAM4, "a heading from the present one; parameter 4 may be 0: from north"
-        )
+        raise ItemError("INVALID_PARAM4", "a heading from the present one; parameter 4 may be 0: from north")
     if not math.isfinite(item.param1):
-        raise ItemError(m.MAV_MISSION_INVALID_PARAM1, f"a heading of {item.param1:g} deg")
+        raise ItemError("INVALID_PARAM1", f"a heading of {item.param1:g} deg")
     return MissionItem(None, commands=(SetHeading(math.radians(item.param1)),))
 
 
 def _jump(context: VehicleContext, item: ReceivedMissionItem, count: int) -> MissionItem:
-    m, first = context.mavlink, int(context.profile.has_home_item)
+    first = int(context.profile.has_home_item)
     to, times = round_finite(item.param1), round_finite(item.param2)
     if to is None or not 0 <= to - first < count:
-        raise ItemError(
-            m.MAV_MISSION_INVALID_PARAM1, f"a jump to item {item.param1:g} of {first} to {count - 1 + first}"
-        )
+        raise ItemError("INVALID_PARAM1", f"a jump to item {item.param1:g} of {first} to {count - 1 + first}")
     if times is None:
-        raise ItemError(m.MAV_MISSION_INVALID_PARAM2, f"a jump {item.param2:g} times")
+        raise ItemError("INVALID_PARAM2", f"a jump {item.param2:g} times")
     return MissionItem(None, jump=to - first, times=None if times < 0 else times)
 
 
 def _position(context: VehicleContext, item: ReceivedMissionItem) -> Vector3:
-    m = context.mavlink
     x, y = unscale_position(item.frame, item.x, item.y)
     position = to_local_position(context, item.frame, x, y, item.z)
     if position is None:
-        raise ItemError(m.MAV_MISSION_UNSUPPORTED_FRAME, f"frame {item.frame}; it may be 0, 1, 3, 5 or 6")
-    results = m.MAV_MISSION_INVALID_PARAM5_X, m.MAV_MISSION_INVALID_PARAM6_Y, m.MAV_MISSION_INVALID_PARAM7
+        raise ItemError("UNSUPPORTED_FRAME", f"frame {item.frame}; it may be 0, 1, 3, 5 or 6")
+    results = "INVALID_PARAM5_X", "INVALID_PARAM6_Y", "INVALID_PARAM7"
     for value, result in zip(position, results, strict=True):
         if not abs(value) <= _MAX_POSITION:
             raise ItemError(result, f"it is {value:.4g} m from the origin, expected at most {_MAX_POSITION:g} m")
     return position
 
 
-def _stay(context: VehicleContext, item: ReceivedMissionItem) -> float:
+def _stay(item: ReceivedMissionItem) -> float:
     if math.isnan(item.param1):
         return 0.0
     if not 0.0 <= item.param1 <= _MAX_STAY:
-        raise ItemError(context.mavlink.MAV_MISSION_INVALID_PARAM1, f"a stay of {item.param1:g} s")
+        raise ItemError("INVALID_PARAM1", f"a stay of {item.param1:g} s")
     return item.param1
 
 
-def _acceptance(context: VehicleContext, item: ReceivedMissionItem) -> float | None:
+def _acceptance(item: ReceivedMissionItem) -> float | None:
     if math.isnan(item.param2) or item.param2 == 0.0:
         return None
     if not 0.0 < item.param2 <= _MAX_POSITION:
-        raise ItemError(context.mavlink.MAV_MISSION_INVALID_PARAM2, f"an acceptance radius of {item.param2:g} m")
+        raise ItemError("INVALID_PARAM2", f"an acceptance radius of {item.param2:g} m")
     return item.param2
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from itertools import chain, count
 
 MAX_LENGTH = 16  # characters
 
@@ -18,25 +19,11 @@ _PREFIXES = (
 )
 # abbreviations, used only in names that are too long, before vowels are removed
 _SHORT = {
-    "ACCELERATION": "ACCEL",
-    "ATTITUDE": "ATT",
-    "BANDWIDTH": "BW",
-    "BARRIER": "BARR",
-    "BRAKING": "BRAKE",
-    "CONSTANT": "CONST",
-    "CURRENT": "CURR",
-    "DECELERATION": "DECEL",
-    "FAILURE": "FAIL",
-    "OBSTACLE": "OBST",
-    "POSITION": "POS",
-    "QUATERNION": "QUAT",
-    "RESTORING": "REST",
-    "SURFACE": "SURF",
-    "THRESHOLD": "THRESH",
-    "TOLERANCE": "TOL",
-    "TURNING": "TURN",
-    "VELOCITY": "VEL",
-}
+    "ACCELERATION": "ACCEL", "ATTITUDE": "ATT", "BANDWIDTH": "BW", "BARRIER": "BARR", "BRAKING": "BRAKE",
+    "CONSTANT": "CONST", "CURRENT": "CURR", "DECELERATION": "DECEL", "FAILURE": "FAIL", "OBSTACLE": "OBST",
+    "POSITION": "POS", "QUATERNION": "QUAT", "RESTORING": "REST", "SURFACE": "SURF", "THRESHOLD": "THRESH",
+    "TOLERANCE": "TOL", "TURNING": "TURN", "VELOCITY": "VEL",
+}  # fmt: skip
 _AXES = {"0": "X", "1": "Y", "2": "Z"}
 
 
@@ -46,16 +33,12 @@ def parameter_names(keys: Iterable[str]) -> dict[str, str]:
     # from their ends. A number at the end distinguishes equal names.
     all_keys = list(keys)
     names: dict[str, str] = {}
-    used: set[str] = set()
     for key in all_keys:
-        name = _shorten(_split_words(key, all_keys))
-        number = 2
-        while name in used:
-            tail = f"_{number}"
-            name = _shorten(_split_words(key, all_keys), MAX_LENGTH - len(tail)) + tail
-            number += 1
-        used.add(name)
-        names[key] = name
+        words = _split_words(key, all_keys)
+        candidates = (
+            _shorten(words, MAX_LENGTH - len(tail)) + tail for tail in chain([""], map("_{}".format, count(2)))
+        )
+        names[key] = next(name for name in candidates if name not in names.values())
     return names
 
 

@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.options import LossAction
+from plant_fmu import Vehicle
 
 _HEAVY = "bluerov2_heavy"
 _VECTORED_6DOF, _CUSTOM_FRAME = 2.0, 7.0  # ArduSub's FRAME_CONFIG
@@ -27,66 +28,52 @@ _ON_LOSS: dict[LossAction, float] = {
     "surface": 3.0,
     "disarm": 6.0,
 }  # NAV_DLL_ACT
+# there is neither magnetometer nor battery, these failures are not detected, and home is at the surface
+_ARDUSUB_ZEROS = (
+    *(f"COMPASS_DEV_ID{i}" for i in ("", 2, 3)), *(f"COMPASS_OFS{i}_{axis}" for i in ("", 2, 3) for axis in "XYZ"),
+    "COMPASS_DEC", "BATT_MONITOR", "FS_EKF_ACTION", "FS_LEAK_ENABLE", "FS_OPTIONS", "FS_PRESS_ENABLE", "FS_TEMP_ENABLE",
+)  # fmt: skip
+_PX4_ZEROS = (
+    "SYS_HAS_MAG", *(f"CAL_MAG{i}_ID" for i in range(3)), "COM_LOW_BAT_ACT", "NAV_RCL_ACT",
+    *(f"RC_MAP_{stick}" for stick in ("ROLL", "PITCH", "YAW", "THROTTLE", "FLAPS", "AUX1", "AUX2")),
+    "RTL_RETURN_ALT", "RTL_DESCEND_ALT", "RTL_LAND_DELAY",
+)  # fmt: skip
 
 
 def station_parameters(context: VehicleContext) -> dict[str, Callable[[], float]]:
     """Return functions that read the read-only parameters of the vehicle's profile, by name."""
     match context.profile.name:
         case "ardusub":
-            values = _of_ardusub(context)
+            return _constants(_of_ardusub(context.scenario.vehicle))
         case "px4":
-            values = _of_px4(context)
-        case "generic":
-            return {}
-    table: dict[str, Callable[[], float]] = {name: partial(float, value) for name, value in values.items()}
-    if context.profile.name == "px4":
-        table["NAV_DLL_ACT"] = lambda: _ON_LOSS[context.loss_action]
-        table["COM_DL_LOSS_T"] = lambda: context.loss_timeout
-    return table
+            return _constants(_of_px4(context.scenario.vehicle)) | {
+                "NAV_DLL_ACT": lambda: _ON_LOSS[context.loss_action],
+                "COM_DL_LOSS_T": lambda: context.loss_timeout,
+            }
+    return {}
 
 
-def _of_ardusub(context: VehicleContext) -> dict[str, float]:
-    vehicle = context.scenario.vehicle
+def _constants(values: Mapping[str, float]) -> dict[str, Callable[[], float]]:
+    return {name: partial(float, value) for name, value in values.items()}
+
+
+def _of_ardusub(vehicle: Vehicle) -> dict[str, float]:
     motors = _MOTORS[: vehicle.n_thrusters]
     functions = [*motors, *[0] * max(0, _SERVOS - len(motors))]
-    numbers = ("", "2", "3")
-    return {
+    return dict.fromkeys(_ARDUSUB_ZEROS, 0.0) | {
         "FRAME_CONFIG": _VECTORED_6DOF if vehicle.name == _HEAVY else _CUSTOM_FRAME,
-        **{f"SERVO{i}_FUNCTION": float(function) for i, function in enumerate(functions, 1)},
+        **{f"SERVO{i}_FUNCTION": function for i, function in enumerate(functions, 1)},
         **{f"INS_ACCOFFS_{axis}": _EXACT for axis in "XYZ"},
-        # there is neither magnetometer nor battery
-        **{f"COMPASS_DEV_ID{i}": 0.0 for i in numbers},
-        **{f"COMPASS_OFS{i}_{axis}": 0.0 for i in numbers for axis in "XYZ"},
-        "COMPASS_DEC": 0.0,
-        "BATT_MONITOR": 0.0,
-        # these failures are not detected
-        "FS_EKF_ACTION": 0.0,
-        "FS_LEAK_ENABLE": 0.0,
-        "FS_OPTIONS": 0.0,
-        "FS_PRESS_ENABLE": 0.0,
-        "FS_TEMP_ENABLE": 0.0,
         "FS_PILOT_INPUT": _WARN,
     }
 
 
-def _of_px4(context: VehicleContext) -> dict[str, float]:
-    sticks = ("ROLL", "PITCH", "YAW", "THROTTLE", "FLAPS", "AUX1", "AUX2")
-    return {
-        "SYS_AUTOSTART": _BLUEROV2_HEAVY if context.scenario.vehicle.name == _HEAVY else _UUV,
+def _of_px4(vehicle: Vehicle) -> dict[str, float]:
+    return dict.fromkeys(_PX4_ZEROS, 0.0) | {
+        "SYS_AUTOSTART": _BLUEROV2_HEAVY if vehicle.name == _HEAVY else _UUV,
         "CAL_ACC0_ID": 1.0,
         "CAL_GYRO0_ID": 1.0,
-        # there is neither magnetometer nor battery
-        "SYS_HAS_MAG": 0.0,
-        **{f"CAL_MAG{i}_ID": 0.0 for i in range(3)},
-        "COM_LOW_BAT_ACT": 0.0,
-        # sticks come only by MAVLink, and select no modes
-        "COM_RC_IN_MODE": _JOYSTICK_ALONE,
+        "COM_RC_IN_MODE": _JOYSTICK_ALONE,  # sticks come only by MAVLink, and select no modes
         "COM_RC_LOSS_T": _STICKS_LAST,
-        "NAV_RCL_ACT": 0.0,
-        **{f"RC_MAP_{stick}": 0.0 for stick in sticks},
         **{f"COM_FLTMODE{i}": -1.0 for i in range(1, 7)},
-        # home is at the surface
-        "RTL_RETURN_ALT": 0.0,
-        "RTL_DESCEND_ALT": 0.0,
-        "RTL_LAND_DELAY": 0.0,
     }

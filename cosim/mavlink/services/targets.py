@@ -62,14 +62,12 @@ class Targets(Service):
             moving, self._drift_velocity, self._last = any(self._drift_velocity), None, ()
             if moving and context.mode_ahead == "reach":
                 context.submit(SetTarget(context.view.position_ned, context.settings["commands.hold_radius"]))
-                context.send_text(
-                    f"No velocity for {_VELOCITY_TIMEOUT:g} s: the vehicle stays", context.mavlink.MAV_SEVERITY_WARNING
-                )
+                context.send_text(f"No velocity for {_VELOCITY_TIMEOUT:g} s: the vehicle stays", "WARNING")
         if early is not None and context.now - early[0] >= _REPORT_DELAY:
             self._early = None
             now, then = (MODE_TABLE[mode].name.lower() for mode in (context.mode_ahead, "reach"))
             text = f"Set-points wait: the mode is {now}, they apply in {then}"
-            context.send_text(text, context.mavlink.MAV_SEVERITY_NOTICE, "early", 10.0)
+            context.send_text(text, "NOTICE", "early", 10.0)
 
     def restart(self) -> None:
         """Clear the last set-point."""
@@ -165,9 +163,7 @@ class Targets(Service):
         """Send a warning for each objection to a target, which is accepted nevertheless; position [m, NED]."""
         context = self.context
         for words in self._keep_in.objections(position, context.view, context.settings):
-            context.send_text(
-                f"Warning: {target} {words}", context.mavlink.MAV_SEVERITY_WARNING, f"{target} {words}", _WARNING_PERIOD
-            )
+            context.send_text(f"Warning: {target} {words}", "WARNING", f"{target} {words}", _WARNING_PERIOD)
 
     # ---- commands ----
 

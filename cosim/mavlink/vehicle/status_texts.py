@@ -29,7 +29,7 @@ class StatusTexts:
         self._rejections: dict[str, dict[str, int]] = {}  # count of each unreported reason, by kind
         self._text_id = 0
 
-    def send_text(self, text: str, severity: int | None = None, key: str = "", every: float = 0.0) -> None:
+    def send_text(self, text: str, severity: str = "INFO", key: str = "", every: float = 0.0) -> None:
         """Send a text on every link, in parts if it is long; at once, or later if the rate is at its limit."""
         # with every [s, wall clock]
         now = self._clock()
@@ -61,7 +61,7 @@ class StatusTexts:
         self._send_pending()
 
     def _send_rejection(self, reason: str) -> None:
-        self.send_text(f"Refused: {reason}", self._mavlink.MAV_SEVERITY_WARNING)
+        self.send_text(f"Refused: {reason}", "WARNING")
 
     def _send_pending(self) -> None:
         now = self._clock()
@@ -71,9 +71,9 @@ class StatusTexts:
                 for link in self._links:
                     link.send(message)
 
-    def make_text(self, text: str, severity: int | None = None) -> list[Any]:
+    def make_text(self, text: str, severity: str = "INFO") -> list[Any]:
         """Return the STATUSTEXT messages of a text."""
-        level = self._mavlink.MAV_SEVERITY_INFO if severity is None else severity
+        level = getattr(self._mavlink, f"MAV_SEVERITY_{severity}")
         text = text[:_MAX_TEXT]
         if len(text) <= _CHUNK:
             return [self._make("STATUSTEXT", level, text, 0, 0)]

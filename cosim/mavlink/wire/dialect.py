@@ -12,3 +12,8 @@ def dialect() -> Any:
     from pymavlink.dialects.v20 import all as mavlink
 
     return mavlink
+
+
+def make_heartbeat(mavlink: Any, kind: int, state: int) -> Any:
+    """Return the heartbeat of a system that is no vehicle; kind is its MAV_TYPE, state its MAV_STATE."""
+    return mavlink.MAVLink_heartbeat_message(kind, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, state, 3)

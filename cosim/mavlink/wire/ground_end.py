@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from typing import Any, NamedTuple, Self
 
-from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.dialect import dialect, make_heartbeat
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.framing import V2, FrameFilter, RxStats
 from cosim.mavlink.wire.link import Link, Signer, open_channel
@@ -43,9 +43,7 @@ class GroundLink:
         self._link = Link(endpoint.text, self.channel, frames, identity, signer=signer)
         self.sends_first = endpoint.kind in ("udpout", "tcp", "serial")  # else the vehicle may not know this address
         m = dialect()
-        self._heartbeat = m.MAVLink_heartbeat_message(
-            m.MAV_TYPE_GCS, m.MAV_AUTOPILOT_INVALID, 0, 0, m.MAV_STATE_ACTIVE, 3
-        )
+        self._heartbeat = make_heartbeat(m, m.MAV_TYPE_GCS, m.MAV_STATE_ACTIVE)
 
     def receive(self, timeout: float) -> list[ReceivedMessage]:
         """Return received messages, waiting for the first; timeout [s]."""
@@ -56,10 +54,8 @@ class GroundLink:
             received: list[ReceivedMessage] = []
             for frame, message in self._link.receive(time.perf_counter() + _MAX_READ_TIME):
                 self.v1_frames += frame[0] != V2
-                sender = message.get_srcSystem(), message.get_srcComponent()
-                received.append(
-                    ReceivedMessage(time.monotonic(), *sender, message.get_seq(), message.get_type(), message)
-                )
+                source = message.get_srcSystem(), message.get_srcComponent(), message.get_seq()
+                received.append(ReceivedMessage(time.monotonic(), *source, message.get_type(), message))
                 if len(received) == _MAX_MESSAGES:
                     break
             if received or now >= deadline:
