@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal
+
+from plant_fmu.toml_tables import Table
 
 MAX_CHANNELS = 32  # maximum number of channels, those of MAVLink's longer servo packet
 MIN_PULSE, MAX_PULSE = 800, 2200  # us, minimum and maximum length of a pulse that a speed controller accepts
@@ -13,8 +14,7 @@ MIN_PULSE, MAX_PULSE = 800, 2200  # us, minimum and maximum length of a pulse th
 Curve = Callable[[float], float]  # from a servo output [us] to a fraction of the maximum force, -1 to 1; or the inverse
 
 
-@dataclass(frozen=True)
-class Autopilot:
+class Autopilot(Table, frozen=True):
     """The table ``autopilot`` of a vehicle's file."""
 
     frame: str  # the autopilot's name for the arrangement of the thrusters, such as vectored_6dof

@@ -1,22 +1,21 @@
-"""Decode TOML tables into frozen dataclasses, with errors that name the key, its value and the expected one."""
+"""Decode TOML tables into typed tables, with errors that name the key, its value and the expected one."""
 
 from __future__ import annotations
 
-import dataclasses
 import difflib
 import functools
-import math
+import re
+import sys
 import tomllib
 import types
 import typing
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, Literal
 
 import msgspec
 
 from plant_fmu.errors import TableError
-
-T = TypeVar("T")
 
 MAX_FILE = 4_000_000  # maximum number of bytes of a file; the longest in the package has a thousandth of that
 MAX_DEPTH = 20  # maximum number of levels of nested tables and lists
@@ -25,6 +24,29 @@ MAX_DIGITS = 400  # maximum number of digits of a whole number, more than any fl
 _MAX_COMPARED = 100  # maximum number of characters of a name that are compared with known names
 
 _MAX_LISTED = 30  # maximum number of names that a message lists
+
+_FINITE = sys.float_info.max
+Finite = Annotated[float, msgspec.Meta(ge=-_FINITE, le=_FINITE)]
+NonNegative = Annotated[float, msgspec.Meta(ge=0.0, le=_FINITE)]
+Positive = Annotated[float, msgspec.Meta(gt=0.0, le=_FINITE)]
+Unlimited = Annotated[float, msgspec.Meta(ge=0.0)]  # 0 to infinity
+
+_STEP = re.compile(r"\.(\w+)|\[(\d+|\.\.\.)\]")  # a part of the decoder's path, such as $.regions[0].shape
+_TYPES = {
+    "object": "a table", "array": "a list", "float": "a number", "int": "a whole number", "str": "a text",
+    "bool": "true or false", "null": "nothing",
+}  # fmt: skip
+
+
+class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """Base of all tables; a ValueError of a subclass's `__post_init__` begins with the key."""
+
+
+def key(meaning: str, unit: str = "", more: str = "", default: str = "", **constraints: Any) -> msgspec.Meta:
+    """Describe a key in Markdown: meaning, unit, addition for the reference, and the default unless it is a value."""
+    # `expected` replaces the words for a pattern in error messages.
+    extra = {"unit": unit, "more": more, "default": default, "expected": constraints.pop("expected", "")}
+    return msgspec.Meta(description=meaning, extra=extra, **constraints)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
@@ -60,16 +82,20 @@ def require_bounded(table: dict[str, Any]) -> None:
             stack += [(key, item, depth + 1) for item in value if isinstance(item, dict | list | int)]
 
 
-def decode(table: dict[str, Any], kind: type[T], where: str = "") -> T:
-    """Turn a table into a dataclass, checking every key and type."""
-    _refuse_unknown(table, kind, where)
+def decode(table: Any, kind: Any, where: str = "") -> Any:
+    """Turn a table into a `Table`, or one of several by their tags, checking every key, type and range."""
     try:
         return msgspec.convert(table, kind)
     except UnicodeEncodeError as error:  # from a command line: files are read as UTF-8
         raise TableError(f"{where or 'a text'}: {error.object!r} is no UTF-8, expected such a text") from error
     except msgspec.ValidationError as error:
-        text, _, key_path = str(error).partition(" - at ")
-        raise _type_error(text, key_path, table, kind, where) from error
+        raise TableError(_describe(error, table, kind, where)) from error
+
+
+def require(ok: bool, key: str, received: object, expected: str) -> None:
+    """Raise a ValueError that names the key of a table, unless the condition holds."""
+    if not ok:
+        raise ValueError(f"{key} is {received}, expected {expected}")
 
 
 def hint(received: str, known: typing.Iterable[str]) -> str:
@@ -82,76 +108,137 @@ def hint(received: str, known: typing.Iterable[str]) -> str:
     return f"expected one of {listed or '(none)'}"
 
 
-def find_dataclass(annotation: Any) -> type | None:
-    """Return the dataclass within an annotation such as ``X | None`` or ``tuple[X, ...]``, if there is one."""
-    if dataclasses.is_dataclass(annotation):
-        return typing.cast(type, annotation)
-    if typing.get_origin(annotation) in (types.UnionType, typing.Union, tuple, list):
-        return next((inner for a in typing.get_args(annotation) if (inner := find_dataclass(a))), None)
-    return None
-
-
 @functools.cache
-def _hints(kind: Any) -> dict[str, Any]:
-    return typing.get_type_hints(kind)
+def fields_of(kind: type[msgspec.Struct]) -> dict[str, Any]:
+    """Return the annotation of each key of a table, with its description."""
+    hints = typing.get_type_hints(kind, include_extras=True)
+    return {name: hints[name] for name in kind.__struct_fields__}
 
 
-def _refuse_unknown(table: dict[str, Any], kind: Any, where: str) -> None:
-    hints: dict[str, Any] = _hints(kind)
-    names = [f.name for f in dataclasses.fields(kind)]
-    for key, value in table.items():
-        key_path = f"{where}.{key}" if where else key
-        if key not in names:
-            raise TableError(f"{key_path}: unknown key; {hint(key, names)}")
-        inner = find_dataclass(hints[key])
-        if inner and isinstance(value, dict):
-            _refuse_unknown(value, inner, key_path)
-        elif inner and isinstance(value, list):
-            for i, item in enumerate(value):
-                if isinstance(item, dict):
-                    _refuse_unknown(item, inner, f"{key_path}.{i}")
+def types_in(annotation: Any, metas: tuple[msgspec.Meta, ...] = ()) -> Iterator[tuple[Any, tuple[msgspec.Meta, ...]]]:
+    """Yield each type that an annotation permits, with its constraints and descriptions."""
+    if typing.get_origin(annotation) is Annotated:
+        yield from types_in(annotation.__origin__, (*metas, *annotation.__metadata__))
+    elif typing.get_origin(annotation) in (typing.Union, types.UnionType):
+        for choice in typing.get_args(annotation):
+            yield from types_in(choice, metas)
+    else:
+        yield annotation, metas
 
 
-def _is_number(value: Any) -> bool:
+def table_in(annotation: Any) -> tuple[type[Table] | None, bool]:
+    """Return the table that an annotation permits, if it is one, and whether it permits a list of them."""
+    for kind, _ in types_in(annotation):
+        items = typing.get_args(kind)
+        listed = typing.get_origin(kind) is tuple and len(items) == 2 and items[1] is Ellipsis
+        item = items[0] if listed else kind
+        if isinstance(item, type) and issubclass(item, Table):
+            return item, listed
+    return None, False
+
+
+def _describe(error: msgspec.ValidationError, table: Any, kind: Any, where: str) -> str:
+    """Format an error of the decoder, which ends in a path such as ``$.a.b[0]``, with the name of the item."""
+    text, _, location = str(error).rpartition(" - at ")
+    text, value, annotation, unit, item = text or location, table, kind, "", ""
+    for name, index in _STEP.findall(location) if location.startswith("`$") else ():
+        choices = list(types_in(annotation))
+        unit = next((meta.extra["unit"] for _, metas in choices for meta in metas if meta.extra), unit)
+        annotation, step = _enter(choices, value, name or index)
+        value = value[step]
+        where += f"[{step}]" if isinstance(step, int) else f".{step}" if where else step
+        if isinstance(step, int) and isinstance(value, dict) and isinstance(value.get("name"), str):
+            item = f" ({where} is {value['name']!r})"
+    is_own = isinstance(error.__cause__, ValueError)
+    return _sentence(text, value, list(types_in(annotation)), where, unit, is_own) + item
+
+
+def _sentence(text: str, value: Any, choices: list[tuple[Any, Any]], where: str, unit: str, is_own: bool) -> str:
+    """Format the text of the decoder, or of a table's own check, about a value and the types that its key permits."""
+    metas = [meta for _, metas in choices for meta in metas]
+    extras = [meta.extra for meta in metas if meta.extra]
+    unit = next((extra["unit"] for extra in extras), unit)
+    shown, dot = f"{where or 'file'}: ", f"{where}." if where else ""
+    if is_own:
+        return f"{dot}{text}"
+    if "unknown field" in text or "missing required field" in text:
+        name = text.split("`")[1]
+        if "missing" in text:
+            tags = [tag for tag, field in _tags(choices) if field == name]
+            return f"{dot}{name} is missing" + (f", expected one of {', '.join(tags)}" if tags else "")
+        known = [name for choice, _ in choices for name in _names(choice, value)]
+        return f"{dot}{name}: unknown key; {hint(name, known)}"
+    literals = [x for choice, _ in choices if typing.get_origin(choice) is Literal for x in choice.__args__]
+    if literals:
+        tip = hint(value, filter(None, literals)) if isinstance(value, str) and isinstance(literals[0], str) else ""
+        listed = f"{shown}expected one of {', '.join(map(repr, literals))} (got {value!r})"
+        return f"{listed}; {tip}" if tip.startswith("did") else listed
+    if text.startswith("Invalid value"):  # a tag
+        return f"{where} is {value!r}, unknown; {hint(str(value), choices[0][0])}"
+    phrase = next((extra["expected"] for extra in extras if extra["expected"] and isinstance(value, str)), "")
+    if isinstance(value, int | float) and not isinstance(value, bool) and ("<" in text or ">" in text):
+        phrase = _range(metas, unit, abs(value) <= _FINITE)
+    if phrase:
+        return f"{where} is {value!r}, expected {phrase}"
+    return f"{shown}{_plain(text)}" + ("" if isinstance(value, dict) else f" (got {value!r})")
+
+
+def _names(kind: Any, value: Any) -> tuple[str, ...]:
+    """Return the keys of a table; of a tagged one if it has the tag of the value."""
+    if not (isinstance(kind, type) and issubclass(kind, Table)):
+        return ()
+    config = kind.__struct_config__
+    if not config.tag_field or not isinstance(value, dict):
+        return kind.__struct_fields__
+    return kind.__struct_fields__ if value.get(config.tag_field) == config.tag else ()
+
+
+def _enter(choices: list[tuple[Any, Any]], value: Any, step: str) -> tuple[Any, Any]:
+    """Return annotation and key of an item of a value, whose types are given; `step` is ``...`` for some key."""
+    for kind, _ in choices:
+        items = typing.get_args(kind)
+        if isinstance(value, list | tuple) and typing.get_origin(kind) is tuple and step.isdecimal():
+            return items[0 if items[-1] is Ellipsis else int(step)], int(step)
+        if step in _names(kind, value):
+            return fields_of(kind)[step], step
+        if step == "..." and typing.get_origin(kind) is dict:
+            return items[1], next(key for key, item in value.items() if not _is_valid(item, items[1]))
+    return [tag for tag, _ in _tags(choices)], int(step) if step.isdecimal() else step
+
+
+def _tags(choices: list[tuple[Any, Any]]) -> list[tuple[str, str]]:
+    """Return the tag of each table among the types, and the key that holds it."""
+    configs = [kind.__struct_config__ for kind, _ in choices if isinstance(kind, type) and issubclass(kind, Table)]
+    return [(str(config.tag), str(config.tag_field)) for config in configs if config.tag_field]
+
+
+def _is_valid(value: Any, kind: Any) -> bool:
     try:
-        return not isinstance(value, bool) and math.isfinite(float(value)) and not isinstance(value, str)
-    except (OverflowError, TypeError, ValueError):
+        msgspec.convert(value, kind)
+    except msgspec.ValidationError:
         return False
+    return True
 
 
-def _type_error(text: str, key_path: str, table: Any, kind: Any, where: str) -> TableError:
-    """Convert the decoder's error, with its path such as ``$.a.b[0]``, to one that names the key."""
-    value, annotation, path = table, kind, [where] if where else []
-    for step in (
-        key_path.strip("`").removeprefix("$").replace("[...]", ".*").replace("[", ".").replace("]", "").split(".")
-    ):
-        if not step:
-            continue
-        if step == "*":  # some key of a mapping to numbers
-            step = next((k for k, v in value.items() if not _is_number(v)), step)
-            if step == "*":
-                break
-        if isinstance(value, list):
-            value = value[int(step)]
-        else:
-            value = value[step]
-            annotation = _hints(typing.cast(Any, annotation))[step] if dataclasses.is_dataclass(annotation) else None
-            annotation = find_dataclass(annotation) or annotation
-        path.append(step)
+def _range(metas: list[msgspec.Meta], unit: str, is_finite: bool) -> str:
+    """Format the range of a number, which is finite or not."""
+    low, above = next(((m.gt, "above ") for m in metas if m.gt is not None), (None, ""))
+    low = next((m.ge for m in metas if m.ge is not None), low)
+    high = next((m.le for m in metas if m.le is not None), None)
+    unit = f" {unit}" if unit else ""
+    if low is None or low == -_FINITE:
+        return "a finite number" if high in (None, _FINITE) else f"at most {high:.12g}{unit}"
+    if high is not None and high < _FINITE:
+        return f"{above}{low:.12g} to {high:.12g}{unit}"
+    bound = f"above {low:.12g}{unit}" if above else f"{low:.12g}{unit} or above"
+    if high is None:
+        return f"{bound}, or inf"
+    return bound if is_finite else f"a finite number, {bound}"
 
-    words = {
-        "Object": "table",
-        "`object`": "a table",
-        "`array`": "a list",
-        "`float`": "a number",
-        "`int`": "a whole number",
-        "`float | null`": "a number",
-        "`int | null`": "a whole number",
-    }
-    for word, replacement in words.items():
-        text = text.replace(word, replacement)
-    text = text[:1].lower() + text[1:].replace("`", "'")
-    if typing.get_origin(annotation) is typing.Literal:
-        text = f"expected one of {', '.join(map(repr, typing.get_args(annotation)))}"
-    received = "" if isinstance(value, dict) else f" (got {value!r})"
-    return TableError(f"{'.'.join(path) or 'file'}: {text}{received}")
+
+def _plain(text: str) -> str:
+    """Replace the decoder's names of types by words."""
+    for quoted in re.findall(r"`[^`]*`", text):
+        words = [_TYPES.get(name, name) for name in quoted.strip("`").split(" | ") if name != "null"]
+        text = text.replace(quoted, " or ".join(words))
+    return text[:1].lower() + text[1:]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from plant_fmu.autopilot import Autopilot, validate_autopilot
 from plant_fmu.errors import TableError, VehicleError
-from plant_fmu.toml_tables import decode, read_toml
+from plant_fmu.toml_tables import Table, decode, read_toml
 
 Vector3 = tuple[float, float, float]
 Vector6 = tuple[float, float, float, float, float, float]
@@ -53,8 +53,7 @@ _KEYS = {
 }
 
 
-@dataclass(frozen=True)
-class RigidBody:
+class RigidBody(Table, frozen=True):
     """Mass, inertia about the body origin, center of gravity and weight."""
 
     mass: float  # kg
@@ -63,16 +62,14 @@ class RigidBody:
     weight: float  # N
 
 
-@dataclass(frozen=True)
-class Hydrostatics:
+class Hydrostatics(Table, frozen=True):
     """Buoyancy and its center."""
 
     buoyancy: float  # N
     center_of_buoyancy: Vector3  # m, body frame
 
 
-@dataclass(frozen=True)
-class Hydrodynamics:
+class Hydrodynamics(Table, frozen=True):
     """Added mass and damping, positive in the equation of motion."""
 
     added_mass: Matrix  # kg, kg m, kg m2: 6 by 6, or its diagonal
@@ -80,8 +77,7 @@ class Hydrodynamics:
     quadratic_damping: Vector6  # N s2/m2, N m s2/rad2
 
 
-@dataclass(frozen=True)
-class Thrusters:
+class Thrusters(Table, frozen=True):
     """Wrench, limits and dynamics of each thruster."""
 
     matrix: Rows  # 6 rows (X Y Z K M N), a column for each thruster: wrench of one newton
@@ -93,16 +89,14 @@ class Thrusters:
     curve: float | tuple[float, ...] = 0.0  # 0: force linear in the command; 1: quadratic; between: a mixture
 
 
-@dataclass(frozen=True)
-class Hull:
+class Hull(Table, frozen=True):
     """The sphere about the body origin that meets surface and bottom, and the shape in pictures."""
 
     radius: float = 0.0  # m
     shape: Literal["frame", "sphere"] = "frame"  # shape in pictures; the dynamics do not depend on it
 
 
-@dataclass(frozen=True)
-class _File:
+class _File(Table, frozen=True):
     name: str
     title: str
     source: str
@@ -219,7 +213,7 @@ def _shipped(name: str) -> Vehicle:
 
 def _decode(path: Path, where: str) -> Vehicle:
     try:
-        file = decode(read_toml(path), _File)
+        file: _File = decode(read_toml(path), _File)
     except TableError as error:
         raise TableError(f"{where}: {error}") from error
     return _make_vehicle(file, where)

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import msgspec
 import numpy as np
 
 from cosim.campaigns.analysis.statistics import Facts, mean_ratio, median_difference, paired, rate
@@ -21,7 +21,7 @@ from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
-from cosim.scenario.rule_variants import RuleVariant
+from cosim.scenario.tables import RuleVariant
 from plant_fmu.toml_tables import hint
 
 LAW, WHOLE = "deployable", "whole"
@@ -83,7 +83,7 @@ def ablate(
     with SceneStore(scenes) as store:
         for name, variant in flown.items():
             campaigns[name] = run_campaign(
-                store, LAW, out / name, dataclasses.replace(conditions, arbiter=variant.arbiter),
+                store, LAW, out / name, msgspec.structs.replace(conditions, arbiter=variant.arbiter),
                 gains._replace(**variant.gains), workers, progress=progress,
             )  # fmt: skip
         whole = campaigns[WHOLE].results

@@ -12,7 +12,7 @@ import numpy as np
 
 from cosim.companion.vehicle_state import ReportedState
 from cosim.mavlink.vehicle.geodesy import LocalFrame
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 from cosim.simulation.signals import Array
 
 _SAMPLES = 10  # consecutive samples of the offset that must agree before it is known

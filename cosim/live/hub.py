@@ -19,8 +19,8 @@ from cosim.live.viewer_messages import format_message, write_rows
 from cosim.replay.command_words import command_words
 from cosim.replay.header import header_of, limits_of, shape_of
 from cosim.replay.view_columns import ViewColumns
+from cosim.scenario.region_tables import PARKED_POSITION
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import PARKED_POSITION
 from cosim.simulation.commands.commands import AddObstacle, ChangeSetting, Command, ManualControl, RemoveObstacle
 from cosim.simulation.commands.obstacle_slots import ObstacleSlots
 from cosim.simulation.commands.sources import CommandQueue

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,7 +16,7 @@ from cosim.logs.quantities import QUANTITIES
 from cosim.logs.spool import LogContents
 from cosim.simulation.signals import Array
 from plant_fmu.errors import TableError
-from plant_fmu.toml_tables import decode, read_toml
+from plant_fmu.toml_tables import Table, decode, read_toml
 
 _ORDER = re.compile(r"[XYZ]{3}|[xyz]{3}")
 _MOST_ODD = 0.1  # greatest fraction of quaternions of a length other than 1, which are treated as missing
@@ -25,16 +24,14 @@ World = Literal["NED", "ENU", "NWU"]
 Body = Literal["FRD", "FLU", "RFU"]
 
 
-@dataclass(frozen=True)
-class TimeColumn:
+class TimeColumn(Table, frozen=True):
     """Column and unit of times."""
 
     column: str
     unit: Literal["s", "ms", "us", "ns", "iso8601"] = "s"
 
 
-@dataclass(frozen=True)
-class MappedQuantity:
+class MappedQuantity(Table, frozen=True):
     """Columns, unit and frame of a quantity."""
 
     columns: tuple[str, ...] = ()
@@ -49,8 +46,7 @@ class MappedQuantity:
     body: Body | None = None  # default: that of the map
 
 
-@dataclass(frozen=True)
-class ColumnMap:
+class ColumnMap(Table, frozen=True):
     """A whole column map: default time, frames and the columns of each quantity."""
 
     time: TimeColumn | None = None
@@ -157,11 +153,11 @@ def _require_angles(mapped: MappedQuantity, angles: Array) -> None:
 def read_map(path: Path) -> ColumnMap:
     """Read a column map."""
     try:
-        columns = decode(read_toml(path), ColumnMap)
+        columns: ColumnMap = decode(read_toml(path), ColumnMap)
         for name, mapped in columns.quantities.items():
             _check(name, mapped)
         if columns.messages:
-            columns = dataclasses.replace(columns, messages=str(path.parent / columns.messages))
+            columns = msgspec.structs.replace(columns, messages=str(path.parent / columns.messages))
             if not Path(columns.messages).is_dir():
                 raise TableError(f"messages is {columns.messages!r}, expected a folder of .msg files")
         if not columns.quantities:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+import msgspec
 import numpy as np
 
 from cosim.errors import ImportLogError
@@ -94,7 +95,7 @@ def _of_pulses(
 
         words = f"pulses of {topic.name} by the T200's published curve, at {voltage}, cut at {VOLTAGES[0]:g} V"
         return Commands(topic.quantity, "thrusters", thrust, f"{words} and {VOLTAGES[-1]:g} V")
-    shape = Autopilot(**{**vars(table), "curve": curve or table.curve})
+    shape = msgspec.structs.replace(table, curve=curve or table.curve)
     efforts = [np.vectorize(effort_of_pulse(shape, int(sign)), otypes=[float]) for sign in signs]
 
     def forces(values: Array, _: Array) -> Array:

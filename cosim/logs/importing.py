@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from cosim.errors import ImportLogError, RunError
@@ -225,7 +226,7 @@ def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, w
                     recorder.observe(k, row)
                     k += 1
         recorder.close()
-        write_atomic(folder.path / IMPORT, json_text(dataclasses.asdict(facts)))
+        write_atomic(folder.path / IMPORT, json_text(msgspec.to_builtins(facts)))
         return conclude(folder.path, _flown_by(flown, contents), IMPORTED, None, wanted.report)
     except OSError as error:
         folder.discard()
@@ -262,8 +263,8 @@ def _from_first(scenario: Scenario, rows: Array, names: list[str]) -> Scenario:
         values = rows[:, [names.index(column) for column in columns]]
         known = np.flatnonzero(np.isfinite(values).all(axis=1))
         if known.size:
-            initial = dataclasses.replace(initial, **{key: tuple(values[known[0]].tolist())})
-    table = scenario.table | {"initial": dataclasses.asdict(initial)}
+            initial = msgspec.structs.replace(initial, **{key: tuple(values[known[0]].tolist())})
+    table = scenario.table | {"initial": msgspec.to_builtins(initial)}
     return validate_scenario(table, scenario.name, scenario.vehicle)
 
 

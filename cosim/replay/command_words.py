@@ -7,7 +7,7 @@ from bisect import bisect_right
 from collections.abc import Sequence
 from typing import assert_never
 
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 from cosim.simulation.commands.commands import (
     AddObstacle,
     Arm,

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json
 from plant_fmu.errors import TableError
-from plant_fmu.toml_tables import decode
+from plant_fmu.toml_tables import Table, decode
 
 IMPORT = "import.json"
 COMMAND_TIME = "measured.time.commands"  # column of an imported run: when its commands were sampled [s]
 
 
-@dataclass(frozen=True)
-class TopicFacts:
+class TopicFacts(Table, frozen=True):
     """A quantity of a log: its source, its sample rate, and repairs of its samples."""
 
     quantity: str
@@ -31,8 +29,7 @@ class TopicFacts:
     broken: int  # samples with NaN or infinity
 
 
-@dataclass(frozen=True)
-class LogFacts:
+class LogFacts(Table, frozen=True):
     """Facts about the log of an imported run."""
 
     log: str  # name of the file
@@ -49,6 +46,7 @@ def load_log_facts(folder: Path) -> LogFacts:
     """Load the facts about the log of an imported run."""
     file = folder / IMPORT
     try:
-        return decode(read_json(file), LogFacts)
+        facts: LogFacts = decode(read_json(file), LogFacts)
+        return facts
     except TableError as error:
         raise RunError(f"{file}: {error}") from error

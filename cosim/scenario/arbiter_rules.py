@@ -9,17 +9,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import msgspec
+
 from controller.regions.region_set import of_attitude
 from cosim.errors import ScenarioError
 from cosim.scenario.criteria import PAPER, CriterionSetup
-from cosim.scenario.rule_variants import rules_by_order
-from cosim.scenario.tables import ArbiterSetup, SecondaryRegion
-from fuzzy_arbiter import Arbiter, ArbiterError, System
+from cosim.scenario.tables import ArbiterSetup, RuleVariant, SecondaryRegion
+from fuzzy_arbiter import Arbiter, ArbiterError, Rule, Shape, System, Term, Variable, prioritised
 from fuzzy_arbiter.formats import FORMATS, reads
 from plant_fmu.toml_tables import hint
 
 MAX_TEXT = 200_000  # greatest number of characters of a file of rules
 MAX_INPUTS = 32  # greatest number of inputs of a file of rules
+
+_ON = Shape(((0.5 - 1e-9, 0.0), (0.5 + 1e-9, 1.0)))  # crisp, but continuous
+_OFF = Shape(((0.5 - 1e-9, 1.0), (0.5 + 1e-9, 0.0)))
 
 Kind = Literal["given", "time", "depth", "speed", "membership", "clearance", "closing_speed", "approach_time"]
 VEHICLE_SIGNALS: dict[str, str] = {"time": "s", "depth": "m", "speed": "m/s"}  # signals of the vehicle, and their units
@@ -70,7 +74,7 @@ def read_rules(setup: ArbiterSetup) -> ArbiterSetup:
     text = setup.text or _text(path)
     if len(text) > MAX_TEXT:
         raise ScenarioError(f"arbiter.file: {path.name} has more than {MAX_TEXT} characters, expected rules for people")
-    return replace(setup, file=path.name, text=text)
+    return msgspec.structs.replace(setup, file=path.name, text=text)
 
 
 def _text(path: Path) -> str:
@@ -115,6 +119,27 @@ def check_rules(
         if name not in known:
             raise ScenarioError(f"arbiter.inputs.{name}: {setup.file} has no such input; {hint(name, known)}")
     return ArbiterRules(system, tuple(_signals(setup, known, criteria, regions)))
+
+
+@functools.lru_cache(maxsize=16)
+def rules_by_order(variant: RuleVariant, criteria: tuple[CriterionSetup, ...], points: int) -> System:
+    """Make the fuzzy system that weighs criteria by their order."""
+    fuzzy = [criterion.fuzzy for criterion in criteria]
+    if variant == "reversed":
+        system = prioritised(fuzzy[::-1], points=points)
+        return replace(system, outputs=system.outputs[::-1], weights_of=system.weights_of[::-1])
+    system = prioritised(fuzzy, points=points)
+    if variant == "crisp":
+        inputs = [Variable(c.name, (0.0, 1.0), (Term(c.off, _OFF), Term(c.on, _ON))) for c in fuzzy]
+        return replace(system, inputs=tuple(inputs))
+    if variant == "none":
+        rules = [
+            Rule.parse(f"if {criterion.name} is {term} then {output.name} is {level}")
+            for criterion, output in zip(fuzzy, system.outputs, strict=True)
+            for term, level in zip((criterion.off, criterion.on), output.term_names, strict=True)
+        ]
+        return replace(system, rules=tuple(rules))
+    return system
 
 
 @functools.lru_cache(maxsize=8)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal
+
+import msgspec
 
 from controller.regions.region_set import of_attitude
 from cosim.errors import ScenarioError
 from cosim.scenario.membership_terms import read_term, term_in_words
-from cosim.scenario.tables import PAPER_CRITERIA, CriterionEntry, SecondaryRegion
+from cosim.scenario.region_tables import PAPER_CRITERIA, CriterionEntry
+from cosim.scenario.tables import SecondaryRegion
 from fuzzy_arbiter import SECTION_VI, Criterion
 from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.shapes import Membership
@@ -25,8 +27,6 @@ QUANTITIES: dict[str, str] = {  # argument of a membership function, and its uni
     "approach_time": "s",
 }
 MAX_CRITERIA = 16
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,23}")  # valid in column names, and as a variable in all formats of rules
-_COLOUR = re.compile(r"#[0-9A-Fa-f]{6}")
 # for criteria without a colour: Okabe and Ito's purple, then muted ones of Tol's
 _COLOURS = ("#CC79A7", "#882255", "#44AA99", "#999933", "#332288", "#88CCEE", "#AA4499", "#117733")
 _PAPER = {criterion.name: criterion for criterion in SECTION_VI}
@@ -67,29 +67,27 @@ class CriterionSetup:
         return _PAPER.get(self.name) or Criterion(self.name, on="pressing", off="satisfied")
 
 
-def check_criteria(
-    entries: tuple[CriterionEntry, ...],
-) -> tuple[tuple[CriterionEntry, ...], tuple[CriterionSetup, ...]]:
-    """Check the criteria; return the entries with defaults filled in, and the criteria by descending priority."""
+def fill_criteria(entries: tuple[CriterionEntry, ...]) -> tuple[CriterionEntry, ...]:
+    """Fill in the defaults of order and colour."""
+    return tuple(_filled(entry, i, entries) for i, entry in enumerate(entries))
+
+
+def check_criteria(entries: tuple[CriterionEntry, ...]) -> tuple[CriterionSetup, ...]:
+    """Check the criteria; return them by descending priority."""
     if not 1 <= len(entries) <= MAX_CRITERIA:
-        raise ScenarioError(f"criteria: {len(entries)} came, expected 1 to {MAX_CRITERIA}")
-    names = [entry.name for entry in entries]
-    filled = tuple(_filled(entry, i, entries) for i, entry in enumerate(entries))
-    for i, entry in enumerate(filled):
-        key = f"criteria.{entry.name}"
-        if not (_NAME.fullmatch(entry.name) and is_identifier(entry.name)):
-            expected = "a letter, then at most 23 letters, digits and _, no word of rules"
-            raise ScenarioError(f"criteria.{i}.name is {entry.name!r}, expected {expected}")
-        if names.count(entry.name) > 1:
-            raise ScenarioError(f"{key}.name is used twice, expected a name of its own")
-        if not _COLOUR.fullmatch(entry.colour):
-            raise ScenarioError(f"{key}.colour is {entry.colour!r}, expected #RRGGBB")
-        before = next((other for other in filled[:i] if other.order == entry.order), None)
-        if before is not None:
-            raise ScenarioError(f"{key}.order is {entry.order}, as that of {before.name}: expected one of its own")
-    setups = [CriterionSetup(e.name, e.colour, tuple(_reasons(e.membership, f"criteria.{e.name}"))) for e in filled]
-    order = sorted(range(len(filled)), key=lambda i: filled[i].order or 0)
-    return filled, tuple(setups[i] for i in order)
+        raise ScenarioError(f"criteria: got {len(entries)}, expected 1 to {MAX_CRITERIA}")
+    setups: dict[int, CriterionSetup] = {}
+    for i, entry in enumerate(fill_criteria(entries)):
+        key, order = f"criteria[{i}]", entry.order or 0
+        if not is_identifier(entry.name):
+            raise ScenarioError(f"{key}.name is {entry.name!r}, expected no word of rules")
+        if entry.name in (setup.name for setup in setups.values()):
+            raise ScenarioError(f"{key}.name is {entry.name!r}, used twice, expected a name of its own")
+        if order in setups:
+            raise ScenarioError(f"{key}.order is {order}, as that of {setups[order].name}: expected one of its own")
+        reasons = tuple(_reasons(entry.membership, f"{key}.membership"))
+        setups[order] = CriterionSetup(entry.name, entry.colour, reasons)
+    return tuple(setups[order] for order in sorted(setups))
 
 
 def _filled(entry: CriterionEntry, place: int, entries: Sequence[CriterionEntry]) -> CriterionEntry:
@@ -98,14 +96,15 @@ def _filled(entry: CriterionEntry, place: int, entries: Sequence[CriterionEntry]
     of_paper = {c.name: c.colour for c in PAPER_CRITERIA if c.colour not in taken}
     without = sum(not other.colour and other.name not in of_paper for other in entries[:place])
     order = place + 1 if entry.order is None else entry.order
-    return replace(entry, order=order, colour=entry.colour or of_paper.get(entry.name) or free[without % len(free)])
+    colour = entry.colour or of_paper.get(entry.name) or free[without % len(free)]
+    return msgspec.structs.replace(entry, order=order, colour=colour)
 
 
 def _reasons(membership: dict[str, Any], key: str) -> Iterator[Reason]:
     if not membership:
         yield Reason("ramp", None)
     for quantity, value in membership.items():
-        where = f"{key}.membership.{quantity}"
+        where = f"{key}.{quantity}"
         if quantity not in QUANTITIES:
             raise ScenarioError(f"{where}: unknown key; {hint(quantity, QUANTITIES)}")
         if quantity == "ramp":
@@ -120,8 +119,8 @@ def _reasons(membership: dict[str, Any], key: str) -> Iterator[Reason]:
 def check_criteria_of_regions(regions: Sequence[SecondaryRegion], criteria: Sequence[CriterionSetup]) -> None:
     """Raise `ScenarioError` unless each region has a criterion with a reason that applies to it."""
     known = {criterion.name: criterion for criterion in criteria}
-    for region in regions:
-        key, name = f"regions.{region.region.name}.criterion", region.criterion
+    for i, region in enumerate(regions):
+        key, name = f"regions[{i}].criterion", region.criterion
         if name not in known and region.is_dynamic:
             raise ScenarioError(
                 f"commands.obstacles is above 0, expected 0 without a criterion {name!r}, which they have"
@@ -137,4 +136,4 @@ def check_criteria_of_regions(regions: Sequence[SecondaryRegion], criteria: Sequ
             )
 
 
-PAPER = check_criteria(PAPER_CRITERIA)[1]
+PAPER = check_criteria(PAPER_CRITERIA)

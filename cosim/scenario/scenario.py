@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,12 +18,12 @@ from controller.regions.shape import Shape
 from controller.restoring import parameters
 from cosim.errors import ScenarioError
 from cosim.scenario.arbiter_rules import ArbiterRules, check_rules, read_rules
-from cosim.scenario.changes import changed_keys, differing_keys, join_keys, shown_title
-from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions
+from cosim.scenario.changes import changed_keys, differing_keys, join_keys, shown_title, with_values
+from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions, fill_criteria
 from cosim.scenario.crossing_costs import with_crossing_costs
 from cosim.scenario.keys import comments
+from cosim.scenario.region_tables import PAPER_CRITERIA, Vector3
 from cosim.scenario.tables import (
-    PAPER_CRITERIA,
     Actuation,
     ArbiterSetup,
     Commands,
@@ -40,24 +39,16 @@ from cosim.scenario.tables import (
     SecondaryRegion,
     Sensing,
     Time,
-    TimeEntry,
-    Vector3,
-)
+)  # fmt: skip
 from cosim.scenario.toml_file import flatten, list_scenarios, override, read_table, set_key
 from cosim.scenario.toml_text import scenario_text
 from cosim.scenario.validation import (
-    check_commands,
-    check_failures,
     check_goal,
     check_intersection,
     check_law,
-    check_numbers,
-    check_outages,
-    check_parameters,
-    check_record,
     check_regions,
-    check_texts,
-    check_time,
+    check_tables,
+    obstacle_slots,
     steps_per_period,
 )
 from plant_fmu.errors import PlantFmuError
@@ -156,13 +147,13 @@ class Scenario:
         >>> load_scenario("paper").replace({"limit.force": 500.0, "regions.SR1.gain": 5000.0}).limit.force
         500.0
         """
-        before, table = tomllib.loads(self.toml()), tomllib.loads(self.toml())
+        table = with_values(self.table, {})
         try:
             for key, value in changes.items():
                 set_key(table, key, value.tolist() if isinstance(value, np.generic | np.ndarray) else value)
             require_bounded(table)
             scenario = validate_scenario(table, self.name)
-            return _with_changes(scenario, table, before)
+            return _with_changes(scenario, table, self.table)
         except (PlantFmuError, ControllerError, ScenarioError) as error:
             raise ScenarioError(f"{self.name}: {error}") from error
 
@@ -260,7 +251,7 @@ def load_scenario(name_or_file: str | Path, overrides: Sequence[str] = (), impor
     try:
         table, name, titled = read_table(text)
         for one in (table, titled):  # so that keys of the default can be set
-            one.setdefault("criteria", [dataclasses.asdict(entry) for entry in PAPER_CRITERIA])
+            one.setdefault("criteria", [msgspec.to_builtins(entry) for entry in PAPER_CRITERIA])
         for change in overrides:
             override(table, change)
         require_bounded(table)
@@ -283,49 +274,50 @@ def to_scenario(scenario: Scenario | str | Path) -> Scenario:
 def _with_changes(scenario: Scenario, table: dict[str, Any], titled: dict[str, Any]) -> Scenario:
     """Return the scenario with the list of keys in which its table differs from the one that has its title."""
     try:
-        before = validate_scenario(titled, scenario.name)
+        before = msgspec.to_builtins(read_tables(titled, scenario.name))
     except (PlantFmuError, ControllerError, ScenarioError):  # an incomplete base: keys that complete it are changes too
         keys: Iterable[str] = differing_keys(titled, table)
     else:
-        keys = changed_keys(before.table, scenario.table, scenario.vehicle)
+        keys = changed_keys(before, scenario.table, scenario.vehicle)
     return dataclasses.replace(scenario, table=scenario.table | {"changed": join_keys(scenario.table["changed"], keys)})
 
 
 def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None = None) -> Scenario:
     """Make a scenario from the table of its file."""
+    return make_scenario(read_tables(table, name), name, vehicle)
+
+
+def read_tables(table: dict[str, Any], name: str) -> File:
+    """Check each table of a scenario's file, and fill in the defaults."""
     plant = table.get("plant")
     if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
-        plant["parameters"] = flatten(plant["parameters"])
-    file = decode(table, File)
-    check_texts(file)
-    time = check_time(file.time)
-    check_numbers(file)
-    goal, motion = check_goal(file)
-    regions = check_regions(file.regions)
-    criterion_entries, criteria = check_criteria(file.criteria)
-    overlapping = check_intersection(file.intersection, regions)
-    slots = check_commands(file.commands, file.record, file.law.name, tuple(r.region.name for r in regions))
-    check_criteria_of_regions(regions + slots, criteria)
-    arbiter = read_rules(file.arbiter)
-    rules = check_rules(arbiter, criteria, regions)
-    vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
-    vehicle = vehicle or load_vehicle(vehicle_file or file.vehicle)
-    check_parameters(file.plant.parameters, vehicle)
-    regions = with_crossing_costs(regions, tuple(c.name for c in criteria), rules, file.initial.position[2])
-    law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(slots))
-    check_failures(file.failures, file.actuation.through, vehicle)
-    check_outages(file.outages, file.sensing.through)
-    check_record(file.record, law, regions)
-
-    filled = dataclasses.replace(
+        table = table | {"plant": plant | {"parameters": flatten(plant["parameters"])}}
+    file: File = decode(table, File)
+    return msgspec.structs.replace(
         file,
         title=file.title or name,
-        time=TimeEntry(time.duration, time.step, time.control, time.arbiter),
-        law=dataclasses.replace(file.law, gains=law.gains._asdict()),
-        arbiter=arbiter,
-        criteria=criterion_entries,
-        intersection=tuple(regions[i].region.name for i in overlapping),
+        law=msgspec.structs.replace(file.law, gains=file.law.setup.gains._asdict()),
+        criteria=fill_criteria(file.criteria),
+        arbiter=read_rules(file.arbiter),
     )
+
+
+def make_scenario(file: File, name: str, vehicle: Vehicle | None = None) -> Scenario:
+    """Check the tables of a scenario against each other and the vehicle."""
+    time = file.time
+    goal, motion = check_goal(file)
+    regions = check_regions(file.regions)
+    criteria = check_criteria(file.criteria)
+    overlapping = check_intersection(file.intersection, regions)
+    slots = obstacle_slots(file)
+    check_criteria_of_regions(regions + slots, criteria)
+    rules = check_rules(file.arbiter, criteria, regions)
+    vehicle_file = Path(file.vehicle) if file.vehicle.endswith(".toml") else None
+    vehicle = vehicle or load_vehicle(vehicle_file or file.vehicle)
+    law = check_law(file.law, file.actuation.through, vehicle, time.control, len(regions) + len(slots))
+    check_tables(file, regions, vehicle)
+    regions = with_crossing_costs(regions, tuple(c.name for c in criteria), rules, file.initial.position[2])
+    names = tuple(regions[i].region.name for i in overlapping)
     return Scenario(
         name=name,
         vehicle=vehicle,
@@ -337,7 +329,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
         plant=file.plant,
         initial=file.initial,
         law=law,
-        arbiter=arbiter,
+        arbiter=file.arbiter,
         criteria=criteria,
         rules=rules,
         limit=file.limit,
@@ -357,5 +349,5 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
         regions=regions + slots,
         intersection=overlapping,
         compare=file.compare,
-        table=msgspec.to_builtins(dataclasses.asdict(filled)),
+        table=msgspec.to_builtins(msgspec.structs.replace(file, intersection=names)),
     )

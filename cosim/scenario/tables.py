@@ -1,79 +1,131 @@
-"""The tables of a scenario: as in its file, and checked."""
+"""The tables of a scenario's file: each key with its type, range, unit and meaning; and checked values."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, NamedTuple
 
+import msgspec
+
+from controller import LAWS
 from controller.regions import Region
+from cosim.scenario.region_tables import PAPER_CRITERIA, CriterionEntry, RegionEntry, Vector3, Vector4, Vector6
+from plant_fmu.toml_tables import Finite, NonNegative, Positive, Table, Unlimited, hint, key, require
 
-Vector3 = tuple[float, float, float]
-Vector4 = tuple[float, float, float, float]
-Vector6 = tuple[float, float, float, float, float, float]
-
-PARKED_POSITION: Vector3 = (0.0, 0.0, -1e5)  # m, NED: position of free obstacle slots
-
-
-# ---- the same in the file and checked ------------------------------------------------------------------------------
+RuleVariant = Literal["ordered", "reversed", "crisp", "none"]
+MAX_TEXT = 200  # greatest number of characters of a text
+MAX_POINTS = 100_001  # greatest number of samples of the arbiter's output universe
+MAX_OBSTACLES = 100  # greatest number of obstacle slots
 
 
-@dataclass(frozen=True)
-class PlantSetup:
+def require_text(name: str, text: str) -> None:
+    """Require one printable line, without control characters for terminals."""
+    ok = text.isprintable() and len(text) <= MAX_TEXT
+    require(ok, name, repr(text), f"one line of at most {MAX_TEXT} printable characters")
+
+
+def _require_unit(name: str, quaternion: Vector4) -> None:
+    ok = abs(math.hypot(*quaternion) - 1.0) < 1e-6
+    require(ok, name, quaternion, "four numbers of length 1")
+
+
+# ---- tables of the file --------------------------------------------------------------------------------------------
+
+
+class PlantSetup(Table, frozen=True):
     """Setup of the plant."""
 
-    fmi: Literal[2, 3] = 3
-    current: Vector3 = (0.0, 0.0, 0.0)  # m/s, velocity of the water, world frame
-    substep: float = 0.005  # s, greatest integration step
-    parameters: dict[str, float | bool] = field(default_factory=dict)  # FMU parameters that override the vehicle's
+    fmi: Annotated[Literal[2, 3], key("FMI version of the plant, 2 or 3")] = 3
+    current: Annotated[Vector3, key("velocity of the water, north east down", "m/s")] = (0.0, 0.0, 0.0)
+    substep: Annotated[Positive, key("greatest integration step", "s")] = 0.005
+    parameters: Annotated[
+        dict[str, bool | Finite],
+        key("parameters of the FMU over those of the vehicle, such as `mass` or `r_G.z`", more="; not for the law"),
+    ] = msgspec.field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Initial:
+class Initial(Table, frozen=True):
     """State of the vehicle at time 0."""
 
-    position: Vector3  # m, NED
-    quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)  # unit quaternion from body to world, scalar first
-    velocity: Vector6 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # m/s, rad/s, body frame
+    position: Annotated[Vector3, key("position at time 0, north east down", "m")]
+    quaternion: Annotated[Vector4, key("attitude at time 0, body to world, scalar first")] = (1.0, 0.0, 0.0, 0.0)
+    velocity: Annotated[Vector6, key("velocity at time 0, body frame", "m/s, rad/s")] = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def __post_init__(self) -> None:
+        _require_unit("quaternion", self.quaternion)
 
 
-@dataclass(frozen=True)
-class ArbiterSetup:
+class ArbiterSetup(Table, frozen=True):
     """Setup of the arbiter, which computes weights from memberships or other signals."""
 
-    engine: Literal["closed", "exact", "grid", "skfuzzy"] = "closed"
-    ramp: float = 0.2  # m (rad for regions of attitude), width over which a membership falls from 1 to 0 outside
-    points: int = 101  # samples of the output universe, for grid and skfuzzy
-    rules: Literal["ordered", "reversed", "crisp", "none"] = "ordered"  # rule variant without a file
-    file: str = ""  # rule file in a format of fuzzy_arbiter; empty: rules by the order of the criteria
-    text: str = ""  # content of the file
-    inputs: dict[str, Any] = field(default_factory=dict)  # signal, number or course of each input of the file's rules
+    engine: Annotated[
+        Literal["closed", "exact", "grid", "skfuzzy"],
+        key("`closed`, `exact`, `grid` or `skfuzzy`", more="; see [arbiter.md](arbiter.md#engines)"),
+    ] = "closed"
+    ramp: Annotated[
+        NonNegative,
+        key("width over which a membership falls outside its region; rad for regions of attitude", "m"),
+    ] = 0.2
+    points: Annotated[int, key("samples of the output universe, for `grid` and `skfuzzy`", ge=3, le=MAX_POINTS)] = 101
+    rules: Annotated[
+        RuleVariant,
+        key(
+            "`ordered`: by the criteria's order; `reversed`, `crisp`, `none`: to compare with",
+            more=", see [criteria.md](criteria.md#to-compare-with); not beside a file",
+        ),
+    ] = "ordered"
+    file: Annotated[
+        str,
+        key(
+            "rules of one's own, beside the file that names it",
+            more=": any format of [fuzzy_arbiter](arbiter.md#formats), see [criteria.md](criteria.md#your-own-rules)",
+        ),
+    ] = ""
+    text: Annotated[str, key("content of that file", more="; runs write it into their folder")] = ""
+    inputs: Annotated[dict[str, Any], key("signal for each input of these rules")] = msgspec.field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class Limit:
+class Limit(Table, frozen=True):
     """Limit of the direct body wrench, followed by a lag."""
 
-    force: float = math.inf  # N, on the norm of the body force; its direction is kept, the moment left alone
-    time_constant: float = 0.0  # s, time constant of the lag
+    force: Annotated[
+        Unlimited,
+        key(
+            "limit on the norm of the direct body force", "N",
+            "; direction kept, moment left alone; not with thrusters",
+        ),
+    ] = math.inf  # fmt: skip
+    time_constant: Annotated[NonNegative, key("lag behind that limit", "s")] = 0.0
 
 
-@dataclass(frozen=True)
-class Actuation:
+class Actuation(Table, frozen=True):
     """Path of the law's wrench to the body."""
 
-    through: Literal["wrench", "thrusters"] = "wrench"
-    limits: Literal["direction", "per-thruster"] = "direction"  # scale all thruster forces alike, or cut each
+    through: Annotated[
+        Literal["wrench", "thrusters"],
+        key(
+            "`wrench` on the body, or `thrusters`",
+            more=": through the allocation, or set by a law that drives thrusters",
+        ),
+    ] = "wrench"
+    limits: Annotated[
+        Literal["direction", "per-thruster"],
+        key("`direction` scales all thrusters together, `per-thruster` cuts each"),
+    ] = "direction"
 
 
-@dataclass(frozen=True)
-class Failure:
+class Failure(Table, frozen=True):
     """A thruster that gives less force, or a constant one, from some time on."""
 
-    thruster: int  # number of the thruster, from 1
-    time: float  # s, time of the failure
-    effectiveness: float = 0.0  # remaining fraction of its force
-    stuck: bool = False  # True: it keeps the force that was commanded last
+    thruster: Annotated[int, key("number of the thruster, from 1")]
+    time: Annotated[NonNegative, key("time of the failure", "s")]
+    effectiveness: Annotated[float, key("part of its force that remains, 0 to 1", ge=0.0, le=1.0)] = 0.0
+    stuck: Annotated[bool, key("it keeps the force that was commanded last")] = False
+
+    def __post_init__(self) -> None:
+        ok = not (self.stuck and self.effectiveness)
+        require(ok, "effectiveness", self.effectiveness, "none of a thruster that is stuck")
 
     @property
     def is_total(self) -> bool:
@@ -81,28 +133,43 @@ class Failure:
         return self.stuck or self.effectiveness == 0.0
 
 
-@dataclass(frozen=True)
-class Outage:
+class Outage(Table, frozen=True):
     """A period in which a sensor gives no samples."""
 
-    sensor: Literal["depth_sensor", "dvl", "imu", "compass", "usbl"]
-    time: float  # s, beginning of the outage
-    duration: float  # s
+    sensor: Annotated[
+        Literal["depth_sensor", "dvl", "imu", "compass", "usbl"],
+        key("`depth_sensor`, `dvl`, `imu`, `compass` or `usbl`"),
+    ]
+    time: Annotated[NonNegative, key("beginning of the outage", "s")]
+    duration: Annotated[NonNegative, key("duration of the outage", "s")]
 
 
-@dataclass(frozen=True)
-class Sensing:
+class Sensing(Table, frozen=True):
     """Source of the state for law and arbiter: the plant's state, or a navigation filter with the plant's sensors."""
 
-    # The plant's position and linear velocity may have noise; its attitude and body rates are exact.
+    # The plant's position and linear velocity may have white noise, drawn anew at each control step; its attitude and
+    # body rates are exact.
 
-    through: Literal["state", "sensors"] = "state"
-    position_noise: float = 0.0  # m, standard deviation of each coordinate, white, drawn anew at each control step
-    velocity_noise: float = 0.0  # m/s, standard deviation of each linear velocity, likewise
-    seed: int = 0  # seed of the noise
-    dead_from: float = math.inf  # s, time at which both are lost
-    dead_for: float = 0.0  # s, duration of the loss
-    frozen: bool = False  # True: the last values are held meanwhile; False: they are NaN
+    through: Annotated[
+        Literal["state", "sensors"],
+        key(
+            "`state`, with noise on position and velocity, or `sensors`",
+            more=": what the navigation filter makes of them, see [navigation.md](navigation.md)",
+        ),
+    ] = "state"
+    position_noise: Annotated[NonNegative, key("standard deviation of each measured coordinate", "m")] = 0.0
+    velocity_noise: Annotated[
+        NonNegative, key("standard deviation of each measured linear velocity, body frame", "m/s")
+    ] = 0.0
+    seed: Annotated[int, key("seed of the noise", ge=0)] = 0
+    dead_from: Annotated[Unlimited, key("time at which measured position and linear velocity are lost", "s")] = math.inf
+    dead_for: Annotated[NonNegative, key("duration of that loss", "s")] = 0.0
+    frozen: Annotated[bool, key("the last values are held during that loss, instead of NaN")] = False
+
+    def __post_init__(self) -> None:
+        for name in ("position_noise", "velocity_noise", "dead_for") if self.through == "sensors" else ():
+            expected = "0 with sensing.through = 'sensors': plant.parameters and outages say it"
+            require(getattr(self, name) == 0.0, name, getattr(self, name), expected)
 
     @property
     def exact(self) -> bool:
@@ -111,136 +178,186 @@ class Sensing:
         return not noisy and (self.dead_for == 0.0 or self.dead_from == math.inf)
 
 
-@dataclass(frozen=True)
-class Commands:
+class Commands(Table, frozen=True):
     """Setup of commands to the running vehicle."""
 
-    enabled: bool = False
-    await_arm: bool = False  # True: the run starts once the vehicle is armed
-    obstacles: int = 8  # number of obstacle slots
-    obstacle_radius: float = 0.5  # m, radius of obstacles without a given size
-    obstacle_gain: float = 100.0  # N per unit of g, gain of each obstacle
-    hold_radius: float = 0.3  # m, radius of the target sphere in modes hold and surface
-    surface_depth: float = 0.5  # m, depth of that sphere's centre in mode surface
-    pilot_gain: float = 0.5  # fraction of the greatest wrench at full stick
+    enabled: Annotated[
+        bool,
+        key("the running vehicle takes [commands](mavlink.md) from outside", more="; `cosim run --commands` sets it"),
+    ] = False
+    await_arm: Annotated[bool, key("nothing moves before it is armed", more="; `--await-arm` sets it")] = False
+    obstacles: Annotated[
+        int,
+        key("greatest number of obstacles that commands add during the run, up to 100", ge=0, le=MAX_OBSTACLES),
+    ] = 8
+    obstacle_radius: Annotated[Positive, key("radius of an obstacle whose size is not given", "m")] = 0.5
+    obstacle_gain: Annotated[NonNegative, key("gain of each obstacle, per unit of g", "N")] = 100.0
+    hold_radius: Annotated[Positive, key("radius of the target sphere in modes hold and surface", "m")] = 0.3
+    surface_depth: Annotated[
+        float, key("depth of that sphere's centre in mode surface", "m", ge=0.0, le=1e3)
+    ] = 0.5  # fmt: skip
+    pilot_gain: Annotated[
+        float,
+        key("part of the greatest wrench along an axis that a full stick commands", ge=0.0, le=1.0),
+    ] = 0.5
 
 
-@dataclass(frozen=True)
-class MasterSetup:
+class MasterSetup(Table, frozen=True):
     """Order in which a step calls its parts."""
 
-    # gauss-seidel: each part uses outputs of this step; jacobi: all parts use outputs of the step before
-    order: Literal["gauss-seidel", "jacobi"] = "gauss-seidel"
+    order: Annotated[
+        Literal["gauss-seidel", "jacobi"],
+        key(
+            "`gauss-seidel`, or `jacobi`: each part uses the outputs of the step before",
+            more=", see [The order of a step](#the-order-of-a-step)",
+        ),
+    ] = "gauss-seidel"
 
 
-@dataclass(frozen=True)
-class RecordSetup:
+class RecordSetup(Table, frozen=True):
     """Optional signals of the record."""
 
-    lyapunov: bool = False  # V of (31) and its rate, with the paper's law
+    lyapunov: Annotated[
+        bool,
+        key(
+            "record V of (31) and its rate, with the paper's law",
+            more=", in three forms; see [theory.md](theory.md#where-the-theory-holds)",
+        ),
+    ] = False
 
 
-# ---- as in the file ------------------------------------------------------------------------------------------------
+class Time(Table, frozen=True):
+    """Periods; each is a whole multiple of the step."""
+
+    duration: Annotated[Positive, key("duration of the run", "s")]
+    step: Annotated[Positive, key("co-simulation step; the other periods are whole multiples", "s")] = 0.001
+    control: Annotated[Positive, key("period of the law", "s", default="the step")] = 0.0
+    arbiter: Annotated[Positive, key("period of the arbiter", "s", default="the step")] = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("control", "arbiter"):
+            msgspec.structs.force_setattr(self, name, getattr(self, name) or self.step)
 
 
-@dataclass(frozen=True)
-class TimeEntry:
-    """Periods; defaults depend on the step."""
+class LawEntry(Table, frozen=True):
+    """Name and gains of the law; gains that are not given are the law's own."""
 
-    duration: float  # s
-    step: float = 0.001  # s
-    control: float | None = None  # s, default: the step
-    arbiter: float | None = None  # s, default: the step
+    name: Annotated[
+        str,
+        key(
+            "one of `controller.LAWS`",
+            more="; naming another one than the base drops the base's gains. In the folder of a run that "
+            "[a law of one's own](howto/own-law.md) flew: where that is from, such as `mine.py:steer`",
+        ),
+    ] = "ismail_dunnigan"
+    desired_quaternion: Annotated[
+        Vector4, key("attitude to be kept, body to world, scalar first")
+    ] = (1.0, 0.0, 0.0, 0.0)  # fmt: skip
+    gains: Annotated[
+        dict[str, float],
+        key(
+            "gains of that law",
+            more="; the paper's law, section VII: `k_p1 k_p2 k_q k_v1 k_v2 sigma_p sigma_a gamma`",
+            default="the law's own",
+        ),
+    ] = msgspec.field(default_factory=dict)
 
+    def __post_init__(self) -> None:
+        require_text("name", self.name)
+        _require_unit("desired_quaternion", self.desired_quaternion)
+        if self.is_custom:
+            if self.gains:
+                raise ValueError(f"gains has {next(iter(self.gains))!r}, expected nothing with a law of one's own")
+            return
+        if self.name not in LAWS:
+            new = "'ismail_dunnigan': the paper's law has its authors' names now" if self.name == "printed" else ""
+            require(False, "name", repr(self.name), new or f"one of {', '.join(map(repr, sorted(LAWS)))}")
+        known = LAWS[self.name].gains_type._fields
+        for name in self.gains:
+            if name not in known:
+                raise ValueError(f"gains.{name}: unknown key; {hint(name, known)}")
 
-@dataclass(frozen=True)
-class LawEntry:
-    """Name and gains of the law, not checked yet."""
+    @property
+    def setup(self) -> LawSetup:
+        """The law with all of its gains."""
+        gains = NoGains() if self.is_custom else LAWS[self.name].gains_type(**self.gains)
+        return LawSetup(self.name, self.desired_quaternion, gains)
 
-    name: str = "ismail_dunnigan"
-    desired_quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)
-    gains: dict[str, float] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class CriterionEntry:
-    """A criterion for which regions are weighed."""
-
-    name: str
-    order: int | None = None  # rank, the least of which comes first; default: its index in the list, from 1
-    colour: str = ""  # #RRGGBB; default: an unused one
-    membership: dict[str, Any] = field(default_factory=dict)  # terms by quantity; default: the arbiter's ramp
-
-
-# section VI of the paper; the colours are Okabe and Ito's, which are safe for colour blindness
-PAPER_CRITERIA = (
-    CriterionEntry("obstacle", 1, "#D55E00"),
-    CriterionEntry("shape", 2, "#E69F00"),
-    CriterionEntry("depth", 3, "#56B4E9"),
-)
-
-
-@dataclass(frozen=True)
-class RegionEntry:
-    """A secondary region; the keys of its shape depend on the shape."""
-
-    name: str
-    criterion: str  # name of a criterion
-    keep: Literal["in", "out"]
-    gain: float
-    shape: dict[str, Any]
-    velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
-    streamed: bool = False  # True: moved from outside during the run
-    hard: bool = True  # True: must not be violated, for laws that distinguish hard and soft regions
-    deviation: float | tuple[float, float, float] = 0.0  # m, standard deviation of its position: one number, or NED
-    priority: float = 1.0  # factor of its violation in the score; laws do not receive it
+    @property
+    def is_custom(self) -> bool:
+        """True if the name is the source of a custom law, such as ``mine.py:steer``."""
+        return ":" in self.name
 
 
-@dataclass(frozen=True)
-class File:
+class File(Table, frozen=True):
     """A whole scenario file."""
 
-    vehicle: str
-    time: TimeEntry
+    vehicle: Annotated[
+        str, key("a shipped vehicle, or a TOML file beside the file that names it", more=" (with `--set`: here)")
+    ]
+    time: Time
     initial: Initial
-    goal: dict[str, Any] = field(default_factory=dict)  # empty only for an imported log without a goal
-    title: str = ""
-    log: str = ""  # name of the file that the run was imported from
-    changed: tuple[str, ...] = ()  # keys that were changed since the title was written
-    compare: Literal["", "paper"] = ""
-    intersection: tuple[str, ...] = ()
-    report_failures: bool = False
+    goal: Annotated[dict[str, Any], key("a shape in space: the primary region", more=", see below")] = msgspec.field(
+        default_factory=dict
+    )
+    title: Annotated[str, key("one line for the report, at most 200 characters", default="the name")] = ""
+    log: Annotated[
+        str,
+        key(
+            "name of the log that a run was imported from",
+            more="; `cosim import` writes it into the run folder, and no scenario with it can be run",
+            default="none",
+        ),
+    ] = ""
+    changed: Annotated[
+        tuple[str, ...],
+        key(
+            "keys that were changed since the title was written",
+            more=", see [below](#titles); runs write it into their folder",
+            default="none",
+        ),
+    ] = ()
+    compare: Annotated[Literal["", "paper"], key('`"paper"` puts the paper\'s claims beside the run')] = ""
+    intersection: Annotated[
+        tuple[str, ...],
+        key("names of the regions, to be kept out of, whose overlap is reported", default="all"),
+    ] = ()
+    report_failures: Annotated[bool, key("law and allocation are informed when a thruster fails")] = False
     plant: PlantSetup = PlantSetup()
     law: LawEntry = LawEntry()
     arbiter: ArbiterSetup = ArbiterSetup()
-    criteria: tuple[CriterionEntry, ...] = PAPER_CRITERIA
+    criteria: Annotated[
+        tuple[CriterionEntry, ...],
+        key(
+            "reasons for which regions ask for attention",
+            more=", see [criteria.md](criteria.md)",
+            default="the paper's three",
+        ),
+    ] = PAPER_CRITERIA
     limit: Limit = Limit()
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
-    failures: tuple[Failure, ...] = ()
-    outages: tuple[Outage, ...] = ()
+    failures: Annotated[
+        tuple[Failure, ...],
+        key("thrusters that fail; only where `thrusters` carry the wrench", default="none"),
+    ] = ()
+    outages: Annotated[
+        tuple[Outage, ...],
+        key("times in which a sensor gives no samples; where sensing is through `sensors`", default="none"),
+    ] = ()
     master: MasterSetup = MasterSetup()
     record: RecordSetup = RecordSetup()
     commands: Commands = Commands()
-    regions: tuple[RegionEntry, ...] = ()
+    regions: Annotated[tuple[RegionEntry, ...], key("secondary regions", default="none")] = ()
+
+    def __post_init__(self) -> None:
+        for name in ("title", "log"):
+            require_text(name, getattr(self, name))
+        for changed in self.changed:
+            require_text("changed", changed)
 
 
-def is_custom_law(law: str) -> bool:
-    """Return True if a law's name is the source of a custom law, such as ``mine.py:steer``."""
-    return ":" in law
-
-
-# ---- checked -------------------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Time:
-    """Periods; each is a whole multiple of the step."""
-
-    duration: float  # s
-    step: float  # s, co-simulation step of the plant
-    control: float  # s, period of the law
-    arbiter: float  # s, period of the arbiter
+# ---- checked values ------------------------------------------------------------------------------------------------
 
 
 class NoGains(NamedTuple):
@@ -258,7 +375,7 @@ class LawSetup:
     @property
     def own(self) -> bool:
         """True if it is a custom law, whose code is not in the file."""
-        return is_custom_law(self.name)
+        return isinstance(self.gains, NoGains)
 
 
 @dataclass(frozen=True)

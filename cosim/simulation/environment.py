@@ -15,8 +15,8 @@ from controller.regions import Box, Cylinder, Ellipsoid, Sphere, pack
 from controller.regions.region_set import PackedRegions, evaluate_packed
 from controller.regions.shape import Shape
 from cosim.errors import CommandError, RunError
+from cosim.scenario.region_tables import PARKED_POSITION, Vector3
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import PARKED_POSITION, Vector3
 from cosim.simulation.signals import Array
 
 CENTERED = (Box, Ellipsoid, Sphere)  # shapes with a centre

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from controller.quaternion import rotation_matrix
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 from cosim.simulation.stepped_plant import SteppedPlant
 from cosim.sitl.rangefinder import Rangefinder
 

@@ -1,7 +1,6 @@
 """The autopilot table of a vehicle file: validation, and pulses of thrusters."""
 
-import dataclasses
-
+import msgspec
 import pytest
 
 from plant_fmu.autopilot import MAX_PULSE, MIN_PULSE, Autopilot, effort_of_pulse, pulse_of_effort, validate_autopilot
@@ -13,7 +12,7 @@ def require(good, key, came, expected):
 
 
 def checked(**change):
-    return validate_autopilot(dataclasses.replace(Autopilot("vectored_6dof"), **change), 4, require)
+    return validate_autopilot(msgspec.structs.replace(Autopilot("vectored_6dof"), **change), 4, require)
 
 
 def test_each_thruster_has_a_channel_and_a_sign():

@@ -118,7 +118,7 @@ def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Rep
 
 def _of_scene(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
     gains = law_named(plan["law"]).gains_type(**plan["gains"])
-    conditions = decode(plan["conditions"], Conditions, "conditions")
+    conditions: Conditions = decode(plan["conditions"], Conditions, "conditions")
     line = stored["scene"].encode()
     scenario = None
     if stored["refused"] is None:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
-from controller.regions.region_set import SHAPES
+import msgspec
+
+from controller.regions.region_set import name_of
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.scenario_scene import AnyScene, ScenarioScene
 from cosim.campaigns.scenes.scene import Scene, plant_values, scene_regions
@@ -38,12 +39,12 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
             "parameters": {k: float(v) for k, v in values.items() if k.partition(".")[0] not in _OF_THE_SCENARIO},
         },
         "initial": {"position": scene.start},
-        "goal": {"type": "sphere", **dataclasses.asdict(scene.goal)},
+        "goal": {"type": "sphere", **msgspec.to_builtins(scene.goal)},
         "law": {"name": law, "gains": gains._asdict()},
         "arbiter": conditions.arbiter_table({"ramp": conditions.ramp}),
         "actuation": {"through": "thrusters"},
         "sensing": _sensing(scene, conditions),
-        "outages": [dataclasses.asdict(outage) for outage in conditions.outages],
+        "outages": msgspec.to_builtins(conditions.outages),
         "failures": _failures(scene, conditions),
         "report_failures": conditions.report_failures,
         "regions": _regions(scene),
@@ -59,7 +60,7 @@ def _changes(scene: ScenarioScene, conditions: Conditions) -> dict[str, Any]:
     if conditions.sensing == "sensors":
         changes["sensing"] = {"through": "sensors", "seed": scene.seed}
     if conditions.outages:
-        changes["outages"] = [*table.get("outages", ()), *map(dataclasses.asdict, conditions.outages)]
+        changes["outages"] = [*table.get("outages", ()), *msgspec.to_builtins(conditions.outages)]
     return changes
 
 
@@ -84,7 +85,6 @@ def _failures(scene: Scene, conditions: Conditions) -> list[dict[str, float]]:
 
 def _regions(scene: Scene) -> list[dict[str, Any]]:
     """Return the regions for the law, as tables of a scenario."""
-    kinds = {shape: name for name, shape in SHAPES.items()}
     return [
         {
             "name": region.name,
@@ -92,7 +92,7 @@ def _regions(scene: Scene) -> list[dict[str, Any]]:
             "keep": region.keep,
             "gain": region.gain,
             "velocity": region.velocity,
-            "shape": {"type": kinds[type(region.shape)], **dataclasses.asdict(region.shape)},  # type: ignore[call-overload]
+            "shape": {"type": name_of(region.shape), **msgspec.to_builtins(region.shape)},
         }
         for region, criterion in scene_regions(scene)
     ]

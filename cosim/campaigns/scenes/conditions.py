@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario.arbiter_rules import read_rules
-from cosim.scenario.rule_variants import RuleVariant
-from cosim.scenario.tables import ArbiterSetup, Outage
+from cosim.scenario.tables import ArbiterSetup, Outage, RuleVariant
 from fuzzy_arbiter import Arbiter, ArbiterError
 from fuzzy_arbiter.formats import FORMATS, reads
+from plant_fmu.toml_tables import Table
 
 
-@dataclass(frozen=True)
-class Conditions:
+class Conditions(Table, frozen=True):
     """Conditions of flights; the defaults are those of the score."""
 
     # A scene that is a scenario has its own duration, periods and ramp.

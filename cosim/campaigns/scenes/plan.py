@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.store.plan import SCENES, code_digest, versions
@@ -23,8 +25,8 @@ class Plan:
 
     def table(self) -> dict[str, Any]:
         """Return the plan as a table for JSON."""
-        outages = [asdict(outage) for outage in self.conditions.outages]  # a list, as JSON reads them
-        return {"kind": SCENES} | asdict(self) | {"conditions": asdict(self.conditions) | {"outages": outages}}
+        plan: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(self))
+        return {"kind": SCENES} | plan
 
 
 def plan_of(law: str, gains: Any, conditions: Conditions, scenes: int, digest: str) -> Plan:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
 from typing import Any
 
 from controller import ControllerError
@@ -12,12 +11,12 @@ from cosim.campaigns.scenes.scene import Scene
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu import PlantFmuError
+from plant_fmu.toml_tables import Table
 
 _MOST = 60  # greatest number of characters of a kind
 
 
-@dataclass(frozen=True)
-class ScenarioScene:
+class ScenarioScene(Table, frozen=True):
     """One scene of a file."""
 
     seed: int

@@ -4,26 +4,23 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from controller.regions import DepthBand, Region, Sphere
 from controller.regions.shape import GREATEST
 from cosim.errors import ScenarioError
+from plant_fmu.toml_tables import Table
 from plant_fmu.vehicle import Vehicle
 
 Vector3 = tuple[float, float, float]
 
 
-@dataclass(frozen=True)
-class SphereSpec:
+class SphereSpec(Table, frozen=True):
     """The goal region."""
 
     centre: Vector3  # m, NED
     radius: float  # m
 
 
-@dataclass(frozen=True)
-class Obstacle:
+class Obstacle(Table, frozen=True):
     """A sphere to keep out of, which may drift."""
 
     centre: Vector3  # m, NED, at time 0
@@ -31,8 +28,7 @@ class Obstacle:
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
 
 
-@dataclass(frozen=True)
-class Noise:
+class Noise(Table, frozen=True):
     """Standard deviations of the white noise of measurements at each control step."""
 
     position: float = 0.0  # m
@@ -40,16 +36,14 @@ class Noise:
     seed: int | None = None  # seed of the noise; None: that of the scene
 
 
-@dataclass(frozen=True)
-class Failure:
+class Failure(Table, frozen=True):
     """A thruster that gives no force from some time on."""
 
     index: int  # number of the thruster, from 1
     time: float  # s, time of the failure
 
 
-@dataclass(frozen=True)
-class Scene:
+class Scene(Table, frozen=True):
     r"""One scene of a file.
 
     Examples

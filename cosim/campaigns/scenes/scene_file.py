@@ -23,7 +23,7 @@ def decode_scene(line: bytes) -> AnyScene:
         table = msgspec.json.decode(line)
         if not isinstance(table, dict):
             raise ScenarioError(f"expected one JSON object, got {type(table).__name__!r}")
-        scene = decode(table, ScenarioScene) if "scenario" in table else decode(table, Scene)
+        scene: AnyScene = decode(table, ScenarioScene) if "scenario" in table else decode(table, Scene)
     except (msgspec.MsgspecError, PlantFmuError, RecursionError, UnicodeDecodeError) as error:
         raise ScenarioError(str(error).removeprefix("file: ")) from error
     if isinstance(scene, Scene):

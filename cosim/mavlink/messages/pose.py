@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import Fields
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 
 _E7 = 1e7  # in a degree
 _MM = 1e3

@@ -9,7 +9,7 @@ from cosim.mavlink.messages.pose import to_lat_lon_alt
 from cosim.mavlink.vehicle.proximity import MAX_RANGE, SECTORS
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import Fields
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 
 SURFACE_PRESSURE = 1013.25  # hPa
 WATER_DENSITY = 1000.0  # kg/m3, fresh water, ArduSub's default

@@ -8,7 +8,7 @@ from typing import Any
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 from cosim.mavlink.wire.thrust_body import THRUST_BODY_SET, get_thrust_body
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 from cosim.simulation.commands.commands import Mode, SetAttitude, SetTarget
 from cosim.simulation.commands.stick_stabilizer import CLIMB_RATE
 

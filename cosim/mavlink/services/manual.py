@@ -16,7 +16,7 @@ from cosim.mavlink.vehicle.ardusub_sticks import (
     apply_dead_zone,
 )
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
-from cosim.scenario.tables import Vector6
+from cosim.scenario.region_tables import Vector6
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.commands import STICK_MODES, ManualControl, Mode
 from cosim.simulation.commands.stick_stabilizer import GREATEST_TILT

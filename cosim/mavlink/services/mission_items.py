@@ -11,7 +11,7 @@ from cosim.mavlink.services.service import to_local_position, unscale_position
 from cosim.mavlink.vehicle.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.vehicle_context import ReceivedMissionItem, VehicleContext
 from cosim.mavlink.wire.encode import round_finite
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 from cosim.simulation.commands.commands import ChangeSetting, MissionItem, SetHeading
 
 _MAX_STAY = 1e9  # s

@@ -9,7 +9,7 @@ from typing import Any
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 from cosim.simulation.commands.commands import AddObstacle, RemoveObstacle
 
 _MIN_MOVE = 0.05  # m, displacement below which no command is submitted

@@ -9,7 +9,7 @@ from typing import Any
 
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
 from cosim.mavlink.wire.encode import round_finite
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 from cosim.simulation.commands.commands import Command
 
 Handler = Callable[[Sender, Any], None]

@@ -13,7 +13,7 @@ from cosim.mavlink.vehicle.keep_in_regions import KeepInRegions
 from cosim.mavlink.vehicle.profile import MODE_TABLE
 from cosim.mavlink.vehicle.speed import SPEED, resolve_speed
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 from cosim.simulation.commands.commands import Command, SetHeading, SetMode, SetTarget
 
 _X_Y, _Z = 0b011, 0b100  # type_mask: bits of ignored fields

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 
 _SEMI_MAJOR = 6_378_137.0  # m, WGS84
 _ECCENTRICITY_SQUARED = 6.69437999014e-3

@@ -11,8 +11,8 @@ from controller.regions import pack
 from controller.regions.region_set import of_attitude
 from controller.regions.shape import Shape
 from cosim.mavlink.vehicle.view import View
+from cosim.scenario.region_tables import Vector3
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.settings import LiveSettings
 
 _LEVEL = np.array([1.0, 0.0, 0.0, 0.0])

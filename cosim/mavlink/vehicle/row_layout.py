@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from cosim.scenario.region_tables import Vector3
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import Vector3
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array, Column

@@ -20,8 +20,8 @@ from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.encode import Encoder
 from cosim.mavlink.wire.link import Link
 from cosim.mavlink.wire.options import MavlinkOptions
+from cosim.scenario.region_tables import Vector3, Vector6
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import Vector3, Vector6
 from cosim.simulation.commands.commands import Arm, Command, MissionItem, Mode, SetMode, SetTarget
 from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.sources import CommandQueue

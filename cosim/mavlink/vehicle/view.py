@@ -8,7 +8,7 @@ from functools import cached_property
 
 from controller.quaternion import rotation_rows
 from cosim.mavlink.vehicle.row_layout import RowLayout
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 from cosim.simulation.commands.commands import MODES, Mode
 from cosim.simulation.signals import Array
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from controller import VehicleState
 from cosim.errors import CommandError
+from cosim.scenario.region_tables import Vector3
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import Vector3
 from cosim.simulation.actuators import Actuators
 from cosim.simulation.commands.commands import (
     MODES,

@@ -9,7 +9,7 @@ from typing import Literal, get_args
 import msgspec
 
 from cosim.errors import CommandError
-from cosim.scenario.tables import Vector3, Vector6
+from cosim.scenario.region_tables import Vector3, Vector6
 
 Mode = Literal["manual", "hold", "reach", "mission", "surface", "stabilize", "depth_hold"]
 

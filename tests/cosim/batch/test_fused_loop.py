@@ -3,11 +3,11 @@
 import ctypes
 import math
 import signal
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from controller import LAWS, IsmailDunniganLaw, VehicleState
 from controller.allocation import Allocation

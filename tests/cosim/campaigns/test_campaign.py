@@ -3,12 +3,12 @@
 import json
 import math
 import os
-from dataclasses import replace
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
+from msgspec.structs import replace
 
 from controller import LawError
 from controller.paper_law import Gains

@@ -1,8 +1,6 @@
 """The page on campaigns matches the code."""
 
-import dataclasses
 import re
-import typing
 from pathlib import Path
 
 from cosim.batch.fused import FusedFlyer
@@ -16,7 +14,7 @@ from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.sweeps.design import KINDS
 from cosim.command_line.cli import main
 from cosim.scenario.scenario import load_scenario
-from plant_fmu.toml_tables import find_dataclass
+from plant_fmu.toml_tables import fields_of, table_in
 
 PAGE = (Path(__file__).parents[3] / "docs" / "campaigns.md").read_text()
 
@@ -35,11 +33,11 @@ def table_after(heading):
 
 def test_every_key_of_a_scene_is_documented():
     words = " ".join(row[0] for row in table_after("## Scenes"))
-    for field in dataclasses.fields(Scene):
-        kind = find_dataclass(typing.get_type_hints(Scene)[field.name])
-        assert f"`{field.name}" in words
-        for inner in dataclasses.fields(kind) if kind else ():
-            assert f".{inner.name}`" in words, (field.name, inner.name)
+    for name, annotation in fields_of(Scene).items():
+        table, _ = table_in(annotation)
+        assert f"`{name}" in words
+        for inner in fields_of(table) if table else ():
+            assert f".{inner}`" in words, (name, inner)
 
 
 def test_the_example_is_a_scene():

@@ -8,7 +8,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from scipy.spatial.transform import Rotation
 
 from cosim.mavlink.wire.options import PROFILES
-from cosim.scenario.tables import PARKED_POSITION
+from cosim.scenario.region_tables import PARKED_POSITION
 from tests.cosim.mavlink.station import Station, scenario
 
 NOTHING, UNKNOWN = 2001, 0xFFFF

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from cosim.errors import ScenarioError
+from cosim.scenario.arbiter_rules import rules_by_order
 from cosim.scenario.criteria import PAPER, CriterionSetup, Reason
-from cosim.scenario.rule_variants import rules_by_order
 from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import SECTION_VI, Arbiter, prioritised
 

@@ -1,5 +1,7 @@
 """Successive goals: when they advance, when they count as reached, and the fused loop bit for bit."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -80,13 +82,13 @@ def test_soft_region_does_not_block_a_goal_inside_it(net_weight):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("goal.stay=-1.0", "goal.stay is -1.0, expected a finite number"),
-        ("goal.then=[[0.0, 0.0, inf]]", "goal.then.0"),
+        ("goal.stay=-1.0", "goal.stay is -1.0, expected 0 s"),
+        ("goal.then=[[0.0, 0.0, inf]]", "goal.then[0][2]"),
         ("goal.velocity=[0.1, 0.0, 0.0]", "goal.velocity"),
         ("goal.streamed=true", "goal.streamed is true"),
         ("commands.enabled=true", "commands.enabled is true"),
     ],
 )
 def test_incompatible_keys_are_rejected_by_name(change, words):
-    with pytest.raises(ScenarioError, match=words.replace(".", r"\.")):
+    with pytest.raises(ScenarioError, match=re.escape(words)):
         load_scenario("paper", [*TOUR, change])

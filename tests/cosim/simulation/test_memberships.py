@@ -10,7 +10,8 @@ from controller.compiling.function import CompiledFunction
 from controller.regions import Orientation, Region, Sphere
 from cosim.errors import ScenarioError
 from cosim.scenario.criteria import PAPER, check_criteria
-from cosim.scenario.tables import CriterionEntry, SecondaryRegion
+from cosim.scenario.region_tables import CriterionEntry
+from cosim.scenario.tables import SecondaryRegion
 from cosim.simulation.curves import _power, _quotient
 from cosim.simulation.memberships import compute_memberships, pack_memberships
 from fuzzy_arbiter import Shape
@@ -60,7 +61,7 @@ def test_membership_term_equals_its_curve(places, data):
     if len(set(degrees)) == 1 or min(np.diff(places)) < 1e-9:
         return
     points = [list(point) for point in zip(places, degrees, strict=True)]
-    _, setups = check_criteria(
+    setups = check_criteria(
         (
             CriterionEntry("near", membership={"clearance": points}),
             CriterionEntry("soon", membership={"approach_time": points}),
@@ -79,7 +80,7 @@ def test_criterion_membership_is_the_maximum_over_its_terms():
         "angle": {"falling": [0.0, 0.1]},
         "approach_time": {"falling": [2.0, 4.0]},
     }
-    _, setups = check_criteria((CriterionEntry("view", membership=membership),))
+    setups = check_criteria((CriterionEntry("view", membership=membership),))
     assert memberships_of([0.5], ["view"], 0.2, setups, [9.0]).tolist() == [0.5]
     assert memberships_of([0.5], ["view"], 0.2, setups, [2.5]).tolist() == [0.75]
     level = Orientation((1.0, 0.0, 0.0, 0.0), 0.1)
@@ -88,7 +89,7 @@ def test_criterion_membership_is_the_maximum_over_its_terms():
 
 
 def test_criteria_without_membership_use_the_arbiter_ramp():
-    _, setups = check_criteria((CriterionEntry("a"), CriterionEntry("b", membership={"ramp": 0.4})))
+    setups = check_criteria((CriterionEntry("a"), CriterionEntry("b", membership={"ramp": 0.4})))
     assert memberships_of([0.1, 0.1], ["a", "b"], 0.2, setups).tolist() == [0.5, 0.75]
     assert pack_memberships(regions(["a", "b"]), setups, 0.2).follows.tolist() == [True, False]
 
@@ -119,8 +120,7 @@ FORMULAS = [
 
 
 def curved(term):
-    _, setups = check_criteria((CriterionEntry("near", membership={"clearance": term}),))
-    return setups
+    return check_criteria((CriterionEntry("near", membership={"clearance": term}),))
 
 
 def test_every_curve_has_a_case():
@@ -185,7 +185,7 @@ def test_division_and_power_errors_follow_numpy(a, b):
     ],
 )
 def test_invalid_curves_are_rejected(term, fault):
-    with pytest.raises(ScenarioError, match=f"^criteria.near.membership.{fault}"):
+    with pytest.raises(ScenarioError, match=rf"^criteria\[0\].membership.{fault}"):
         curved(term)
 
 

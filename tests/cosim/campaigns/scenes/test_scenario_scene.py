@@ -200,7 +200,7 @@ SCENARIO = make_conflict(0)["scenario"]
         ({"scenario": SCENARIO | {"vehicle": "mine.toml"}}, r"vehicle is 'mine\.toml', expected one that is shipped"),
         ({"scenario": SCENARIO | {"arbiter": {"file": "a.fcl"}}}, r"arbiter\.text is missing"),
         ({"scenario": SCENARIO | {"master": {"order": "jacobi"}}}, r"scenario\.master\.order is 'jacobi', expected"),
-        ({"scenario": SCENARIO | {"regions": [{"name": "x"}]}}, r"regions\.(0|x)"),
+        ({"scenario": SCENARIO | {"regions": [{"name": "x"}]}}, r"regions\[0\]\.criterion is missing"),
         ({"more": 1}, r"more: unknown key"),
     ],
 )

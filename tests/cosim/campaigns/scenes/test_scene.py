@@ -1,11 +1,11 @@
 """Scenes: parsed by line, rejected by line and key, and passed to the law without undisclosed conditions."""
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 from controller import LAWS, IsmailDunniganLaw
 from controller.regions.region_set import PackedRegions

@@ -1,0 +1,142 @@
+"""The tables of a scenario's goal, regions, shapes and criteria."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_type_hints
+
+import msgspec
+
+from controller.errors import RegionError
+from controller.regions.region_set import deviations_of
+from controller.regions.shape import Shape
+from controller.regions.shapes import ENTRIES
+from plant_fmu.toml_tables import Finite, NonNegative, Table, key, require
+
+Vector3 = tuple[Finite, Finite, Finite]
+Vector4 = tuple[Finite, Finite, Finite, Finite]
+Vector6 = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+PARKED_POSITION: Vector3 = (0.0, 0.0, -1e5)  # m, NED: position of free obstacle slots
+
+
+class CriterionEntry(Table, frozen=True):
+    """A criterion for which regions are weighed."""
+
+    name: Annotated[
+        str,
+        key(
+            "unique name: a letter, then at most 23 letters, digits and _",
+            pattern=r"\A[A-Za-z][A-Za-z0-9_]{0,23}\Z",  # valid in column names, and as a variable in all rule formats
+            expected="a letter, then at most 23 letters, digits and _, no word of rules",
+        ),
+    ]
+    order: Annotated[int | None, key("priority: the least comes first", default="its place in the list")] = None
+    colour: Annotated[
+        str,
+        key(
+            "colour in figures and pages, `#RRGGBB`", default="one that no other has",
+            pattern=r"\A(#[0-9A-Fa-f]{6})?\Z", expected="#RRGGBB",
+        ),
+    ] = ""  # fmt: skip
+    membership: Annotated[
+        dict[str, Any],
+        key(
+            "memberships by `ramp`, `clearance`, `angle`, `approach_time`; the greatest counts",
+            default="`arbiter.ramp`",
+        ),
+    ] = msgspec.field(default_factory=dict)
+
+
+# section VI of the paper; the colours are Okabe and Ito's, which are safe for colour blindness
+PAPER_CRITERIA = (
+    CriterionEntry("obstacle", 1, "#D55E00"),
+    CriterionEntry("shape", 2, "#E69F00"),
+    CriterionEntry("depth", 3, "#56B4E9"),
+)
+
+
+class ShapeTable(Table, frozen=True, tag_field="type", omit_defaults=True):
+    """Base of the table of each shape."""
+
+    def __post_init__(self) -> None:
+        try:
+            self.shape  # noqa: B018
+        except RegionError as error:
+            raise ValueError(str(error).partition(": ")[2]) from error
+
+    @property
+    def shape(self) -> Shape:
+        """The shape itself."""
+        values = {name: getattr(self, name) for name in self.__struct_fields__}
+        return ENTRIES[str(self.__struct_config__.tag)].shape(**values)
+
+
+def _shape_table(kind: str) -> type[ShapeTable]:
+    shape = ENTRIES[kind].shape
+    hints = get_type_hints(shape)
+    fields = [
+        (name, hints[name], getattr(shape, name)) if hasattr(shape, name) else (name, hints[name])
+        for name in ENTRIES[kind].units
+    ]
+    fields.sort(key=len)  # required ones first
+    return msgspec.defstruct(shape.__name__, fields, bases=(ShapeTable,), frozen=True, tag=kind)  # type: ignore[return-value]
+
+
+if TYPE_CHECKING:
+    AnyShape = ShapeTable
+else:
+    AnyShape = Union[tuple(_shape_table(kind) for kind in ENTRIES)]  # noqa: UP007
+
+
+class GoalMotion(Table, frozen=True):
+    """Keys of the goal beside those of its shape."""
+
+    velocity: Annotated[
+        Vector3, key("velocity of the goal, north east down", "m/s", "; as `regions[].velocity`")
+    ] = (0.0, 0.0, 0.0)  # fmt: skip
+    streamed: Annotated[bool, key("moved from outside during the run", more="; as `regions[].streamed`")] = False
+    then: Annotated[
+        tuple[Vector3, ...], key("next centres of the goal in turn, north east down", "m", ", below")
+    ] = ()  # fmt: skip
+    stay: Annotated[NonNegative, key("time within the goal before the goal moves to its next place", "s")] = 5.0
+
+
+class RegionEntry(Table, frozen=True):
+    """A secondary region; the keys of its shape depend on the shape."""
+
+    name: Annotated[
+        str,
+        key(
+            "unique name: letters, digits, blanks, - and _",
+            pattern=r"\A(?!goal\Z)[A-Za-z0-9][A-Za-z0-9 _-]{0,39}\Z",  # valid in column names and labels of figures
+            expected="at most 40 letters, digits, blanks, - and _, and not goal",
+        ),
+    ]
+    criterion: Annotated[str, key("name of the criterion", more=" whose weight multiplies the gain")]
+    keep: Annotated[Literal["in", "out"], key("`in` or `out`")]
+    gain: Annotated[NonNegative, key("alpha of section VII")]
+    shape: Annotated[AnyShape, key("a shape", more=", below")]
+    velocity: Annotated[Vector3, key("velocity, north east down; the law receives it", "m/s")] = (0.0, 0.0, 0.0)
+    streamed: Annotated[bool, key("moved from outside during the run", more=", below")] = False
+    hard: Annotated[
+        bool,
+        key("must not be violated", more="; the paper's law and laws of plain potentials do not use it"),
+    ] = True
+    deviation: Annotated[
+        float | tuple[float, float, float],  # a range beside a tuple makes msgspec read memory that is not its own
+        key(
+            "standard deviation of its place, or three: north, east, down", "m",
+            ": margins of the deployable law grow",
+        ),
+    ] = 0.0  # fmt: skip
+    priority: Annotated[
+        NonNegative,
+        key(
+            "factor of its violation in the score",
+            more=" `weighted_violation`; neither arbiter nor law receives it",
+        ),
+    ] = 1.0
+
+    def __post_init__(self) -> None:
+        ok = all(0.0 <= deviation < math.inf for deviation in deviations_of(self.deviation))
+        require(ok, "deviation", self.deviation, "finite, 0 m or above, one number or three")
