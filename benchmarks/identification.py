@@ -25,9 +25,7 @@ from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from controller.quaternion import from_axis_angle, multiply
-from cosim.identification.excitation.design import design
-from cosim.identification.excitation.rehearsal import DVL_PERIOD, NOISE, rehearse
-from cosim.identification.excitation.scenario_text import ROW, load, scenario_text
+from cosim.identification.excitation import DVL_PERIOD, NOISE, ROW, design, excitation_scenario, rehearse
 from cosim.identification.findings import NAMED
 from cosim.identification.fit import Fit, fit, integration_step
 from cosim.identification.intervals import DISAGREES
@@ -211,7 +209,7 @@ def jacobian_times(log: Log, vehicle: Vehicle, parameters: list[Parameter], done
 
 
 def measure(
-    nuisance: str, estimated: bool, seed: int, text: str, commands: Any, noise: float
+    nuisance: str, estimated: bool, seed: int, duration: float, commands: Any, noise: float
 ) -> tuple[dict[str, Any], tuple[Log, list[Parameter], Fit]]:
     """Simulate a vehicle and identify it; return its line of results, and its log, parameters and fit."""
     vehicle = load_vehicle(VEHICLE)
@@ -223,7 +221,9 @@ def measure(
     over = {p.plant: float(x) for p, x in zip(truths, truth, strict=True) if p.plant}
     lag = float(truth[[p.kind for p in truths].index("lag")])
     over |= {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
-    scenario = load(text, VEHICLE).replace({"plant.current": current, "plant.parameters": over})
+    scenario = excitation_scenario(VEHICLE, vehicle, DEPTH, duration).replace(
+        {"plant.current": current, "plant.parameters": over}
+    )
     log, gone = fly(scenario, commands, nuisance, noise, rng)
     parameters = [*truths, *free_parameters(vehicle, free), *nuisances(beside, [log])]
     wall, process = time.perf_counter(), time.process_time()
@@ -298,9 +298,8 @@ def main() -> None:
     started = time.perf_counter()
     plan = None if options.dive else design(VEHICLE, BOX, DEPTH, options.duration)
     commands = dive(options.duration) if plan is None else plan.commands
-    duration = options.duration if plan is None else plan.duration
+    duration = options.duration if plan is None else plan.scenario.time.duration
     print(json.dumps({"design [s]": round(time.perf_counter() - started, 1), "duration [s]": duration}), flush=True)
-    text = scenario_text(VEHICLE, DEPTH, duration, VEHICLE)
     known = options.out.read_text().splitlines() if options.out and options.out.exists() else []
     flown = {(line["nuisance"], line["estimated"], line["seed"]): line for line in map(json.loads, known)}
     asked = [
@@ -311,7 +310,7 @@ def main() -> None:
     last = None
     for case in asked:
         if case not in flown:
-            flown[case], last = measure(*case, text, commands, options.noise)
+            flown[case], last = measure(*case, duration, commands, options.noise)
             if options.out:
                 with options.out.open("a") as file:
                     file.write(json.dumps(flown[case]) + "\n")

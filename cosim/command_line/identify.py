@@ -91,13 +91,13 @@ def _excite(
     options: argparse.Namespace, free: Sequence[str], nuisance: Sequence[str], progress: Callable[[float], None]
 ) -> list[str]:
     """Design the stick inputs and write their folder; return what to print."""
-    from cosim.identification.excitation import folder
-    from cosim.identification.excitation.design import design
+    from cosim.identification import excitation_page
+    from cosim.identification.excitation import design
 
     refuse_flags(options, ["runs", "held_out"], "none with --excite")
-    folder.require_empty(options.out)
+    excitation_page.require_empty(options.out)
     given = {name: getattr(options, name) for name in _EXCITATION if getattr(options, name) is not None}
     box, depth, time, current, seed = (_EXCITATION | given).values()
     done = design(options.vehicle, tuple(box), depth, time, free, nuisance, seed, progress, current)
-    page = folder.write_folder(done, options.out)
-    return [folder.verdict(done), *folder.warnings(done), str(page)]
+    page = excitation_page.write_folder(done, options.out)
+    return [excitation_page.verdict(done), *excitation_page.warnings(done), str(page)]

@@ -66,7 +66,7 @@ def within_margins(p: Parameter, delays: dict[str, float]) -> Parameter:
     if p.kind != "delay":
         return p
     late = delays.get(p.plant, 0.0)
-    return replace(p, least=late - MARGINS[1], most=late + MARGINS[0])
+    return replace(p, min=late - MARGINS[1], max=late + MARGINS[0])
 
 
 def _velocities(topic: Topic) -> tuple[Array, Array]:

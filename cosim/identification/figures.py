@@ -1,19 +1,30 @@
-"""Figures of an identification's page."""
+"""Figures of the pages of an identification and of an excitation design."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 from matplotlib.figure import Figure
 
+from cosim.identification.excitation import BEGIN, RETURN, SECONDS, Design
 from cosim.identification.fit import Fit
-from cosim.identification.log import UNITS
+from cosim.identification.log import AXES, UNITS
 from cosim.identification.validation import Prediction
-from cosim.report.figures.style import BLACK, BLUE, ORANGE, SKY, NamedFigure
+from cosim.report.figures.style import BLACK, BLUE, ORANGE, SKY, STYLE, NamedFigure
+from cosim.report.web_page import InlineFigure, inline_figure
+from plant_fmu.archive import temporary_folder
 
 _WIDTH = 7.2  # in
-_MOST = 60  # most parameters in a figure
+_MAX_SHOWN = 60  # parameters in a figure
+
+
+def inline_figures(drawings: Iterable[NamedFigure]) -> dict[str, InlineFigure]:
+    """Return figures as a page shows them, by name."""
+    with temporary_folder("identify-") as scratch, mpl.rc_context(STYLE):  # applies while figures are drawn
+        return {drawing.name: inline_figure(drawing, scratch) for drawing in drawings}
 
 
 def figures_of(fit: Fit, predictions: Sequence[Prediction]) -> Iterator[NamedFigure]:
@@ -27,7 +38,7 @@ def figures_of(fit: Fit, predictions: Sequence[Prediction]) -> Iterator[NamedFig
 
 _NUMBERS = (
     "What the runs add: each number less its start, in standard deviations of what was known before, with its "
-    "95 % interval. A bar that fills the grey band rests on its prior."
+    "95 % interval. A bar that fills the gray band rests on its prior."
 )
 _RESIDUALS = "Residuals of the last stage by component, in standard deviations of the sensor's noise, over all windows."
 _PREDICTIONS = (
@@ -35,32 +46,35 @@ _PREDICTIONS = (
     "from starts that the samples give."
 )
 _CORRELATION = "Correlation of the numbers: these runs hardly separate two that are dark."
+_REHEARSAL = (
+    "The rehearsal: where the vehicle goes, with the numbers as they are known before. Gray: segments; between them "
+    "the law brings it back. Dotted: sides of the box."
+)
 
 
 def _numbers(fit: Fit) -> Figure:
-    places = fit.vehicle_part()[:_MOST]
-    figure = Figure(figsize=(_WIDTH, 0.7 + 0.19 * len(places)), layout="constrained")
+    indices = fit.vehicle_part()[:_MAX_SHOWN]
+    figure = Figure(figsize=(_WIDTH, 0.7 + 0.19 * len(indices)), layout="constrained")
     axes = figure.subplots()
-    deviation = np.array([fit.parameters[i].deviation for i in places])
-    start = np.array([fit.parameters[i].start for i in places])
-    x = (fit.values[places] - start) / deviation
-    half = fit.intervals.half[places] / deviation
-    rows = np.arange(len(places))[::-1]
+    deviation = np.array([fit.parameters[i].deviation for i in indices])
+    start = np.array([fit.parameters[i].start for i in indices])
+    x = (fit.values[indices] - start) / deviation
+    half = fit.intervals.half[indices] / deviation
+    rows = np.arange(len(indices))[::-1]
     axes.axvspan(-2.0, 2.0, color=BLACK, alpha=0.06, linewidth=0)
     axes.errorbar(x, rows, xerr=half, fmt="o", color=BLUE, markersize=3.5, linewidth=1.2)
-    axes.set_yticks(rows, [fit.parameters[i].name for i in places], fontsize=7)
-    axes.set(xlabel="found less start, in deviations of the prior", ylim=(-1, len(places)))
+    axes.set_yticks(rows, [fit.parameters[i].name for i in indices], fontsize=7)
+    axes.set(xlabel="found less start, in deviations of the prior", ylim=(-1, len(indices)))
     return figure
 
 
 def _residuals(fit: Fit) -> Figure:
-    names = [topic.name for topic in fit.windows[0].topics]
-    figure = Figure(figsize=(_WIDTH, 1.5 * len(names)), layout="constrained")
-    panels = figure.subplots(len(names), 1, squeeze=False)[:, 0]
+    residuals = fit.residuals_by_topic()
+    figure, panels = _panels(len(residuals), 1.5)
     bins = np.linspace(-5.0, 5.0, 51)
     normal = np.exp(-0.5 * np.square(bins)) / np.sqrt(2.0 * np.pi)
-    for axes, name in zip(panels, names, strict=True):
-        for component, values in _by_component(fit, name).items():
+    for axes, (name, rows) in zip(panels, residuals.items(), strict=True):
+        for component, values in zip(AXES[name], rows.T, strict=True):
             axes.hist(np.clip(values, -5.0, 5.0), bins, density=True, histtype="step", label=component)
         axes.plot(bins, normal, color=BLACK, linewidth=0.8, linestyle=":")
         axes.set(ylabel=name.replace("_", " "), yticks=[])
@@ -69,45 +83,55 @@ def _residuals(fit: Fit) -> Figure:
     return figure
 
 
-def _by_component(fit: Fit, name: str) -> dict[str, np.ndarray]:
-    found: dict[str, list[np.ndarray]] = {}
-    for window, reduced in zip(fit.windows, fit.residuals, strict=True):
-        count = 0
-        for topic in window.topics:
-            size = len(topic.times) * len(topic.components)
-            if topic.name == name:
-                rows = reduced.residual[count : count + size].reshape(-1, len(topic.components))
-                for component, values in zip(topic.components, rows.T, strict=True):
-                    found.setdefault(component, []).append(values)
-            count += size
-    return {component: np.concatenate(parts) for component, parts in found.items()}
-
-
 def _predictions(predictions: Sequence[Prediction]) -> Figure:
     shown = [p for p in predictions if p.topic in ("velocity", "angular_velocity")] or list(predictions)
-    figure = Figure(figsize=(_WIDTH, 1.9 * len(shown)), layout="constrained")
-    panels = figure.subplots(len(shown), 1, squeeze=False)[:, 0]
+    figure, panels = _panels(len(shown), 1.9)
     for axes, p in zip(panels, shown, strict=True):
-        places = np.arange(len(p.identified))
-        for k, (label, values, colour) in enumerate((
+        bars = np.arange(len(p.identified))
+        for k, (label, values, color) in enumerate((
             ("identified", p.identified, BLUE), ("start vehicle", p.start_vehicle, ORANGE),
             ("hold the start velocity", p.held, SKY),
         )):  # fmt: skip
-            axes.bar(places + 0.27 * (k - 1), values, 0.25, color=colour, label=label)
-        axes.set_xticks(places, list("uvw" if p.topic == "velocity" else "pqr" if p.topic != "depth" else "z"))
+            axes.bar(bars + 0.27 * (k - 1), values, 0.25, color=color, label=label)
+        axes.set_xticks(bars, list(AXES[p.topic]))
         axes.set_ylabel(f"{p.horizon:g} s ahead [{UNITS[p.topic]}]")
     panels[0].legend(loc="upper right", fontsize=7)
     return figure
 
 
 def _correlation(fit: Fit) -> Figure:
-    places = fit.vehicle_part()[:_MOST]
-    size = max(3.0, 0.12 * len(places) + 1.8)
+    indices = fit.vehicle_part()[:_MAX_SHOWN]
+    size = max(3.0, 0.12 * len(indices) + 1.8)
     figure = Figure(figsize=(min(_WIDTH, size + 0.8), size), layout="constrained")
     axes = figure.subplots()
-    drawn = axes.imshow(np.abs(fit.intervals.correlation[np.ix_(places, places)]), vmin=0.0, vmax=1.0, cmap="Greys")
-    axes.set_yticks(range(len(places)), [fit.parameters[i].name for i in places], fontsize=5)
+    drawn = axes.imshow(np.abs(fit.intervals.correlation[np.ix_(indices, indices)]), vmin=0.0, vmax=1.0, cmap="Greys")
+    axes.set_yticks(range(len(indices)), [fit.parameters[i].name for i in indices], fontsize=5)
     axes.set_xticks([])
     axes.grid(visible=False)
     figure.colorbar(drawn, ax=axes, shrink=0.6, label="magnitude")
     return figure
+
+
+def rehearsal_figures(design: Design) -> Iterator[NamedFigure]:
+    """Yield the figure of a design's rehearsal."""
+    figure, panels = _panels(3, 1.4, sharex=True)
+    for axes, name, values, middle, size in zip(
+        panels, ("north [m]", "east [m]", "depth [m]"), design.rehearsal.states[:, :3].T, design.center, design.box,
+        strict=True,
+    ):  # fmt: skip
+        for k in range(len(design.segments)):
+            begin = BEGIN + k * (SECONDS + RETURN)
+            axes.axvspan(begin, begin + SECONDS, color=BLACK, alpha=0.06, linewidth=0)
+        axes.plot(design.rehearsal.times, values)
+        for side in (middle - 0.5 * size, middle + 0.5 * size):
+            axes.axhline(side, color=BLACK, linewidth=0.8, linestyle=":")
+        axes.set_ylabel(name)
+    panels[2].invert_yaxis()
+    panels[2].set_xlabel("time [s]")
+    yield NamedFigure("rehearsal", _REHEARSAL, figure)
+
+
+def _panels(count: int, height: float, sharex: bool = False) -> tuple[Figure, Any]:
+    """Return a figure with panels below each other, of a height [in] each."""
+    figure = Figure(figsize=(_WIDTH, height * count), layout="constrained")
+    return figure, figure.subplots(count, 1, squeeze=False, sharex=sharex)[:, 0]

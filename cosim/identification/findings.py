@@ -1,7 +1,8 @@
-"""Findings of an identification as text: its reliability, what the runs do not determine, and the next manoeuvre."""
+"""Findings of an identification as text: its reliability, what the runs do not determine, and the next maneuver."""
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -9,17 +10,18 @@ import numpy as np
 from cosim.errors import IdentificationError
 from cosim.identification.fit import STAGES, Fit
 from cosim.identification.intervals import DISAGREES
-from cosim.identification.log import UNITS, Log, command_period
+from cosim.identification.log import UNITS, Log, command_spans
 from cosim.identification.parameters import NUISANCES, RANDOM_FORCE
 
-_LOST = 10.0  # chi2 per degree of freedom, above which nothing was identified
-_ALIKE = 0.95  # magnitude of the correlation, above which runs do not separate two numbers
-_LISTED = 6  # most names in a list
+_USELESS = 10.0  # chi2 per degree of freedom, above which nothing was identified
+_MAX_CORRELATION = 0.95  # magnitude of the correlation, above which runs do not separate two numbers
+_MAX_LISTED = 6  # names in a list
 NAMED = 0.1  # share of the unexplained residuals, above which a cause is named
+_WEAK = 0.1  # ratio of nominal to prior deviation, above which a maneuver is advised
 _LATE = 0.15  # s, delay of samples above which a delay is named as a cause: a lag of the thrusters is seldom longer
 _SLOW = 0.2  # s, time between changes of the commands, from which on added mass and lag are not determined
 _SLOW_SAMPLES = 0.03  # s, time between samples of servo outputs, from which on a warning names their rate
-_APART = 0.9  # magnitude of the correlation of a delay and the lag, above which the fit is refused
+_MAX_DELAY_CORRELATION = 0.9  # magnitude of the correlation of a delay and the lag, above which the fit is refused
 _NEEDS = {  # motion that determines the numbers of a key
     "hydrodynamics.added_mass": "quick changes of speed along and about the axis: steps of full stick, a second each",
     "hydrodynamics.linear_damping": "slow and fast motion along the axis, each held for some seconds",
@@ -35,21 +37,20 @@ _NEEDS = {  # motion that determines the numbers of a key
 def verdict(fit: Fit) -> str:
     """Return a sentence about the count of determined numbers and the quality of the fit."""
     free = fit.vehicle_part()
-    determined = len(free) - len(fit.resting())
+    determined = len(free) - len(fit.undetermined())
     seconds = sum(window.steps for window in fit.windows) * fit.step
-    text = (
+    return (
         f"{determined} of {len(free)} numbers are determined by {seconds:.0f} s of motion in {len(fit.windows)} "
-        f"window{'s' if len(fit.windows) > 1 else ''}"
+        f"window{'s' if len(fit.windows) > 1 else ''}; chi² is {fit.intervals.chi2:.2f} by degrees of freedom."
     )
-    return f"{text}; chi² is {fit.intervals.chi2:.2f} by degrees of freedom."
 
 
 def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
     """Yield the warnings that a user must read before using the numbers."""
-    if fit.intervals.chi2 > _LOST:
+    if fit.intervals.chi2 > _USELESS:
         yield (
             f"Do not use these numbers: chi² is {fit.intervals.chi2:.0f} by degrees of freedom, and no better were "
-            "found. Free fewer numbers, start from a vehicle that is nearer, or drive more manoeuvres."
+            "found. Free fewer numbers, start from a vehicle that is nearer, or drive more maneuvers."
         )
     elif fit.intervals.chi2 > DISAGREES:
         worst, size = fit.worst_topic()
@@ -73,16 +74,14 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
             f"Predictions over {STAGES[-1]:g} s fail, as they do where a motion is unstable without its control: the "
             f"numbers are those of windows of {STAGES[0]:g} s."
         )
-    resting = [fit.parameters[i].name for i in fit.resting()]
-    if resting:
+    undetermined = [fit.parameters[i].name for i in fit.undetermined()]
+    if undetermined:
         yield (
-            f"These numbers rest on what was known before, not on the runs: {_listed(resting)}. Nothing in these logs "
-            "excites them enough."
+            f"These numbers rest on what was known before, not on the runs: {_list(undetermined)}. Nothing in these "
+            "logs excites them enough."
         )
-    alike = list(fit.alike(_ALIKE))
-    if alike:
-        pairs = [f"{one} and {other}" for one, other in alike[:_LISTED]]
-        yield f"These runs hardly separate (correlation above {_ALIKE}): {_listed(pairs)}."
+    if pairs := [f"{one} and {other}" for one, other in fit.correlated(_MAX_CORRELATION)]:
+        yield f"These runs hardly separate (correlation above {_MAX_CORRELATION}): {_list(pairs[:_MAX_LISTED])}."
     if not any(p.kind == "thrust" for p in fit.parameters):
         yield (
             "All is in units of the thrust that the start vehicle's thrusters give. If they give 5 % more, damping, "
@@ -99,9 +98,7 @@ def warnings(fit: Fit, logs: Sequence[Log]) -> Iterator[str]:
         yield f"{fit.rejected.total()} windows were rejected: {counts}."
     if fit.outliers:
         yield f"{fit.outliers} of {fit.samples} measured components are outliers, and count by Huber's weights."
-    for log in logs:
-        if said := slow_commands(log):
-            yield said
+    yield from filter(None, map(slow_commands, logs))
     missing = {"velocity", "angular_velocity", "depth"} - {topic.name for log in logs for topic in log.topics}
     for name in sorted(missing):
         yield f"There are no samples of {name.replace('_', ' ')} in these runs."
@@ -121,7 +118,8 @@ def slow_commands(log: Log) -> str:
             "Telemetry with SERVO_OUTPUT_RAW at 50 Hz makes them smaller: an ArduSub's .BIN has 10 Hz, which no "
             "parameter changes."
         )
-    period = command_period(log)
+    spans = command_spans(log)
+    period = float(np.quantile(spans, 0.05)) if len(spans) else 0.0
     if period < _SLOW:
         return ""
     return (
@@ -134,14 +132,14 @@ def _cause(fit: Fit, slow: bool) -> str:
     """Return the likely causes of a poor fit as text, with the flags that would estimate them."""
     late = {name: x for name, x in fit.delays.items() if x > _LATE}
     if late and not slow and not any(p.kind == "delay" for p in fit.parameters):
-        said = ", ".join(f"{name.replace('_', ' ')} {x:.2f} s" for name, x in late.items())
-        return f"Samples come late behind the commands: {said}. Estimate that, too: {_nuisance_flag(fit, 'delay')}."
+        delays = ", ".join(f"{name.replace('_', ' ')} {x:.2f} s" for name, x in late.items())
+        return f"Samples come late behind the commands: {delays}. Estimate that, too: {_nuisance_flag(fit, 'delay')}."
     named = [cause for cause in fit.causes if cause.share > NAMED]
     if named:
-        said = ", ".join(f"{_CAUSES[c.flag.split()[1]]} ({100 * c.share:.0f} %: {c.flag})" for c in named[:3])
+        causes = ", ".join(f"{_CAUSES[c.flag.split()[1]]} ({100 * c.share:.0f} %: {c.flag})" for c in named[:3])
         return (
-            f"What would explain most of that, in one step of the fit: {said}. A flag takes the place of what it names "
-            f"now, {_nuisance_flag(fit)}: give it whole."
+            f"What would explain most of that, in one step of the fit: {causes}. A flag takes the place of what it "
+            f"names now, {_nuisance_flag(fit)}: give it whole."
         )
     if fit.forces is not None:
         return "The force may change within windows too: no delay, scale or factor of a thruster explains the rest."
@@ -171,27 +169,24 @@ _CAUSES = {
 
 def require_apart(fit: Fit) -> None:
     """Refuse a fit of a delay and the thrusters' lag that the runs do not separate."""
-    of_kind = {kind: [i for i, p in enumerate(fit.parameters) if p.kind == kind] for kind in ("lag", "delay")}
-    for lag in of_kind["lag"]:
-        for delay in of_kind["delay"]:
-            size = abs(float(fit.intervals.correlation[lag, delay]))
-            if size > _APART:
-                raise IdentificationError(
-                    f"{fit.parameters[lag].name} and the {fit.parameters[delay].name} are not separated by these runs "
-                    f"(correlation {size:.2f}), expected one of the two: --free without the time constant, or "
-                    "--nuisance without delay"
-                )
+    lags, delays = ([i for i, p in enumerate(fit.parameters) if p.kind == kind] for kind in ("lag", "delay"))
+    for lag, delay in itertools.product(lags, delays):
+        size = abs(float(fit.intervals.correlation[lag, delay]))
+        if size > _MAX_DELAY_CORRELATION:
+            raise IdentificationError(
+                f"{fit.parameters[lag].name} and the {fit.parameters[delay].name} are not separated by these runs "
+                f"(correlation {size:.2f}), expected one of the two: --free without the time constant, or "
+                "--nuisance without delay"
+            )
 
 
 def advice(fit: Fit) -> Iterator[str]:
-    """Yield the manoeuvres to drive next, for the numbers that are determined worst."""
+    """Yield the maneuvers to drive next, for the numbers that are determined worst."""
     worst: dict[str, float] = {}
     for i in fit.vehicle_part():
-        p = fit.parameters[i]
-        key = ".".join(p.name.split(".")[:2])
-        part = float(fit.intervals.prior_part[i])
-        if part > 0.1:  # ratio of nominal to prior deviation
-            worst[key] = max(worst.get(key, 0.0), part)
+        key, ratio = ".".join(fit.parameters[i].name.split(".")[:2]), float(fit.intervals.prior_part[i])
+        if ratio > _WEAK:
+            worst[key] = max(worst.get(key, 0.0), ratio)
     for key in sorted(worst, key=lambda key: -worst[key])[:3]:
         yield f"For {key}: {_NEEDS.get(key, 'motion along and about all axes')}."
     if not worst:
@@ -204,15 +199,10 @@ def topic_rows(logs: Sequence[Log]) -> Iterator[tuple[str, ...]]:
         for topic in log.topics:
             rate = (len(topic.times) - 1) / max(1e-9, float(topic.times[-1] - topic.times[0]))
             noise = ", ".join(f"{x:.2g}" for x in np.unique(topic.noise.round(6)))
-            yield (
-                log.name,
-                topic.name.replace("_", " "),
-                f"{len(topic.times)}",
-                f"{rate:.1f}",
-                f"{noise} {UNITS[topic.name]}",
-            )
+            name, count = topic.name.replace("_", " "), f"{len(topic.times)}"
+            yield log.name, name, count, f"{rate:.1f}", f"{noise} {UNITS[topic.name]}"
 
 
-def _listed(names: Sequence[str]) -> str:
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return ", ".join(names[:_LISTED]) + more
+def _list(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _MAX_LISTED} more" if len(names) > _MAX_LISTED else ""
+    return ", ".join(names[:_MAX_LISTED]) + more

@@ -17,11 +17,11 @@ from cosim.identification.windows import Window
 Array = NDArray[np.float64]
 
 DISAGREES = 1.2  # chi2 per degree of freedom, above which the model is called wrong
-RESTS = 0.5  # ratio of nominal to prior deviation, above which a number rests on its prior
+MAX_PRIOR_PART = 0.5  # ratio of nominal to prior deviation, above which a number rests on its prior
 _BLOCK = 5.0  # s, length of the pieces that the jackknife leaves out
 _LONG_BLOCK = 20.0  # s, their length if neighboring windows are correlated: a model error may last for seconds
-_FEWEST_RUNS = 8  # least number of runs from which on the jackknife leaves out whole runs
-_COVERED = 0.95  # coverage of the intervals
+_MIN_RUNS = 8  # number of runs from which on the jackknife leaves out whole runs
+_COVERAGE = 0.95  # coverage of the intervals
 NORMAL = 1.96  # standard deviations, half width of a 95 % interval of a normal distribution
 
 
@@ -64,7 +64,7 @@ def estimate_intervals(
         jackknife, freedom = _jackknife(information, inverse, pieces)
         if not are_correlated:  # residuals agree with the noise: degrees of freedom by the number of pieces suffice
             freedom = np.full_like(freedom, len(pieces) - 1.0)
-        half = np.maximum(half, jackknife * student.ppf(0.5 + _COVERED / 2.0, freedom))
+        half = np.maximum(half, jackknife * student.ppf(0.5 + _COVERAGE / 2.0, freedom))
     scale = half / (NORMAL * nominal)
     covariance: Any = inverse * np.outer(scale, scale)
     return Intervals(
@@ -99,19 +99,22 @@ def _pieces(
 ) -> tuple[list[tuple[Array, Array]], str]:
     """Return jacobian and residual of each piece that the jackknife leaves out, and a description of the pieces."""
     runs = len({window.run for window in windows})
-    if runs >= _FEWEST_RUNS or are_correlated:
-        whole = runs >= _FEWEST_RUNS
-        together: dict[tuple[int, int], list[Reduced]] = {}
+    if runs >= _MIN_RUNS or are_correlated:
+        by_run = runs >= _MIN_RUNS
+        groups: dict[tuple[int, int], list[Reduced]] = {}
         for r, window in zip(reduced, windows, strict=True):
-            together.setdefault((window.run, 0 if whole else int(window.begin / _LONG_BLOCK)), []).append(r)
-        joined = [
-            (np.concatenate([r.jacobian for r in own]), np.concatenate([r.residual for r in own]))
-            for own in together.values()
+            groups.setdefault((window.run, 0 if by_run else int(window.begin / _LONG_BLOCK)), []).append(r)
+        pieces = [
+            (np.concatenate([r.jacobian for r in group]), np.concatenate([r.residual for r in group]))
+            for group in groups.values()
         ]
-        if whole or len(joined) > 1:
-            return joined, f"each of {runs} runs" if whole else f"each of {len(joined)} pieces of {_LONG_BLOCK:g} s"
-    found = []
-    for r in reduced:
-        block = (r.times / _BLOCK).astype(int)
-        found += [(r.jacobian[block == k], r.residual[block == k]) for k in np.unique(block)]
-    return found, f"each of {len(found)} pieces of {_BLOCK:g} s"
+        if by_run:
+            return pieces, f"each of {runs} runs"
+        if len(pieces) > 1:
+            return pieces, f"each of {len(pieces)} pieces of {_LONG_BLOCK:g} s"
+    blocks = [(r.times / _BLOCK).astype(int) for r in reduced]
+    pieces = [
+        (r.jacobian[block == k], r.residual[block == k])
+        for r, block in zip(reduced, blocks, strict=True) for k in np.unique(block)
+    ]  # fmt: skip
+    return pieces, f"each of {len(pieces)} pieces of {_BLOCK:g} s"

@@ -20,39 +20,40 @@ Array = NDArray[np.float64]
 
 TOPICS = ("velocity", "angular_velocity", "depth", "attitude", "position")
 UNITS = {"velocity": "m/s", "angular_velocity": "rad/s", "depth": "m", "attitude": "rad", "position": "m"}
-_AXES = {"velocity": "uvw", "angular_velocity": "pqr", "depth": "z", "attitude": "xyz", "position": "xyz"}
-# least standard deviations of noise that is estimated from samples, in the units of `UNITS`
-_LEAST_NOISE = {"velocity": 1e-3, "angular_velocity": 1e-3, "depth": 1e-3, "attitude": 1e-2, "position": 5e-3}
-_MOST_SAMPLES = 50.0  # Hz; faster topics are averaged over blocks
-_FEWEST = 20  # least number of samples of a topic, and of commands
+AXES = {"velocity": "uvw", "angular_velocity": "pqr", "depth": "z", "attitude": "xyz", "position": "xyz"}
+# elements of a motion's state that a topic measures: position, quaternion, velocity [m/s, rad/s]
+STATES = {
+    "velocity": slice(7, 10), "angular_velocity": slice(10, 13), "depth": slice(2, 3), "attitude": slice(3, 7),
+    "position": slice(0, 3),
+}  # fmt: skip
+# smallest standard deviations of noise that is estimated from samples, in the units of `UNITS`
+_MIN_NOISE = {"velocity": 1e-3, "angular_velocity": 1e-3, "depth": 1e-3, "attitude": 1e-2, "position": 5e-3}
+_MAX_RATE = 50.0  # Hz; faster topics are averaged over blocks
+_MIN_SAMPLES = 20  # number of samples of a topic, and of commands
 _DIFFERENCE = np.array([1.0, -4.0, 6.0, -4.0, 1.0])  # fourth difference: its variance is 70 times that of white noise
 _MAD = 1.4826  # standard deviation of a normal distribution, in median absolute deviations
 
 _SAMPLED = ("pulses", "effort")  # quantities of commands that an autopilot logs slower than it changes them
-
 _MEANS = ("VISO", "VISION_POSITION_DELTA")  # DVL messages with the displacement since the last message
 
 # topic: columns that may hold it, in order of preference, each with the column of its samples' times or ""
 _COLUMNS: dict[str, tuple[tuple[tuple[str, ...], str], ...]] = {
-    "velocity": (
-        (tuple(f"measured.velocity.{name}" for name in "uvw"), "measured.time.dvl"),
-        (tuple(f"sensed.{name}" for name in "uvw"), ""),
-        (tuple(f"velocity.{name}" for name in "uvw"), ""),
-    ),
-    "angular_velocity": (
-        (tuple(f"measured.angular_velocity.{name}" for name in "pqr"), "measured.time.imu"),
-        (tuple(f"velocity.{name}" for name in "pqr"), ""),
-    ),
-    "depth": ((("measured.depth",), "measured.time.depth_sensor"), (("position.z",), "")),
-    "attitude": (
-        (tuple(f"sensed.e{i}" for i in range(4)), ""),
-        (tuple(f"quaternion.e{i}" for i in range(4)), ""),
-    ),
-    "position": (
-        (tuple(f"measured.position.{axis}" for axis in "xyz"), "measured.time.usbl"),
-        (tuple(f"sensed.{axis}" for axis in "xyz"), ""),
-        (tuple(f"position.{axis}" for axis in "xyz"), ""),
-    ),
+    name: tuple((tuple(f"{prefix}{axis}" for axis in axes), stamp) for prefix, axes, stamp in columns)
+    for name, columns in {
+        "velocity": (
+            ("measured.velocity.", "uvw", "measured.time.dvl"),
+            ("sensed.", "uvw", ""),
+            ("velocity.", "uvw", ""),
+        ),
+        "angular_velocity": (("measured.angular_velocity.", "pqr", "measured.time.imu"), ("velocity.", "pqr", "")),
+        "depth": (("measured.", ("depth",), "measured.time.depth_sensor"), ("position.", "z", "")),
+        "attitude": (("sensed.e", "0123", ""), ("quaternion.e", "0123", "")),
+        "position": (
+            ("measured.position.", "xyz", "measured.time.usbl"),
+            ("sensed.", "xyz", ""),
+            ("position.", "xyz", ""),
+        ),
+    }.items()
 }
 
 
@@ -71,7 +72,7 @@ class Topic:
     @property
     def components(self) -> tuple[str, ...]:
         """Names of the components of the residual."""
-        return tuple(_AXES[self.name])
+        return tuple(AXES[self.name])
 
     @property
     def offsets(self) -> tuple[float, ...]:
@@ -99,14 +100,15 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
     """Return a topic from samples; estimate its noise from them if it is not given; times (n,) [s], values (n, m)."""
     if name == "attitude":
         values = _continuous(values)
-    components = values if name != "attitude" else _rotation_vectors(values)
+    # twice the vector part of a quaternion, since its noise is that of small angles
+    components = values if name != "attitude" else 2.0 * values[:, 1:]
     if noise is None:
         rough = np.abs(np.stack([np.convolve(x, _DIFFERENCE, "valid") for x in components.T], axis=1))
         deviations = _MAD * np.median(rough, axis=0) / np.sqrt(np.square(_DIFFERENCE).sum())
     else:
         deviations = np.full(components.shape[1], float(noise))
     period, spread = float(np.median(np.diff(times))), 0.0
-    block = max(1, round((1.0 / _MOST_SAMPLES) / period))
+    block = max(1, round((1.0 / _MAX_RATE) / period))
     if block > 1:
         spread = period * float(np.sqrt((block**2 - 1) / 12.0))  # deviation of a block's times: exact for cubic motion
         count = len(times) // block
@@ -115,15 +117,13 @@ def make_topic(name: str, times: Array, values: Array, noise: float | None = Non
         deviations = deviations / np.sqrt(block)
     if name == "attitude":
         values = values / np.linalg.norm(values, axis=1, keepdims=True)
-    least = _LEAST_NOISE[name] if noise is None else 0.0
-    return Topic(name, times, values, np.maximum(deviations, least), spread=spread)
+    return Topic(name, times, values, np.maximum(deviations, _MIN_NOISE[name] if noise is None else 0.0), spread=spread)
 
 
-def command_period(log: Log) -> float:
-    """Return the 5 % quantile of the times between changes of the commands [s]; 0 without changes."""
+def command_spans(log: Log) -> Array:
+    """Return the times between changes of the commands [s]."""
     commands = np.concatenate([log.thrust, log.wrench], axis=1)
-    spans = np.diff(log.times[1:][(np.diff(commands, axis=0) != 0.0).any(axis=1)])
-    return float(np.quantile(spans, 0.05)) if len(spans) else 0.0
+    return np.diff(log.times[1:][(np.diff(commands, axis=0) != 0.0).any(axis=1)])
 
 
 def load_log(folder: Path, vehicle: Vehicle) -> Log:
@@ -138,14 +138,15 @@ def load_log(folder: Path, vehicle: Vehicle) -> Log:
     time = record["time"]
     commands = record.stack([*thrusters, *wrench])
     known = np.isfinite(commands).all(axis=1)
-    if known.sum() < _FEWEST or not np.any(commands[known]):
+    if known.sum() < _MIN_SAMPLES or not np.any(commands[known]):
         raise IdentificationError(f"{folder}: the thrusters rest, expected commands")
     facts = load_log_facts(folder).topics if (folder / IMPORT).exists() else ()
     topics = tuple(_with_mean(topic, facts) for topic in _topics(record, time))
     names = {topic.name for topic in topics}
-    for needed, said in (({"attitude"}, "attitude"), ({"velocity", "position"}, "velocity or position")):
-        if not names & needed:
-            raise IdentificationError(f"{folder}: has no {said} that changes, expected {_FEWEST} samples at the least")
+    for required in (("attitude",), ("velocity", "position")):
+        if not names & {*required}:
+            what = " or ".join(required)
+            raise IdentificationError(f"{folder}: has no {what} that changes, expected at least {_MIN_SAMPLES} samples")
     n = vehicle.n_thrusters
     _require_steady_actuators(folder, bool(np.any(commands[known, n:])))
     sampled = any(fact.quantity in _SAMPLED for fact in facts)
@@ -165,10 +166,7 @@ def _with_mean(topic: Topic, facts: Sequence[TopicFacts]) -> Topic:
 
 def _require_steady_actuators(folder: Path, has_wrench: bool) -> None:
     """Refuse a run whose scenario has failing thrusters, or limits or lags a commanded wrench."""
-    file = folder / SCENARIO
-    if not file.exists():
-        return
-    tables = read_toml(file)
+    tables = read_toml(folder / SCENARIO) if (folder / SCENARIO).exists() else {}
     if tables.get("failures"):
         raise IdentificationError(f"{folder}: thrusters fail in it ({SCENARIO}: failures), expected runs without")
     limit = tables.get("limit", {})
@@ -179,16 +177,16 @@ def _require_steady_actuators(folder: Path, has_wrench: bool) -> None:
 
 
 def _topics(record: Record, time: Array) -> Iterator[Topic]:
-    found = set()
+    has_velocity = False
     for name in TOPICS:
-        if name == "position" and "velocity" in found:
+        if name == "position" and has_velocity:
             continue
         for columns, stamp in _COLUMNS[name]:
             if not all(column in record.units for column in columns):
                 continue
             times, values = _samples(record, time, columns, stamp if stamp in record.units else "")
-            if len(times) >= _FEWEST:
-                found.add(name)
+            if len(times) >= _MIN_SAMPLES:
+                has_velocity |= name == "velocity"
                 yield make_topic(name, times, values)
                 break
 
@@ -198,13 +196,11 @@ def _samples(record: Record, time: Array, columns: Sequence[str], stamp: str) ->
     values, times = record.stack(columns), record[stamp] if stamp else time
     known = np.isfinite(values).all(axis=1) & np.isfinite(times) & (times >= time[0] - 1.0)
     values, times = values[known], times[known]
-    if not len(times):
-        return times, values
-    fresh = np.diff(times) > 0.0 if stamp else (np.diff(values, axis=0) != 0.0).any(axis=1)
-    keep = np.concatenate([[True], fresh])
-    values, times = values[keep], times[keep]
-    rising = np.concatenate([[True], np.diff(np.maximum.accumulate(times)) > 0.0])
-    return times[rising], values[rising]
+    is_new = np.diff(times) > 0.0 if stamp else (np.diff(values, axis=0) != 0.0).any(axis=1)
+    first = np.ones(min(1, len(times)), bool)
+    values, times = (x[np.concatenate([first, is_new])] for x in (values, times))
+    is_later = np.concatenate([first, np.diff(np.maximum.accumulate(times)) > 0.0])
+    return times[is_later], values[is_later]
 
 
 def _continuous(quaternions: Array) -> Array:
@@ -212,10 +208,4 @@ def _continuous(quaternions: Array) -> Array:
     units = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     signs = np.where(np.sum(units[1:] * units[:-1], axis=1) < 0.0, -1.0, 1.0)
     result: Array = units * np.concatenate([[1.0], np.cumprod(signs)])[:, None]
-    return result
-
-
-def _rotation_vectors(quaternions: Array) -> Array:
-    """Return twice the vector part of each quaternion, shape (n, 3) [rad]: its noise is that of small angles."""
-    result: Array = 2.0 * quaternions[:, 1:]
     return result

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 from cosim.errors import IdentificationError
 from cosim.identification import findings
+from cosim.identification.fit import Fit
 from cosim.identification.identify import Identification, vehicle_contents
+from cosim.identification.intervals import MAX_PRIOR_PART
 from cosim.identification.log import UNITS
-from cosim.identification.posterior import posterior_lines
+from cosim.identification.parameters import Parameter
+from cosim.identification.vehicle_file import posterior_lines
 from cosim.io.atomic_file import reason, write_together
-from cosim.report.web_page import inline_figure, render_page
-from plant_fmu.archive import temporary_folder
+from cosim.report.web_page import render_page
 from plant_fmu.vehicle import load_vehicle
 
 
@@ -36,29 +37,22 @@ def write_results(done: Identification, out: Path) -> tuple[Path, Path]:
 
 def page_contents(done: Identification, out: Path) -> str:
     """Return the page of an identification whose vehicle's file is `out`."""
-    import matplotlib as mpl
-
-    from cosim.identification.figures import figures_of
-    from cosim.report.figures.style import STYLE
+    from cosim.identification.figures import figures_of, inline_figures
 
     fit, logs = done.fit, done.logs
-    with temporary_folder("identify-") as scratch, mpl.rc_context(STYLE):
-        figures = {f.name: inline_figure(f, scratch) for f in figures_of(fit, done.predictions)}
     return render_page(
-        "cosim.identification/identification.html.j2", vehicle=done.vehicle.title, out=out, figures=figures,
-        verdict=findings.verdict(fit), warnings=findings.warnings(fit, logs), advice=findings.advice(fit),
-        rows=list(_rows(done, False)), nuisance_rows=list(_rows(done, True)), clusters=fit.intervals.clusters,
-        predictions=done.predictions, held_out=[log.name for log in done.held_out], units=UNITS,
-        topics=findings.topic_rows(logs), logs=[log.name for log in logs], start=done.start,
-        free=list(dict.fromkeys(".".join(fit.parameters[i].name.split(".")[:2]) for i in fit.vehicle_part())),
+        "cosim.identification/identification.html.j2", vehicle=done.vehicle.title, out=out,
+        figures=inline_figures(figures_of(fit, done.predictions)), verdict=findings.verdict(fit),
+        warnings=findings.warnings(fit, logs), advice=findings.advice(fit), rows=list(_rows(done.fit, False)),
+        nuisance_rows=list(_rows(done.fit, True)), clusters=fit.intervals.clusters, predictions=done.predictions,
+        held_out=[log.name for log in done.held_out], units=UNITS, topics=findings.topic_rows(logs),
+        logs=[log.name for log in logs], start=done.start, free=fit.free_keys(),
     )  # fmt: skip
 
 
-def _rows(done: Identification, nuisance: bool) -> Iterator[dict[str, Any]]:
-    fit = done.fit
-    resting = set(fit.resting())
+def _rows(fit: Fit, nuisance: bool) -> Iterator[tuple[Parameter, float, float, str]]:
+    """Yield parameter, value, half width of its 95 % interval, and what it rests on."""
     for i, p in enumerate(fit.parameters):
         if p.is_nuisance == nuisance:
-            on_prior = i in resting or (nuisance and fit.intervals.prior_part[i] > 0.5)
-            numbers = {"start": p.start, "value": float(fit.values[i]), "half": float(fit.intervals.half[i])}
-            yield {"name": p.name, "unit": p.unit, "basis": "prior" if on_prior else "runs", **numbers}
+            basis = "prior" if fit.intervals.prior_part[i] > MAX_PRIOR_PART else "runs"
+            yield p, float(fit.values[i]), float(fit.intervals.half[i]), basis

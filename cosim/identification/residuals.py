@@ -18,20 +18,20 @@ from cosim.identification import measurements
 from cosim.identification.actuation import CommandedForces, error_wrenches
 from cosim.identification.command_errors import Whitener, most_likely_errors, whitener
 from cosim.identification.log import Log, Topic
-from cosim.identification.measurements import turn_tangent
+from cosim.identification.measurements import half_turns
 from cosim.identification.parameters import Parameter, Setting, setting_of
 from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
-from cosim.identification.windows import Window, topic_names
+from cosim.identification.windows import Window
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
 _START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s
-_FORCES = range(12, 15)  # places of a window's force behind those of its state
+_FORCES = range(12, 15)  # indices of a window's force behind those of its state
 _FORCE = 0.5  # N, standard deviation of a random force before any residual is known
-_LEAST_FORCE = 0.01  # N
+_MIN_FORCE = 0.01  # N
 _SOLVED = 0.05  # of a start's standard deviation: what is left is linear
-_MOST_SOLVES = 12
+_MAX_SOLVES = 12
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Residuals:
         self.holds_starts = False  # as samples have them, while the free numbers are far off
         self._found: dict[int, _Start] = {}
         self._tried: dict[int, _Start] = {}
-        self.weights: list[Array] = [np.ones(len(topic_names(window))) for window in windows]
+        self.weights: list[Array] = [np.ones(len(window.topic_names)) for window in windows]
         self.command_error: float | None = None  # factor of the errors of sampled commands; None where it is unknown
         self.whiteners: list[Whitener | None] = [None] * len(windows)
         self._noise_parts: dict[str, float] = {}  # part of the noise of its samples that a topic has, by its name
@@ -163,7 +163,7 @@ class Residuals:
             left.append(residual - q @ (q.T @ residual))
             projected.append(by - q @ (q.T @ by))
             by_impulses.append(by)
-        which = [topic_names(window) for window in self.windows]
+        which = [window.topic_names for window in self.windows]
         self.command_error, parts = most_likely_errors(left, projected, which, self._noise_parts)
         before = [self._per_noise(window) for window in self.windows]
         self._noise_parts = parts
@@ -173,7 +173,7 @@ class Residuals:
 
     def _per_noise(self, window: Window) -> Array:
         """Return the factor of each row by which the noise of its topic is less than that of its samples."""
-        return np.array([1.0 / self._noise_parts.get(name, 1.0) for name in topic_names(window)])
+        return np.array([1.0 / self._noise_parts.get(name, 1.0) for name in window.topic_names])
 
     def _by_impulse(self, i: int, settings: Sequence[Setting], start: Array) -> Array:
         """Return the residuals of a window by the impulses that sampled commands leave open."""
@@ -200,7 +200,7 @@ class Residuals:
             if which in _FORCES:
                 force[row, which - _FORCES.start] = 1.0
             elif 3 <= which < 6:
-                tangents[row, 3:7] = turn_tangent(start[3:7], which - 3)
+                tangents[row, 3:7] = 0.5 * half_turns(start[3:7])[which - 3]
             else:
                 tangents[row, which if which < 3 else which + 1] = 1.0
         names: list[str | None] = [None] * count
@@ -247,7 +247,7 @@ class Residuals:
         if known is not None:
             state = self._moved(known.state, known.slope @ (values - known.values))
         weight, best, base, step = self.weights[i], np.inf, state, np.zeros(len(self._starts))
-        for _ in range(_MOST_SOLVES):
+        for _ in range(_MAX_SOLVES):
             try:
                 residual, by_start, _ = self.raw(i, settings, state, full=False)
                 left, by_start = self._with_prior(weight * residual, weight[:, None] * by_start, state)
@@ -299,10 +299,6 @@ class Residuals:
         """Unknowns of each window that are eliminated."""
         return len(self._starts)
 
-    def rows(self, i: int) -> int:
-        """Return the number of rows of a window in `reduced`."""
-        return len(self.weights[i]) + (0 if self.force_deviation is None else len(_FORCES))
-
     def forces(self) -> Array:
         """Return the force of each window as eliminated last, shape (windows, 3) [N, NED]."""
         return np.array([self._tried[i].state[13:] for i in range(len(self.windows))])
@@ -310,7 +306,7 @@ class Residuals:
     def update_force_deviation(self) -> None:
         """Take the deviation of the random force from the windows' forces."""
         if self.force_deviation is not None:
-            self.force_deviation = np.maximum(_LEAST_FORCE, np.sqrt(np.mean(np.square(self.forces()), axis=0)))
+            self.force_deviation = np.maximum(_MIN_FORCE, np.sqrt(np.mean(np.square(self.forces()), axis=0)))
 
     def _with_prior(self, left: Array, by_start: Array, state: Array) -> tuple[Array, Array]:
         """Return residuals and derivatives by the start, with those of the prior of a window's force behind them."""
@@ -340,7 +336,7 @@ class Residuals:
         moved = state.copy()
         for which, by in zip(self._starts, step, strict=True):
             if 3 <= which < 6:
-                moved[3:7] += by * turn_tangent(state[3:7], which - 3)
+                moved[3:7] += by * (0.5 * half_turns(state[3:7])[which - 3])
             else:
                 moved[which if which < 3 else which + 1] += by
         moved[3:7] /= np.linalg.norm(moved[3:7])

@@ -1,44 +1,51 @@
-"""File of the identified vehicle, with provenance and intervals as comments."""
+"""Files of an identification: the vehicle with provenance and intervals as comments, and drawn vehicles."""
 
 from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+import textwrap
+from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification.fit import Fit
 from cosim.identification.parameters import with_values
+from cosim.scenario.toml_text import scenario_text
 from plant_fmu.toml_tables import read_toml
 from plant_fmu.vehicle import Vehicle, shipped_vehicles
 
-_WIDTH = 118  # most characters of a comment's line
+DRAWS = 256  # number of drawn vehicles
+_MAX_TRIALS = 100  # draws per vehicle, until its mass matrix is positive definite
+_WIDTH = 118  # greatest length of a comment
+_ATTRIBUTES = {
+    "rigid_body.center_of_gravity": "r_G", "hydrostatics.center_of_buoyancy": "r_B",
+    "thrusters.matrix": "thruster_matrix", "thrusters.time_constant": "thrust_time_constant",
+}  # fmt: skip
 
 
 def vehicle_text(start: str, vehicle: Vehicle, fit: Fit, name: str, provenance: Sequence[str]) -> str:
     """Return the text of the identified vehicle's file."""
-    found = with_values(vehicle, fit.parameters, fit.values)
-    tables = _tables_of(start)
+    identified = with_values(vehicle, fit.parameters, fit.values)
+    tables = _start_tables(start)
     tables["name"], tables["title"] = name, f"{tables['title']}, identified"
     tables["source"] = (
         f"Identified from runs, see the comments; what was not free is that of {vehicle.name}: " + vehicle.source
     )
-    for key in _changed(fit):
+    for key in fit.free_keys():
         table, _, entry = key.partition(".")
-        tables[table][entry] = _entry(key, found)
-    lines = [*(f"# {line}" for sentence in provenance for line in _wrapped(sentence)), ""]
-    lines += [f"{key} = {_value(value)}" for key, value in tables.items() if not isinstance(value, dict)]
-    for key, value in tables.items():
-        if isinstance(value, dict):
-            lines += ["", f"[{key}]"]
-            for entry, inside in value.items():
-                lines += [f"# {line}" for line in _about(f"{key}.{entry}", fit)]
-                lines.append(f"{entry} = {_value(inside)}")
+        tables[table][entry] = _entry(key, identified)
+    lines = [*(f"# {line}" for sentence in provenance for line in textwrap.wrap(sentence, _WIDTH)), ""]
+    table = ""
+    for line in scenario_text(tables, {}).splitlines():
+        table = f"{line[1:-1]}." if line.startswith("[") else table
+        comment = _comment(table + line.partition(" = ")[0], fit)
+        lines += [*(f"# {part}" for part in textwrap.wrap(comment, _WIDTH)), line]
     return "\n".join(lines) + "\n"
 
 
@@ -52,67 +59,72 @@ def name_of_file(out: Path) -> str:
     return name
 
 
-def _tables_of(start: str) -> dict[str, Any]:
+def _start_tables(start: str) -> dict[str, Any]:
     if start not in shipped_vehicles():
         return read_toml(Path(start))
     with resources.as_file(resources.files("plant_fmu") / "vehicles" / f"{start}.toml") as file:
         return read_toml(file)
 
 
-def _changed(fit: Fit) -> list[str]:
-    """Return the keys of the file that the fit changes, each once."""
-    keys = [".".join(fit.parameters[i].name.split(".")[:2]) for i in fit.vehicle_part()]
-    return list(dict.fromkeys(keys))
-
-
-def _entry(key: str, found: Vehicle) -> Any:
-    names = {
-        "rigid_body.center_of_gravity": "r_G", "hydrostatics.center_of_buoyancy": "r_B",
-        "thrusters.matrix": "thruster_matrix", "thrusters.time_constant": "thrust_time_constant",
-    }  # fmt: skip
-    value = np.asarray(getattr(found, names.get(key, key.partition(".")[2])))
+def _entry(key: str, vehicle: Vehicle) -> Any:
+    """Return the value of a key in the vehicle's file; a diagonal matrix as its diagonal."""
+    value = np.asarray(getattr(vehicle, _ATTRIBUTES.get(key, key.partition(".")[2])))
     if key == "thrusters.time_constant":
         return float(value[0])
-    square = value.ndim == 2 and value.shape[0] == value.shape[1] and key != "thrusters.matrix"
-    if square and not np.any(value - np.diag(np.diag(value))):
+    is_square = value.ndim == 2 and value.shape[0] == value.shape[1] and key != "thrusters.matrix"
+    if is_square and not np.any(value - np.diag(np.diag(value))):
         value = np.diag(value)
     return value.tolist()
 
 
-def _about(key: str, fit: Fit) -> Iterator[str]:
-    """Yield comments on the numbers of a key: values, halves of their 95 % intervals, units."""
-    words = []
+def _comment(key: str, fit: Fit) -> str:
+    """Return values, half widths of 95 % intervals and units of the parameters of a key; empty for other keys."""
+    texts = []
     for i in fit.vehicle_part():
         p = fit.parameters[i]
         if p.name != key and not p.name.startswith(f"{key}."):
             continue
-        place = p.name.removeprefix(key).lstrip(".")
-        half = fit.intervals.half[i]
-        at = f"({place.replace('.', ',')}) " if place else ""
-        rests = ", rests on its prior" if i in fit.resting() else ""
-        words.append(f"{at}{fit.values[i]:.4g} ± {half:.2g} {p.unit}".rstrip() + rests)
-    if words:
-        yield from _wrapped("; ".join(words))
+        index = p.name.removeprefix(key).lstrip(".").replace(".", ",")
+        basis = ", rests on its prior" if i in fit.undetermined() else ""
+        number = f"{fit.values[i]:.4g} ± {fit.intervals.half[i]:.2g} {p.unit}".rstrip()
+        texts.append((f"({index}) " if index else "") + number + basis)
+    return "; ".join(texts)
 
 
-def _wrapped(text: str) -> list[str]:
-    lines = [""]
-    for word in text.split():
-        if lines[-1] and len(lines[-1]) + len(word) >= _WIDTH:
-            lines.append("")
-        lines[-1] += f" {word}" if lines[-1] else word
-    return lines
+def posterior_lines(fit: Fit, vehicle: Vehicle) -> list[str]:
+    """Draw vehicles from an identification that began at `vehicle`; return a line of JSON for each."""
+    return [json.dumps({"draw": i, "parameters": p}) for i, p in enumerate(draw_plants(fit, vehicle, seed=0))]
 
 
-def _value(value: Any) -> str:
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, list):
-        if value and isinstance(value[0], list):
-            return "[\n" + "".join(f"    {_value(row)},\n" for row in value) + "]"
-        return f"[{', '.join(map(_value, value))}]"
-    if isinstance(value, dict):
-        return "{ " + ", ".join(f"{key} = {_value(inside)}" for key, inside in value.items()) + " }"
-    return repr(value)
+def draw_plants(fit: Fit, vehicle: Vehicle, seed: int, count: int = DRAWS) -> list[dict[str, float]]:
+    """Draw parameters of the FMU from the normal distribution of the identified parameters."""
+    indices = fit.vehicle_part()
+    parameters = [fit.parameters[i] for i in indices]
+    low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("min", "max"))
+    covariance = fit.intervals.covariance[np.ix_(indices, indices)]
+    rng = np.random.default_rng([seed, 28])
+    plants: list[dict[str, float]] = []
+    for _ in range(_MAX_TRIALS * count):
+        values = np.clip(rng.multivariate_normal(fit.values[indices], covariance), low, high)
+        body = with_values(vehicle, parameters, values)
+        if np.linalg.eigvalsh(body.mass_matrix)[0] <= 0.0:
+            continue
+        plants.append(_plant_parameters(fit, indices, values, body))
+        if len(plants) == count:
+            return plants
+    raise IdentificationError("hardly any vehicle within the intervals has a positive definite mass matrix")
+
+
+def _plant_parameters(fit: Fit, indices: Sequence[int], values: NDArray[np.float64], body: Vehicle) -> dict[str, float]:
+    """Return the parameters of the FMU that values of the vehicle's parameters set."""
+    plant: dict[str, float] = {}
+    for i, value in zip(indices, values.tolist(), strict=True):
+        p = fit.parameters[i]
+        if p.kind == "lag":
+            plant |= {f"thrust_time_constant[{n + 1}]": value for n in range(body.n_thrusters)}
+        elif p.kind == "thrust":
+            column = body.thruster_matrix[:, p.index]
+            plant |= {f"thruster_matrix[{k + 1},{p.index + 1}]": float(column[k]) for k in np.flatnonzero(column)}
+        else:
+            plant[p.plant] = value
+    return plant

@@ -10,21 +10,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.identification.log import Log, Topic
+from cosim.identification.log import STATES, Log, Topic
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
 MARGINS = (0.1, 0.2)  # s, times without samples at start and end of a window, if delays are estimated
 
-_SHORTEST = 0.6  # fraction of a full window, below which the rest of a run is dropped
+_MIN_LENGTH = 0.6  # fraction of a full window, below which the rest of a run is dropped
 _SETTLED = 1.0  # s, from a run's first command to its first window: the commands then determine lagged forces
-_RESTS = 0.01  # fraction of a thruster's greatest command, up to which it rests: its neutral pulse may be a little off
+_REST_FRACTION = (
+    0.01  # fraction of a thruster's greatest command, up to which it rests: its neutral pulse may be a little off
+)
 _IDLE = "no thruster works before or after it: the vehicle may be held"
-_MOST_GAP, _MOST_PAUSE = 1.0, 1.5  # s, longest gap in the commands; in samples of velocity, position and attitude
-_FASTEST = 3.0  # rad/s, greatest angular velocity about a body axis
-_STEEPEST = math.radians(80.0)  # rad, greatest pitch
-_MOST_SATURATED = 0.1  # greatest fraction of a window in which a thruster is commanded beyond its limits
+_MAX_GAP, _MAX_PAUSE = 1.0, 1.5  # s, longest gap in the commands; in samples of velocity, position and attitude
+_MAX_RATE = 3.0  # rad/s, greatest angular velocity about a body axis
+_MAX_PITCH = math.radians(80.0)  # rad, greatest pitch
+_MAX_SATURATED = 0.1  # greatest fraction of a window in which a thruster is commanded beyond its limits
 
 
 @dataclass(frozen=True)
@@ -38,12 +40,22 @@ class Window:
     topics: tuple[Topic, ...]  # samples, with times since the window's start
     start: Array  # (13,) start state interpolated from samples: position [m], quaternion, velocity [m/s, rad/s]
 
+    @property
+    def topic_names(self) -> NDArray[np.str_]:
+        """Topic of each residual, shape (n,)."""
+        return np.repeat([t.name for t in self.topics], [len(t.times) * len(t.components) for t in self.topics])
+
+    def by_topic(self, residual: Array) -> dict[str, Array]:
+        """Split residuals by topic, shape (samples, components) each; residual (n,)."""
+        names = self.topic_names
+        return {t.name: residual[: len(names)][names == t.name].reshape(len(t.times), -1) for t in self.topics}
+
 
 def cut_windows(
     logs: Sequence[Log], vehicle: Vehicle, step: float, length: float, margins: tuple[float, float] = (0.0, 0.0)
 ) -> tuple[list[Window], Counter[str]]:
     """Cut runs into windows, and reject those that cannot be predicted; step [s], length [s], margins [s]."""
-    kept: list[Window] = []
+    windows: list[Window] = []
     rejected: Counter[str] = Counter()
     for run, log in enumerate(logs):
         begin, end = _working_time(log)
@@ -52,18 +64,17 @@ def cut_windows(
             rejected[_IDLE] += idle
         for first, steps in _pieces(log, begin, end, step, length):
             window = _window(log, run, first, steps, step, margins)
-            reason = _fault(log, vehicle, window, steps * step)
-            if reason:
+            if reason := _rejection(log, vehicle, window, steps * step):
                 rejected[reason] += 1
             else:
-                kept.append(window)
-    return kept, rejected
+                windows.append(window)
+    return windows, rejected
 
 
 def _working_time(log: Log) -> tuple[float, float]:
     """Return the times [s] of a run's first and last command above its noise; its start and end if all are zero."""
     commands = np.abs(np.concatenate([log.thrust, log.wrench], axis=1))
-    working = np.flatnonzero((commands > _RESTS * commands.max(axis=0)).any(axis=1))
+    working = np.flatnonzero((commands > _REST_FRACTION * commands.max(axis=0)).any(axis=1))
     if not len(working):
         return float(log.times[0]), float(log.times[-1])
     # a sampled command may have begun after the sample before, and ended before the sample after
@@ -77,17 +88,15 @@ def _pieces(log: Log, begin: float, end: float, step: float, length: float) -> I
     steps = max(1, round(length / step))
     for first in range(math.ceil((begin - log.times[0] + _SETTLED) / step), total, steps):
         count = min(steps, total - first)
-        if count >= _SHORTEST * steps:
+        if count >= _MIN_LENGTH * steps:
             yield first, count
 
 
 def _window(log: Log, run: int, first: int, steps: int, step: float, margins: tuple[float, float]) -> Window:
     begin = float(log.times[0]) + first * step
     end = begin + steps * step
-    topics = []
-    for topic in log.topics:
-        inside = (topic.times >= begin + margins[0]) & (topic.times < end - margins[1])
-        topics.append(replace(topic, times=topic.times[inside] - begin, values=topic.values[inside]))
+    inside = [(t.times >= begin + margins[0]) & (t.times < end - margins[1]) for t in log.topics]
+    topics = (replace(t, times=t.times[i] - begin, values=t.values[i]) for t, i in zip(log.topics, inside, strict=True))
     return Window(run, first, steps, begin, tuple(topics), _start(log, begin))
 
 
@@ -96,44 +105,34 @@ def _start(log: Log, time: float) -> Array:
     state = np.zeros(13)
     for topic in log.topics:
         values = np.array([np.interp(time, topic.times, x) for x in topic.values.T])
-        if topic.name == "attitude":
-            state[3:7] = values / np.linalg.norm(values)
-        elif topic.name == "depth":
-            state[2] = values[0]
-        else:
-            first = {"velocity": 7, "angular_velocity": 10, "position": 0}[topic.name]
-            state[first : first + 3] = values
+        size = np.linalg.norm(values) if topic.name == "attitude" else 1.0
+        state[STATES[topic.name]] = values / size
     return state
 
 
-def _fault(log: Log, vehicle: Vehicle, window: Window, length: float) -> str:
-    """Return the rule that rejects a window; empty if the window is accepted."""
+def _rejection(log: Log, vehicle: Vehicle, window: Window, length: float) -> str:
+    """Return the rule that rejects a window, or an empty text."""
     begin, end = window.begin, window.begin + length
-    commanded = (log.times >= begin - _MOST_GAP) & (log.times < end + _MOST_GAP)
-    if commanded.sum() < 2 or np.diff(log.times[commanded]).max() > _MOST_GAP:
-        return f"a gap of more than {_MOST_GAP:g} s in the commands"
+    commanded = (log.times >= begin - _MAX_GAP) & (log.times < end + _MAX_GAP)
+    if commanded.sum() < 2 or np.diff(log.times[commanded]).max() > _MAX_GAP:
+        return f"a gap of more than {_MAX_GAP:g} s in the commands"
     for topic in window.topics:
         if topic.name in ("velocity", "position", "attitude"):
             times = np.concatenate([[0.0], topic.times, [length]])
-            if np.diff(times).max() > _MOST_PAUSE:
-                return f"a gap of more than {_MOST_PAUSE:g} s in the {topic.name}"
+            if np.diff(times).max() > _MAX_PAUSE:
+                return f"a gap of more than {_MAX_PAUSE:g} s in the {topic.name}"
         if not len(topic.times):
             return f"no samples of {topic.name.replace('_', ' ')}"
-        if topic.name == "angular_velocity" and np.abs(topic.values).max() > _FASTEST:
-            return f"it turns at more than {_FASTEST:g} rad/s"
+        if topic.name == "angular_velocity" and np.abs(topic.values).max() > _MAX_RATE:
+            return f"it turns at more than {_MAX_RATE:g} rad/s"
         if topic.name == "attitude":
             e0, e1, e2, e3 = topic.values.T
-            if np.abs(2.0 * (e0 * e2 - e1 * e3)).max() > math.sin(_STEEPEST):
-                return f"it pitches by more than {math.degrees(_STEEPEST):.0f} degrees"
+            if np.abs(2.0 * (e0 * e2 - e1 * e3)).max() > math.sin(_MAX_PITCH):
+                return f"it pitches by more than {math.degrees(_MAX_PITCH):.0f} degrees"
         if topic.name == "depth" and topic.values.min() < vehicle.hull_radius:
             return "the hull is at the surface"
     thrust = log.thrust[(log.times >= begin) & (log.times < end)]
     beyond = (thrust < vehicle.thrust_min) | (thrust > vehicle.thrust_max)
-    if len(thrust) and beyond.mean(axis=0).max() > _MOST_SATURATED:
-        return f"a thruster is beyond its limits for more than {100 * _MOST_SATURATED:.0f} % of it"
+    if len(thrust) and beyond.mean(axis=0).max() > _MAX_SATURATED:
+        return f"a thruster is beyond its limits for more than {100 * _MAX_SATURATED:.0f} % of it"
     return ""
-
-
-def topic_names(window: Window) -> NDArray[np.str_]:
-    """Return the topic's name for each residual of a window, shape (n,)."""
-    return np.repeat([t.name for t in window.topics], [len(t.times) * len(t.components) for t in window.topics])

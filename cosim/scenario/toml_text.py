@@ -65,12 +65,13 @@ def _key(key: str) -> str:
 
 
 def _value(value: Any) -> str:
-    """Format a value as TOML: in one line, or a long list with a line for each item."""
+    """Format a value as TOML: in one line, or a long list with a line for each item; numbers in one line."""
     if isinstance(value, Mapping):
         inner = ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items())
         return f"{{ {inner} }}" if inner else "{}"
     if isinstance(value, list | tuple):
         items = [_value(item) for item in value]
         line = f"[{', '.join(items)}]"
-        return line if len(line) <= _WIDE else "[\n" + "".join(f"    {item},\n" for item in items) + "]"
+        is_row = all(isinstance(item, int | float) for item in value)  # as of a matrix
+        return line if is_row or len(line) <= _WIDE else "[\n" + "".join(f"    {item},\n" for item in items) + "]"
     return tomli_w.dumps({"v": value}).removeprefix("v = ").removesuffix("\n")

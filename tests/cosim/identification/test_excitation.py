@@ -7,11 +7,23 @@ import numpy as np
 import pytest
 
 from cosim.command_line.cli import main
-from cosim.identification.excitation import design as designing
-from cosim.identification.excitation.design import BEGIN, RETURN, farthest, information, keep_inside, schedule
-from cosim.identification.excitation.rehearsal import rehearse
-from cosim.identification.excitation.scenario_text import ROW, load, scenario_text
-from cosim.identification.excitation.segments import PERIOD, SECONDS, Segment, candidates
+from cosim.identification import excitation
+from cosim.identification.excitation import (
+    AXES,
+    BEGIN,
+    PERIOD,
+    RETURN,
+    ROW,
+    SECONDS,
+    candidate_segments,
+    choose_segments,
+    excitation_scenario,
+    excursions_of,
+    information,
+    keep_inside,
+    rehearse,
+    schedule,
+)  # fmt: skip
 from cosim.identification.parameters import free_parameters
 from cosim.simulation.commands.commands import SetMode, validate_command
 from plant_fmu import load_vehicle
@@ -19,29 +31,24 @@ from plant_fmu import load_vehicle
 FREE = ("hydrodynamics.quadratic_damping.1", "hydrodynamics.added_mass.1.1", "hydrostatics.buoyancy")
 
 
-@pytest.fixture(scope="module")
-def vehicle():
-    return load_vehicle("bluerov2_heavy")
+VEHICLE = load_vehicle("bluerov2_heavy")
 
 
-def tried(axes=(True,) * 6, seed=0):
-    return list(candidates(np.array(axes), np.random.default_rng(seed), 1))
+def candidates(axes=(True,) * 6):
+    return list(candidate_segments(np.array(axes), np.random.default_rng(0)))
 
 
-def test_sticks_are_within_range_with_zero_mean():
-    for segment in tried():
+def test_sticks_are_within_range_with_zero_mean_on_actuated_axes():
+    for segment in candidates():
         assert segment.sticks.shape == (round(SECONDS / PERIOD), 6)
         assert np.abs(segment.sticks).max() <= 1.0
         assert segment.sticks.mean(axis=0) == pytest.approx(np.zeros(6), abs=1e-12)
-
-
-def test_unactuated_axes_are_not_excited():
     axes = (True, False, True, False, False, True)
-    assert all(not segment.sticks[:, [1, 3, 4]].any() for segment in tried(axes))
+    assert all(not segment.sticks[:, [1, 3, 4]].any() for segment in candidates(axes))
 
 
 def test_schedule_returns_between_segments_with_valid_commands():
-    segments = [s for s in tried() if s.mode == "stabilize"][:2]
+    segments = [s for s in candidates() if s.mode == "stabilize"][:2]
     commands = schedule(segments)
     for _, command in commands:
         validate_command(command)
@@ -52,44 +59,41 @@ def test_schedule_returns_between_segments_with_valid_commands():
     assert [time for time, _ in modes] == pytest.approx([time for time, _ in expected])
 
 
-def rehearsed(segment, duration=BEGIN + SECONDS):
-    return rehearse(load(scenario_text("bluerov2_heavy", 4.0, duration, "test"), "bluerov2_heavy"), schedule([segment]))
-
-
 @pytest.mark.slow  # compiles the prediction
-def test_surge_segment_informs_its_damping_and_rest_does_not(vehicle):
-    steps = next(s for s in tried() if s.mode == "depth_hold" and s.title.startswith("surge: steps"))
-    parameters = free_parameters(vehicle, FREE)
-    rest = Segment("rest", "depth_hold", 0.0 * steps.sticks)
-    moved, still = (information([rehearsed(s).log()], vehicle, parameters) for s in (steps, rest))
+def test_surge_segment_informs_its_damping_and_rest_does_not():
+    steps = next(s for s in candidates() if s.mode == "depth_hold" and s.title.startswith("surge: steps"))
+    parameters = free_parameters(VEHICLE, FREE)
+    scenario = excitation_scenario("bluerov2_heavy", VEHICLE, 4.0, BEGIN + SECONDS)
+    moving, resting = (
+        information(rehearse(scenario, schedule([s])).log(), VEHICLE, parameters) for s in (steps, steps.scaled(0, 0))
+    )
     scale = np.array([p.deviation for p in parameters[:2]])
-    assert moved[1, 1] > 0.0
-    assert (np.diag(moved)[:2] * scale**2 > 1e3 * np.diag(still)[:2] * scale**2).all()
+    assert moving[1, 1] > 0.0
+    assert (np.diag(moving)[:2] * scale**2 > 1e3 * np.diag(resting)[:2] * scale**2).all()
 
 
-def test_segment_choice_complements_known_information(vehicle):
+def test_segment_choice_complements_known_information():
     """Two of three candidates are alike: the third is taken second."""
-    parameters = free_parameters(vehicle, FREE)[:2]
+    parameters = free_parameters(VEHICLE, FREE)[:2]
     scale = np.array([p.deviation for p in parameters])
     first, second = np.diag([100.0, 0.0]), np.diag([0.0, 80.0])
-    found = [m / np.outer(scale, scale) for m in (first, 0.99 * first, second)]
-    assert sorted(designing._choose(found, parameters, 2)) == [0, 2]
+    matrices = [m / np.outer(scale, scale) for m in (first, 0.99 * first, second)]
+    assert sorted(choose_segments(matrices, parameters, 2)) == [0, 2]
 
 
 @pytest.mark.medium
 def test_segment_is_made_smaller_until_other_vehicles_stay_inside():
     """Steps of full surge, and vehicles with half the damping in a current: forces become smaller, moments stay."""
-    full = next(s for s in tried() if s.mode == "manual" and s.title.startswith("all axes: steps of 2"))
-    box, text = (6.0, 6.0, 4.0), scenario_text("bluerov2_heavy", 4.0, BEGIN + SECONDS + RETURN, "test")
-    scenario = load(text, "bluerov2_heavy")
+    full = next(s for s in candidates() if s.mode == "manual" and s.title.startswith("all axes: steps of 2"))
+    box, scenario = (6.0, 6.0, 4.0), excitation_scenario("bluerov2_heavy", VEHICLE, 4.0, BEGIN + SECONDS + RETURN)
     halved = {f"quadratic_damping[{i}]": 0.5 * float(x) for i, x in enumerate(scenario.vehicle.quadratic_damping, 1)}
     other = scenario.replace({"plant.current": [0.05, 0.05, 0.0], "plant.parameters": halved})
-    before = farthest(rehearse(other, schedule([full])), scenario, box, 1)
-    (made,) = keep_inside([full], scenario, box, [other])
-    after = farthest(rehearse(other, schedule([made])), scenario, box, 1)
+    before = excursions_of(rehearse(other, schedule([full])), scenario, box, 1)
+    (reduced,) = keep_inside([full], scenario, box, [other])
+    after = excursions_of(rehearse(other, schedule([reduced])), scenario, box, 1)
     assert before[0] > 1.0 >= after[0]
-    assert np.abs(made.sticks[:, :3]).max() < np.abs(full.sticks[:, :3]).max()
-    assert (made.sticks[:, 3:] == full.sticks[:, 3:]).all()
+    assert np.abs(reduced.sticks[:, :3]).max() < np.abs(full.sticks[:, :3]).max()
+    assert (reduced.sticks[:, 3:] == full.sticks[:, 3:]).all()
 
 
 @pytest.mark.parametrize(
@@ -117,7 +121,8 @@ def test_nonempty_folder_is_rejected(tmp_path, capsys):
 @pytest.mark.slow
 def test_identification_recovers_the_plant_from_an_excitation_run(tmp_path, monkeypatch, capsys):
     """The run of another plant than the one that the sticks were chosen for becomes the numbers of that plant."""
-    monkeypatch.setattr(designing, "candidates", lambda axes, rng, draws: tried()[10:60:4])
+    segments = candidates()[10:60:4]
+    monkeypatch.setattr(excitation, "candidate_segments", lambda axes, rng: segments)
     pool, run, mine = tmp_path / "pool", tmp_path / "run", tmp_path / "mine.toml"
     box = ["--box", "8", "8", "4", "--depth", "4"]
     start = ["--vehicle", "bluerov2_heavy"]
@@ -135,7 +140,7 @@ def test_identification_recovers_the_plant_from_an_excitation_run(tmp_path, monk
         assert np.histogram(changes * rate % 1.0, 4, (0.0, 1.0))[0] == pytest.approx(len(changes) / 4, rel=0.1), rate
     log = [json.loads(line)["command"] for line in (pool / "commands.jsonl").read_text().splitlines()]
     wrenches = [command["wrench"] for command in log if command["command"] == "manual_control"]
-    played = [[float(row[a]) for a in ("surge", "sway", "heave", "roll", "pitch", "yaw")]
+    played = [[float(row[a]) for a in AXES]
               for row in rows if row["mode"] != "return"]  # fmt: skip
     assert np.array(played) == pytest.approx(np.array(wrenches), abs=1e-4)
 

@@ -5,6 +5,7 @@ import json
 from types import SimpleNamespace
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 
 import cosim
@@ -12,7 +13,7 @@ from cosim.campaigns.sweeps.design import vary_vehicles
 from cosim.command_line.cli import main
 from cosim.errors import IdentificationError, RunError
 from cosim.identification.parameters import DEFAULT_FREE, free_parameters
-from cosim.identification.posterior import draw_plants, posterior_lines
+from cosim.identification.vehicle_file import draw_plants, posterior_lines
 from plant_fmu import load_vehicle
 
 VEHICLE = load_vehicle("bluerov2_heavy")
@@ -73,11 +74,7 @@ def test_a_sweep_flies_each_vehicle_and_says_which_number_decides(tmp_path, caps
     settings = ["arbiter.engine=closed", "vehicle=bluerov2_heavy", "actuation.through=thrusters", "time.duration=3"]
     command = ["sweep", "docking", *(part for text in settings for part in ("--set", text)), "--out", str(out), "-q"]
     assert main([*command, "--vehicles", str(path), "--samples", "24", "--replays", "0"]) == 0
-    results = cosim.read_results(out) if hasattr(cosim, "read_results") else None
-    import pyarrow.parquet as pq
-
     table = pq.read_table(out / "results.parquet").to_pydict()
-    assert results is None or len(results) == 24
     assert table["plant.parameters.buoyancy"] == [plant["buoyancy"] for plant in drawn[:24]]
     assert not any(table["refused"]) and len(set(table["final_z"])) == 24
     summary = json.loads((out / "summary.json").read_text())
