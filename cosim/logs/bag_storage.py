@@ -15,8 +15,8 @@ from typing import Any, BinaryIO, NamedTuple
 
 from cosim.errors import ImportLogError
 from cosim.logs.bag_database import open_database
+from cosim.logs.chunked_file import OnProgress
 from cosim.logs.decompression import MAX_PART, Decompressor
-from cosim.logs.format import Moved
 
 MAX_DECODED = 1 << 20  # bytes, greatest size of a message that is decoded: its objects take up to a hundred times that
 _MAX_TOPICS = 20_000
@@ -44,7 +44,7 @@ class StoredMessage(NamedTuple):
     encoding: str  # encoding of the data, such as cdr, ros1 or json
     data: bytes
     time: float  # s, time of recording, by the recorder's clock
-    part: float  # fraction of the file read so far, 0 to 1
+    position: float  # fraction of the file read so far, 0 to 1
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -67,10 +67,10 @@ def _sort_key(file: Path) -> tuple[list[int], str]:
     return [int(number) for number in _NUMBER.findall(file.stem)], file.name
 
 
-def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[StoredMessage]:
+def stored_messages(path: Path, remarks: list[str], on_progress: OnProgress) -> Iterator[StoredMessage]:
     """Yield the messages of a bag in the order of its files and their storage."""
     failures = _failures()
-    files, readers = bag_files(path), {".mcap": _of_mcap, ".db3": _of_sqlite, ".bag": _of_ros1}
+    files, readers = bag_files(path), {".mcap": _mcap_messages, ".db3": _sqlite_messages, ".bag": _ros1_messages}
     topics: set[str] = set()
     for k, file in enumerate(files):
         try:
@@ -80,7 +80,7 @@ def stored_messages(path: Path, remarks: list[str], moved: Moved) -> Iterator[St
                     topics.add(message.topic)
                     if len(topics) > _MAX_TOPICS:
                         raise ImportLogError(f"has more than {_MAX_TOPICS} topics")
-                moved((k + message.part) / len(files))
+                on_progress((k + message.position) / len(files))
         except failures as error:
             words = str(error) or type(error).__name__
             if not topics:
@@ -97,67 +97,57 @@ def _failures() -> tuple[type[Exception], ...]:
     return (McapError, ReaderError, ZstdError, sqlite3.Error, *DAMAGE)
 
 
-class _McapFile:
-    """An MCAP file, read in the order of its records."""
+def _mcap_messages(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
+    """Yield the messages of an MCAP file in the order of its records; raise EOFError if the file ends early."""
+    from mcap.data_stream import ReadDataStream
+    from mcap.records import Channel, Chunk, Schema
+    from mcap.stream_reader import read_magic
 
-    def __init__(self, path: Path) -> None:
-        self._path, self._parts = path, Decompressor(path)
-        self._schemas: dict[int, tuple[str, str, str]] = {}  # name, definition and language
-        self._channels: dict[int, tuple[str, str, str, str, str]] = {}  # the first fields of a `StoredMessage`
-        self.damaged_chunks = self.unknown = 0
+    size, failures, parts = path.stat().st_size, _failures(), Decompressor(path)
+    schemas: dict[int, tuple[str, str, str]] = {}  # name, definition and language
+    channels: dict[int, tuple[str, str, str, str, str]] = {}  # the first fields of a `StoredMessage`
+    damaged_chunks = unknown = 0
 
-    def messages(self) -> Iterator[StoredMessage]:
-        """Yield the messages; raise EOFError if the file ends early."""
-        from mcap.data_stream import ReadDataStream
-        from mcap.stream_reader import read_magic
-
-        total, failures = self._path.stat().st_size, _failures()
-        with self._path.open("rb") as file:
-            read_magic(ReadDataStream(file))
-            for opcode, body in _mcap_records(file):
-                if opcode == _FOOTER:
-                    return
-                part = file.tell() / total
-                try:
-                    for kind, record in self._chunk(body) if opcode == _CHUNK else [(opcode, body)]:
-                        if kind != _MESSAGE:
-                            self._take(kind, record)
-                            continue
-                        key, time = _MESSAGE_HEAD.unpack_from(record)
-                        channel = self._channels.get(key)
-                        if channel is None:
-                            self.unknown += 1
-                            continue
-                        yield StoredMessage(*channel, record[_DATA:], time * 1e-9, part)
-                except failures:
-                    if opcode != _CHUNK:
-                        raise
-                    self.damaged_chunks += 1
-        raise EOFError("the file ends without a footer")
-
-    def _chunk(self, body: bytes) -> Iterator[tuple[int, bytes]]:
+    def records_in(body: bytes) -> Iterator[tuple[int, bytes]]:
         """Decompress a chunk, and yield opcode and body of each record."""
-        from mcap.data_stream import ReadDataStream
-        from mcap.records import Chunk
-
         chunk = Chunk.read(ReadDataStream(BytesIO(body)))
-        data = self._parts.decompress(chunk.compression, chunk.data)
+        data = parts.decompress(chunk.compression, chunk.data)
         if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
             raise ValueError("a chunk has another checksum")
         yield from _mcap_records(BytesIO(data))
 
-    def _take(self, opcode: int, body: bytes) -> None:
-        """Take a schema or channel."""
-        from mcap.data_stream import ReadDataStream
-        from mcap.records import Channel, Schema
-
-        if opcode == _SCHEMA:
-            schema = Schema.read(ReadDataStream(BytesIO(body)))
-            self._schemas[schema.id] = schema.name, schema.data.decode(errors="replace"), schema.encoding
-        elif opcode == _CHANNEL:
-            channel = Channel.read(ReadDataStream(BytesIO(body)))
-            schema = self._schemas.get(channel.schema_id, ("", "", ""))
-            self._channels[channel.id] = channel.topic, *schema, channel.message_encoding
+    try:
+        with path.open("rb") as file:
+            read_magic(ReadDataStream(file))
+            for opcode, body in _mcap_records(file):
+                if opcode == _FOOTER:
+                    return
+                position = file.tell() / size
+                try:
+                    for kind, record in records_in(body) if opcode == _CHUNK else [(opcode, body)]:
+                        if kind == _SCHEMA:
+                            schema = Schema.read(ReadDataStream(BytesIO(record)))
+                            schemas[schema.id] = schema.name, schema.data.decode(errors="replace"), schema.encoding
+                        elif kind == _CHANNEL:
+                            channel = Channel.read(ReadDataStream(BytesIO(record)))
+                            definition = schemas.get(channel.schema_id, ("", "", ""))
+                            channels[channel.id] = channel.topic, *definition, channel.message_encoding
+                        elif kind == _MESSAGE:
+                            key, time = _MESSAGE_HEAD.unpack_from(record)
+                            if key in channels:
+                                yield StoredMessage(*channels[key], record[_DATA:], time * 1e-9, position)
+                            else:
+                                unknown += 1
+                except failures:
+                    if opcode != _CHUNK:
+                        raise
+                    damaged_chunks += 1
+        raise EOFError("the file ends without a footer")
+    finally:
+        if damaged_chunks:
+            remarks.append(f"{damaged_chunks} damaged chunks of {path.name} were passed over.")
+        if unknown:
+            remarks.append(f"{unknown} messages of {path.name} are of no channel, and were passed over.")
 
 
 def _mcap_records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
@@ -176,18 +166,7 @@ def _mcap_records(file: BinaryIO) -> Iterator[tuple[int, bytes]]:
         yield opcode, body
 
 
-def _of_mcap(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
-    file = _McapFile(path)
-    try:
-        yield from file.messages()
-    finally:
-        if file.damaged_chunks:
-            remarks.append(f"{file.damaged_chunks} damaged chunks of {path.name} were passed over.")
-        if file.unknown:
-            remarks.append(f"{file.unknown} messages of {path.name} are of no channel, and were passed over.")
-
-
-def _of_sqlite(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
+def _sqlite_messages(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
     parts, total, read = Decompressor(path), path.stat().st_size, 0
     with open_database(path) as database:
         if not database.tables >= {"topics", "messages"}:
@@ -217,7 +196,7 @@ def _three_parts(kind: str) -> str:
     return kind.replace("/", "/msg/") if kind.count("/") == 1 else kind
 
 
-def _of_ros1(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
+def _ros1_messages(path: Path, remarks: list[str]) -> Iterator[StoredMessage]:
     from rosbags.rosbag1.reader import Header, Reader, ReaderError, RecordType, read_bytes, read_uint32
 
     class BoundedReader(Reader):  # type: ignore[misc]

@@ -13,9 +13,9 @@ from typing import Any
 
 from cosim.errors import ImportLogError
 from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, StoredMessage, stored_messages
+from cosim.logs.chunked_file import OnProgress
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import require_map
-from cosim.logs.format import Moved
 from cosim.logs.spool import LogContents
 from cosim.logs.vehicle_messages import AUTOPILOT, NO_AUTOPILOT, VehicleMessages
 from cosim.mavlink.wire.dialect import dialect
@@ -25,12 +25,12 @@ _ALL_MESSAGES = "mavlink/out"  # topic of all messages; each is also recorded wi
 _ONE_KIND = re.compile(r"mavlink/\d+/\d+/[A-Z0-9_]+")
 
 
-def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
+def read_recording(path: Path, contents: LogContents, on_progress: OnProgress) -> None:
     """Read a recording, or the folder with the recordings of a dive."""
     by_kind, vehicle = _find_vehicle(path)
     clock, messages = Clock(), VehicleMessages(contents, *vehicle)
     kinds = {kind.msgname: kind for kind in dialect().mavlink_map.values()}
-    for stored in stored_messages(path, contents.remarks, moved):
+    for stored in stored_messages(path, contents.remarks, on_progress):
         if not stored.topic.startswith("mavlink"):
             contents.unread[stored.topic] += 1
         if not (_ONE_KIND.fullmatch(stored.topic) if by_kind else stored.topic == _ALL_MESSAGES):
@@ -39,21 +39,21 @@ def read_recording(path: Path, contents: LogContents, moved: Moved) -> None:
         try:
             header, fields = _parts(stored)
             name = fields["type"]
-            if name in messages.wanted:
+            if name in messages.message_names:
                 message = kinds[name](**_values(kinds[name], fields))
-                messages.take(header["system_id"], header["component_id"], message, written)
+                messages.add(header["system_id"], header["component_id"], message, written)
             elif name != "HEARTBEAT":
                 contents.unread[name] += 1
         except DAMAGE:
             contents.unread[f"{name} that is not as expected"] += 1
-    contents.remarks += clock.remarks("the recorder")
+    contents.remarks += clock.remarks("The clock of the recorder")
 
 
 def _find_vehicle(path: Path) -> tuple[bool, tuple[int, int, int]]:
     """Find the autopilot: return True if each kind of message has a topic, and the autopilot's identity."""
     # The identity is system id, MAV_AUTOPILOT and MAV_TYPE.
-    found, any_mavlink = None, False
-    for stored in stored_messages(path, [], lambda part: None):
+    vehicle, any_mavlink = None, False
+    for stored in stored_messages(path, [], lambda fraction: None):
         by_kind = _ONE_KIND.fullmatch(stored.topic) is not None
         is_mavlink = by_kind or stored.topic == _ALL_MESSAGES
         any_mavlink |= is_mavlink
@@ -63,14 +63,14 @@ def _find_vehicle(path: Path) -> tuple[bool, tuple[int, int, int]]:
             header, fields = _parts(stored)
             autopilot, kind = _value(fields["autopilot"]), _value(fields["mavtype"])
             if header["component_id"] == AUTOPILOT and autopilot != NO_AUTOPILOT:
-                found = int(header["system_id"]), int(autopilot), int(kind)
+                vehicle = int(header["system_id"]), int(autopilot), int(kind)
                 if by_kind:
-                    return True, found
+                    return True, vehicle
     if not any_mavlink:
         require_map(None)
-    if found is None:
+    if vehicle is None:
         raise ImportLogError("holds no heartbeat of an autopilot, expected a recording of a vehicle")
-    return False, found
+    return False, vehicle
 
 
 def _parts(stored: StoredMessage) -> tuple[dict[str, Any], dict[str, Any]]:

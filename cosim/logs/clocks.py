@@ -8,11 +8,11 @@ import numpy as np
 
 from cosim.simulation.signals import Array
 
-_BACK = 1.0  # s; a step back by more is a jump, not a message out of order
-_AHEAD = 3600.0  # s; a step ahead by more is a jump, not a pause
+_MAX_STEP_BACK = 1.0  # s; a step back by more is a jump, not a message out of order
+_MAX_STEP_AHEAD = 3600.0  # s; a step ahead by more is a jump, not a pause
 _PAUSE = 1.0  # s, assumed duration of a jump
-_WINDOW = 60.0  # s of the vehicle's clock, in which only the message of least delay is used
-_MOST_DRIFT = 5e-4  # relative drift above which a fit is discarded
+_WINDOW = 60.0  # s of the vehicle's clock, in which only the message of smallest delay is used
+_MAX_DRIFT = 5e-4  # relative drift above which a fit is discarded
 
 
 class Clock:
@@ -22,70 +22,50 @@ class Clock:
         self.jumps: list[tuple[float, float]] = []  # converted time [s] and size [s] of each jump
         self._shift, self._last = 0.0, math.nan
 
-    def time(self, said: float) -> float:
-        """Return the time [s] of a clock reading [s]; call it in the order of the log."""
-        time = said + self._shift
-        by = time - self._last
-        if by < -_BACK or by > _AHEAD:
-            self._shift += _PAUSE - by
+    def time(self, reading: float) -> float:
+        """Return the time [s] of a clock reading [s], NaN for NaN; call it in the order of the log."""
+        if not math.isfinite(reading):
+            return math.nan
+        time = reading + self._shift
+        step = time - self._last
+        if step < -_MAX_STEP_BACK or step > _MAX_STEP_AHEAD:
+            self._shift += _PAUSE - step
             time = self._last + _PAUSE
-            self.jumps.append((time, by))
-        if not time <= self._last:
+            self.jumps.append((time, step))
+        if time > self._last or math.isnan(self._last):
             self._last = time
         return time
 
-    def remarks(self, owner: str) -> list[str]:
-        """Return a sentence for each jump of an owner's clock."""
-        return [f"The clock of {owner} jumps by {by:+.4g} s: it is taken as a pause of 1 s." for _, by in self.jumps]
-
-    def is_behind(self, said: float) -> bool:
-        """Return True if a reading [s] would be taken for a jump back."""
-        return said + self._shift < self._last - _BACK
-
-    def times(self, said: Array) -> Array:
+    def times(self, readings: Array) -> Array:
         """Return the times [s] of clock readings [s], shape (n,)."""
-        turned: Array = np.asarray(said, float) + self._shift
-        first = 0
-        known = np.flatnonzero(np.isfinite(turned))
-        highest = np.maximum.accumulate(turned[known]) if known.size else turned[known]
-        before = np.concatenate([[self._last], highest[:-1]])
-        steps = turned[known] - before
-        while (odd := np.flatnonzero((steps[first:] < -_BACK) | (steps[first:] > _AHEAD))).size:
-            at = first + int(odd[0])
-            turned[known[at] :] += _PAUSE - steps[at]
-            self.jumps.append((float(turned[known[at]]), float(steps[at])))
-            self._shift += _PAUSE - float(steps[at])
-            highest = np.maximum.accumulate(np.concatenate([before[at : at + 1], turned[known[at:]]]))[1:]
-            before = np.concatenate([before[: at + 1], highest[:-1]])
-            steps = turned[known] - before
-            first = at + 1
-        if known.size:
-            self._last = float(np.fmax(self._last, turned[known].max()))
-        return turned
+        return np.array([self.time(reading) for reading in readings.tolist()])
+
+    def remarks(self, name: str) -> list[str]:
+        """Return a sentence for each jump of a clock with a name."""
+        return [f"{name} jumps by {step:+.4g} s: it is taken as a pause of 1 s." for _, step in self.jumps]
+
+    def is_behind(self, reading: float) -> bool:
+        """Return True if a reading [s] would be taken for a jump back."""
+        return reading + self._shift < self._last - _MAX_STEP_BACK
 
 
 class VehicleClock:
     """Convert stamps of the vehicle's own clock to the clock of the log's writer."""
 
-    # A message is late, never early: in each minute, the message of least delay gives the offset of the clocks. A line
-    # through these gives the drift. A stamp that steps back is a restart of the vehicle.
+    # A message is late, never early: in each minute, the message of smallest delay gives the offset of the clocks. A
+    # line through these gives the drift. A stamp that steps back is a restart of the vehicle.
 
     def __init__(self) -> None:
         self._last = -math.inf
-        self._restarts: list[float] = []  # times of restarts on the writer's clock [s]
-        # before the first restart and after each: stamp and offset [s] of the message of least delay, by minute
+        self.restarts: list[float] = []  # times of restarts on the writer's clock [s]
+        # before the first restart and after each: stamp and offset [s] of the message of smallest delay, by minute
         self._offsets: list[dict[int, tuple[float, float]]] = [{}]
         self._lines: list[tuple[float, float]] | None = None
 
-    @property
-    def restarts(self) -> list[float]:
-        """Times of restarts of the vehicle's clock [s]."""
-        return self._restarts
-
     def put(self, stamp: float, written: float) -> None:
         """Add a stamp [s] and its time of writing [s], in the order of the log."""
-        if stamp < self._last - _BACK:
-            self._restarts.append(written)
+        if stamp < self._last - _MAX_STEP_BACK:
+            self.restarts.append(written)
             self._offsets.append({})
             self._last = stamp
         self._last = max(self._last, stamp)
@@ -99,25 +79,25 @@ class VehicleClock:
         if self._lines is None:
             self._lines = [_line(minutes) for minutes in self._offsets]
         lines = np.array(self._lines)
-        drift, offset = lines[np.searchsorted(self._restarts, written, "right")].T
+        drift, offset = lines[np.searchsorted(self.restarts, written, "right")].T
         return np.where(np.isnan(stamps), written, stamps * (1.0 + drift) + offset)
 
-    def words(self) -> str:
+    def summary(self) -> str:
         """Return a sentence about the alignment of the clocks; empty without stamps."""
         if not any(self._offsets):
             return ""
         drift = _line(self._offsets[0])[0]
         drifts = f", drift {drift * 1e6:+.0f} ppm" if drift else ""
-        return f"the vehicle's clock is put on that of the log's writer by its quickest message of each minute{drifts}"
+        return f"the vehicle's clock is put on that of the log's writer by its fastest message of each minute{drifts}"
 
 
 def _line(minutes: dict[int, tuple[float, float]]) -> tuple[float, float]:
-    """Return drift and offset [s] of a clock from the least offset of each minute."""
+    """Return drift and offset [s] of a clock from the smallest offset of each minute."""
     if not minutes:
         return 0.0, 0.0
     stamps, offsets = np.array(sorted(minutes.values())).T
     if len(stamps) >= 3:
         drift, _ = np.polyfit(stamps - stamps.mean(), offsets, 1)
-        if abs(drift) < _MOST_DRIFT:
+        if abs(drift) < _MAX_DRIFT:
             return float(drift), float((offsets - drift * stamps).min())
     return 0.0, float(offsets.min())

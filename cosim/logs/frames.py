@@ -68,6 +68,12 @@ def rotate_to_body(quaternions: Array, vectors: Array) -> Array:
     return turned
 
 
+def unit_quaternion(components: Sequence[float]) -> list[float]:
+    """Return the unit quaternion of components, NaN if they are zero."""
+    length = math.hypot(*components)
+    return [x / length if length > 0.0 else math.nan for x in components]
+
+
 def quaternion_of_angles(roll: float, pitch: float, yaw: float) -> Sequence[float]:
     """Return the unit quaternion of roll, pitch and yaw [rad], scalar first, for one sample."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
+import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -15,14 +17,14 @@ import numpy as np
 from cosim.errors import ImportLogError, RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text
+from cosim.logs.chunked_file import OnProgress
 from cosim.logs.clocks import VehicleClock
 from cosim.logs.column_map import read_map
-from cosim.logs.forces import CURVES, Commands, commands_of
-from cosim.logs.format import LogFormat, Moved
-from cosim.logs.formats import FORMATS
+from cosim.logs.forces import CURVES, CommandForces, command_forces
+from cosim.logs.formats import BAGS, FORMATS, LogFormat
 from cosim.logs.quantities import COMMANDS
 from cosim.logs.rows import RowMaker
-from cosim.logs.selection import rate_of, select_topics, span_of
+from cosim.logs.selection import default_rate, select_topics, time_span
 from cosim.logs.spool import LogContents
 from cosim.logs.topics import Topic
 from cosim.results.log_facts import COMMAND_TIME, IMPORT, LogFacts, TopicFacts
@@ -39,9 +41,16 @@ from plant_fmu.archive import temporary_folder
 from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
 
-_KEPT = ("goal", "regions", "criteria", "arbiter", "intersection", "title")  # keys of a scenario that apply to a log
+_SCENARIO_KEYS = (
+    "goal",
+    "regions",
+    "criteria",
+    "arbiter",
+    "intersection",
+    "title",
+)  # keys of a scenario that apply to a log
 _MIN_ROWS, _ROWS_PER_SAMPLE = 500_000, 200  # rows that a log may have: some, and for each of its samples
-_GAPS = 12  # greatest number of gaps of a topic in a report
+_MAX_GAPS = 12  # gaps of a topic in a report
 
 
 def import_log(
@@ -56,7 +65,7 @@ def import_log(
     voltage: float | None = None,
     report: bool = True,
     overwrite: bool = False,
-    moved: Moved = lambda part: None,
+    on_progress: OnProgress = lambda fraction: None,
 ) -> Run:
     r"""Read a log of a vehicle and write it as a run folder.
 
@@ -74,7 +83,7 @@ def import_log(
     columns : str or Path, optional
         The column map that tables and bags of ROS need.
     rate : float, optional
-        Rows per second [Hz]. Default: the least of 5, 10, 20, 25, 50, 100 and 200 that no state or command exceeds.
+        Rows per second [Hz]. Default: the lowest of 5, 10, 20, 25, 50, 100 and 200 that no state or command exceeds.
     curve : str, optional
         Curve from pulse to force: ``linear``, ``quadratic`` or ``t200``. Default: that of the vehicle's table
         ``autopilot``.
@@ -84,7 +93,7 @@ def import_log(
         True to write report and replay.
     overwrite : bool
         True to replace a run in `out`.
-    moved : callable
+    on_progress : callable
         Receives the fraction of the log read so far, 0 to 1.
 
     Returns
@@ -117,23 +126,25 @@ def import_log(
     path = Path(log)
     try:
         form = _format_of(path)
-        column_map = _map_of(form, columns)
-        craft = load_vehicle(Path(vehicle) if str(vehicle).endswith(".toml") else str(vehicle))
+        if columns is not None and not form.takes_map:
+            raise ImportLogError("a column map is given, expected none: its messages say what they are")
+        column_map = None if columns is None else read_map(Path(columns))
+        loaded = load_vehicle(Path(vehicle) if str(vehicle).endswith(".toml") else str(vehicle))
         if curve is not None and curve not in CURVES:
             raise ImportLogError(f"curve is {curve!r}, expected one of {', '.join(CURVES)}")
         # a log may hold any numbers, also such that overflow
         with temporary_folder("cosim-import-") as scratch, np.errstate(all="ignore"):
             contents = LogContents(scratch)
             try:
-                form.read(path, column_map, contents, moved)
+                form.read(path, column_map, contents, on_progress)
             except ModuleNotFoundError as error:
                 if not form.needs or (error.name or "").startswith("cosim"):
                     raise
                 raise ImportLogError(f"needs {error.name}; {install_hint(*form.needs)}") from error
-            _require_vehicle(contents, craft)
+            _require_vehicle(contents, loaded)
             folder = None if out is None else Path(out)
-            wanted = _Wanted(str(vehicle), scenario, folder, rate, curve, voltage, report, overwrite)
-            return _write(path, contents, scratch, craft, wanted)
+            options = _Options(str(vehicle), scenario, folder, rate, curve, voltage, report, overwrite)
+            return _write(path, contents, scratch, loaded, options)
     except ImportLogError as error:
         raise ImportLogError(f"{path}: {error}") from error
     except OSError as error:
@@ -141,23 +152,16 @@ def import_log(
 
 
 def _format_of(path: Path) -> LogFormat:
-    known = ", ".join(sorted(FORMATS))
     if path.is_dir():
-        return next(form for form in FORMATS.values() if form.folder)
+        return BAGS
     form = FORMATS.get(path.suffix.lower())
     if form is None:
-        raise ImportLogError(f"ends in {path.suffix!r}, expected one of {known}")
+        raise ImportLogError(f"ends in {path.suffix!r}, expected one of {', '.join(sorted(FORMATS))}")
     if not path.is_file():
         raise ImportLogError("is a device, expected a file" if path.exists() else "no such file")
     if not path.stat().st_size:
         raise ImportLogError("is empty, expected a log")
     return form
-
-
-def _map_of(form: LogFormat, columns: str | Path | None) -> Any:
-    if not form.mapped and columns is not None:
-        raise ImportLogError("a column map is given, expected none: its messages say what they are")
-    return None if columns is None else read_map(Path(columns))
 
 
 def _require_vehicle(contents: LogContents, vehicle: Vehicle) -> None:
@@ -174,7 +178,7 @@ def _require_vehicle(contents: LogContents, vehicle: Vehicle) -> None:
 
 
 @dataclass(frozen=True)
-class _Wanted:
+class _Options:
     """Arguments of `import_log`."""
 
     vehicle: str
@@ -187,18 +191,18 @@ class _Wanted:
     overwrite: bool
 
 
-def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, wanted: _Wanted) -> Run:
+def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, options: _Options) -> Run:
     """Write the contents of a log as a run folder."""
     topics, clock = select_topics(contents, scratch)
     command = next((topics[name] for name in COMMANDS if name in topics), None)
     for name in COMMANDS:
         if name in topics and topics[name] is not command:
             contents.unread[f"{topics[name].name} ({name})"] += topics.pop(name).count
-    start, end = span_of(topics)
+    start, end = time_span(topics)
     supply = f"the voltage of {topics['voltage'].name}" if "voltage" in topics else ""
-    supply = f"{wanted.voltage:g} V" if wanted.voltage else supply
-    commands = commands_of(command, vehicle, wanted.curve, supply, contents.parameters) if command else None
-    hertz = wanted.rate or rate_of(topics)
+    supply = f"{options.voltage:g} V" if options.voltage else supply
+    commands = command_forces(command, vehicle, options.curve, supply, contents.parameters) if command else None
+    hertz = options.rate or default_rate(topics)
     steps = max(1, math.floor((end - start) * hertz + 1e-6))
     samples = sum(topic.count for topic in topics.values())
     limit = min(MAX_ROWS - 1, max(_MIN_ROWS, _ROWS_PER_SAMPLE * samples))
@@ -207,27 +211,27 @@ def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, w
             f"lasts {end - start:.4g} s with {samples} samples: {steps} rows at {hertz:g} Hz, expected at most {limit}"
         )
     through = commands.through if commands else "thrusters" if vehicle.n_thrusters else "wrench"
-    draft = _scenario(path, vehicle, wanted, through, steps, 1.0 / hertz)
-    volts = math.nan if wanted.voltage is None else wanted.voltage
+    draft = _scenario(path, vehicle, options, through, steps, 1.0 / hertz)
+    volts = math.nan if options.voltage is None else options.voltage
     columns = columns_without_plant(draft)
     if commands:
         columns.append(Column(COMMAND_TIME, "s", "When the commands were sampled"))
-    with RowMaker(draft, columns, topics, commands, volts, start) as maker:
+    make_rows = functools.partial(
+        RowMaker, columns=columns, topics=topics, commands=commands, voltage=volts, start=start
+    )
+    with make_rows(draft) as maker:
         first = next(maker.blocks())
-    flown = _from_first(draft, first, [column.name for column in columns])
+    scenario = _with_first_pose(draft, first, [column.name for column in columns], contents.autopilot or "log")
     facts = _facts(path, contents, topics, commands, clock, hertz, start)
-    folder = claim(wanted.out, flown, wanted.overwrite)
+    folder = claim(options.out, scenario, options.overwrite)
     try:
         recorder = Recorder(folder.path, columns)
-        with RowMaker(flown, columns, topics, commands, volts, start) as maker:
-            k = 0
-            for block in maker.blocks():
-                for row in block:
-                    recorder.observe(k, row)
-                    k += 1
+        with make_rows(scenario) as maker:
+            for k, row in enumerate(itertools.chain.from_iterable(maker.blocks())):
+                recorder.observe(k, row)
         recorder.close()
         write_atomic(folder.path / IMPORT, json_text(msgspec.to_builtins(facts)))
-        return conclude(folder.path, _flown_by(flown, contents), IMPORTED, None, wanted.report)
+        return conclude(folder.path, scenario, IMPORTED, None, options.report)
     except OSError as error:
         folder.discard()
         raise RunError(f"{folder.path}: {error.strerror or error}") from error
@@ -236,15 +240,15 @@ def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, w
         raise
 
 
-def _scenario(path: Path, vehicle: Vehicle, wanted: _Wanted, through: str, steps: int, step: float) -> Scenario:
+def _scenario(path: Path, vehicle: Vehicle, options: _Options, through: str, steps: int, step: float) -> Scenario:
     """Return the scenario of a log's run: the vehicle, with goal and regions of the given scenario."""
     table: dict[str, Any] = {"title": f"Imported from {printable(path.name)}"[:200]}
-    if wanted.scenario is not None:
-        given = load_scenario(wanted.scenario, ["commands.enabled=false"]).table
-        table |= {key: given[key] for key in _KEPT if key in given}
+    if options.scenario is not None:
+        given = load_scenario(options.scenario, ["commands.enabled=false"]).table
+        table |= {key: given[key] for key in _SCENARIO_KEYS if key in given}
         table["title"] = f"{table['title']}, imported from {printable(path.name)}"[:200]
     table |= {
-        "vehicle": wanted.vehicle,
+        "vehicle": options.vehicle,
         "log": printable(path.name),
         "time": {"duration": steps * step, "step": step},
         "initial": {"position": [0.0, 0.0, 0.0]},
@@ -253,8 +257,8 @@ def _scenario(path: Path, vehicle: Vehicle, wanted: _Wanted, through: str, steps
     return validate_scenario(table, printable(path.stem), vehicle)
 
 
-def _from_first(scenario: Scenario, rows: Array, names: list[str]) -> Scenario:
-    """Return a scenario with the initial position and attitude of the log, if its first rows have them."""
+def _with_first_pose(scenario: Scenario, rows: Array, names: list[str], law: str) -> Scenario:
+    """Return a scenario with the first position and attitude of the rows, if they have any, and a law's name."""
     initial = scenario.initial
     for key, columns in (
         ("position", [f"position.{a}" for a in "xyz"]),
@@ -265,26 +269,20 @@ def _from_first(scenario: Scenario, rows: Array, names: list[str]) -> Scenario:
         if known.size:
             initial = msgspec.structs.replace(initial, **{key: tuple(values[known[0]].tolist())})
     table = scenario.table | {"initial": msgspec.to_builtins(initial)}
-    return validate_scenario(table, scenario.name, scenario.vehicle)
-
-
-def _flown_by(scenario: Scenario, contents: LogContents) -> Scenario:
-    name = contents.autopilot or "log"
-    return dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, name=name))
+    validated = validate_scenario(table, scenario.name, scenario.vehicle)
+    return dataclasses.replace(validated, law=dataclasses.replace(validated.law, name=law))
 
 
 def _facts(
-    path: Path, contents: LogContents, topics: Mapping[str, Topic], commands: Commands | None, clock: VehicleClock,
+    path: Path, contents: LogContents, topics: Mapping[str, Topic], commands: CommandForces | None, clock: VehicleClock,
     hertz: float, start: float,
 ) -> LogFacts:  # fmt: skip
     """Return the facts about the log that the run records."""
-    remarks = list(contents.remarks)
+    remarks = [*contents.remarks, *([f"Clocks: {clock.summary()}."] if clock.summary() else [])]
     files = [file for file in path.iterdir() if file.is_file()] if path.is_dir() else [path]
-    if clock.words():
-        remarks.append(f"Clocks: {clock.words()}.")
     size = sum(file.stat().st_size for file in files)
     return LogFacts(
-        printable(path.name), size, start, hertz, commands.words if commands else "",
+        printable(path.name), size, start, hertz, commands.summary if commands else "",
         tuple(_topic_facts(topic, start) for topic in topics.values()),
         {printable(name): count for name, count in contents.unread.most_common()},
         tuple(printable(remark) for remark in remarks),
@@ -292,7 +290,7 @@ def _facts(
 
 
 def _topic_facts(topic: Topic, start: float) -> TopicFacts:
-    gaps = tuple((begin - start, end - start) for begin, end in topic.gaps[:_GAPS])
+    gaps = tuple((begin - start, end - start) for begin, end in topic.gaps[:_MAX_GAPS])
     return TopicFacts(
         topic.quantity, printable(topic.name), topic.count, topic.rate, topic.longest, topic.gap_count, gaps,
         topic.held, topic.burst, topic.late, topic.broken,

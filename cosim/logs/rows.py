@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping
 import numpy as np
 
 from controller import VehicleState
-from cosim.logs.forces import Commands
+from cosim.logs.forces import CommandForces
 from cosim.logs.frames import euler_zyx, rotate_to_body
 from cosim.logs.resampling import TopicReader
 from cosim.logs.topics import Topic
@@ -40,7 +40,7 @@ class RowMaker:
         scenario: Scenario,
         columns: list[Column],
         topics: Mapping[str, Topic],
-        commands: Commands | None,
+        commands: CommandForces | None,
         voltage: float,
         start: float,
     ) -> None:

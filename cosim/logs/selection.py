@@ -30,9 +30,9 @@ def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic
     topics: dict[str, Topic] = {}
     for quantity in QUANTITIES:
         source = contents.best(quantity)
-        for (of, name), other in contents.sources.items():
-            if of == quantity and other is not source and other.count:
-                contents.unread[f"{name} ({quantity})"] += other.count
+        for other in contents.sources.values():
+            if other.quantity == quantity and other is not source and other.count:
+                contents.unread[f"{other.name} ({quantity})"] += other.count
         if source is not None:
             topics[quantity] = clean(source, _undelayed(_filter_delay(contents, quantity), clock), None, scratch)
     _depth_of_pressure(contents, topics, clock, scratch)
@@ -47,7 +47,7 @@ def select_topics(contents: LogContents, scratch: Path) -> tuple[dict[str, Topic
     if contents.autopilot == "ardupilot" and not set(_FILTERS.values()) & set(contents.parameters):
         contents.remarks.append("The log has no INS_GYRO_FILTER: rates are as late as that filter made them.")
     for when in clock.restarts:
-        contents.remarks.append(f"The vehicle's clock began anew {when - span_of(topics)[0]:.1f} s after the start")
+        contents.remarks.append(f"The vehicle's clock restarted {when - time_span(topics)[0]:.1f} s after the start")
     return topics, clock
 
 
@@ -62,7 +62,7 @@ def _undelayed(delay: float, clock: VehicleClock) -> Callable[[Array, Array], Ar
     return lambda stamps, written: clock.times(stamps, written) - delay
 
 
-def span_of(topics: Mapping[str, Topic]) -> tuple[float, float]:
+def time_span(topics: Mapping[str, Topic]) -> tuple[float, float]:
     """Return start and end [s] of the rows: all of the motion is known there, unless that cuts 5 s or more."""
     motion = [topics[name] for name in _MOTION if name in topics]
     starts, ends = [topic.start for topic in motion], [topic.end for topic in motion]
@@ -108,14 +108,12 @@ def _depth_of_pressure(contents: LogContents, topics: dict[str, Topic], clock: V
     scale = _SPECIFIC * gravity
     source = contents.sources["pressure", pressure.name]
 
-    def deep(values: Array) -> Array:
-        return (values - ground) / scale
-
-    topics["depth"] = dataclasses.replace(clean(source, clock.times, deep, scratch), quantity="depth")
+    topic = clean(source, clock.times, lambda pressures: (pressures - ground) / scale, scratch)
+    topics["depth"] = dataclasses.replace(topic, quantity="depth")
 
 
-def rate_of(topics: Mapping[str, Topic]) -> float:
-    """Return the least rate [Hz] of `RATES` that no state or command exceeds."""
+def default_rate(topics: Mapping[str, Topic]) -> float:
+    """Return the lowest rate [Hz] of `RATES` that no state or command exceeds."""
     fast = max((t.rate for t in topics.values() if QUANTITIES[t.quantity].kind in ("state", "command")), default=0.0)
     fast = fast or max(topic.rate for topic in topics.values())
     return float(next((rate for rate in RATES if rate >= 0.98 * fast), RATES[-1]))

@@ -17,7 +17,7 @@ from cosim.simulation.signals import Array
 
 BLOCK = 2**15  # samples that are processed together
 _MAX_STAMP = 1e10  # s, 300 years
-_WAITING = 2**14  # numbers of a source in memory before they go to disk
+_MAX_PENDING = 2**14  # numbers of a source in memory before they go to disk
 
 
 @dataclass
@@ -32,17 +32,17 @@ class Source:
     size: int  # number of components
     count: int = 0  # number of samples
     broken: int = 0  # number of omitted samples with a number that is not finite
-    _waiting: array[float] = field(default_factory=lambda: array("d"))
+    _pending: array[float] = field(default_factory=lambda: array("d"))
 
     def put(self, stamp: float, written: float, values: Sequence[float]) -> None:
-        """Append a sample; one with a number that is not finite is counted and left out. An absurd stamp is dropped."""
+        """Append a sample; count and omit one with a number that is not finite, drop an implausible stamp."""
         if not (math.isfinite(written) and all(map(math.isfinite, values))):
             self.broken += 1
             return
         stamp = stamp if abs(stamp) <= _MAX_STAMP else math.nan
-        self._waiting.extend((stamp, written, *values))
+        self._pending.extend((stamp, written, *values))
         self.count += 1
-        if len(self._waiting) > _WAITING:
+        if len(self._pending) > _MAX_PENDING:
             self.flush()
 
     def put_many(self, written: Array, values: Array) -> None:
@@ -57,10 +57,10 @@ class Source:
 
     def flush(self) -> None:
         """Write the buffer to disk."""
-        if self._waiting:
+        if self._pending:
             with self.path.open("ab") as file:
-                self._waiting.tofile(file)
-            self._waiting = array("d")
+                self._pending.tofile(file)
+            self._pending = array("d")
 
     def blocks(self) -> Iterator[Array]:
         """Yield the samples in their order, each block of shape (n, 2 + size)."""
@@ -89,14 +89,14 @@ class LogContents:
 
     def source(self, quantity: str, name: str, size: int | None = None) -> Source:
         """Return the source of a name for a quantity; create it if there is none."""
-        found = self.sources.get((quantity, name))
-        wanted = size or QUANTITIES[quantity].size
-        if found is None:
+        size = size or QUANTITIES[quantity].size
+        if (quantity, name) not in self.sources:
             path = self._folder / f"{len(self.sources)}.samples"
-            found = self.sources[quantity, name] = Source(quantity, name, path, wanted)
-        if found.size != wanted:
-            raise ImportLogError(f"{name}: has {wanted} values, expected {found.size} as before")
-        return found
+            self.sources[quantity, name] = Source(quantity, name, path, size)
+        source = self.sources[quantity, name]
+        if source.size != size:
+            raise ImportLogError(f"{name}: has {size} values, expected {source.size} as before")
+        return source
 
     def put(self, quantity: str, name: str, stamp: float, written: float, values: Sequence[float]) -> None:
         """Append a sample of a quantity to its source, like `Source.put`."""
@@ -104,8 +104,6 @@ class LogContents:
 
     def best(self, quantity: str) -> Source | None:
         """Return the source to use for a quantity: the preferred one, else the one with most samples, or None."""
-        found = {name: s for (q, name), s in self.sources.items() if q == quantity and s.count}
-        preferred = next((name for name in self.preferences.get(quantity, ()) if name in found), None)
-        if preferred is not None:
-            return found[preferred]
-        return max(found.values(), key=lambda source: source.count, default=None)
+        sources = {s.name: s for s in self.sources.values() if s.quantity == quantity and s.count}
+        preferred = (sources[name] for name in self.preferences.get(quantity, ()) if name in sources)
+        return next(preferred, max(sources.values(), key=lambda source: source.count, default=None))

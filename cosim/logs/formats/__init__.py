@@ -1,27 +1,38 @@
-"""Formats of logs, one module each, whose `LogFormat` is called ``FORMAT``.
+"""Formats of logs, one module each, with a function ``read``.
 
-To add a format, add a module to this folder.
+To add a format, add a module to this folder, and its suffixes to `FORMATS`.
 
 Imports: mavlink.wire, plant_fmu, simulation.
 """
 
-from importlib import import_module
-from pkgutil import iter_modules
+from __future__ import annotations
 
-from cosim.logs.format import LogFormat
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
 
-__all__ = ["FORMATS"]
+from cosim.logs.bag_storage import SUFFIXES
+from cosim.logs.chunked_file import OnProgress
+from cosim.logs.column_map import ColumnMap
+from cosim.logs.formats import bag, dataflash, table, tlog, ulog
+from cosim.logs.spool import LogContents
 
-
-def _find_formats() -> dict[str, LogFormat]:
-    """Return the format of each suffix."""
-    found: dict[str, LogFormat] = {}
-    for module in iter_modules(__path__):
-        entry = getattr(import_module(f"{__name__}.{module.name}"), "FORMAT", None)
-        if not isinstance(entry, LogFormat):
-            raise TypeError(f"{__name__}.{module.name} has no FORMAT, expected its LogFormat")
-        found |= dict.fromkeys(entry.suffixes, entry)
-    return found
+__all__ = ["FORMATS", "LogFormat"]
 
 
-FORMATS: dict[str, LogFormat] = _find_formats()
+@dataclass(frozen=True)
+class LogFormat:
+    """A format of logs."""
+
+    # ``read(path, columns, contents, on_progress)`` reads a log into `contents`; `columns` is None for self-describing
+    # messages. It imports optional packages itself, and raises ImportLogError if the file is no such log
+    read: Callable[[Path, ColumnMap | None, LogContents, OnProgress], None]
+    takes_map: bool = False
+    needs: tuple[str, ...] = ()  # packages beyond the base installation, as requirements of pip
+
+
+BAGS = LogFormat(bag.read, takes_map=True, needs=("mcap>=1.2", "rosbags>=0.11.6"))  # a log may be a folder of them
+FORMATS = {  # by suffix, in small letters
+    ".bin": LogFormat(dataflash.read), ".tlog": LogFormat(tlog.read), ".ulg": LogFormat(ulog.read),
+    **dict.fromkeys((".csv", ".parquet"), LogFormat(table.read, takes_map=True)), **dict.fromkeys(SUFFIXES, BAGS),
+}  # fmt: skip

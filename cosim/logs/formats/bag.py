@@ -11,29 +11,30 @@ from typing import Any
 import numpy as np
 
 from cosim.errors import ImportLogError
-from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, SUFFIXES, StoredMessage, bag_files, stored_messages
+from cosim.logs.bag_storage import DAMAGE, MAX_DECODED, StoredMessage, bag_files, stored_messages
 from cosim.logs.blueos import read_recording
+from cosim.logs.chunked_file import OnProgress
 from cosim.logs.clocks import Clock
-from cosim.logs.column_map import ColumnMap, TimeColumn, require_map
-from cosim.logs.format import LogFormat, Moved
+from cosim.logs.column_map import ColumnMap, require_map
 from cosim.logs.frames import UNITS
 from cosim.logs.message_definitions import parse_definition, reachable_types
 from cosim.logs.spool import LogContents
 from plant_fmu.toml_tables import hint
 
-_WAITING = 4096  # messages of a quantity that are written together
+_PENDING = 4096  # messages of a quantity that are written together
 _PART = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")  # a field's name or an index in a path
+_PATH = re.compile(f"({_PART.pattern})*")
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")  # types that definitions may omit
 
 Getter = Callable[[Any], float]
 
 
-def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
+def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progress: OnProgress) -> None:
     """Read a bag, as specified by `LogFormat`; raise ImportLogError for another file, or a missing topic or field."""
     from rosbags.serde import SerdeError
 
     if columns is None and all(file.suffix.lower() == ".mcap" for file in bag_files(path)):
-        read_recording(path, contents, moved)
+        read_recording(path, contents, on_progress)
         return
     columns = require_map(columns)
     nameless = next((name for name, mapped in columns.quantities.items() if not mapped.topic), None)
@@ -44,7 +45,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
         readers.setdefault(mapped.topic, []).append(_FieldReader(columns, name, contents))
     clock, decoder = Clock(), Decoder(columns.messages)
     topics: set[str] = set()
-    for message in stored_messages(path, contents.remarks, moved):
+    for message in stored_messages(path, contents.remarks, on_progress):
         topics.add(message.topic)
         if message.topic not in readers:
             contents.unread[message.topic] += 1
@@ -56,13 +57,13 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Mo
             contents.unread[f"{message.topic} that cannot be decoded"] += 1
             continue
         for reader in readers[message.topic]:
-            reader.take(decoded, written)
+            reader.add(decoded, written)
     missing = sorted(set(readers) - topics)
     if missing:
         raise ImportLogError(f"has no topic {missing[0]!r}, which the map names; {hint(missing[0], topics)}")
     for reader in (reader for several in readers.values() for reader in several):
         reader.flush()
-    contents.remarks += clock.remarks("the bag's writer")
+    contents.remarks += clock.remarks("The clock of the bag's writer")
 
 
 class Decoder:
@@ -104,10 +105,10 @@ class Decoder:
             if message.definition:
                 types = {name: self._standard[name] for name in _TIMES}
                 types |= parse_definition(message.definition, message.type, message.language)
-            found = reachable_types(types, message.type, 1 if message.encoding == "cdr" else 0)
+            reachable = reachable_types(types, message.type, 1 if message.encoding == "cdr" else 0)
             store = get_typestore(Stores.EMPTY)
-            store.register(found)
-            for name in found:  # else rosbags would make its code again for each message that it cannot decode
+            store.register(reachable)
+            for name in reachable:  # else rosbags would make its code again for each message that it cannot decode
                 store.get_msgdef(name)
         except ImportLogError as error:
             raise ImportLogError(f"{message.topic}: the definition of its type {error}") from error
@@ -122,18 +123,20 @@ class _FieldReader:
 
     def __init__(self, columns: ColumnMap, name: str, contents: LogContents) -> None:
         self._columns, self._name, self._contents = columns, name, contents
-        self._mapped = columns.quantities[name]
-        self._getters = [_getter(column, self._mapped.topic) for column in self._mapped.columns]
-        time = columns.time_of(name)
-        self._stamp = None if time is None else _stamp_getter(time, self._mapped.topic)
+        mapped, time = columns.quantities[name], columns.time_of(name)
+        self._getters = [_getter(column, mapped.topic, "a number", _number) for column in mapped.columns]
+        self._stamp = None
+        if time is not None:
+            factor = UNITS["s"].get(time.unit, 1.0)
+            self._stamp = _getter(time.column, mapped.topic, "a time", lambda value: _seconds(value, factor))
         self._clock = Clock()
         self._rows: list[list[float]] = []
 
-    def take(self, message: Any, written: float) -> None:
+    def add(self, message: Any, written: float) -> None:
         """Add a message, written at a time [s]."""
-        at = written if self._stamp is None else self._clock.time(self._stamp(message))
-        self._rows.append([at, *(get(message) for get in self._getters)])
-        if len(self._rows) >= _WAITING:
+        time = written if self._stamp is None else self._clock.time(self._stamp(message))
+        self._rows.append([time, *(get(message) for get in self._getters)])
+        if len(self._rows) >= _PENDING:
             self.flush()
 
     def flush(self) -> None:
@@ -144,57 +147,34 @@ class _FieldReader:
             self._columns.put(self._contents, self._name, rows[:, 0], rows[:, 1:])
 
 
-def _walk(path: str, topic: str) -> Callable[[Any], Any]:
-    """Return a function from a message to its field at a path, such as ``pose.position.x`` or ``data[3]``."""
-    parts: list[str | int] = []
-    at = 0
-    while at < len(path):
-        part = _PART.match(path, at)
-        if part is None:
-            raise ImportLogError(
-                f"field {path!r} of {topic} is no path, expected one such as pose.position.x or data[3]"
-            )
-        parts.append(part[1] if part[1] is not None else int(part[2]))
-        at = part.end()
-
-    def find(message: Any) -> Any:
-        for part in parts:
-            try:
-                message = message[part] if isinstance(part, int) else getattr(message, part)
-            except (AttributeError, IndexError, TypeError) as error:
-                fields = [name for name in getattr(message, "__dataclass_fields__", ()) if not name.startswith("_")]
-                known = f"; {hint(str(part), fields)}" if fields else ""
-                raise ImportLogError(f"{topic} has no field {path!r}: nothing is at {part!r}{known}") from error
-        return message
-
-    return find
-
-
-def _getter(path: str, topic: str) -> Getter:
-    find = _walk(path, topic)
+def _getter(path: str, topic: str, what: str, convert: Getter) -> Getter:
+    """Return a function from a message to its converted field at a path, such as ``pose.position.x`` or ``data[3]``."""
+    if not _PATH.fullmatch(path):
+        raise ImportLogError(f"field {path!r} of {topic} is no path, expected one such as pose.position.x or data[3]")
+    parts = [name or int(index) for name, index in _PART.findall(path)]
 
     def get(message: Any) -> float:
-        value = find(message)
-        with contextlib.suppress(TypeError, ValueError):
-            return float(value)
-        raise ImportLogError(f"{topic}: {path} is {type(value).__name__}, expected a number")
+        value = message
+        for part in parts:
+            try:
+                value = value[part] if isinstance(part, int) else getattr(value, part)
+            except (AttributeError, IndexError, TypeError) as error:
+                fields = [name for name in getattr(value, "__dataclass_fields__", ()) if not name.startswith("_")]
+                known = f"; {hint(str(part), fields)}" if fields else ""
+                raise ImportLogError(f"{topic} has no field {path!r}: nothing is at {part!r}{known}") from error
+        with contextlib.suppress(TypeError, ValueError, AttributeError):
+            return convert(value)
+        raise ImportLogError(f"{topic}: {path} is {type(value).__name__}, expected {what}")
 
     return get
 
 
-def _stamp_getter(time: TimeColumn, topic: str) -> Getter:
-    """Return a function from a message to its own time [s]: a field of seconds and nanoseconds, or a number."""
-    find = _walk(time.column, topic)
-
-    def stamp(message: Any) -> float:
-        value = find(message)
-        with contextlib.suppress(TypeError, ValueError, AttributeError):
-            if hasattr(value, "nanosec"):
-                return float(value.sec + 1e-9 * value.nanosec)
-            return float(value) * UNITS["s"].get(time.unit, 1.0)
-        raise ImportLogError(f"{topic}: {time.column} is {type(value).__name__}, expected a time")
-
-    return stamp
+def _number(value: Any) -> float:
+    return float(value)
 
 
-FORMAT = LogFormat(SUFFIXES, read, mapped=True, needs=("mcap>=1.2", "rosbags>=0.11.6"), folder=True)
+def _seconds(value: Any, factor: float) -> float:
+    """Convert a field of seconds and nanoseconds, or a number with a factor, to seconds."""
+    if hasattr(value, "nanosec"):
+        return float(value.sec + 1e-9 * value.nanosec)
+    return float(value) * factor

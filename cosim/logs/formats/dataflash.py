@@ -13,184 +13,170 @@ from typing import Any
 from pymavlink.DFReader import DFFormat
 
 from cosim.errors import ImportLogError
+from cosim.logs.chunked_file import ChunkedFile, OnProgress
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import ColumnMap
-from cosim.logs.format import LogFormat, Moved
-from cosim.logs.frames import quaternion_of_angles
+from cosim.logs.frames import quaternion_of_angles, unit_quaternion
 from cosim.logs.spool import LogContents
+from cosim.logs.vehicle_messages import DOWNWARD
 
-_CHUNK = 1 << 20  # bytes that are read at once
 _HEAD = b"\xa3\x95"  # first bytes of each message
 _FMT, _FMT_SIZE = 0x80, 89  # type of the message FMT; its size [bytes]
-_NOTHING = math.nan
+_MAX_MESSAGE = 512  # bytes
 _FRAMES = (  # names of ArduSub's FRAME_CONFIG, from 0
     "bluerov1", "vectored", "vectored_6dof", "vectored_6dof_90deg", "simplerov_3", "simplerov_4", "simplerov_5",
 )  # fmt: skip
 _OTHERS = ("ArduCopter", "ArduPlane", "ArduRover", "AntennaTracker", "Blimp")  # firmware of other vehicles
-_OF_THE_LOG = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "VER"}  # messages about the log, not counted as unread
+_ABOUT_LOG = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "VER"}  # messages that are not counted as unread
+_SAMPLES = {  # message: the quantities that it holds, with their fields and the factor to SI units
+    "XKF1": (("position", "PN PE PD", 1.0), ("velocity_world", "VN VE VD", 1.0)),
+    "RATE": (("rates", "R P Y", math.pi / 180.0),),
+    "IMU": (("gyro", "GyrX GyrY GyrZ", 1.0), ("acceleration", "AccX AccY AccZ", 1.0)),
+    "BARO": (("depth", "Alt", -1.0),),
+    "RFND": (("altitude", "Dist", 1.0),),
+    "BAT": (("voltage", "Volt", 1.0),),
+}
 
 Fields = dict[str, Any]
 
 
-def read(path: Path, columns: ColumnMap | None, contents: LogContents, moved: Moved) -> None:
+def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progress: OnProgress) -> None:
     """Read a dataflash log, as specified by `LogFormat`; raise ImportLogError for another file."""
     contents.autopilot = "ardupilot"
-    handlers = _MessageHandlers(contents)
+    messages = _Messages(contents)
     lost, any_message = 0, False
-    for name, fields in _messages(path, handlers.wanted, moved):
+    for name, fields in parse_messages(path, messages.names, on_progress):
         if name is None:
             lost += 1
             continue
         any_message = True
         if fields is not None:
-            handlers.take(name, fields)
-        elif name not in _OF_THE_LOG:
+            messages.add(name, fields)
+        elif name not in _ABOUT_LOG:
             contents.unread[name] += 1
     if not any_message:
         raise ImportLogError("holds no message, expected a dataflash log of ArduPilot")
     if lost:
         contents.remarks.append(f"{lost} bytes of the log are no messages and were passed over.")
-    for _, by in handlers.clock.jumps:
-        contents.remarks.append(f"The autopilot's clock jumps by {by:+.4g} s: it is taken as a pause of 1 s.")
-    handlers.conclude()
+    contents.remarks += messages.clock.remarks("The autopilot's clock")
+    contents.preferences |= {
+        "attitude": ("XKQ[0]", "ATT"),
+        "depth": _preferred_barometers(contents),
+        "position": ("XKF1[0]", "POS"),
+        "velocity_world": ("XKF1[0]",),
+        "rates": ("RATE",),
+        "gyro": ("IMU[0]", "IMU"),
+        "acceleration": ("IMU[0]", "IMU"),
+    }
 
 
-class _MessageHandlers:
+def _preferred_barometers(contents: LogContents) -> tuple[str, ...]:
+    """Return the sources of depth: the primary barometer, then the last one, which is external on ArduSub."""
+    instances = sorted((name for quantity, name in contents.sources if quantity == "depth"), reverse=True)
+    primary = f"BARO[{int(contents.parameters.get('BARO_PRIMARY', 0.0))}]"
+    return tuple(sorted(instances, key=lambda name: name != primary))
+
+
+class _Messages:
     """Add messages to the contents of a log."""
 
     def __init__(self, contents: LogContents) -> None:
         self._contents = contents
         self.clock = Clock()
-        self._rate_stamp = _NOTHING
-        self._handlers: dict[str, Callable[[Fields, float], None]] = {
-            name.removeprefix("_on_").upper(): getattr(self, name) for name in dir(self) if name.startswith("_on_")
-        }
-        self.wanted = frozenset(self._handlers)
+        self._rate_stamp = math.nan
+        self._handlers: dict[str, Callable[[Fields, str, float], None]] = {
+            "PARM": self._store_parameter, "MSG": self._store_kind, "ATT": self._put_angles,
+            "XKQ": self._put_quaternion, "VISO": self._put_dvl, "RCOU": self._put_pulses,
+        }  # fmt: skip
+        self.names = frozenset(self._handlers) | _SAMPLES.keys()
 
-    def take(self, name: str, m: Fields) -> None:
-        """Add a message with its fields."""
-        if name == "RATE" and self._is_stale(m["TimeUS"] * 1e-6):
-            return
-        at = self.clock.time(m["TimeUS"] * 1e-6) if "TimeUS" in m else _NOTHING
+    def add(self, name: str, m: Fields) -> None:
+        """Add a message of `names` with its fields."""
         try:
-            self._handlers[name](m, at)
+            self._add(name, m)
         except KeyError as error:
             raise ImportLogError(f"message {name} has no field {error}, expected it as ArduPilot has it") from error
+        except TypeError as error:
+            raise ImportLogError(f"message {name} has a text, expected numbers as ArduPilot has them") from error
+
+    def _add(self, name: str, m: Fields) -> None:
+        stamp = m.get("TimeUS", math.nan) * 1e-6
+        if name == "RATE" and self._is_stale(stamp):
+            return
+        time = self.clock.time(stamp)
+        if name == "RFND" and m.get("Orient", DOWNWARD) != DOWNWARD:
+            self._contents.unread[f"RFND of orientation {m['Orient']}"] += 1
+            return
+        if name == "BAT" and m.get("Inst", m.get("Instance", 0)) != 0:
+            return
+        instance = m.get("C", m.get("I"))
+        source = name if instance is None else f"{name}[{instance}]"
+        for quantity, fields, factor in _SAMPLES.get(name, ()):
+            self._put(quantity, source, time, *(factor * m[field] for field in fields.split()))
+        if name in self._handlers:
+            self._handlers[name](m, source, time)
 
     def _is_stale(self, stamp: float) -> bool:
         """Return True for a RATE that repeats an old stamp [s], since the rate controller rests, as in MANUAL."""
         last, self._rate_stamp = self._rate_stamp, stamp
         return stamp == last or self.clock.is_behind(stamp)
 
-    def conclude(self) -> None:
-        """Set the preferences among several sources."""
-        contents = self._contents
-        primary = int(contents.parameters.get("BARO_PRIMARY", 0.0))
-        instances = sorted(name for quantity, name in contents.sources if quantity == "depth")
-        named = f"BARO[{primary}]"
-        contents.preferences |= {
-            "attitude": ("XKQ[0]", "ATT"),
-            "depth": tuple(dict.fromkeys([*([named] if named in instances else []), *reversed(instances)])),
-            "position": ("XKF1[0]", "POS"),
-            "velocity_world": ("XKF1[0]",),
-            "rates": ("RATE",),
-            "gyro": ("IMU[0]", "IMU"),
-            "acceleration": ("IMU[0]", "IMU"),
-        }
+    def _put(self, quantity: str, source: str, time: float, *values: float) -> None:
+        self._contents.put(quantity, source, math.nan, time, values)
 
-    def _put(self, quantity: str, name: str, at: float, *values: float) -> None:
-        self._contents.put(quantity, name, _NOTHING, at, values)
+    # ---- messages that are no plain samples ----
 
-    # ---- handlers, one for each message, named after it ----
-
-    def _on_parm(self, m: Fields, at: float) -> None:
+    def _store_parameter(self, m: Fields, source: str, time: float) -> None:
         self._contents.parameters[str(m["Name"])] = float(m["Value"])
         if m["Name"] == "FRAME_CONFIG" and 0 <= m["Value"] < len(_FRAMES):
             self._contents.frame = _FRAMES[int(m["Value"])]
 
-    def _on_msg(self, m: Fields, at: float) -> None:
+    def _store_kind(self, m: Fields, source: str, time: float) -> None:
         firmware = str(m["Message"]).split(" ")[0]
         if firmware in _OTHERS:
             self._contents.kind = f"vehicle of {firmware}"
 
-    def _on_att(self, m: Fields, at: float) -> None:
-        angles = [math.radians(m[name]) for name in ("Roll", "Pitch", "Yaw")]
-        self._put("attitude", "ATT", at, *quaternion_of_angles(*angles))
+    def _put_angles(self, m: Fields, source: str, time: float) -> None:
+        angles = (math.radians(m[name]) for name in ("Roll", "Pitch", "Yaw"))
+        self._put("attitude", source, time, *quaternion_of_angles(*angles))
 
-    def _on_xkq(self, m: Fields, at: float) -> None:
-        q = [m[f"Q{i}"] for i in range(1, 5)]
-        length = math.hypot(*q)
-        self._put("attitude", f"XKQ[{m.get('C', 0)}]", at, *(part / length if length else _NOTHING for part in q))
+    def _put_quaternion(self, m: Fields, source: str, time: float) -> None:
+        self._put("attitude", source, time, *unit_quaternion([m[f"Q{i}"] for i in range(1, 5)]))
 
-    def _on_xkf1(self, m: Fields, at: float) -> None:
-        name = f"XKF1[{m.get('C', 0)}]"
-        self._put("position", name, at, m["PN"], m["PE"], m["PD"])
-        self._put("velocity_world", name, at, m["VN"], m["VE"], m["VD"])
-
-    def _on_rate(self, m: Fields, at: float) -> None:
-        self._put("rates", "RATE", at, *(math.radians(m[name]) for name in "RPY"))
-
-    def _on_imu(self, m: Fields, at: float) -> None:
-        name = f"IMU[{m['I']}]" if "I" in m else "IMU"
-        self._put("gyro", name, at, m["GyrX"], m["GyrY"], m["GyrZ"])
-        self._put("acceleration", name, at, m["AccX"], m["AccY"], m["AccZ"])
-
-    def _on_baro(self, m: Fields, at: float) -> None:
-        self._put("depth", f"BARO[{m['I']}]" if "I" in m else "BARO", at, -m["Alt"])
-
-    def _on_rfnd(self, m: Fields, at: float) -> None:
-        if m.get("Orient", 25) == 25:  # looking down
-            self._put("altitude", "RFND", at, m["Dist"])
-        else:
-            self._contents.unread[f"RFND of orientation {m['Orient']}"] += 1
-
-    def _on_viso(self, m: Fields, at: float) -> None:
+    def _put_dvl(self, m: Fields, source: str, time: float) -> None:
         if m["dt"] > 0.0:  # the mean over dt, which ends at the stamp
-            self._put("dvl", "VISO", at - 0.5 * m["dt"], *(m[f"PosD{axis}"] / m["dt"] for axis in "XYZ"))
+            self._put("dvl", source, time - 0.5 * m["dt"], *(m[f"PosD{axis}"] / m["dt"] for axis in "XYZ"))
 
-    def _on_rcou(self, m: Fields, at: float) -> None:
-        self._put("pulses", "RCOU", at, *(float(m[f"C{i}"]) for i in range(1, 33) if f"C{i}" in m))
-
-    def _on_bat(self, m: Fields, at: float) -> None:
-        if m.get("Inst", m.get("Instance", 0)) == 0:
-            self._put("voltage", "BAT", at, m["Volt"])
+    def _put_pulses(self, m: Fields, source: str, time: float) -> None:
+        self._put("pulses", source, time, *(float(m[f"C{i}"]) for i in range(1, 33) if f"C{i}" in m))
 
 
-def _messages(path: Path, wanted: frozenset[str], moved: Moved) -> Iterator[tuple[str | None, Fields | None]]:
-    """Yield name and fields of each message, None for fields of unwanted ones; None and None for an invalid byte."""
+def parse_messages(
+    path: Path, names: frozenset[str], on_progress: OnProgress
+) -> Iterator[tuple[str | None, Fields | None]]:
+    """Yield name and fields of each message, None for fields of other names; None and None for an invalid byte."""
     formats: dict[int, tuple[DFFormat, struct.Struct]] = {}
     first = DFFormat(_FMT, "FMT", _FMT_SIZE, "BBnNZ", "Type,Length,Name,Format,Columns")
     formats[_FMT] = first, struct.Struct(first.msg_struct)
-    total = max(1, path.stat().st_size)
-    with path.open("rb") as file:
-        data, at, done, ended = b"", 0, 0, False
-        while True:
-            if len(data) - at < 512 and not ended:
-                more = file.read(_CHUNK)
-                ended, done = not more, done + len(more)
-                data, at = data[at:] + more, 0
-                moved(done / total)
-            if len(data) - at < 3:
-                return
-            form, unpack = formats.get(data[at + 2], (None, None)) if data[at : at + 2] == _HEAD else (None, None)
-            if form is None or unpack is None or at + form.len > len(data):
+    with ChunkedFile(path, on_progress) as file:
+        while (ahead := file.ahead(_MAX_MESSAGE)) >= 3:
+            data, offset = file.data, file.offset
+            form, unpack = formats.get(data[offset + 2], (None, None))
+            if form is None or unpack is None or data[offset : offset + 2] != _HEAD or form.len > ahead:
                 yield None, None
-                at += 1
+                file.offset += 1
                 continue
-            name = form.name
-            body = data[at + 3 : at + form.len]
-            at += form.len
-            if name == "FMT":
-                _learn(unpack.unpack(body), formats)
-            if name in wanted:
-                yield name, _fields(form, unpack.unpack(body))
-            else:
-                yield name, None
+            file.offset += form.len
+            is_read = form.name in names
+            values = unpack.unpack(data[offset + 3 : file.offset]) if is_read or form.name == "FMT" else ()
+            if form.name == "FMT":
+                _learn(values, formats)
+            yield form.name, _fields(form, values) if is_read else None
 
 
 def _learn(fields: tuple[Any, ...], formats: dict[int, tuple[DFFormat, struct.Struct]]) -> None:
     kind, size, *texts = fields
-    name, letters, columns = (text.split(b"\0")[0].decode("ascii", "replace") for text in texts)
+    name, letters, columns = map(_text, texts)
     try:
         with contextlib.redirect_stdout(io.StringIO()):  # pymavlink prints an unknown letter
             form = DFFormat(kind, name, size, letters, columns)
@@ -203,13 +189,11 @@ def _learn(fields: tuple[Any, ...], formats: dict[int, tuple[DFFormat, struct.St
 
 
 def _fields(form: DFFormat, values: tuple[Any, ...]) -> Fields:
-    made: Fields = {}
-    for column, value, scale in zip(form.columns, values, form.msg_mults, strict=True):
-        if isinstance(value, bytes):
-            made[column] = value.split(b"\0")[0].decode("ascii", "replace")
-        else:
-            made[column] = value * scale if scale is not None else value
-    return made
+    return {
+        column: _text(value) if isinstance(value, bytes) else value if scale is None else value * scale
+        for column, value, scale in zip(form.columns, values, form.msg_mults, strict=True)
+    }
 
 
-FORMAT = LogFormat((".bin",), read)
+def _text(value: bytes) -> str:
+    return value.split(b"\0")[0].decode("ascii", "replace")

@@ -16,7 +16,7 @@ def test_clock_drift_and_delays_are_corrected():
         clock.put(*pair)
     error = clock.times(stamps, written) - 1.7e9 - true - 0.002
     assert np.abs(error).max() < 0.003  # where what was written is off by up to half a second
-    assert "+40 ppm" in clock.words()
+    assert "+40 ppm" in clock.summary()
 
 
 def test_vehicle_restart_starts_a_new_clock_fit():

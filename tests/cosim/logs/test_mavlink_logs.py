@@ -14,7 +14,7 @@ from scipy import signal
 import cosim
 from cosim.errors import CosimError, ImportLogError
 from cosim.io.strict_json import json_text
-from cosim.logs.formats.dataflash import _MessageHandlers
+from cosim.logs.formats.dataflash import _Messages, parse_messages
 from cosim.logs.selection import select_topics
 from cosim.logs.vehicle_messages import VehicleMessages
 from cosim.results.log_facts import load_log_facts
@@ -244,10 +244,12 @@ def test_log_of_another_firmware_is_rejected(tmp_path, six_thrusters):
 
 def test_dataflash_parser_matches_pymavlink():
     """Every message that the readers take comes to the same numbers."""
-    from cosim.logs.formats.dataflash import _messages
-
     wanted = frozenset({"ATT", "XKF1", "IMU", "PARM", "BAT", "RCOU", "BARO"})
-    ours = [(name, fields) for name, fields in _messages(DATAFLASH, wanted, lambda part: None) if fields is not None]
+    ours = [
+        (name, fields)
+        for name, fields in parse_messages(DATAFLASH, wanted, lambda fraction: None)
+        if fields is not None
+    ]
     log = DFReader.DFReader_binary(str(DATAFLASH))
     for name, fields in ours:
         theirs = log.recv_match(type=list(wanted))
@@ -263,11 +265,11 @@ def test_dataflash_parser_matches_pymavlink():
 @pytest.mark.medium
 def test_rates_of_a_controller_that_rests_are_no_samples(contents):
     """In MANUAL an ArduSub writes RATE on and on with the stamp of its last control step; other clocks go on."""
-    handlers = _MessageHandlers(contents)
+    handlers = _Messages(contents)
     for k in range(100):
         at = 10_000_000 + 40_000 * k
-        handlers.take("ATT", {"TimeUS": at, "Roll": 1.0, "Pitch": 0.0, "Yaw": 0.0})
-        handlers.take("RATE", {"TimeUS": min(at, 11_000_000), "R": 1.0, "P": 0.0, "Y": 0.0})
+        handlers.add("ATT", {"TimeUS": at, "Roll": 1.0, "Pitch": 0.0, "Yaw": 0.0})
+        handlers.add("RATE", {"TimeUS": min(at, 11_000_000), "R": 1.0, "P": 0.0, "Y": 0.0})
     assert not handlers.clock.jumps
     assert contents.sources["rates", "RATE"].count == 26 and contents.sources["attitude", "ATT"].count == 100
 
@@ -300,14 +302,14 @@ def test_rates_are_stamped_where_the_gyro_filter_had_them(contents, tmp_path, au
 
 def test_visual_odometry_is_the_mean_velocity_of_its_interval(contents):
     """Fields as ArduPilot's structure VISO has them; the interval ends at the stamp."""
-    handlers = _MessageHandlers(contents)
+    handlers = _Messages(contents)
     turned = {"AngDX": 0.0, "AngDY": 0.0, "AngDZ": 0.1}
-    handlers.take("VISO", {"TimeUS": 2e6, "dt": 0.2, "PosDX": 0.1, "PosDY": -0.02, "PosDZ": 0.0, "conf": 90.0} | turned)
+    handlers.add("VISO", {"TimeUS": 2e6, "dt": 0.2, "PosDX": 0.1, "PosDY": -0.02, "PosDZ": 0.0, "conf": 90.0} | turned)
     source = contents.sources["dvl", "VISO"]
     assert source.count == 1
     assert next(source.blocks())[0, 1:] == pytest.approx([1.9, 0.5, -0.1, 0.0])
     message = mavlink.MAVLink_vision_position_delta_message(2_000_000, 200_000, [0.0] * 3, [0.1, -0.02, 0.0], 90.0)
-    VehicleMessages(contents, 1, 3, 12).take(255, 197, message, 2.0)
+    VehicleMessages(contents, 1, 3, 12).add(255, 197, message, 2.0)
     source = contents.sources["dvl", "VISION_POSITION_DELTA"]
     assert next(source.blocks())[0, 1:] == pytest.approx([1.9, 0.5, -0.1, 0.0])
 

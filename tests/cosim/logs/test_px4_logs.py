@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import cosim
-from cosim.logs import ulog_messages
+from cosim.logs import chunked_file, ulog_messages
 from cosim.logs.ulog_messages import ULogMessages
 from cosim.results.log_facts import load_log_facts
 from tests.cosim.logs.dive import Dive, errors
@@ -91,7 +91,7 @@ def read_samples(path):
     """The reader, and all samples of the file's topics."""
     ours = {}
     log = ULogMessages(path, TOPICS)
-    for name, block in log.blocks(lambda part: None):
+    for name, block in log.blocks(lambda fraction: None):
         ours.setdefault(name, []).append(block)
     return log, {name: np.concatenate(blocks) for name, blocks in ours.items()}
 
@@ -169,13 +169,13 @@ def test_nested_formats_are_bounded(tmp_path):
         subscription = message("A", b"\0\0\0vehicle_attitude")
         (tmp_path / "deep.ulg").write_bytes(b"ULog\x01\x12\x35\x01" + bytes(8) + b"".join(formats) + subscription)
         log = ULogMessages(tmp_path / "deep.ulg", frozenset(["vehicle_attitude"]))
-        assert not list(log.blocks(lambda part: None)) and log.is_damaged
+        assert not list(log.blocks(lambda fraction: None)) and log.is_damaged
 
 
 @pytest.mark.medium
 def test_memory_does_not_grow_with_the_log(dive, tmp_path, monkeypatch):
     """Samples are given in blocks: a log of four times the length needs the same memory."""
-    monkeypatch.setattr(ulog_messages, "_CHUNK", 1 << 15)
+    monkeypatch.setattr(chunked_file, "_CHUNK", 1 << 15)
     monkeypatch.setattr(ulog_messages, "_BLOCK", 1 << 10)
     path = tmp_path / "dive.ulg"
     write_ulog(path, dive)
@@ -185,7 +185,7 @@ def test_memory_does_not_grow_with_the_log(dive, tmp_path, monkeypatch):
     def peak(times):
         path.write_bytes(whole + times * section)
         tracemalloc.start()
-        for _ in ULogMessages(path, TOPICS).blocks(lambda part: None):
+        for _ in ULogMessages(path, TOPICS).blocks(lambda fraction: None):
             pass
         found = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()

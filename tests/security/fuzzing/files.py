@@ -227,7 +227,7 @@ def telemetry_log(seeds: Seeds) -> Case:
     return _log(seeds, "it.tlog", (LOGS / "small.tlog").read_bytes()[:40_000])
 
 
-@reader("dataflash log", "bytes", "cosim.logs.formats.dataflash:_messages", "cosim.logs.formats.dataflash:_learn")
+@reader("dataflash log", "bytes", "cosim.logs.formats.dataflash:parse_messages", "cosim.logs.formats.dataflash:_learn")
 def dataflash_log(seeds: Seeds) -> Case:
     data = (LOGS / "small.BIN").read_bytes()[:60_000]  # of a vehicle with six thrusters, which it now does not say
     return _log(seeds, "it.bin", data.replace(b"FRAME_CONFIG", b"FRAME_CONFIX").replace(b"SERVO", b"SERVX"))
@@ -237,7 +237,7 @@ def dataflash_log(seeds: Seeds) -> Case:
     "log of PX4",
     "bytes",
     "cosim.logs.ulog_messages:ULogMessages._messages",
-    "cosim.logs.ulog_messages:ULogMessages._take",
+    "cosim.logs.ulog_messages:ULogMessages._process",
     "cosim.logs.ulog_messages:_Topic.samples",
 )
 def ulog(seeds: Seeds) -> Case:
