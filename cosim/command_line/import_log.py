@@ -44,7 +44,8 @@ def import_(options: argparse.Namespace) -> int:
             done = import_log(
                 options.log, options.vehicle, options.out,
                 scenario=options.scenario, columns=options.map, rate=options.rate, curve=options.curve,
-                voltage=options.voltage, report=not options.no_report, overwrite=options.overwrite, on_progress=bar.update_to,
+                voltage=options.voltage, report=not options.no_report, overwrite=options.overwrite,
+                on_progress=bar.update_to,
             )  # fmt: skip
         print_run(options, done, not options.no_report)
 

@@ -22,7 +22,8 @@ SCENARIO, COMMANDS, STICKS, PAGE = "excite.toml", "commands.jsonl", "sticks.csv"
 _GOLDEN = 0.618033988749895  # golden ratio less 1: its multiples modulo 1 cover 0 to 1 evenly
 _MAX_DEVIATION = 0.1  # ratio of expected to prior deviation, above which a parameter is called hardly identifiable
 _COMMENTS = {
-    "title": "Made by cosim identify --excite; the law brings the vehicle back between segments", "time.duration": "s", "time.step": "s",
+    "title": "Made by cosim identify --excite; the law brings the vehicle back between segments",
+    "time.duration": "s", "time.step": "s",
     "initial.position": "m, center of the box", "commands.pilot_gain": "sticks are fractions of the greatest wrench",
 }  # fmt: skip
 

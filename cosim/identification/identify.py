@@ -1,25 +1,29 @@
-"""Identification from run folders to a vehicle's file and its page."""
+"""Identification from run folders to a vehicle's file, drawn vehicles and the page."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from cosim.errors import IdentificationError
 from cosim.identification import findings
 from cosim.identification.fit import Fit, fit
-from cosim.identification.log import Log, load_log
+from cosim.identification.intervals import MAX_PRIOR_PART
+from cosim.identification.log import UNITS, Log, load_log
 from cosim.identification.parameters import (
     DEFAULT_FREE,
     DEFAULT_NUISANCES,
     RANDOM_FORCE,
+    Parameter,
     free_parameters,
     nuisances,
     with_mean_nuisances,
 )
 from cosim.identification.validation import Prediction, validate
-from cosim.identification.vehicle_file import name_of_file, vehicle_text
+from cosim.identification.vehicle_file import name_of_file, posterior_lines, vehicle_text
+from cosim.io.atomic_file import reason, write_together
+from cosim.report.web_page import render_page
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
 
@@ -53,27 +57,65 @@ def identify(
     logs, others = (tuple(load_log(run, vehicle) for run in folders) for folders in (runs, held_out))
     parameters += nuisances(nuisance, logs)
     try:
-        found = fit(logs, vehicle, parameters, progress, RANDOM_FORCE in nuisance)
+        fitted = fit(logs, vehicle, parameters, progress, RANDOM_FORCE in nuisance)
     except IdentificationError as error:
-        slow = [said for log in logs if (said := findings.slow_commands(log))]
-        if not slow:
-            raise
-        raise IdentificationError(f"{error}. {' '.join(slow)}") from error
-    findings.require_apart(found)
+        slow = [text for log in logs if (text := findings.slow_commands(log))]
+        raise IdentificationError(". ".join([str(error), *([" ".join(slow)] if slow else [])])) from error
+    findings.require_apart(fitted)
     if others:
-        predictions = validate(others, vehicle, *with_mean_nuisances(parameters, found.values), found.step)
+        predictions = validate(others, vehicle, *with_mean_nuisances(parameters, fitted.values), fitted.step)
     else:
-        predictions = validate(logs, vehicle, parameters, found.values, found.step)
-    return Identification(start, vehicle, logs, others, found, tuple(predictions))
+        predictions = validate(logs, vehicle, parameters, fitted.values, fitted.step)
+    return Identification(start, vehicle, logs, others, fitted, tuple(predictions))
 
 
-def vehicle_contents(done: Identification, out: Path) -> str:
+def vehicle_contents(result: Identification, out: Path) -> str:
     """Return the content of the identified vehicle's file `out`; raise IdentificationError if its name is invalid."""
-    names = ", ".join(log.name for log in done.logs)
+    names = ", ".join(log.name for log in result.logs)
     provenance = [
-        f"Identified by cosim identify from {names}, starting from {done.vehicle.name}. Behind a number stands half of "
-        "its 95 % interval.",
-        findings.verdict(done.fit),
-        *findings.warnings(done.fit, done.logs),
+        f"Identified by cosim identify from {names}, starting from {result.vehicle.name}. Behind a number stands "
+        "half of its 95 % interval.",
+        findings.verdict(result.fit),
+        *findings.warnings(result.fit, result.logs),
     ]
-    return vehicle_text(done.start, done.vehicle, done.fit, name_of_file(out), provenance)
+    return vehicle_text(result.start, result.vehicle, result.fit, name_of_file(out), provenance)
+
+
+def write_results(result: Identification, out: Path) -> tuple[Path, Path]:
+    """Write the vehicle's file, the drawn vehicles and the page; at no time does one stand beside an older other."""
+    posterior, page = out.with_suffix(".posterior.jsonl"), out.with_suffix(".html")
+    contents = {
+        out: vehicle_contents(result, out),
+        posterior: "".join(f"{line}\n" for line in posterior_lines(result.fit, result.vehicle)),
+        page: page_contents(result, out),
+    }
+    try:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_together(contents)
+    except OSError as error:
+        raise IdentificationError(f"{error.filename or out}: {reason(error)}") from error
+    load_vehicle(out)
+    return posterior, page
+
+
+def page_contents(result: Identification, out: Path) -> str:
+    """Return the page of an identification whose vehicle's file is `out`."""
+    from cosim.identification.figures import figures_of, inline_figures
+
+    fit, logs = result.fit, result.logs
+    return render_page(
+        "cosim.identification/identification.html.j2", vehicle=result.vehicle.title, out=out,
+        figures=inline_figures(figures_of(fit, result.predictions)), verdict=findings.verdict(fit),
+        warnings=findings.warnings(fit, logs), advice=findings.advice(fit), rows=list(_rows(result.fit, False)),
+        nuisance_rows=list(_rows(result.fit, True)), clusters=fit.intervals.clusters, predictions=result.predictions,
+        held_out=[log.name for log in result.held_out], units=UNITS, topics=findings.topic_rows(logs),
+        logs=[log.name for log in logs], start=result.start, free=fit.free_keys(),
+    )  # fmt: skip
+
+
+def _rows(fit: Fit, nuisance: bool) -> Iterator[tuple[Parameter, float, float, str]]:
+    """Yield parameter, value, half width of its 95 % interval, and what it rests on."""
+    for i, p in enumerate(fit.parameters):
+        if p.is_nuisance == nuisance:
+            basis = "prior" if fit.intervals.prior_part[i] > MAX_PRIOR_PART else "runs"
+            yield p, float(fit.values[i]), float(fit.intervals.half[i]), basis

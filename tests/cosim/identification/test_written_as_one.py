@@ -9,7 +9,7 @@ from unittest import mock
 import pytest
 
 from cosim.errors import IdentificationError
-from cosim.identification import page
+from cosim.identification import identify as page
 from tests.faults import FAIL_ON, FAIL_ONCE, INTERRUPT, KILL, arm, call_with_faults, count, needs_faults
 
 NAMES = ("mine.toml", "mine.posterior.jsonl", "mine.html")
