@@ -40,17 +40,14 @@ def watch(options: argparse.Namespace) -> int:
 
     terminal = sys.stdout.isatty()
     console = Screen(width=None if terminal else _WIDE, highlight=False)
-    ascii_only = console.options.ascii_only
-    once = options.once or not terminal
-    last = None
+    once, last = options.once or not terminal, None
     try:
         with contextlib.ExitStack() as stack:
             live = None if once else stack.enter_context(Live(console=console, screen=True, auto_refresh=False))
-            for look in looks(options.run, None if options.rate == math.inf else options.rate, once):
-                last = look
+            for last in looks(options.run, None if options.rate == math.inf else options.rate, once):
                 if live is not None:
-                    live.update(picture(look, console.width, console.height, ascii_only), refresh=True)
+                    live.update(picture(last), refresh=True)
     finally:
         if last is not None:  # the last picture stays on the terminal
-            console.print(picture(last, console.width, None, ascii_only))
+            console.print(picture(last))
     return 0

@@ -38,7 +38,7 @@ ONE_PLACE = {
     "pymavlink": {"cosim.mavlink.wire.dialect", "cosim.logs.formats.dataflash"},
     "rerun": {"cosim.export.rrd_writer"},
     "rosbags": {"cosim.logs.bag_storage", "cosim.logs.formats.bag", "cosim.logs.message_definitions"},
-    "rich": {"cosim.command_line.watch", "cosim.live.watching.bars", "cosim.live.watching.terminal_view"},
+    "rich": {"cosim.command_line.watch", "cosim.live.watching.terminal_view"},
     "shtab": {"cosim.command_line.help"},
     "skfuzzy": {"fuzzy_arbiter.engines.scikit"},
     "threadpoolctl": {"cosim.identification.fit"},

@@ -1,9 +1,17 @@
 """``cosim watch``: a run displayed in the terminal."""
 
+import contextlib
 import dataclasses
+import fcntl
 import io
+import os
+import pty
 import re
 import shutil
+import struct
+import subprocess
+import sys
+import termios
 import threading
 
 import numpy as np
@@ -29,77 +37,94 @@ def paper(shipped_run):
     return shipped_run("paper", PAPER, "time.duration=6")
 
 
-def drawn(look, width, height, **options):
-    console = Console(file=io.StringIO(), width=width, height=height, **options)
-    console.print(picture(look, width, height, console.options.ascii_only))
+def drawn(look, width=100, **options):
+    console = Console(file=io.StringIO(), width=width, **options)
+    console.print(picture(look))
     return console.file.getvalue()
 
 
+@pytest.fixture(scope="module")
+def frames(paper):
+    return list(looks(str(paper.folder), rate=None))
+
+
 @pytest.mark.medium
-def test_without_a_terminal_one_frame_shows_the_result(paper, capsys):
+def test_without_a_terminal_one_table_shows_the_result(paper, capsys):
     assert main(["watch", str(paper.folder)]) == 0
     out = capsys.readouterr().out
-    assert "\x1b" not in out
-    assert out.count("Weights of the arbiter") == 1
+    assert "\x1b" not in out and out.count("Active region") == 1
     record = load_record(paper.folder)
+
+    def shown(name, pattern):
+        return [float(number) for number in re.search(rf"(?m)^{name} +{pattern}", out).groups()]
+
+    def last(*names):
+        return pytest.approx([record[name][-1] for name in names], abs=0.006)
+
     for name in ("goal", "SR1", "SR2", "SR3"):
-        shown = float(re.search(rf"{name} .*?([+-]\d+\.\d\d)m", out).group(1))
-        assert shown == pytest.approx(record[f"{name}.clearance"][-1], abs=0.006)
+        assert shown(name, r"([+-]\d+\.\d\d) m") == last(f"{name}.clearance")
+    for name in ("obstacle", "shape", "depth"):
+        assert shown(name, r"weight ([\d.]+), membership ([\d.]+)") == last(f"weight.{name}", f"membership.{name}")
+    axes = [f"position.{axis}" for axis in "xyz"]
+    assert shown("North east depth", r"(\S+) +(\S+) +(\S+) m") == last(*axes)
+    for group, i in (("command", 0), ("actuation", 1)):
+        force = np.linalg.norm([record[f"{group}.{axis}"][-1] for axis in "XYZ"])
+        assert shown("Force", r"([\d.]+) N commanded, ([\d.]+) N actual")[i] == pytest.approx(force, abs=0.06)
     assert "completed: The vehicle entered the goal region" in out
 
 
-@pytest.mark.medium(fast=1)
-@pytest.mark.parametrize("size", [(80, 24), (100, 24), (200, 50)])
-def test_every_picture_of_a_run_fits_its_terminal(paper, size):
-    frames = list(looks(str(paper.folder), rate=None))
+@pytest.mark.parametrize("width", [40, 80, 200])
+def test_table_fits_the_width_of_the_terminal(frames, width):
     assert 150 < len(frames) <= 250
     for frame in (*frames[::20], frames[-1]):
-        lines = drawn(frame, *size).rstrip("\n").split("\n")
-        assert len(lines) <= size[1] and max(map(len, lines)) <= size[0]
+        lines = drawn(frame, width).rstrip("\n").split("\n")
+        assert max(map(len, lines)) <= width and (width == 40 or len(lines) <= 30)
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
-def test_picture_of_a_row_without_numbers_says_so(value, paper):
-    *_, frame = looks(str(paper.folder), rate=None)
-    names = [signal["name"] for signal in frame.header["signals"]]
-    row = np.where([name == "time" for name in names], frame.row, value)
-    text = drawn(dataclasses.replace(frame, row=row), 100, 40)
-    assert "no number" in text and not re.search(r"\b(nan|inf)", text.partition("completed")[0])
+def test_picture_of_a_row_without_numbers_says_so(value, frames):
+    names = [signal["name"] for signal in frames[-1].header["signals"]]
+    row = np.where([name == "time" for name in names], frames[-1].row, value)
+    text = drawn(dataclasses.replace(frames[-1], row=row, ended=None))
+    assert "no number" in text and not re.search(r"\b(nan|inf)", text)
 
 
-def test_violations_are_readable_without_color(paper):
+def test_violations_are_readable_without_color(paper, frames):
     record = load_record(paper.folder)
-    k = int(np.argmin(record["SR1.clearance"]))
-    frames = list(looks(str(paper.folder), rate=None))
-    frame = min(frames, key=lambda look: abs(look["time"] - record["time"][k]))
-    text = drawn(frame, 80, 24)
-    assert re.search(r"SR1 .*-\d\.\d\dm !", text)
-    assert re.search(r"VIOLATED: .*SR1", text)
-    assert "Rules that fire" in text and "obstacle exist → α1 high" in text
-    assert "Gives way to" in text
+    time = record["time"][int(np.argmin(record["SR1.clearance"]))]
+    text = drawn(min(frames, key=lambda look: abs(look["time"] - time)), 80)
+    assert re.search(r"SR1 +-\d\.\d\d m VIOLATED", text) and re.search(r"Active region +SR\d \(", text)
+    assert "obstacle exist → α1 high" in text
 
 
-def test_ascii_terminal_gets_ascii_bars(paper):
-    *_, last = looks(str(paper.folder), rate=None)
-    file = io.TextIOWrapper(io.BytesIO(), encoding="ascii", errors="replace")
-    console = Console(file=file, width=80)
-    assert console.options.ascii_only
-    console.print(picture(last, 80, 24, console.options.ascii_only))
-    file.flush()
-    assert "#" in file.buffer.getvalue().decode() and "?????" not in file.buffer.getvalue().decode()
-
-
-def test_colors_are_omitted_if_unwanted(paper, monkeypatch):
-    *_, last = looks(str(paper.folder), rate=None)
-    assert "\x1b[3" in drawn(last, 80, 24, force_terminal=True, color_system="standard")
+def test_colors_are_omitted_if_unwanted(frames, monkeypatch):
+    assert "\x1b[3" in drawn(frames[-1], force_terminal=True, color_system="standard")
     monkeypatch.setenv("NO_COLOR", "1")
-    assert "\x1b[3" not in drawn(last, 80, 24, force_terminal=True)
+    assert "\x1b[3" not in drawn(frames[-1], force_terminal=True)
 
 
-def test_names_cannot_inject_terminal_codes(paper):
-    *_, last = looks(str(paper.folder), rate=None)
-    header = last.header | {"title": "a\x1b[2Jb\x07"}
-    assert "\x1b" not in drawn(Look(header, last.row, "\x1b]0;x\x07"), 80, 24)
+def test_names_cannot_inject_terminal_codes(frames):
+    header = frames[-1].header | {"title": "a\x1b[2Jb\x07"}
+    assert "\x1b" not in drawn(Look(header, frames[-1].row, "\x1b]0;x\x07"))
+
+
+@pytest.mark.medium
+def test_table_in_a_terminal_is_redrawn_and_cut_to_its_height(paper):
+    terminal, slave = pty.openpty()
+    fcntl.ioctl(slave, termios.TIOCSWINSZ, struct.pack("HHHH", 12, 60, 0, 0))
+    command = [sys.executable, "-m", "cosim", "watch", str(paper.folder), "--rate", "max"]
+    variables = {name: value for name, value in os.environ.items() if name not in ("COLUMNS", "LINES")}
+    variables |= {"TERM": "xterm", "NO_COLOR": "1"}
+    process = subprocess.Popen(command, stdin=slave, stdout=slave, stderr=slave, env=variables)
+    os.close(slave)
+    text = b""
+    with contextlib.suppress(OSError):  # the other end is closed
+        while chunk := os.read(terminal, 65536):
+            text += chunk
+    assert process.wait(timeout=60) == 0
+    pictures = text.decode().split("\x1b[H")
+    assert len(pictures) > 150 and all(len(one.splitlines()) <= 12 for one in pictures[1:-1])
+    assert "Outcome" in pictures[-1] and "\x1b[3" not in text.decode()
 
 
 def test_a_run_that_is_being_written_is_followed_to_its_end(paper, tmp_path):

@@ -70,11 +70,11 @@ def test_events_and_report_name_the_active_criterion(four):
 def test_terminal_view_lists_all_criteria(four):
     *_, last = looks(str(four.folder), rate=None)
     console = Console(file=io.StringIO(), width=80, height=40)
-    console.print(picture(last, 80, 40))
+    console.print(picture(last))
     shown = console.file.getvalue()
     for name, _ in CRITERIA:
         weight, asks = (four.record[f"{of}.{name}"][-1] for of in ("weight", "membership"))
-        assert f" {weight:4.2f} asks {asks:4.2f}" in next(
+        assert f" weight {weight:4.2f}, membership {asks:4.2f}" in next(
             line for line in shown.splitlines() if line.startswith(name[:12])
         )
 

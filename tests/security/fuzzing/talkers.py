@@ -93,7 +93,7 @@ def live_view(seeds: Seeds) -> Case:
         seeds.patch.setattr("socket.create_connection", lambda *_, **__: None)
         seeds.patch.setattr("websockets.sync.client.connect", lambda *_, **__: _Connection(messages))
         for look in looks("ws://127.0.0.1:8765"):
-            console.print(picture(look, 100, 40))
+            console.print(picture(look))
 
     return Case(("\n".join(texts).encode() + b"\n",), read, "ws://127.0.0.1:8765")
 
