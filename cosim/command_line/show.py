@@ -57,5 +57,5 @@ def check(options: argparse.Namespace) -> int:
     from cosim.scenario.scenario import load_scenario
 
     found = check_scenario(load_scenario(options.scenario, options.set))
-    print(check_json(found) if options.json else check_text(found))
+    print(check_json(found).rstrip() if options.json else check_text(found))
     return 0 if found.holds else 1

@@ -7,9 +7,9 @@ import logging
 import socket
 import threading
 import time
-from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from http import HTTPStatus
+from typing import Any
 
 from websockets.asyncio.server import ServerConnection
 from websockets.asyncio.server import serve as serve_websockets
@@ -96,7 +96,7 @@ class _Viewers:
         self.cursors: list[Cursor] = []
         self._address, self._hub, self._page = address, hub, page
         self._news = asyncio.Event()
-        self._failures: Counter[str] = Counter()
+        self._failures: set[type[Exception]] = set()
 
     def wake(self) -> None:
         """Wake the tasks of all viewers, which send new messages."""
@@ -132,31 +132,31 @@ class _Viewers:
         """Send the run to a viewer, and take its commands, until it disconnects."""
         cursor = Cursor()
         self.cursors.append(cursor)
-        sending = asyncio.create_task(self._send_news(connection, cursor))
+        sending = asyncio.create_task(self._serve(connection, self._send_news(connection, cursor)))
         try:
-            await self._accept(connection)
-        except ConnectionClosed:
-            log.debug("a viewer has gone")
-        except Exception as error:  # broad: an error of one viewer must not end the others
-            if self._is_new(error):
-                log.exception("a viewer was lost")
+            await self._serve(connection, self._accept(connection))
         finally:
             sending.cancel()
             self.cursors.remove(cursor)
 
-    async def _send_news(self, connection: ServerConnection, cursor: Cursor) -> None:
+    async def _serve(self, connection: ServerConnection, work: Coroutine[Any, Any, None]) -> None:
+        """Do the work for a viewer until it disconnects, or is disconnected because of an error."""
         try:
-            while True:
-                news = self._news
-                while (message := self._hub.next_for(cursor)) is not None:
-                    await connection.send(message)  # waits while the viewer's buffer is full
-                await news.wait()
+            await work
         except ConnectionClosed:
             log.debug("a viewer has gone")
-        except Exception as error:  # broad: as above
-            if self._is_new(error):
+        except Exception as error:  # broad: an error of one viewer must not end the others
+            if type(error) not in self._failures:  # later ones of its type are not logged
+                self._failures.add(type(error))
                 log.exception("a viewer was lost")
             await connection.close(1011)
+
+    async def _send_news(self, connection: ServerConnection, cursor: Cursor) -> None:
+        while True:
+            news = self._news
+            while (message := self._hub.next_for(cursor)) is not None:
+                await connection.send(message)  # waits while the viewer's buffer is full
+            await news.wait()
 
     async def _accept(self, connection: ServerConnection) -> None:
         """Take commands at a limited rate (token bucket)."""
@@ -175,8 +175,3 @@ class _Viewers:
             reason = "the run has not begun" if self._hub.desk is None else self._hub.desk.submit(message)
             if reason is not None:
                 await connection.send(format_message("said", kind="refused", text=reason, time=None))
-
-    def _is_new(self, error: Exception) -> bool:
-        """Return True for the first error of its type; later ones are not logged."""
-        self._failures[type(error).__name__] += 1
-        return self._failures[type(error).__name__] == 1

@@ -2,19 +2,13 @@
 
 from __future__ import annotations
 
-import json
-import math
+import dataclasses
 import textwrap
-from typing import Any
 
+from cosim.io.strict_json import json_text
 from cosim.precheck.precheck import Check
 
-_TOPICS = {
-    "vehicle": "Vehicle",
-    "law": "Law",
-    "regions": "Regions",
-    "thrust": "Thrusters",
-}
+_TOPICS = {"vehicle": "Vehicle", "law": "Law", "regions": "Regions", "thrust": "Thrusters"}
 _WIDTH = 110
 
 
@@ -25,38 +19,19 @@ def check_text(check: Check) -> str:
         lines += ["", heading]
         for finding in check.findings:
             if finding.topic == topic:
-                lead = f"  {finding.status:5}  {finding.name}: "
-                lines += textwrap.wrap(finding.text, _WIDTH, initial_indent=lead, subsequent_indent=" " * 9)
-    lines += ["", *_verdict(check)]
+                lines += _wrapped(f"  {finding.status:5}  {finding.name}: ", finding.text, 9)
+    if check.holds:
+        return "\n".join([*lines, "", "Verdict: nothing is wrong with this scenario."])
+    lines += ["", f"Verdict: {len(check.failed)} of {len(check.findings)} fail. What to change:"]
+    for finding in check.failed:
+        lines += _wrapped(f"  - {finding.name}: ", finding.advice, 4)
     return "\n".join(lines)
 
 
-def _verdict(check: Check) -> list[str]:
-    if check.holds:
-        return ["Verdict: nothing stands against this scenario."]
-    lines = [f"Verdict: {len(check.failed)} of {len(check.findings)} fail. What to change:"]
-    for finding in check.failed:
-        lead = f"  - {finding.name}: "
-        lines += textwrap.wrap(finding.advice, _WIDTH, initial_indent=lead, subsequent_indent="    ")
-    return lines
+def _wrapped(lead: str, text: str, indent: int) -> list[str]:
+    return textwrap.wrap(text, _WIDTH, initial_indent=lead, subsequent_indent=" " * indent)
 
 
 def check_json(check: Check) -> str:
     """Format a check as JSON, with null for NaN and infinity."""
-    findings = [
-        {
-            "topic": finding.topic,
-            "name": finding.name,
-            "status": finding.status,
-            "text": finding.text,
-            "advice": finding.advice,
-            "numbers": {key: _finite(value) for key, value in finding.numbers.items()},
-        }
-        for finding in check.findings
-    ]
-    head = {"scenario": check.scenario, "title": check.title, "vehicle": check.vehicle, "law": check.law}
-    return json.dumps(head | {"holds": check.holds, "findings": findings}, indent=2)
-
-
-def _finite(value: Any) -> Any:
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return json_text({**dataclasses.asdict(check), "holds": check.holds})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,20 +102,44 @@ def start_weights(scenario: Scenario) -> Array:
     return arbitration.region_weights
 
 
+@dataclass(frozen=True)
+class _Start:
+    """Numbers at the start on which the conditions of the paper's law depend."""
+
+    scenario: Scenario
+    model: Model
+    gains: Gains
+    value: float  # f of the goal
+    slope: float  # |df/dp| of the goal
+    radii: tuple[float, float, float] | None  # m, within which conditions hold, of a sphere as goal
+
+    @property
+    def position(self) -> Array:
+        return np.array(self.scenario.initial.position)
+
+    def or_start_within(self, radius: int) -> str:
+        """Return the end of an advice: to start nearer to the goal, if it is known how near."""
+        return f", or start within {self.radii[radius]:.2f} m." if self.radii else "."
+
+    @property
+    def distance(self) -> str:
+        """Text that says how far from the center of a sphere the start is."""
+        assert isinstance(self.scenario.goal, Sphere)
+        return f"the start is {math.dist(self.scenario.initial.position, self.scenario.goal.centre):.2f} m away."
+
+
 def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
     """Yield the findings on (38) and (45) at the start, and on where else they hold, for the paper's law."""
     gains: Gains = scenario.law.gains
-    model = true_model(scenario)
-    goal = scenario.goal_region
-    start = np.array(scenario.initial.position)
-    f, gradient = _value_and_gradient(goal, start)
-    slope = float(np.linalg.norm(gradient))
-    radii: tuple[float, float, float] | None = None
-    if isinstance(scenario.goal, Sphere):
-        radii = sphere_radii(model.mass, model.linear_damping, scenario.goal.radius, gains)
-    yield _potential(model, gains, slope, radii, scenario)
-    yield _secondary(model, gains, weights, scenario)
-    yield _damped(model, gains, goal, start, f, radii, scenario)
+    model, goal = true_model(scenario), scenario.goal
+    value, gradient = _value_and_gradient(scenario.goal_region, np.array(scenario.initial.position))
+    radii = None
+    if isinstance(goal, Sphere):
+        radii = sphere_radii(model.mass, model.linear_damping, goal.radius, gains)
+    start = _Start(scenario, model, gains, value, float(np.linalg.norm(gradient)), radii)
+    yield _potential(start)
+    yield _secondary(start, weights)
+    yield _damped(start)
     second, third = gain_fits(gains)
     yield Finding(
         "law", "(45) 2, 3", status(second.holds and third.holds),
@@ -124,15 +149,14 @@ def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
     )  # fmt: skip
 
 
-def _potential(
-    model: Model, gains: Gains, slope: float, radii: tuple[float, float, float] | None, scenario: Scenario
-) -> Finding:
-    least = least_of_potential_test(model.mass, slope, gains) if slope else math.inf
-    limit = greatest_gradient(model.mass, gains)
-    first, second = potential_fits(model.mass, slope, gains)
+def _potential(start: _Start) -> Finding:
+    mass, gains, slope = start.model.mass, start.gains, start.slope
+    least = least_of_potential_test(mass, slope, gains) if slope else math.inf
+    limit = greatest_gradient(mass, gains)
+    first, second = potential_fits(mass, slope, gains)
     where = f"Holds where |df/dp| < {limit:.4g}" + (
-        f", within {radii[0]:.2f} m of the goal's centre; the start is {_distance(scenario):.2f} m away."
-        if radii
+        f", within {start.radii[0]:.2f} m of the goal's center; {start.distance}"
+        if start.radii
         else f"; at the start it is {slope:.4g}."
     )
     scalar = "" if second.holds else (
@@ -140,44 +164,44 @@ def _potential(
         "it takes the mass for an inertia."
     )  # fmt: skip
     text = f"P - sigma M sigma has the least eigenvalue {least:.4g} at the start ({_pair(first)} in position). "
-    advice = ""
-    if least <= 0.0:
-        mended = _greatest_sigma(lambda s: least_of_potential_test(model.mass, slope, gains._replace(sigma_p=s)))
-        advice = (
-            f"Lower law.gains.sigma_p to {_below(mended)}" + (f", or start within {radii[0]:.2f} m." if radii else ".")
-            if mended
-            else _mend_attitude(model, gains, slope)
-        )
     return Finding(
-        "law", "(38) 1, 2", status(least > 0.0), text + where + scalar, advice,
+        "law", "(38) 1, 2", status(least > 0.0), text + where + scalar, "" if least > 0.0 else _lower_sigma(start),
         {
             "least_eigenvalue": least, "position_have": first.have, "position_need": first.need,
             "attitude_have": second.have, "attitude_need_scalar": second.need, "greatest_gradient": limit,
-            "gradient_at_start": slope, "radius": radii[0] if radii else None,
+            "gradient_at_start": slope, "radius": start.radii[0] if start.radii else None,
         },
     )  # fmt: skip
 
 
-def _mend_attitude(model: Model, gains: Gains, slope: float) -> str:
-    still = gains._replace(sigma_p=0.0)
-    mended = _greatest_sigma(lambda s: least_of_potential_test(model.mass, slope, still._replace(sigma_a=s)))
-    if not mended:
-        return "Raise law.gains.k_p1 and k_p2 above 0."
-    return f"Lower law.gains.sigma_a to {_below(mended)}: the condition fails in attitude, everywhere."
+def _lower_sigma(start: _Start) -> str:
+    """Return advice on sigma_p, or on sigma_a where the condition fails in attitude."""
+
+    def greatest(gains: Gains, name: str) -> float | None:
+        return _greatest_sigma(
+            lambda sigma: least_of_potential_test(start.model.mass, start.slope, gains._replace(**{name: sigma}))
+        )
+
+    if sigma := greatest(start.gains, "sigma_p"):
+        return f"Lower law.gains.sigma_p to {_below(sigma)}" + start.or_start_within(0)
+    if sigma := greatest(start.gains._replace(sigma_p=0.0), "sigma_a"):
+        return f"Lower law.gains.sigma_a to {_below(sigma)}: the condition fails in attitude, everywhere."
+    return "Raise law.gains.k_p1 and k_p2 above 0."
 
 
-def _secondary(model: Model, gains: Gains, weights: Array, scenario: Scenario) -> Finding:
+def _secondary(start: _Start, weights: Array) -> Finding:
+    scenario, gains, mass = start.scenario, start.gains, start.model.mass
     regions = [secondary.region for secondary in scenario.regions]
     values, gradients, _ = evaluate_regions(regions, scenario.initial.position, scenario.initial.quaternion)
     alphas = np.array([region.gain for region in regions]) * weights
     active = (values > 0.0) & (alphas > 0.0)
-    fit = secondary_fit(model.mass, np.linalg.norm(gradients[active], axis=1), alphas[active] / gains.k_q, gains)
+    fit = secondary_fit(mass, np.linalg.norm(gradients[active], axis=1), alphas[active] / gains.k_q, gains)
     names = ", ".join(region.name for region, on in zip(regions, active, strict=True) if on)
     at_start = f"Active at the start: {names} ({_pair(fit)})." if names else "No region is active at the start."
     limits = {}
     for region in regions:  # alone and with weight 1: bound of its gradient
         if region.gain > 0.0:
-            one = secondary_fit(model.mass, np.ones(1), np.array([region.gain / gains.k_q]), gains)
+            one = secondary_fit(mass, np.ones(1), np.array([region.gain / gains.k_q]), gains)
             limits[region.name] = math.sqrt(one.have / one.need) if one.need else math.inf
     where = "; ".join(f"{name} {limit:.3g}" for name, limit in limits.items())
     return Finding(
@@ -188,38 +212,33 @@ def _secondary(model: Model, gains: Gains, weights: Array, scenario: Scenario) -
     )  # fmt: skip
 
 
-def _damped(
-    model: Model,
-    gains: Gains,
-    goal: Region,
-    start: Array,
-    f: float,
-    radii: tuple[float, float, float] | None,
-    scenario: Scenario,
-) -> Finding:
+def _damped(start: _Start) -> Finding:
+    model, gains, goal, radii = start.model, start.gains, start.scenario.goal_region, start.radii
     steps = _STEP * np.eye(3)
-    jacobian = np.column_stack([_error(goal, start + h) - _error(goal, start - h) for h in steps]) / (2.0 * _STEP)
+    jacobian = np.column_stack([_error(goal, start.position + h) - _error(goal, start.position - h) for h in steps]) / (
+        2.0 * _STEP
+    )
     bound = max(0.0, error_jacobian_bound(jacobian))
-    fit = damping_fit(model.mass, model.linear_damping, bound, gains)
-    translation = damping_fit(model.mass, model.linear_damping, bound, gains, translation_alone=True)
+    fit, translation = (
+        damping_fit(model.mass, model.linear_damping, bound, gains, translation_alone=alone) for alone in (False, True)
+    )
     text = (
         f"At the start lambda_min[D] + lambda_min[K_v] = {fit.have:.4g} ({translation.have:.4g} for translation alone) "
         f"against sigma c_0, of which the term with de_p/dt alone is {fit.need:.4g}."
     )
     if radii:
         text += (
-            f" From that term it can hold within {radii[1]:.2f} m ({radii[2]:.2f} m) of the goal's centre; "
-            f"the start is {_distance(scenario):.2f} m away."
+            f" From that term it can hold within {radii[1]:.2f} m ({radii[2]:.2f} m) of the goal's center; "
+            f"{start.distance}"
         )
     advice = ""
     if not fit.holds:
-        advice = f"Lower law.gains.sigma_p to {_below(gains.sigma_p * fit.have / fit.need)}" + (
-            f", or start within {radii[1]:.2f} m." if radii else "."
-        )
+        sigma = _below(gains.sigma_p * fit.have / fit.need)
+        advice = f"Lower law.gains.sigma_p to {sigma}{start.or_start_within(1)}"
     return Finding(
         "law", "(45) 1", status(fit.holds), text, advice,
         {
-            "have": fit.have, "have_translation": translation.have, "need": fit.need, "f_at_start": f,
+            "have": fit.have, "have_translation": translation.have, "need": fit.need, "f_at_start": start.value,
             "radius": radii[1] if radii else None, "radius_translation": radii[2] if radii else None,
         },
     )  # fmt: skip
@@ -232,11 +251,6 @@ def _value_and_gradient(goal: Region, position: Array) -> tuple[float, Array]:
 
 def _error(goal: Region, position: Array) -> Array:
     return primary_error(*_value_and_gradient(goal, position))
-
-
-def _distance(scenario: Scenario) -> float:
-    assert isinstance(scenario.goal, Sphere)
-    return math.dist(scenario.initial.position, scenario.goal.centre)
 
 
 def _greatest_sigma(test: Callable[[float], float]) -> float | None:

@@ -297,7 +297,7 @@ def test_failed_check_prints_advice_and_exits_with_1(capsys):
 def test_passed_check_exits_with_0(capsys):
     arguments = [word for change in (CLOSED, *MENDED) for word in ("--set", change)]
     assert main(["check", "paper", *arguments]) == 0
-    assert "nothing stands against" in capsys.readouterr().out
+    assert "nothing is wrong" in capsys.readouterr().out
 
 
 @pytest.mark.slow
