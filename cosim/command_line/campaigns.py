@@ -5,15 +5,20 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cosim.command_line.flags import add_changes, add_verb, flag, refuse_flags, whole
 from cosim.command_line.process import say, say_if_interrupted
 from cosim.errors import RunError
 
+if TYPE_CHECKING:
+    from cosim.campaigns import Campaign
+    from cosim.campaigns.sweeps.design import Vary
+
+_SENSING = ("state", "sensors")  # with the scenes' noise; or IMU, DVL, compass, pressure sensor and USBL
 _WORKERS = whole(1, 1024)
 
 
@@ -49,10 +54,7 @@ def _add_scenes(verb: argparse.ArgumentParser) -> None:
     verb.add_argument("scenes", type=Path, metavar="SCENES.jsonl", help="a scene a line; - for standard input")
     add_campaign_folder(verb)
     flag(verb, "--report-failures", "report failing thrusters to the law")
-    flag(
-        verb, "--sensing", "input of the law: the state with the scenes' noise, or a navigation filter's estimate from "
-        "IMU, DVL, compass, pressure sensor and USBL", default="state", choices=("state", "sensors"),
-    )  # fmt: skip
+    flag(verb, "--sensing", "input of the law: state, or navigation filter", default="state", choices=_SENSING)
     flag(
         verb, "--arbiter ordered|reversed|crisp|none|FILE", "weigh criteria by their order (default), in reversed "
         "order, by memberships of 0 or 1, all with 1, or by rules of a file with the criteria as inputs",
@@ -61,10 +63,7 @@ def _add_scenes(verb: argparse.ArgumentParser) -> None:
 
 def add_campaign_folder(verb: argparse.ArgumentParser) -> None:
     """Add the flags for the folder of a campaign, and for the replays of its worst flights."""
-    flag(
-        verb, "--out DIR", "a new folder, or one that this command began: it goes on with what is left", Path,
-        required=True,
-    )  # fmt: skip
+    flag(verb, "--out DIR", "a new folder, or one to go on with what is left", Path, required=True)
     flag(verb, "--replays N", "worst flights, of each law, that are repeated with a replay", whole(0, 1000), 3)
 
 
@@ -81,15 +80,11 @@ def add_cluster(verb: argparse.ArgumentParser) -> None:
     flag(where, "--scheduler tcp://HOST:PORT", "use an existing Dask cluster")
 
 
-def require_one_count(options: argparse.Namespace) -> None:
-    """Raise a RunError if the number of processes is given for an existing cluster."""
-    if options.scheduler and options.workers:
-        raise RunError("--workers: expected none with --scheduler: the cluster sets their number")
-
-
 @contextlib.contextmanager
 def executor_of(options: argparse.Namespace) -> Iterator[Executor | None]:
     """Connect to the Dask cluster of the flags; yield its executor, or None without one."""
+    if options.scheduler and options.workers:
+        raise RunError("--workers: expected none with --scheduler: the cluster sets their number")
     if not (options.dask or options.scheduler):
         yield None
         return
@@ -106,28 +101,49 @@ def _conditions(options: argparse.Namespace) -> Any:
     return Conditions.by_arbiter(arbiter, report_failures=options.report_failures, sensing=options.sensing)
 
 
+def fly(
+    options: argparse.Namespace,
+    work: Callable[[], Any],
+    lines: Callable[[Any], Iterable[str]],
+    write_page: Callable[[Path, int], Path],
+) -> int:
+    """Fly what is left of a campaign, print its outcome and its page; after Ctrl-C or a kill, print what is kept."""
+
+    def run() -> None:
+        done = work()
+        if not getattr(done, "flown", True):
+            say(options, f"{options.out}: was complete already")
+        say(options, *lines(done))
+        print(write_page(options.out, options.replays))
+
+    return say_if_interrupted(run, f"what is flown is kept in {options.out}, and the same command goes on")
+
+
+def refuse_both(vary: Sequence[Vary], changes: Sequence[str]) -> None:
+    """Raise a RunError if a key is set and varies."""
+    from cosim.scenario.toml_file import split_change
+
+    both = {one.key for one in vary} & {split_change(text)[0] for text in changes}
+    if both:
+        raise RunError(f"{min(both)} is set and varies, expected either")
+
+
 def campaign(options: argparse.Namespace) -> int:
     """Run ``cosim campaign``."""
     from cosim.campaigns import run_campaign
     from cosim.campaigns.pages.campaign_page import campaign_lines, write_campaign_page
     from cosim.campaigns.scenes.law_gains import gains_from
 
-    require_one_count(options)
-    gains = gains_from(options.law, options.set)
-    conditions = _conditions(options)
+    gains, conditions = gains_from(options.law, options.set), _conditions(options)
 
-    def run() -> None:
+    def work() -> Campaign:
         with executor_of(options) as executor:
             n, progress = options.workers or 1, not options.quiet
-            done = run_campaign(
+            return run_campaign(
                 options.scenes, options.law, options.out, conditions, gains, n, executor, progress=progress
             )
-        if not done.flown:
-            say(options, f"{options.out}: was complete already")
-        say(options, *campaign_lines(done.summary))
-        print(write_campaign_page(options.out, options.replays))
 
-    return resumable(run, options.out)
+    return fly(options, work, lambda done: campaign_lines(done.summary), write_campaign_page)
 
 
 def compare(options: argparse.Namespace) -> int:
@@ -140,18 +156,14 @@ def compare(options: argparse.Namespace) -> int:
         return _ablate(options)
     refuse_flags(options, ["variants"], "--ablate with it")
     laws = [law.strip() for law in options.laws.split(",") if law.strip()]
-    gains = gains_by_law(laws, options.set)
-    conditions = _conditions(options)
+    gains, conditions = gains_by_law(laws, options.set), _conditions(options)
+    given = options.scenes, laws, options.out, conditions, gains, options.workers
 
-    def run() -> None:
-        done = compare_laws(
-            options.scenes, laws, options.out, conditions, gains, options.workers, progress=not options.quiet
-        )
+    def lines(done: Any) -> Iterator[str]:
         for law, s in done.numbers["laws"].items():
-            say(options, f"{law}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation")
-        print(write_comparison_page(options.out, options.replays))
+            yield f"{law}: {s['reached']} of {s['scenes']} scenes reached, {s['violations']} with a violation"
 
-    return resumable(run, options.out)
+    return fly(options, lambda: compare_laws(*given, progress=not options.quiet), lines, write_comparison_page)
 
 
 def _ablate(options: argparse.Namespace) -> int:
@@ -160,20 +172,13 @@ def _ablate(options: argparse.Namespace) -> int:
 
     refuse_flags(options, ["arbiter"], "no --ablate with it")
     names = list(VARIANTS) if options.variants is None else [name.strip() for name in options.variants.split(",")]
-    conditions = _conditions(options)
+    given = options.scenes, options.out, names, _conditions(options), options.set, options.workers
 
-    def run() -> None:
-        done = ablate(options.scenes, options.out, names, conditions, options.set, options.workers, not options.quiet)
+    def lines(done: Any) -> Iterator[str]:
         for name, result in done.numbers["variants"].items():
             violated = result["weighted_violation"]["other"]
             weighted = "" if violated is None else f", weighted violation {violated:.4g} m s on average"
             completed = f"{result['completed']['rows']} of {result['scenes']} scenes completed"
-            say(options, f"{name} ({result['description']}): {completed}{weighted}")
-        print(write_ablation_page(options.out, options.replays))
+            yield f"{name} ({result['description']}): {completed}{weighted}"
 
-    return resumable(run, options.out)
-
-
-def resumable(run: Callable[[], None], out: Path) -> int:
-    """Run a campaign; after Ctrl-C or a kill, print that finished rows are kept."""
-    return say_if_interrupted(run, f"what is flown is kept in {out}, and the same command goes on")
+    return fly(options, lambda: ablate(*given, not options.quiet), lines, write_ablation_page)

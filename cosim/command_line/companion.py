@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+from dataclasses import fields
 from typing import Any
 
 from cosim.command_line.flags import add_changes, add_remote, add_run_folder, add_verb, flag, number, whole
@@ -34,53 +35,26 @@ def add_verbs(verbs: Any) -> None:
         verb, "--steer-by", "sticks: surge, sway, heave and yaw while the autopilot keeps level; wrench: all six axes "
         "in manual mode; velocity: set-points; attitude: set-points, with forces", default="sticks", choices=_STEER_BY,
     )  # fmt: skip
-    flag(
-        verb, "--sticks-by", "message that carries sticks; the pilot gain does not scale rc-override",
-        default="manual-control", choices=_STICKS_BY,
-    )  # fmt: skip
+    flag(verb, "--sticks-by", "message that carries sticks", default="manual-control", choices=_STICKS_BY)
     where = verb.add_mutually_exclusive_group()
-    flag(
-        where, "--scene-origin LAT,LON",
-        "latitude and longitude of the scene's origin, in degrees with seven decimals: the fourth is 11 m", origin,
-    )  # fmt: skip
+    flag(where, "--scene-origin LAT,LON", "coordinates of the scene's origin: seven decimals are 1 cm", origin)
     flag(where, "--surveyed-origin N,E,D", "position of the autopilot's local origin in the scene [m]", _position)
-    flag(
-        verb, "--surface-pressure HPA", "pressure of the air, from which depth is measured", number(500.0, 1200.0),
-        1013.25,
-    )  # fmt: skip
+    flag(verb, "--surface-pressure HPA", "pressure of the air at the surface", number(500.0, 1200.0), 1013.25)
     flag(verb, "--water-density KG/M3", "sea: 1025", number(900.0, 1200.0), 1000.0)
     arming = verb.add_mutually_exclusive_group()
     flag(arming, "--dry-run", "compute and record, and send neither sticks nor commands")
     flag(arming, "--await-arm", "wait for somebody to arm the vehicle (the default)")
     flag(arming, "--arm", "arm the vehicle")
-    flag(
-        verb, "--pilot-gain N", "part of the greatest wrench that full sticks give: ArduSub's JS_GAIN_DEFAULT",
-        number(0.05, 1.0), 0.5,
-    )  # fmt: skip
+    flag(verb, "--pilot-gain N", "fraction of the wrench at full sticks: JS_GAIN_DEFAULT", number(0.05, 1.0), 0.5)
     lag = number(0.01, 10.0)
     flag(verb, "--velocity-lag S", "time constant of the autopilot's horizontal velocity loop", lag, 2.0)
     flag(verb, "--vertical-lag S", "time constant of the autopilot's vertical velocity loop", lag, 0.5)
-    flag(
-        verb, "--reckoning-error PART",
-        "position error while the autopilot has no fix, as a part of the distance covered", number(0.0, 1.0), 0.03,
-    )  # fmt: skip
-    flag(
-        verb, "--level-dive M", "depth by which an ArduSub dives after arming, to align its heading; 0 for none",
-        number(0.0, 10.0), 0.6,
-    )  # fmt: skip
-    flag(
-        verb, "--least-battery PERCENT", "charge below which the vehicle holds its position; 0 for never",
-        number(0.0, 100.0), 0.0,
-    )  # fmt: skip
-    flag(
-        verb, "--system-id N", "system id of the companion; an ArduSub takes sticks from its SYSID_MYGCS alone",
-        whole(1, 255), 255,
-    )  # fmt: skip
+    flag(verb, "--reckoning-error N", "position error per distance, without a fix", number(0.0, 1.0), 0.03)
+    flag(verb, "--level-dive M", "an ArduSub's dive after arming, to align its heading", number(0.0, 10.0), 0.6)
+    flag(verb, "--least-battery PERCENT", "charge below which the vehicle holds still", number(0.0, 100.0), 0.0)
+    flag(verb, "--system-id N", "system id: an ArduSub takes sticks from its SYSID_MYGCS alone", whole(1, 255), 255)
     flag(verb, "--timeout S", "end if steering cannot begin in so many seconds", number(0.1, 1e6))
-    flag(
-        verb, "--speedup N", "speed of a simulated autopilot: its seconds per second of the wall clock",
-        number(0.01, 100.0), 1.0,
-    )  # fmt: skip
+    flag(verb, "--speedup N", "seconds of a simulated autopilot per second", number(0.01, 100.0), 1.0)
     add_remote(verb)
     add_live_flag(verb, "show the flight in browsers while it goes on")
     add_run_folder(verb)
@@ -101,11 +75,8 @@ def companion(options: argparse.Namespace) -> int:
     if endpoint.kind == "tlog":
         raise TelemetryError(f"endpoint {options.endpoint!r}: expected a network or a serial device, not a file")
     scene = SceneOrigin(options.scene_origin, options.surveyed_origin, options.surface_pressure, options.water_density)
-    chosen = CompanionOptions(
-        options.profile, options.steer_by, options.sticks_by, scene, options.dry_run, options.arm, options.pilot_gain,
-        options.velocity_lag, options.vertical_lag, options.reckoning_error, options.level_dive, options.least_battery,
-        options.timeout,
-    )  # fmt: skip
+    names = {field.name for field in fields(CompanionOptions)} - {"origin"}
+    chosen = CompanionOptions(origin=scene, **{name: getattr(options, name) for name in names})
     scenario = load_scenario(options.scenario, options.set)
     key = load_key(options.signing_key) if options.signing_key else None
     with contextlib.ExitStack() as stack:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.flags import add_changes, add_verb, flag, number, refuse_flags, whole
+from cosim.command_line.flags import LIST, add_changes, add_verb, flag, number, refuse_flags, whole
 from cosim.command_line.process import say_if_interrupted
 
 
@@ -29,15 +29,9 @@ def add_verbs(verbs: Any) -> None:
     thinned = verb.add_mutually_exclusive_group()
     flag(thinned, "--every N", "export every N-th step (default: all)", whole(1, 10**9))
     flag(thinned, "--rate HZ", "steps per simulated second", number(1e-9, 1e9))
-    flag(
-        verb, "--signals GLOB", "names or patterns such as 'position.*' '*.clearance' (default: all); the time is "
-        "always included", nargs="+", action="extend", default=[],
-    )  # fmt: skip
+    flag(verb, "--signals GLOB", "such as 'position.*' (default: all); the time is always included", **LIST)
     flag(verb, "--fmi", "with ssp: FMI version (default: 2, which most SSP masters support)", int, choices=(2, 3))
-    flag(
-        verb, "--platforms NAMES", "with ssp: native for this machine (default); by the ziglang package: all, or such "
-        "as x86_64-linux,x86_64-windows",
-    )  # fmt: skip
+    flag(verb, "--platforms NAMES", "with ssp: native (default), all, or such as x86_64-linux,x86_64-windows")
     add_changes(verb, "a key of the scenario, with ssp")
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from cosim.command_line.campaigns import add_campaign_folder, add_workers, resumable
-from cosim.command_line.flags import add_changes, add_verb, flag, refuse_flags
-from cosim.command_line.process import say
+from cosim.command_line.campaigns import add_campaign_folder, add_workers, fly, refuse_both
+from cosim.command_line.flags import LIST, add_changes, add_verb, flag, refuse_flags
 from cosim.errors import RunError
 
 
@@ -26,19 +25,15 @@ def add_verbs(verbs: Any) -> None:
         help="plain, hard, conflict or tour, as cosim scenes makes them; or a shipped name or TOML file, before --vary",
     )  # fmt: skip
     flag(verb, "--law NAME", "law such as pd; instead of a scenario's own")
+    flag(verb, "--vary KEY=LOW:HIGH[:log]", "a key of the scenario and the range to search; or KEY=A,B,C", **LIST)
     flag(
-        verb, "--vary KEY=LOW:HIGH[:log]", "a key of the scenario and the range to search; or KEY=A,B,C",
-        nargs="+", action="extend", default=[],
-    )  # fmt: skip
-    flag(
-        verb, "--objective clearance|violation|arrival", "the least clearance, the greatest violation weighted by "
-        "priority, or the latest arrival", default="clearance",
-    )  # fmt: skip
+        verb,
+        "--objective clearance|violation|arrival",
+        "clearance, weighted violation, or time",
+        default="clearance",
+    )
     flag(verb, "--budget N", "number of flights", int, 2000)
-    flag(
-        verb, "--rare-event",
-        "estimate the probability of a violation with an interval, instead of searching for the worst flight",
-    )  # fmt: skip
+    flag(verb, "--rare-event", "estimate the probability of a violation, instead of searching for the worst flight")
     flag(verb, "--seed S", "seed of the search", int, 0)
     add_campaign_folder(verb)
     add_workers(verb)
@@ -50,16 +45,12 @@ def falsify(options: argparse.Namespace) -> int:
     from cosim.campaigns.falsification.falsification import run_falsification
     from cosim.campaigns.pages.falsification_page import falsification_lines, write_falsification_page
 
-    work = _search(options)
+    search = _search(options)
 
-    def run() -> None:
-        done = run_falsification(work, options.out, options.workers, progress=not options.quiet)
-        if not done.flown:
-            say(options, f"{options.out}: was complete already")
-        say(options, *falsification_lines(done.summary))
-        print(write_falsification_page(options.out, options.replays))
+    def work() -> Any:
+        return run_falsification(search, options.out, options.workers, progress=not options.quiet)
 
-    return resumable(run, options.out)
+    return fly(options, work, lambda done: falsification_lines(done.summary), write_falsification_page)
 
 
 def _search(options: argparse.Namespace) -> Any:
@@ -70,7 +61,6 @@ def _search(options: argparse.Namespace) -> Any:
     from cosim.campaigns.scenes.work import SceneTask
     from cosim.campaigns.sweeps.design import vary_from
     from cosim.scenario.scenario import load_scenario
-    from cosim.scenario.toml_file import split_change
 
     what, settings = options.what, SearchSettings(options.objective, options.budget, options.seed, options.rare_event)
     if what in FAMILIES:
@@ -81,8 +71,6 @@ def _search(options: argparse.Namespace) -> Any:
     if what.endswith(".jsonl"):
         raise RunError(f"{what}: is a file of scenes, expected a family ({', '.join(FAMILIES)}) or a scenario")
     vary = vary_from(options.vary)
-    both = {key.key for key in vary} & {split_change(text)[0] for text in options.set}
-    if both:
-        raise RunError(f"{min(both)} is set and varies, expected either")
+    refuse_both(vary, options.set)
     law = [f"law.name={options.law}"] if options.law else []
     return ScenarioSearch(load_scenario(what, [*law, *options.set]), vary, settings)

@@ -12,6 +12,9 @@ from cosim.errors import RunError
 
 _SHOWN = 40  # greatest number of characters of a refused text in the message
 
+# of a flag that takes several values and may be repeated
+LIST: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+
 Container = argparse._ActionsContainer  # a parser, or a group of its flags
 
 

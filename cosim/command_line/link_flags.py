@@ -16,7 +16,6 @@ if TYPE_CHECKING:
     from cosim.live.live_view import LiveView
     from cosim.mavlink.wire.endpoint import Endpoint
 
-_MAX_TIMEOUT = 3600.0  # s
 _SYSTEM = whole(1, 255)
 
 
@@ -31,23 +30,19 @@ def add_link_flags(verb: argparse.ArgumentParser, commands: bool = False, requir
     add_remote(verb)
     flag(verb, "--allow-system ID[,ID]", "accept these system ids alone (default: all)", _systems)
     flag(verb, "--system-id N", "system id of the vehicle", _SYSTEM, usual.system_id)
-    flag(
-        verb, "--origin LAT,LON", "latitude and longitude of position 0, in degrees with seven decimals (default: "
-        "{:.7f},{:.7f})".format(*usual.origin), origin,
-    )  # fmt: skip
+    flag(verb, "--origin LAT,LON", "coordinates of position 0 (default: {:.7f},{:.7f})".format(*usual.origin), origin)
     verb.set_defaults(commands=False, await_arm=False, link_loss=None, link_timeout=None)
     if not commands:
         return
     flag(verb, "--commands", "accept commands; without it, the link only sends telemetry")
     flag(verb, "--await-arm", "nothing moves before the vehicle is armed")
+    flag(verb, "--link-loss", f"action on link loss (default: {usual.loss_action})", choices=LOSS_ACTIONS)
     flag(
-        verb, "--link-loss", "action when the ground station that commands falls silent (default: "
-        f"{usual.loss_action})", choices=LOSS_ACTIONS,
-    )  # fmt: skip
-    flag(
-        verb, "--link-timeout S", "seconds of the wall clock that count as silence (default: "
-        f"{usual.loss_timeout:g})", number(0.1, _MAX_TIMEOUT),
-    )  # fmt: skip
+        verb,
+        "--link-timeout S",
+        f"silence that counts as link loss (default: {usual.loss_timeout:g})",
+        number(0.1, 3600.0),
+    )
 
 
 def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOptions]:

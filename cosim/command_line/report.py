@@ -19,20 +19,11 @@ def add_verbs(verbs: Any) -> None:
         ("report runs/docking", "report runs/docking --format png", "report runs/a runs/b --replay --out both.html"),
     )  # fmt: skip
     verb.add_argument("folders", type=Path, nargs="+", metavar="RUN", help="a run folder, also of a killed run")
-    flag(
-        verb, "--format html|png", "html: a page with its figures, and the replay (default), which browsers print; "
-        "png: the figures as pictures; both with a comma between them", _formats, action="extend", default=[],
-    )  # fmt: skip
+    flag(verb, "--format html|png", "pages with replay (default), or pictures", _formats, [], action="extend")
     flag(verb, "--replay", "write the replay alone: a page that plays one or several runs")
-    flag(
-        verb, "--out FILE", "with --replay: file to write (default: replay.html, in the folder of a single run, or "
-        "here for several)", Path,
-    )  # fmt: skip
+    flag(verb, "--out FILE", "with --replay: file to write (default: replay.html, in the folder of a single run)", Path)
     flag(verb, "--title TEXT", "with --replay: title of the page (default: the scenario's)")
-    flag(
-        verb, "--interactive", "with --replay: let the page simulate its run again, with another goal, regions, "
-        "current, noise or gains",
-    )  # fmt: skip
+    flag(verb, "--interactive", "with --replay: let the page fly its run again with other numbers")
 
 
 def _formats(text: str) -> list[str]:

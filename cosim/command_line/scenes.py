@@ -19,10 +19,7 @@ def add_verbs(verbs: Any) -> None:
         ("scenes --count 200 --seed 0 --out scenes.jsonl", "scenes --kind hard --count 3"),
     )  # fmt: skip
     flag(verb, "--count N", "scenes", whole(1, _MAX_COUNT), 100)
-    flag(
-        verb, "--seed S", "seed of the first scene, which the next ones count up; the same seed gives the same scene",
-        whole(0, 2**63 - 1 - _MAX_COUNT), 0,
-    )  # fmt: skip
+    flag(verb, "--seed S", "seed of the first scene, which the next ones count up", whole(0, 2**63 - 1 - _MAX_COUNT), 0)
     flag(
         verb, "--kind", "hard: more obstacles, drift, a stronger current, noise, a thruster that fails; conflict: "
         "regions that exclude each other, on three vehicles; tour: the same with goals in turn; trial: scenes that "

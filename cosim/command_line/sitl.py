@@ -25,28 +25,16 @@ def add_verbs(verbs: Any) -> None:
     flag(verb, "--vehicle NAME", "a shipped vehicle, or a TOML file (default: the scenario's)")
     flag(verb, "--scenario NAME", "a shipped name, or a TOML file", default="sitl")
     add_changes(verb)
-    flag(
-        verb, "--backend", "ardupilot: its JSON backend, by UDP; px4: its simulator interface, by TCP",
-        default="ardupilot", choices=tuple(_PORTS),
-    )  # fmt: skip
+    flag(verb, "--backend", "ardupilot: JSON by UDP; px4: HIL by TCP", default="ardupilot", choices=tuple(_PORTS))
     ports = "default: {ardupilot}, with px4 {px4}".format(**_PORTS)
     flag(verb, "--port N", ports, whole(1, 65535))
     flag(verb, "--host ADDRESS", "bound address", default="127.0.0.1")
     flag(verb, "--allow-remote", "let the address be seen from other machines")
     flag(verb, "--timeout S", "end after so many seconds without a frame (default: never)", number(1e-3, 1e6))
-    flag(
-        verb, "--speedup N", "greatest number of simulated seconds per second, px4 alone; ArduPilot has its own "
-        "(default: 1)", number(0.01, 100.0),
-    )  # fmt: skip
+    flag(verb, "--speedup N", "with px4: most simulated seconds per second (default: 1)", number(0.01, 100.0))
     flag(verb, "--record-rate HZ", "greatest number of recorded rows per simulated second", number(1e-3, 1e6), 100.0)
-    flag(
-        verb, "--autopilot ENDPOINT",
-        "a port of the autopilot, such as tcp:127.0.0.1:5762: record its own estimate (ardupilot alone)",
-    )  # fmt: skip
-    flag(
-        verb, "--dvl HZ", "rate at which the autopilot gets the velocity over ground, as VISION_POSITION_DELTA, in "
-        "simulated time", number(0.1, 100.0),
-    )  # fmt: skip
+    flag(verb, "--autopilot ENDPOINT", "with ardupilot: its port, such as tcp:127.0.0.1:5762; records its estimate")
+    flag(verb, "--dvl HZ", "rate of VISION_POSITION_DELTA to the autopilot, in simulated time", number(0.1, 100.0))
     flag(verb, "--dvl-latency S", "their latency", number(0.0, 10.0), 0.1)
     flag(verb, "--dvl-dropout PART", "part of these messages that is lost", number(0.0, 1.0), 0.0)
     add_run_folder(verb)

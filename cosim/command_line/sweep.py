@@ -6,10 +6,9 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.campaigns import add_campaign_folder, add_cluster, executor_of, require_one_count, resumable
+from cosim.command_line.campaigns import add_campaign_folder, add_cluster, executor_of, fly, refuse_both
 from cosim.command_line.flags import add_changes, add_verb, flag
 from cosim.command_line.process import INTERRUPTED, print_run, print_status, say
-from cosim.errors import RunError
 
 
 def add_verbs(verbs: Any) -> None:
@@ -24,14 +23,8 @@ def add_verbs(verbs: Any) -> None:
         "scenario", help="a shipped name (cosim show lists them), or a TOML file; it stands before --vary"
     )
     varied = verb.add_mutually_exclusive_group(required=True)
-    flag(
-        varied, "--vary KEY=LOW:HIGH[:N][:log]", "a key of the scenario and its range, with the number of points on a "
-        "grid; or KEY=A,B,C", nargs="+", action="extend",
-    )  # fmt: skip
-    flag(
-        varied, "--vehicles FILE.jsonl", "vehicles that cosim identify has drawn: each is the plant of a row, and the "
-        "law knows the scenario's own", Path,
-    )  # fmt: skip
+    flag(varied, "--vary KEY=LOW:HIGH[:N][:log]", "a key and its range, or KEY=A,B,C", nargs="+", action="extend")
+    flag(varied, "--vehicles FILE.jsonl", "vehicles that cosim identify has drawn: each is the plant of a row", Path)
     flag(verb, "--samples N", "number of rows, unless the design is a grid", int)
     flag(verb, "--design grid|random|sobol|lhs|paired", "how rows are spread (default: random; of --vehicles: paired)")
     flag(verb, "--seed S", "seed of the design and the rows", int, 0)
@@ -54,27 +47,19 @@ def sweep(options: argparse.Namespace) -> int:
     from cosim.campaigns.sweep import run_sweep
     from cosim.campaigns.sweeps.design import Design, vary_from, vary_vehicles
     from cosim.scenario.scenario import load_scenario
-    from cosim.scenario.toml_file import split_change
 
-    require_one_count(options)
     vary = vary_vehicles(options.vehicles) if options.vehicles else vary_from(options.vary)
     kind: Any = options.design or ("paired" if options.vehicles else "random")
     design = Design(vary, kind, options.samples, options.seed)
-    both = {vary.key for vary in design.vary} & {split_change(text)[0] for text in options.set}
-    if both:
-        raise RunError(f"{min(both)} is set and varies, expected either")
+    refuse_both(design.vary, options.set)
     scenario = load_scenario(options.scenario, options.set)
 
-    def run() -> None:
+    def work() -> Any:
         with executor_of(options) as executor:
             n = options.workers or 1
-            done = run_sweep(scenario, design, options.out, workers=n, executor=executor, progress=not options.quiet)
-        if not done.flown:
-            say(options, f"{options.out}: was complete already")
-        say(options, *sweep_lines(done.summary))
-        print(write_sweep_page(options.out, options.replays))
+            return run_sweep(scenario, design, options.out, workers=n, executor=executor, progress=not options.quiet)
 
-    return resumable(run, options.out)
+    return fly(options, work, lambda done: sweep_lines(done.summary), write_sweep_page)
 
 
 def rerun(options: argparse.Namespace) -> int:

@@ -13,7 +13,7 @@ from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error_parts, rotation_rows
 from cosim.precheck.finding import Finding, status
 from cosim.precheck.region_values import evaluate_regions
-from cosim.precheck.thrust_margin import Margin, ThrustMargin, greatest_force, least_left, thrust_margin
+from cosim.precheck.thrust_margin import Margin, ThrustMargin, greatest_force, held_wrench, least_margin, thrust_margin
 from cosim.results.wording import format_force
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
@@ -70,7 +70,8 @@ def _mend_current(scenario: Scenario) -> str:
     quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
 
     def reach(part: float) -> float:
-        left = least_left(vehicle, phi, quaternion, part * current)
+        hold = held_wrench(vehicle, phi, quaternion, part * current)
+        left = least_margin(vehicle, quaternion, hold, np.ones(vehicle.n_thrusters, dtype=bool))
         return left.force - _ROUNDING if left else -1.0
 
     if reach(0.0) <= 0.0:

@@ -11,7 +11,7 @@ from scipy.optimize import linprog
 
 from controller.quaternion import rotation_matrix
 from controller.restoring import regressor
-from controller.theory import Model, coriolis, damping
+from controller.theory import coriolis, damping
 from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
@@ -56,52 +56,32 @@ def greatest_force(vehicle: Vehicle, direction_body: Array, hold: Array, alive: 
     return float(-done.fun) if done.success else None
 
 
-def held_wrench(model: Model, quaternion: Array, current: Array) -> Array:
+def held_wrench(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> Array:
     """Return the wrench that keeps a vehicle at rest in a current, (6,) [N, N m], body frame: (11) with nu = 0."""
-    # with current [m/s]
+    # with phi [N, N m], current [m/s]
     relative = np.zeros(6)
     relative[:3] = -rotation_matrix(quaternion).T @ current
-    drag = damping(model.linear_damping, model.quadratic_damping, relative) * relative
-    wrench: Array = coriolis(model.mass, relative) @ relative + drag + regressor(quaternion) @ model.phi
+    drag = damping(np.array(vehicle.linear_damping), np.array(vehicle.quadratic_damping), relative) * relative
+    wrench: Array = coriolis(np.array(vehicle.added_mass), relative) @ relative + drag + regressor(quaternion) @ phi
     return wrench
 
 
 def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> ThrustMargin:
-    """Return the forces that the thrusters can give, and those left while the vehicle is kept still; phi [N, N m]."""
-    # with current [m/s]
-    hold = held_wrench(_added(vehicle, phi), quaternion, current)
-    weightless = held_wrench(_added(vehicle, np.zeros(4)), quaternion, current)
-    all_alive = np.ones(vehicle.n_thrusters, dtype=bool)
-    thrust = _least(vehicle, quaternion, np.zeros(6), all_alive)
-    without = []
-    for lost in range(vehicle.n_thrusters):
-        alive = all_alive.copy()
-        alive[lost] = False
-        without.append(_least(vehicle, quaternion, hold, alive))
+    """Return the forces that the thrusters can give, and those left while the vehicle is kept still."""
+    # with phi [N, N m], current [m/s]
+    hold = held_wrench(vehicle, phi, quaternion, current)
+    every = np.ones(vehicle.n_thrusters, dtype=bool)
     return ThrustMargin(
         hold=tuple(hold.tolist()),
-        drag=float(np.linalg.norm(weightless[:3])),
+        drag=float(np.linalg.norm(held_wrench(vehicle, np.zeros(4), quaternion, current)[:3])),
         excess_weight=float(phi[0]),
-        thrust=thrust,
-        left=least_left(vehicle, phi, quaternion, current),
-        left_without=tuple(without),
+        thrust=least_margin(vehicle, quaternion, np.zeros(6), every),
+        left=least_margin(vehicle, quaternion, hold, every),
+        left_without=tuple(least_margin(vehicle, quaternion, hold, alive) for alive in ~np.diag(every)),
     )
 
 
-def least_left(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> Margin | None:
-    """Return `ThrustMargin.left` alone. Arguments as `thrust_margin`."""
-    hold = held_wrench(_added(vehicle, phi), quaternion, current)
-    return _least(vehicle, quaternion, hold, np.ones(vehicle.n_thrusters, dtype=bool))
-
-
-def _added(vehicle: Vehicle, phi: Array) -> Model:
-    """Return the model for `held_wrench`: added mass, damping, and phi."""
-    return Model(
-        np.array(vehicle.added_mass), np.array(vehicle.linear_damping), np.array(vehicle.quadratic_damping), phi
-    )
-
-
-def _least(vehicle: Vehicle, quaternion: Array, hold: Array, alive: Array) -> Margin | None:
+def least_margin(vehicle: Vehicle, quaternion: Array, hold: Array, alive: Array) -> Margin | None:
     """Return the direction and force of the least margin, None if `hold` is not feasible."""
     to_body = rotation_matrix(quaternion).T
     worst: Margin | None = None
