@@ -48,15 +48,15 @@ def until(found):
     return value
 
 
-def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
-    running = live("harbour", "time.duration=600", commands=True, rate=1.0)  # waits for the button
+def open_page(browser, running, condition="subreach.runs[0]?.rows > 0 && !!subreach.scene"):
     until(lambda: running.view._run >= 0)
     browser.get(running.url)
-    until(
-        lambda: browser.execute_script(
-            "return window.subreach?.ready && subreach.runs[0]?.rows > 0 && !!subreach.scene"
-        )
-    )
+    until(lambda: browser.execute_script(f"return window.subreach?.ready && {condition}"))
+
+
+def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
+    running = live("harbour", "time.duration=600", commands=True, rate=1.0)  # waits for the button
+    open_page(browser, running)
     where = "return subreach.scene.drawn.runs[0].position"
     first = until(lambda: browser.execute_script(where))
     assert browser.execute_script("return subreach.scene.drawn.runs[0].current") == [0.05, -0.1, 0]
@@ -108,13 +108,7 @@ def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
 
 def test_keep_in_region_is_dragged_by_its_label(browser, live):
     running = live("harbour", "time.duration=12", "regions.ship.keep=in", commands=True, rate=1.0)
-    until(lambda: running.view._run >= 0)
-    browser.get(running.url)
-    until(
-        lambda: browser.execute_script(
-            "return window.subreach?.ready && subreach.runs[0]?.rows > 0 && !!subreach.scene"
-        )
-    )
+    open_page(browser, running)
     name = "return subreach.scene.labels.placed.find((box) => box.of?.region === 1)"
     box = until(lambda: browser.execute_script(name))
     canvas = browser.find_element("id", "scene")
@@ -130,9 +124,7 @@ def test_keep_in_region_is_dragged_by_its_label(browser, live):
 
 def test_page_lists_regions_and_moving_regions(browser, live):
     running = live("moving-obstacle", "time.duration=4", commands=True, await_arm=False, rate=1.0)
-    until(lambda: running.view._run >= 0)
-    browser.get(running.url)
-    until(lambda: browser.execute_script("return window.subreach?.ready && subreach.runs[0]?.rows > 20"))
+    open_page(browser, running, "subreach.runs[0]?.rows > 20")
     names = "return subreach.runs[0].header.regions.map(({ name, comes }) => [name, comes])"
     regions = browser.execute_script(names)
     assert sum(comes for _, comes in regions) > 0
@@ -150,9 +142,7 @@ def test_page_lists_regions_and_moving_regions(browser, live):
 
 def test_scrolled_command_panel_does_not_cover_its_heading(browser, live):
     running = live("harbour", commands=True, await_arm=False)
-    until(lambda: running.view._run >= 0)
-    browser.get(running.url)
-    until(lambda: browser.execute_script("return Boolean(window.subreach?.runs[0]?.header.verdict)"))
+    open_page(browser, running, "Boolean(subreach.runs[0]?.header.verdict)")
     box = browser.execute_script("return document.querySelector('#commands summary').getBoundingClientRect().toJSON()")
     inside = [box["left"] + 9, box["top"] + 2, box["right"] - 20, box["bottom"] - 2]
 

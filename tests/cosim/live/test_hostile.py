@@ -36,6 +36,12 @@ def refused(url, status, **headers):
     assert caught.value.code == status
 
 
+def fly(running):
+    with running.viewer() as viewer:
+        viewer.command(**ARM)
+        viewer.until("end")
+
+
 def closed_with(client):
     try:
         while True:
@@ -58,9 +64,7 @@ def test_only_the_page_is_served_and_only_to_own_origin(live):
         with pytest.raises(InvalidStatus) as caught:
             connect(running.url.replace("http", "ws") + "ws", additional_headers=headers)
         assert caught.value.response.status_code == 403
-    with running.viewer() as viewer:
-        viewer.command(**ARM)
-        viewer.until("end")
+    fly(running)
 
 
 @pytest.mark.medium
@@ -69,12 +73,8 @@ def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
     host, port = running.url.removeprefix("http://").strip("/").split(":")
     place = (host, int(port))
     url = running.url.replace("http", "ws") + "ws"
-    for garbage in (
-        b"\x00\xff" * 5000,
-        b"GET / HTTP/1.1\r\n\r\n",
-        b"POST /ws HTTP/1.1\r\nHost: a\r\n\r\n",
-        b"\r\n" * 999,
-    ):
+    requests = b"GET / HTTP/1.1\r\n\r\n", b"POST /ws HTTP/1.1\r\nHost: a\r\n\r\n"
+    for garbage in (b"\x00\xff" * 5000, *requests, b"\r\n" * 999):
         with socket.create_connection(place, timeout=WAIT) as foreign, contextlib.suppress(OSError):
             foreign.sendall(garbage)
             foreign.recv(100)
@@ -87,21 +87,11 @@ def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
         assert closed_with(client) == 1002
     with running.viewer() as viewer:
         viewer.until("header")
-        for bad in (
-            b"\x00" * 100,
-            "",
-            "null",
-            "[]",
-            "{",
-            '{"command":1}',
-            '"arm"',
-            "[" * 5000,
-            '{"command":"arm","armed":1e999}',
-            '{"a":' * 3000,  # D4: deeper than a parser goes
-            '{"command":"change_setting","key":"goal.centre.' + "9" * 5000 + '","value":1}',
-        ):
+        deep = "[" * 5000, '{"a":' * 3000  # deeper than a parser goes
+        number = '{"command":"change_setting","key":"goal.centre.' + "9" * 5000 + '","value":1}'
+        brief = "", "null", "[]", "{", '{"command":1}', '"arm"', '{"command":"arm","armed":1e999}'
+        for bad in (b"\x00" * 100, *brief, *deep, number):
             viewer.socket.send(bad)
-        for _ in range(11):
             viewer.until("said")
         assert len(viewer.texts_of("refused")) == 11
         assert all(said.isprintable() and len(said) < 300 for said in viewer.texts_of("refused"))
@@ -110,9 +100,7 @@ def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
         assert closed_with(client) == 1007
     with connect(url) as left:  # who goes without a word
         left.socket.shutdown(socket.SHUT_RDWR)
-    with running.viewer() as viewer:
-        viewer.command(**ARM)
-        viewer.until("end")
+    fly(running)
     assert "Traceback" not in caplog.text
     done = running.end()
     assert done.summary["commands"] == 1
@@ -131,9 +119,7 @@ def test_flooding_viewer_is_throttled_and_disconnected(live):
             for _ in range(5000):
                 flood.send('{"command":"set_mode","mode":"reach"}')
         assert closed_with(flood) == 1008
-    with running.viewer() as viewer:
-        viewer.command(**ARM)
-        viewer.until("end")
+    fly(running)
     assert running.end().summary["commands"] < 500
 
 
@@ -165,9 +151,7 @@ def test_excess_connections_are_closed_to_preserve_file_descriptors(live):
             early.setblocking(False)
             with pytest.raises(BlockingIOError):
                 early.recv(1)
-    with running.viewer() as viewer:
-        viewer.command(**ARM)
-        viewer.until("end")
+    fly(running)
     assert running.end().summary["status"] == "completed"
 
 

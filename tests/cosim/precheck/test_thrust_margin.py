@@ -12,8 +12,6 @@ from plant_fmu import load_vehicle
 
 ODIN = load_vehicle("odin")
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
-ALL = np.ones(8, dtype=bool)
-NOTHING = np.zeros(6)
 STILL = np.zeros(3)
 
 
@@ -24,24 +22,21 @@ def test_directions_are_26_unit_vectors_with_names_of_their_own():
 
 
 @pytest.mark.parametrize(
-    ("direction", "expected"),
-    # four horizontal thrusters at 45 degrees, four vertical ones, of 27 N each
-    [("north", 4 * 27.0 / math.sqrt(2.0)), ("south-west", 54.0), ("down", 108.0), ("up", 108.0)],
+    ("direction", "load", "lost", "expected"),
+    [  # four horizontal thrusters at 45 degrees, four vertical ones, of 27 N each
+        ("north", 0.0, [], 4 * 27.0 / math.sqrt(2.0)),
+        ("south-west", 0.0, [], 54.0),
+        ("down", 0.0, [], 108.0),
+        ("up", 0.0, [], 108.0),
+        ("down", 0.0, [4], 54.0),  # a lost vertical thruster leaves half of the vertical force
+        ("down", 100.0, [], 8.0),
+        ("down", 108.1, [], None),
+    ],
 )
-def test_greatest_force_matches_the_thruster_geometry(direction, expected):
-    assert greatest_force(ODIN, np.array(DIRECTIONS[direction]), NOTHING, ALL) == pytest.approx(expected)
-
-
-def test_losing_a_vertical_thruster_halves_the_vertical_force():
-    alive = ALL.copy()
-    alive[4] = False
-    assert greatest_force(ODIN, np.array(DIRECTIONS["down"]), NOTHING, alive) == pytest.approx(54.0)
-
-
-def test_unsustainable_load_gives_none():
-    assert greatest_force(ODIN, np.array(DIRECTIONS["down"]), np.r_[0.0, 0.0, 108.1, 0.0, 0.0, 0.0], ALL) is None
-    left = greatest_force(ODIN, np.array(DIRECTIONS["down"]), np.r_[0.0, 0.0, 100.0, 0.0, 0.0, 0.0], ALL)
-    assert left == pytest.approx(8.0)
+def test_greatest_force_matches_the_thruster_geometry(direction, load, lost, expected):
+    alive = ~np.isin(np.arange(8), lost)
+    force = greatest_force(ODIN, np.array(DIRECTIONS[direction]), np.array([0.0, 0.0, load, 0.0, 0.0, 0.0]), alive)
+    assert force == (None if expected is None else pytest.approx(expected))
 
 
 def margin(current, weight=ODIN.weight, quaternion=LEVEL, vehicle=ODIN):

@@ -1,6 +1,8 @@
 """Run folders: complete and readable, even after an interruption."""
 
 import json
+import shutil
+from importlib import resources
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -86,27 +88,6 @@ def test_spans_of_a_boolean_signal_are_found():
     assert spans(np.zeros(6, bool), time) == []
 
 
-def test_a_folder_in_use_is_refused(tmp_path):
-    (tmp_path / "precious").write_text("x")
-    with pytest.raises(RunError, match="not empty"):
-        run_scenario(load_scenario("paper", SHORT), tmp_path)
-    assert [p.name for p in tmp_path.iterdir()] == ["precious"]
-
-
-def test_unwritable_folder_is_rejected(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(RunError, match="file"):
-        run_scenario(load_scenario("paper", SHORT), tmp_path / "file" / "run")
-
-
-def test_scenario_rejected_by_the_fmu_leaves_no_folder(tmp_path):
-    out = tmp_path / "run"
-    for override in ("plant.parameters.mass=-5", "law.gains.k_p1=1e9"):  # before the first step, and in it
-        with pytest.raises(PlantError):
-            run_scenario(load_scenario("paper", [*SHORT, override]), out)
-        assert not out.exists()
-
-
 @pytest.mark.slow
 def test_plant_error_keeps_recorded_rows(tmp_path):
     out = tmp_path / "run"
@@ -121,26 +102,7 @@ def test_plant_error_keeps_recorded_rows(tmp_path):
 
 
 @pytest.mark.slow
-def test_ctrl_c_leaves_a_readable_run(tmp_path, monkeypatch):
-    class Interrupting(Recorder):
-        def observe(self, k, row):
-            super().observe(k, row)
-            if k == 150:
-                raise KeyboardInterrupt
-
-    monkeypatch.setattr("cosim.run.run.Recorder", Interrupting)
-    run = run_scenario(load_scenario("paper", SHORT), tmp_path / "run")
-    assert run.summary["status"] == "interrupted"
-    assert run.summary["steps"] == 150
-    assert len(load_record(run.folder)["time"]) == 151
-    assert "was interrupted at 0.150 s" in (run.folder / "report.html").read_text()
-    assert (run.folder / "report.html").exists()
-
-
-@pytest.mark.slow
 def test_a_killed_run_can_be_reported(tmp_path):
-    import shutil
-
     whole = run_scenario(load_scenario("paper", SHORT), tmp_path / "run", report=False)
     killed = tmp_path / "killed"
     (killed / "record.parts").mkdir(parents=True)
@@ -155,11 +117,6 @@ def test_a_killed_run_can_be_reported(tmp_path):
     assert not list(killed.glob(".*"))
 
 
-def test_missing_run_cannot_be_reported(tmp_path):
-    with pytest.raises(RunError, match="no run"):
-        report_again(tmp_path)
-
-
 def test_runs_that_start_together_get_folders_of_their_own(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     scenario = load_scenario("paper", SHORT)
@@ -167,38 +124,9 @@ def test_runs_that_start_together_get_folders_of_their_own(tmp_path, monkeypatch
     assert len(set(paths)) == 5
 
 
-def test_a_discarded_run_leaves_the_users_folder(tmp_path):
-    mine = tmp_path / "mine"
-    mine.mkdir()
-    with pytest.raises(PlantError):
-        run_scenario(load_scenario("paper", [*SHORT, "law.gains.k_p1=1e9"]), mine)
-    assert list(mine.iterdir()) == []
-
-
-def test_error_before_the_first_row_leaves_no_folder(tmp_path, monkeypatch):
-    def broken(self):
-        raise ZeroDivisionError
-
-    scenario = load_scenario("paper", [*SHORT, "time.arbiter=0.1"])
-    monkeypatch.setattr("cosim.simulation.master.Master._arbitrate", broken)
-    with pytest.raises(ZeroDivisionError):
-        run_scenario(scenario, tmp_path / "none")
-    assert not (tmp_path / "none").exists()
-
-
 def test_region_names_do_not_affect_saturation(tmp_path):
     scenario = load_scenario("paper", [*SHORT, "regions.SR3.name=not_saturated"])
     assert run_scenario(scenario, tmp_path / "run", report=False).summary["saturated_time"] == 0.0
-
-
-def test_interrupt_before_the_first_step_leaves_no_folder(tmp_path, monkeypatch):
-    def interrupted(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("cosim.run.run.Recorder", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        run_scenario(load_scenario("paper", SHORT), tmp_path / "run")
-    assert not (tmp_path / "run").exists()
 
 
 def test_missing_or_damaged_record_is_rejected(tmp_path):
@@ -211,8 +139,6 @@ def test_missing_or_damaged_record_is_rejected(tmp_path):
 
 @pytest.mark.slow
 def test_custom_vehicle_file_is_copied_into_the_run(tmp_path):
-    from importlib import resources
-
     text = (
         (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text().replace("mass = 125.0 ", "mass = 126.0 ")
     )
@@ -222,3 +148,40 @@ def test_custom_vehicle_file_is_copied_into_the_run(tmp_path):
     assert not (run.folder / "report.html").exists()
     (tmp_path / "boat.toml").unlink()
     assert load_scenario(run.folder / "scenario.toml").vehicle.mass == 126.0
+
+
+@pytest.mark.parametrize("override", ["plant.parameters.mass=-5", "law.gains.k_p1=1e9"])  # before the first step, in it
+@pytest.mark.parametrize("exists", [False, True])
+def test_scenario_rejected_by_the_fmu_leaves_no_folder_but_the_users(tmp_path, override, exists):
+    out = tmp_path / "run"
+    if exists:
+        out.mkdir()
+    with pytest.raises(PlantError):
+        run_scenario(load_scenario("paper", [*SHORT, override]), out)
+    assert out.exists() is exists and not list(tmp_path.rglob("*/*"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("last", [0, 150])
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
+def test_run_that_is_cut_off_keeps_its_rows(tmp_path, monkeypatch, last, error):
+    class Interrupting(Recorder):
+        def observe(self, k, row):
+            if k == last == 0:
+                raise error
+            super().observe(k, row)
+            if k == last:
+                raise error
+
+    monkeypatch.setattr("cosim.run.run.Recorder", Interrupting)
+    out, scenario = tmp_path / "run", load_scenario("paper", SHORT)
+    if last == 0 or error is ZeroDivisionError:
+        with pytest.raises(error):
+            run_scenario(scenario, out)
+    else:
+        run = run_scenario(scenario, out)
+        assert (run.summary["status"], run.summary["steps"]) == ("interrupted", 150)
+        assert "was interrupted at 0.150 s" in (out / "report.html").read_text()
+    assert out.exists() == bool(last)
+    if last:
+        assert len(load_record(out)["time"]) == 151

@@ -284,26 +284,12 @@ VERBS = {  # {run}: a run folder
     "help --completion": ["bash"],
 }  # fmt: skip
 WAITING = {"sitl", "companion"}  # verbs that say on standard error that they wait, and who came
-SLOW = {
-    "report",
-    "check",
-    "identify --excite",
-    "export --to ssp",
-    "campaign",
-    "compare",
-    "compare --ablate",
-    "falsify",
-    "identify",
-    "sweep",
-    "rerun",
-}
-NEED = {
-    "watch": "rich",
-    "falsify": "cma",
-    "mavlink listen": "pymavlink",
-    "mavlink stream": "pymavlink",
-    "companion": "pymavlink",
-}
+SLOW = {"report", "check", "identify --excite", "export --to ssp", "campaign", "compare", "compare --ablate", "falsify",
+        "identify", "sweep", "rerun"}  # fmt: skip
+NEED = {"watch": "rich", "falsify": "cma", "companion": "pymavlink"}
+NEED |= {"mavlink listen": "pymavlink", "mavlink stream": "pymavlink"}
+    ("mavlink listen", "mavlink stream", "companion"), "pymavlink"
+)
 
 
 def test_D12_every_verb_has_a_case():
