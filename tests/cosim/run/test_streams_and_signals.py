@@ -288,8 +288,6 @@ SLOW = {"report", "check", "identify --excite", "export --to ssp", "campaign", "
         "identify", "sweep", "rerun"}  # fmt: skip
 NEED = {"watch": "rich", "falsify": "cma", "companion": "pymavlink"}
 NEED |= {"mavlink listen": "pymavlink", "mavlink stream": "pymavlink"}
-    ("mavlink listen", "mavlink stream", "companion"), "pymavlink"
-)
 
 
 def test_D12_every_verb_has_a_case():
