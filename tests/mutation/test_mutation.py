@@ -96,7 +96,6 @@ def test_python_operators_match_the_syntax_tree():
     assert kinds == expected
 
 
-@pytest.mark.medium
 def test_every_controller_and_plant_source_is_in_the_plan():
     for path in [*(ROOT / "controller").rglob("*.py"), *(ROOT / "controller").rglob("*.c")]:
         name = path.relative_to(ROOT).as_posix()
@@ -106,7 +105,6 @@ def test_every_controller_and_plant_source_is_in_the_plan():
         assert part_of(path.relative_to(ROOT).as_posix())
 
 
-@pytest.mark.medium
 def test_planned_tests_exist_and_equivalent_mutants_have_reasons():
     assert all((ROOT / test).is_file() for part in parts() for test in part.tests)
     assert all(reason for reason in equivalent().values())
