@@ -19,7 +19,8 @@ from cosim.simulation.signals import Array, Column
 
 MAX_ROWS = 100_000_001  # rows of a run with the greatest number of steps that a scenario may have
 RECORD = "record.parquet"
-PARTS = "record.parts"  # folder of the parts of a run that is under way or was killed
+STREAM = "record.arrows"  # Arrow stream of the rows of a run that is under way or was killed
+PARTS = "record.parts"  # folder in which earlier versions left the rows of a killed run, as Parquet files
 _DIGITS = 9  # greatest number of digits of a format number
 _BLOCK = 10_000  # rows that are read at once
 _SMALL = 2**22  # numbers; a record of at most so many is read as a whole
@@ -84,7 +85,7 @@ class Record(Rows):
     Parameters
     ----------
     files : sequence of Path
-        Parquet files of one schema, in the order of their rows.
+        Parquet files or Arrow streams of one schema, in the order of their rows.
 
     Attributes
     ----------
@@ -114,15 +115,12 @@ class Record(Rows):
         self._files, self.file = list(files), files[0]
         columns, rows = [], 0
         for file in self._files:
-            with _opened(file) as parquet:
-                schema, metadata = parquet.schema_arrow, parquet.metadata
-                rows += metadata.num_rows
-                if metadata.num_rows != sum(metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)):
-                    raise RunError(f"{file}: cannot be read: its groups have another number of rows than the file")
-                _require_numbers(file, schema, rows)
-                if (format_number := _format_of(schema)) is not None:
+            with _opened(file) as source:
+                rows += sum(source.group_rows)
+                _require_numbers(file, source.schema, rows)
+                if (format_number := _format_of(source.schema)) is not None:
                     require_format(file, format_number)
-                columns.append(tuple(map(_column_of, schema)))
+                columns.append(tuple(map(_column_of, source.schema)))
             if columns[-1] != columns[0]:
                 raise RunError(f"{file}: has other columns than {self._files[0].name}, expected parts of one record")
         self._kept: OrderedDict[str, Array] = OrderedDict()
@@ -161,36 +159,34 @@ class Record(Rows):
     def _batches(self, columns: Sequence[Column]) -> Iterator[Rows]:
         """Yield all rows in order, from the files."""
         for file in self._files:
-            with _opened(file) as parquet:
-                yield from _batches(parquet, columns, range(parquet.num_row_groups))
+            with _opened(file) as source:
+                yield from source.read(columns, range(len(source.group_rows)))
 
     def take(self, rows: Sequence[int] | NDArray[np.intp], names: Sequence[str] | None = None) -> Rows:
         """Return a selection of `rows` (rising, from 0), of all signals or of those in `names`."""
         if self._small and self._kept:
             return super().take(rows, names)
         columns, rows = self._columns_of(names), np.asarray(rows, np.intp)
-        found: dict[str, list[Array]] = {column.name: [np.empty(0)] for column in columns}
+        pieces: dict[str, list[Array]] = {column.name: [np.empty(0)] for column in columns}
         first = 0
         for file in self._files:
-            with _opened(file) as parquet:
-                for group in range(parquet.num_row_groups):
-                    end = first + parquet.metadata.row_group(group).num_rows
-                    if np.searchsorted(rows, first) == np.searchsorted(rows, end):
-                        first = end
+            with _opened(file) as source:
+                for group, length in enumerate(source.group_rows):
+                    if np.searchsorted(rows, first) == np.searchsorted(rows, first + length):
+                        first += length
                         continue
-                    for batch in _batches(parquet, columns, [group]):
+                    for batch in source.read(columns, [group]):
                         begin, stop = np.searchsorted(rows, [first, first + len(batch)])
-                        for name, arrays in found.items():
+                        for name, arrays in pieces.items():
                             arrays.append(batch[name][rows[begin:stop] - first])
                         first += len(batch)
-        return Rows(columns, {name: np.concatenate(arrays) for name, arrays in found.items()})
+        return Rows(columns, {name: np.concatenate(arrays) for name, arrays in pieces.items()})
 
 
 def load_record(folder: Path) -> Record:
     """Open the record of a run, whether it was finished or killed."""
     require_utf8(folder)
-    files = [folder / RECORD] if (folder / RECORD).exists() else part_files(folder)
-    if not files:
+    if not (files := record_files(folder)):
         raise RunError(f"{folder}: holds no record of a run")
     record = Record(files)
     if not len(record):
@@ -203,15 +199,58 @@ def _column_of(field: pa.Field) -> Column:
     return Column(field.name, about.get(b"unit", b"").decode(), about.get(b"description", b"").decode())
 
 
-def _batches(parquet: Any, columns: Sequence[Column], groups: Sequence[int]) -> Iterator[Rows]:
-    """Yield the rows of some row groups."""
-    names, rows = [column.name for column in columns], 0
-    for batch in parquet.iter_batches(_BLOCK, row_groups=list(groups), columns=names):
-        rows += len(batch)
-        yield Rows(columns, {name: _numbers(batch.column(name)) for name in names})
-    expected_rows = sum(parquet.metadata.row_group(group).num_rows for group in groups)
-    if rows != expected_rows:
-        raise TypeError(f"{rows} rows are there, expected {expected_rows}")
+class _ParquetSource:
+    """Rows of a Parquet file, by row group."""
+
+    def __init__(self, parquet: Any) -> None:
+        self._parquet, self.schema = parquet, parquet.schema_arrow
+        metadata = parquet.metadata
+        self.group_rows = [metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)]
+        if metadata.num_rows != sum(self.group_rows):
+            raise TypeError("its groups have another number of rows than the file")
+
+    def read(self, columns: Sequence[Column], groups: Sequence[int]) -> Iterator[Rows]:
+        """Yield the rows of some row groups."""
+        names, rows = [column.name for column in columns], 0
+        for batch in self._parquet.iter_batches(_BLOCK, row_groups=list(groups), columns=names):
+            rows += len(batch)
+            yield _rows_of(batch, columns)
+        expected_rows = sum(self.group_rows[group] for group in groups)
+        if rows != expected_rows:
+            raise TypeError(f"{rows} rows are there, expected {expected_rows}")
+
+
+class _StreamSource:
+    """Rows of an Arrow stream, by batch, up to the first that is incomplete."""
+
+    def __init__(self, stream: Any) -> None:
+        self.schema, self._batches = stream.schema, list(_complete_batches(stream))
+        self.group_rows = [len(batch) for batch in self._batches]
+
+    def read(self, columns: Sequence[Column], groups: Sequence[int]) -> Iterator[Rows]:
+        """Yield the rows of some batches."""
+        for group in groups:
+            yield _rows_of(self._batches[group], columns)
+
+
+def _complete_batches(stream: Any) -> Iterator[pa.RecordBatch]:
+    """Yield the batches of a stream up to the first that a kill or a full disk has cut."""
+    with contextlib.suppress(StopIteration, pa.ArrowInvalid, OSError):
+        while True:
+            batch = stream.read_next_batch()
+            batch.validate()
+            yield batch
+
+
+@contextlib.contextmanager
+def stream_batches(file: Path) -> Iterator[Iterator[pa.RecordBatch]]:
+    """Open an Arrow stream to read its complete batches, whose memory is the file's."""
+    with pa.memory_map(str(file)) as memory, pa.ipc.open_stream(memory) as stream:
+        yield _complete_batches(stream)
+
+
+def _rows_of(batch: pa.RecordBatch, columns: Sequence[Column]) -> Rows:
+    return Rows(columns, {column.name: _numbers(batch.column(column.name)) for column in columns})
 
 
 def _numbers(column: pa.Array) -> Array:
@@ -223,13 +262,17 @@ def _numbers(column: pa.Array) -> Array:
 
 
 @contextlib.contextmanager
-def _opened(file: Path) -> Iterator[Any]:
-    """Open a Parquet file; convert all errors of reading it to a RunError."""
+def _opened(file: Path) -> Iterator[_ParquetSource | _StreamSource]:
+    """Open a file of a record; convert all errors of reading it to a RunError."""
     require_utf8(file)
     try:
-        # with pre_buffer all that was read of a file would stay in memory until it is closed
-        with pq.ParquetFile(file, pre_buffer=False) as parquet:
-            yield parquet
+        if file.suffix == Path(STREAM).suffix:
+            with pa.memory_map(str(file)) as memory, pa.ipc.open_stream(memory) as stream:
+                yield _StreamSource(stream)
+        else:
+            # with pre_buffer all that was read of a file would stay in memory until it is closed
+            with pq.ParquetFile(file, pre_buffer=False) as parquet:
+                yield _ParquetSource(parquet)
     except (OSError, pa.ArrowException, UnicodeDecodeError, TypeError, BufferError, KeyError) as error:
         raise RunError(f"{file}: cannot be read: {error}") from error
 
@@ -262,6 +305,8 @@ def _format_of(schema: pa.Schema) -> int | str | None:
     return int(number) if number.isdecimal() and len(number) < _DIGITS else number
 
 
-def part_files(folder: Path) -> list[Path]:
-    """Return the Parquet files of the parts in a run's folder, in order."""
-    return sorted((folder / PARTS).glob("*.parquet"))
+def record_files(folder: Path) -> list[Path]:
+    """Return the files that hold the rows of a run: its record, or what a killed run has left."""
+    files = [folder / RECORD, folder / STREAM, *sorted((folder / PARTS).glob("*.parquet"))]
+    files = [file for file in files if file.exists() and file.stat().st_size]
+    return files[:1] if files and files[0].parent == folder else files

@@ -2,14 +2,16 @@
 
 import contextlib
 import errno
+import io
+import itertools
 import os
 import shlex
 import shutil
 import subprocess
 from pathlib import Path
+from types import SimpleNamespace
 from unittest import mock
 
-import pyarrow.parquet as pq
 import pytest
 
 from cosim.errors import RunError
@@ -45,7 +47,7 @@ def a_full_disk(of, monkeypatch):
 
 
 PLACES = {
-    "the record": ["cosim.results.recorder.pq.write_table", "cosim.results.recorder.pq.ParquetWriter"],
+    "the record": ["cosim.results.recorder.Recorder._write"],
     "the vehicle's file": ["cosim.run.run_folder.shutil.copyfile"],
 }
 
@@ -70,18 +72,16 @@ def test_d9_command_succeeds_after_disk_space_is_freed(tmp_path, monkeypatch, of
 
 
 def test_d9_rows_recorded_before_a_full_disk_are_kept(tmp_path, monkeypatch):
-    """A part is written at once here; the next one finds no room."""
-    written, write = 0, pq.write_table
+    """The first rows are written at once here; the next ones find no space."""
+    opened = itertools.count()
 
-    def room_for_one(*arguments, **options):
-        nonlocal written
-        if written:
+    def space_for_one(*arguments):
+        if next(opened) > 1:  # the schema, and rows
             raise OSError(errno.ENOSPC, "No space left on device")
-        write(*arguments, **options)
-        written += 1
+        return io.FileIO(*arguments)
 
-    monkeypatch.setattr("cosim.results.recorder._PART_SECONDS", 0.0)
-    monkeypatch.setattr("cosim.results.recorder.pq.write_table", room_for_one)
+    monkeypatch.setattr("cosim.results.recorder._PERIOD", 0.0)
+    monkeypatch.setattr("cosim.results.recorder.io", SimpleNamespace(FileIO=space_for_one))
     with pytest.raises(RunError, match="No space left"):
         run_scenario(scenario(), tmp_path / "run", report=False)
     assert load_run(tmp_path / "run").summary["status"] == "killed"

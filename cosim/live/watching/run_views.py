@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import socket
@@ -19,7 +20,7 @@ from cosim.errors import RunError, TelemetryError
 from cosim.live.viewer_messages import read_rows
 from cosim.replay.header import header_of
 from cosim.replay.view_columns import ViewColumns
-from cosim.results.record import PARTS, RECORD, Record
+from cosim.results.record import RECORD, STREAM, load_record
 from cosim.results.required_columns import require_columns
 from cosim.results.run_result import SCENARIO, SUMMARY, load_run
 from cosim.results.wording import verdict
@@ -30,7 +31,7 @@ from cosim.simulation.signals import Array
 _FRAME = 0.1  # s of the wall clock, between pictures
 _FAST = 200  # number of pictures of a run that is played back at full speed
 _ROWS = 10_000  # greatest number of rows of a finished run
-_FRESH = 5.0  # s; a run whose newest part is older is not being recorded
+_FRESH = 5.0  # s; a run whose newest rows are older is not being recorded
 _ANSWER = 5.0  # s, timeout of a connection to a live view
 _GREATEST = 1 << 26  # bytes, greatest size of a message
 
@@ -137,37 +138,29 @@ def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Look]:
 
 def _is_being_recorded(path: Path) -> bool:
     """Return True if a run is being recorded in a folder."""
-    parts = path / PARTS
-    if (path / RECORD).exists() or (path / SUMMARY).exists() or not parts.is_dir():
+    if (path / RECORD).exists() or (path / SUMMARY).exists():
         return False
-    files = list(parts.glob("*.parquet"))
-    try:
-        return not files or time.time() - max(file.stat().st_mtime for file in files) < _FRESH
-    except FileNotFoundError:  # the run has just merged its parts
-        return False
+    with contextlib.suppress(FileNotFoundError):  # no run, or one that has just been completed
+        stream = (path / STREAM).stat()
+        return stream.st_size == 0 or time.time() - stream.st_mtime < _FRESH
+    return False
 
 
 def _recording(path: Path) -> Iterator[Look]:
     scenario = load_scenario(path / SCENARIO)
     header: dict[str, Any] = header_of(scenario, ())
     row: Array | None = None
-    known, since = "", time.monotonic()
+    known, since = 0, time.monotonic()
     while not (path / SUMMARY).exists():
-        newest = max((file.name for file in (path / PARTS).glob("*.parquet")), default="")
-        if newest > known:
-            try:
-                record = Record([path / PARTS / newest])
-                require_columns(scenario, record)
-                view_columns = ViewColumns(scenario, record.columns)
-                header = header_of(scenario, view_columns.columns)
-                if not len(record):
-                    raise ValueError("it is empty")
-                last = record.take([len(record) - 1]).to_array()
-            except RunError:
-                if (path / PARTS / newest).exists():
-                    raise
-                continue  # the run has just merged its parts
-            known, since = newest, time.monotonic()
+        record = None
+        with contextlib.suppress(RunError):  # before the first rows, and while the run completes its record
+            record = load_record(path)
+        if record is not None and len(record) > known:
+            require_columns(scenario, record)
+            view_columns = ViewColumns(scenario, record.columns)
+            header = header_of(scenario, view_columns.columns)
+            last = record.take([len(record) - 1]).to_array()
+            known, since = len(record), time.monotonic()
             row = view_columns.compute_rows(last[:, view_columns.picked])[0]
         silent = time.monotonic() - since
         wait = f"no new rows for {silent:.0f} s: waiting, writing its report, or killed"

@@ -15,17 +15,16 @@ import termios
 import threading
 
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 import pytest
 from rich.console import Console
 
 from cosim.command_line.cli import main
 from cosim.errors import RunError, TelemetryError
 from cosim.live.watching import Look, looks, picture
-from cosim.results.record import PARTS, RECORD, load_record
+from cosim.results.record import RECORD, STREAM, load_record
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import SCENARIO
+from cosim.simulation.signals import Column
 from tests.cosim.live.conftest import ARM
 from tests.threads import ended
 
@@ -133,7 +132,7 @@ def test_a_run_that_is_being_written_is_followed_to_its_end(paper, tmp_path):
     shutil.copy(paper.folder / SCENARIO, folder)
     record = load_record(paper.folder)
     rows = record.to_array()
-    recorder = Recorder(folder, record.columns, rows_per_part=1000)
+    recorder = Recorder(folder, record.columns, batch_rows=1000)
     frames = looks(str(folder))
     assert next(frames).row is None
     for k in range(2001):
@@ -144,7 +143,7 @@ def test_a_run_that_is_being_written_is_followed_to_its_end(paper, tmp_path):
     for k in range(2001, len(rows)):
         recorder.observe(k, rows[k])
     recorder.close()
-    assert (folder / RECORD).exists() and not (folder / PARTS).exists()
+    assert (folder / RECORD).exists() and not (folder / STREAM).exists()
     shutil.copy(paper.folder / "summary.json", folder)
     *_, last = frames
     assert last["time"] == 6.0 and last.ended[0] == "completed"
@@ -181,21 +180,17 @@ def test_missing_run_or_server_is_reported():
 
 def test_run_killed_before_its_first_rows_does_not_block_watch(paper, tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.live.watching.run_views._FRESH", 0.0)
-    (tmp_path / PARTS).mkdir()
+    (tmp_path / STREAM).touch()
     shutil.copy(paper.folder / SCENARIO, tmp_path)
     (look,) = looks(str(tmp_path), once=True)
     assert look.row is None
     assert "no new rows" in look.note
 
 
-@pytest.mark.parametrize("garbage", ["no parquet", "another table"])
-def test_invalid_parts_give_one_line_error(paper, tmp_path, garbage):
-    (tmp_path / PARTS).mkdir()
+def test_rows_of_another_run_give_one_line_error(paper, tmp_path):
     shutil.copy(paper.folder / SCENARIO, tmp_path)
-    part = tmp_path / PARTS / "000000.parquet"
-    if garbage == "no parquet":
-        part.write_bytes(b"garbage")
-    else:
-        pq.write_table(pa.table({"a": [1.0]}), part)
-    with pytest.raises(RunError, match=r"cannot be read|which its scenario calls for"):
+    recorder = Recorder(tmp_path, [Column("a", "", "")], batch_rows=1)
+    for k in range(2):
+        recorder.observe(k, np.zeros(1))
+    with pytest.raises(RunError, match="which its scenario calls for"):
         next(iter(looks(str(tmp_path))))
