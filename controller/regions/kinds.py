@@ -11,6 +11,10 @@ from controller.regions.shapes.sphere import Sphere
 from controller.translator.generated import functions_of
 
 SPHERE, DEPTH_BAND = Sphere.kind, DepthBand.kind
+FLAT = tuple(entry.shape.kind for entry in ENTRIES.values() if entry.flat_faces)  # kinds with flat faces
+CONVEX = tuple(entry.shape.kind for entry in ENTRIES.values() if entry.convex)
+KINKED_INSIDE = tuple(entry.shape.kind for entry in ENTRIES.values() if entry.kinks != "nowhere")
+KINKED_OUTSIDE = tuple(entry.shape.kind for entry in ENTRIES.values() if entry.kinks == "everywhere")
 FIRST_OF_ATTITUDE = sum(not entry.of_attitude for entry in ENTRIES.values())  # kinds from it on depend on attitude
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 from controller.arithmetic import hypotenuse
-from controller.regions.kinds import FIRST_OF_ATTITUDE, evaluate_shape
+from controller.regions.kinds import CONVEX, FIRST_OF_ATTITUDE, evaluate_shape
 from controller.regions.region_set import PackedRegions
 from controller.regions.shape import Array, Evaluation
-from controller.regions.shapes import ENTRIES
 from controller.regions.shapes.ellipsoid import Ellipsoid
 from controller.regions.shapes.pipe import Pipe
 from controller.regions.shapes.prism import Prism
@@ -21,7 +20,6 @@ _PARALLEL = 1e-100  # component of a direction that counts as 0: squared, or as 
 _ELLIPSOID = Ellipsoid.kind
 _PIPE = Pipe.kind
 _PRISM = Prism.kind
-_CONVEX = tuple(entry.shape.kind for entry in ENTRIES.values() if entry.convex)
 
 
 def ray_distances(regions: PackedRegions, origin: Array, directions: Array, farthest: float, distances: Array) -> None:
@@ -46,7 +44,7 @@ def ray_distances(regions: PackedRegions, origin: Array, directions: Array, fart
                 piece[1:] = numbers[first : first + 6]
                 _meet(kind, piece, 1.0, True, start, directions, farthest, distances)
         else:
-            convex = sign < 0.0 and (kind in _CONVEX or (kind == _PRISM and _is_convex(numbers)))
+            convex = sign < 0.0 and (kind in CONVEX or (kind == _PRISM and _is_convex(numbers)))
             _meet(kind, numbers, -sign, convex, start, directions, farthest, distances)
 
 

@@ -35,7 +35,6 @@ from controller.regions.shape import (
 )
 from controller.regions.shapes import ENTRIES
 from controller.regions.shapes.depth_band import band_about
-from controller.regions.shapes.orientation import Orientation
 from controller.regions.shapes.sphere import sphere_about
 from controller.stack_array import zeros
 
@@ -80,8 +79,8 @@ class Region:
         )  # fmt: skip
         cost = self.crossing_cost
         require(0.0 <= cost < math.inf, f"region {self.name!r}", "crossing_cost", cost, "a finite number, 0 or above")
-        at_rest = not isinstance(self.shape, Orientation) or not any(self.velocity)
-        require(at_rest, f"region {self.name!r}", "velocity", self.velocity, "none: an orientation is at no place")
+        at_rest = not any(self.velocity) or shape_entry(self.shape).has_position
+        require(at_rest, f"region {self.name!r}", "velocity", self.velocity, "none: the shape has no position")
 
 
 def deviations_of(deviation: float | Vector3) -> Vector3:

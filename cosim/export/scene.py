@@ -7,12 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from controller.quaternion import rotation_matrix
-from controller.regions import Orientation, Visibility
 from controller.regions.mesh import Mesh, sector
-from controller.regions.region_set import SHAPES, name_of, of_attitude, surface_of
+from controller.regions.region_set import SHAPES, shape_entry, surface_of
 from controller.regions.shape import Bounds, Shape
-from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
 from cosim.replay.header import header_of
 from cosim.replay.region_changes import changes_of, log_of
@@ -20,6 +17,7 @@ from cosim.scenario.colours import colours_of_regions
 from cosim.simulation.signals import Array
 
 NED, PLACE, BODY = "ned", "place", "body"  # frames: world; at the vehicle, parallel to the world; body
+_FRAMES = {"vehicle": PLACE, "body": BODY}  # of the cones that stand for shapes of attitude
 POSITION = ("position.x", "position.y", "position.z")
 QUATERNION = ("quaternion.e0", "quaternion.e1", "quaternion.e2", "quaternion.e3")
 HULL_COLOUR, TRAIL_COLOUR, THRUST_COLOUR = (240, 228, 66), (140, 140, 140), (204, 121, 167)
@@ -96,7 +94,7 @@ class Scene:
             _rgb(colours_of_regions(scenario)[index]),
             shape,
             self._mesh(shape, limits),
-            {Orientation: PLACE, Visibility: BODY}.get(type(shape), NED),
+            _FRAMES[cone(shape).frame] if (cone := shape_entry(shape).cone) else NED,
             region.name in scenario.moving,
         )
 
@@ -110,16 +108,11 @@ class Scene:
         return tuple(low.tolist()), tuple(high.tolist())
 
     def _mesh(self, shape: Shape, limits: Bounds) -> Mesh:
-        if not of_attitude(shape):
+        cone = shape_entry(shape).cone
+        if cone is None:
             return surface_of(shape, limits)
-        reach = _SIGHT * self.hull_radius
-        if isinstance(shape, Visibility):
-            return sector(shape.camera_position, shape.camera_axis, shape.half_angle, reach)
-        if not isinstance(shape, Orientation):
-            raise ExportError(f"shape {name_of(shape)!r} has no picture, expected orientation or visibility")
-        # sector in which the direction of the bow has to be
-        e = np.array(shape.quaternion) / np.linalg.norm(shape.quaternion)
-        return sector((0.0, 0.0, 0.0), rotation_matrix(e)[:, 0].tolist(), shape.tolerance, reach)
+        drawn = cone(shape)
+        return sector(drawn.apex, drawn.axis, drawn.half_angle, _SIGHT * self.hull_radius)
 
 
 def _rgb(colour: str) -> tuple[int, int, int]:

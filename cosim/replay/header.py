@@ -20,7 +20,6 @@ from plant_fmu import Vehicle
 from plant_fmu.thruster_lines import thruster_lines
 
 VERSION = 1  # version of the header's format
-ATTITUDE_SHAPES = ("orientation", "visibility")  # shapes that the page draws at the vehicle
 _MIN_MARGIN = 5.0  # m, around start and bounded regions
 _DIGITS = 6  # decimals of coordinates in m
 _SEA_WATER = 1026.0 * 9.81  # N/m3; for the size of a hull without a radius in the vehicle's file
@@ -60,10 +59,11 @@ def rules_of(system: System) -> list[dict[str, str]]:
 def shape_of(shape: Shape, limits: Bounds) -> dict[str, Any]:
     """Return a shape with its ``kind``, its own parameters [m, rad, NED], and its ``drawing``; limits [m, NED]."""
     # The drawing of a shape of position is its `centre` and `half_axes`, or its `planes`, each with `point` and
-    # `normal`, or the `points` and `faces` of its mesh.
+    # `normal`, or the `points` and `faces` of its mesh. A shape of attitude has a `sight`, its cone, instead.
     kind = name_of(shape)
     known = {"kind": kind, **dataclasses.asdict(shape)}  # type: ignore[call-overload]
-    return known if kind in ATTITUDE_SHAPES else known | {"drawing": _drawing(shape, limits)}
+    cone = shape_entry(shape).cone
+    return known | ({"sight": cone(shape)._asdict()} if cone else {"drawing": _drawing(shape, limits)})
 
 
 def limits_of(scenario: Scenario) -> Bounds:

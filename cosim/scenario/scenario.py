@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller import ControllerError
-from controller.regions import Orientation, Region
+from controller.regions import Region
+from controller.regions.region_set import shape_entry
 from controller.regions.shape import Shape
 from controller.restoring import parameters
 from cosim.errors import ScenarioError
@@ -202,7 +203,7 @@ class Scenario:
         """Names of the regions, goal included, that may move away from their position in the scenario."""
         goal = ("goal",) if self.goal_streamed or self.goal_then or any(self.goal_velocity) else ()
         commanded = self.commands.enabled  # commands can move all regions in space
-        regions = [s for s in self.regions if s.moves or (commanded and not isinstance(s.region.shape, Orientation))]
+        regions = [s for s in self.regions if s.moves or (commanded and shape_entry(s.region.shape).has_position)]
         return (*goal, *(secondary.region.name for secondary in regions))
 
     @property

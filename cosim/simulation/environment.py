@@ -11,15 +11,14 @@ import numpy as np
 
 from controller import VehicleState
 from controller.compiling.function import CompiledFunction
-from controller.regions import Box, Cylinder, Ellipsoid, Sphere, pack
-from controller.regions.region_set import PackedRegions, evaluate_packed
+from controller.regions import Sphere, pack
+from controller.regions.region_set import PackedRegions, evaluate_packed, shape_entry
 from controller.regions.shape import Shape
 from cosim.errors import CommandError, RunError
 from cosim.scenario.region_tables import PARKED_POSITION, Vector3
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-CENTERED = (Box, Ellipsoid, Sphere)  # shapes with a centre
 _AT_REST = (0.0, 0.0, 0.0)
 _ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 
@@ -241,12 +240,9 @@ def stay_steps(scenario: Scenario) -> int:
 
 def shape_center(shape: Shape) -> Vector3:
     """Return the centre of a shape, the point by which targets are placed; returns [m, NED]."""
-    # to the last bit, which the mean of two bounds is not
-    if isinstance(shape, CENTERED):
-        return shape.centre
-    if isinstance(shape, Cylinder):
-        a, b = shape.start, shape.end
-        return (a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0, (a[2] + b[2]) / 2.0
+    center = shape_entry(shape).center
+    if center is not None:
+        return center(shape)
     middle = [0.0, 0.0, 0.0]
     for axis, (low, high) in enumerate(zip(*shape.bounds(), strict=True)):
         ends = [end for end in (low, high) if math.isfinite(end)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import ClassVar
 
 import numpy as np
@@ -71,4 +72,7 @@ def surface(shape: Torus, limits: Bounds) -> Mesh:
 
 
 EXAMPLE = Torus((1.0, 0.0, 2.0), (1.0, 0.0, 0.0), 1.5, 0.2)
-ENTRY = Entry(Torus, torus, EXAMPLE, {"centre": "m", "axis": "", "radius": "m", "tube": "m"}, surface)
+ENTRY = Entry(
+    Torus, torus, EXAMPLE, {"centre": "m", "axis": "", "radius": "m", "tube": "m"},
+    flat_faces=False, kinks="everywhere", convex=False, center=attrgetter("centre"), surface=surface,
+)  # fmt: skip

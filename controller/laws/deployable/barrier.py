@@ -30,15 +30,13 @@ from controller.laws.deployable.faces import FACES, face_ahead, has_faces
 from controller.laws.deployable.gains import SPREADS, DeployableGains
 from controller.linear_algebra import copy
 from controller.quadratic_program import Workspace
-from controller.regions import Box, DepthBand, HalfSpace, Prism
-from controller.regions.kinds import FIRST_OF_ATTITUDE
+from controller.regions.kinds import FIRST_OF_ATTITUDE, FLAT
 from controller.regions.region_set import PackedRegions, evaluate_packed, place_clearance
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
-_FLAT = (Box.kind, Prism.kind, DepthBand.kind, HalfSpace.kind)  # kinds with flat faces
 _IMPULSE = 0.5  # s, assumed duration of the desired acceleration in the search for faces ahead
 _LN_10 = 2.302585092994046
 _AHEAD = 1e-4  # s, step of the difference quotient of a gradient: relative error 1e-4, rounding included
@@ -138,7 +136,7 @@ def gradient_rate(kind: int, sign: float, n: Array, later: Array, velocity: Arra
     for axis in range(6):
         turning += (later[axis] - n[axis]) / _AHEAD * velocity[axis]
         alike += later[axis] * n[axis]
-    if turning < 0.0 and kind < _ATTITUDE and (kind in _FLAT or alike < _LEAP):
+    if turning < 0.0 and kind < _ATTITUDE and (kind in FLAT or alike < _LEAP):
         return 0.0
     if turning > 0.0 and kind < _ATTITUDE and sign > 0.0:
         return 0.0

@@ -11,14 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.regions import Ellipsoid, HalfSpace, Sphere
+from controller.regions.kinds import KINKED_INSIDE, KINKED_OUTSIDE
 from controller.regions.region_set import PackedRegions, clearance_of_place, place_clearance
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-_SMOOTH = (Sphere.kind, Ellipsoid.kind)  # kinds whose clearance has no kink outside
-_HALF_SPACE = HalfSpace.kind
 FACES = 2  # greatest number of faces besides the nearest that have barriers
 _LINE_SAMPLES = 16  # a stride along a line, which ends with an evaluation, is at least the line's length over this
 _HALVINGS = 6  # bisections of the interval in which the line leaves the region
@@ -26,9 +24,8 @@ _HALVINGS = 6  # bisections of the interval in which the line leaves the region
 
 def has_faces(kind: int, sign: float) -> bool:
     """Return True if the clearance of a region has a kink where two faces are equally near."""
-    # Inside a region to stay in (`sign` above 0) this holds for all but a half space: an ellipsoid has the kink along
-    # its long axes, a sphere at its center.
-    return kind != _HALF_SPACE and (sign > 0.0 or kind not in _SMOOTH)
+    # An ellipsoid to stay in (`sign` above 0) has the kink along its long axes, a sphere at its center.
+    return kind in KINKED_OUTSIDE or (sign > 0.0 and kind in KINKED_INSIDE)
 
 
 def face_ahead(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import ClassVar
 
 import numpy as np
@@ -86,4 +87,7 @@ def surface(shape: Box, limits: Bounds) -> Mesh:
 
 
 _UNITS = {"centre": "m", "size": "m", "quaternion": ""}
-ENTRY = Entry(Box, box, Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0), (0.9, 0.1, -0.3, 0.2)), _UNITS, surface, convex=True)
+ENTRY = Entry(
+    Box, box, Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0), (0.9, 0.1, -0.3, 0.2)), _UNITS,
+    flat_faces=True, kinks="everywhere", convex=True, center=attrgetter("centre"), surface=surface,
+)  # fmt: skip

@@ -96,4 +96,7 @@ def surface(shape: Cone, limits: Bounds) -> Mesh:
 
 
 _UNITS = {"feature": "m", "axis": "", "half_angle": "rad", "range": "m"}
-ENTRY = Entry(Cone, cone, Cone((1.0, 1.0, 1.0), (-1.0, 0.0, 0.3), 0.6, 3.0), _UNITS, surface, convex=True)
+ENTRY = Entry(
+    Cone, cone, Cone((1.0, 1.0, 1.0), (-1.0, 0.0, 0.3), 0.6, 3.0), _UNITS,
+    flat_faces=False, kinks="everywhere", convex=True, center=None, surface=surface,
+)  # fmt: skip

@@ -52,8 +52,7 @@ class Cylinder:
     def packed(self) -> tuple[float, ...]:
         """Return the middle, the unit axis, half the length and the radius."""
         between = tuple(b - a for a, b in zip(self.start, self.end, strict=True))
-        middle = tuple((a + b) / 2.0 for a, b in zip(self.start, self.end, strict=True))
-        return (*middle, *unit("cylinder", "axis", between), math.hypot(*between) / 2.0, self.radius)
+        return (*middle(self), *unit("cylinder", "axis", between), math.hypot(*between) / 2.0, self.radius)
 
     def numbers(self) -> tuple[Number, ...]:
         """Return name and unit of each number of `packed`."""
@@ -85,6 +84,12 @@ def cylinder(p: Array, q: Array) -> Evaluation:
     return g, outward * x + axial * q[3], outward * y + axial * q[4], outward * z + axial * q[5], g
 
 
+def middle(shape: Cylinder) -> Vector3:
+    """Return the middle of its axis [m, NED]."""
+    a, b = shape.start, shape.end
+    return (a[0] + b[0]) / 2.0, (a[1] + b[1]) / 2.0, (a[2] + b[2]) / 2.0
+
+
 def surface(shape: Cylinder, limits: Bounds) -> Mesh:
     """Return its side and its two ends."""
     start, end = np.array(shape.start), np.array(shape.end)
@@ -94,4 +99,7 @@ def surface(shape: Cylinder, limits: Bounds) -> Mesh:
 
 
 _UNITS = {"start": "m", "end": "m", "radius": "m"}
-ENTRY = Entry(Cylinder, cylinder, Cylinder((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), 0.7), _UNITS, surface, convex=True)
+ENTRY = Entry(
+    Cylinder, cylinder, Cylinder((0.0, 0.0, 0.0), (1.0, 2.0, 3.0), 0.7), _UNITS,
+    flat_faces=False, kinks="everywhere", convex=True, center=middle, surface=surface,
+)  # fmt: skip

@@ -69,4 +69,7 @@ def planes(shape: DepthBand) -> list[tuple[Array, Array]]:
 
 
 _UNITS = {"depth": "m", "tolerance": "m"}
-ENTRY = Entry(DepthBand, depth_band, DepthBand(2.5, 1.8), _UNITS, surface, planes=planes, convex=True)
+ENTRY = Entry(
+    DepthBand, depth_band, DepthBand(2.5, 1.8), _UNITS,
+    flat_faces=True, kinks="everywhere", convex=True, center=None, surface=surface, planes=planes,
+)  # fmt: skip

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import ClassVar
 
 import numpy as np
@@ -115,11 +116,6 @@ def half_axes(shape: Ellipsoid) -> tuple[Array, Array]:
 
 _UNITS = {"centre": "m", "semi_axes": "m", "quaternion": ""}
 ENTRY = Entry(
-    Ellipsoid,
-    ellipsoid,
-    Ellipsoid((1.0, 0.0, 1.0), (2.0, 1.0, 0.5), (0.9, 0.1, -0.3, 0.2)),
-    _UNITS,
-    surface,
-    half_axes,
-    convex=True,
-)
+    Ellipsoid, ellipsoid, Ellipsoid((1.0, 0.0, 1.0), (2.0, 1.0, 0.5), (0.9, 0.1, -0.3, 0.2)), _UNITS,
+    flat_faces=False, kinks="inside", convex=True, center=attrgetter("centre"), surface=surface, half_axes=half_axes,
+)  # fmt: skip

@@ -66,11 +66,6 @@ def planes(shape: HalfSpace) -> list[tuple[Array, Array]]:
 
 _UNITS = {"point": "m", "normal": ""}
 ENTRY = Entry(
-    HalfSpace,
-    half_space,
-    HalfSpace((0.0, 0.0, 1.0), (1.0, 1.0, 0.2)),
-    _UNITS,
-    surface,
-    planes=planes,
-    convex=True,
-)
+    HalfSpace, half_space, HalfSpace((0.0, 0.0, 1.0), (1.0, 1.0, 0.2)), _UNITS,
+    flat_faces=True, kinks="nowhere", convex=True, center=None, surface=surface, planes=planes,
+)  # fmt: skip

@@ -7,9 +7,11 @@ from dataclasses import dataclass
 from math import inf
 from typing import ClassVar
 
+import numpy as np
+
 from controller.arithmetic import arctangent
-from controller.quaternion import error_parts
-from controller.regions.entry import Entry
+from controller.quaternion import error_parts, rotation_matrix
+from controller.regions.entry import Entry, ViewCone
 from controller.regions.numbers import ANGLE, PART, Number
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector4, require, unit
 
@@ -60,5 +62,14 @@ def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     return g, 0.0, 0.0, 0.0, turn[1] / sine, turn[2] / sine, turn[3] / sine
 
 
+def sector_of_bow(shape: Orientation) -> ViewCone:
+    """Return the sector in which the direction of the bow has to be."""
+    R = rotation_matrix(np.array(unit("orientation", "quaternion", shape.quaternion)))
+    return ViewCone("vehicle", (0.0, 0.0, 0.0), tuple(R[:, 0].tolist()), shape.tolerance)
+
+
 _UNITS = {"quaternion": "", "tolerance": "rad"}
-ENTRY = Entry(Orientation, orientation, Orientation((0.9, 0.1, -0.3, 0.2), 0.8), _UNITS, of_attitude=True)
+ENTRY = Entry(
+    Orientation, orientation, Orientation((0.9, 0.1, -0.3, 0.2), 0.8), _UNITS,
+    flat_faces=False, kinks="everywhere", convex=False, center=None, cone=sector_of_bow,
+)  # fmt: skip

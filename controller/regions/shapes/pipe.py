@@ -149,4 +149,7 @@ def _left(shape: Pipe, origins: Array, directions: Array) -> Array:
 
 
 _UNITS = {"points": "m", "radius": "m"}
-ENTRY = Entry(Pipe, pipe, Pipe(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 1.0)), 0.4), _UNITS, surface)
+ENTRY = Entry(
+    Pipe, pipe, Pipe(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0), (2.0, 2.0, 1.0)), 0.4), _UNITS,
+    flat_faces=False, kinks="everywhere", convex=False, center=None, surface=surface,
+)  # fmt: skip

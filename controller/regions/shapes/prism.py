@@ -174,6 +174,8 @@ def _ears(corners: Array) -> list[tuple[int, int, int]]:
 
 
 _UNITS = {"corners": "m", "top": "m", "bottom": "m"}
+_CORNERS = ((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (1.0, 0.5), (0.0, 2.0))
 ENTRY = Entry(
-    Prism, prism, Prism(((0.0, 0.0), (3.0, 0.0), (3.0, 2.0), (1.0, 0.5), (0.0, 2.0)), 1.0, 3.0), _UNITS, surface
-)
+    Prism, prism, Prism(_CORNERS, 1.0, 3.0), _UNITS,
+    flat_faces=True, kinks="everywhere", convex=False, center=None, surface=surface,
+)  # fmt: skip

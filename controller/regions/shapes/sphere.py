@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import ClassVar
 
 import numpy as np
@@ -70,4 +71,7 @@ def half_axes(shape: Sphere) -> tuple[Array, Array]:
 
 
 _UNITS = {"centre": "m", "radius": "m"}
-ENTRY = Entry(Sphere, sphere, Sphere((2.0, 0.0, 1.8), 0.5), _UNITS, surface, half_axes, convex=True)
+ENTRY = Entry(
+    Sphere, sphere, Sphere((2.0, 0.0, 1.8), 0.5), _UNITS,
+    flat_faces=False, kinks="inside", convex=True, center=attrgetter("centre"), surface=surface, half_axes=half_axes,
+)  # fmt: skip

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 from controller.arithmetic import arctangent
 from controller.quaternion import rotation_rows
-from controller.regions.entry import Entry
+from controller.regions.entry import Entry, ViewCone
 from controller.regions.numbers import ANGLE, LENGTH, PART, Number, vector
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector3, require, require_finite, unit
 
@@ -103,6 +103,15 @@ def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     )
 
 
+def field_of_view(shape: Visibility) -> ViewCone:
+    """Return the field of view of the camera."""
+    axis = unit("visibility", "camera_axis", shape.camera_axis)
+    return ViewCone("body", shape.camera_position, (axis[0], axis[1], axis[2]), shape.half_angle, shape.feature)
+
+
 _UNITS = {"feature": "m", "camera_axis": "", "half_angle": "rad", "camera_position": "m"}
 _EXAMPLE = Visibility((1.0, 2.0, 3.0), (1.0, 0.2, 0.5), 0.9, (0.3, -0.1, 0.2))
-ENTRY = Entry(Visibility, visibility, _EXAMPLE, _UNITS, of_attitude=True)
+ENTRY = Entry(
+    Visibility, visibility, _EXAMPLE, _UNITS,
+    flat_faces=False, kinks="everywhere", convex=False, center=None, cone=field_of_view,
+)  # fmt: skip

@@ -45,7 +45,7 @@ function partsOf(shape, shift, { keep }, pose, target, bounds) {
   if (shape.drawing?.planes) {
     return sheetsOf(shape, keep, shift, bounds).map((sheet) => ({ sheet, middle: Vec.mean(sheet.corners) }));
   }
-  return pose ? [{ sight: SIGHTS[shape.kind](shape, pose, shift, pose.size), size: pose.size }] : [];
+  return pose ? [{ sight: sightOf(shape, pose, shift, pose.size), size: pose.size }] : [];
 }
 
 /** Return where a region is drawn at a time [s]: where it is, and the goal's next place: [{place, next, shift}]. */

@@ -14,28 +14,21 @@ const rimOf = (apex, axis, angle, length) =>
  * @property {number[]} anchor of the label
  */
 
-/** Functions from a shape of attitude, a pose, a shift and a size [m] to its sight. */
-const SIGHTS = {
-  /** Return the cone within the tolerance of the wanted heading, with lines along the wanted and current headings. */
-  orientation(shape, { position, quaternion }, shift, size) {
-    const [axis, nose] = [shape.quaternion, quaternion].map((q) => Vec.turned(Vec.matrix(q), [1, 0, 0]));
-    const length = 5 * size;
-    const wanted = Vec.along(position, axis, length);
-    const lines = [[position, wanted], [position, Vec.along(position, nose, 1.06 * length)]];
-    const rim = rimOf(position, axis, shape.tolerance, length);
-    return { apex: position, axis, rim, lines, feature: null, anchor: wanted };
-  },
-
-  /** Return the camera's cone of view as far as the feature, and the line of sight to it. */
-  visibility(shape, { position, quaternion }, shift, size) {
-    const R = Vec.matrix(quaternion);
-    const apex = Vec.add(position, Vec.turned(R, shape.camera_position));
-    const axis = Vec.turned(R, Vec.unit(shape.camera_axis));
-    const feature = Vec.add(shape.feature, shift);
-    const rim = rimOf(apex, axis, shape.half_angle, Math.max(3 * size, Vec.distance(feature, apex)));
-    return { apex, axis, rim, lines: [[apex, feature]], feature, anchor: feature };
-  },
-};
+/**
+ * Return the sight of a shape of attitude at a pose, shifted, of a size [m]: the camera's cone as far as its feature,
+ * with the line of sight; without a feature the cone about the wanted heading, with that and the current heading.
+ */
+function sightOf({ sight }, { position, quaternion }, shift, size) {
+  const R = Vec.matrix(quaternion);
+  const turned = (v) => (sight.frame === "body" ? Vec.turned(R, v) : v);
+  const [apex, axis] = [Vec.add(position, turned(sight.apex)), turned(sight.axis)];
+  const feature = sight.feature && Vec.add(sight.feature, shift);
+  const length = feature ? Math.max(3 * size, Vec.distance(feature, apex)) : 5 * size;
+  const anchor = feature ?? Vec.along(apex, axis, length);
+  const nose = Vec.along(apex, Vec.turned(R, [1, 0, 0]), 1.06 * length);
+  const lines = [[apex, anchor], ...(feature ? [] : [[apex, nose]])];
+  return { apex, axis, rim: rimOf(apex, axis, sight.half_angle, length), lines, feature, anchor };
+}
 
 /** Draw a region of attitude: a clear cone with its rim, the lines in it, and the feature as a cross in a circle. */
 function paintSight(painter, { apex, rim, lines, feature }, { colour, alpha, width, dash }) {

@@ -9,15 +9,16 @@ function placeOf(run, index, t, place = null) {
   if (index === 0 && run.has("target.x")) return run.vectorHeld("target", t);
   const shape = run.shape(index, t);
   const planes = shape.drawing?.planes?.map(({ point }) => point);
-  const handle = surfaceOf(shape)?.centre ?? (planes ? Vec.mean(planes) : shape.feature);
+  const handle = surfaceOf(shape)?.centre ?? (planes ? Vec.mean(planes) : shape.sight?.feature);
   return handle ? Vec.add(handle, run.shift(index, t, place)) : null;
 }
 
 /** Return true if a command may move a region. */
 const canMove = (run, index) => index === 0 || run.header.regions[index].moves;
 
-/** Return true if a region has a depth only. */
-const isFlat = (run, index) => run.header.regions[index].shape.kind === "depth_band";
+/** Return true if a region has a depth only: all its planes are level. */
+const isFlat = (run, index) =>
+  run.header.regions[index].shape.drawing?.planes?.every(({ normal: [x, y] }) => x === 0 && y === 0) ?? false;
 
 /** Return the command that moves a region from one point to another [m, NED]. */
 function commandToMove(run, index, from, to, t) {

@@ -132,7 +132,7 @@ class WhatIfPanel extends FieldPanel {
 
 /** Return a text that explains why some regions cannot be moved here. */
 function wordsOfFixed(regions) {
-  const isTurned = ({ shape }) => shape.kind in SIGHTS && !shape.feature;
+  const isTurned = ({ shape }) => Boolean(shape.sight) && !shape.sight.feature;
   const [turned, placed] = [true, false].map((is) =>
     regions.filter((region) => isTurned(region) === is).map(({ name }) => name).join(", "));
   return [

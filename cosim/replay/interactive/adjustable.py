@@ -13,13 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller import ControllerError
-from controller.regions import Cylinder
+from controller.regions.region_set import shape_entry
 from cosim.errors import ScenarioError
 from cosim.replay.interactive.flight import Flight
 from cosim.scenario.changes import value_at, with_values
 from cosim.scenario.key_names import PARAMETERS, key_name
 from cosim.scenario.scenario import Scenario, validate_scenario
-from cosim.simulation.environment import CENTERED
 from cosim.ssp.memory import Memory
 from plant_fmu import PlantFmuError
 from plant_fmu.variables import variables
@@ -61,13 +60,13 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[tuple[t
     moving_keys = [key for axes in moving for keys in axes for key in keys]
     places = dict(_search(flight, memory, [*numbers, *moving_keys]))
     for path, shape in shapes:
-        if shape["type"] == "cylinder":
-            places |= _ends_of_cylinder(flight, memory, path)
+        if {"start", "end"} <= shape.keys():
+            places |= _ends_by_middle(flight, memory, path)
     then = [f"goal.then.{i}.{axis}" for i in range(len(scenario.goal_then)) for axis in range(3)]
     first = memory.keep(flight.setup.goal_places)
     places |= {key: (("shift", first + i),) for i, key in enumerate(then)}
     moves = [axes if any(axes) and all(key in places for keys in axes for key in keys) else None for axes in moving]
-    if then and not isinstance(scenario.goal, (*CENTERED, Cylinder)):
+    if then and shape_entry(scenario.goal).center is None:
         moves[0] = None  # the page does not know where its center would be
     offered = {key for axes in moves if axes for keys in axes for key in keys}.union(numbers, then)
     slots = []
@@ -103,8 +102,8 @@ def _moving_keys(path: str, shape: dict[str, Any]) -> tuple[tuple[str, ...], ...
     return tuple(map(tuple, axes))
 
 
-def _ends_of_cylinder(flight: Flight, memory: Memory, path: str) -> dict[str, tuple[tuple[str, int], ...]]:
-    """Return both ends of a cylinder with the places of its middle, which alone changes when both move by the same."""
+def _ends_by_middle(flight: Flight, memory: Memory, path: str) -> dict[str, tuple[tuple[str, int], ...]]:
+    """Return both ends of an axis with the places of its middle, which alone changes when both move by the same."""
     ends = [(f"{path}.start.{axis}", f"{path}.end.{axis}") for axis in range(3)]
     changes = {key: _value(flight.scenario, key) + by for pair, by in zip(ends, _TOGETHER, strict=True) for key in pair}
     try:

@@ -12,8 +12,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.rcsetup import cycler
 
-from controller.regions import Region, Visibility
-from controller.regions.region_set import of_attitude
+from controller.regions import Region
+from controller.regions.region_set import of_attitude, shape_entry
 from cosim.results.record import Rows
 from cosim.scenario.colours import colours_of_regions
 from cosim.scenario.scenario import Scenario
@@ -125,8 +125,10 @@ def places_of(data: FigureData) -> Iterator[Place]:
 def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
     """Yield name, colour and final position [m, NED], shape (3,), of the feature of every visibility region."""
     for region, colour in regions_of(data.scenario):
-        if isinstance(region.shape, Visibility):
-            yield region.name, colour, np.array(region.shape.feature) + shifts_of(data.record, region.name)[-1]
+        cone = shape_entry(region.shape).cone
+        feature = cone(region.shape).feature if cone else None
+        if feature is not None:
+            yield region.name, colour, np.array(feature) + shifts_of(data.record, region.name)[-1]
 
 
 def shifts_of(record: Rows, name: str) -> Array:
