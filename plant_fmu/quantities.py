@@ -73,6 +73,10 @@ class Quantity:
     nominal: float = 1.0
     is_gain: bool = False  # True for a gain of a control law, which is shown in the law's own unit
 
+    def __post_init__(self) -> None:
+        if self.unit and self.unit not in UNITS:
+            raise ValueError(f"unit is {self.unit!r}, expected one of plant_fmu.quantities.UNITS")
+
     @property
     def display_unit(self) -> str:
         """The unit in which tools show it, "" for its own."""
@@ -131,6 +135,11 @@ def base_unit(unit: str) -> dict[str, str]:
     """Return the attributes of a unit's element ``BaseUnit``, which FMI and SSP share."""
     factor = {"factor": repr(_FACTORS[unit])} if unit in _FACTORS else {}
     return {base: str(power) for base, power in UNITS[unit].items()} | factor
+
+
+def rate_unit(unit: str) -> str:
+    """Return the unit of a time derivative."""
+    return f"{unit}2" if unit.endswith("/s") else f"{unit or 1}/s"
 
 
 def unbounded(unit: str, nominal: float = 1.0) -> Quantity:

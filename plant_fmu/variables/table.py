@@ -165,7 +165,6 @@ def _measured(output: Callable[..., Variable]) -> Iterator[Variable]:
 
 
 def _derivatives(vehicle: Vehicle) -> Iterator[Variable]:
-    units = {"m": "m/s", "": "1/s", "m/s": "m/s2", "rad/s": "rad/s2", "N": "N/s", "N.m": "N.m/s"}
     for state in _states(vehicle):
         name = state.name
         kind, _, part = name.partition(".")
@@ -181,7 +180,7 @@ def _derivatives(vehicle: Vehicle) -> Iterator[Variable]:
         else:
             depends = _wrench_names(FORCES.index(part[-1]))
         member = state.member.replace("state.", "outputs.rate.", 1)
-        quantity = q.unbounded(units[state.quantity.unit], state.quantity.nominal)
+        quantity = q.unbounded(q.rate_unit(state.quantity.unit), state.quantity.nominal)
         yield Variable(f"der({name})", "derivative", member, quantity, f"Time derivative of {name}", depends=depends)
 
 

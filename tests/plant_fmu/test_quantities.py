@@ -65,3 +65,8 @@ def test_quantity_ranges_are_nonempty_and_symmetric_or_nonnegative(name):
 def test_seeds_are_nonnegative_32_bit_integers():
     assert (quantities.SEED.minimum, quantities.SEED.maximum) == (0, np.iinfo(np.int32).max)
     assert [q.minimum < 0.0 for q in MADE.values()] == [True, False, True, False, True]
+
+
+def test_unknown_units_are_refused_by_name():
+    with pytest.raises(ValueError, match=r"unit is 'V/N', expected one of plant_fmu\.quantities\.UNITS"):
+        Quantity("V/N", 0.0, 1.0)

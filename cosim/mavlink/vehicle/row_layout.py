@@ -12,6 +12,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array, Column
+from plant_fmu.variables import variables
 
 
 class RowLayout:
@@ -30,8 +31,9 @@ class RowLayout:
         )
 
     def make_first_row(self, scenario: Scenario) -> Array:
-        """Return the row before the first step: the vehicle's initial state, 0 in other columns; returns (n,)."""
-        row = np.zeros(self.length)
+        """Return the row before the first step: start values of the plant's variables, 0 elsewhere; returns (n,)."""
+        starts = {v.name: v.start for v in variables(scenario.vehicle)}
+        row = np.array([starts.get(name, 0.0) for name in self.index])
         initial, commands = scenario.initial, scenario.commands
         roll, pitch, yaw = quaternion_to_euler(initial.quaternion)
         depth = initial.position[2]
