@@ -15,7 +15,7 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cosim.campaigns import Campaign, Comparison, Design, Sweep, compare, run_campaign, run_sweep, vary_from
+    from cosim.campaigns import Campaign, Comparison, Design, compare, run_campaign, run_sweep, vary_from
     from cosim.campaigns.scenes.flyer import SceneFlyer
     from cosim.campaigns.scenes.generator import generate_scenes
     from cosim.campaigns.scenes.scene import Scene
@@ -57,7 +57,6 @@ __all__ = [
     "Scene",
     "SceneFlyer",
     "SceneOrigin",
-    "Sweep",
     "check_scenario",
     "compare",
     "export_run",
@@ -75,7 +74,7 @@ __all__ = [
 ]
 
 _EXPORTS = {
-    "campaigns": {"Campaign", "Comparison", "Design", "Sweep", "compare", "run_campaign", "run_sweep", "vary_from"},
+    "campaigns": {"Campaign", "Comparison", "Design", "compare", "run_campaign", "run_sweep", "vary_from"},
     "campaigns.scenes.flyer": {"SceneFlyer"},
     "campaigns.scenes.generator": {"generate_scenes"},
     "campaigns.scenes.scene": {"Scene"},

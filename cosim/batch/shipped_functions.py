@@ -24,18 +24,12 @@ from controller.regions import Region, Sphere, pack
 from controller.regions.rays import ray_distances
 from controller.regions.region_set import PackedRegions, evaluate_packed, write_clearances
 from cosim.batch.c_calls import Clock
-from cosim.batch.flight_config import (
-    Allocator,
-    BoundArbiter,
-    BoundLaw,
-    FlightConfig,
-    FlightMetrics,
-    FlightOutputs,
-    make_workspace,
-)
+from cosim.batch.flight_config import Allocator, BoundArbiter, BoundLaw, FlightOutputs, make_workspace
+from cosim.batch.fused import configure_flight
 from cosim.batch.fused_loop import fly
 from cosim.scenario.arbiter_rules import PAPER_RULES
 from cosim.scenario.criteria import PAPER
+from cosim.scenario.scenario import load_scenario
 from cosim.scenario.vehicle_model import vehicle_model
 from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, pack_inputs, write_arbiter_state
 from cosim.simulation.compiled_rules import rules_text
@@ -67,7 +61,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
     yield write_arbiter_state, (state, _FLAT, state)
     yield compute_inputs, (inputs, goal, regions, state, _FLAT, _FLAT, empty_signals(inputs, 1, 3))
-    yield fly, _flight_arguments(goal, regions)
+    yield fly, _flight_arguments()
 
 
 def _law_arguments(
@@ -78,19 +72,13 @@ def _law_arguments(
     return state, goal, regions, _FLAT, gains, made.memory, np.zeros(made.n_forces)
 
 
-def _flight_arguments(goal: PackedRegions, regions: PackedRegions) -> tuple[Any, ...]:
-    references = np.zeros(1, np.uint32)
+def _flight_arguments() -> tuple[Any, ...]:
+    references, reports = np.zeros(1, np.uint32), np.zeros((0, 0))
     native = Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)
-    inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
-    setup = FlightConfig(
-        goal, regions, _INTEGERS, _FLAT, inputs, 1.0, 1, 1, 1, False, _TABLE, 1, True, np.zeros((0, 6)), 0.0, 0.0,
-        False, False, SensorModel(), _INTEGERS, _INTEGERS, _FLAT, _INTEGERS, _INTEGERS, _FLAT, False, 1, -1,
-        Clock().numbers,
-    )  # fmt: skip
-    out = FlightOutputs(np.zeros(len(FlightMetrics._fields)), _FLAT, np.zeros((0, 0)), np.zeros((0, 0)))
+    setup = configure_flight(load_scenario("paper"), 1, Clock().numbers)
     law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
-    arbiter = BoundArbiter(0, 0)
-    return setup, native, native, native, allocator, law, arbiter, make_workspace(setup, 3, 1, 1), out
+    out = FlightOutputs(_FLAT, _FLAT, reports, reports)
+    return setup, native, native, native, allocator, law, BoundArbiter(0, 0), make_workspace(setup, 3, 1, 1), out
 
 
 def shipped_texts() -> dict[str, str]:
@@ -112,16 +100,12 @@ def write_libraries(platforms: str, folder: Path) -> None:
         (folder / platform.name).mkdir()
     texts = sorted(set(shipped_texts().values()))
     with temporary_folder("subreach-") as scratch, ThreadPoolExecutor(os.cpu_count()) as pool:
-        sources = [_written(text, scratch) for text in texts]
+        sources = [scratch / f"{library_name(text)}.c" for text in texts]
+        for source, text in zip(sources, texts, strict=True):
+            source.write_text(text, encoding="utf-8")
         made = [pool.submit(_compile, source, folder, *compiler) for source in sources for compiler in compilers]
         for library in made:
             library.result()
-
-
-def _written(text: str, folder: Path) -> Path:
-    source = folder / f"{library_name(text)}.c"
-    source.write_text(text, encoding="utf-8")
-    return source
 
 
 def _compile(source: Path, folder: Path, platform: Platform, compiler: list[str]) -> None:

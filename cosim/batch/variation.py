@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 from controller import ControllerError
@@ -35,23 +35,16 @@ class Variation:
 
     def scenario(self, values: Sequence[float], seed: int) -> Scenario:
         """Make the scenario for values and a seed."""
-        changes = dict(self._changes(values, seed))
+        changes: dict[str, float | int] = {
+            key: _convert(self.number(key), float(value), key) for key, value in zip(self.keys, values, strict=True)
+        }
+        changes |= dict.fromkeys(self._seeds, int(seed))
         table = with_values(self.base.table, changes)
-        table["changed"] = join_keys(table["changed"], (k for k, value in changes.items() if value != self.number(k)))
+        table["changed"] = join_keys(table["changed"], (k for k, x in changes.items() if x != self.number(k)))
         try:
             return validate_scenario(table, self.base.name, self.base.vehicle)
         except (PlantFmuError, ControllerError) as error:
             raise ScenarioError(str(error)) from error
-
-    def overrides(self, values: Sequence[float], seed: int) -> list[str]:
-        """Return the overrides for ``--set`` that make the same scenario from the base."""
-        return [f"{key}={value!r}" for key, value in self._changes(values, seed)]
-
-    def _changes(self, values: Sequence[float], seed: int) -> Iterator[tuple[str, float | int]]:
-        for key, value in zip(self.keys, values, strict=True):
-            yield key, _convert(self.number(key), float(value), key)
-        for key in self._seeds:
-            yield key, int(seed)
 
     def _has(self, key: str) -> bool:
         try:

@@ -3,25 +3,27 @@
 Scenes flown by one law or by several, or one scenario with varied numbers. Public: `run_campaign`, `compare`,
 `run_sweep`, `vary_from`.
 
-Imports: controller, io, plant_fmu, report, run, scenario.
+Imports: controller, io, plant_fmu, report, run, scenario, simulation.
 """
 
 import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from cosim.campaigns.campaign import Campaign, run_campaign
+    from cosim.campaigns.campaign import run_campaign
     from cosim.campaigns.comparison import Comparison, compare
-    from cosim.campaigns.sweep import Sweep, run_sweep
+    from cosim.campaigns.runner import Campaign
+    from cosim.campaigns.sweep import run_sweep
     from cosim.campaigns.sweeps.design import Design, Vary, vary_from
 
-__all__ = ["Campaign", "Comparison", "Design", "Sweep", "Vary", "compare", "run_campaign", "run_sweep", "vary_from"]
+__all__ = ["Campaign", "Comparison", "Design", "Vary", "compare", "run_campaign", "run_sweep", "vary_from"]
 
 # imported at the first use: reading a scene's text does not need the code that flies it
 _EXPORTS = {
-    "campaign": {"Campaign", "run_campaign"},
+    "campaign": {"run_campaign"},
     "comparison": {"Comparison", "compare"},
-    "sweep": {"Sweep", "run_sweep"},
+    "runner": {"Campaign"},
+    "sweep": {"run_sweep"},
     "sweeps.design": {"Design", "Vary", "vary_from"},
 }
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -11,17 +10,17 @@ import msgspec
 import numpy as np
 
 from cosim.campaigns.analysis.statistics import Facts, mean_ratio, median_difference, paired, rate
-from cosim.campaigns.campaign import Campaign, run_campaign
-from cosim.campaigns.comparison import completed, refuse_other_files
+from cosim.campaigns.analysis.summary import rates_of
+from cosim.campaigns.comparison import Comparison, completed, fly_each, refuse_other_files
+from cosim.campaigns.runner import Campaign
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.kinds import scene_kinds
 from cosim.campaigns.scenes.law_gains import gains_from
-from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.scenes.work import SceneTask
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.io.atomic_file import write_atomic
-from cosim.io.strict_json import json_text
 from cosim.scenario.tables import RuleVariant
+from cosim.simulation.signals import Array
 from plant_fmu.toml_tables import hint
 
 LAW, WHOLE = "deployable", "whole"
@@ -53,15 +52,6 @@ VARIANTS: dict[str, Variant] = {
 }
 
 
-@dataclass(frozen=True)
-class Ablation:
-    """Folder and results of an ablation."""
-
-    folder: Path
-    campaigns: dict[str, Campaign]  # campaign of each variant, the whole law first
-    numbers: dict[str, Any]  # content of ``ablation.json``
-
-
 def ablate(
     scenes: Path,
     out: Path,
@@ -70,7 +60,7 @@ def ablate(
     settings: Sequence[str] = (),
     workers: int = 1,
     progress: bool = False,
-) -> Ablation:
+) -> Comparison:
     """Fly the same scenes with the deployable law, and without one of its parts each."""
     for name in variants:
         if name not in VARIANTS:
@@ -79,53 +69,48 @@ def ablate(
         raise RunError(f"variants are {', '.join(variants) or 'none'}, expected one or more, each once")
     refuse_other_files(out, {NUMBERS, PAGE, WHOLE, *VARIANTS}, "an ablation")
     flown = {WHOLE: Variant("all of it")} | {name: VARIANTS[name] for name in variants}
-    gains, conditions, campaigns = gains_from(LAW, settings), conditions or Conditions(), {}
-    with SceneStore(scenes) as store:
-        for name, variant in flown.items():
-            campaigns[name] = run_campaign(
-                store, LAW, out / name, msgspec.structs.replace(conditions, arbiter=variant.arbiter),
-                gains._replace(**variant.gains), workers, progress=progress,
-            )  # fmt: skip
-        whole = campaigns[WHOLE].results
-        numbers = {
+    gains, conditions = gains_from(LAW, settings), conditions or Conditions()
+
+    def numbers(campaigns: Mapping[str, Campaign]) -> dict[str, Any]:
+        whole = campaigns[WHOLE]
+        return {
             "law": LAW,
-            "scenes": len(store),
-            "scenes_sha256": store.digest,
             "variants": {
-                name: {"description": variant.description, **_beside(whole, campaigns[name].results)}
+                name: {"description": variant.description, **_compare(whole.results, campaigns[name].results)}
                 for name, variant in flown.items()
             },
-            "versions": campaigns[WHOLE].summary["versions"],
-            "code_sha256": campaigns[WHOLE].summary["code_sha256"],
+            "versions": whole.summary["versions"],
+            "code_sha256": whole.summary["code_sha256"],
         }
-    try:
-        write_atomic(out / NUMBERS, json_text(numbers))
-    except OSError as error:
-        raise RunError(f"{out}: {error.strerror or error}") from error
-    return Ablation(out, campaigns, numbers)
 
-
-def _beside(whole: Results, results: Results) -> dict[str, Any]:
-    """Compare a variant with the whole law, over all scenes and by their kinds."""
-    every = np.ones(len(results), dtype=bool)
-    return _numbers(whole, results, every) | {
-        "kinds": {name: _numbers(whole, results, of) for name, of in scene_kinds(results).groups()}
+    tasks = {
+        name: SceneTask(
+            LAW, gains._replace(**variant.gains), msgspec.structs.replace(conditions, arbiter=variant.arbiter)
+        )
+        for name, variant in flown.items()
     }
+    return fly_each(scenes, out, tasks, NUMBERS, numbers, workers, progress)
 
 
-def _numbers(whole: Results, results: Results, of: Facts) -> dict[str, Any]:
-    """Compare on scenes `of`; ratios and differences are of the whole law to this variant."""
-    theirs, mine = completed(results)[of], completed(whole)[of]
-    violation = {name: rows.number("weighted_violation", absent=np.nan)[of] for name, rows in
-                 ((WHOLE, whole), ("variant", results))}  # fmt: skip
-    both = theirs & mine
+def _compare(whole: Results, results: Results) -> dict[str, Any]:
+    """Compare a variant with the whole law, over all scenes and by their kinds."""
+    kinds = {name: _numbers(whole, results, rows) for name, rows in scene_kinds(results).groups()}
+    return _numbers(whole, results, np.ones(len(results), dtype=bool)) | {"kinds": kinds}
+
+
+def _numbers(whole: Results, results: Results, rows: Facts) -> dict[str, Any]:
+    """Compare on some scenes; ratios and differences are of the whole law to this variant."""
+    by_whole, by_variant = completed(whole)[rows], completed(results)[rows]
+
+    def columns(name: str) -> tuple[Array, Array]:
+        return whole.number(name)[rows], results.number(name)[rows]
+
+    times = columns("reach_time")
     return {
-        "scenes": int(of.sum()),
-        "completed": rate(theirs),
-        "reached": rate(results["reached"][of]),
-        "violation": rate(results["violation"][of]),
-        "paired": paired(mine, theirs),
-        "weighted_violation": mean_ratio(violation[WHOLE], violation["variant"]),
-        "reach_time": median_difference((whole.number("reach_time")[of] - results.number("reach_time")[of])[both]),
-        "thrust_variation": mean_ratio(whole.number("thrust_variation")[of], results.number("thrust_variation")[of]),
+        "scenes": int(rows.sum()),
+        **{name: rate(happened[rows]) for name, happened in rates_of(results).items()},
+        "paired": paired(by_whole, by_variant),
+        "weighted_violation": mean_ratio(*columns("weighted_violation")),
+        "reach_time": median_difference((times[0] - times[1])[by_whole & by_variant]),
+        "thrust_variation": mean_ratio(*columns("thrust_variation")),
     }

@@ -4,40 +4,15 @@ from __future__ import annotations
 
 import contextlib
 from concurrent.futures import Executor
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from cosim.campaigns.analysis.summary import summarize_campaign
-from cosim.campaigns.runner import carry_out
+from cosim.campaigns.runner import Campaign, carry_out
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.campaigns.scenes.work import SceneTask, SceneWork
-from cosim.campaigns.store.folder import SUMMARY
-from cosim.campaigns.store.results import Results
-from cosim.io.atomic_file import write_atomic
-from cosim.io.strict_json import json_text
-
-
-@dataclass(frozen=True)
-class Campaign:
-    r"""Folder, rows and summary of a campaign.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> import cosim
-    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
-    >>> campaign = cosim.run_campaign(Path("scenes.jsonl"), "pd", Path("pd"))
-    >>> campaign.flown, len(campaign.results)
-    (2, 2)
-    """
-
-    folder: Path
-    results: Results
-    summary: dict[str, Any]
-    flown: int  # number of scenes flown by this call
 
 
 def run_campaign(
@@ -104,11 +79,6 @@ def run_campaign(
     with contextlib.ExitStack() as stack:
         store = scenes if isinstance(scenes, SceneStore) else stack.enter_context(SceneStore(Path(scenes)))
         work = SceneWork(store, task)
-        summary: dict[str, Any] = {}
-
-        def conclude(results: Results) -> None:
-            summary.update(summarize_campaign(work.flown, results, out))
-            write_atomic(out / SUMMARY, json_text(summary))
-
-        done = carry_out(work, out, workers, executor, progress, conclude)
-    return Campaign(out, done.results, summary, done.flown)
+        return carry_out(
+            work, out, lambda results: summarize_campaign(work.plan, results, out), workers, executor, progress
+        )

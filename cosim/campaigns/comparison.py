@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from controller import LAWS
-from cosim.campaigns.analysis.statistics import median_difference, paired
-from cosim.campaigns.analysis.summary import median
-from cosim.campaigns.campaign import Campaign, run_campaign
+from cosim.campaigns.analysis.statistics import Facts, median_difference, paired
+from cosim.campaigns.analysis.summary import median, rates_of
+from cosim.campaigns.campaign import run_campaign
 from cosim.campaigns.pages.comparison_page import NUMBERS, PAGE
 from cosim.campaigns.pages.replays import WORST
+from cosim.campaigns.runner import Campaign
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.law_gains import law_named
+from cosim.campaigns.scenes.law_gains import gains_from, law_named
 from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.scenes.work import SceneTask
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic
@@ -28,7 +30,7 @@ from cosim.report.web_page import FIGURES
 
 @dataclass(frozen=True)
 class Comparison:
-    r"""Folder and results of a comparison.
+    r"""Folder and results of a comparison or an ablation.
 
     Examples
     --------
@@ -41,8 +43,8 @@ class Comparison:
     """
 
     folder: Path
-    campaigns: dict[str, Campaign]  # campaign of each law
-    numbers: dict[str, Any]  # content of ``compare.json``
+    campaigns: dict[str, Campaign]  # campaign of each law, or of each variant of the law
+    numbers: dict[str, Any]  # content of ``compare.json`` or ``ablation.json``
 
 
 def compare(
@@ -95,72 +97,78 @@ def compare(
     >>> sorted(path.name for path in comparison.folder.iterdir() if path.is_dir())
     ['pd', 'sun_cheah']
     """
-    scenes, out = Path(scenes), Path(out)
     for law in laws:
         law_named(law)
     if len(laws) < 2 or len(set(laws)) < len(laws):
         raise RunError(f"laws are {', '.join(laws) or 'none'}, expected two or more, each once")
+    out, gains, conditions = Path(out), gains or {}, conditions or Conditions()
     refuse_other_files(out, {NUMBERS, PAGE, *LAWS}, "a comparison")
-    campaigns = {}
-    with SceneStore(scenes) as store:
-        for law in laws:
-            campaigns[law] = run_campaign(
-                store, law, out / law, conditions, (gains or {}).get(law), workers, progress=progress
-            )
-        numbers = {
-            "scenes": len(store),
-            "scenes_sha256": store.digest,
+
+    def numbers(campaigns: Mapping[str, Campaign]) -> dict[str, Any]:
+        results = {law: campaign.results for law, campaign in campaigns.items()}
+        return {
             "laws": {law: campaign.summary for law, campaign in campaigns.items()},
-            "pairs": [
-                medians_where_completed(one, campaigns[one].results, other, campaigns[other].results)
-                for one in laws
-                for other in laws
-                if one != other
-            ],
-            "paired": [
-                paired_differences(one, campaigns[one].results, other, campaigns[other].results)
-                for one, other in itertools.combinations(laws, 2)
-            ],
+            "pairs": [medians_where_completed(one, other, results) for one, other in itertools.permutations(laws, 2)],
+            "paired": [paired_differences(one, other, results) for one, other in itertools.combinations(laws, 2)],
         }
+
+    tasks = {law: SceneTask(law, gains.get(law) or gains_from(law), conditions) for law in laws}
+    return fly_each(Path(scenes), out, tasks, NUMBERS, numbers, workers, progress)
+
+
+def fly_each(
+    scenes: Path,
+    out: Path,
+    tasks: Mapping[str, SceneTask],
+    file: str,
+    compute_numbers: Callable[[Mapping[str, Campaign]], dict[str, Any]],
+    workers: int,
+    progress: bool,
+) -> Comparison:
+    """Fly the same scenes by each task, as a campaign in the folder of its name, and write the numbers to a file."""
+    with SceneStore(scenes) as store:
+        campaigns = {
+            name: run_campaign(store, task.law, out / name, task.conditions, task.gains, workers, progress=progress)
+            for name, task in tasks.items()
+        }
+        numbers = {"scenes": len(store), "scenes_sha256": store.digest, **compute_numbers(campaigns)}
     try:
-        write_atomic(out / NUMBERS, json_text(numbers))
+        write_atomic(out / file, json_text(numbers))
     except OSError as error:
         raise RunError(f"{out}: {error.strerror or error}") from error
     return Comparison(out, campaigns, numbers)
 
 
-def medians_where_completed(one: str, results: Results, other: str, others: Results) -> dict[str, Any]:
-    """Compare two laws on the scenes that one of them completes without a violation; returns [s]."""
-    at = completed(results)
+def medians_where_completed(one: str, other: str, results: Mapping[str, Results]) -> dict[str, Any]:
+    """Compare two laws on the scenes that the first of them completes without a violation."""
+    rows = completed(results[one])
     return {
         "completed_by": one,
-        "scenes": int(at.sum()),
+        "scenes": int(rows.sum()),
         "beside": other,
-        "completed_by_both": int((at & completed(others)).sum()),
-        "reach_time": {
-            law: median(rows.number("reach_time", absent=np.inf)[at]) for law, rows in ((one, results), (other, others))
-        },
-        "effort": {law: median(rows.number("effort")[at]) for law, rows in ((one, results), (other, others))},
+        "completed_by_both": int((rows & completed(results[other])).sum()),
+        "reach_time": {law: median(results[law].number("reach_time", missing=np.inf)[rows]) for law in (one, other)},
+        "effort": {law: median(results[law].number("effort")[rows]) for law in (one, other)},
     }
 
 
-def paired_differences(one: str, results: Results, other: str, others: Results) -> dict[str, Any]:
-    """Compare two laws scene by scene; returns [s]."""
-    mine, theirs = completed(results), completed(others)
-    both = mine & theirs
+def paired_differences(one: str, other: str, results: Mapping[str, Results]) -> dict[str, Any]:
+    """Compare two laws scene by scene."""
+    by_one, by_other = completed(results[one]), completed(results[other])
+    both = by_one & by_other
     return {
         "laws": [one, other],
-        **paired(mine, theirs),
+        **paired(by_one, by_other),
         "differences": {
-            name: median_difference((results.number(name) - others.number(name))[both])
+            name: median_difference((results[one].number(name) - results[other].number(name))[both])
             for name in ("reach_time", "effort")
         },
     }
 
 
-def completed(results: Results) -> Any:
-    """Return a mask of the scenes that were reached without a violation, bool, shape (scenes,)."""
-    return results["reached"] & ~results["violation"]
+def completed(results: Results) -> Facts:
+    """Return a mask of the scenes that were reached without a violation, shape (scenes,)."""
+    return rates_of(results)["completed"]
 
 
 def refuse_other_files(out: Path, own: set[str], kind: str) -> None:

@@ -16,7 +16,7 @@ from cosim.errors import ExportError
 from cosim.io.strict_json import json_text
 from cosim.results.record import Rows
 from cosim.results.run_result import SCENARIO, Run, load_run
-from cosim.simulation.signals import Array, Column
+from cosim.simulation.signals import Column
 
 _ROUNDING = 1e-6  # periods, tolerance of the comparison of times and ticks
 
@@ -26,24 +26,20 @@ class Excerpt:
     """A run with the selection of its signals and steps."""
 
     run: Run
-    picked: tuple[int, ...]  # indices of the signals in a row of the record, rising, `time` included
+    indices: tuple[int, ...]  # indices of the signals in a row of the record, rising, `time` included
     every: int  # export every n-th step, from the first one on
     rate: float | None = None  # Hz, steps per simulated second instead of `every`
 
     @property
     def columns(self) -> tuple[Column, ...]:
         """Columns of the selected signals, in the order of the record."""
-        return tuple(self.run.record.columns[i] for i in self.picked)
+        return tuple(self.run.record.columns[i] for i in self.indices)
 
     @property
-    def scenario_text(self) -> str:
-        """Text of the scenario file in the run folder."""
-        return (self.run.folder / SCENARIO).read_text(encoding="utf-8")
-
-    @property
-    def summary_text(self) -> str:
-        """The summary as JSON, with null for NaN and infinity."""
-        return json_text(self.run.summary)
+    def texts(self) -> dict[str, str]:
+        """Scenario file of the run folder, and summary as JSON with null for NaN and infinity, by file name."""
+        scenario = (self.run.folder / SCENARIO).read_text(encoding="utf-8")
+        return {"scenario.toml": scenario, "summary.json": json_text(self.run.summary)}
 
     @cached_property
     def count(self) -> int:
@@ -67,24 +63,22 @@ class Excerpt:
 
     def take(self, steps: NDArray[np.intp], names: Sequence[str]) -> Rows:
         """Return a selection of the exported steps; `steps` are indices among them, rising, from 0."""
-        found: list[Rows] = []
+        parts: list[Rows] = []
         first = 0
         for block in self.blocks(names):
-            found.append(block.take(steps[(steps >= first) & (steps < first + len(block))] - first))
+            parts.append(block.take(steps[(steps >= first) & (steps < first + len(block))] - first))
             first += len(block)
-        return Rows(found[0].columns, {name: np.concatenate([rows[name] for rows in found]) for name in names})
-
-    def signal(self, name: str) -> Array:
-        """Return a signal of the record at all exported steps, shape (count,)."""
-        return np.concatenate([block[name] for block in self.blocks([name])])
+        return Rows(parts[0].columns, {name: np.concatenate([rows[name] for rows in parts]) for name in names})
 
 
 def excerpt_of(folder: Path, signals: Sequence[str] = (), every: int = 1, rate: float | None = None) -> Excerpt:
     """Select signals and steps of a run for export; rate [Hz]."""
     run = load_run(folder)
     names = [column.name for column in run.record.columns]
-    wanted = {name for pattern in signals for name in _match_names(pattern, names)} | {"time"} if signals else {*names}
-    return Excerpt(run, tuple(i for i, name in enumerate(names) if name in wanted), every, rate)
+    selected = (
+        {name for pattern in signals for name in _match_names(pattern, names)} | {"time"} if signals else {*names}
+    )
+    return Excerpt(run, tuple(i for i, name in enumerate(names) if name in selected), every, rate)
 
 
 def _match_names(pattern: str, names: Sequence[str]) -> list[str]:

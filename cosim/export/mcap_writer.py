@@ -29,6 +29,10 @@ from cosim.results.run_result import Run
 
 PACKAGE = "subreach"  # Protobuf package of the signals' schemas
 _CHUNK = 4 * 2**20  # bytes
+_TOPICS = {
+    "/tf_static": FrameTransforms, "/tf": FrameTransforms, "/vehicle/pose": PoseInFrame, "/vehicle/model": SceneUpdate,
+    "/scene": SceneUpdate, "/log": Log,
+}  # fmt: skip
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
@@ -36,18 +40,12 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=_CHUNK)
         writer.start(library="subreach")
-        _attach(writer, excerpt)
+        for name, text in excerpt.texts.items():
+            kind = f"application/{name.rpartition('.')[2]}"
+            writer.add_attachment(create_time=0, log_time=0, name=name, media_type=kind, data=text.encode())
         _write_messages(writer, excerpt)
         writer.finish()
     return [path]
-
-
-def _attach(writer: Writer, excerpt: Excerpt) -> None:
-    for name, kind, text in (
-        ("scenario.toml", "application/toml", excerpt.scenario_text),
-        ("summary.json", "application/json", excerpt.summary_text),
-    ):
-        writer.add_attachment(create_time=0, log_time=0, name=name, media_type=kind, data=text.encode())
 
 
 def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
@@ -57,7 +55,7 @@ def _write_messages(writer: Writer, excerpt: Excerpt) -> None:
     for rows in excerpt.blocks():
         block = rows.to_array()
         times = np.rint(block[:, 0] * 1e9).astype(np.int64).tolist()
-        messages = zip(*(numbers_messages(block[:, picked]) for _, picked in tables), strict=True)
+        messages = zip(*(numbers_messages(block[:, indices]) for _, indices in tables), strict=True)
         draw = drawing.row_writer(rows)
         for i, (time, row) in enumerate(zip(times, messages, strict=True)):
             for (channel, _), message in zip(tables, row, strict=True):
@@ -76,7 +74,7 @@ def _tables(writer: Writer, excerpt: Excerpt) -> list[tuple[int, list[int]]]:
         schema = writer.register_schema(f"{PACKAGE}.{name}", "protobuf", numbers_schema(PACKAGE, name, fields))
         descriptions = {f: f"{c.name} [{c.unit or '-'}]: {c.description}" for f, c in zip(fields, columns, strict=True)}
         channel = writer.register_channel(f"/signals/{name}", "protobuf", schema, metadata=descriptions)
-        tables.append((channel, [excerpt.picked[i] for i in members.values()]))
+        tables.append((channel, [excerpt.indices[i] for i in members.values()]))
     return tables
 
 
@@ -85,16 +83,10 @@ class _Drawing:
 
     def __init__(self, writer: Writer, run: Run, scene: Scene) -> None:
         self._writer, self._run, self._scene = writer, run, scene
-        self._channels: dict[str, int] = {}
-        for topic, kind in (
-            ("/tf_static", FrameTransforms),
-            ("/tf", FrameTransforms),
-            ("/vehicle/pose", PoseInFrame),
-            ("/vehicle/model", SceneUpdate),
-            ("/scene", SceneUpdate),
-            ("/log", Log),
-        ):
-            self._channels[topic] = writer.register_channel(topic, "protobuf", register_schema(writer, kind))
+        self._channels = {
+            topic: writer.register_channel(topic, "protobuf", register_schema(writer, message))
+            for topic, message in _TOPICS.items()
+        }
         self._solids = [*scene.solids]
         self._drawn: int | None = None  # index of the region that is shown as active
         self._changes, self._events = deque(scene.changes), deque(events_of(run, scene.log))

@@ -94,10 +94,8 @@ class _Sender:
 
     def send_texts(self) -> None:
         """Send scenario and summary."""
-        for name, kind, text in (
-            ("scenario", "toml", self._excerpt.scenario_text),
-            ("summary", "json", self._excerpt.summary_text),
-        ):
+        for file, text in self._excerpt.texts.items():
+            name, _, kind = file.partition(".")
             self._stay(name, rr.TextDocument(f"```{kind}\n{text}\n```", media_type=rr.MediaType.MARKDOWN))
 
     def send_names(self) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,45 +11,44 @@ import numpy as np
 from cosim.campaigns.analysis.statistics import Facts, quantiles, rate
 from cosim.campaigns.analysis.worst_rows import worst_table
 from cosim.campaigns.scenes.kinds import scene_kinds
-from cosim.campaigns.scenes.plan import Plan
 from cosim.campaigns.store.results import Results
 from cosim.simulation.signals import Array
 
 SPREADS = ("reach_time", "min_clearance", "effort", "thrust_variation")  # columns with quantiles
 OF_ALL = ("min_clearance",)  # columns with quantiles over all scenes; the others over those that were reached
-_REASONS = 5  # greatest number of listed reasons for refusing scenes
+_REASONS = 5  # greatest number of listed reasons for refusing rows
 MEDIANS = ("reach_time", "effort", "thrust_variation", "min_clearance", "worst_step_time")  # columns with medians
 
 
-def summarize_campaign(plan: Plan, results: Results, folder: Path) -> dict[str, Any]:
+def summarize_campaign(plan: Mapping[str, Any], results: Results, folder: Path) -> dict[str, Any]:
     """Summarize a campaign."""
     reached, violation, seeds = results["reached"], results["violation"], results["seed"]
-    stopped = ~np.isnan(results.number("stopped_at"))
+    stopped = ~results.is_null("stopped_at")
     return {
-        "law": plan.law,
+        "law": plan["law"],
         "scenes": len(results),
         "reached": int(reached.sum()),
         "violations": int(violation.sum()),
         "stopped": int(stopped.sum()),
-        "refused": int((~results.absent("refused")).sum()),
-        "reasons": _reasons(results),
+        "refused": int((~results.is_null("refused")).sum()),
+        "reasons": refusal_reasons(results),
         **_spread(results, np.ones(len(results), dtype=bool)),
         "kinds": {
-            name: {"scenes": int(of.sum()), **_spread(results, of)} for name, of in scene_kinds(results).groups()
+            name: {"scenes": int(rows.sum()), **_spread(results, rows)} for name, rows in scene_kinds(results).groups()
         },
         "medians": {name: median(results.number(name)[reached]) for name in MEDIANS},
-        "least_clearance": _or_none(np.min, results.number("min_clearance")),
-        "mean_weighted_violation": _or_none(np.mean, results.number("weighted_violation")),
+        "least_clearance": _finite(np.min, results.number("min_clearance")),
+        "mean_weighted_violation": _finite(np.mean, results.number("weighted_violation")),
         "bound_exceeded": int((results.number("bound_excess") > 0.0).sum()),
-        "worst_step_time": _or_none(np.max, results.number("worst_step_time")),
+        "worst_step_time": _finite(np.max, results.number("worst_step_time")),
         "failed": {
             "not_reached": seeds[~reached].tolist(),
             "violated": seeds[violation].tolist(),
             "stopped": seeds[stopped].tolist(),
         },
         "worst": worst_table(results, folder),
-        "report_failures": plan.conditions.report_failures,
-        **{key: value for key, value in plan.table().items() if key not in ("law", "scenes")},
+        "report_failures": plan["conditions"]["report_failures"],
+        **{key: value for key, value in plan.items() if key not in ("law", "scenes")},
     }
 
 
@@ -58,29 +58,31 @@ def rates_of(results: Results) -> dict[str, Facts]:
     return {"completed": reached & ~violation, "reached": reached, "violation": violation}
 
 
-def _spread(results: Results, of: Facts) -> dict[str, Any]:
-    """Return rates and quantiles over a mask `of` of scenes, shape (scenes,)."""
+def _spread(results: Results, rows: Facts) -> dict[str, Any]:
+    """Return rates and quantiles over a mask of scenes, shape (scenes,)."""
     reached = results["reached"]
     return {
-        "rates": {name: rate(happened[of]) for name, happened in rates_of(results).items()},
+        "rates": {name: rate(happened[rows]) for name, happened in rates_of(results).items()},
         "quantiles": {
-            name: quantiles(results.number(name)[of if name in OF_ALL else of & reached]) for name in SPREADS
+            name: quantiles(results.number(name)[rows if name in OF_ALL else rows & reached]) for name in SPREADS
         },
     }
 
 
-def _reasons(results: Results) -> dict[str, str]:
-    """Return the reasons for refusing the first refused scenes, by seed."""
-    first = np.flatnonzero(~results.absent("refused"))[:_REASONS]
-    return {str(seed): str(why) for seed, why in zip(results["seed"][first], results["refused"][first], strict=True)}
+def refusal_reasons(results: Results) -> dict[str, str]:
+    """Return the reasons for refusing the first refused rows, by key."""
+    first = np.flatnonzero(~results.is_null("refused"))[:_REASONS]
+    keys = results[results.schema.names[0]][first]
+    return {str(key): str(reason) for key, reason in zip(keys, results["refused"][first], strict=True)}
 
 
 def median(values: Array) -> float | None:
     """Return the median of numbers without NaN; None if it is not finite, or without numbers."""
-    return _or_none(np.median, values[~np.isnan(values)])
+    return _finite(np.median, values)
 
 
-def _or_none(of: Any, values: Array) -> float | None:
+def _finite(statistic: Any, values: Array) -> float | None:
+    """Return a statistic of the numbers without NaN; None if it is not finite, or without numbers."""
     values = values[~np.isnan(values)]
-    result = float(of(values)) if values.size else np.nan
+    result = float(statistic(values)) if values.size else np.nan
     return result if np.isfinite(result) else None

@@ -36,9 +36,9 @@ def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
     far = results.number("closest_to_goal", 0.0) if "closest_to_goal" in names else np.zeros(len(keys))
     group = np.where(violated, 0, np.where(reached, 2, 1))
     badness = np.select([group == 0, group == 1], [depth, far], np.nan_to_num(time))
-    flown = np.flatnonzero(results.absent("refused"))
+    flown = np.flatnonzero(results.is_null("refused"))
     order = flown[np.lexsort((keys[flown], -badness[flown], group[flown]))][: max(count, 0)]
-    found = []
+    worst = []
     for i in order:
         if np.isfinite(stopped[i]):
             why = f"stopped at {stopped[i]:.2f} s"
@@ -48,8 +48,8 @@ def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
             why = f"not reached, {far[i]:.2f} m short" if far[i] > 0.0 else "not reached"
         else:
             why = f"reached at {time[i]:.2f} s"
-        found.append(Worst(int(keys[i]), why))
-    return found
+        worst.append(Worst(int(keys[i]), why))
+    return worst
 
 
 def worst_table(results: Results, folder: Path, count: int = LISTED) -> list[dict[str, Any]]:

@@ -2,6 +2,6 @@
 
 Rows are flown as those of campaigns and sweeps are, but each depends on the results of earlier ones.
 
-Imports: campaigns.analysis, campaigns.scenes, campaigns.store, campaigns.sweeps, campaigns.workers, io, plant_fmu,
+Imports: campaigns.analysis, campaigns.scenes, campaigns.store, campaigns.sweeps, campaigns.workers, plant_fmu,
 scenario.
 """

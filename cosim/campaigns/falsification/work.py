@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
@@ -15,14 +15,13 @@ from cosim.campaigns.falsification.search import import_cma
 from cosim.campaigns.falsification.spaces import FAMILIES, SceneSpace
 from cosim.campaigns.falsification.splitting import LEAST_BUDGET
 from cosim.campaigns.scenes.generator import generate_scenes
-from cosim.campaigns.scenes.plan import plan_of
 from cosim.campaigns.scenes.rows import SCHEMA, refused_row, table_of
 from cosim.campaigns.scenes.work import SceneTask
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweep import run_sweep
 from cosim.campaigns.sweeps.design import Design, Vary
 from cosim.campaigns.sweeps.rows import SweepBatch, SweepWork
-from cosim.campaigns.workers.work import Rows
+from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
 from cosim.scenario.scenario import Scenario
 from plant_fmu.archive import temporary_folder
@@ -61,22 +60,20 @@ class SearchSettings:
         return asdict(self) | ({} if self.rare_event else {"cma": import_cma().__version__})
 
 
-class SceneSearch:
+class SceneSearch(Work):
     """A search for the worst scenes of a family of the generator."""
 
     unit, schema = "scene", SCHEMA
-    files: Mapping[str, bytes] = {}
 
     def __init__(self, family: str, task: SceneTask, settings: SearchSettings) -> None:
         if family not in FAMILIES:
             raise RunError(f"family {family!r} is unknown; {hint(family, FAMILIES)}")
         self._space = SceneSpace(family, None if settings.rare_event else _LIMIT)
         self.dimension, self.horizon = self._space.dimension, task.conditions.duration
-        self.family, self.name, self.task, self.settings = family, task.law, task, settings
+        self.family, self.name, self.settings = family, task.law, settings
+        self.task = self._task = task
         self.title = f"The {task.law} law on {family} scenes"
-        plan = plan_of(task.law, task.gains, task.conditions, settings.budget, "").table()
-        del plan["scenes_sha256"]  # they follow from the search
-        self.plan: Mapping[str, Any] = plan | {"search": {"family": family, **settings.table()}}
+        self.plan = task.plan(settings.budget) | {"search": {"family": family, **settings.table()}}
         self._lines: list[bytes] = []
 
     def __len__(self) -> int:
@@ -92,10 +89,6 @@ class SceneSearch:
         """Return the scenes of some rows, as lines of JSON."""
         return [self._lines[row] for row in rows]
 
-    def rows_of(self, keys: Rows) -> Rows:
-        """Return the rows of some seeds, which equal their numbers; -1 for a seed without a row."""
-        return np.where((keys >= 0) & (keys < len(self)), keys, -1)
-
     def refused(self, row: int, reason: str) -> Any:
         """Return the table of one scene that could not be flown."""
         return table_of([refused_row(row, reason, self._lines[row].decode().strip())])
@@ -103,9 +96,8 @@ class SceneSearch:
     def fly_random(self, out: Path, workers: int, progress: bool) -> Results:
         """Fly random scenes of the generator, as many as the budget."""
         with temporary_folder("falsify-") as folder:
-            scenes = folder / "scenes.jsonl"
+            scenes, task = folder / "scenes.jsonl", self._task
             scenes.write_text("\n".join(generate_scenes(len(self), self.settings.seed, self.family)))
-            task = self.task
             return run_campaign(scenes, task.law, out, task.conditions, task.gains, workers, progress=progress).results
 
 

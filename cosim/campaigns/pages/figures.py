@@ -126,7 +126,7 @@ def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
             rates = [rate(happened[part.rows]) for part in parts]
             shares, low, high = (np.array([r[name] for r in rates]) for name in ("share", "low", "high"))
             axes.errorbar(
-                [part.middle for part in parts], shares, yerr=(shares - low, high - shares), label=fact,
+                [part.median for part in parts], shares, yerr=(shares - low, high - shares), label=fact,
                 color=FACT_COLOURS[fact], marker=_MARKS[fact], markersize=4, linewidth=1.0, elinewidth=1.6,
             )  # fmt: skip
         _across(axes, key)

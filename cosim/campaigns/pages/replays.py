@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
 
 WORST = "worst"  # folder of the replays
-_FLOWN = "flown.json"  # file beside a replay with remarks on differing flights
+_REMARKS = "flown.json"  # file beside a replay with remarks on differing flights
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def write_page_with_replays(
 def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Replay:
     """Fly a row of one or several campaigns again, unless done before, and write a page with the flights."""
     place = out / WORST / str(key)
-    if not (place / _FLOWN).exists():
+    if not (place / _REMARKS).exists():
         place.parent.mkdir(exist_ok=True)
         with temporary_folder(f".{key}-", place.parent) as scratch:
             traces, remarks = [], []
@@ -77,13 +77,13 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
                 remarks += [name + remark] if remark else []
             if traces:
                 write_page(scratch / REPLAY, traces, title)
-            write_atomic(scratch / _FLOWN, json_text({"remarks": remarks}))
+            write_atomic(scratch / _REMARKS, json_text({"remarks": remarks}))
             scratch.chmod(0o755)
             shutil.rmtree(place, ignore_errors=True)
             scratch.replace(place)
-    stored = read_json(place / _FLOWN).get("remarks")
+    stored = read_json(place / _REMARKS).get("remarks")
     if not (isinstance(stored, list) and all(isinstance(remark, str) for remark in stored)):
-        raise RunError(f"{place / _FLOWN}: cannot be read: remarks are missing")
+        raise RunError(f"{place / _REMARKS}: cannot be read: remarks are missing")
     return Replay(f"{WORST}/{key}/{REPLAY}" if (place / REPLAY).exists() else None, tuple(stored))
 
 
@@ -91,7 +91,7 @@ def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
     """Fly a row step by step; return its trace, None if it cannot be shown, and a remark."""
     if repeat.scenario is None:
         return None, f"was not flown: {repeat.stored['refused']}"
-    apart, remark = {}, ""
+    remark = ""
     try:
         try:
             run_scenario(repeat.scenario, folder, report=False)
@@ -100,8 +100,7 @@ def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:
         run = load_run(folder)
         if run.summary["status"] == "interrupted":
             raise KeyboardInterrupt
-        if run.summary["status"] == "completed":
-            apart = repeat.apart(repeat.outcome(repeat.scenario, run.record, run.summary))
+        apart = repeat.differences(run)
         trace = trace_of(run).as_json()
     except CosimError as error:
         return None, f"cannot be shown: {remark or error}"

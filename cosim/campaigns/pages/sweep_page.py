@@ -74,7 +74,7 @@ def _drawings(results: Results, s: dict[str, Any]) -> Iterator[NamedFigure]:
     from cosim.campaigns.pages.figures import Key, Rated, binned_rates, distributions, forest, scatter
     from cosim.report.figures.style import NamedFigure
 
-    flown = results.absent("refused")
+    flown = results.is_null("refused")
     lines = [Rated(fact, "", s["flown"], s[fact]) for fact in FACTS]
     caption = "How many rows reached the goal, settled there, and violated a hard region."
     yield NamedFigure("rates", caption, forest(lines))

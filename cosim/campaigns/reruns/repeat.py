@@ -29,8 +29,7 @@ from cosim.campaigns.workers.dispatch import KILLED
 from cosim.campaigns.workers.work import Task
 from cosim.errors import CosimError, RunError
 from cosim.io.strict_json import understood
-from cosim.results.record import Record
-from cosim.results.run_result import SCENARIO
+from cosim.results.run_result import SCENARIO, Run
 from cosim.results.spans import spans
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario, load_scenario
 from plant_fmu import PlantFmuError
@@ -48,15 +47,16 @@ class Repeat:
     task: Task  # task that flies the row
     batch: Any  # batch with this row alone
     scenario: Scenario | None  # equivalent to the row; None if the row was refused
-    outcome: Callable[[Scenario, Record, dict[str, Any]], Outcome]  # columns of the row from a recorded run
+    outcome: Callable[[Run], Outcome]  # columns of the row from a recorded run
 
-    def apart(self, received: Outcome) -> dict[str, tuple[Any, Any]]:
-        """Return stored and `received` values of the columns that differ by more than rounding."""
-        assert self.scenario is not None
-        step = 1.5 * self.scenario.time.step
+    def differences(self, run: Run) -> dict[str, tuple[Any, Any]]:
+        """Return stored and recorded values of the columns that differ by more than rounding; none of a partial run."""
+        if run.summary["status"] != "completed":
+            return {}
+        step = 1.5 * run.scenario.time.step
         return {
             name: (self.stored[name], now)
-            for name, now in received.items()
+            for name, now in self.outcome(run).items()
             if not _close(self.stored[name], now, step if name.endswith("_time") else _ROUNDING)
         }
 
@@ -98,11 +98,10 @@ def require_complete(folder: Path) -> None:
 
 
 def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
-    work = SweepWork(load_scenario(folder / SCENARIO), design_of(plan), plan["engine"])
-    if differing := difference(
-        {"scenario": plan["scenario"]}, {"scenario": json.loads(json.dumps(work.plan["scenario"]))}
-    ):
-        raise RunError(f"{folder / SCENARIO}: is not that of the campaign ({differing})")
+    work = SweepWork(load_scenario(folder / SCENARIO), design_of(plan))
+    scenarios = ({"scenario": plan["scenario"]}, {"scenario": json.loads(json.dumps(work.plan["scenario"]))})
+    if differences := difference(*scenarios):
+        raise RunError(f"{folder / SCENARIO}: is not that of the campaign ({differences})")
     if plan["vehicle_sha256"] != work.plan["vehicle_sha256"]:
         raise RunError(f"{folder / VEHICLE_COPY}: is not that of the campaign")
     row = stored["row"]
@@ -124,27 +123,25 @@ def _of_scene(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Rep
     if stored["refused"] is None:
         scenario = scene_scenario(decode_scene(line), plan["law"], gains, conditions)
 
-    def outcome(scenario: Scenario, record: Record, summary: dict[str, Any]) -> Outcome:
-        return _scene_outcome(scenario, record, summary, conditions)
-
-    return Repeat(stored, SceneTask(plan["law"], gains, conditions), [line], scenario, outcome)
+    task = SceneTask(plan["law"], gains, conditions)
+    return Repeat(stored, task, [line], scenario, lambda run: _scene_outcome(run, conditions))
 
 
-def _row_outcome(scenario: Scenario, record: Record, summary: dict[str, Any]) -> Outcome:
+def _row_outcome(run: Run) -> Outcome:
     """Return the columns of a sweep's row from a recorded run."""
     same = ("reached", "reach_time", "settled", "closest_to_goal", "effort", "max_force", "max_speed")
-    return {name: summary[name] for name in same} | {
-        "violated": bool(summary["hard_violated"]),
-        "min_clearance": _least_clearance(scenario, summary),
+    return {name: run.summary[name] for name in same} | {
+        "violated": bool(run.summary["hard_violated"]),
+        "min_clearance": _least_clearance(run),
     }
 
 
-def _scene_outcome(scenario: Scenario, record: Record, summary: dict[str, Any], conditions: Conditions) -> Outcome:
+def _scene_outcome(run: Run, conditions: Conditions) -> Outcome:
     """Return the columns of a row of a campaign of scenes from a recorded run."""
-    time, inside = record["time"], record["goal.clearance"] >= 0.0
+    time, inside = run.record["time"], run.record["goal.clearance"] >= 0.0
     entered = spans(inside, time)[-1][0] if inside[-1] else math.inf
     reached = bool(time[-1] - entered >= conditions.settled - 0.5 * conditions.plant_step)
-    clearance = _least_clearance(scenario, summary)
+    clearance = _least_clearance(run)
     return {
         "reached": reached,
         "violation": clearance < 0.0,
@@ -153,10 +150,10 @@ def _scene_outcome(scenario: Scenario, record: Record, summary: dict[str, Any], 
     }
 
 
-def _least_clearance(scenario: Scenario, summary: dict[str, Any]) -> float:
+def _least_clearance(run: Run) -> float:
     """Return the least clearance of hard regions of position [m], inf where there is none."""
-    hard = [r.region.name for r in scenario.regions if r.region.hard and not of_attitude(r.region.shape)]
-    return min((summary["min_clearance"][name] for name in hard), default=math.inf)
+    hard = [r.region.name for r in run.scenario.regions if r.region.hard and not of_attitude(r.region.shape)]
+    return min((run.summary["min_clearance"][name] for name in hard), default=math.inf)
 
 
 def _close(one: Any, other: Any, tolerance: float) -> bool:

@@ -10,7 +10,6 @@ from typing import Any
 from cosim.campaigns.reruns.repeat import repeat_of
 from cosim.campaigns.store.folder import read_plan
 from cosim.campaigns.store.plan import code_digest
-from cosim.results.record import load_record
 from cosim.results.run_result import Run
 from cosim.run.run import run_scenario
 from plant_fmu import PlantError
@@ -48,13 +47,11 @@ def rerun(folder: Path, key: int, out: Path | None = None, progress: bool = Fals
     if repeat.scenario is not None:
         try:
             run = run_scenario(repeat.scenario, out, progress=progress)
+            apart = repeat.differences(run)
         except PlantError as error:
             if repeat.stored["stopped_at"] is None:
                 raise
             stopped = str(error)
-        else:
-            if run.summary["status"] == "completed":
-                apart = repeat.apart(repeat.outcome(repeat.scenario, load_record(run.folder), run.summary))
     other_code = read_plan(folder).get("code_sha256") != code_digest()
     return Rerun(key, differing, other_code, run, apart, stopped)
 

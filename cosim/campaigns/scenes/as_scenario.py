@@ -10,12 +10,11 @@ import msgspec
 from controller.regions.region_set import name_of
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.scenario_scene import AnyScene, ScenarioScene
-from cosim.campaigns.scenes.scene import Scene, plant_values, scene_regions
+from cosim.campaigns.scenes.scene import Scene, plant_parameters, scene_regions
 from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu.vehicle import load_vehicle
 
 VEHICLE = "odin"  # vehicle of scenes that name none
-_OF_THE_SCENARIO = ("substep", "current", "position")  # values of the plant with other keys in a scenario
 
 
 def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions) -> Scenario:
@@ -23,7 +22,6 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
     if isinstance(scene, ScenarioScene):
         return scene.with_law(law, gains._asdict(), _changes(scene, conditions))
     vehicle = load_vehicle(VEHICLE)
-    values = plant_values(scene, vehicle, conditions.plant_step)
     table = {
         "title": f"Scene {scene.seed}",
         "vehicle": VEHICLE,
@@ -36,7 +34,7 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
         "plant": {
             "current": scene.current,
             "substep": conditions.plant_step,
-            "parameters": {k: float(v) for k, v in values.items() if k.partition(".")[0] not in _OF_THE_SCENARIO},
+            "parameters": plant_parameters(scene, vehicle),
         },
         "initial": {"position": scene.start},
         "goal": {"type": "sphere", **msgspec.to_builtins(scene.goal)},

@@ -8,21 +8,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from cosim.campaigns.scenes.scene_tables import (
+    Generator,
+    Table,
+    horizontal,
+    scenario_table,
+    sphere_table,
+    thruster_lags,
+)
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
-Generator = np.random.Generator
-Table = dict[str, Any]
 Kinds = dict[str, Callable[[Generator], tuple[Table, list[Table]]]]
 
 # s, lag of each vehicle's thrusters; None: that of its file
 _LAGS = {"odin": 0.0, "bluerov2_heavy": 0.15, "rexrov": None}
 _PRIORITY = 4.0  # ratio of priorities of successive criteria
 _NET_WEIGHT = 50.0  # N, greatest magnitude of the net weight of a light vehicle
-_MOST_OF_WEIGHT = 0.025  # greatest magnitude as a fraction of the weight, where that is more: of a heavy vehicle
+_WEIGHT_FRACTION = 0.025  # greatest magnitude as a fraction of the weight, where that is more: of a heavy vehicle
 _CURRENT = 0.4  # m/s, greatest speed of the current
 _CRITERIA = ("obstacle", "shape", "depth", "visibility")
 
@@ -40,27 +47,17 @@ def draw_conflict(rng: Any, seed: int, family: str = "conflict") -> Table:
     order = rng.permutation(len(_CRITERIA)).tolist()  # position of each criterion in the order, from 0
     goal, regions = kinds[kind](rng)
     heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, _CURRENT)
-    criteria: list[Table] = [{"name": name, "order": 1 + place} for name, place in zip(_CRITERIA, order, strict=True)]
+    criteria: list[Table] = [{"name": name, "order": 1 + rank} for name, rank in zip(_CRITERIA, order, strict=True)]
     criteria[-1]["membership"] = {"clearance": {"falling": [-0.2, 0.1]}}
     for region in regions:
-        place = order[_CRITERIA.index(region["criterion"])]
-        region |= {"gain": 100.0 * _scale(vehicle), "priority": _PRIORITY ** (len(_CRITERIA) - 1 - place)}
-    table = {
-        "title": f"{family.capitalize()} {seed}: {kind}, {vehicle.name}",
-        "vehicle": vehicle.name,
-        "time": {"duration": duration, "step": 0.01, "control": 0.02, "arbiter": 0.02},
-        "plant": {
-            "current": [float(speed * np.cos(heading)), float(speed * np.sin(heading)), 0.0],
-            "substep": 0.01,
-            "parameters": _parameters(rng, vehicle),
-        },
-        "initial": {"position": [0.0, 0.0, float(rng.uniform(3.6, 4.4))]},
-        "goal": goal,
-        "criteria": criteria,
-        "actuation": {"through": "thrusters"},
-        "sensing": {"position_noise": 0.02, "velocity_noise": 0.01, "seed": seed},
-        "regions": regions,
-    }
+        rank = order[_CRITERIA.index(region["criterion"])]
+        region |= {"gain": 100.0 * _scale(vehicle), "priority": _PRIORITY ** (len(_CRITERIA) - 1 - rank)}
+    current, parameters = horizontal(heading, speed), _parameters(rng, vehicle)
+    start = [0.0, 0.0, float(rng.uniform(3.6, 4.4))]
+    title = f"{family.capitalize()} {seed}: {kind}, {vehicle.name}"
+    table = scenario_table(
+        title, seed, vehicle, duration, current, parameters, start, {"goal": goal, "criteria": criteria}, regions
+    )
     return {"seed": seed, "kind": f"{kind}, {vehicle.name}", "scenario": table}
 
 
@@ -70,27 +67,17 @@ def _scale(vehicle: Vehicle) -> float:
 
 
 def _parameters(rng: Generator, vehicle: Vehicle) -> dict[str, float]:
-    most = max(_NET_WEIGHT, _MOST_OF_WEIGHT * vehicle.weight)
+    most = max(_NET_WEIGHT, _WEIGHT_FRACTION * vehicle.weight)
     parameters = {"buoyancy": float(vehicle.weight - rng.uniform(-most, most))}
     lag = _LAGS[vehicle.name]
     if lag is not None:
-        parameters |= {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
+        parameters |= thruster_lags(vehicle, lag)
     return parameters
 
 
 def _region(name: str, criterion: str, keep: str, hard: bool, shape: Table, velocity: Any = (0.0, 0.0, 0.0)) -> Table:
-    return {
-        "name": name,
-        "criterion": criterion,
-        "keep": keep,
-        "hard": hard,
-        "velocity": [float(v) for v in velocity],
-        "shape": shape,
-    }
-
-
-def _sphere(x: float, y: float, z: float, radius: float) -> Table:
-    return {"type": "sphere", "centre": [float(x), float(y), float(z)], "radius": float(radius)}
+    drift = [float(v) for v in velocity]
+    return {"name": name, "criterion": criterion, "keep": keep, "hard": hard, "velocity": drift, "shape": shape}
 
 
 def _box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> Table:
@@ -125,17 +112,7 @@ def _closing(rng: Generator, axis: int, middle: float) -> tuple[Table, list[Tabl
     ]
     meet = middle - apart / 2.0 + share * apart
     ahead = rng.uniform(6.0, 9.0)
-    return _sphere(ahead, meet if axis == 1 else 0.0, meet if axis == 2 else 4.0, 1.0), regions
-
-
-def _ceiling(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make a ceiling and a greatest depth that approach each other."""
-    return _closing(rng, 2, 4.0)
-
-
-def _dock(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make walls of a dock that approach each other."""
-    return _closing(rng, 1, 0.0)
+    return sphere_table((ahead, meet if axis == 1 else 0.0, meet if axis == 2 else 4.0), 1.0), regions
 
 
 def _door(rng: Generator) -> tuple[Table, list[Table]]:
@@ -145,17 +122,13 @@ def _door(rng: Generator) -> tuple[Table, list[Table]]:
     at, deep = rng.uniform(4.0, 6.0), rng.uniform(0.6, 2.0)
     door = rng.uniform(-1.5, 1.5)
     walls = [
-        _region(
-            "left wall", "obstacle", "out", True, _box((at, at + 0.6), (door - 20.0, door - gap / 2.0), (-5.0, edge))
-        ),
-        _region(
-            "right wall", "obstacle", "out", True, _box((at, at + 0.6), (door + gap / 2.0, door + 20.0), (-5.0, edge))
-        ),
+        _region(name, "obstacle", "out", True, _box((at, at + 0.6), (door + left, door + right), (-5.0, edge)))
+        for name, left, right in (("left wall", -20.0, -gap / 2.0), ("right wall", gap / 2.0, 20.0))
     ]
     width = rng.uniform(2.0, 4.0)
     behind = _box((at, at + deep), (door - width / 2.0, door + width / 2.0), (-5.0, edge))
     below = _beyond(2, edge - rng.uniform(0.0, 0.6))
-    return _sphere(10.0, rng.uniform(-1.0, 1.0), rng.uniform(3.5, 4.5), 0.5), [
+    return sphere_table((10.0, rng.uniform(-1.0, 1.0), rng.uniform(3.5, 4.5)), 0.5), [
         *walls,
         _region("behind the door", one, "out", False, behind),
         _region("greatest depth", other, "in", False, below),
@@ -168,7 +141,7 @@ def _sides(rng: Generator) -> tuple[Table, list[Table]]:
     at, half = rng.uniform(4.0, 5.5), rng.uniform(1.0, 1.8)
     thick = rng.uniform(0.8, 2.0, 2)
     wide = rng.uniform(6.0, 9.0)
-    return _sphere(10.0, rng.uniform(-0.8, 0.8), rng.uniform(3.5, 4.5), 0.5), [
+    return sphere_table((10.0, rng.uniform(-0.8, 0.8), rng.uniform(3.5, 4.5)), 0.5), [
         _region("obstacle ahead", "obstacle", "out", True, _box((at, at + 0.8), (-half, half), (-5.0, 15.0))),
         _region("left", one, "out", False, _box((at, at + thick[0]), (-half - wide, -half), (-5.0, 15.0))),
         _region("right", other, "out", False, _box((at, at + thick[1]), (half, half + wide), (-5.0, 15.0))),
@@ -179,7 +152,7 @@ def _squeeze(rng: Generator) -> tuple[Table, list[Table]]:
     """Make a least and a greatest depth, both soft, that exclude each other."""
     one, other = _two(rng)
     middle, overlap = rng.uniform(3.7, 4.3), rng.uniform(0.2, 1.0)
-    return _sphere(rng.uniform(8.0, 11.0), rng.uniform(-2.0, 2.0), middle, rng.uniform(0.8, 1.4)), [
+    return sphere_table((rng.uniform(8.0, 11.0), rng.uniform(-2.0, 2.0), middle), rng.uniform(0.8, 1.4)), [
         _region("least depth", one, "out", False, _beyond(2, middle + overlap / 2.0)),
         _region("greatest depth", other, "in", False, _beyond(2, middle - overlap / 2.0)),
     ]
@@ -192,7 +165,7 @@ def _view(rng: Generator) -> tuple[Table, list[Table]]:
     end = 2.0 + 60.0 * speed
     radius, place = rng.uniform(0.4, 0.7), rng.uniform(3.5, 0.5 * end + 2.0)
     clutter = rng.uniform(0.5 * end + 1.0, end - 1.0)
-    goal = _sphere(2.0, 1.4, 3.8, 1.5) | {"velocity": list(velocity)}
+    goal = sphere_table((2.0, 1.4, 3.8), 1.5) | {"velocity": list(velocity)}
     pillar = {"type": "cylinder", "start": [place, 2.6, 0.0], "end": [place, 2.6, 12.0], "radius": radius}
     risers = {"type": "cylinder", "start": [clutter, 2.2, 0.0], "end": [clutter, 2.2, 12.0], "radius": 1.0}
     cone = {"type": "cone", "feature": [2.0, 4.0, 4.2], "axis": [0.0, -1.0, -0.15], "half_angle": 0.35, "range": 2.6}
@@ -235,9 +208,9 @@ def _views_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
     places = [(x + off * np.sin(a), y - off * np.cos(a), z + rng.uniform(-0.6, 0.4)) for a in angles]
     standing = {"type": "cylinder", "start": [x, y - pillar, 0.0], "end": [x, y - pillar, 12.0], "radius": radius}
     cone = {"type": "cone", "feature": [x, y, z], "axis": [0.0, -1.0, 0.0], "half_angle": 1.2, "range": 2.6}
-    return _in_turn(_sphere(*places[0], 0.4), *places[1:]), [
+    return _in_turn(sphere_table(places[0], 0.4), *places[1:]), [
         _region("pillar", "obstacle", "out", True, standing),
-        _region("structure", "shape", "out", False, _sphere(x, y, z, rng.uniform(1.2, 1.6))),
+        _region("structure", "shape", "out", False, sphere_table((x, y, z), rng.uniform(1.2, 1.6))),
         _region("greatest depth", "depth", "in", False, _beyond(2, z + rng.uniform(-0.3, 0.1))),
         _region("view", "visibility", "in", False, cone),
     ]
@@ -252,8 +225,8 @@ class _Family(NamedTuple):
 
 
 _KINDS: Kinds = {
-    "ceiling": _ceiling,
-    "dock": _dock,
+    "ceiling": partial(_closing, axis=2, middle=4.0),  # a ceiling and a greatest depth
+    "dock": partial(_closing, axis=1, middle=0.0),  # the walls of a dock
     "door": _door,
     "sides": _sides,
     "squeeze": _squeeze,

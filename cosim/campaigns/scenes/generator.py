@@ -10,7 +10,7 @@ import functools
 import itertools
 import json
 from collections.abc import Callable, Iterable, Iterator
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,19 +21,6 @@ from cosim.campaigns.scenes.trials import make_trial
 MOST_OBSTACLES = {"plain": 6, "hard": 14}  # greatest number of obstacles of each kind of scene
 _GOAL_RADIUS = 0.5  # m
 _FREE = 0.6  # m, least distance of an obstacle from the start and from the goal region
-
-
-class Draws(Protocol):
-    """Source of a scene's random numbers: a NumPy generator, or an object with its methods."""
-
-    def uniform(self, low: Any, high: Any) -> Any:
-        """Draw uniformly between two bounds, or two lists of them."""
-
-    def normal(self, mean: Any, deviation: Any) -> Any:
-        """Draw from normal distributions."""
-
-    def integers(self, low: int, high: int) -> Any:
-        """Draw a whole number from `low` to `high` - 1."""
 
 
 def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[str]:
@@ -71,8 +58,8 @@ def make_scene(seed: int, kind: str = "plain") -> dict[str, Any]:
     return draw_scene(rng, itertools.repeat(rng), seed, kind)
 
 
-def draw_scene(rng: Draws, of_obstacles: Iterable[Draws], seed: int, kind: str) -> dict[str, Any]:
-    """Make a plain or hard scene from random numbers."""
+def draw_scene(rng: Any, of_obstacles: Iterable[Any], seed: int, kind: str) -> dict[str, Any]:
+    """Make a plain or hard scene; `rng` and those of the obstacles have the methods of a NumPy generator."""
     hard = kind == "hard"
     start = np.array([0.0, 0.0, rng.uniform(1.5, 4.0)])
     goal = np.array([rng.uniform(8.0, 12.0), rng.uniform(-3.0, 3.0), rng.uniform(1.5, 4.5)])
@@ -95,7 +82,7 @@ def draw_scene(rng: Draws, of_obstacles: Iterable[Draws], seed: int, kind: str) 
     }
 
 
-def _make_obstacle(rng: Draws, start: NDArray[np.float64], goal: NDArray[np.float64]) -> dict[str, Any]:
+def _make_obstacle(rng: Any, start: NDArray[np.float64], goal: NDArray[np.float64]) -> dict[str, Any]:
     while True:
         radius = rng.uniform(0.3, 0.9)
         centre = start + rng.uniform(0.2, 0.8) * (goal - start) + rng.normal(0.0, [0.3, 0.6, 0.5])

@@ -43,16 +43,14 @@ class SceneKinds:
 
 def scene_kinds(results: Results) -> SceneKinds:
     """Return kinds and features of a campaign's scenes."""
-    kinds: list[str] = []
-    numbers: list[tuple[float, ...]] = []
-    for lines in results.pieces("scene"):
-        for line in lines:
-            try:
-                scene = decode_scene(line.encode())
-            except ScenarioError as error:
-                raise RunError(f"{results.path}: scene: {error}") from error
-            kinds.append(kind_of(scene))
-            numbers.append(_numbers(scene))
+    kinds, numbers = [], []
+    for line in results.values("scene"):
+        try:
+            scene = decode_scene(line.encode())
+        except ScenarioError as error:
+            raise RunError(f"{results.path}: scene: {error}") from error
+        kinds.append(kind_of(scene))
+        numbers.append(_numbers(scene))
     columns = np.array(numbers, dtype=float).reshape(-1, len(FEATURES)).T
     return SceneKinds(np.array(kinds, dtype=str), dict(zip(FEATURES, columns, strict=True)))
 

@@ -7,19 +7,19 @@ from typing import Any
 
 from controller import ControllerError
 from cosim.batch.fused import require_fused
-from cosim.campaigns.scenes.scene import Scene
+from cosim.campaigns.scenes.scene import Scene, Seed
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu import PlantFmuError
 from plant_fmu.toml_tables import Table
 
-_MOST = 60  # greatest number of characters of a kind
+_MAX_LENGTH = 60  # greatest number of characters of a kind
 
 
 class ScenarioScene(Table, frozen=True):
     """One scene of a file."""
 
-    seed: int
+    seed: Seed
     kind: str  # name under which scenes are summarized together
     scenario: dict[str, Any]  # table of the scenario, without a law
 
@@ -37,10 +37,8 @@ AnyScene = Scene | ScenarioScene
 
 def check_scenario_scene(scene: ScenarioScene) -> None:
     """Raise `ScenarioError` at the first invalid key, for any law."""
-    if not 0 <= scene.seed < 2**63:
-        raise ScenarioError(f"seed is {scene.seed}, expected a whole number from 0 to 2^63 - 1")
-    if not (0 < len(scene.kind) <= _MOST and scene.kind.isprintable()):
-        raise ScenarioError(f"kind is {scene.kind!r}, expected up to {_MOST} printable characters")
+    if not (0 < len(scene.kind) <= _MAX_LENGTH and scene.kind.isprintable()):
+        raise ScenarioError(f"kind is {scene.kind!r}, expected up to {_MAX_LENGTH} printable characters")
     table = scene.scenario
     if "law" in table:
         raise ScenarioError("scenario.law is given, expected none: the campaign says by which law it is flown")

@@ -9,12 +9,12 @@ from typing import IO
 import msgspec
 
 from cosim.campaigns.scenes.scenario_scene import AnyScene, ScenarioScene, check_scenario_scene
-from cosim.campaigns.scenes.scene import Scene, check_scene
+from cosim.campaigns.scenes.scene import Scene
 from cosim.errors import ScenarioError
 from plant_fmu import PlantFmuError
 from plant_fmu.toml_tables import decode
 
-_LONGEST = 1_000_000  # greatest number of bytes of a line, since a pipe may send an endless one
+_MAX_BYTES = 1_000_000  # greatest number of bytes of a line, since a pipe may send an endless one
 
 
 def decode_scene(line: bytes) -> AnyScene:
@@ -26,10 +26,10 @@ def decode_scene(line: bytes) -> AnyScene:
         scene: AnyScene = decode(table, ScenarioScene) if "scenario" in table else decode(table, Scene)
     except (msgspec.MsgspecError, PlantFmuError, RecursionError, UnicodeDecodeError) as error:
         raise ScenarioError(str(error).removeprefix("file: ")) from error
-    if isinstance(scene, Scene):
-        check_scene(scene)
-    else:
+    if isinstance(scene, ScenarioScene):
         check_scenario_scene(scene)
+    elif not scene.depth_band[0] < scene.depth_band[1]:
+        raise ScenarioError(f"depth_band is {scene.depth_band}, expected two depths, the shallow one first")
     return scene
 
 
@@ -68,9 +68,9 @@ def read_scenes(path: str | Path) -> Iterator[AnyScene]:
 
 def scenes_in(file: IO[bytes], name: str) -> Iterator[AnyScene]:
     """Read scenes from an open file."""
-    for number, line in enumerate(iter(lambda: file.readline(_LONGEST + 1), b""), 1):
-        if len(line) > _LONGEST:
-            raise ScenarioError(f"{name}, line {number}: has more than {_LONGEST} bytes, expected a scene")
+    for number, line in enumerate(iter(lambda: file.readline(_MAX_BYTES + 1), b""), 1):
+        if len(line) > _MAX_BYTES:
+            raise ScenarioError(f"{name}, line {number}: has more than {_MAX_BYTES} bytes, expected a scene")
         if line.strip():
             try:
                 yield decode_scene(line)

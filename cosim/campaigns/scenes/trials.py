@@ -6,14 +6,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
+from cosim.campaigns.scenes.scene_tables import (
+    Generator,
+    Table,
+    horizontal,
+    scenario_table,
+    sphere_table,
+    thruster_lags,
+)
 from plant_fmu.vehicle import Vehicle, load_vehicle
-
-Generator = np.random.Generator
-Table = dict[str, Any]
 
 VEHICLES = ("odin", "bluerov2_heavy", "rexrov")
 _START, _GOAL = np.array([0.0, 0.0, 4.0]), np.array([10.0, 0.0, 4.0])
@@ -26,24 +30,14 @@ def make_trial(seed: int) -> Table:
     rng = np.random.default_rng([20261125, seed])
     vehicle = load_vehicle(VEHICLES[int(rng.integers(len(VEHICLES)))])
     kind = list(_KINDS)[int(rng.integers(len(_KINDS)))]
-    table = {
-        "title": f"Trial {seed}: {kind}, {vehicle.name}",
-        "vehicle": vehicle.name,
-        "time": {"duration": 60.0, "step": 0.01, "control": 0.02, "arbiter": 0.02},
-        "plant": {
-            "current": [0.0, 0.0, 0.0],
-            "substep": 0.01,
-            "parameters": {f"thrust_time_constant[{i + 1}]": 0.0 for i in range(vehicle.n_thrusters)},
-        },
-        "initial": {"position": _START.tolist()},
-        "goal": {"type": "sphere", "centre": _GOAL.tolist(), "radius": _GOAL_RADIUS},
-        "actuation": {"through": "thrusters"},
-        "sensing": {"position_noise": 0.02, "velocity_noise": 0.01, "seed": seed},
-        "regions": [
-            *(_region(f"obstacle {i + 1}", _sphere(rng)) for i in range(int(rng.integers(6, 12)))),
-            _region("depth band", {"type": "depth_band", "depth": 4.0, "tolerance": 2.5}, "depth", "in"),
-        ],
-    }
+    regions = [
+        *(_region(f"obstacle {i + 1}", _sphere(rng)) for i in range(int(rng.integers(6, 12)))),
+        _region("depth band", {"type": "depth_band", "depth": 4.0, "tolerance": 2.5}, "depth", "in"),
+    ]
+    table = scenario_table(
+        f"Trial {seed}: {kind}, {vehicle.name}", seed, vehicle, 60.0, [0.0, 0.0, 0.0], thruster_lags(vehicle, 0.0),
+        _START.tolist(), {"goal": sphere_table(_GOAL, _GOAL_RADIUS)}, regions,
+    )  # fmt: skip
     _KINDS[kind](rng, vehicle, table)
     return {"seed": seed, "kind": kind, "scenario": table}
 
@@ -59,7 +53,7 @@ def _sphere(rng: Generator) -> Table:
         centre = _START + rng.uniform(0.2, 0.8) * (_GOAL - _START) + rng.normal(0.0, [0.3, 0.8, 0.8])
         free = np.linalg.norm(centre - _START), np.linalg.norm(centre - _GOAL) - _GOAL_RADIUS
         if min(free) - radius > _FREE:
-            return {"type": "sphere", "centre": centre.tolist(), "radius": float(radius)}
+            return sphere_table(centre, radius)
 
 
 def _net_weight(rng: Generator, vehicle: Vehicle, table: Table) -> None:
@@ -72,7 +66,7 @@ def _net_weight(rng: Generator, vehicle: Vehicle, table: Table) -> None:
 def _current(rng: Generator, vehicle: Vehicle, table: Table) -> None:
     """Set a current of 0.25 to 0.5 m/s."""
     heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.25, 0.5)
-    table["plant"]["current"] = [float(speed * np.cos(heading)), float(speed * np.sin(heading)), 0.0]
+    table["plant"]["current"] = horizontal(heading, speed)
 
 
 def _moments(rng: Generator, vehicle: Vehicle, table: Table) -> None:
@@ -91,19 +85,13 @@ def _effectiveness(rng: Generator, vehicle: Vehicle, table: Table) -> None:
 
 def _lag(rng: Generator, vehicle: Vehicle, table: Table) -> None:
     """Set a lag of the thrusters of 0.2 to 0.5 s, which is not in the vehicle's file."""
-    lag = float(rng.uniform(0.2, 0.5))
-    table["plant"]["parameters"] = {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
+    table["plant"]["parameters"] = thruster_lags(vehicle, float(rng.uniform(0.2, 0.5)))
 
 
 def _failure(rng: Generator, vehicle: Vehicle, table: Table) -> None:
     """Let a thruster fail or stick during the run."""
-    table["failures"] = [
-        {
-            "thruster": int(rng.integers(1, vehicle.n_thrusters + 1)),
-            "time": float(rng.uniform(2.0, 8.0)),
-            "stuck": bool(rng.integers(2)),
-        }
-    ]
+    thruster, time = int(rng.integers(1, vehicle.n_thrusters + 1)), float(rng.uniform(2.0, 8.0))
+    table["failures"] = [{"thruster": thruster, "time": time, "stuck": bool(rng.integers(2))}]
 
 
 def _pocket(rng: Generator, vehicle: Vehicle, table: Table) -> None:
@@ -114,20 +102,11 @@ def _pocket(rng: Generator, vehicle: Vehicle, table: Table) -> None:
         "left": ((at - deep, at), (-half - 0.4, -half)),
         "right": ((at - deep, at), (half, half + 0.4)),
     }
-    table["regions"] = [
-        table["regions"][-1],
-        *(
-            _region(
-                name,
-                {
-                    "type": "box",
-                    "centre": [sum(x) / 2.0, sum(y) / 2.0, 4.0],
-                    "size": [x[1] - x[0], y[1] - y[0], 8.0],
-                },
-            )
-            for name, (x, y) in walls.items()
-        ),
-    ]
+    boxes = {
+        name: {"type": "box", "centre": [sum(x) / 2.0, sum(y) / 2.0, 4.0], "size": [x[1] - x[0], y[1] - y[0], 8.0]}
+        for name, (x, y) in walls.items()
+    }
+    table["regions"] = [table["regions"][-1], *(_region(name, box) for name, box in boxes.items())]
 
 
 _KINDS: dict[str, Callable[[Generator, Vehicle, Table], None]] = {

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 import numpy as np
 
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer
-from cosim.campaigns.scenes.plan import Plan, plan_of
 from cosim.campaigns.scenes.rows import SCHEMA, refused_row, row_of, table_of
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.scene_store import SceneStore
-from cosim.campaigns.workers.work import Rows
+from cosim.campaigns.store.plan import SCENES, code_digest, versions
+from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import ScenarioError
 from plant_fmu import PlantError
 
@@ -31,12 +31,25 @@ class SceneTask:
         """Create a flyer."""
         return SceneBatches(self)
 
+    def plan(self, scenes: int) -> dict[str, Any]:
+        """Return all inputs that determine the rows of a number of scenes, but the scenes themselves."""
+        return {
+            "kind": SCENES,
+            "law": self.law,
+            "gains": self.gains._asdict(),
+            "conditions": msgspec.to_builtins(self.conditions),
+            "scenes": scenes,
+            "code_sha256": code_digest(),
+            "versions": versions(),
+        }
+
 
 class SceneBatches:
     """Flies scenes, given as lines, one after the other."""
 
     def __init__(self, task: SceneTask) -> None:
         self._flyer = SceneFlyer(task.law, task.conditions, task.gains)
+        self.close = self._flyer.close
 
     def fly(self, batch: list[bytes]) -> Any:
         """Return a table with a row for each line; a scene that the plant refuses has a row with the reason."""
@@ -51,21 +64,15 @@ class SceneBatches:
                 rows.append(row_of(scene.seed, score, self._flyer.conditions.plant_step, text))
         return table_of(rows)
 
-    def close(self) -> None:
-        """Free the plant. May be called twice."""
-        self._flyer.close()
 
-
-class SceneWork:
+class SceneWork(Work):
     """The scenes of a store, flown by one law."""
 
     unit, schema = "scene", SCHEMA
-    files: Mapping[str, bytes] = {}
 
     def __init__(self, store: SceneStore, task: SceneTask) -> None:
         self.name, self.task = task.law, task
-        self.flown: Plan = plan_of(task.law, task.gains, task.conditions, len(store), store.digest)
-        self.plan = self.flown.table()
+        self.plan = {**task.plan(len(store)), "scenes_sha256": store.digest}
         self._store = store
         self._seeds = np.array(store.seeds, dtype=np.int64)
 

@@ -13,13 +13,11 @@ import pyarrow.compute as pc
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from cosim.campaigns.store.columns import to_array
-from cosim.campaigns.store.parts import check_schema
 from cosim.errors import RunError
 from cosim.simulation.signals import Array
 
 _MAX_NUMBER = 1e100  # greatest size of a number, whose powers are still finite
-_PIECE = 1000  # number of rows that are read at once
+_CHUNK = 1000  # number of rows that are read at once
 
 
 class Results:
@@ -28,10 +26,10 @@ class Results:
     def __init__(self, path: Path, schema: Any = None) -> None:
         self.path = path
         with self._readable():
-            if schema is not None:
-                check_schema(path, schema)
             metadata = pq.read_metadata(path)
-        self.schema = metadata.schema.to_arrow_schema()
+            self.schema = metadata.schema.to_arrow_schema()
+        if schema is not None and not self.schema.equals(schema):
+            raise RunError(f"{path}: cannot be read: {_difference(self.schema, schema)}")
         self._rows = int(metadata.num_rows)
 
     def __len__(self) -> int:
@@ -39,8 +37,7 @@ class Results:
 
     def __getitem__(self, name: str) -> Any:
         """Return a column, shape (rows,), with NaN or None for null; raise a RunError for numbers beyond statistics."""
-        with self._readable():
-            column = to_array(self._read([name])[name])
+        column = self._read([name])[name].to_numpy()
         if column.dtype == np.float64 and (beyond := np.isfinite(column) & (np.abs(column) > _MAX_NUMBER)).any():
             i = int(np.argmax(beyond))
             raise RunError(
@@ -48,25 +45,26 @@ class Results:
             )
         return column
 
-    def number(self, name: str, absent: float = np.nan) -> Array:
-        """Return a column of numbers, shape (rows,), with `absent` for null and NaN."""
+    def number(self, name: str, missing: float = np.nan) -> Array:
+        """Return a column of numbers, shape (rows,), with `missing` for null and NaN."""
         column: Array = self[name].astype(float)
-        return np.where(np.isnan(column), absent, column)
+        return np.where(np.isnan(column), missing, column)
 
     def fact(self, name: str) -> NDArray[np.bool_]:
         """Return a column of Booleans, shape (rows,), with False for null."""
         facts: NDArray[np.bool_] = self[name].astype(bool)  # None is false
         return facts
 
-    def absent(self, name: str) -> NDArray[np.bool_]:
+    def is_null(self, name: str) -> NDArray[np.bool_]:
         """Return a mask of the nulls of a column, shape (rows,)."""
-        return to_array(pc.is_null(self._read([name])[name]))
+        mask: NDArray[np.bool_] = pc.is_null(self._read([name])[name]).to_numpy()
+        return mask
 
-    def pieces(self, name: str) -> Iterator[list[Any]]:
-        """Yield a column in pieces of rows in order; raise a RunError if it does not exist."""
+    def values(self, name: str) -> Iterator[Any]:
+        """Yield the values of a column in order; raise a RunError if it does not exist."""
         with self._readable(), pq.ParquetFile(self.path) as file:
-            for batch in file.iter_batches(_PIECE, columns=[name]):
-                yield batch.column(0).to_pylist()
+            for batch in file.iter_batches(_CHUNK, columns=[name]):
+                yield from batch.column(0).to_pylist()
 
     def row(self, key: int) -> dict[str, Any] | None:
         """Return the row of a key, None if there is none."""
@@ -89,3 +87,26 @@ class Results:
             yield
         except (OSError, pa.ArrowException, UnicodeDecodeError) as error:
             raise RunError(f"{self.path}: cannot be read: {error}") from error
+
+
+def make_schema(columns: Any) -> Any:
+    """Make a schema of columns, each a name, an Arrow type, a unit, a description, and whether it has nulls."""
+    return pa.schema(
+        [
+            pa.field(name, kind, nullable=nullable, metadata={"unit": unit, "description": description})
+            for name, kind, unit, description, nullable in columns
+        ]
+    )
+
+
+def _difference(received: Any, expected: Any) -> str:
+    """Describe the first column in which two schemas differ."""
+    for field in expected:
+        if received.names.count(field.name) != 1:
+            number = "two columns" if field.name in received.names else "no column"
+            return f"has {number} {field.name!r}, expected one"
+        if not received.field(field.name).equals(field):
+            types = (f"{f.type}{', perhaps null' if f.nullable else ''}" for f in (received.field(field.name), field))
+            return f"column {field.name!r} holds {', expected '.join(types)}"
+    unknown = next((name for name in received.names if name not in expected.names), received.names[0])
+    return f"column {unknown!r} is not expected there"

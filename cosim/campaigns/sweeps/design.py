@@ -20,8 +20,8 @@ from cosim.scenario.toml_file import plain_key, split_change
 
 Kind = Literal["grid", "random", "sobol", "lhs", "paired"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-MOST = 10_000_000  # greatest number of rows
-_MOST_SOBOL = 21201  # greatest number of keys of a Sobol' sequence
+MAX_ROWS = 10_000_000  # greatest number of rows
+_MAX_SOBOL_KEYS = 21201  # greatest number of keys of a Sobol' sequence
 _SEEDS = 2**31  # number of FMI integers from 0
 
 
@@ -39,28 +39,28 @@ class Vary:
     def __post_init__(self) -> None:
         object.__setattr__(self, "key", plain_key(self.key))
 
-    def at(self, share: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Return the values at each `share` of the range or list, from 0 to 1; the ends are exact."""
+    def at(self, fraction: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the values at fractions of the range or list, from 0 to 1; the ends are exact."""
         if self.values:
-            places = np.minimum(np.floor(share * len(self.values)).astype(np.int64), len(self.values) - 1)
-            return np.array(self.values)[places]
+            indices = np.minimum(np.floor(fraction * len(self.values)).astype(np.int64), len(self.values) - 1)
+            return np.array(self.values)[indices]
         if self.log:
-            between = np.exp(math.log(self.low) * (1.0 - share) + math.log(self.high) * share)
+            between = np.exp(math.log(self.low) * (1.0 - fraction) + math.log(self.high) * fraction)
         else:
-            between = self.low * (1.0 - share) + self.high * share
+            between = self.low * (1.0 - fraction) + self.high * fraction
         inside = np.clip(between, self.low, self.high)
-        return np.where(share == 0.0, self.low, np.where(share == 1.0, self.high, inside))
+        return np.where(fraction == 0.0, self.low, np.where(fraction == 1.0, self.high, inside))
 
     @property
     def steps(self) -> int:
         """Number of values on a grid."""
         return len(self.values) or self.points or 0
 
-    def on_grid(self, places: Rows) -> NDArray[np.float64]:
+    def on_grid(self, indices: Rows) -> NDArray[np.float64]:
         """Return the values at indices of a grid, from 0."""
         if self.values:
-            return np.array(self.values)[places]
-        return self.at(places / max(1, self.steps - 1))
+            return np.array(self.values)[indices]
+        return self.at(indices / max(1, self.steps - 1))
 
     @property
     def whole(self) -> bool:
@@ -123,8 +123,8 @@ class Design:
             self._check_lists()
         else:
             self._check_samples()
-        if self.rows > MOST:
-            raise RunError(f"the design has {self.rows} rows, expected up to {MOST}")
+        if self.rows > MAX_ROWS:
+            raise RunError(f"the design has {self.rows} rows, expected up to {MAX_ROWS}")
 
     def _check_grid(self) -> None:
         if self.samples is not None:
@@ -149,8 +149,8 @@ class Design:
         for vary in self.vary:
             if vary.points is not None:
                 raise RunError(f"{vary.key}: {vary.points} points are given, expected them with the design grid alone")
-        if self.kind == "sobol" and len(self.vary) > _MOST_SOBOL:
-            raise RunError(f"{len(self.vary)} keys vary, expected up to {_MOST_SOBOL} with the design sobol")
+        if self.kind == "sobol" and len(self.vary) > _MAX_SOBOL_KEYS:
+            raise RunError(f"{len(self.vary)} keys vary, expected up to {_MAX_SOBOL_KEYS} with the design sobol")
 
     @property
     def rows(self) -> int:
@@ -173,13 +173,13 @@ class Design:
             Values of the keys in these rows. The values of a row do not depend on the other rows.
         """
         if self.kind == "grid":
-            places = np.unravel_index(rows, [vary.steps for vary in self.vary])
-            columns = [vary.on_grid(place) for vary, place in zip(self.vary, places, strict=True)]
+            indices = np.unravel_index(rows, [vary.steps for vary in self.vary])
+            columns = [vary.on_grid(i) for vary, i in zip(self.vary, indices, strict=True)]
         elif self.kind == "paired":
             columns = [np.array(vary.values)[rows] for vary in self.vary]
         else:
-            shares = self._shares(rows)
-            columns = [vary.at(shares[:, i]) for i, vary in enumerate(self.vary)]
+            fractions = self._fractions(rows)
+            columns = [vary.at(fractions[:, i]) for i, vary in enumerate(self.vary)]
         return np.column_stack(columns)
 
     def seeds(self, rows: Rows) -> Rows:
@@ -188,35 +188,33 @@ class Design:
         odd = int(factor) | 1
         return (rows * odd + int(offset)) % _SEEDS
 
-    def _shares(self, rows: Rows) -> NDArray[np.float64]:
-        """Return the values of some rows as shares of their ranges, from 0 to 1, shape (n, keys)."""
+    def _fractions(self, rows: Rows) -> NDArray[np.float64]:
+        """Return the values of some rows as fractions of their ranges, from 0 to 1, shape (n, keys)."""
         if self.kind == "lhs":
             return self._hypercube[rows]
         first, n, keys = int(rows[0]), int(rows[-1] - rows[0]) + 1, len(self.vary)
         if self.kind == "random":
             bits = np.random.PCG64(self.seed)
             bits.advance(first * keys)
-            shares = np.random.Generator(bits).random((n, keys))
+            fractions = np.random.Generator(bits).random((n, keys))
         else:
             from scipy.stats import qmc  # imported here, since workers do not need it
 
-            sobol = qmc.Sobol(keys, scramble=True, seed=self._generator())
+            sobol = qmc.Sobol(keys, scramble=True, seed=np.random.default_rng(self.seed))
             with warnings.catch_warnings():  # for numbers of rows that are not powers of two
                 warnings.simplefilter("ignore", UserWarning)
                 if first:
                     sobol.fast_forward(first)
-                shares = sobol.random(n)
-        return shares[rows - first]
+                fractions = sobol.random(n)
+        return fractions[rows - first]
 
     @cached_property
     def _hypercube(self) -> NDArray[np.float64]:
         from scipy.stats import qmc
 
-        shares: NDArray[np.float64] = qmc.LatinHypercube(len(self.vary), seed=self._generator()).random(self.rows)
-        return shares
-
-    def _generator(self) -> np.random.Generator:
-        return np.random.default_rng(self.seed)
+        hypercube = qmc.LatinHypercube(len(self.vary), seed=np.random.default_rng(self.seed))
+        fractions: NDArray[np.float64] = hypercube.random(self.rows)
+        return fractions
 
     def table(self) -> dict[str, Any]:
         """Return it as a table for JSON."""
@@ -227,17 +225,14 @@ class Design:
 def design_of(table: dict[str, Any]) -> Design:
     """Make a design from a table of `Design.table`."""
     try:
-        vary = tuple(_vary_of(key, of) for key, of in table["vary"].items())
+        vary = tuple(
+            Vary(key, **(keys if "low" in keys else {"values": tuple(keys["values"])}))
+            for key, keys in table["vary"].items()
+        )
         samples = None if table["design"] == "grid" else table["samples"]
         return Design(vary, table["design"], samples, table["seed"])
     except (KeyError, TypeError, AttributeError) as error:
         raise RunError(f"the design of the campaign cannot be read: {error!r}") from error
-
-
-def _vary_of(key: str, table: dict[str, Any]) -> Vary:
-    if "values" in table:
-        return Vary(key, values=tuple(table["values"]))
-    return Vary(key, table["low"], table["high"], table.get("points"), table["log"])
 
 
 def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
@@ -265,18 +260,16 @@ def vary_from(texts: Sequence[str]) -> tuple[Vary, ...]:
     >>> cosim.vary_from(["limit.force=100:500:5"])[0].points
     5
     """
-    found: list[Vary] = []
-    for text in texts:
-        vary = _vary(text)
-        if vary.key in [other.key for other in found]:
-            raise RunError(f"{vary.key} varies twice, expected each key once")
-        found.append(vary)
-    return tuple(found)
+    vary = tuple(map(_parse_vary, texts))
+    keys = [one.key for one in vary]
+    for key in keys:
+        if keys.count(key) > 1:
+            raise RunError(f"{key} varies twice, expected each key once")
+    return vary
 
 
 def vary_vehicles(path: Path) -> tuple[Vary, ...]:
     """Read the parameters that vary between vehicles from a file that ``cosim identify`` has written."""
-    lists: dict[str, list[float]] = {}
     try:
         lines = [line for line in path.read_bytes().splitlines() if line.strip()]
         plants = [msgspec.json.decode(line, type=_Drawn).parameters for line in lines]
@@ -287,18 +280,16 @@ def vary_vehicles(path: Path) -> tuple[Vary, ...]:
     for number, plant in enumerate(plants, 1):
         if plant.keys() != plants[0].keys() or not plant:
             raise RunError(f"{path}: line {number} has other parameters than the first, expected the same")
-        for name, value in plant.items():
-            lists.setdefault(f"plant.parameters.{name}", []).append(value)
-    if not lists:
+    if not plants:
         raise RunError(f"{path}: is empty, expected a vehicle a line")
-    return tuple(Vary(key, values=tuple(values)) for key, values in lists.items())
+    return tuple(Vary(f"plant.parameters.{name}", values=tuple(p[name] for p in plants)) for name in plants[0])
 
 
 class _Drawn(msgspec.Struct):
     parameters: dict[str, float]
 
 
-def _vary(text: str) -> Vary:
+def _parse_vary(text: str) -> Vary:
     try:
         key, rest = (part.strip() for part in split_change(text))
     except ScenarioError as error:
@@ -321,8 +312,8 @@ def _vary(text: str) -> Vary:
 
 
 def _points(key: str, text: str) -> int:
-    if not (text.isascii() and text.isdecimal() and len(text) < 20 and 2 <= int(text) <= MOST):
-        raise RunError(f"{key}: {text!r} points, expected a whole number from 2 to {MOST}")
+    if not (text.isascii() and text.isdecimal() and len(text) < 20 and 2 <= int(text) <= MAX_ROWS):
+        raise RunError(f"{key}: {text!r} points, expected a whole number from 2 to {MAX_ROWS}")
     return int(text)
 
 

@@ -1,12 +1,10 @@
-"""The rows of a sweep: flown in batches by an engine, and converted to a table."""
+"""The rows of a sweep: flown in batches by the fused loop, and converted to a table."""
 
 from __future__ import annotations
 
-import importlib
 import json
 import math
 import secrets
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from hashlib import sha256
 from typing import Any, NamedTuple
@@ -15,19 +13,18 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from cosim.batch.fused import FusedFlyer
 from cosim.batch.outcome import FIELDS, BatchResult, empty_outcomes
 from cosim.batch.variation import Variation
-from cosim.campaigns.store.columns import of_numbers, of_texts
 from cosim.campaigns.store.plan import SWEEP, code_digest, versions
+from cosim.campaigns.store.results import make_schema
 from cosim.campaigns.sweeps.design import Design
-from cosim.campaigns.workers.work import Rows
+from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
 from cosim.results.run_result import SCENARIO
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
-from plant_fmu.toml_tables import hint
 
-# class of each engine, as "module:class"
-ENGINES = {"fused": "cosim.batch.fused:FusedFlyer"}
+_TYPES = {np.bool_: pa.bool_(), np.float64: pa.float64()}
 
 
 class SweepBatch(NamedTuple):
@@ -42,18 +39,13 @@ def schema_of(keys: tuple[str, ...]) -> Any:
     """Make the schema of the rows of a sweep."""
     if taken := {"row", "seed", "refused", *FIELDS} & set(keys):
         raise ValueError(f"{min(taken)!r} varies, expected keys of a scenario")
-
-    def field(name: str, kind: Any, unit: str, description: str, nullable: bool = False) -> Any:
-        return pa.field(name, kind, nullable=nullable, metadata={"unit": unit, "description": description})
-
-    types = {np.bool_: pa.bool_(), np.float64: pa.float64()}
-    return pa.schema(
+    return make_schema(
         [
-            field("row", pa.int64(), "", "Number of the row, from 0"),
-            *(field(key, pa.float64(), "", "Key of the scenario, in its own unit") for key in keys),
-            field("seed", pa.int64(), "", "Of what is random in the row"),
-            *(field(name, types[kind], unit, text, True) for name, (kind, unit, text) in FIELDS.items()),
-            field("refused", pa.string(), "", "Why the row was not flown; null if it was", True),
+            ("row", pa.int64(), "", "Number of the row, from 0", False),
+            *((key, pa.float64(), "", "Key of the scenario, in its own unit", False) for key in keys),
+            ("seed", pa.int64(), "", "Of what is random in the row", False),
+            *((name, _TYPES[kind], unit, text, True) for name, (kind, unit, text) in FIELDS.items()),
+            ("refused", pa.string(), "", "Why the row was not flown; null if it was", True),
         ]
     )
 
@@ -64,11 +56,11 @@ def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: BatchResult) -> An
     refused[list(flown.refused)] = True
     outcomes = []
     for name, (kind, _, _) in FIELDS.items():
-        column = flown.outcomes[name]
-        outcomes.append(of_numbers(column, refused | (np.isnan(column) if kind is np.float64 else False)))
-    reasons = of_texts([flown.refused.get(i) for i in range(len(batch.rows))])
-    columns = [of_numbers(batch.rows), *map(of_numbers, batch.values.T), of_numbers(batch.seeds), *outcomes, reasons]
-    return pa.Table.from_arrays(columns, schema=schema_of(keys))
+        column = flown.outcomes[name].copy()
+        outcomes.append(pa.array(column, mask=refused | (np.isnan(column) if kind is np.float64 else False)))
+    reasons = pa.array([flown.refused.get(i) for i in range(len(batch.rows))], pa.string())
+    columns = [batch.rows, *batch.values.T, batch.seeds, *outcomes, reasons]
+    return pa.Table.from_arrays([pa.array(column) for column in columns], schema=schema_of(keys))
 
 
 @dataclass(frozen=True)
@@ -76,7 +68,7 @@ class SweepTask:
     """The data that all rows of a sweep share."""
 
     variation: Variation = field(compare=False)
-    engine: str  # class of the engine, as "module:class"
+    engine: type[FusedFlyer]
     mark: str = field(default_factory=lambda: secrets.token_hex(16))  # random identity of the task across processes
 
     def flyer(self) -> SweepFlyer:
@@ -85,30 +77,23 @@ class SweepTask:
 
 
 class SweepFlyer:
-    """Flies batches of a sweep by an engine."""
+    """Flies batches of a sweep by the fused loop."""
 
     def __init__(self, task: SweepTask) -> None:
-        module, _, name = task.engine.partition(":")
-        self._keys = task.variation.keys
-        self._engine = getattr(importlib.import_module(module), name)(task.variation)
+        self._keys, self._engine = task.variation.keys, task.engine(task.variation)
+        self.close = self._engine.close
 
     def fly(self, batch: SweepBatch) -> Any:
         """Fly a batch; return a table with its rows."""
         return table_of(self._keys, batch, self._engine.fly(batch.values, batch.seeds))
 
-    def close(self) -> None:
-        """Free the engine. May be called twice."""
-        self._engine.close()
 
-
-class SweepWork:
-    """The rows of a design, flown by one engine."""
+class SweepWork(Work):
+    """The rows of a design."""
 
     unit = "row"
 
-    def __init__(self, scenario: Scenario, design: Design, engine: str = "fused") -> None:
-        if engine not in ENGINES:
-            raise RunError(f"engine {engine!r} is unknown; {hint(engine, ENGINES)}")
+    def __init__(self, scenario: Scenario, design: Design) -> None:
         keys = tuple(vary.key for vary in design.vary)
         self.variation = Variation(scenario, keys)
         for vary in design.vary:
@@ -117,13 +102,12 @@ class SweepWork:
                     f"{vary.key} is a whole number, expected {vary.key}=A,B,C, or a grid that meets no others"
                 )
         self.name, self.design = scenario.name, design
-        self.task = SweepTask(self.variation, ENGINES[engine])
+        self.task = SweepTask(self.variation, FusedFlyer)
         self.schema = schema_of(keys)
-        self.files: Mapping[str, bytes] = _files(scenario)
-        self.plan: Mapping[str, Any] = {
+        self.files = _files(scenario)
+        self.plan = {
             "kind": SWEEP,
             "name": scenario.name,
-            "engine": engine,
             **design.table(),
             "scenario": _for_json(scenario.table | ({"vehicle": VEHICLE_COPY} if scenario.vehicle_file else {})),
             "vehicle_sha256": sha256(self.files.get(VEHICLE_COPY, b"")).hexdigest(),
@@ -137,10 +121,6 @@ class SweepWork:
     def batch(self, rows: Rows) -> SweepBatch:
         """Return values and seeds of some rows."""
         return SweepBatch(rows, self.design.values(rows), self.design.seeds(rows))
-
-    def rows_of(self, keys: Rows) -> Rows:
-        """Return the rows of some keys, which are their numbers; -1 for an unknown key."""
-        return np.where((keys >= 0) & (keys < len(self)), keys, -1)
 
     def refused(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""

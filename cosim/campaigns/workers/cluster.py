@@ -12,11 +12,10 @@ from typing import Any
 
 from cosim.campaigns.workers.work import Task
 from cosim.campaigns.workers.worker import fly, release
-from cosim.campaigns.workers.worker_pools import Flight, WorkerCrash, interrupts_held
+from cosim.campaigns.workers.worker_pools import QUEUED, Flight, WorkerCrash, WorkerPool, interrupts_held, lost_work
 from cosim.errors import RunError
 from plant_fmu.installing import install_hint
 
-_QUEUED = 2  # number of batches submitted per worker thread, so that no thread waits for work
 _COUNT_PERIOD = 5.0  # s between counts of the workers, which may join and leave
 _WORKER_TIMEOUT = 30.0  # s, wait for the first worker, and for a new one in a cluster without workers
 _SCHEDULER_TIMEOUT = 10.0  # s, wait for the scheduler of a cluster
@@ -29,6 +28,7 @@ _LOW_OVERHEAD: dict[str, Any] = {
     "distributed.admin.tick.interval": "1s",
     "distributed.scheduler.allowed-failures": 0,  # `dispatch` counts crashes itself, and finds the row
 }
+_LOST = "the cluster is lost"
 _SETTLING = 1.0  # s, wait for new workers, so that one that crashes at once is not restarted again
 
 
@@ -38,7 +38,7 @@ def is_cluster(executor: Executor) -> bool:
     return module is not None and isinstance(executor, module.ClientExecutor)
 
 
-class Cluster:
+class Cluster(WorkerPool):
     """The workers of a Dask cluster. Batches lost with a worker are flown again by another one."""
 
     def __init__(self, executor: Any) -> None:
@@ -46,38 +46,35 @@ class Cluster:
 
         self._executor, self._client = executor, executor._client
         self._killed: Any = distributed.KilledWorker
+        self._local = isinstance(self._client.cluster, distributed.LocalCluster)
         self._workers = self._counted = self._last_present = 0.0
         self._has_crashed = False
-        self._local = isinstance(self._client.cluster, distributed.LocalCluster)
         self._count_workers()
         self._most = self._workers
 
     @property
-    def width(self) -> int:
+    def width(self) -> int:  # type: ignore[override]
         """Greatest number of batches under way."""
         if time.monotonic() - self._counted >= _COUNT_PERIOD:
             self._count_workers()
-        return max(1, _QUEUED * int(self._workers))
+        return max(1, QUEUED * int(self._workers))
 
     def submit(self, task: Task, batch: Any) -> Flight:
         """Submit a batch; after a crash, first wait until there are as many workers as before."""
         if self._has_crashed:
             self._recover()
-        try:
+        with lost_work(_LOST, RuntimeError, OSError):
             flight: Flight = self._executor.submit(fly, task, batch)
-        except (RuntimeError, OSError) as error:
-            raise _lost(error) from error
         return flight
 
     def result(self, flight: Flight) -> tuple[Any, float] | WorkerCrash:
         """Return the result of a batch; after a crash Dask fails all batches that were sent to that worker."""
-        try:
-            return flight.result()
-        except self._killed as error:
-            self._has_crashed = True
-            return WorkerCrash(error.allowed_failures + 1, certain=False)
-        except (CancelledError, OSError) as error:
-            raise _lost(error) from error
+        with lost_work(_LOST, CancelledError, OSError):
+            try:
+                return flight.result()
+            except self._killed as error:
+                self._has_crashed = True
+                return WorkerCrash(error.allowed_failures + 1)
 
     def check(self) -> None:
         """Raise a RunError if there have been no workers for some time."""
@@ -86,10 +83,8 @@ class Cluster:
             raise RunError(f"the cluster has had no workers for {_WORKER_TIMEOUT:g} s; what is flown is kept")
 
     def _count_workers(self) -> None:
-        try:
+        with lost_work(_LOST, OSError, RuntimeError, TimeoutError):
             self._workers = sum(self._client.nthreads().values())
-        except (OSError, RuntimeError, TimeoutError) as error:
-            raise _lost(error) from error
         self._counted = time.monotonic()
         if self._workers:
             self._last_present = self._counted
@@ -116,11 +111,6 @@ class Cluster:
         """Free the flyers of the workers; the cluster stays open."""
         with contextlib.suppress(Exception):  # workers that have left hold no flyer
             self._client.run(release, _RELEASE_TIMEOUT)
-
-
-def _lost(error: BaseException) -> RunError:
-    said = " ".join(str(error).split()) or type(error).__name__
-    return RunError(f"the cluster is lost ({said}); what is flown is kept")
 
 
 @contextlib.contextmanager
@@ -164,8 +154,8 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
             stack.enter_context(client)
             client.wait_for_workers(1, timeout=_WORKER_TIMEOUT)
         except (OSError, ValueError, TimeoutError) as error:
-            said = " ".join(str(error).split()) or type(error).__name__
-            raise RunError(f"the cluster {scheduler or 'on this machine'} cannot be used: {said}") from error
+            reason = " ".join(str(error).split()) or type(error).__name__
+            raise RunError(f"the cluster {scheduler or 'on this machine'} cannot be used: {reason}") from error
         executor = client.get_executor()
         stack.callback(executor.shutdown, wait=False)  # not waiting for batches that no worker may be left to finish
         yield executor

@@ -21,8 +21,9 @@ _MAX_CRASHES = 30  # greatest number of crashes without a finished batch in betw
 
 def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, None, None]:
     """Fly batches, and yield the table of each as it finishes, in any order."""
-    # A batch that crashes its worker is flown again. After three crashes it is halved, down to the row that causes
-    # them, which is refused. The first batch is flown alone: it compiles the code that the others load from disk.
+    # Batches that are under way when a worker crashes are flown again, each alone. One that crashes its worker again is
+    # halved after three crashes, down to the row that causes them, which is refused. The first batch is alone too: it
+    # compiles the code that the others load from disk.
     under_way: dict[Flight, Batch] = {}
     refused: list[Any] = []  # tables of rows to be refused, once another batch has finished
     n_finished, crashes = 0, 0
@@ -55,7 +56,7 @@ def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, No
                     yield from refused
                     refused.clear()
                     continue
-                crashes += received.crash_count > 0
+                crashes += batch.alone
                 if crashes > _MAX_CRASHES:
                     raise RunError(f"{crashes} processes crashed in a row, with any rows; what is flown is kept")
                 refused += _retry(work, batches, batch, received)
@@ -69,14 +70,12 @@ def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, No
 
 def _retry(work: Work, batches: Batches, batch: Batch, crash: WorkerCrash) -> list[Any]:
     """Put back a batch whose worker crashed, whole or in halves; return the table of its row if that is the cause."""
-    if not crash.crash_count:
-        batches.put_back(batch)
-    elif not (crash.certain or batch.alone):
-        log.warning("a process crashed; the batches that may be the cause are flown again one by one")
+    if not batch.alone:
+        log.warning("a process crashed; its %d rows are flown again, apart from others", len(batch.rows))
         batches.put_back(Batch(batch.rows, batch.crash_count, alone=True))
     elif (crash_count := batch.crash_count + crash.crash_count) < FATAL:
         log.warning("a process crashed (killed, or out of memory); its %d rows are flown again", len(batch.rows))
-        batches.put_back(Batch(batch.rows, crash_count, batch.alone))
+        batches.put_back(Batch(batch.rows, crash_count, alone=True))
     elif len(batch.rows) > 1:
         for half in reversed(batch.halves(FATAL - 1)):
             batches.put_back(half)

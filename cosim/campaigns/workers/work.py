@@ -28,42 +28,27 @@ class Task(Protocol):
         """Create a flyer."""
 
 
-class Work(Protocol):
+class Work:
     """Rows 0 to ``len(work)`` - 1, and the task by which they are flown."""
 
-    # The first column of the schema, a 64-bit integer, is the key of a row; keys rise with the rows.
+    name: str  # name for the progress bar
+    unit: str  # word for a row, such as "scene"
+    task: Task
+    schema: Any  # pyarrow.Schema of the rows; its first column, a 64-bit integer, is the key, which rises with the rows
+    plan: Mapping[str, Any]  # all inputs that determine the rows, for JSON
+    files: Mapping[str, bytes] = {}  # further files of the folder, by name
 
-    @property
-    def name(self) -> str:
-        """Name of the work, for the progress bar."""
-
-    @property
-    def unit(self) -> str:
-        """Word for a row, such as ``"scene"``."""
-
-    @property
-    def task(self) -> Task:
-        """The task by which rows are flown."""
-
-    @property
-    def schema(self) -> Any:
-        """The pyarrow.Schema of the rows."""
-
-    @property
-    def plan(self) -> Mapping[str, Any]:
-        """All inputs that determine the rows, for JSON."""
-
-    @property
-    def files(self) -> Mapping[str, bytes]:
-        """Further files of the folder beside the plan, by name."""
-
-    def __len__(self) -> int: ...
+    def __len__(self) -> int:
+        raise NotImplementedError
 
     def batch(self, rows: Rows) -> Any:
         """Return the picklable batch of some rows for a flyer."""
+        raise NotImplementedError
 
     def rows_of(self, keys: Rows) -> Rows:
         """Return the rows of some keys; -1 for a key that no row has."""
+        return np.where((keys >= 0) & (keys < len(self)), keys, -1)
 
     def refused(self, row: int, reason: str) -> Any:
         """Return the table of one row that could not be flown."""
+        raise NotImplementedError

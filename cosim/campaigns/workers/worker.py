@@ -23,7 +23,7 @@ class _Held:
     task: Task | None = None
     flyer: Flyer | None = None
 
-    def of(self, task: Task) -> Flyer:
+    def flyer_of(self, task: Task) -> Flyer:
         if self.flyer is None or self.task != task:
             self.free()
             self.flyer, self.task = task.flyer(), task
@@ -41,16 +41,10 @@ _held = _Held()
 def fly(task: Task, batch: Any) -> tuple[Any, float]:
     """Fly a batch; threads of one process take turns; returns [s]."""
     with _held.lock:
-        flyer = _held.of(task)
+        flyer = _held.flyer_of(task)
         started = time.perf_counter()
         table = flyer.fly(batch)
         return table, time.perf_counter() - started
-
-
-def prepare(task: Task) -> None:
-    """Create the flyer of a task; after a failure the first batch raises the error."""
-    with _held.lock:
-        _held.of(task)
 
 
 def release(patience: float) -> None:
@@ -65,20 +59,23 @@ def release(patience: float) -> None:
 @contextlib.contextmanager
 def flyer_held(task: Task) -> Iterator[None]:
     """Hold a flyer in this process during a block: it raises errors of the task, and builds what is built once."""
-    prepare(task)
+    with _held.lock:
+        _held.flyer_of(task)
     try:
         yield
     finally:
         _held.free()
 
 
-def begin_worker() -> None:
+def begin_worker(task: Task) -> None:
     """Set up a worker process: ignore Ctrl-C and SIGHUP, which the parent handles, and end with the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "SIGHUP"):
         signal.signal(signal.SIGHUP, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, _end_worker)
     threading.Thread(target=_follow_parent, name="follow-parent", daemon=True).start()
+    with contextlib.suppress(Exception):  # after a failure the first batch raises the error
+        _held.flyer_of(task)
 
 
 def _follow_parent() -> None:

@@ -1,4 +1,4 @@
-"""The compiled loop against a reference loop in Python, and reuse of a plant."""
+"""The compiled loop against the master, its score against formulas, and reuse of a plant."""
 
 import ctypes
 import math
@@ -9,19 +9,18 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
-from controller import LAWS, IsmailDunniganLaw, VehicleState
-from controller.allocation import Allocation
-from controller.regions import Region, Sphere, pack
+from controller import LAWS, IsmailDunniganLaw
 from cosim.batch.c_calls import Clock, fmi_do_step, seconds
+from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer
-from cosim.campaigns.scenes.scene import Failure, Obstacle, SphereSpec, plant_values, scene_regions
+from cosim.campaigns.scenes.scene import Failure, Obstacle, SphereSpec
 from cosim.campaigns.scenes.scene_file import read_scenes
 from cosim.errors import RunError, ScenarioError
-from cosim.scenario.vehicle_model import vehicle_model
-from fuzzy_arbiter import Arbiter, ramp
-from plant_fmu import Plant, PlantError, load_vehicle
+from cosim.scenario.tables import Outage
+from plant_fmu import PlantError
 from plant_fmu.running.native import Native
+from tests.cosim.simulation.keep import kept_rows
 
 SCENES = Path(__file__).parents[2] / "data" / "scenes"
 PLAIN, HARD = (list(read_scenes(SCENES / f"{kind}.jsonl")) for kind in ("plain", "hard"))
@@ -32,81 +31,6 @@ SHORT = Conditions(duration=8.0)
 def flyer():
     with SceneFlyer("ismail_dunnigan", SHORT) as flyer:
         yield flyer
-
-
-class Readable:
-    """A flight in plain Python, over the FMU's Python interface."""
-
-    def __init__(self, scene, conditions, law="ismail_dunnigan"):
-        self.scene, self.conditions = scene, conditions
-        self.vehicle = load_vehicle("odin")
-        regions, criteria = zip(*scene_regions(scene), strict=True)
-        self.goal = pack([Region("goal", Sphere(scene.goal.centre, scene.goal.radius), "in")])
-        self.regions = pack(regions)
-        self.criteria = [["obstacle", "shape", "depth"].index(name) for name in criteria]
-        n = len(regions)
-        gains, level = LAWS[law].gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
-        self.law = LAWS[law].for_vehicle(vehicle_model(self.vehicle), gains, level, conditions.control, n)
-        self.values, self.gradients, self.rotation_gradients = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
-        self.clearances = np.zeros(n)
-
-    def fly(self):
-        scene, c = self.scene, self.conditions
-        arbiter = Arbiter()
-        v = self.vehicle
-        allocation = Allocation(v.thruster_matrix, v.thrust_min, v.thrust_max)
-        noise = np.random.default_rng([scene.seed, 1]).standard_normal((round(c.duration / c.control), 6))
-        wrench, forces, before, weights = np.zeros(6), np.zeros(8), np.zeros(8), np.zeros(len(self.clearances))
-        step, steps = c.control / c.plant_steps, round(c.duration / c.control)
-        failure = scene.failed_thruster
-        positions, effort, variation, rows = [], 0.0, 0.0, []
-        with Plant(v) as plant:
-            plant.set(plant_values(scene, v, step))
-            plant.initialise()
-            positions.append(self.position(plant))
-            for k in range(steps):
-                if failure and (k - 1) * c.control < failure.time <= k * c.control:
-                    plant[f"thrust_effectiveness[{failure.index}]"] = 0.0
-                state = VehicleState(
-                    self.position(plant) + scene.noise.position * noise[k, :3],
-                    np.array([plant[f"quaternion.e{i}"] for i in range(4)]),
-                    np.array([plant[f"velocity.{axis}"] for axis in "uvwpqr"]),
-                    np.ones(8),
-                )
-                state.velocity_body[:3] += scene.noise.velocity * noise[k, 3:]
-                for regions in (self.goal, self.regions):
-                    regions.move_to(plant.time)
-                self.regions.evaluate(
-                    state.position,
-                    state.quaternion,
-                    self.values,
-                    self.gradients,
-                    self.rotation_gradients,
-                    self.clearances,
-                )
-                memberships = [0.0] * 3
-                for criterion, clearance in zip(self.criteria, self.clearances, strict=True):
-                    memberships[criterion] = max(memberships[criterion], ramp(clearance, c.ramp))
-                weights[:] = np.array(arbiter(memberships))[self.criteria]
-                if self.law.output == "wrench":
-                    self.law.step(state, self.goal, self.regions, weights, wrench)
-                    allocation(wrench, forces)
-                else:
-                    self.law.step(state, self.goal, self.regions, weights, forces)
-                rows.append(np.concatenate([self.position(plant), state.position, forces]))
-                variation += np.abs(forces - before).sum()
-                before[:] = forces
-                for i in range(8):
-                    plant[f"thrust[{i + 1}]"] = forces[i]
-                for _ in range(c.plant_steps):
-                    plant.step(step)
-                    positions.append(self.position(plant))
-                    effort += sum(abs(plant[f"thruster_force[{i + 1}]"]) for i in range(8)) * step
-        return np.array(rows), np.array(positions), effort, variation
-
-    @staticmethod
-    def position(plant):
-        return np.array([plant[f"position.{axis}"] for axis in "xyz"])
 
 
 def distances(scene, positions, step):
@@ -120,27 +44,41 @@ def distances(scene, positions, step):
     return np.min([*of, positions[:, 2] - shallow, deep - positions[:, 2]], axis=0)
 
 
+def stacked(kept, form, names):
+    return np.column_stack([kept[form.format(name)] for name in names])
+
+
+OTHERS = [pytest.param(law, {}, marks=pytest.mark.slow) for law in sorted(LAWS) if law != "ismail_dunnigan"]
+REPORTED = {"report_failures": True}
+ON_SENSORS = {"sensing": "sensors", "outages": (Outage("dvl", 2.0, 3.0),)}
+
+
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("scene", [PLAIN[0], HARD[1]], ids=["plain", "hard"])
 @pytest.mark.parametrize(
-    "law",
+    ("law", "changes"),
     [
-        "ismail_dunnigan",
-        *(pytest.param(law, marks=pytest.mark.slow) for law in sorted(LAWS) if law != "ismail_dunnigan"),
+        ("ismail_dunnigan", {}),
+        *OTHERS,
+        *(pytest.param("deployable", changes, marks=pytest.mark.slow) for changes in (REPORTED, ON_SENSORS)),
     ],
 )
-def test_compiled_loop_equals_the_reference_loop(law, scene):
+def test_compiled_loop_equals_the_master_and_its_score_follows_from_the_flight(law, changes, scene):
     if scene.failed_thruster:
         scene = replace(scene, failed_thruster=Failure(scene.failed_thruster.index, 3.01))
-    with SceneFlyer(law, SHORT) as flyer:
+    conditions = replace(SHORT, **changes)
+    with SceneFlyer(law, conditions) as flyer:
         score, trace = flyer.fly(scene, trace=True)
-    rows, positions, effort, variation = Readable(scene, SHORT, law).fly()
-    np.testing.assert_array_equal(trace[:, 1:4], rows[:, :3])  # to the last bit
-    np.testing.assert_array_equal(trace[:, 14:17], rows[:, 3:6])
-    np.testing.assert_array_equal(trace[:, 20:28], rows[:, 6:])
-    assert score.effort == pytest.approx(effort, rel=1e-12)
-    assert score.thrust_variation == pytest.approx(variation, rel=1e-12)
-    assert score.min_clearance == pytest.approx(distances(scene, positions, 0.01).min(), abs=1e-12)
+        kept = kept_rows(scene_scenario(scene, law, flyer.gains, conditions))
+    path, commands = stacked(kept, "position.{}", "xyz"), stacked(kept, "thrust[{}]", range(1, 9))[:-1:2]
+    np.testing.assert_array_equal(trace[:, 1:4], path[:-1:2])  # to the last bit
+    measured = stacked(kept, "sensed.{}", "xyz") if scene.noise.position or "sensing" in changes else path
+    np.testing.assert_array_equal(trace[:, 14:17], measured[:-1:2])
+    np.testing.assert_array_equal(trace[:, 20:28], commands)
+    forces = stacked(kept, "thruster_force[{}]", range(1, 9))
+    assert score.effort == pytest.approx(np.abs(forces[:-1]).sum() * 0.01, rel=1e-9)
+    assert score.thrust_variation == pytest.approx(np.abs(np.diff(commands, axis=0, prepend=0.0)).sum(), rel=1e-9)
+    assert score.min_clearance == pytest.approx(distances(scene, path, 0.01).min(), abs=1e-12)
     assert score.failed_step == -1 and 0.0 < score.worst_step < 1.0
 
 
@@ -166,7 +104,7 @@ def test_reached_requires_a_final_stay_and_reach_time_is_its_start(flyer):
 def test_reach_time_is_the_first_instant_of_the_stay(flyer):
     scene = replace(PLAIN[0], goal=SphereSpec(PLAIN[0].goal.centre, 9.0), obstacles=PLAIN[0].obstacles[:1])
     score, _ = flyer.fly(scene)
-    _, positions, _, _ = Readable(scene, SHORT).fly()
+    positions = stacked(kept_rows(scene_scenario(scene, "ismail_dunnigan", flyer.gains, SHORT)), "position.{}", "xyz")
     outside = np.linalg.norm(positions - np.array(scene.goal.centre), axis=1) > 9.0
     assert outside[0] and not outside[-1]
     assert score.reach_time == pytest.approx((np.flatnonzero(outside)[-1] + 1) * 0.01, abs=1e-9)

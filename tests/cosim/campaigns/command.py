@@ -8,10 +8,10 @@ import sys
 import time
 from pathlib import Path
 
+import pyarrow as pa
 import pytest
 
 from cosim.campaigns.store.folder import PARTS
-from cosim.campaigns.store.results import Results
 
 ROOT = Path(__file__).parents[3]
 needs_posix = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
@@ -21,15 +21,15 @@ import sys
 from cosim.run import progress
 from cosim.campaigns.sweeps import rows
 from cosim.command_line.cli import main
-from tests.cosim.campaigns.fake import ENGINES
-rows.ENGINES.update(ENGINES, fused=ENGINES["slow"])
+from tests.cosim.campaigns.fake import Slow
+rows.FusedFlyer = Slow
 progress._Notice.emit = lambda *_: None  # whether anything is compiled depends on what earlier runs kept
 sys.exit(main(sys.argv[1:]))
 """
 
 
 class Command:
-    """A ``cosim`` command with ``--out`` in a session of its own, to which the engines of `fake` are known."""
+    """A ``cosim`` command with ``--out`` in a session of its own; sweeps fly by `fake.Slow`."""
 
     def __init__(self, folder, cache, *words):
         self.out, self.temporary = folder / "out", folder / "temporary"
@@ -50,19 +50,22 @@ class Command:
             os.killpg(self.process.pid, signal.SIGKILL)
         self.process.communicate()
 
-    def wait_for_parts(self, n):
-        """Wait until so many parts are written."""
-        parts = self.out / PARTS
+    def wait_for_rows(self, n):
+        """Wait until so many rows are stored."""
         deadline = time.monotonic() + 240.0
-        while not parts.exists() or len(list(parts.glob("*.parquet"))) < n:
+        while len(self.keys()) < n:
             assert self.process.poll() is None, self.process.communicate()[1]
             assert time.monotonic() < deadline
             time.sleep(0.01)
 
     def keys(self):
-        """Return the keys of the rows that parts hold."""
-        parts = [Results(part) for part in (self.out / PARTS).glob("*.parquet")]
-        return [key for part in parts for key in part[part.schema.names[0]].tolist()]
+        """Return the keys of the rows that are stored."""
+        keys = []
+        for file in (self.out / PARTS).glob("*.arrows"):
+            with contextlib.suppress(pa.ArrowException, OSError), pa.OSFile(str(file)) as content:
+                for batch in pa.ipc.open_stream(content):
+                    keys += batch[0].to_pylist()
+        return keys
 
     def workers(self):
         """Return the processes that fly."""

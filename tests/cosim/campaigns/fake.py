@@ -10,6 +10,7 @@ import pytest
 from cosim.batch.outcome import FIELDS, BatchResult, empty_outcomes
 from cosim.campaigns import Design, vary_from
 from cosim.campaigns.sweeps import rows
+from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
 
 KEYS = ("initial.position.1", "regions.SR1.gain", "law.gains.k_p1")
@@ -71,27 +72,18 @@ class Deadly(Fake):
 
 class Unfit(Fake):
     def __init__(self, variation):
-        from cosim.errors import RunError
-
         raise RunError("the engine cannot fly this")
-
-
-ENGINES = {
-    kind.__name__.lower(): f"tests.cosim.campaigns.fake:{kind.__name__}"
-    for kind in (Fake, Slow, Choosy, Poisoned, Deadly, Unfit)
-}
 
 
 @pytest.fixture
 def fakes(monkeypatch):
-    """Let sweeps have the engines of this file."""
-    for name, where in ENGINES.items():
-        monkeypatch.setitem(rows.ENGINES, name, where)
+    """Let sweeps fly by `Fake`; return a function that chooses another class of this file."""
 
+    def choose(engine):
+        monkeypatch.setattr(rows, "FusedFlyer", engine)
 
-def sweep_by(monkeypatch, name):
-    """Let the command line sweep by one of these engines."""
-    monkeypatch.setitem(rows.ENGINES, "fused", ENGINES[name])
+    choose(Fake)
+    return choose
 
 
 def design(n=50, kind="random", seed=3, vary=VARY):
@@ -102,6 +94,14 @@ def paper():
     return load_scenario("paper")
 
 
-def flown(results):
-    """Return all rows."""
-    return results.table.to_pylist()
+def expected(n=50):
+    """Return the rows that the fake makes of the design."""
+    d, rows = design(n), np.arange(n)
+    values, seeds = d.values(rows), d.seeds(rows)
+    outcomes = Fake(None).fly(values, seeds).outcomes
+    table = []
+    for i in range(n):
+        row = {"row": i} | dict(zip(KEYS, values[i].tolist(), strict=True)) | {"seed": int(seeds[i])}
+        row |= {name: outcomes[name][i].item() for name in FIELDS}
+        table.append({k: None if v != v else v for k, v in row.items()} | {"refused": None})
+    return table

@@ -3,15 +3,15 @@
 import json
 from pathlib import Path
 
+import pyarrow.parquet as pq
+
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.rows import SCHEMA, table_of
-from cosim.campaigns.store.parts import write_tables
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.workers import batch_sizing
 
 DATA = Path(__file__).parents[2] / "data" / "scenes"
-PLAIN = [json.loads(line) for line in (DATA / "plain.jsonl").read_text().splitlines()]
-HARD = [json.loads(line) for line in (DATA / "hard.jsonl").read_text().splitlines()]
+PLAIN, HARD = ([json.loads(line) for line in (DATA / f"{k}.jsonl").read_text().splitlines()] for k in ("plain", "hard"))
 BRIEF = Conditions(duration=0.4)
 
 
@@ -33,11 +33,26 @@ def rows(results):
 
 def results_of(path, rows):
     """Write rows to a file, and return them as results."""
-    write_tables(path, [table_of(rows)], SCHEMA)
+    pq.write_table(table_of(rows), path)
     return Results(path, SCHEMA)
 
 
 def batches_of(monkeypatch, n):
     """Make every batch hold `n` rows, independent of their duration."""
-    for name, value in {"FIRST": n, "GREATEST": n, "TARGET": 1e9, "LEAST": 1e9}.items():
+    for name, value in {"FIRST": n, "MAX_ROWS": n, "TARGET": 1e9, "MIN_TIME": 1e9}.items():
         monkeypatch.setattr(batch_sizing, name, value)
+
+
+def interrupt_after(patch, tables, error=KeyboardInterrupt):
+    """Raise an error instead of storing more than a number of tables."""
+    from cosim.campaigns.store.row_log import RowLog
+
+    add, left = RowLog.add, [tables]
+
+    def counting(log, table):
+        if not left[0]:
+            raise error
+        left[0] -= 1
+        add(log, table)
+
+    patch.setattr(RowLog, "add", counting)

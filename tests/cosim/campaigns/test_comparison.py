@@ -100,12 +100,13 @@ def test_paired_comparison_uses_scenes_completed_by_either_law(results):
     other = results(
         "other", score(60.0, 0.1, 50.0), score(1.0, 0.1, 1.0), score(1.0, 0.1, 1.0), score(math.inf, 0.3, 70.0)
     )
-    assert medians_where_completed("mine", mine, "other", other) == {
+    both = {"mine": mine, "other": other}
+    assert medians_where_completed("mine", "other", both) == {
         "completed_by": "mine", "scenes": 2, "beside": "other", "completed_by_both": 1,
         "reach_time": {"mine": 40.0, "other": None},  # between 60 s and never
         "effort": {"mine": 150.0, "other": 60.0},
     }  # fmt: skip
-    assert medians_where_completed("other", other, "mine", mine) == {
+    assert medians_where_completed("other", "mine", both) == {
         "completed_by": "other", "scenes": 3, "beside": "mine", "completed_by_both": 1,
         "reach_time": {"other": 1.0, "mine": 40.0}, "effort": {"other": 1.0, "mine": 2.0},
     }  # fmt: skip
@@ -114,7 +115,7 @@ def test_paired_comparison_uses_scenes_completed_by_either_law(results):
 def test_differences_use_scenes_completed_by_both_laws(results):
     mine = results("mine", *(score(time, 0.1, 10.0 * time) for time in (3.0, 5.0, 9.0, math.inf)))
     other = results("other", *(score(time, 0.1, 10.0 * time) for time in (1.0, 4.0, math.inf, 2.0)))
-    found = paired_differences("mine", mine, "other", other)
+    found = paired_differences("mine", "other", {"mine": mine, "other": other})
     assert [found[name] for name in ("both", "only_one", "only_other", "neither")] == [2, 1, 1, 0]
     assert found["differences"]["reach_time"]["median"] == 1.5 and found["differences"]["effort"]["median"] == 15.0
 

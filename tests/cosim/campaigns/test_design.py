@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.stats import qmc
 
-from cosim.campaigns.sweeps.design import KINDS, MOST, Design, Vary, design_of, vary_from
+from cosim.campaigns.sweeps.design import KINDS, MAX_ROWS, Design, Vary, design_of, vary_from
 from cosim.errors import RunError
 
 TWO = vary_from(["a=-2:2", "b=1:1000:log"])
@@ -92,12 +92,12 @@ def test_values_stay_in_range_and_differ_between_seeds(kind):
 
 @pytest.mark.medium
 def test_row_seeds_are_unique_31_bit_integers():
-    found = Design(TWO, "random", MOST, 5)
+    found = Design(TWO, "random", MAX_ROWS, 5)
     seeds = found.seeds(np.arange(1_000_000))
     assert len(np.unique(seeds)) == 1_000_000 and seeds.min() >= 0 and seeds.max() < 2**31
-    last = found.seeds(np.array([MOST - 1]))
+    last = found.seeds(np.array([MAX_ROWS - 1]))
     assert 0 <= last[0] < 2**31
-    assert np.mean(seeds == Design(TWO, "random", MOST, 6).seeds(np.arange(1_000_000))) < 1e-3
+    assert np.mean(seeds == Design(TWO, "random", MAX_ROWS, 6).seeds(np.arange(1_000_000))) < 1e-3
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_invalid_varied_keys_are_rejected(texts, words):
         (["a=1:2:4"], "lhs", 10, 0, "4 points are given"),
         (["a=1:2"], "square", 10, 0, "design is 'square', expected one of grid, random, sobol, lhs"),
         (["a=1:2"], "random", 10, -1, "seed is -1"),
-        (["a=1:2"], "random", MOST + 1, 0, "10000001 rows, expected up to 10000000"),
+        (["a=1:2"], "random", MAX_ROWS + 1, 0, "10000001 rows, expected up to 10000000"),
         (["a=1:2:4000", "b=1:2:4000"], "grid", None, 0, "16000000 rows"),
         ([], "random", 10, 0, "nothing varies"),
     ],

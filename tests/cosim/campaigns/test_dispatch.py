@@ -5,7 +5,6 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 
-from cosim.campaigns.workers import batch_sizing as module
 from cosim.campaigns.workers.batch_sizing import Batch, Batches
 from cosim.campaigns.workers.dispatch import fly_all
 from cosim.campaigns.workers.worker_pools import FATAL, WorkerCrash
@@ -26,17 +25,17 @@ class Work:
 
 
 class WorkerPool:
-    """A pool that runs batches in order of submission and crashes on some rows."""
+    """A pool that runs batches in order of submission; some rows crash it, and all that is under way with them."""
 
-    def __init__(self, poison=(), width=4, certain=True):
-        self.poison, self.width, self.certain = set(poison), width, certain
+    def __init__(self, poison=(), width=4):
+        self.poison, self.width = set(poison), width
         self.deaths, self.sent = [], []
         self.most = 0
         self.under_way = []
 
     def submit(self, task, batch):
         flight = Future()
-        flight.rows = batch
+        flight.rows, flight.crashed = batch, False
         flight.set_result(None)
         self.under_way.append(flight)
         self.sent.append(batch)
@@ -47,20 +46,19 @@ class WorkerPool:
         self.under_way.remove(flight)
         if self.poison & set(flight.rows):
             self.deaths.append(flight.rows)
-            if not self.certain:  # everything that was under way is under suspicion
-                for other in self.under_way:
-                    other.detect_fault = True
-            return WorkerCrash(1, self.certain)
-        if getattr(flight, "suspect", False):
-            return WorkerCrash(1, certain=False)
-        return flight.rows, 0.01 * len(flight.rows)
+            for other in (flight, *self.under_way):
+                other.crashed = True
+        return WorkerCrash() if flight.crashed else (flight.rows, 0.01 * len(flight.rows))
 
-    def close(self):
-        pass
+
+def batches_of(n):
+    batches = Batches()
+    batches.add(np.arange(n))
+    return batches
 
 
 def flown(pool, n=200):
-    return sorted(row for table in fly_all(Work(), Batches(np.arange(n)), pool) for row in table)
+    return sorted(row for table in fly_all(Work(), batches_of(n), pool) for row in table)
 
 
 def test_every_row_is_completed_once():
@@ -70,20 +68,17 @@ def test_every_row_is_completed_once():
     assert sum(len(batch) for batch in pool.sent) == 200
 
 
-@pytest.mark.parametrize("certain", [True, False])
 @pytest.mark.parametrize("poison", [{77}, {60, 61, 150}, {1}, {199}, {0}])
-def test_only_rows_that_crash_workers_are_rejected(poison, certain):
-    pool = WorkerPool(poison, certain=certain)
-    found = flown(pool)
-    zero = {0} & poison  # refused as -0
-    assert found == sorted([-p for p in poison] + [row for row in range(200) if row not in poison])
-    for row in poison - zero:
+def test_only_rows_that_crash_workers_are_rejected(poison):
+    pool = WorkerPool(poison)
+    assert flown(pool) == sorted([-p for p in poison] + [row for row in range(200) if row not in poison])
+    for row in poison - {0}:  # which is refused as -0
         assert any(batch == [row] for batch in pool.deaths)
-    assert len(pool.deaths) <= len(poison) * (FATAL + 8) * (1 if certain else 2)
+    assert len(pool.deaths) <= len(poison) * (FATAL + 8) * 2
 
 
 def test_suspect_row_runs_alone():
-    pool = WorkerPool({77}, certain=False)
+    pool = WorkerPool({77})
     alone = []
     submit = pool.submit
 
@@ -103,7 +98,7 @@ def test_worker_crash_loses_no_row():
             if len(self.sent) in (5, 6) and not self.deaths:
                 self.under_way.remove(flight)
                 self.deaths.append(flight.rows)
-                return WorkerCrash(1)
+                return WorkerCrash()
             return super().result(flight)
 
     assert flown(Unlucky()) == list(range(200))
@@ -120,7 +115,7 @@ def test_persistent_worker_crashes_abort_without_rejecting_rows():
 
 
 def test_batch_size_adapts_to_row_duration():
-    batches = Batches(np.arange(100_000))
+    batches = batches_of(100_000)
     sizes = []
     for _ in range(12):
         batch = batches.take(4)
@@ -131,7 +126,7 @@ def test_batch_size_adapts_to_row_duration():
 
 
 def test_startup_time_of_a_new_worker_does_not_shrink_batches():
-    batches = Batches(np.arange(100_000))
+    batches = batches_of(100_000)
     for _ in range(12):
         rows = len(batches.take(4).rows)
         batches.measured(rows, 0.001 * rows)
@@ -141,7 +136,7 @@ def test_startup_time_of_a_new_worker_does_not_shrink_batches():
 
 
 def test_slow_rows_are_dispatched_singly():
-    batches = Batches(np.arange(50))
+    batches = batches_of(50)
     for _ in range(50):
         batch = batches.take(4)
         assert len(batch.rows) == 1
@@ -150,7 +145,7 @@ def test_slow_rows_are_dispatched_singly():
 
 
 def test_final_batches_are_balanced_with_a_minimum_size():
-    batches = Batches(np.arange(1000))
+    batches = batches_of(1000)
     batches.measured(1000, 1.0)  # 1 ms each
     batches.measured(1000, 1.0)
     sizes = []
@@ -160,11 +155,7 @@ def test_final_batches_are_balanced_with_a_minimum_size():
     assert sizes == sorted(sizes, reverse=True)
 
 
-def test_split_batch_keeps_all_rows(monkeypatch):
+def test_split_batch_keeps_all_rows():
     one, other = Batch(np.arange(7), 1, True).halves(2)
     assert one.rows.tolist() + other.rows.tolist() == list(range(7))
     assert one.crash_count == other.crash_count == 2 and one.alone and other.alone
-
-
-def test_first_batches_hold_one_row(monkeypatch):
-    assert module.FIRST == 1 and len(Batches(np.arange(9)).take(4).rows) == 1

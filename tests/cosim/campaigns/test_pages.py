@@ -20,7 +20,7 @@ from cosim.campaigns.scenes.conditions import Conditions
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.report.web_page import number
-from tests.cosim.campaigns.fake import design, fakes, paper
+from tests.cosim.campaigns.fake import Choosy, design, fakes, paper
 from tests.cosim.campaigns.scene_data import BRIEF, HARD, PLAIN, write
 from tests.cosim.campaigns.test_comparison import idle
 from tests.security.test_pages import Elements
@@ -153,7 +153,7 @@ def test_replay_that_differs_is_marked_on_the_page(tmp_path, monkeypatch):
 
     out = tmp_path / "out"
     run_campaign(write(tmp_path / "s.jsonl", PLAIN[:1]), "ismail_dunnigan", out, BRIEF)
-    monkeypatch.setattr(Repeat, "apart", lambda self, came: {"min_clearance": (0.5, came["min_clearance"])})
+    monkeypatch.setattr(Repeat, "differences", lambda self, run: {"min_clearance": (0.5, 0.4)})
     write_campaign_page(out, 1)
     assert "the flight step by step differs: min_clearance" in (out / "campaign.html").read_text()
 
@@ -186,7 +186,7 @@ def test_run_stopped_by_the_plant_has_a_replay_up_to_the_stop(tmp_path):
 def test_incomplete_campaign_has_no_page(tmp_path, fakes):
     with pytest.raises(RunError, match="is not complete"):
         write_campaign_page(tmp_path, 0)
-    run_sweep(paper(), design(3), tmp_path / "out", "fake")
+    run_sweep(paper(), design(3), tmp_path / "out")
     with pytest.raises(RunError, match="holds no campaign of scenes"):
         write_campaign_page(tmp_path / "out", 0)
     (tmp_path / "out" / "summary.json").write_text("[")
@@ -196,7 +196,8 @@ def test_incomplete_campaign_has_no_page(tmp_path, fakes):
 
 @pytest.mark.slow
 def test_sweep_page_lists_varied_keys_and_outcomes(tmp_path, fakes):
-    run_sweep(paper(), design(40), tmp_path / "out", "choosy")
+    fakes(Choosy)
+    run_sweep(paper(), design(40), tmp_path / "out")
     checker = check(write_sweep_page(tmp_path / "out", 0))
     assert ["gain k_p1 [N/m3]", "law.gains.k_p1", "10 to 30"] in checker.rows
     assert ["gain of SR1", "regions.SR1.gain", "500 to 5000, logarithmic"] in checker.rows
@@ -213,7 +214,7 @@ def test_sweep_page_lists_varied_keys_and_outcomes(tmp_path, fakes):
     assert sum("expected less" in row[-1] for row in checker.rows) == 5
     names = {p.stem for p in (tmp_path / "out" / "figures").iterdir()}
     assert names == {"rates", "distributions", "depends", "by-min-clearance", "by-reach-time"}
-    run_sweep(paper(), design(3, vary=["initial.position.1=1.6:2"]), tmp_path / "none", "choosy")
+    run_sweep(paper(), design(3, vary=["initial.position.1=1.6:2"]), tmp_path / "none")
     assert "None of the 3 rows could be flown" in write_sweep_page(tmp_path / "none", 1).read_text()
 
 
@@ -276,7 +277,8 @@ def test_hostile_texts_of_a_campaign_are_escaped(flown, tmp_path):
 
 @pytest.mark.medium
 def test_hostile_texts_of_a_sweep_are_escaped(tmp_path, fakes):
-    run_sweep(paper(), design(20), tmp_path / "out", "choosy")
+    fakes(Choosy)
+    run_sweep(paper(), design(20), tmp_path / "out")
     attack(tmp_path / "out" / "summary.json", write_sweep_page)
 
 

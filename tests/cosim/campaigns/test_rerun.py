@@ -115,7 +115,7 @@ def test_folders_without_a_complete_campaign_are_rejected(folder, tmp_path):
     for change, words in (
         ({"kind": "other"}, "of another version"),
         ({"vary": None}, r"campaign\.json: cannot be understood"),
-        ({"engine": "none"}, "engine 'none' is unknown"),
+        ({"seed": "none"}, "the design of the campaign cannot be read"),
     ):
         (folder / "campaign.json").write_text(json.dumps(plan | change))
         with pytest.raises(RunError, match=words):

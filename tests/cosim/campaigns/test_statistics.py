@@ -35,10 +35,10 @@ def test_bins_hold_every_row_once_and_about_as_many():
     ):
         parts = list(bins(values))
         assert np.array_equal(sum(part.rows.astype(int) for part in parts), np.ones(len(values)))
-        assert all(one.high < other.low for one, other in itertools.pairwise(parts))
-        assert all(part.low <= part.middle <= part.high for part in parts)
+        assert all(values[one.rows].max() < values[other.rows].min() for one, other in itertools.pairwise(parts))
+        assert all(part.median == np.median(values[part.rows]) for part in parts)
     assert [part.rows.sum() for part in bins(np.arange(600.0))] == [100] * 6
-    assert [part.low for part in bins(np.array([2.0, 1.0, 2.0]))] == [1.0, 2.0]
+    assert [part.median for part in bins(np.array([2.0, 1.0, 2.0]))] == [1.0, 2.0]
 
 
 def ishigami(x, a=7.0, b=0.1):

@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from importlib import resources
 from multiprocessing import current_process, get_context
 from pathlib import Path
 
@@ -16,42 +17,41 @@ from scipy.stats import norm
 
 from cosim.batch.outcome import FIELDS
 from cosim.campaigns import run_sweep
-from cosim.campaigns.store.folder import PARTS, RESULTS, CampaignFolder
+from cosim.campaigns.store.folder import PARTS, RESULTS
 from cosim.campaigns.sweeps.design import design_of
 from cosim.campaigns.sweeps.rows import schema_of
 from cosim.command_line.cli import main
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario.scenario import load_scenario
-from tests.cosim.campaigns.fake import KEYS, VARY, Fake, design, fakes, flown, paper, sweep_by
-from tests.cosim.campaigns.scene_data import batches_of
+from tests.cosim.campaigns.fake import KEYS, VARY, Choosy, Fake, Unfit, design, expected, fakes, paper
+from tests.cosim.campaigns.scene_data import batches_of, interrupt_after
 
 ROOT = Path(__file__).parents[3]
-WORDS = ["sweep", "paper", "--vary", *VARY, "--samples", "50", "--seed", "3"]
+WORDS = ["sweep", "paper", "--vary", *VARY, "--samples", "50", "--seed", "3", "--replays", "0"]
 
 __all__ = ["fakes"]
 
 
-def expected(n=50):
-    """Return the rows that the fake makes of the design."""
-    d = design(n)
-    rows = np.arange(n)
-    values, seeds = d.values(rows), d.seeds(rows)
-    outcomes = Fake(None).fly(values, seeds).outcomes
-    found = []
-    for i in range(n):
-        row = {"row": i} | dict(zip(KEYS, values[i].tolist(), strict=True)) | {"seed": int(seeds[i])}
-        row |= {name: outcomes[name][i].item() for name in FIELDS}
-        found.append({k: None if v != v else v for k, v in row.items()} | {"refused": None})
-    return found
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """Return a sweep of fifty rows by the fake."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("cosim.campaigns.sweeps.rows.FusedFlyer", Fake)
+        return run_sweep(
+            load_scenario("paper", ["limit.force=900"]), design(), tmp_path_factory.mktemp("swept") / "out"
+        )
 
 
-def test_one_row_per_design_point_in_order(tmp_path, fakes):
-    done = run_sweep(paper(), design(), tmp_path / "out", "fake")
-    assert done.flown == 50 and flown(done.results) == expected()
-    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
+def rows_of(done):
+    return done.results.table.to_pylist()
+
+
+def test_one_row_per_design_point_in_order(swept):
+    assert swept.flown == 50 and rows_of(swept) == expected()
+    assert sorted(p.name for p in swept.folder.iterdir()) == [
         ".lock", "campaign.json", "results.parquet", "scenario.toml", "summary.json"
     ]  # fmt: skip
-    schema = pq.read_schema(tmp_path / "out" / RESULTS)
+    schema = pq.read_schema(swept.folder / RESULTS)
     assert schema.equals(schema_of(KEYS))
     units = {f.name: f.metadata[b"unit"].decode() for f in schema}
     assert units["reach_time"] == "s" and units["effort"] == "N.s" and all(f.metadata[b"description"] for f in schema)
@@ -60,8 +60,7 @@ def test_one_row_per_design_point_in_order(tmp_path, fakes):
 @pytest.mark.slow
 def test_extreme_numbers_are_blamed_on_the_results(tmp_path, fakes, capsys, monkeypatch):
     """Their statistics overflow: the file that holds them is named, whichever column it is, and not the summary."""
-    sweep_by(monkeypatch, "fake")
-    words = [*WORDS, "--replays", "0", "--out", str(tmp_path / "out")]
+    words = [*WORDS, "--out", str(tmp_path / "out")]
     assert main(words) == 0
     file = tmp_path / "out" / RESULTS
     table = pq.read_table(file)
@@ -78,39 +77,36 @@ def test_extreme_numbers_are_blamed_on_the_results(tmp_path, fakes, capsys, monk
     assert len(numbers) > 10
 
 
-def test_folder_records_the_complete_sweep(tmp_path, fakes):
-    run_sweep(load_scenario("paper", ["limit.force=900"]), design(), tmp_path / "out", "fake")
-    plan = json.loads((tmp_path / "out" / "campaign.json").read_text())
-    assert plan["kind"] == "sweep" and plan["engine"] == "fake" and plan["scenario"]["limit"]["force"] == 900.0
+def test_folder_records_the_complete_sweep(swept):
+    plan = json.loads((swept.folder / "campaign.json").read_text())
+    assert plan["kind"] == "sweep" and plan["scenario"]["limit"]["force"] == 900.0
     again = design_of(plan)
     assert np.array_equal(again.values(np.arange(50)), design().values(np.arange(50)))
-    assert load_scenario(tmp_path / "out" / "scenario.toml").limit.force == 900.0
+    assert load_scenario(swept.folder / "scenario.toml").limit.force == 900.0
 
 
 @pytest.mark.medium
-def test_vehicle_file_is_identified_by_content_not_location(tmp_path, fakes, monkeypatch):
-    from importlib import resources
-
+def test_vehicle_file_is_identified_by_content_not_location(tmp_path, fakes):
     for place in ("one", "two"):
         (tmp_path / place).mkdir()
         text = (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text()
         (tmp_path / place / "mine.toml").write_text(text)
         (tmp_path / place / "s.toml").write_text('base = "paper"\nvehicle = "mine.toml"\n')
-    run_sweep(load_scenario(tmp_path / "one" / "s.toml"), design(), tmp_path / "out", "fake")
+    run_sweep(load_scenario(tmp_path / "one" / "s.toml"), design(), tmp_path / "out")
     assert (tmp_path / "out" / "vehicle.toml").read_text() == text
-    assert run_sweep(load_scenario(tmp_path / "two" / "s.toml"), design(), tmp_path / "out", "fake").flown == 0
+    assert run_sweep(load_scenario(tmp_path / "two" / "s.toml"), design(), tmp_path / "out").flown == 0
     (tmp_path / "two" / "mine.toml").write_text(text + "\n# another\n")
     with pytest.raises(RunError, match="vehicle_sha256"):
-        run_sweep(load_scenario(tmp_path / "two" / "s.toml"), design(), tmp_path / "out", "fake")
+        run_sweep(load_scenario(tmp_path / "two" / "s.toml"), design(), tmp_path / "out")
 
 
 @pytest.mark.slow
 def test_processes_and_executors_give_the_same_rows(tmp_path, fakes):
-    run_sweep(paper(), design(), tmp_path / "two", "fake", workers=2)
+    run_sweep(paper(), design(), tmp_path / "two", workers=2)
     with ThreadPoolExecutor(3) as threads:
-        run_sweep(paper(), design(), tmp_path / "threads", "fake", workers=3, executor=threads)
+        run_sweep(paper(), design(), tmp_path / "threads", workers=3, executor=threads)
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        run_sweep(paper(), design(), tmp_path / "pool", "fake", workers=2, executor=pool)
+        run_sweep(paper(), design(), tmp_path / "pool", workers=2, executor=pool)
         assert pool.submit(int, "1").result() == 1  # it is not closed
     for name in ("two", "threads", "pool"):
         assert pq.read_table(tmp_path / name / RESULTS).to_pylist() == expected(), name
@@ -131,41 +127,34 @@ def test_engine_calls_of_threads_are_serialized(tmp_path, fakes, monkeypatch):
     monkeypatch.setattr(Fake, "fly", watched)
     batches_of(monkeypatch, 1)
     with ThreadPoolExecutor(4) as threads:
-        assert run_sweep(paper(), design(), tmp_path / "out", "fake", workers=4, executor=threads).flown == 50
+        assert run_sweep(paper(), design(), tmp_path / "out", workers=4, executor=threads).flown == 50
 
 
 def test_closed_executor_gives_one_line_error(tmp_path, fakes):
     with ThreadPoolExecutor(1) as threads:
         pass
     with pytest.raises(RunError, match=r"the executor takes no more work .* what is flown is kept"):
-        run_sweep(paper(), design(), tmp_path / "out", "fake", executor=threads)
-    assert run_sweep(paper(), design(), tmp_path / "out", "fake").flown == 50
+        run_sweep(paper(), design(), tmp_path / "out", executor=threads)
+    assert run_sweep(paper(), design(), tmp_path / "out").flown == 50
 
 
 @pytest.mark.medium
 def test_resumed_sweep_neither_loses_nor_repeats_rows(tmp_path, fakes, monkeypatch):
     batches_of(monkeypatch, 7)
-    add, left = CampaignFolder.add, [2]
-
-    def until(folder, table):
-        if not left[0]:
-            raise KeyboardInterrupt
-        left[0] -= 1
-        add(folder, table)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(CampaignFolder, "add", until)
-        with pytest.raises(KeyboardInterrupt):
-            run_sweep(paper(), design(), tmp_path / "out", "fake")
-    assert len(list((tmp_path / "out" / PARTS).iterdir())) == 2
-    done = run_sweep(paper(), design(), tmp_path / "out", "fake")
-    assert done.flown == 50 - 14 and flown(done.results) == expected()
+    for error, raised in ((KeyboardInterrupt, KeyboardInterrupt), (OSError(28, os.strerror(28)), RunError)):
+        with monkeypatch.context() as patch:
+            interrupt_after(patch, 2, error)
+            with pytest.raises(raised, match="No space left .* what is flown is kept" if raised is RunError else None):
+                run_sweep(paper(), design(), tmp_path / "out")
+    done = run_sweep(paper(), design(), tmp_path / "out")
+    assert done.flown == 50 - 28 and rows_of(done) == expected()
     assert not (tmp_path / "out" / PARTS).exists()
 
 
 def test_rejected_row_is_kept_with_its_reason(tmp_path, fakes, caplog):
-    done = run_sweep(paper(), design(), tmp_path / "out", "choosy")
-    rows = flown(done.results)
+    fakes(Choosy)
+    done = run_sweep(paper(), design(), tmp_path / "out")
+    rows = rows_of(done)
     refused = [row for row in rows if row["refused"]]
     assert 3 < len(refused) == done.summary["refused"] and len(rows) == 50
     for row, other in zip(rows, expected(), strict=True):
@@ -177,9 +166,12 @@ def test_rejected_row_is_kept_with_its_reason(tmp_path, fakes, caplog):
     assert len([r for r in caplog.records if ": refused: " in r.message]) == 3
     assert f"{len(refused)} rows were refused" in caplog.text
     assert done.summary["reached"]["rows"] == sum(row["reached"] is True for row in rows)
+    none = run_sweep(paper(), design(3, vary=["initial.position.1=1.6:2"]), tmp_path / "none").summary
+    assert none["reached"] == {"rows": 0, "share": None, "low": None, "high": None} and none["refused"] == 3
+    assert none["worst"] == [] and none["quantiles"]["effort"]["0.5"] is None
+    assert list(none["reasons"]) == ["0", "1", "2"] and all("expected less" in why for why in none["reasons"].values())
 
 
-@pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -187,38 +179,43 @@ def test_rejected_row_is_kept_with_its_reason(tmp_path, fakes, caplog):
         ({"kind": "lhs"}, "design is 'random', now 'lhs'"),
         ({"seed": 4}, "seed is 3, now 4"),
         ({"vary": (*VARY[:2], "law.gains.k_p1=10:31")}, r"vary.law.gains.k_p1.high is 30.0, now 31.0"),
-        ({"engine": "slow"}, "engine is 'fake', now 'slow'"),
-        ({"overrides": ["initial.position.2=3"]}, r"scenario.initial.position.2 is \d.*, now 3"),
+        ({"overrides": ["limit.force=901"]}, r"scenario.limit.force is 900.0, now 901"),
     ],
 )
-def test_folder_of_another_sweep_is_rejected(tmp_path, fakes, change, words):
-    run_sweep(paper(), design(), tmp_path / "out", "fake")
-    engine, overrides = change.pop("engine", "fake"), change.pop("overrides", [])
+def test_folder_of_another_sweep_is_rejected(swept, fakes, change, words):
+    overrides = change.pop("overrides", ["limit.force=900"])
     with pytest.raises(RunError, match=f"holds another campaign .*{words}"):
-        run_sweep(load_scenario("paper", overrides), design(**change), tmp_path / "out", engine)
+        run_sweep(load_scenario("paper", overrides), design(**change), swept.folder)
 
 
 def test_script_without_main_guard_is_rejected(tmp_path, fakes, monkeypatch):
     monkeypatch.setattr(current_process(), "_inheriting", True, raising=False)  # as while a spawned process starts
     with pytest.raises(RunError, match="__main__"):
-        run_sweep(paper(), design(), tmp_path / "out", "fake")
+        run_sweep(paper(), design(), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 
 def test_unsupported_engine_leaves_no_folder(tmp_path, fakes):
-    with pytest.raises(RunError, match="cannot fly this"):
-        run_sweep(paper(), design(), tmp_path / "out", "unfit")
     with pytest.raises(ScenarioError, match=r"law\.gains\.k_p9"):
-        run_sweep(paper(), design(vary=["law.gains.k_p9=1:2"]), tmp_path / "out", "fake")
+        run_sweep(paper(), design(vary=["law.gains.k_p9=1:2"]), tmp_path / "out")
+    fakes(Unfit)
+    with pytest.raises(RunError, match="cannot fly this"):
+        run_sweep(paper(), design(), tmp_path / "out")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("key", ["row", "seed", "reached", "refused"])
+def test_no_key_of_a_sweep_has_the_name_of_another_column(key):
+    with pytest.raises(ValueError, match=f"'{key}' varies"):
+        schema_of(("limit.force", key))
 
 
 # ---- the summary ----
 
 
 def test_the_summary_follows_from_the_rows(tmp_path, fakes):
-    done = run_sweep(paper(), design(200), tmp_path / "out", "fake")
-    s, rows = done.summary, flown(done.results)
+    done = run_sweep(paper(), design(200), tmp_path / "out")
+    s, rows = done.summary, rows_of(done)
     assert json.loads((tmp_path / "out" / "summary.json").read_text()) == s
     reached = sum(row["reached"] for row in rows)
     z = norm.ppf(0.975)
@@ -239,23 +236,14 @@ def test_the_summary_follows_from_the_rows(tmp_path, fakes):
 
 
 def test_worst_rows_carry_their_rerun_command(tmp_path, fakes):
-    done = run_sweep(paper(), design(), tmp_path / "out dir", "fake")
-    worst = done.summary["worst"]
+    worst = run_sweep(paper(), design(), tmp_path / "out dir").summary["worst"]
     missed = [row for row in expected() if not row["reached"]]  # the fake violates only what it reaches
     assert len(worst) == 10 and not any(row["violated"] for row in missed)
     violated = sorted((r for r in expected() if r["violated"]), key=lambda r: min(r["min_clearance"], 0.0))
     assert [w["row"] for w in worst] == [row["row"] for row in violated[:10]]
     assert worst[0]["command"] == f"cosim rerun '{tmp_path / 'out dir'}' {worst[0]['row']}"
-
-
-def test_the_summary_of_a_single_row_and_of_none_flown(tmp_path, fakes):
-    one = run_sweep(paper(), design(1), tmp_path / "one", "fake").summary
-    assert one["rank_correlations"][KEYS[0]]["effort"] is None and one["rows"] == 1
-    none = run_sweep(paper(), design(3, vary=["initial.position.1=1.6:2"]), tmp_path / "none", "choosy").summary
-    assert none["reached"] == {"rows": 0, "share": None, "low": None, "high": None} and none["refused"] == 3
-    assert none["worst"] == [] and none["quantiles"]["effort"]["0.5"] is None
-    assert list(none["reasons"]) == ["0", "1", "2"] and not one["reasons"]
-    assert all("expected less" in why for why in none["reasons"].values())
+    one = run_sweep(paper(), design(1), tmp_path / "one").summary
+    assert one["rank_correlations"][KEYS[0]]["effort"] is None and one["rows"] == 1 and not one["reasons"]
 
 
 # ---- the command ----
@@ -290,9 +278,9 @@ def test_user_errors_are_one_line(tmp_path, capsys, words, said):
 
 
 @pytest.mark.slow
-def test_command_prints_the_sweep_result(tmp_path, fakes, capsys, monkeypatch):
-    sweep_by(monkeypatch, "fake")
-    out, words = tmp_path / "out", [*WORDS, "--replays", "0"]
+def test_command_prints_the_sweep_result(tmp_path, fakes, capsys):
+    out = tmp_path / "out"
+    words = WORDS
     assert main([*words, "--out", str(out)]) == 0
     said = capsys.readouterr().out.splitlines()
     assert said[0] == "paper: 50 of 50 rows flown, 0 refused, 0 stopped early"
@@ -307,78 +295,33 @@ def test_command_prints_the_sweep_result(tmp_path, fakes, capsys, monkeypatch):
     assert "holds no campaign" in capsys.readouterr().err
 
 
-# ---- a full disk ----
-
-_FULL = """
-import resource, sys
-from pathlib import Path
-from cosim.campaigns import run_sweep
-from cosim.campaigns.sweeps import rows
-from cosim.campaigns.workers import batch_sizing
-from cosim.errors import RunError
-from tests.cosim.campaigns.fake import ENGINES, design, paper
-rows.ENGINES.update(ENGINES)
-batch_sizing.FIRST = batch_sizing.GREATEST = int(sys.argv[2])
-batch_sizing.TARGET = batch_sizing.LEAST = 1e9  # s: none is smaller because the machine is slow
-if len(sys.argv) > 3:
-    resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[3]), -1))
-try:
-    print(run_sweep(paper(), design(1200), Path(sys.argv[1]), "fake").flown)
-except RunError as error:
-    print(f"refused: {error}")
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files")
-def test_full_disk_gives_one_line_error_and_sweep_can_resume(tmp_path):
-    def run(*words):
-        environment = os.environ | {"PYTHONPATH": str(ROOT)}
-        words = [sys.executable, "-c", _FULL, str(tmp_path / "out"), *map(str, words)]
-        done = subprocess.run(words, env=environment, cwd=ROOT, capture_output=True, text=True, check=True)
-        return done.stdout, done.stderr
-
-    said, complaints = run(16, 40_000)  # a merge is larger than that
-    assert said.startswith("refused: ") and "File too large" in said and "kept" in said and complaints == ""
-    kept = sorted(p.name for p in (tmp_path / "out" / PARTS).iterdir())
-    assert len(kept) == 64 and not any(name.startswith(".") for name in kept)
-    assert run(16) == (f"{1200 - 64 * 16}\n", "")
-    assert flown_rows(tmp_path / "out") == expected(1200)
-
-
-def flown_rows(folder):
-    return pq.read_table(folder / RESULTS).to_pylist()
-
-
 # ---- memory ----
 
 _MEMORY = """
 import sys
 from pathlib import Path
 from cosim.campaigns import run_sweep
-from cosim.campaigns.store import parts
+from cosim.campaigns.store import row_log
 from cosim.campaigns.sweeps import rows
 from cosim.campaigns.workers import batch_sizing
-from tests.cosim.campaigns.fake import ENGINES, design, paper
-rows.ENGINES.update(ENGINES)
-batch_sizing.FIRST = batch_sizing.GREATEST = 48
+from tests.cosim.campaigns.fake import Fake, design, paper
+rows.FusedFlyer = Fake
+batch_sizing.FIRST = batch_sizing.MAX_ROWS = 48
 
 def resident():
     pages = int(Path("/proc/self/statm").read_text().split()[1])
     return pages * 4096 / 2**20
 
-marks, most = {}, 0
-add = parts.Parts.add
+marks = {}
+add = row_log.RowLog.add
 def watched(self, table):
-    global most
     add(self, table)
     watched.rows += len(table)
-    most = max(most, len(self._files))
     marks[watched.rows // 10_000] = resident()
 watched.rows = 0
-parts.Parts.add = watched
-done = run_sweep(paper(), design(40_000), Path(sys.argv[1]), "fake")
-print(len(done.results), most, marks[1], marks[3], resident())
+row_log.RowLog.add = watched
+done = run_sweep(paper(), design(40_000), Path(sys.argv[1]))
+print(len(done.results), marks[1], marks[3], resident())
 """
 
 
@@ -388,6 +331,6 @@ def test_forty_thousand_rows_need_no_more_memory_than_ten_thousand(tmp_path):
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     words = [sys.executable, "-c", _MEMORY, str(tmp_path / "out")]
     done = subprocess.run(words, env=environment, cwd=ROOT, capture_output=True, text=True, check=True)
-    rows, parts, early, late, end = map(float, done.stdout.split())
-    assert rows == 40_000 and parts < 200
+    rows, early, late, end = map(float, done.stdout.split())
+    assert rows == 40_000
     assert late - early < 10.0 and end - early < 120.0  # MiB; the summary reads columns

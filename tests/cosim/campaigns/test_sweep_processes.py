@@ -21,9 +21,8 @@ from cosim.campaigns.workers.dispatch import KILLED
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from tests.cosim.campaigns.command import ROOT, command, command_cache, needs_posix
-from tests.cosim.campaigns.fake import KEYS, VARY, design, fakes, paper, sweep_by
+from tests.cosim.campaigns.fake import KEYS, VARY, Deadly, Poisoned, Slow, design, expected, fakes, paper
 from tests.cosim.campaigns.scene_data import batches_of, many, rows, write
-from tests.cosim.campaigns.test_sweep import expected
 
 __all__ = ["command", "command_cache", "fakes"]
 
@@ -41,7 +40,7 @@ def rows_of(folder):
 def test_killed_sweep_resumes_with_the_same_command(command, workers):
     words = [*SLOW, "--workers", workers]
     killed = command(*words)
-    killed.wait_for_parts(4)
+    killed.wait_for_rows(4)
     os.kill(killed.process.pid, signal.SIGKILL)
     killed.process.communicate(timeout=240)  # which its workers, who follow, hold open
     assert killed.gone()
@@ -57,8 +56,8 @@ def test_killed_sweep_resumes_with_the_same_command(command, workers):
 @pytest.mark.slow
 def test_workers_that_are_killed_are_replaced(command):
     bereft = command(*SLOW, "--workers", 2)
-    for parts in (3, 6):
-        bereft.wait_for_parts(parts)
+    for count in (30, 200):
+        bereft.wait_for_rows(count)
         os.kill(bereft.workers()[0], signal.SIGKILL)
     _, complaints = bereft.process.communicate(timeout=240)
     assert bereft.process.returncode == 0 and bereft.gone()
@@ -71,7 +70,7 @@ def test_workers_that_are_killed_are_replaced(command):
 @pytest.mark.parametrize("words", [("--workers", 1), ("--workers", 2), ("--workers", 2, "--dask")])
 def test_ctrl_c_keeps_completed_rows(command, words):
     interrupted = command(*SLOW, *words)
-    interrupted.wait_for_parts(3)
+    interrupted.wait_for_rows(3)
     os.killpg(interrupted.process.pid, signal.SIGINT)  # as a terminal does
     said, complaints = interrupted.process.communicate(timeout=240)
     assert interrupted.process.returncode == 130
@@ -94,15 +93,17 @@ def check_poisoned(folder, n):
 @pytest.mark.slow
 def test_rows_that_crash_workers_are_rejected_and_others_complete(tmp_path, fakes, caplog, monkeypatch):
     batches_of(monkeypatch, 4)  # each halving costs processes
-    done = run_sweep(paper(), design(60), tmp_path / "out", "poisoned", workers=2)
+    fakes(Poisoned)
+    done = run_sweep(paper(), design(60), tmp_path / "out", workers=2)
     check_poisoned(tmp_path / "out", 60)
     assert done.summary["refused"] > 0 and f"refused: {KILLED}" in caplog.text
 
 
 @pytest.mark.slow
 def test_crash_of_every_worker_rejects_no_row(tmp_path, fakes):
+    fakes(Deadly)
     with pytest.raises(RunError, match="every process crashed, with any rows"):
-        run_sweep(paper(), design(1), tmp_path / "out", "deadly", workers=2)
+        run_sweep(paper(), design(1), tmp_path / "out", workers=2)
     assert not (tmp_path / "out" / RESULTS).exists()
 
 
@@ -119,9 +120,8 @@ def cluster():
 
 
 @pytest.mark.slow
-def test_dask_gives_the_same_rows(tmp_path, fakes, cluster, capfd, monkeypatch):
-    sweep_by(monkeypatch, "fake")
-    run_sweep(paper(), design(), tmp_path / "one", "fake", executor=cluster)
+def test_dask_gives_the_same_rows(tmp_path, fakes, cluster, capfd):
+    run_sweep(paper(), design(), tmp_path / "one", executor=cluster)
     assert rows_of(tmp_path / "one") == expected()
     words = ["sweep", "paper", "--vary", *VARY, "--samples", "50", "--seed", "3"]
     address = cluster._client.scheduler.address
@@ -147,7 +147,8 @@ def test_campaign_on_dask_gives_the_same_rows(tmp_path, cluster, capfd):
 @pytest.mark.slow
 def test_rows_that_crash_dask_workers_are_rejected_and_others_complete(tmp_path, fakes, cluster, monkeypatch):
     batches_of(monkeypatch, 4)
-    run_sweep(paper(), design(60), tmp_path / "out", "poisoned", executor=cluster)
+    fakes(Poisoned)
+    run_sweep(paper(), design(60), tmp_path / "out", executor=cluster)
     check_poisoned(tmp_path / "out", 60)
 
 
@@ -158,8 +159,8 @@ def test_sweep_ends_after_the_last_dask_worker_is_killed(tmp_path, fakes, monkey
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr("cosim.campaigns.workers.cluster._WORKER_TIMEOUT", 5.0)
     monkeypatch.setattr("cosim.campaigns.workers.dispatch._CHECK_PERIOD", 0.2)
-    sweep_by(monkeypatch, "slow")
     out, said = tmp_path / "out", []
+    fakes(Slow)
     with distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster, contextlib.ExitStack() as stack:
         address = cluster.scheduler_address
 
@@ -189,7 +190,7 @@ def test_sweep_ends_after_the_last_dask_worker_is_killed(tmp_path, fakes, monkey
         sweep = threading.Thread(target=run_verb if verb else run_python, daemon=True)
         sweep.start()
         deadline = time.monotonic() + 120.0
-        while len(list((out / PARTS).glob("*.parquet"))) < 3 and time.monotonic() < deadline:
+        while not (out / PARTS / "000000.arrows").exists() and time.monotonic() < deadline:
             time.sleep(0.01)
         for worker in workers:
             worker.kill()

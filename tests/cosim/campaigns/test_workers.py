@@ -38,7 +38,7 @@ def test_two_workers_give_the_same_rows_as_one(tmp_path):
 def test_killed_campaign_resumes_with_the_same_command(tmp_path, command, whole):
     scenes = write(tmp_path / "s.jsonl", many(N))
     killed = command("campaign", scenes, "--law", "ismail_dunnigan", "--workers", 2)
-    killed.wait_for_parts(3)
+    killed.wait_for_rows(3)
     os.kill(killed.process.pid, signal.SIGKILL)
     killed.process.communicate(timeout=240)  # which its workers, who follow, hold open
     assert killed.gone()
@@ -62,7 +62,7 @@ def test_killed_campaign_resumes_with_the_same_command(tmp_path, command, whole)
 def test_ctrl_c_or_closed_terminal_keeps_completed_rows(tmp_path, command, workers, sent):
     scenes = write(tmp_path / "s.jsonl", many(2 * N))
     interrupted = command("campaign", scenes, "--law", "ismail_dunnigan", "--workers", workers)
-    interrupted.wait_for_parts(2)
+    interrupted.wait_for_rows(2)
     os.killpg(interrupted.process.pid, sent)  # as a terminal does
     said, complaints = interrupted.process.communicate(timeout=240)
     assert interrupted.process.returncode == 130
@@ -79,11 +79,11 @@ def test_ctrl_c_or_closed_terminal_keeps_completed_rows(tmp_path, command, worke
 def test_a_worker_that_is_killed_is_replaced(tmp_path, command, whole):
     scenes = write(tmp_path / "s.jsonl", many(N))
     bereft = command("campaign", scenes, "--law", "ismail_dunnigan", "--workers", 2)
-    bereft.wait_for_parts(3)
+    bereft.wait_for_rows(3)
     os.kill(bereft.workers()[0], signal.SIGKILL)
     _, complaints = bereft.process.communicate(timeout=240)
     assert bereft.process.returncode == 0 and bereft.gone()
-    assert "rows are flown again" in complaints
+    assert "flown again" in complaints
     assert rows(Results(bereft.out / RESULTS)) == whole
 
 

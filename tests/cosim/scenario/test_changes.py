@@ -151,7 +151,7 @@ def test_sweep_row_titles_list_varied_keys(tmp_path, fakes):
     base = load_scenario("paper-limited", ["arbiter.ramp=0.5"])
     made = Variation(base, ["limit.force", "law.gains.k_p1"]).scenario([1 / 3, 18.8], 7)
     assert made.title == f"{LIMITED} (changed: arbiter.ramp = 0.5 m, limit.force = 0.333333 N)"
-    run_sweep(base, design(3, vary=["limit.force=50:500"]), tmp_path / "out", "fake")
+    run_sweep(base, design(3, vary=["limit.force=50:500"]), tmp_path / "out")
     repeated = repeat_of(tmp_path / "out", 1).scenario
     assert repeated.title.startswith(f"{LIMITED} (changed: arbiter.ramp = 0.5 m, limit.force = ")
 

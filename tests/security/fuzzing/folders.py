@@ -18,11 +18,11 @@ from cosim.campaigns.pages.replays import replay_of
 from cosim.campaigns.pages.sweep_page import write_sweep_page
 from cosim.campaigns.reruns.repeat import repeat_of
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.plan import plan_of
 from cosim.campaigns.scenes.rows import SCHEMA
+from cosim.campaigns.scenes.work import SceneTask
 from cosim.campaigns.store.folder import PLAN, RESULTS, SUMMARY
-from cosim.campaigns.store.parts import Parts
 from cosim.campaigns.store.results import Results
+from cosim.campaigns.store.row_log import RowLog
 from cosim.io.strict_json import json_text
 from cosim.replay.events import events_of
 from cosim.replay.page import is_page, write_page
@@ -152,19 +152,19 @@ def plan_of_sweep(seeds: Seeds) -> Case:
     return _with_its_scenario(seeds, PLAN)
 
 
-_RESULTS = [f"cosim.campaigns.store.results:Results.{name}" for name in ("__init__", "row", "_read", "pieces")]
+_RESULTS = [f"cosim.campaigns.store.results:Results.{name}" for name in ("__init__", "row", "_read", "values")]
 
 
-@reader("results of a campaign", "parquet", *_RESULTS, "cosim.campaigns.store.parts:check_schema")
+@reader("results of a campaign", "parquet", *_RESULTS)
 def results(seeds: Seeds) -> Case:
-    of = plan_of("ismail_dunnigan", LAWS["ismail_dunnigan"].gains_type(), Conditions(), 2, "")
+    plan = SceneTask("ismail_dunnigan", LAWS["ismail_dunnigan"].gains_type(), Conditions()).plan(2)
     seed = json.loads(SCENES[0])["seed"]
 
     def read(path: Path) -> None:
         repeat_of(path.parent, seed)
         found = Results(path, SCHEMA)
-        summarize_campaign(of, found, path.parent)
-        list(found.pieces("scene"))
+        summarize_campaign(plan, found, path.parent)
+        list(found.values("scene"))
 
     case = seeds.file(RESULTS, read, of=seeds.comparison / "ismail_dunnigan")
     return replace(case, named=str(Path(case.named).parent))
@@ -180,21 +180,20 @@ def results_of_sweep(seeds: Seeds) -> Case:
     return _with_its_scenario(seeds, RESULTS)
 
 
-@reader(
-    "part of a campaign",
-    "parquet",
-    *("cosim.campaigns.store.parts:_keys", "cosim.campaigns.store.parts:check_schema"),
-    *("cosim.campaigns.store.parts:_least", "cosim.campaigns.store.parts:_Reader.__init__"),
-)
+@reader("part of a campaign", "bytes", "cosim.campaigns.store.row_log:RowLog._batches")
 def part_of_campaign(seeds: Seeds) -> Case:
-    """One that is damaged is removed, and flown again."""
-    content, folder = (seeds.comparison / "ismail_dunnigan" / RESULTS).read_bytes(), seeds.folder()
+    """The rows that are damaged are flown again."""
+    folder, table = seeds.folder(), pq.read_table(seeds.comparison / "ismail_dunnigan" / RESULTS)
+    log = RowLog(folder, SCHEMA)
+    log.add(table)
+    log.close()
+    (file,) = folder.iterdir()
+    content = file.read_bytes()
 
     def read(content: bytes) -> None:
-        (folder / "00000000-00000000.parquet").write_bytes(content)
-        parts = Parts(folder, SCHEMA)
-        if len(parts.keys()):
-            parts.join(folder.parent / "joined.parquet")
+        file.write_bytes(content)
+        if len(RowLog(folder, SCHEMA).keys()):
+            RowLog(folder, SCHEMA).join(folder.parent / "joined.parquet")
 
     return Case((content,), read, str(folder))
 

@@ -17,11 +17,11 @@ from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.campaigns.scenes.rows import refused_row, row_of, table_of
 from cosim.campaigns.scenes.work import SceneTask
-from cosim.campaigns.store.folder import PARTS, CampaignFolder
+from cosim.campaigns.store.folder import PARTS
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
-from tests.cosim.campaigns.scene_data import BRIEF, rows
+from tests.cosim.campaigns.scene_data import BRIEF, interrupt_after, rows
 from tests.cosim.campaigns.test_pages import check, runs_of
 
 pytest.importorskip("cma")
@@ -99,19 +99,6 @@ def test_conflicts_are_searched_for_the_greatest_violation_weighted_by_priority(
     weighted = found.results["weighted_violation"]
     assert weighted.max() > 0.0 and -found.summary["worst"][0]["cost"] == weighted.max()
     assert check(write_falsification_page(tmp_path / "out", 0)).asked == []
-
-
-def interrupt_after(monkeypatch, tables):
-    """Raise KeyboardInterrupt after the given number of tables."""
-    add, left = CampaignFolder.add, [tables]
-
-    def counting(folder, table):
-        add(folder, table)
-        left[0] -= 1
-        if not left[0]:
-            raise KeyboardInterrupt
-
-    monkeypatch.setattr(CampaignFolder, "add", counting)
 
 
 @pytest.mark.parametrize("make", [search, varied])

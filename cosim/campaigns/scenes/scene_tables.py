@@ -1,0 +1,53 @@
+"""Tables that generated scenes with a scenario of their own share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from plant_fmu.vehicle import Vehicle
+
+Generator = np.random.Generator
+Table = dict[str, Any]
+
+
+def scenario_table(
+    title: str,
+    seed: int,
+    vehicle: Vehicle,
+    duration: float,
+    current: list[float],
+    parameters: dict[str, float],
+    start: list[float],
+    goal: Table,
+    regions: list[Table],
+) -> Table:
+    """Make the scenario of a scene; `goal` has the table of the goal, and perhaps further tables."""
+    return {
+        "title": title,
+        "vehicle": vehicle.name,
+        "time": {"duration": duration, "step": 0.01, "control": 0.02, "arbiter": 0.02},
+        "plant": {"current": current, "substep": 0.01, "parameters": parameters},
+        "initial": {"position": start},
+        **goal,
+        "actuation": {"through": "thrusters"},
+        "sensing": {"position_noise": 0.02, "velocity_noise": 0.01, "seed": seed},
+        "regions": regions,
+    }
+
+
+def horizontal(heading: float, speed: float) -> list[float]:
+    """Return a horizontal velocity [m/s, NED]."""
+    return [float(speed * np.cos(heading)), float(speed * np.sin(heading)), 0.0]
+
+
+def thruster_lags(vehicle: Vehicle, lag: float) -> dict[str, float]:
+    """Return the parameters for a lag of all thrusters [s]."""
+    return {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
+
+
+def sphere_table(centre: Iterable[float], radius: float) -> Table:
+    """Return a sphere."""
+    return {"type": "sphere", "centre": [float(x) for x in centre], "radius": float(radius)}
