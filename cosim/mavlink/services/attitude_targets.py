@@ -13,10 +13,7 @@ from cosim.simulation.commands.commands import Mode, SetAttitude, SetTarget
 from cosim.simulation.commands.stick_stabilizer import CLIMB_RATE
 
 _THRUST_IGNORED, _ATTITUDE_IGNORED = 1 << 6, 1 << 7  # type_mask
-_TIMEOUTS: dict[Mode, float] = {
-    "reach": 3.0,
-    "depth_hold": 5.0,
-}  # s without a set-point, after which an attitude ends
+_TIMEOUTS: dict[Mode, float] = {"reach": 3.0, "depth_hold": 5.0}  # s without a set-point, after which an attitude ends
 _REPORT_DELAY, _REPORT_PERIOD = 3.0, 10.0  # s of set-points in another mode before a status text; s between two texts
 _NO_FORCE: Vector3 = (0.0, 0.0, 0.0)
 

@@ -17,6 +17,11 @@ def links_end(monkeypatch):
     yield
     for links in begun:
         links.close()
+    if importlib.util.find_spec("pymavlink"):
+        from tests.cosim.mavlink.stubs import opened
+
+        while opened:
+            opened.pop().channel.close()
 
 
 @pytest.fixture

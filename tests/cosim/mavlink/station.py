@@ -7,6 +7,8 @@ from collections import Counter
 from typing import Any
 
 import numpy as np
+import pytest
+from msgspec.structs import astuple
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.autopilot import Autopilot
@@ -56,8 +58,18 @@ def row(**values: Any) -> np.ndarray:
     return new
 
 
+def close_to(commands: list[Any], expected: list[Any], tolerance: float = 1e-6) -> bool:
+    """Compare commands, with numbers within a tolerance."""
+
+    def flat(value: Any) -> list[Any]:
+        return [x for item in value for x in flat(item)] if isinstance(value, tuple | list) else [value]
+
+    given, wanted = ([x for c in each for x in (type(c), *flat(astuple(c)))] for each in (commands, expected))
+    return given == pytest.approx(wanted, abs=tolerance)
+
+
 class Wire:
-    """An Outlet that encodes and decodes what is sent."""
+    """A link that encodes and decodes what is sent."""
 
     def __init__(self, name: str = "wire") -> None:
         self.name = name

@@ -83,8 +83,12 @@ def open_filter(verifier=None, own=SOURCE, allowed=None):
     return FrameFilter(RxStats(), own, allowed, verifier)
 
 
+opened = []  # links, closed after each test
+
+
 def link_of(channel, **options):
-    return Link("test", channel, open_filter(), SOURCE, **options)
+    opened.append(Link("test", channel, open_filter(), SOURCE, **options))
+    return opened[-1]
 
 
 def udp_link(port, **options):

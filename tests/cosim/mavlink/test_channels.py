@@ -54,7 +54,6 @@ def test_udpout_accepts_only_its_configured_peer():
         foreign.sendto(Station().pack(attitude(1)), address)
         peer.sendto(Station().pack(attitude(2)), address)
         assert [m.time_boot_ms for m in received(link)] == [2]
-        link.channel.close()
 
 
 def test_udpout_survives_absent_peer_and_late_peer_receives_frames():
@@ -87,7 +86,6 @@ def test_udpin_sends_to_peers_with_accepted_frames():
         bad.setblocking(False)
         with pytest.raises(BlockingIOError):
             bad.recv(1000)
-    link.channel.close()
 
 
 def test_udp_peers_are_answered_in_their_mavlink_version():
@@ -113,7 +111,6 @@ def test_udp_peers_are_answered_in_their_mavlink_version():
         received(link)
         send_now(link, heartbeat())
         assert old.recv(1000)[0] == 0xFD
-    link.channel.close()
 
 
 def test_tcp_client_is_answered_in_its_mavlink_version():
@@ -125,7 +122,6 @@ def test_tcp_client_is_answered_in_its_mavlink_version():
     send_now(link, attitude(3))
     assert v10.MAVLink(None).parse_buffer(side.recv(1000))[0].time_boot_ms == 3
     side.close()
-    link.channel.close()
 
 
 def test_peer_count_is_bounded_and_silent_peers_expire():
@@ -142,7 +138,6 @@ def test_peer_count_is_bounded_and_silent_peers_expire():
     assert not link.channel.peers
     for one in sockets:
         one.close()
-    link.channel.close()
 
 
 def test_occupied_ports_give_one_line_error():
@@ -199,7 +194,6 @@ def test_server_receives_from_all_clients():
     assert sorted(m.time_boot_ms for m in received(link) + received(link)) == [5, 6]
     for client in (a, b):
         client.close()
-    link.channel.close()
 
 
 def test_disconnected_client_is_removed():
@@ -209,7 +203,6 @@ def test_disconnected_client_is_removed():
         client.close()
         assert until(lambda: not (received(link) or link.channel.poll(time.monotonic()) or link.channel.clients))
     assert link.send(heartbeat())
-    link.channel.close()
 
 
 def test_client_reset_during_send_is_removed():
@@ -222,7 +215,6 @@ def test_client_reset_during_send_is_removed():
     link.channel.poll(time.monotonic())
     link.channel.poll(time.monotonic())
     assert not link.channel.clients
-    link.channel.close()
 
 
 def test_excess_clients_are_rejected():
@@ -240,7 +232,6 @@ def test_excess_clients_are_rejected():
     )
     for client in clients:
         client.close()
-    link.channel.close()
 
 
 @pytest.mark.slow
@@ -282,7 +273,6 @@ def test_stalled_client_is_closed_after_a_timeout():
     assert not link.channel.clients
     assert "1 clients closed that took nothing" in link.loss_reports()
     client.close()
-    link.channel.close()
 
 
 def test_send_timeout_restarts_with_progress():
@@ -335,7 +325,6 @@ def test_tcp_client_waits_for_its_server(monkeypatch):
         send_now(link, attitude(2))
         assert frames_of(side.recv(1000))[0].time_boot_ms == 2
         side.close()
-    link.channel.close()
 
 
 def test_tcp_client_reconnects_after_server_restart(monkeypatch):
@@ -408,7 +397,6 @@ def test_serial_line_is_bidirectional_and_8_bit_clean():
     found = []
     assert until(lambda: found.extend(received(link)) or len(found) == 2)
     assert [m.get_type() for m in found] == ["ENCAPSULATED_DATA", "HEARTBEAT"]
-    link.channel.close()
     os.close(ours)
     os.close(theirs)
 
@@ -454,7 +442,6 @@ def test_serial_device_is_reopened_after_disconnection(tmp_path, caplog):
     assert send_now(link, attitude(9))
     assert come_to(ours, 1)[0].time_boot_ms == 9
     assert [record.message.split(" ", 2)[2] for record in caplog.records] == ["is gone", "is back"]
-    link.channel.close()
     os.close(ours)
     os.close(theirs)
 

@@ -72,10 +72,12 @@ def test_long_text_is_split_into_chunks(station):
             assert parts[0].id == 0
 
 
-def test_status_text_rate_is_limited(station):
-    for i in range(100):
-        station.autopilot._context.send_text(f"line {i}")
+def test_status_text_rate_is_limited_and_the_rest_is_sent_later(station):
+    for k in range(30):
+        station.autopilot._context.send_text(f"text {k}")
     assert len(station.wire.texts) == 12
+    station.wait(3.0)
+    assert station.wire.texts == [f"text {k}" for k in range(30)]
 
 
 # ---- the watch ----

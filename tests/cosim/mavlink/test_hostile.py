@@ -216,4 +216,3 @@ def test_flood_from_many_ports_leaves_the_station_its_answers():
     assert len(link.channel.peers) == MAX_PEERS
     for one in sockets:
         one.close()
-    link.channel.close()

@@ -245,11 +245,7 @@ def test_receiving_no_vehicle_exits_with_1(capsys):
 
 @pytest.mark.parametrize(
     ("arguments", "text"),
-    [
-        (["udpin:10.0.0.1:14550"], "--allow-remote"),
-        (["nonsense"], "endpoint 'nonsense'"),
-        (["new.tlog"], "not a file"),
-    ],
+    [(["udpin:10.0.0.1:14550"], "--allow-remote"), (["nonsense"], "endpoint 'nonsense'"), (["new.tlog"], "not a file")],
 )
 def test_invalid_endpoint_gives_one_line_error(arguments, text, capsys):
     assert main(["mavlink", "listen", *arguments]) == 2

@@ -60,23 +60,7 @@ CHECKS: tuple[Check, ...] = (
 
 
 def check_vehicle(link: GroundLink) -> Iterator[Result]:
-    """Check a vehicle, and yield each result when its check ends.
-
-    Parameters
-    ----------
-    link : GroundLink
-        Link to the vehicle.
-
-    Yields
-    ------
-    Result
-        Result of each check, in their order.
-
-    Raises
-    ------
-    TelemetryError
-        If no vehicle is received within 10 s, or it becomes silent.
-    """
+    """Check a vehicle, and yield each result when its check ends."""
     client = Client(link)
     if client.find(_FINDING) is None:
         raise TelemetryError(f"{link.name}: no vehicle was heard in {_FINDING:g} s")

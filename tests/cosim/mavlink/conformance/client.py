@@ -29,26 +29,7 @@ class Vehicle(NamedTuple):
 
 
 class Client:
-    """Exchange messages with one vehicle.
-
-    Parameters
-    ----------
-    link : GroundLink
-        Link to the vehicle.
-
-    Attributes
-    ----------
-    vehicle : Vehicle or None
-        The first vehicle received; only its messages are kept.
-    mavlink : module
-        The dialect.
-    lost : int
-        Frames missing between the sequence numbers of received frames.
-    total : int
-        Messages received.
-    last_heard : float
-        Time of the newest message [s, monotonic].
-    """
+    """Exchange messages with one vehicle."""
 
     def __init__(self, link: GroundLink) -> None:
         self.link, self.mavlink = link, dialect()

@@ -55,18 +55,7 @@ class Connection:
 
 
 def qgc_connect(client: Client) -> Connection:
-    """Connect to a vehicle as QGroundControl does.
-
-    Parameters
-    ----------
-    client : Client
-        Client, which need not have found the vehicle yet.
-
-    Returns
-    -------
-    Connection
-        Connection with its steps; without steps if no vehicle was received within 10 s.
-    """
+    """Connect to a vehicle as QGroundControl does."""
     if client.find(_HEARTBEAT_TIMEOUT) is None:
         return Connection(())
     return Connection(tuple(_Connecting(client).steps()))
@@ -173,22 +162,7 @@ class _Connecting:
 
 
 def fetch_parameters(client: Client) -> tuple[dict[int, Any], int | None, int]:
-    """Fetch the parameter list, and request missing parameters again.
-
-    Parameters
-    ----------
-    client : Client
-        A client that has found a vehicle.
-
-    Returns
-    -------
-    dict
-        PARAM_VALUE messages, by index.
-    int or None
-        Number of parameters of the vehicle; None without an answer.
-    int
-        Number of repeated requests.
-    """
+    """Fetch the parameter list, and request missing parameters again."""
     m, got, count, retries = client.mavlink, dict[int, Any](), None, 0
 
     def is_value(message: Any) -> bool:
@@ -215,24 +189,7 @@ def fetch_parameters(client: Client) -> tuple[dict[int, Any], int | None, int]:
 
 
 def fetch_mission(client: Client, kind: int) -> tuple[list[Any] | None, str, int]:
-    """Fetch a mission, a fence or rally points.
-
-    Parameters
-    ----------
-    client : Client
-        A client that has found a vehicle.
-    kind : int
-        A MAV_MISSION_TYPE.
-
-    Returns
-    -------
-    list or None
-        MISSION_ITEM_INT messages; None if some were not received.
-    str
-        Description of the result.
-    int
-        Number of repeated requests.
-    """
+    """Fetch a mission, a fence or rally points."""
     m, target, retries = client.mavlink, client.target, 0
 
     def ask(message: Any, wanted: str, sequence: int | None = None) -> Any:

@@ -87,20 +87,7 @@ def _packet(message: Any) -> Packet:
 
 
 def download(client: Client, path: str) -> Download:
-    """Download a file.
-
-    Parameters
-    ----------
-    client : Client
-        A client that has found a vehicle.
-    path : str
-        Path on the vehicle, such as ``@PARAM/param.pck``.
-
-    Returns
-    -------
-    Download
-        Data of the file, or the description of the error.
-    """
+    """Download a file."""
     session = _Session(client)
     opened = session.ask(_OPEN, data=path.encode())
     if opened is None:

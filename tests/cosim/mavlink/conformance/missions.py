@@ -85,20 +85,7 @@ def _item(subject: Subject, sequence: int, latitude: int, longitude: int, altitu
 
 
 def upload(subject: Subject, items: list[Any]) -> int | None:
-    """Upload a mission as ground stations do; return the type of the last MISSION_ACK, or None if none came.
-
-    Parameters
-    ----------
-    subject : Subject
-        Vehicle that gets the mission.
-    items : list
-        MISSION_ITEM_INT messages; none clears the mission.
-
-    Returns
-    -------
-    int or None
-        MAV_MISSION_RESULT of the ack; None without one.
-    """
+    """Upload a mission as ground stations do; return the type of the last MISSION_ACK, or None if none came."""
     m, client = subject.mavlink, subject.client
     kind = m.MAV_MISSION_TYPE_MISSION
     client.discard_unread()

@@ -73,18 +73,7 @@ class Subject:
 
 
 def speed_of(heard: tuple[ReceivedMessage, ...]) -> float:
-    """Return the seconds of the vehicle's clock per second of the wall clock; 1 if it sends no time.
-
-    Parameters
-    ----------
-    heard : tuple of ReceivedMessage
-        Messages in the order of reception.
-
-    Returns
-    -------
-    float
-        Ratio by the boot times in the messages.
-    """
+    """Return the seconds of the vehicle's clock per second of the wall clock; 1 if it sends no time."""
     clocked = [(h.time, h.message.time_boot_ms * 1e-3) for h in heard if hasattr(h.message, "time_boot_ms")]
     if len(clocked) < 2 or clocked[-1][0] <= clocked[0][0] or clocked[-1][1] <= clocked[0][1]:
         return 1.0

@@ -39,25 +39,7 @@ class _FirstStep:
 
 @contextlib.contextmanager
 def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> Iterator[LinkThread]:
-    """Run a vehicle in a thread until the context ends.
-
-    Parameters
-    ----------
-    endpoints : sequence of Endpoint
-        Endpoints of the vehicle's links.
-    options : MavlinkOptions
-        Identity and profile.
-
-    Yields
-    ------
-    LinkThread
-        Thread of the vehicle's links, after its first step.
-
-    Raises
-    ------
-    TelemetryError
-        If a link cannot be opened, or the vehicle does not start within 120 s.
-    """
+    """Run a vehicle in a thread until the context ends."""
     scenario = load_scenario(_SCENARIO, _OVERRIDES)
     commands, begun = CommandQueue(), _FirstStep()
     with Master(scenario) as master:
@@ -88,13 +70,7 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> I
 
 @contextlib.contextmanager
 def own_vehicle(profile: ProfileName) -> Iterator[GroundLink]:
-    """Run a vehicle that accepts commands, and yield a link to it.
-
-    Yields
-    ------
-    GroundLink
-        Link to the vehicle, open until the context ends.
-    """
+    """Run a vehicle that accepts commands, and yield a link to it."""
     ground = Endpoint("udpin", f"own vehicle, profile {profile}", host=_HOST)  # port 0: any free port
     with GroundLink(ground) as link:
         assert isinstance(link.channel, UdpIn)
