@@ -40,11 +40,8 @@ class StandIn:
         options = MavlinkOptions(profile=profile, commands=True)
         self.autopilot = Autopilot(self.master.scenario, self.master.signals.columns, options, self.queue)
         self.shift = np.array(shift)  # m: of the scene's origin in the autopilot's own frame
-        self.cut, self.refused_commands, self.silent = (
-            False,
-            set(),
-            set(silent),
-        )  # no link at all; commands, messages that go nowhere
+        self.cut = False  # True: no link at all
+        self.refused_commands, self.silent = set(), set(silent)  # commands and messages that go nowhere
         self.tamper = {}  # what is done to a message of a kind on its way
         self.events = []  # times, and what happens then
         self.stall = 0.0  # s, for which the companion's computer does nothing

@@ -1,5 +1,6 @@
 """The companion flies our own vehicle through its autopilot, whose clock is the run's; nothing here waits."""
 
+import math
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -188,11 +189,14 @@ def test_a_dry_run_sends_nothing_either_once_something_ends_it(tmp_path):
 # ---- what ends steering: each condition of the table ----
 
 
-def position_off(link, by):
-    def leap(message):
-        message.x += by
+def position_off(link, by, speed=math.inf):
+    """Let the local position move away by so many meters, at once or at a speed [m/s], and stay there."""
+    begun = link.clock()
 
-    link.tamper["LOCAL_POSITION_NED"] = leap
+    def move(message):
+        message.x += by if speed == math.inf else min(by, speed * (link.clock() - begun))
+
+    link.tamper["LOCAL_POSITION_NED"] = move
 
 
 def heading_off(link, degrees):
@@ -209,32 +213,9 @@ def changed(link, kind, **fields):
     link.tamper[kind] = lambda message: message.__dict__.update(fields)
 
 
-def position_creeps(link, by):
-    """Let the local position creep away by so many metres in two seconds, and stay there."""
-    begun = link.clock()
-
-    def creep(message):
-        message.x += by * min(1.0, 0.5 * (link.clock() - begun))
-
-    link.tamper["LOCAL_POSITION_NED"] = creep
-
-
-def drift(link):
-    begun = link.clock()
-
-    def creep(message):
-        message.x += 0.4 * (link.clock() - begun)
-
-    link.tamper["LOCAL_POSITION_NED"] = creep
-
-
 def command(link, number, *parameters, system=1, component=1):
     filled = [*parameters, *[0.0] * (7 - len(parameters))]
     link.hear(mavlink.MAVLink_command_long_message(system, component, number, 0, *filled))
-
-
-def says_the_pilot_gain(link, gain):
-    link.hear(mavlink.MAVLink_named_value_float_message(0, b"PilotGain", gain), 1, 1)
 
 
 FAULTS = {
@@ -246,7 +227,7 @@ FAULTS = {
     "heading leap": lambda link: heading_off(link, 8.0),
     "battery": lambda link: changed(link, "SYS_STATUS", battery_remaining=12),
     "leak": lambda link: link.autopilot._context.send_text("Leak Detected"),
-    "pilot gain": lambda link: says_the_pilot_gain(link, 1.0),
+    "pilot gain": lambda link: link.hear(mavlink.MAVLink_named_value_float_message(0, b"PilotGain", 1.0), 1, 1),
     "takeover": lambda link: command(link, 193, 0.0, system=IDENTITY[0], component=IDENTITY[1]),
 }
 
@@ -329,30 +310,31 @@ def test_a_velocity_that_is_off_does_not_shift_the_position(tmp_path):
 @pytest.mark.medium
 def test_frame_drift_holds_the_vehicle(tmp_path):
     link = StandIn(profile="generic", shift=SHIFT)
-    flight = Flight(tmp_path, 8.0, link=link, events=[lambda: drift(link)])
+    flight = Flight(tmp_path, 8.0, link=link, events=[lambda: position_off(link, 10.0, 0.4)])
     assert flight.status == "held: frame drift" and flight.companion.session.alignment.drift > 0.5
 
 
+@pytest.fixture
+def margins(monkeypatch):
+    """Return the list of the margins [m] that a flight sets for position errors."""
+    found, inflate = [], RegionEnvironment.inflate_position_uncertainty
+    monkeypatch.setattr(RegionEnvironment, "inflate_position_uncertainty",
+                        lambda self, by: (found.append(SPREADS * by), inflate(self, by)))  # fmt: skip
+    return found
+
+
 @pytest.mark.medium
-def test_frame_drift_widens_margins(tmp_path, monkeypatch):
+def test_frame_drift_widens_margins(tmp_path, margins):
     """Of sources that come apart by 0.3 m, the margins of all regions are as much wider, and it goes on."""
-    doubts, doubt = [], RegionEnvironment.inflate_position_uncertainty
-    monkeypatch.setattr(
-        RegionEnvironment, "inflate_position_uncertainty", lambda self, by: (doubts.append(by), doubt(self, by))
-    )
     link = StandIn(profile="generic", shift=SHIFT)
-    flight = Flight(tmp_path, 8.0, link=link, events=[lambda: position_creeps(link, 0.3)])
+    flight = Flight(tmp_path, 8.0, link=link, events=[lambda: position_off(link, 0.3, 0.15)])
     assert flight.status == "completed"
     assert 0.2 < flight.companion.session.alignment.drift < 0.4
-    assert SPREADS * doubts[0] == pytest.approx(UNSEEN)
-    assert SPREADS * doubts[-1] == pytest.approx(UNSEEN + 0.3, abs=0.1)
+    assert margins[0] == pytest.approx(UNSEEN)
+    assert margins[-1] == pytest.approx(UNSEEN + 0.3, abs=0.1)
 
 
-def test_dead_reckoning_widens_margins_with_distance(tmp_path, monkeypatch):
-    doubts, doubt = [], RegionEnvironment.inflate_position_uncertainty
-    monkeypatch.setattr(
-        RegionEnvironment, "inflate_position_uncertainty", lambda self, by: (doubts.append(by), doubt(self, by))
-    )
+def test_dead_reckoning_widens_margins_with_distance(tmp_path, margins):
     link = StandIn(profile="generic", shift=SHIFT)
     link.tamper["EKF_STATUS_REPORT"] = link.tamper["ESTIMATOR_STATUS"] = lambda m: setattr(m, "flags", 8)
     flight = Flight(tmp_path, 6.0, link=link, reckoning_error=0.05)
@@ -360,22 +342,22 @@ def test_dead_reckoning_widens_margins_with_distance(tmp_path, monkeypatch):
     way = np.array([table[f"position.{a}"].to_numpy() for a in "xy"])
     moved = np.linalg.norm(np.diff(way, axis=1), axis=0).sum()
     assert flight.status == "completed" and moved > 0.5
-    assert SPREADS * doubts[-1] - UNSEEN == pytest.approx(0.05 * moved, rel=0.1)
+    assert margins[-1] - UNSEEN == pytest.approx(0.05 * moved, rel=0.1)
 
 
-def test_setpoints_are_not_sent_to_an_autopilot_that_ignores_them(tmp_path):
+@pytest.mark.parametrize(
+    ("message", "words"),
+    [
+        (mavlink.MAVLink_param_value_message(b"SYSID_MYGCS", 250.0, 9, 1, 0),
+         r"SYSID_MYGCS is 250, and the companion's system id 255"),
+        (mavlink.MAVLink_named_value_float_message(0, b"PilotGain", 0.25),
+         r"the autopilot's pilot gain is 0.25, expected 0.5 of --pilot-gain"),
+    ],
+)  # fmt: skip
+def test_an_ardusub_that_would_ignore_or_misread_sticks_gets_none(tmp_path, message, words):
     link = StandIn(profile="ardusub", shift=SHIFT)
-    told = mavlink.MAVLink_param_value_message(b"SYSID_MYGCS", 250.0, 9, 1, 0)
-    link.events = [(0.5, lambda: link.hear(told, 1, 1))]
-    with pytest.raises(RunError, match=r"SYSID_MYGCS is 250, and the companion's system id 255"):
-        Flight(tmp_path, link=link, profile="ardusub")
-    assert not [m for _, m in link.sent if m.get_type() in STICKS]
-
-
-def test_an_ardusub_of_another_pilot_gain_is_refused_before_anything_is_sent(tmp_path):
-    link = StandIn(profile="ardusub", shift=SHIFT)
-    link.events = [(0.5, lambda: says_the_pilot_gain(link, 0.25))]
-    with pytest.raises(RunError, match=r"the autopilot's pilot gain is 0.25, expected 0.5 of --pilot-gain"):
+    link.events = [(0.5, lambda: link.hear(message, 1, 1))]
+    with pytest.raises(RunError, match=words):
         Flight(tmp_path, link=link, profile="ardusub")
     assert not [m for _, m in link.sent if m.get_type() in STICKS]
 
@@ -388,17 +370,9 @@ def test_violated_hard_region_holds_the_vehicle(tmp_path):
     assert inside == (flight.status == "held: geofence")
 
 
-def takes_the_mode(link):
-    command(link, 176, 1.0, 4.0, 3.0)
-
-
-def moves_a_stick(link):
-    link.hear(mavlink.MAVLink_manual_control_message(1, 600, 0, 0, 0, 0))
-
-
 PILOTS = {
-    "mode taken": takes_the_mode,
-    "pilot's sticks": moves_a_stick,
+    "mode taken": lambda link: command(link, 176, 1.0, 4.0, 3.0),
+    "pilot's sticks": lambda link: link.hear(mavlink.MAVLink_manual_control_message(1, 600, 0, 0, 0, 0)),
     "disarmed": lambda link: command(link, 400, 0.0),
 }
 

@@ -9,12 +9,9 @@ from pymavlink.dialects.v20 import all as mavlink
 from cosim.companion.companion_run import scenario_to_steer
 from cosim.companion.outputs import Output
 from cosim.companion.set_points import LevelLead
-from tests.cosim.companion.test_parts import HEAVY, VECTORED_6DOF, decoded, reported
+from tests.cosim.companion.test_parts import HEAVY, decoded, reported
 from tests.cosim.mavlink.station import scenario
-
-INERTIA = (np.diag(HEAVY.inertia) + np.diag(HEAVY.added_mass)[3:])[:2]
-REACH = 4 * 40.0 * 0.218  # N m, of the vertical thrusters about roll
-LINK, SHAPED = 0.08, 0.15  # s, from a state to its sticks' effect; ATC_INPUT_TC
+from tests.cosim.sitl.stand_in import VECTORED_6DOF
 
 
 def angle_of(pulse):
@@ -79,42 +76,6 @@ def test_leans_cancel_munk_s_moment():
     made = -np.array([(heave - sway) * -v * w, (heave - surge) * u * w])
     assert LevelLead(HEAVY).moments(np.array([u, v, w])) == pytest.approx(made)
     assert LevelLead(HEAVY).moments(np.full(3, math.nan)).tolist() == [0.0, 0.0]
-
-
-def peak_of_sensitivity(effort, bandwidth=None, stiffness=0.0):
-    """Return the greatest gain of 1/(1 + L) about roll; infinite where the closed loop is unstable.
-
-    ArduSub's loop with its default gains around a body whose thrusters are at an `effort`, and around it, if there is a
-    `bandwidth` [rad/s], a law that holds the attitude through leans and counts on a righting `stiffness` [N m/rad].
-    """
-    s = 1j * np.logspace(-1.5, 2.5, 20000)
-    slope, inertia = 2.0 * effort * REACH, INERTIA[0]
-    body = np.exp(-0.005 * s) / (inertia * s**2 + 0.8 * s + 1.3)
-    integral = 1.0 + 0.09 / 0.135 / s
-    loop = slope * 0.135 * (6.0 + s) * integral
-    if bandwidth is not None:
-        shaping = (1.0 + s / 6.0) / (1.0 + 0.5 * SHAPED * s) ** 2
-        law = inertia * (bandwidth**2 + 2.0 * bandwidth * s) - stiffness
-        loop = loop + law * np.exp(-LINK * s) * shaping * s / (s + 0.09 / 0.135) * integral
-    returned = 1.0 + body * loop
-    turns = np.unwrap(np.angle(returned))[[0, -1]] @ (-1.0, 1.0) / math.pi  # 0.5 from the pole of the integral
-    return float(np.abs(1.0 / returned).max()) if turns > 0.0 else math.inf
-
-
-@pytest.mark.parametrize("effort", [0.1, 0.2, 0.4, 0.6])
-def test_an_attitude_loop_through_the_leans_would_take_the_margin(effort):
-    """A peak of 1.3 is a margin of 45 degrees and 12 dB; the true stiffness is 1.3 N m/rad.
-
-    Laws that found the stiffness out beside the autopilot's loop had between -10 and 29 N m/rad in flight.
-    """
-    alone = peak_of_sensitivity(effort)
-    assert alone < 1.3 < peak_of_sensitivity(0.1, 2.0, 1.3)
-    assert peak_of_sensitivity(effort, 2.0, 1.3) > 1.15 * alone
-
-
-def test_a_stiffness_that_is_the_autopilot_s_makes_the_loop_unstable():
-    assert math.isinf(peak_of_sensitivity(0.1, 2.0, 10.0)) and math.isinf(peak_of_sensitivity(0.2, 2.0, 20.0))
-    assert peak_of_sensitivity(0.1, 2.0, -20.0) > 10.0 and math.isinf(peak_of_sensitivity(0.2, 2.0, -30.0))
 
 
 def test_the_law_finds_out_no_stiffness_where_the_autopilot_levels():

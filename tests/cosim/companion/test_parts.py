@@ -29,6 +29,7 @@ from cosim.mavlink.wire.thrust_body import get_thrust_body
 from cosim.simulation.commands.commands import ManualControl
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station, scenario
+from tests.cosim.sitl.stand_in import VECTORED_6DOF
 
 HEAVY = load_vehicle("bluerov2_heavy")
 ARDUSUB = PROFILES["ardusub"]
@@ -116,15 +117,6 @@ def test_full_surge_of_a_bluerov2_at_half_gain_is_28_newtons():
     assert sticks[0] == pytest.approx(1.0, abs=0.01)
     assert np.abs(scale.sticks(np.full(6, -1e3))).max() <= 1.0
     assert scale.sticks(np.array([math.nan, math.inf, 0, 0, 0, 0])) == pytest.approx(np.zeros(6), abs=1e-12)
-
-
-# ArduSub's vectored_6dof, thruster by thruster: forward, lateral, down, roll, pitch, yaw
-VECTORED_6DOF = np.array(
-    [
-        (-1, 1, 0, 0, 0, 1), (-1, -1, 0, 0, 0, -1), (1, 1, 0, 0, 0, -1), (1, -1, 0, 0, 0, 1),
-        (0, 0, 1, 1, -1, 0), (0, 0, 1, -1, -1, 0), (0, 0, 1, 1, 1, 0), (0, 0, 1, -1, 1, 0),
-    ]
-)  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -271,7 +271,7 @@ def test_qgroundcontrol_altitude_change_moves_the_depth(station):
 
 
 def go_to(station, current=2, frame=3, place=(55.9098, -3.3202, -4.0), command=16):
-    """Send what QGroundControl sends ArduPilot for "go to location", a float32 of degrees; return MAV_MISSION_RESULT."""
+    """Send QGroundControl's "go to location" for ArduPilot, a float32 of degrees; return MAV_MISSION_RESULT."""
     item = mavlink.MAVLink_mission_item_message(1, 1, 0, frame, command, current, 1, 0, 0, 0, 0, *place)
     return station.send(item)[-1].type
 

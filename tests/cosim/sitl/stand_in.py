@@ -4,6 +4,8 @@ import re
 import socket
 import struct
 
+import numpy as np
+
 NUMBER = r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)"
 
 # section, key, how many numbers, required: in the order in which ArduPilot looks for them
@@ -91,6 +93,13 @@ class StandIn:
         return parse(newest_line(self.exchange(pwm)))
 
 
+# ArduSub's frame vectored_6dof: what each motor, above neutral, does forward, right, down, in roll, pitch, yaw
+VECTORED_6DOF = np.array(
+    [
+        (-1, 1, 0, 0, 0, 1), (-1, -1, 0, 0, 0, -1), (1, 1, 0, 0, 0, -1), (1, -1, 0, 0, 0, 1),
+        (0, 0, 1, 1, -1, 0), (0, 0, 1, -1, -1, 0), (0, 0, 1, 1, 1, 0), (0, 0, 1, -1, 1, 0),
+    ]
+)  # fmt: skip
 DISARMED = (1500,) * 8
 NEUTRAL = (1501,) * 8  # armed, inside the dead band
 

@@ -11,25 +11,15 @@ from cosim.scenario.scenario import load_scenario
 from cosim.sitl.law import make_control_law, make_pwm_law
 from plant_fmu import load_vehicle
 from plant_fmu.errors import TableError, VehicleError
+from tests.cosim.sitl.stand_in import VECTORED_6DOF
 
 SHIPPED = resources.files("plant_fmu") / "vehicles"
 
-# ArduSub's frame vectored_6dof: what each motor, above neutral, does forward, right, down, in roll, pitch, yaw
-VECTORED_6DOF = [
-    (-1, 1, 0, 0, 0, 1),
-    (-1, -1, 0, 0, 0, -1),
-    (1, 1, 0, 0, 0, -1),
-    (1, -1, 0, 0, 0, 1),
-    (0, 0, 1, 1, -1, 0),
-    (0, 0, 1, -1, -1, 0),
-    (0, 0, 1, 1, 1, 0),
-    (0, 0, 1, -1, 1, 0),
-]
 BLUEROVS = ["bluerov2_heavy", "bluerov2_heavy_wu"]
 
 
-def forces(law, outputs):
-    given = np.full(8, math.nan)
+def forces(law, outputs, n=8):
+    given = np.full(n, math.nan)
     law.set_outputs(outputs)
     law.step(None, None, None, None, given)
     return given
@@ -121,12 +111,9 @@ def test_vehicle_without_autopilot_table_is_rejected():
 
 
 def test_controls_map_linearly_to_force_limits():
-    law = make_control_law(load_vehicle("rexrov"))
     vehicle = load_vehicle("rexrov")
     n = vehicle.n_thrusters
-    given = np.zeros(n)
-    law.set_outputs([1.0, -1.0, 0.5, math.nan, 3.0, 0.0, 0.0, 0.0])
-    law.step(None, None, None, None, given)
+    given = forces(make_control_law(vehicle), [1.0, -1.0, 0.5, math.nan, 3.0, 0.0, 0.0, 0.0], n)
     expected = [1.0, 1.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0][:n]
     limits = [vehicle.thrust_max[0], vehicle.thrust_min[1], *vehicle.thrust_max[2:]]
     assert given == pytest.approx(np.multiply(expected, limits))

@@ -27,6 +27,12 @@ def rows(run):
     return record.stack(list(record.units))
 
 
+def fly(served, frames, pwm=NEUTRAL, **pilot):
+    """Exchange so many frames, with constant pulses or a function of the frame's number; return the answers."""
+    with StandIn(served.address, **pilot) as pilot:
+        return [pilot.fly(pwm(k) if callable(pwm) else pwm) for k in range(frames)]
+
+
 def pulses(k):
     """Something else in each frame."""
     return tuple(1500 + round(300 * np.sin(0.01 * k + i)) for i in range(8))
@@ -49,8 +55,7 @@ def test_frame_counts_are_classified(counts, frames):
 
 def test_each_frame_is_a_step_of_the_plant(serve):
     served = serve("time.duration=0.25")
-    with StandIn(served.address) as pilot:
-        said = [pilot.fly(heave(0.5)) for _ in range(300)]
+    said = fly(served, 300, heave(0.5))
     outcome = served.outcome()
     assert [s["timestamp"] for s in said] == [(k + 1) * DT for k in range(300)]
     assert (outcome.counts.steps, outcome.counts.lost, outcome.counts.resent) == (300, 0, 0)
@@ -68,8 +73,7 @@ def test_each_frame_is_a_step_of_the_plant(serve):
 def test_imu_at_rest_measures_gravity_and_rangefinder_the_bottom(serve):
     """Weight and buoyancy are off by the same amount: the IMU measures gravity alone."""
     served = serve("time.duration=0.01", "plant.parameters.weight=131.588", "initial.position=[1,2,3]")
-    with StandIn(served.address) as pilot:
-        said = [pilot.fly(NEUTRAL) for _ in range(12)]
+    said = fly(served, 12)
     served.outcome()
     assert said[0]["gyro"] == (0.0, 0.0, 0.0)
     assert said[0]["accel_body"] == pytest.approx((0.0, 0.0, -9.81), abs=1e-12)
@@ -99,8 +103,7 @@ def test_an_idle_autopilot_is_lowered_from_the_surface_and_starts_where_the_scen
     monkeypatch.setattr(motion, "_SURFACE_TIME", 0.02)
     monkeypatch.setattr(motion, "_MAX_DURATION", 0.04)
     served = serve("time.duration=0.02", "initial.position=[1,2,3]")
-    with StandIn(served.address) as pilot:
-        said = [pilot.fly(pwm) for pwm in 36 * (DISARMED,) + 60 * (NEUTRAL,)]
+    said = fly(served, 96, lambda k: DISARMED if k < 36 else NEUTRAL)
     outcome = served.outcome()
     depth = np.array([s["position"][2] for s in said])
     assert not depth[:24].any() and depth[71] == pytest.approx(3.0) and depth[-1] == pytest.approx(3.0, abs=1e-3)
@@ -132,8 +135,7 @@ def test_velocity_is_reported_in_ned(serve):
     served = serve(
         "time.duration=0.01", f"initial.quaternion=[{half},0,0,{half}]", "initial.velocity=[1.0,0.5,0.25,0,0,0]"
     )
-    with StandIn(served.address) as pilot:
-        said = [pilot.fly(NEUTRAL) for _ in range(12)]
+    said = fly(served, 12)
     served.outcome()
     assert said[0]["velocity"] == pytest.approx((-0.5, 1.0, 0.25), abs=0.02)
     assert said[0]["attitude"][2] == pytest.approx(np.pi / 2, abs=1e-3)
@@ -160,9 +162,7 @@ def test_run_equals_a_master_with_the_autopilot_as_law(serve):
         "initial.position=[0,0,0.1]",
     )  # fmt: skip
     served = serve(*overrides)
-    with StandIn(served.address) as pilot:
-        for k in range(600):
-            pilot.fly(pulses(k))
+    fly(served, 600, pulses)
     (run,) = served.outcome().runs
     law = make_pwm_law(load_vehicle("bluerov2_heavy"))
     with Master(scenario_to_fly("sitl", overrides, None, 1200, "ardupilot"), law) as master:
@@ -224,9 +224,7 @@ def test_thirty_two_channels_are_accepted(serve, tmp_path):
     text = (resources.files("plant_fmu") / "vehicles" / "bluerov2_heavy.toml").read_text()
     path.write_text(text.replace("signs = -1", "signs = -1\nchannels = [25, 26, 27, 28, 29, 30, 31, 32]"))
     served = serve("time.duration=0.1", vehicle=str(path))
-    with StandIn(served.address, channels=32) as pilot:
-        for _ in range(120):
-            said = pilot.fly((*[1900] * 24, *heave(0.5)))
+    said = fly(served, 120, (*[1900] * 24, *heave(0.5)), channels=32)[-1]
     (run,) = served.outcome().runs
     assert said["velocity"][2] > 0.05
     assert abs(said["velocity"][0]) < 1e-3
@@ -294,25 +292,23 @@ def test_rate_change_during_a_run_keeps_the_step(serve):
 def test_the_step_is_that_of_the_first_frame(serve, rate):
     served = serve("time.duration=0.5")
     n = round(0.5 * rate)
-    with StandIn(served.address, rate) as pilot:
-        times = [pilot.fly(NEUTRAL)["timestamp"] for _ in range(n)]
+    times = [answer["timestamp"] for answer in fly(served, n, rate=rate)]
     assert times == [(k + 1) * (1.0 / rate) for k in range(n)]
     assert served.outcome().runs[0].summary["status"] == "completed"
 
 
 @pytest.mark.medium
 def test_record_does_not_depend_on_wall_clock_timing(serve):
-    found = []
-    for hurry in (True, False):
-        served = serve(
-            "time.duration=0.3", "plant.parameters.imu.rate=100", "plant.parameters.imu.acceleration_noise=0.1"
-        )
-        draw = random.Random(3)
-        with StandIn(served.address) as pilot:
-            for k in range(360):
-                if not hurry and draw.random() < 0.05:
-                    time.sleep(draw.random() * 0.005)
-                pilot.fly(pulses(k))
+    draw = random.Random(3)
+
+    def late_pulses(k):
+        time.sleep(draw.random() * 0.005 if draw.random() < 0.05 else 0.0)
+        return pulses(k)
+
+    found, noise = [], ("plant.parameters.imu.rate=100", "plant.parameters.imu.acceleration_noise=0.1")
+    for pwm in (pulses, late_pulses):
+        served = serve("time.duration=0.3", *noise)
+        fly(served, 360, pwm)
         found.append(rows(served.outcome().runs[0]))
     assert np.array_equal(*found)
 
@@ -322,9 +318,7 @@ def test_record_is_decimated_and_summary_uses_all_steps(serve):
     found = []
     for rate in (100.0, 1200.0):
         served = serve("time.duration=0.5", record_rate=rate)
-        with StandIn(served.address) as pilot:
-            for _ in range(600):
-                pilot.fly(heave(0.5))
+        fly(served, 600, heave(0.5))
         found.append(served.outcome().runs[0])
     thin, full = found
     assert len(load_record(thin.folder)["time"]) == 51
@@ -337,9 +331,7 @@ def test_record_is_decimated_and_summary_uses_all_steps(serve):
 @pytest.mark.medium
 def test_silence_ends_the_run_after_the_timeout(serve):
     served = serve(timeout=0.3)
-    with StandIn(served.address) as pilot:
-        for _ in range(5):
-            pilot.fly(NEUTRAL)
+    fly(served, 5)
     (run,) = served.outcome().runs
     assert (run.summary["status"], run.summary["steps"]) == ("ended: silence for 0.3 s", 4)
 
