@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,10 +69,8 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
     ),
     "generic": (),
 }
-_REACTIONS = {  # parameters of the reaction to a lost companion; at least one of them must be nonzero
-    "ardusub": ("FS_PILOT_INPUT", "FS_GCS_ENABLE"),
-    "px4": ("COM_OF_LOSS_T",),
-}
+# parameters of the reaction to a lost companion; at least one of them must be nonzero
+_REACTIONS = {"ardusub": ("FS_PILOT_INPUT", "FS_GCS_ENABLE"), "px4": ("COM_OF_LOSS_T",)}
 _STICK_SYSTEM = ("SYSID_MYGCS", "MAV_GCS_SYSID")
 _OPTIONAL = (*_STICK_SYSTEM, "ATC_ANGLE_MAX", "ANGLE_MAX")  # absent in some versions: no warning without them
 _HOLD_TIMES = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # times [s] the last sticks act: with a radio, and without one
@@ -116,29 +115,25 @@ class Failsafes:
         silent = [name for name in self._missing() if name not in _OPTIONAL]
         if silent:
             lines.append(f"not answered by the autopilot: {', '.join(silent)}")
-        reactions = _REACTIONS.get(self._profile, ())
-        if reactions and all(self.values.get(name, 0.0) == 0.0 for name in reactions):
-            lines.append(
-                f"WARNING: no reaction is known if the companion fails: {', '.join(reactions)} are 0 or unknown"
-            )
-        lost, sticks = self.values.get("COM_OBL_RC_ACT"), self.values.get("NAV_RCL_ACT")
-        if lost in _BY_STICKS and sticks == 0.0:
-            lines.append(
-                "WARNING: without sticks, the last forces act for ever after set-points are lost: "
+        return [*lines, *(f"WARNING: {warning}" for warning in self._warnings())]
+
+    def _warnings(self) -> Iterator[str]:
+        values, reactions = self.values, _REACTIONS.get(self._profile, ())
+        if reactions and all(values.get(name, 0.0) == 0.0 for name in reactions):
+            yield f"no reaction is known if the companion fails: {', '.join(reactions)} are 0 or unknown"
+        lost = values.get("COM_OBL_RC_ACT")
+        if lost in _BY_STICKS and values.get("NAV_RCL_ACT") == 0.0:
+            yield (
+                "without sticks, the last forces act for ever after set-points are lost: "
                 f"COM_OBL_RC_ACT is {lost:g} and NAV_RCL_ACT 0; expected COM_OBL_RC_ACT 5, which holds"
             )
-        saturation = self.values.get(_SATURATION, 1.0)
+        saturation = values.get(_SATURATION, 1.0)
         if saturation < 1.0:
-            lines.append(
-                f"WARNING: {_SATURATION} is {saturation:g}, but the law counts on the thrusters' full force; expected 1"
-            )
-        hold_times = [(name, self.values[name]) for name in _HOLD_TIMES if name in self.values]
-        if any(not 0.0 <= time <= _MAX_HOLD_TIME for _, time in hold_times):
-            values = ", ".join(f"{name} is {time:g}" for name, time in hold_times)
-            lines.append(
-                f"WARNING: the last sticks outlast a lost link: {values}; expected {_MAX_HOLD_TIME:g} s or less"
-            )
-        return lines
+            yield f"{_SATURATION} is {saturation:g}, but the law counts on the thrusters' full force; expected 1"
+        hold_times = {name: values[name] for name in _HOLD_TIMES if name in values}
+        if any(not 0.0 <= time <= _MAX_HOLD_TIME for time in hold_times.values()):
+            listed = ", ".join(f"{name} is {time:g}" for name, time in hold_times.items())
+            yield f"the last sticks outlast a lost link: {listed}; expected {_MAX_HOLD_TIME:g} s or less"
 
     def ignored_sticks(self, system: int) -> str:
         """Return the reason why the autopilot ignores sticks of a system id; empty if none is known."""

@@ -17,10 +17,7 @@ log = logging.getLogger(__name__)
 _MAX_GAP = 0.2  # s, between two attitudes; over longer ones their rates do not predict the turn
 _ALIGNED = "in-flight", "yaw alignment complete"  # parts of ArduSub's STATUSTEXT after an alignment
 _GAIN, _MAX_SPEED = 0.5, 0.25  # 1/s, gain from remaining depth to speed; m/s, maximum speed of the dive
-_DEPTH_TOLERANCE, _SPEED_TOLERANCE = (
-    0.05,
-    0.05,
-)  # m, m/s, depth error and speed below which the vehicle has reached the depth
+_DEPTH_TOLERANCE, _SPEED_TOLERANCE = 0.05, 0.05  # m, m/s, below which the vehicle has reached the depth
 _MIN_DIVE_TIME = 6.0  # s, from arming to the earliest end of the dive
 _SETTLING_TIME = 1.0  # s, from the last alignment to the earliest end of the dive
 _DIVE_TIMEOUT = 3.0  # s, to wait at the depth for the text, or for the descent to begin
@@ -102,10 +99,8 @@ class LevelDive:
         if self._begun is None:
             here = math.inf if self.clearance is None else self.clearance(state.position)
             if not self._is_path_clear(state, min(here, _MIN_CLEARANCE)):
-                log.warning(
-                    "no dive: a hard region is too near within %g m below; the heading may be off",
-                    self._depth_left(state),
-                )
+                text = "no dive: a hard region is too near within %g m below; the heading may be off"
+                log.warning(text, self._depth_left(state))
                 self._is_done = True
                 return False
             self._begun, self._start = (now, here), state.position[:2].copy()
@@ -137,6 +132,5 @@ class LevelDive:
         if self.clearance is None:
             return True
         depths = np.arange(0.0, max(0.0, self._depth_left(state)) + _SPACING, _SPACING)
-        return all(
-            self.clearance(state.position + np.array([0.0, 0.0, down])) >= min_clearance for down in depths.tolist()
-        )
+        points = [state.position + np.array([0.0, 0.0, down]) for down in depths.tolist()]
+        return all(self.clearance(point) >= min_clearance for point in points)

@@ -48,12 +48,8 @@ class Placement:
             parts.append("inside the goal" if clearances[0] >= 0.0 else f"goal {format_distance(-clearances[0])} away")
         if self.hard.size:
             nearest = self.hard[np.argmin(clearances[self.hard])]
-            clearance = clearances[nearest]
-            margin = (
-                f"{format_distance(clearance)} left"
-                if clearance >= 0.0
-                else f"violated by {format_distance(-clearance)}"
-            )
+            clearance, distance = clearances[nearest], format_distance(abs(clearances[nearest]))
+            margin = f"{distance} left" if clearance >= 0.0 else f"violated by {distance}"
             parts.append(f"nearest hard region {self._names[nearest]!r}, {margin}")
         return ", ".join(parts)
 

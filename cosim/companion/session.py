@@ -25,12 +25,8 @@ from plant_fmu import Vehicle
 
 log = logging.getLogger(__name__)
 
-_HEARTBEAT_PERIOD, _SYNC_PERIOD, _RATES_PERIOD, _MODE_PERIOD = (
-    1.0,
-    0.5,
-    10.0,
-    0.25,
-)  # s, periods of heartbeats, TIMESYNC, rate and mode requests
+# s, periods of heartbeats, TIMESYNC, rate and mode requests
+_HEARTBEAT_PERIOD, _SYNC_PERIOD, _RATES_PERIOD, _MODE_PERIOD = 1.0, 0.5, 10.0, 0.25
 _PILOT_TIMEOUT = 1.0  # s, for which deflected sticks of another station count as a pilot's takeover
 _HOLD_TIMEOUT = 1.0  # s, in ``held`` without the hold mode, after which the depth-hold mode is requested instead
 _ROUNDING = 1e-6  # s
@@ -96,9 +92,8 @@ class AutopilotSession:
             if state == "engaging":
                 self.heading.restart()
                 if self.reported.is_reckoned and self.failsafes.learns_magnetic_field():
-                    log.warning(
-                        "no position fix, and EK3_MAG_CAL is not 2: the heading may drift by degrees; set it to 2"
-                    )
+                    text = "no position fix, and EK3_MAG_CAL is not 2: the heading may drift by degrees; set it to 2"
+                    log.warning(text)
             if before in ("diving", "engaging", "steering") and state == "pilot":
                 self._release_until = now + self.output.release_time
         self._send_requests(now)
@@ -124,10 +119,8 @@ class AutopilotSession:
             until = waits = self._release_until
         else:
             return
-        while self._link.clock() <= until or (
-            self._link.clock() < waits and self.reported.mode != self.profile.custom_modes["hold"]
-        ):
-            now = self._link.clock()
+        hold = self.profile.custom_modes["hold"]
+        while (now := self._link.clock()) <= until or (now < waits and self.reported.mode != hold):
             self.exchange(np.zeros(6), now, now + 0.05)
 
     def missing(self) -> str:
@@ -190,9 +183,8 @@ class AutopilotSession:
         }
         if self._dive_mode == "hold" and self.supervisor.state == "diving" and self.dive.is_stuck(reported, now):
             self._dive_mode, self._was_in_mode = "depth_hold", False
-        needs_dive = (
-            alignment.offset is not None and self.is_placed and has_state and self.dive.is_needed(reported, now)
-        )
+        is_known = alignment.offset is not None and self.is_placed
+        needs_dive = is_known and has_state and self.dive.is_needed(reported, now)
         is_in_mode = reported.mode == (self.profile.custom_modes[self._dive_mode] if needs_dive else self._mode)
         self._was_in_mode |= is_in_mode and self.supervisor.state == "diving"
         is_ours = self.supervisor.state == "steering" or (needs_dive and self._was_in_mode)
@@ -204,7 +196,6 @@ class AutopilotSession:
                 "refused mode": self.supervisor.mode_wait_time(now),
                 "pilot gain": self._gain_error() if uses_sticks(self._options.profile, self._options.steer_by) else 0.0,
             }
-        is_known = alignment.offset is not None and self.is_placed
         return Observation(now, has_state, is_known, reported.is_armed, is_in_mode, values, needs_dive)
 
     # ---- sending ----
@@ -309,11 +300,8 @@ class AutopilotSession:
         system, ours = self._link.identity
         if component != ours and component not in self._shared_ids:
             self._shared_ids.add(component)
-            log.warning(
-                "component %d has the companion's system id %d: its sticks compete; change its system id",
-                component,
-                system,
-            )
+            text = "component %d has the companion's system id %d: its sticks compete; change its system id"
+            log.warning(text, component, system)
             m = self._mavlink
             text = f"Companion: component {component} shares system id {system}"
             self._link.send(m.MAVLink_statustext_message(m.MAV_SEVERITY_WARNING, text[:50].encode()))

@@ -29,9 +29,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array, Column
 
-_HEARTBEAT_PERIOD = (
-    1.1  # s of the wall clock without a heartbeat, after which one is sent; longer than the stream's second
-)
+_HEARTBEAT_PERIOD = 1.1  # s of the wall clock without a heartbeat, after which one is sent: above the stream's second
 _SNAPSHOT_TIMEOUT = 0.5  # s of the wall clock without a snapshot, after which streams go by that clock
 _SECOND = 1_000_000
 

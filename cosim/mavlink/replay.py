@@ -19,9 +19,9 @@ from cosim.results.required_columns import require_columns
 from cosim.results.run_result import SCENARIO
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.columns import column_names
+from cosim.simulation.pace import Pace
 from cosim.simulation.signals import Array
 
-_MAX_SLEEP = 0.5  # s
 _POLL_PERIOD = 0.002  # s between two looks at the queue while the links send
 _MAX_QUEUED = MAX_SNAPSHOTS // 2
 
@@ -50,11 +50,12 @@ def replay(
     every = max(1, round(SNAPSHOT_PERIOD / scenario.time.step))
     thread.start()
     started, simulated = time.perf_counter(), 0.0
+    pace = None if rate is None else Pace(every * scenario.time.step / rate)
     try:
         for k, row in _rows(record, every, [column.name for column in columns]):
             simulated = float(row[0])
-            if rate is not None:
-                _sleep_until(started + simulated / rate)
+            if pace is not None:
+                pace.wait()
             while thread.waiting > _MAX_QUEUED:
                 time.sleep(_POLL_PERIOD)
             thread.observe(k, row)
@@ -73,8 +74,3 @@ def _rows(record: Record, every: int, names: Sequence[str]) -> Iterator[tuple[in
         for i in range(-first % every, len(block), every):
             yield first + i, block[i]
         first += len(block)
-
-
-def _sleep_until(moment: float) -> None:
-    while (left := moment - time.perf_counter()) > 0.0:
-        time.sleep(min(left, _MAX_SLEEP))

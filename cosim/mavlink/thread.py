@@ -96,9 +96,8 @@ class LinkThread:
         """Return a text for each kind of loss or refusal, with its count."""
         reports = [f"{self.dropped} snapshots dropped"] if self.dropped else []
         reports += [f"{n} times {what}" for what, n in self.failures.items()]
-        return reports + [
-            f"{link.name}: {', '.join(link.loss_reports())}" for link in self._links if link.loss_reports()
-        ]
+        losses = [(link.name, link.loss_reports()) for link in self._links]
+        return reports + [f"{name}: {', '.join(texts)}" for name, texts in losses if texts]
 
     # ---- in the thread ----
 

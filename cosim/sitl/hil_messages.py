@@ -28,30 +28,21 @@ def hil_messages(mavlink: Any, motion: Motion, time_us: int, origin: tuple[float
     up = -motion.position_ned[2]
     altitude_mm = round(1e3 * up)
     speeds = [_saturate(100.0 * v, _INT16) for v in motion.velocity_ned]  # cm/s
-    messages = []
+    milli_g = [_saturate(1e3 * f / _GRAVITY, _INT16) for f in motion.specific_force]
+    state = time_us, motion.quaternion, *motion.gyro, latitude, longitude, altitude_mm, *speeds, 0, 0, *milli_g
+    field = rotation_matrix(np.array(motion.quaternion)).T @ np.array(FIELD_NED)
+    field_body: list[float] = (field + FLICKER * (time_us * RATE // 1_000_000 % 2)).tolist()
+    air = pressure_at(-up), 0.0, up, TEMPERATURE, _ALL_BUT_AIRSPEED
+    messages = [
+        mavlink.MAVLink_hil_state_quaternion_message(*state),
+        mavlink.MAVLink_hil_sensor_message(time_us, *motion.specific_force, *motion.gyro, *field_body, *air),
+    ]
     if gps:
         north, east, _ = motion.velocity_ned
         course = round(math.degrees(math.atan2(east, north)) * 100.0) % 36000
-        ground_speed = _saturate(100.0 * math.hypot(north, east), _UINT16)
-        messages.append(
-            mavlink.MAVLink_hil_gps_message(
-                time_us, 3, latitude, longitude, altitude_mm, 30, 40, ground_speed, *speeds, course, 12
-            )
-        )
-    milli_g = [_saturate(1e3 * f / _GRAVITY, _INT16) for f in motion.specific_force]
-    messages.append(
-        mavlink.MAVLink_hil_state_quaternion_message(
-            time_us, motion.quaternion, *motion.gyro, latitude, longitude, altitude_mm, *speeds, 0, 0, *milli_g
-        )
-    )
-    field = rotation_matrix(np.array(motion.quaternion)).T @ np.array(FIELD_NED)
-    field_body: list[float] = (field + FLICKER * (time_us * RATE // 1_000_000 % 2)).tolist()
-    messages.append(
-        mavlink.MAVLink_hil_sensor_message(
-            time_us, *motion.specific_force, *motion.gyro, *field_body,
-            pressure_at(-up), 0.0, up, TEMPERATURE, _ALL_BUT_AIRSPEED,
-        )
-    )  # fmt: skip
+        motion_cm = _saturate(100.0 * math.hypot(north, east), _UINT16), *speeds, course
+        fix = time_us, 3, latitude, longitude, altitude_mm, 30, 40, *motion_cm, 12
+        messages.insert(0, mavlink.MAVLink_hil_gps_message(*fix))
     return messages
 
 

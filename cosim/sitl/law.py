@@ -32,20 +32,13 @@ class AutopilotLaw:
         idle: float = 0.0,
         link: SitlLink | None = None,
     ) -> None:
-        limits = zip(vehicle.thrust_min.tolist(), vehicle.thrust_max.tolist(), strict=True)
         # thruster, its output from 0, effort, and the force of the efforts -1 and 1
-        self._driven = [
-            (i, channel - 1, effort, *limit)
-            for i, (channel, effort, limit) in enumerate(zip(channels, efforts, limits, strict=True))
-            if channel
-        ]
+        columns = channels, efforts, vehicle.thrust_min.tolist(), vehicle.thrust_max.tolist()
+        each = enumerate(zip(*columns, strict=True))
+        self._driven = [(i, channel - 1, effort, *limits) for i, (channel, effort, *limits) in each if channel]
+        meaning = "Output {} of the autopilot, of thruster {}"
         self.diagnostics = (
-            *(
-                Diagnostic(
-                    f"{output_name}{index + 1}", unit, f"Output {index + 1} of the autopilot, of thruster {i + 1}"
-                )
-                for i, index, *_ in self._driven
-            ),
+            *(Diagnostic(f"{output_name}{j + 1}", unit, meaning.format(j + 1, i + 1)) for i, j, *_ in self._driven),
             Diagnostic("lost", "", "Number of lost frames of the autopilot"),
             *(ESTIMATE if link is not None else ()),
         )

@@ -122,9 +122,6 @@ class SitlLink:
         if system is not None and now - self._requested_at >= _REQUEST_PERIOD:
             self._requested_at = now
             for name, rate in _RATES.items():
-                message_id = getattr(m, f"MAVLINK_MSG_ID_{name}")
-                self._link.send(
-                    m.MAVLink_command_long_message(
-                        system, 1, m.MAV_CMD_SET_MESSAGE_INTERVAL, 0, message_id, 1e6 / rate, 0, 0, 0, 0, 0
-                    )
-                )
+                interval = getattr(m, f"MAVLINK_MSG_ID_{name}"), 1e6 / rate, 0, 0, 0, 0, 0
+                command = system, 1, m.MAV_CMD_SET_MESSAGE_INTERVAL, 0, *interval
+                self._link.send(m.MAVLink_command_long_message(*command))

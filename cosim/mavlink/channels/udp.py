@@ -143,9 +143,8 @@ class UdpIn(_Udp):
         """Remove the silent peer that was active for the shortest time, but never the one active for longest."""
         ages = {address: peer.last - peer.first for address, peer in self._peers.items()}
         oldest = max(ages, key=ages.__getitem__)
-        silent = [
-            address for address, peer in self._peers.items() if now - peer.last > PEER_TIMEOUT and address != oldest
-        ]
+        peers = self._peers.items()
+        silent = [address for address, peer in peers if now - peer.last > PEER_TIMEOUT and address != oldest]
         if not silent:
             return False
         del self._peers[min(silent, key=ages.__getitem__)]

@@ -9,6 +9,7 @@ from cosim.mavlink.messages.message_table import build_messages
 from cosim.mavlink.services.service import CommandRequest, Service, to_local_position
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender
+from cosim.scenario.tables import Vector3
 
 _E7 = 1e-7
 _MM = 1e-3
@@ -39,11 +40,9 @@ class Origin(Service):
         context = self.context
         if not context.accepts_commands:
             return context.submit()
-        position = (
-            context.view.position_ned
-            if request[1] == 1.0
-            else to_local_position(context, request.frame, request[5], request[6], 0.0)
-        )
+        position: Vector3 | None = context.view.position_ned
+        if request[1] != 1.0:
+            position = to_local_position(context, request.frame, request[5], request[6], 0.0)
         if position is None or not math.hypot(position[0], position[1]) <= _MAX_HOME_DISTANCE:
             return Result.DENIED
         context.home = position[0], position[1]

@@ -75,26 +75,22 @@ class ParameterProtocol(Service):
 
     def restart(self) -> None:
         """Reset the values to the vehicle's settings."""
-        self._values = {setting.key: setting.value for setting in self.context.settings}
+        self.settings = {setting.key: setting.value for setting in self.context.settings}
 
     # ---- for other services ----
 
     def value(self, name: str) -> float:
         """Return a parameter's value, limited to the range of float32."""
         parameter = self._link_parameters.get(name)
-        return clip_to_float32(self._values[self._keys[name]] if parameter is None else parameter.read())
+        return clip_to_float32(self.settings[self._keys[name]] if parameter is None else parameter.read())
 
     def list_values(self) -> list[tuple[str, float]]:
         """Return names and values of all parameters, in the order of the list."""
         return [(name, self.value(name)) for name in self.names]
 
-    def has_setting(self, key: str) -> bool:
-        """Return True if there is a setting with a key."""
-        return key in self._values
-
     def change(self, key: str, value: float) -> Result:
         """Submit a new value of a setting; an invalid value is denied with the reason."""
-        context, before = self.context, self._values[key]
+        context, before = self.context, self.settings[key]
         if not context.accepts_commands:
             return context.submit()
         try:
@@ -106,14 +102,14 @@ class ParameterProtocol(Service):
         if result != Result.ACCEPTED:
             context.settings.change(key, before)
             return result
-        self._values[key] = value
+        self.settings[key] = value
         return result
 
     def record(self, key: str, value: float) -> None:
         """Record the value of a setting that a mission has changed."""
         with contextlib.suppress(CommandError):  # as the command handler does, which logs it
             self.context.settings.change(key, value)
-            self._values[key] = value
+            self.settings[key] = value
 
     # ---- the list ----
 
@@ -150,9 +146,8 @@ class ParameterProtocol(Service):
     def _send_hash(self, link: Link) -> None:
         m = self.context.mavlink
         (bits,) = struct.unpack("<f", struct.pack("<I", hash_parameters(dict(self.list_values()))))
-        link.send(
-            m.MAVLink_param_value_message(_HASH.encode(), bits, m.MAV_PARAM_TYPE_UINT32, len(self.names), _NO_INDEX)
-        )
+        kind = m.MAV_PARAM_TYPE_UINT32, len(self.names), _NO_INDEX
+        link.send(m.MAVLink_param_value_message(_HASH.encode(), bits, *kind))
 
     # ---- single parameters ----
 

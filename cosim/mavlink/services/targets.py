@@ -137,11 +137,8 @@ class Targets(Service):
         commands: list[Command] = []
         if mask & _X_Y and mask & _Z:
             set_point: tuple[object, ...] = ("velocity", yaw)
-            if (
-                self._drift_velocity is None
-                or not math.dist(self._drift_velocity, velocity) < _SAME_SPEED
-                or set_point != self._last
-            ):
+            before = self._drift_velocity
+            if before is None or not math.dist(before, velocity) < _SAME_SPEED or set_point != self._last:
                 radius = context.settings["commands.hold_radius"]
                 commands.append(SetTarget(context.view.position_ned, radius, velocity))
         else:
@@ -205,7 +202,7 @@ class Targets(Service):
 
     def _execute_do_change_speed(self, request: CommandRequest) -> Result:
         context = self.context
-        if not self._parameters.has_setting(SPEED):
+        if SPEED not in self._parameters.settings:
             return Result.UNSUPPORTED
         try:
             speed = resolve_speed(context, shorten_float32(request[2]) if math.isfinite(request[2]) else request[2])

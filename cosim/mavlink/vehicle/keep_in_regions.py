@@ -32,11 +32,8 @@ class KeepInRegions:
         """Return a text for each violated region of a target, and for one above the surface; position_ned [m]."""
         shifts = [view.shift(region.name) for region in self._regions]
         clearances = self._clearances_at(position_ned, settings.shapes, shifts)
-        words = [
-            f"{-clearance:.2g} m outside {region.name}"
-            for region, clearance in zip(self._regions, clearances, strict=True)
-            if clearance < 0.0
-        ]
+        pairs = zip(self._regions, clearances, strict=True)
+        words = [f"{-clearance:.2g} m outside {region.name}" for region, clearance in pairs if clearance < 0.0]
         if position_ned[2] < 0.0:
             words.append(f"{-position_ned[2]:.2g} m above the surface")
         return words

@@ -27,6 +27,8 @@ _BURST = 0.5  # s of the budget, that can be sent at once
 _RESERVED = 0.25  # fraction of the burst that is reserved for answers
 _ENCODING_ERRORS = (struct.error, OverflowError, IndexError, TypeError, ValueError)  # a field cannot hold its value
 
+_NETWORKS: dict[str, Callable[[str, int], Channel]] = {"udpout": UdpOut, "udpin": UdpIn, "tcpin": TcpIn, "tcp": TcpOut}
+
 
 class SendRule(NamedTuple):
     """How messages of one name are sent."""
@@ -204,10 +206,4 @@ def open_channel(endpoint: Endpoint) -> tuple[Channel, float | None]:
         return Tlog(endpoint.path), None
     if endpoint.kind == "serial":
         return Serial(endpoint.path, endpoint.baud), endpoint.baud / 10  # start and stop bit go along
-    networks: dict[str, Callable[[str, int], Channel]] = {
-        "udpout": UdpOut,
-        "udpin": UdpIn,
-        "tcpin": TcpIn,
-        "tcp": TcpOut,
-    }
-    return networks[endpoint.kind](endpoint.host, endpoint.port), BUDGET
+    return _NETWORKS[endpoint.kind](endpoint.host, endpoint.port), BUDGET

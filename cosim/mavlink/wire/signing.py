@@ -24,9 +24,7 @@ _EPOCH = 1_420_070_400  # s, 2015-01-01 in Unix time, the epoch of MAVLink's tim
 _PER_SECOND = 100_000  # timestamps count 10 us
 _MINUTE = 60 * _PER_SECOND
 _WRITE_AHEAD = 2 * _PER_SECOND  # by which the saved timestamp is ahead of the clock, so that it is seldom written
-_MIN_WRITE_AHEAD = (
-    _PER_SECOND // 4
-)  # by which it is ahead of the last one at least: a peer's clock may be ahead of ours
+_MIN_WRITE_AHEAD = _PER_SECOND // 4  # by which it is ahead of the last one at least: a peer's clock may be ahead
 _REMEDY = "remove the file, after which earlier frames are accepted again"
 _MAX_TIMESTAMP = (1 << 48) - 1
 Rejection = Literal["unsigned", "forged", "replayed", "old", "ahead", "crowded"]  # names in `RxStats`

@@ -12,6 +12,7 @@ from msgspec.structs import astuple
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.autopilot import Autopilot
+from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario, load_scenario
 from cosim.simulation.commands import CommandQueue
@@ -106,7 +107,7 @@ class Station:
     def __init__(
         self, profile: str = "ardusub", commands: bool = True, of: Scenario | None = None, **options: Any
     ) -> None:
-        self.commands = CommandQueue()
+        self.commands, self.profile = CommandQueue(), PROFILES[profile]
         self.autopilot = Autopilot(
             of or scenario(), COLUMNS, MavlinkOptions(profile=profile, commands=commands, **options), self.commands
         )  # type: ignore[arg-type]

@@ -16,8 +16,6 @@ from cosim.mavlink.vehicle.view import View
 from cosim.mavlink.wire.encode import Encoder, clip_to_float32, round_finite
 from cosim.simulation.columns import column_names
 from cosim.simulation.signals import Column
-from plant_fmu import load_vehicle
-from plant_fmu.autopilot import effort_of_pulse, pulse_of_effort
 from tests.cosim.mavlink.station import Station, scenario
 
 TURN = from_axis_angle(np.array([0.0, 0.0, 1.0]), 2.0)
@@ -88,13 +86,6 @@ def test_servo_pulses_follow_the_vehicle_table():
     heavy = scenario("vehicle='bluerov2_heavy'", "actuation.through='thrusters'")
     assert servos(heavy, **forward) == [1300, 1300, 1700, 1700, 1500, 1500, 1500, 1500, 0]
     assert servos(heavy, "px4", **forward) == [1600, 1600, 1400, 1400, 1500, 1500, 1500, 1500, 0]  # linear, unsigned
-
-
-def test_pulses_and_forces_are_each_others_inverse():
-    table = load_vehicle("bluerov2_heavy").autopilot
-    for part in (-1.0, -0.3, 0.02, 0.5, 1.0):
-        assert effort_of_pulse(table, -1)(pulse_of_effort(table, -1)(part)) == pytest.approx(part)
-    assert pulse_of_effort(table, 1)(math.nan) == 1500
 
 
 def test_vehicle_without_a_table_has_linear_pulses_in_order():

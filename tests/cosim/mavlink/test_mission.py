@@ -29,7 +29,7 @@ def station(request):
 
 
 def first(station):
-    return int(station.autopilot._context.profile.has_home_item)
+    return int(station.profile.has_home_item)
 
 
 def item(seq, frame=LOCAL, command=WAYPOINT, numbers=(0.0, 0.0, 0.0, NAN), place=(10_000, 20_000, 3.0), kind=0):
