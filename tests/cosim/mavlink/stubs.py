@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import socket
 import time
 
+from pymavlink import mavutil
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.channels.udp import UdpOut
@@ -100,6 +102,22 @@ def send_now(link, message):
     sent = link.send(message)
     link.channel.poll(time.monotonic())
     return sent
+
+
+def read_log(path):
+    """Return the messages of a .tlog as pymavlink reads them."""
+    reader, messages = mavutil.mavlink_connection(str(path), dialect="all"), []
+    while (message := reader.recv_msg()) is not None:
+        messages.append(message)
+    reader.close()
+    return messages
+
+
+def free_port():
+    """Return a UDP port that nobody listens on."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
 
 def until(condition, seconds=60.0):

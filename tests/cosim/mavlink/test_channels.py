@@ -6,7 +6,6 @@ import socket
 import time
 
 import pytest
-from pymavlink import mavutil
 from pymavlink.dialects.v10 import all as v10
 
 from cosim.errors import TelemetryError
@@ -21,7 +20,18 @@ from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import load_scenario
-from tests.cosim.mavlink.stubs import Station, attitude, heartbeat, link_of, mavlink, odometry, send_now, until
+from tests.cosim.mavlink.stubs import (
+    Station,
+    attitude,
+    free_port,
+    heartbeat,
+    link_of,
+    mavlink,
+    odometry,
+    read_log,
+    send_now,
+    until,
+)
 
 HERE = "127.0.0.1"
 
@@ -35,11 +45,6 @@ def udp_socket():
 
 def received(link):
     return [message for _, message in link.receive(time.perf_counter() + 60.0)]
-
-
-def closed_port():
-    with udp_socket() as probe:
-        return probe.getsockname()[1]
 
 
 # ---- UDP ----
@@ -57,7 +62,7 @@ def test_udpout_accepts_only_its_configured_peer():
 
 
 def test_udpout_survives_absent_peer_and_late_peer_receives_frames():
-    port = closed_port()
+    port = free_port()
     link = link_of(UdpOut(HERE, port))
     for _ in range(50):
         assert send_now(link, heartbeat())
@@ -460,15 +465,6 @@ def test_invalid_serial_devices_are_rejected(tmp_path):
 # ---- logs ----
 
 
-def logged(path):
-    reader = mavutil.mavlink_connection(str(path), dialect="all")
-    found = []
-    while (message := reader.recv_msg()) is not None:
-        found.append(message)
-    reader.close()
-    return found
-
-
 def test_tlog_timestamps_follow_simulation_time(tmp_path):
     path = tmp_path / "dive.tlog"
     before = time.time()
@@ -479,7 +475,7 @@ def test_tlog_timestamps_follow_simulation_time(tmp_path):
         assert link.send(attitude(1))
         link.channel.send(Station().pack(heartbeat()))
     link.channel.close()
-    found = logged(path)
+    found = read_log(path)
     assert [m.get_type() for m in found] == ["ATTITUDE", "HEARTBEAT"] * len(times)
     stamps = [m._timestamp for m in found[::2]]
     assert [s - stamps[0] for s in stamps] == pytest.approx([0.0, 0.5, 1.0, 1.0, 1.0, 1.0, 2.0], abs=1e-5)
@@ -495,7 +491,7 @@ def test_tlog_of_a_fast_run_has_no_future_timestamps(tmp_path):
     for link.channel.simulated in (0.0, 600.0):
         link.send(attitude(1))
     link.channel.close()
-    first, last = (m._timestamp for m in logged(path))
+    first, last = (m._timestamp for m in read_log(path))
     assert last - first == pytest.approx(600.0, abs=1e-5) and last <= time.time()  # LogReplayLink.cc, _parseTimestamp
 
 
@@ -544,6 +540,6 @@ def test_full_disk_is_reported_once_and_truncates_no_frame(tmp_path, caplog):
     assert not sent[-1]  # what waits is bounded
     disk.room = 10**9
     link.channel.close()
-    assert [m.time_usec for m in logged(path)] == [i + 1 for i, went in enumerate(sent) if went]
+    assert [m.time_usec for m in read_log(path)] == [i + 1 for i, went in enumerate(sent) if went]
     assert len(caplog.records) == 1 and "No space left" in caplog.text
     assert any("frames not logged" in trouble for trouble in link.loss_reports())

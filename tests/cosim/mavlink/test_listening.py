@@ -20,14 +20,9 @@ from cosim.mavlink.listening.table_text import mode_name
 from cosim.mavlink.listening.telemetry_table import MAX_ROWS, MAX_TEXTS
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink, ReceivedMessage
+from tests.cosim.mavlink.stubs import free_port
 
 ESCAPE = "\x1b[31mred\x07"
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-        s.bind(("127.0.0.1", 0))
-        return s.getsockname()[1]
 
 
 def heartbeat(autopilot=12, base_mode=0x81, custom_mode=6 << 16, kind=12):

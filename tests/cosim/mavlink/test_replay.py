@@ -1,7 +1,6 @@
 """A recorded run streamed over MAVLink: complete, equal to the record, and read-only."""
 
 import shutil
-import socket
 import struct
 import threading
 
@@ -19,6 +18,7 @@ from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.results.record import load_record
 from tests.cosim.mavlink.conformance.client import Client
+from tests.cosim.mavlink.stubs import free_port
 
 OVERRIDES = ("arbiter.engine=closed", "time.duration=4")
 COMMANDED = (*OVERRIDES, "commands.enabled=true")
@@ -94,10 +94,7 @@ def test_killed_run_is_streamed_to_its_last_row(recorded, tmp_path):
 
 @pytest.mark.slow
 def test_streaming_over_udp_answers_requests_and_rejects_commands(recorded, tmp_path):
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-        s.bind(("127.0.0.1", 0))
-        port = s.getsockname()[1]
-    done = []
+    port, done = free_port(), []
     with GroundLink(parse_endpoint(f"udpin:127.0.0.1:{port}")) as link:
         endpoint = parse_endpoint(f"udpout:127.0.0.1:{port}")
         thread = threading.Thread(target=lambda: done.append(replay(recorded, [endpoint], MavlinkOptions(), 1.0)))

@@ -6,7 +6,6 @@ import time
 
 import numpy as np
 import pytest
-from pymavlink import mavutil
 
 from cosim.mavlink import thread
 from cosim.mavlink.channels.tcp import TcpIn
@@ -26,6 +25,7 @@ from tests.cosim.mavlink.stubs import (
     link_of,
     mavlink,
     odometry,
+    read_log,
     udp_link,
     until,
 )
@@ -69,11 +69,17 @@ def row(t):
     return np.array([t, 1.0, 2.0])
 
 
+def started(*links, vehicle=None, step=0.01):
+    """Start a thread of links; return its vehicle and the thread."""
+    vehicle = vehicle or StubVehicle()
+    running = LinkThread(vehicle, links, step)
+    running.start()
+    return vehicle, running
+
+
 def test_snapshots_are_ordered_copies_every_10_ms():
     with GroundSocket() as ground:
-        vehicle = StubVehicle()
-        links = LinkThread(vehicle, [udp_link(ground.port)], step=1e-3)
-        links.start()
+        vehicle, links = started(udp_link(ground.port), step=1e-3)
         shared = row(0.0)
         for k in range(1001):
             shared[0] = k * 1e-3
@@ -98,9 +104,7 @@ def test_every_row_of_a_coarse_run_is_observed():
 
 def test_requests_are_answered_while_the_simulation_is_paused():
     with GroundSocket() as ground:
-        vehicle = StubVehicle()
-        links = LinkThread(vehicle, [udp_link(ground.port)], step=1e-3)
-        links.start()
+        vehicle, links = started(udp_link(ground.port), step=1e-3)
         links.observe(0, row(0.0))
         assert until(ground.receive)
         ground.send(heartbeat())
@@ -113,10 +117,7 @@ def test_requests_are_answered_while_the_simulation_is_paused():
 def test_many_links_at_once_each_with_a_sequence_of_its_own():
     with GroundSocket() as ground, GroundSocket() as other:
         server, udp_in = TcpIn(HERE, 0), UdpIn(HERE, 0)
-        links = LinkThread(
-            StubVehicle(), [udp_link(ground.port), link_of(udp_in), link_of(server), udp_link(other.port)], step=0.01
-        )
-        links.start()
+        _, links = started(udp_link(ground.port), link_of(udp_in), link_of(server), udp_link(other.port))
         other.address = (HERE, udp_in.port)
         other.send(heartbeat())
         with socket.create_connection((HERE, server.port), 60.0) as client:
@@ -136,9 +137,7 @@ def test_many_links_at_once_each_with_a_sequence_of_its_own():
 def test_log_holds_sent_and_accepted_frames(tmp_path):
     path = tmp_path / "dive.tlog"
     with GroundSocket() as ground:
-        vehicle = StubVehicle()
-        links = LinkThread(vehicle, [udp_link(ground.port), link_of(Tlog(str(path)))], step=0.01)
-        links.start()
+        vehicle, links = started(udp_link(ground.port), link_of(Tlog(str(path))))
         links.observe(0, row(0.0))
         assert until(ground.receive)
         ground.send(heartbeat())
@@ -146,40 +145,32 @@ def test_log_holds_sent_and_accepted_frames(tmp_path):
         for k in range(1, 1001):  # ten seconds in no time
             links.observe(k, row(k * 0.01))
         links.close()
-    reader = mavutil.mavlink_connection(str(path), dialect="all")
-    messages = []
-    while (message := reader.recv_msg()) is not None:
-        messages.append(message)
-    reader.close()
+    messages = read_log(path)
     ours = [m for m in messages if m.get_type() == "ATTITUDE"]
     assert [m._timestamp - ours[0]._timestamp for m in ours] == pytest.approx(np.arange(1001) * 0.01, abs=1e-4)
     assert [m.get_srcSystem() for m in messages if m.get_type() == "HEARTBEAT"] == [255, 1]
     assert all(b._timestamp >= a._timestamp for a, b in zip(messages, messages[1:], strict=False))
 
 
+DEFECTS = {"observe": ZeroDivisionError, "receive": KeyError, "tick": RuntimeError, "attach": ValueError}
+
+
 class Clumsy(StubVehicle):
-    def observe(self, row):
-        super().observe(row)
-        raise ZeroDivisionError("a defect of the vehicle")
+    """Raises another error from each of its methods."""
 
-    def receive(self, link, message, now):
-        super().receive(link, message, now)
-        raise KeyError(message.get_type())
+    def __getattribute__(self, name):
+        method = super().__getattribute__(name)
 
-    def tick(self, now):
-        super().tick(now)
-        raise RuntimeError("tick")
+        def fail(*arguments):
+            method(*arguments)
+            raise DEFECTS[name](name)
 
-    def attach(self, link):
-        super().attach(link)
-        raise ValueError("attach")
+        return fail if name in DEFECTS else method
 
 
 def test_vehicle_errors_are_logged_once_per_kind_and_isolated(caplog):
     with GroundSocket() as ground:
-        vehicle = Clumsy()
-        links = LinkThread(vehicle, [udp_link(ground.port)], step=0.01)
-        links.start()
+        vehicle, links = started(udp_link(ground.port), vehicle=Clumsy())
         for k in range(50):
             links.observe(k, row(k * 0.01))
         assert until(lambda: len(vehicle.rows) == 50 and ground.count("ATTITUDE") == 50)
@@ -188,15 +179,7 @@ def test_vehicle_errors_are_logged_once_per_kind_and_isolated(caplog):
         assert until(lambda: len(vehicle.received) == 5)
         links.close()
     tracebacks = [record.message for record in caplog.records if record.exc_info]
-    assert sorted(tracebacks) == [
-        f"MAVLink: {kind}"
-        for kind in (
-            "KeyError in receive",
-            "RuntimeError in tick",
-            "ValueError in attach",
-            "ZeroDivisionError in observe",
-        )
-    ]
+    assert sorted(tracebacks) == sorted(f"MAVLink: {error.__name__} in {name}" for name, error in DEFECTS.items())
     assert "50 times ZeroDivisionError in observe; 5 times KeyError in receive" in caplog.text.replace(
         f"{links.failures['RuntimeError in tick']} times RuntimeError in tick; ", ""
     )
@@ -259,8 +242,7 @@ def test_closing_is_time_bounded_and_counts_dropped_snapshots(monkeypatch, caplo
     monkeypatch.setattr(thread, "_DRAINING", 0.05)
     vehicle = StubVehicle()
     vehicle.observe = lambda row: time.sleep(0.02)
-    links = LinkThread(vehicle, [], step=0.01)
-    links.start()
+    _, links = started(vehicle=vehicle)
     for k in range(1000):
         links.observe(k, row(k * 0.01))
     links.close()
@@ -282,9 +264,7 @@ def test_endpoints_become_links_of_one_signed_vehicle(tmp_path):
         texts = [f"udpout:127.0.0.1:{ground.port}", str(tmp_path / "dive.tlog")]
         links = open_links([parse_endpoint(text) for text in texts], MavlinkOptions(key=KEY, system_id=9))
         assert [link.name for link in links] == texts
-        vehicle = StubVehicle()
-        running = LinkThread(vehicle, links, step=0.01)
-        running.start()
+        vehicle, running = started(*links)
         running.observe(0, row(0.0))
         assert until(lambda: ground.count("ATTITUDE"))
         assert ground.messages[0].get_srcSystem() == 9
@@ -294,9 +274,7 @@ def test_endpoints_become_links_of_one_signed_vehicle(tmp_path):
         assert until(lambda: links[0].stats.unsigned and vehicle.received)
         running.close()
     assert links[0].loss_reports() == ["1 frames unsigned"]
-    reader = mavutil.mavlink_connection(texts[1], dialect="all")
-    assert reader.recv_msg().get_type() == "ATTITUDE"
-    reader.close()
+    assert read_log(texts[1])[0].get_type() == "ATTITUDE"
 
 
 class Loud(StubVehicle):
@@ -309,8 +287,7 @@ class Loud(StubVehicle):
 def test_a_client_that_never_reads_costs_no_other_client_a_frame():
     server = TcpIn(HERE, 0)
     link = link_of(server)
-    links = LinkThread(Loud(), [link], step=0.01)
-    links.start()
+    _, links = started(link, vehicle=Loud())
     with (
         socket.create_connection((HERE, server.port), 60.0),
         socket.create_connection((HERE, server.port), 60.0) as good,

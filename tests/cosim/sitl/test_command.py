@@ -3,7 +3,6 @@
 import os
 import re
 import signal
-import socket
 import subprocess
 import sys
 
@@ -12,6 +11,7 @@ import pytest
 from cosim.command_line.cli import main
 from cosim.results.record import load_record
 from cosim.run.run_folder import report_again
+from tests.cosim.mavlink.stubs import free_port
 from tests.cosim.sitl.stand_in import NEUTRAL, StandIn
 
 
@@ -48,12 +48,6 @@ def test_invalid_numbers_are_rejected(arguments, capsys):
     with pytest.raises(SystemExit):
         main(["sitl", *arguments])
     assert "expected a" in capsys.readouterr().err
-
-
-def free_port():
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
 
 
 @pytest.mark.slow

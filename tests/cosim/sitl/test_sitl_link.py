@@ -14,9 +14,9 @@ from cosim.sitl.law import make_pwm_law
 from cosim.sitl.motion import Motion
 from cosim.sitl.sitl_link import Dvl, DvlOptions, SitlLink
 from cosim.sitl.sitl_session import FlightOptions, SitlSession
+from tests.cosim.mavlink.stubs import free_port
 from tests.cosim.sitl.conftest import Served
 from tests.cosim.sitl.stand_in import DISARMED, StandIn, frame
-from tests.cosim.sitl.test_command import free_port
 
 STILL = (0.0, 0.0, 0.0)
 STEPS = 48

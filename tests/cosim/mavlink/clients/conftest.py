@@ -7,7 +7,6 @@ import fcntl
 import json
 import shutil
 import signal
-import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -105,10 +104,6 @@ def commands_of(folder):
 @pytest.fixture(scope="session")
 def udp_port():
     """Return a function that gives a port of loopback that is free now."""
+    from tests.cosim.mavlink.stubs import free_port
 
-    def free():
-        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as s:
-            s.bind(("127.0.0.1", 0))
-            return s.getsockname()[1]
-
-    return free
+    return free_port
