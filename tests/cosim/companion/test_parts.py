@@ -455,13 +455,19 @@ def test_rc_override_counts_as_a_pilot():
 # ---- the autopilot's own failsafes ----
 
 
-def value_of(name, value, kind=9):
-    return mavlink.MAVLink_param_value_message(name.encode(), value, kind, 1, 0)
-
-
 def decoded(message):
     (found,) = mavlink.MAVLink(None).parse_buffer(message.pack(mavlink.MAVLink(None, 1, 1)))
     return found
+
+
+def told(profile, failsafes=None, **values):
+    """Return failsafes that were told these parameters; PX4 sends the bits of an integer in a float."""
+    failsafes = failsafes or Failsafes(profile)
+    for name, value in values.items():
+        bits = struct.unpack("<f", struct.pack("<i", value))[0] if isinstance(value, int) else value
+        kind = mavlink.MAV_PARAM_TYPE_INT32 if isinstance(value, int) else mavlink.MAV_PARAM_TYPE_REAL32
+        failsafes.receive(decoded(mavlink.MAVLink_param_value_message(name.encode(), bits, kind, 1, 0)))
+    return failsafes
 
 
 def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
@@ -469,9 +475,8 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.names_to_request(0.25 * k)) for k in range(9)]
     assert asked == [22, 0, 22, 0, 22, 0, 22, 0, 22]
-    values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": float("nan")}
-    for name, value in values.items():
-        failsafes.receive(decoded(value_of(name, value)))
+    values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": math.nan}
+    told("ardusub", failsafes, **values)
     assert "FS_GCS_ENABLE" not in failsafes.names_to_request(2.5)
     assert not failsafes.is_read(3.0) and failsafes.is_read(3.1) and not failsafes.names_to_request(4.0)
     first, second, silent = failsafes.text()
@@ -480,64 +485,43 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     assert silent.startswith("not answered by the autopilot: FS_PILOT_INPUT,")
 
 
-def test_missing_failsafe_and_ignored_station_are_reported():
-    failsafes = Failsafes("ardusub")
-    for name in ("FS_PILOT_INPUT", "FS_GCS_ENABLE"):
-        failsafes.receive(decoded(value_of(name, 0.0)))
-    assert failsafes.text()[-1].startswith("WARNING: no reaction is known if the companion fails")
-    assert failsafes.ignored_sticks(255) == ""
-    failsafes.receive(decoded(value_of("SYSID_MYGCS", 250.0)))
-    assert failsafes.ignored_sticks(250) == "" and "SYSID_MYGCS is 250" in failsafes.ignored_sticks(255)
-
-
-@pytest.mark.parametrize(
-    ("override", "pilot", "warns"), [(3.0, 1.0, True), (0.5, 3.0, True), (-1.0, 1.0, True), (0.5, 1.0, False)]
-)
-def test_sticks_that_outlast_a_cut_link_by_more_than_a_second_are_warned_of(override, pilot, warns):
-    failsafes = Failsafes("ardusub")
-    for name, value in (("FS_GCS_ENABLE", 2.0), ("RC_OVERRIDE_TIME", override), ("FS_PILOT_TIMEOUT", pilot)):
-        failsafes.receive(decoded(value_of(name, value)))
-    said = f"RC_OVERRIDE_TIME is {override:g}, FS_PILOT_TIMEOUT is {pilot:g}; expected 1 s or less"
-    assert any(line.startswith("WARNING") and line.endswith(said) for line in failsafes.text()) == warns
-
-
-def test_an_ardusub_that_learns_the_magnetic_field_is_known():
-    failsafes = Failsafes("ardusub")
-    assert not failsafes.learns_magnetic_field()  # nobody knows
+def test_an_ardusub_that_ignores_the_companion_s_sticks_or_learns_the_magnetic_field_is_known():
+    assert told("ardusub").ignored_sticks(255) == "" and not told("ardusub").learns_magnetic_field()  # nobody knows
+    of_another = told("ardusub", SYSID_MYGCS=250.0)
+    assert of_another.ignored_sticks(250) == "" and "SYSID_MYGCS is 250" in of_another.ignored_sticks(255)
     for value, learns in ((3.0, True), (2.0, False)):
-        failsafes.receive(decoded(value_of("EK3_MAG_CAL", value)))
-        assert failsafes.learns_magnetic_field() == learns
+        assert told("ardusub", EK3_MAG_CAL=value).learns_magnetic_field() == learns
 
 
 def test_px4_integer_parameters_are_decoded_from_bits():
-    failsafes = Failsafes("px4")
-    (bits,) = struct.unpack("<f", struct.pack("<i", 3))
-    failsafes.receive(decoded(value_of("NAV_RCL_ACT", bits, kind=6)))
-    assert failsafes.values == {"NAV_RCL_ACT": 3.0}
+    assert told("px4", NAV_RCL_ACT=3).values == {"NAV_RCL_ACT": 3.0}
+    assert "COM_OBL_RC_ACT 0: on lost set-points it changes to Position" in told("px4", COM_OBL_RC_ACT=0).text()
 
 
-@pytest.mark.parametrize(("lost", "sticks", "warns"), [(0, 0, True), (2, 0, True), (5, 0, False), (0, 2, False)])
-def test_a_px4_without_sticks_that_keeps_its_last_forces_for_ever_is_warned_of(lost, sticks, warns):
-    """As a PX4 did: NAV_RCL_ACT counts where COM_OBL_RC_ACT names a mode that needs sticks."""
-    failsafes = Failsafes("px4")
-    failsafes.receive(decoded(value_of("COM_OF_LOSS_T", 1.0)))
-    for name, value in (("COM_OBL_RC_ACT", lost), ("NAV_RCL_ACT", sticks)):
-        (bits,) = struct.unpack("<f", struct.pack("<i", value))
-        failsafes.receive(decoded(value_of(name, bits, kind=6)))
-    assert any("the last forces act for ever" in line for line in failsafes.text()) == warns
+SAFE = {"ardusub": {"FS_GCS_ENABLE": 2.0}, "px4": {"COM_OF_LOSS_T": 1.0}}
+NO_REACTION = "no reaction is known if the companion fails"
+OUTLASTS = "RC_OVERRIDE_TIME is {:g}, FS_PILOT_TIMEOUT is {:g}; expected 1 s or less"
+FOR_EVER = "the last forces act for ever"
 
 
-def test_a_px4_that_does_not_give_the_full_force_is_warned_of():
-    """And no value of COM_OBL_RC_ACT means that nothing follows: PX4's 0 is its mode Position."""
-    failsafes = Failsafes("px4")
-    assert failsafes.text()[-1].startswith("WARNING: no reaction is known if the companion fails: COM_OF_LOSS_T")
-    (none,) = struct.unpack("<f", struct.pack("<i", 0))
-    failsafes.receive(decoded(value_of("COM_OF_LOSS_T", 1.0)))
-    failsafes.receive(decoded(value_of("COM_OBL_RC_ACT", none, kind=6)))
-    assert "COM_OBL_RC_ACT 0: on lost set-points it changes to Position" in failsafes.text()
-    for part, warned in ((0.1, True), (1.0, False)):
-        failsafes.receive(decoded(value_of("UUV_THRUST_SAT", part)))
-        assert any("WARNING" in line for line in failsafes.text()) == warned
+@pytest.mark.parametrize(
+    ("profile", "values", "warning"),
+    [
+        ("ardusub", {"FS_PILOT_INPUT": 0.0, "FS_GCS_ENABLE": 0.0}, NO_REACTION),
+        ("px4", {"COM_OF_LOSS_T": 0.0}, f"{NO_REACTION}: COM_OF_LOSS_T"),
+        *(("ardusub", {"RC_OVERRIDE_TIME": override, "FS_PILOT_TIMEOUT": pilot},
+           OUTLASTS.format(override, pilot) if warns else None)
+          for override, pilot, warns in ((3.0, 1.0, True), (0.5, 3.0, True), (-1.0, 1.0, True), (0.5, 1.0, False))),
+        # as a PX4 did: NAV_RCL_ACT counts where COM_OBL_RC_ACT names a mode that needs sticks
+        *(("px4", {"COM_OBL_RC_ACT": lost, "NAV_RCL_ACT": sticks}, FOR_EVER if warns else None)
+          for lost, sticks, warns in ((0, 0, True), (2, 0, True), (5, 0, False), (0, 2, False))),
+        ("px4", {"UUV_THRUST_SAT": 0.1}, "the law counts on the thrusters' full force"),
+        ("px4", {"UUV_THRUST_SAT": 1.0}, None),
+    ],
+)  # fmt: skip
+def test_parameters_that_leave_a_vehicle_without_a_failsafe_are_warned_of(profile, values, warning):
+    warnings = [line for line in told(profile, **SAFE[profile] | values).text() if line.startswith("WARNING: ")]
+    assert len(warnings) == (warning is not None) and all(warning in line for line in warnings)
 
 
 def test_simulated_autopilot_clock_runs_at_the_given_speedup():

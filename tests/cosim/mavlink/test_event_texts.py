@@ -180,3 +180,15 @@ def test_time_messages_are_answered(station):
     (ping,) = station.send(mavlink.MAVLink_ping_message(5, 6, 0, 0))
     assert (ping.time_usec, ping.seq, ping.target_system, ping.target_component) == (5, 6, 255, 190)
     assert station.send(mavlink.MAVLink_ping_message(5, 6, 1, 1)) == []
+
+
+def test_requests_of_logs_are_answered_at_once_with_none(station):
+    """MAVSDK waits 7.5 s without an answer."""
+    (entry,) = station.send(mavlink.MAVLink_log_request_list_message(1, 1, 0, 0xFFFF))
+    assert (entry.get_type(), entry.num_logs, entry.last_log_num, entry.size) == ("LOG_ENTRY", 0, 0, 0)
+    data = station.send(mavlink.MAVLink_log_request_data_message(1, 1, 7, 90, 1000))[0]
+    assert (data.get_type(), data.id, data.ofs, data.count) == ("LOG_DATA", 7, 90, 0)
+    assert any("no log 7" in text for text in station.wire.texts)
+    station.send(mavlink.MAVLink_log_erase_message(1, 1))
+    station.wait(2.1)
+    assert "Refused: there are no logs to erase" in station.wire.texts

@@ -5,7 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.simulation.commands.commands import (
+from cosim.simulation.commands.commands import (  # fmt: skip
     ChangeSetting,
     MissionItem,
     SetCurrentItem,
@@ -53,12 +53,7 @@ def upload(station, *items, **who):
 def test_mission_round_trips(station):
     items = [
         {"numbers": (5.0, 1.5, 7.0, 0.25), "place": (12_345, -54_321, 2.5)},
-        {
-            "command": FOR_TIME,
-            "numbers": (9.0, 0.0, 0.0, NAN),
-            "frame": RELATIVE_INT,
-            "place": (LATITUDE, LONGITUDE, -4.0),
-        },
+        {"command": FOR_TIME, "numbers": (9.0, 0.0, 0.0, NAN), "frame": RELATIVE_INT, **GLOBE},
         {"command": FOREVER, "frame": GLOBAL, "place": (LATITUDE + 100, LONGITUDE - 100, -2.0)},
     ]
     assert upload(station, *items) == mavlink.MAV_MISSION_ACCEPTED
@@ -75,65 +70,43 @@ def test_mission_round_trips(station):
         assert old.get_type() == "MISSION_ITEM" and old.x * scale == pytest.approx(back.x, rel=1e-6, abs=100)
 
 
-def test_mission_items_map_to_regions_and_stays(station):
-    upload(
-        station,
-        {"numbers": (5.0, 1.5, 0.0, NAN)},
-        {"numbers": (NAN, 0.0, 0.0, NAN), "frame": RELATIVE_INT, "place": (LATITUDE, LONGITUDE, -4.0)},
-        {
-            "command": FOR_TIME,
-            "numbers": (9.0, 0.0, 0.0, NAN),
-            "frame": GLOBAL_INT,
-            "place": (LATITUDE, LONGITUDE, -2.0),
-        },
-        {"command": FOREVER},
-        {"command": LAND, "place": (0, 0, 0.0)},
-        {"command": LAND, "place": (70_000, 80_000, 0.0)},
-        {"command": HOME, "frame": 2, "place": (0, 0, 0.0)},
-    )
-    (command,) = station.commanded()
-    assert command == SetMission(
-        (
-            MissionItem((1.0, 2.0, 3.0), 1.5, 5.0),
-            MissionItem((0.0, 0.0, 4.0), None, 0.0),
-            MissionItem((0.0, 0.0, 2.0), None, 9.0),
-            MissionItem((1.0, 2.0, 3.0), None, None),
-            MissionItem((1.0, 2.0, 0.5), 0.3, None),
-            MissionItem((7.0, 8.0, 0.5), 0.3, None),
-            MissionItem((0.0, 0.0, 0.5), 0.3, None),
-        )
-    )
+MISSION = {"frame": 2, "place": (0, 0, 0.0)}  # MAV_FRAME_MISSION
+GLOBE = {"place": (LATITUDE, LONGITUDE, -2.0)}
+# an item as it is sent, and what it means; the jumps go to the item with the number 2
+MEANINGS = [
+    ({"numbers": (5.0, 1.5, 0.0, NAN)}, MissionItem((1.0, 2.0, 3.0), 1.5, 5.0)),
+    ({"numbers": (NAN, 0.0, 0.0, NAN), "frame": RELATIVE_INT, **GLOBE}, MissionItem((0.0, 0.0, 2.0), None, 0.0)),
+    ({"command": FOR_TIME, "numbers": (9.0, 0.0, 0.0, NAN), "frame": GLOBAL_INT, **GLOBE},
+     MissionItem((0.0, 0.0, 2.0), None, 9.0)),
+    ({"command": FOREVER}, MissionItem((1.0, 2.0, 3.0), None, None)),
+    ({"command": LAND, "place": (0, 0, 0.0)}, MissionItem((1.0, 2.0, 0.5), 0.3, None)),  # above the one before
+    ({"command": LAND, "place": (70_000, 80_000, 0.0)}, MissionItem((7.0, 8.0, 0.5), 0.3, None)),
+    ({"command": HOME, **MISSION}, MissionItem((0.0, 0.0, 0.5), 0.3, None)),
+    # as QGroundControl's settings of a mission
+    ({"command": SPEED, "numbers": (1.0, 0.3, -1.0, 0.0), **MISSION},
+     MissionItem(None, commands=(ChangeSetting("law.gains.speed", 0.3),))),
+    ({"command": SPEED, "numbers": (1.0, -1.0, -1.0, 0.0), **MISSION}, MissionItem(None)),
+    ({"command": SPLINE, "numbers": (4.0, 0.0, 0.0, 0.0)}, MissionItem((1.0, 2.0, 3.0), None, 4.0)),
+    ({"command": DELAY, "numbers": (5.0, -1.0, -1.0, -1.0), **MISSION}, MissionItem(None, stay=5.0)),
+    ({"command": WAIT, "numbers": (6.0, 0.0, 0.0, 0.0), **MISSION}, MissionItem(None, stay=6.0)),
+    ({"command": YAW, "numbers": (90.0, 0.0, 1.0, 0.0), **MISSION},
+     MissionItem(None, commands=(SetHeading(math.pi / 2),))),
+    ({"command": JUMP, "numbers": (2.0, 3.0, 0.0, 0.0), **MISSION}, MissionItem(None, jump=2, times=3)),
+    ({"command": JUMP, "numbers": (2.0, -1.0, NAN, NAN), "frame": 2, "place": (0, 0, NAN)},
+     MissionItem(None, jump=2, times=None)),
+    ({"command": LAND, "place": (0, 0, 0.0)}, MissionItem((1.0, 2.0, 0.5), 0.3, None)),
+]  # fmt: skip
 
 
-def test_immediate_mission_items_are_decoded(station):
-    jump = 2.0 + first(station)
-    mission = {"frame": 2, "place": (0, 0, 0.0)}  # MAV_FRAME_MISSION
-    assert not upload(
-        station,
-        {"command": SPEED, "numbers": (1.0, 0.3, -1.0, 0.0), **mission},  # as QGroundControl's settings of a mission
-        {"command": SPEED, "numbers": (1.0, -1.0, -1.0, 0.0), **mission},
-        {"command": SPLINE, "numbers": (4.0, 0.0, 0.0, 0.0)},
-        {"command": DELAY, "numbers": (5.0, -1.0, -1.0, -1.0), **mission},
-        {"command": WAIT, "numbers": (6.0, 0.0, 0.0, 0.0), **mission},
-        {"command": YAW, "numbers": (90.0, 0.0, 1.0, 0.0), **mission},
-        {"command": JUMP, "numbers": (jump, 3.0, 0.0, 0.0), **mission},
-        {"command": JUMP, "numbers": (jump, -1.0, NAN, NAN), "frame": 2, "place": (0, 0, NAN)},
-        {"command": LAND, "place": (0, 0, 0.0)},
-    )
-    (command,) = station.commanded()
-    assert command.items == (
-        MissionItem(None, commands=(ChangeSetting("law.gains.speed", 0.3),)),
-        MissionItem(None),
-        MissionItem((1.0, 2.0, 3.0), None, 4.0),
-        MissionItem(None, stay=5.0),
-        MissionItem(None, stay=6.0),
-        MissionItem(None, commands=(SetHeading(math.pi / 2),)),
-        MissionItem(None, jump=2, times=3),
-        MissionItem(None, jump=2, times=None),
-        MissionItem((1.0, 2.0, 0.5), 0.3, None),
-    )
-    (back,) = station.send(mavlink.MAVLink_mission_request_message(1, 1, 6 + first(station), 0))
-    assert (back.command, back.frame, back.param1, back.x) == (JUMP, 2, jump, 0.0)
+def test_mission_items_are_decoded(station):
+    sent = [dict(fields) for fields, _ in MEANINGS]
+    for fields in sent:
+        if fields.get("command") == JUMP:
+            fields["numbers"] = (2.0 + first(station), *fields["numbers"][1:])
+    assert upload(station, *sent) == mavlink.MAV_MISSION_ACCEPTED
+    assert station.commanded() == [SetMission(tuple(meaning for _, meaning in MEANINGS))]
+    (back,) = station.send(mavlink.MAVLink_mission_request_message(1, 1, 13 + first(station), 0))
+    assert (back.command, back.frame, back.param1, back.x) == (JUMP, 2, 2.0 + first(station), 0.0)
 
 
 def test_speed_item_is_rejected_for_a_law_without_speed():
@@ -251,15 +224,12 @@ def test_upload_can_be_canceled(station):
     assert station.wire.of("MISSION_REQUEST_INT") == []
 
 
-def test_concurrent_uploads_are_rejected(station):
+def test_too_long_and_concurrent_uploads_are_rejected(station):
+    (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 501, 0))
+    assert ack.type == mavlink.MAV_MISSION_NO_SPACE
     station.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
     (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0), system=250)
     assert (ack.type, ack.target_system) == (mavlink.MAV_MISSION_DENIED, 250)
-
-
-def test_too_long_mission_is_rejected(station):
-    (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 501, 0))
-    assert ack.type == mavlink.MAV_MISSION_NO_SPACE
 
 
 def test_mission_can_be_cleared(station):
@@ -272,6 +242,7 @@ def test_mission_can_be_cleared(station):
 
 
 def test_mission_start_and_set_current_are_applied(station):
+    assert station.command(300, 0.0) == mavlink.MAV_RESULT_FAILED  # there is no mission yet
     upload(station, {}, {}, {})
     station.commanded()
     assert station.command(300, 0.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
@@ -280,10 +251,6 @@ def test_mission_start_and_set_current_are_applied(station):
     assert station.commanded() == [SetCurrentItem(0), SetMode("mission"), SetCurrentItem(2), SetCurrentItem(1)]
     assert station.command(224, 3.0 + first(station)) == mavlink.MAV_RESULT_DENIED
     assert station.command(224, NAN) == mavlink.MAV_RESULT_DENIED
-
-
-def test_start_without_a_mission_is_rejected(station):
-    assert station.command(300, 0.0) == mavlink.MAV_RESULT_FAILED
 
 
 def test_mission_progress_is_reported(station):

@@ -194,11 +194,7 @@ def test_invalid_value_is_rejected_and_the_old_value_returned(station, name, val
     if before.get_type() == "PARAM_VALUE":
         assert replies[1].param_value == before.param_value
     assert station.commanded() == []
-
-
-def test_rejection_text_names_the_expected_range(station):
-    put(station, "ARB_RAMP", 1e9)
-    assert "expected 0 to 1000" in "".join(station.wire.texts)
+    assert name != "ARB_RAMP" or "expected 0 to 1000" in "".join(station.wire.texts)
 
 
 def test_read_only_rejects_parameter_changes():
@@ -227,11 +223,7 @@ def test_speed_command_sets_the_speed_parameter(station):
     assert station.command(178, 1.0, NAN) == mavlink.MAV_RESULT_DENIED
     assert station.commanded() == [ChangeSetting("law.gains.speed", 0.6)]
     assert read(station, "LAW_SPEED")[0].param_value == pytest.approx(0.6)
-
-
-def test_speed_command_is_unsupported_for_laws_without_speed():
-    station = Station(of=scenario(name="paper"))
-    assert station.command(178, 1.0, 0.6) == mavlink.MAV_RESULT_UNSUPPORTED
+    assert Station(of=scenario(name="paper")).command(178, 1.0, 0.6) == mavlink.MAV_RESULT_UNSUPPORTED  # has no speed
 
 
 def crc_by_bits(data):
@@ -253,16 +245,12 @@ def test_crc32_matches_bitwise_reference(data):
 def test_px4_parameter_hash_identifies_the_list():
     station = Station("px4")
     first = station.send(LIST)[0]
-    assert (first.param_id, first.param_index, first.param_type) == (
-        "_HASH_CHECK",
-        65535,
-        mavlink.MAV_PARAM_TYPE_UINT32,
-    )
+    kind = mavlink.MAV_PARAM_TYPE_UINT32
+    assert (first.param_id, first.param_index, first.param_type) == ("_HASH_CHECK", 65535, kind)
     station.wait(0.1)
     values = station.wire.of("PARAM_VALUE")[1:]
-    by_hand = b"".join(
-        v.param_id.encode() + struct.pack("<f", v.param_value) for v in sorted(values, key=lambda v: v.param_id)
-    )
+    pairs = sorted((v.param_id.encode(), struct.pack("<f", v.param_value)) for v in values)
+    by_hand = b"".join(name + value for name, value in pairs)
     assert struct.unpack("<I", struct.pack("<f", first.param_value))[0] == crc_by_bits(by_hand)
     station.wire.clear()
     station.send(LIST)
