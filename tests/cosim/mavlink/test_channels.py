@@ -50,7 +50,7 @@ def received(link):
 # ---- UDP ----
 
 
-def test_udpout_accepts_only_its_configured_peer():
+def test_udpout_accepts_only_its_configured_peer_and_answers_in_its_version():
     with udp_socket() as peer, udp_socket() as foreign:
         link = link_of(UdpOut(*peer.getsockname()))
         send_now(link, heartbeat())
@@ -59,6 +59,16 @@ def test_udpout_accepts_only_its_configured_peer():
         foreign.sendto(Station().pack(attitude(1)), address)
         peer.sendto(Station().pack(attitude(2)), address)
         assert [m.time_boot_ms for m in received(link)] == [2]
+        send_now(link, attitude(3))
+        assert peer.recv(1000)[0] == 0xFD
+    with udp_socket() as peer:
+        link = link_of(UdpOut(*peer.getsockname()))
+        send_now(link, heartbeat())
+        peer.sendto(Station().pack(heartbeat(), v1=True), peer.recvfrom(1000)[1])
+        received(link)
+        send_now(link, attitude(4))
+        frame = peer.recv(1000)
+        assert frame[0] == 0xFE and v10.MAVLink(None).parse_buffer(frame)[0].time_boot_ms == 4
 
 
 def test_udpout_survives_absent_peer_and_late_peer_receives_frames():

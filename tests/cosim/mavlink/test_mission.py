@@ -78,8 +78,8 @@ MEANINGS = [
     ({"numbers": (NAN, 0.0, 0.0, NAN), "frame": RELATIVE_INT, **GLOBE}, MissionItem((0.0, 0.0, 2.0), None, 0.0)),
     ({"command": FOR_TIME, "numbers": (9.0, 0.0, 0.0, NAN), "frame": GLOBAL_INT, **GLOBE},
      MissionItem((0.0, 0.0, 2.0), None, 9.0)),
-    ({"command": FOREVER}, MissionItem((1.0, 2.0, 3.0), None, None)),
-    ({"command": LAND, "place": (0, 0, 0.0)}, MissionItem((1.0, 2.0, 0.5), 0.3, None)),  # above the one before
+    ({"command": FOREVER, "place": (30_000, 40_000, 6.0)}, MissionItem((3.0, 4.0, 6.0), None, None)),
+    ({"command": LAND, "place": (0, 0, 0.0)}, MissionItem((3.0, 4.0, 0.5), 0.3, None)),  # above the one before
     ({"command": LAND, "place": (70_000, 80_000, 0.0)}, MissionItem((7.0, 8.0, 0.5), 0.3, None)),
     ({"command": HOME, **MISSION}, MissionItem((0.0, 0.0, 0.5), 0.3, None)),
     # as QGroundControl's settings of a mission
