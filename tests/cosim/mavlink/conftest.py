@@ -21,7 +21,7 @@ def links_end(monkeypatch):
         from tests.cosim.mavlink.stubs import opened
 
         while opened:
-            opened.pop().channel.close()
+            opened.pop().close()
 
 
 @pytest.fixture

@@ -85,12 +85,24 @@ def open_filter(verifier=None, own=SOURCE, allowed=None):
     return FrameFilter(RxStats(), own, allowed, verifier)
 
 
-opened = []  # links, closed after each test
+opened = []  # channels and sockets, closed after each test
+
+
+def closed_later(thing):
+    opened.append(thing)
+    return thing
 
 
 def link_of(channel, **options):
-    opened.append(Link("test", channel, open_filter(), SOURCE, **options))
-    return opened[-1]
+    return Link("test", closed_later(channel), open_filter(), SOURCE, **options)
+
+
+def udp_socket(port=0):
+    """Return a socket on a port of loopback; it is closed after the test."""
+    made = closed_later(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
+    made.bind(("127.0.0.1", port))
+    made.settimeout(60.0)
+    return made
 
 
 def udp_link(port, **options):

@@ -23,6 +23,7 @@ from cosim.scenario.scenario import load_scenario
 from tests.cosim.mavlink.stubs import (
     Station,
     attitude,
+    closed_later,
     free_port,
     heartbeat,
     link_of,
@@ -30,17 +31,11 @@ from tests.cosim.mavlink.stubs import (
     odometry,
     read_log,
     send_now,
+    udp_socket,
     until,
 )
 
 HERE = "127.0.0.1"
-
-
-def udp_socket():
-    made = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    made.bind((HERE, 0))
-    made.settimeout(60.0)
-    return made
 
 
 def received(link):
@@ -51,24 +46,24 @@ def received(link):
 
 
 def test_udpout_accepts_only_its_configured_peer_and_answers_in_its_version():
-    with udp_socket() as peer, udp_socket() as foreign:
-        link = link_of(UdpOut(*peer.getsockname()))
-        send_now(link, heartbeat())
-        data, address = peer.recvfrom(1000)
-        assert Station().parse(data)[0].get_type() == "HEARTBEAT"
-        foreign.sendto(Station().pack(attitude(1)), address)
-        peer.sendto(Station().pack(attitude(2)), address)
-        assert [m.time_boot_ms for m in received(link)] == [2]
-        send_now(link, attitude(3))
-        assert peer.recv(1000)[0] == 0xFD
-    with udp_socket() as peer:
-        link = link_of(UdpOut(*peer.getsockname()))
-        send_now(link, heartbeat())
-        peer.sendto(Station().pack(heartbeat(), v1=True), peer.recvfrom(1000)[1])
-        received(link)
-        send_now(link, attitude(4))
-        frame = peer.recv(1000)
-        assert frame[0] == 0xFE and v10.MAVLink(None).parse_buffer(frame)[0].time_boot_ms == 4
+    peer, foreign = udp_socket(), udp_socket()
+    link = link_of(UdpOut(*peer.getsockname()))
+    send_now(link, heartbeat())
+    data, address = peer.recvfrom(1000)
+    assert Station().parse(data)[0].get_type() == "HEARTBEAT"
+    foreign.sendto(Station().pack(attitude(1)), address)
+    peer.sendto(Station().pack(attitude(2)), address)
+    assert [m.time_boot_ms for m in received(link)] == [2]
+    send_now(link, attitude(3))
+    assert peer.recv(1000)[0] == 0xFD
+    peer = udp_socket()
+    link = link_of(UdpOut(*peer.getsockname()))
+    send_now(link, heartbeat())
+    peer.sendto(Station().pack(heartbeat(), v1=True), peer.recvfrom(1000)[1])
+    received(link)
+    send_now(link, attitude(4))
+    frame = peer.recv(1000)
+    assert frame[0] == 0xFE and v10.MAVLink(None).parse_buffer(frame)[0].time_boot_ms == 4
 
 
 def test_udpout_survives_absent_peer_and_late_peer_receives_frames():
@@ -77,61 +72,58 @@ def test_udpout_survives_absent_peer_and_late_peer_receives_frames():
     for _ in range(50):
         assert send_now(link, heartbeat())
         assert not received(link)
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as late:
-        late.bind((HERE, port))
-        late.settimeout(60.0)
-        send_now(link, attitude(7))
-        assert Station().parse(late.recv(1000))[0].time_boot_ms == 7
+    late = udp_socket(port)
+    send_now(link, attitude(7))
+    assert Station().parse(late.recv(1000))[0].time_boot_ms == 7
     link.channel.close()
     assert not link.loss_reports()
 
 
 def test_udpin_sends_to_peers_with_accepted_frames():
     link = link_of(UdpIn(HERE, 0))
-    with udp_socket() as good, udp_socket() as other, udp_socket() as bad:
-        to = (HERE, link.channel.port)
-        assert link.send(heartbeat())  # to nobody
-        good.sendto(Station().pack(heartbeat()), to)
-        other.sendto(Station(254).pack(heartbeat()), to)
-        bad.sendto(b"\xfd\xff\x00", to)
-        bad.sendto(Station(1, 1).pack(heartbeat()), to)  # as if it were we
-        assert until(lambda: not received(link) and len(link.channel.peers) == 2)
-        send_now(link, attitude(1))
-        assert good.recv(1000) == other.recv(1000)
-        bad.setblocking(False)
-        with pytest.raises(BlockingIOError):
-            bad.recv(1000)
+    good, other, bad = udp_socket(), udp_socket(), udp_socket()
+    to = (HERE, link.channel.port)
+    assert link.send(heartbeat())  # to nobody
+    good.sendto(Station().pack(heartbeat()), to)
+    other.sendto(Station(254).pack(heartbeat()), to)
+    bad.sendto(b"\xfd\xff\x00", to)
+    bad.sendto(Station(1, 1).pack(heartbeat()), to)  # as if it were we
+    assert until(lambda: not received(link) and len(link.channel.peers) == 2)
+    send_now(link, attitude(1))
+    assert good.recv(1000) == other.recv(1000)
+    bad.setblocking(False)
+    with pytest.raises(BlockingIOError):
+        bad.recv(1000)
 
 
 def test_udp_peers_are_answered_in_their_mavlink_version():
     """By MAVLink's specification an old one has neither extensions nor ids above 255; what pymavlink 1.0 decodes."""
     link, old_side, new_side = link_of(UdpIn(HERE, 0)), Station(), Station(254)
-    with udp_socket() as old, udp_socket() as new:
-        to = (HERE, link.channel.port)
-        old.sendto(old_side.pack(heartbeat(), v1=True), to)
-        new.sendto(new_side.pack(heartbeat()), to)
-        assert until(lambda: not received(link) and len(link.channel.peers) == 2)
-        rates = mavlink.MAVLink_scaled_imu2_message(5, 1, 2, 3, 4, 5, 6, 7, 8, 9, temperature=1234)
-        for message in (attitude(1), mavlink.MAVLink_current_mode_message(0, 4, 4), rates):
-            link.send(message)
-        link.channel.poll(time.monotonic())
-        data = old.recv(1000)
-        assert data[0] == 0xFE
-        decoded = v10.MAVLink(None).parse_buffer(data)
-        assert [(m.get_type(), m.get_seq()) for m in decoded] == [("ATTITUDE", 0), ("SCALED_IMU2", 1)]
-        assert decoded[0].time_boot_ms == 1 and decoded[1].zmag == 9
-        packet = new.recv(1000)
-        assert packet[0] == 0xFD and [m.get_seq() for m in Station().parse(packet)] == [0, 1, 2]
-        old.sendto(old_side.pack(heartbeat()), to)  # it can speak the newer one after all
-        received(link)
-        send_now(link, heartbeat())
-        assert old.recv(1000)[0] == 0xFD
+    old, new = udp_socket(), udp_socket()
+    to = (HERE, link.channel.port)
+    old.sendto(old_side.pack(heartbeat(), v1=True), to)
+    new.sendto(new_side.pack(heartbeat()), to)
+    assert until(lambda: not received(link) and len(link.channel.peers) == 2)
+    rates = mavlink.MAVLink_scaled_imu2_message(5, 1, 2, 3, 4, 5, 6, 7, 8, 9, temperature=1234)
+    for message in (attitude(1), mavlink.MAVLink_current_mode_message(0, 4, 4), rates):
+        link.send(message)
+    link.channel.poll(time.monotonic())
+    data = old.recv(1000)
+    assert data[0] == 0xFE
+    decoded = v10.MAVLink(None).parse_buffer(data)
+    assert [(m.get_type(), m.get_seq()) for m in decoded] == [("ATTITUDE", 0), ("SCALED_IMU2", 1)]
+    assert decoded[0].time_boot_ms == 1 and decoded[1].zmag == 9
+    packet = new.recv(1000)
+    assert packet[0] == 0xFD and [m.get_seq() for m in Station().parse(packet)] == [0, 1, 2]
+    old.sendto(old_side.pack(heartbeat()), to)  # it can speak the newer one after all
+    received(link)
+    send_now(link, heartbeat())
+    assert old.recv(1000)[0] == 0xFD
 
 
 def test_tcp_client_is_answered_in_its_mavlink_version():
     link = link_of(TcpIn(HERE, 0))
     (side,) = connected(link.channel)
-    side.settimeout(60.0)
     side.sendall(Station().pack(heartbeat(), v1=True))
     assert until(lambda: received(link))
     send_now(link, attitude(3))
@@ -151,8 +143,6 @@ def test_peer_count_is_bounded_and_silent_peers_expire():
     assert len(link.channel.peers) == udp.MAX_PEERS
     link.channel.poll(now + udp.PEER_TIMEOUT + 1.0)
     assert not link.channel.peers
-    for one in sockets:
-        one.close()
 
 
 def test_occupied_ports_give_one_line_error():
@@ -172,7 +162,7 @@ def test_occupied_ports_give_one_line_error():
 
 
 def connected(channel, clients=1):
-    found = [socket.create_connection((HERE, channel.port), 2.0) for _ in range(clients)]
+    found = [closed_later(socket.create_connection((HERE, channel.port), 60.0)) for _ in range(clients)]
     assert until(lambda: channel.poll(time.monotonic()) or len(channel.clients) == clients)
     return found
 
@@ -207,8 +197,6 @@ def test_server_receives_from_all_clients():
     a.sendall(pieces[0][20:])
     b.sendall(pieces[1][11:])
     assert sorted(m.time_boot_ms for m in received(link) + received(link)) == [5, 6]
-    for client in (a, b):
-        client.close()
 
 
 def test_disconnected_client_is_removed():
@@ -245,8 +233,6 @@ def test_excess_clients_are_rejected():
             received(link) or link.channel.poll(time.monotonic()) or len(link.channel.clients) == tcp.MAX_CLIENTS - 1
         )
     )
-    for client in clients:
-        client.close()
 
 
 @pytest.mark.slow
@@ -273,8 +259,6 @@ def test_slow_reader_loses_whole_frames_and_other_clients_none():
     assert got == sorted(set(got))
     link.channel.close()
     assert link.loss_reports() == [f"{sum(dropped)} frames dropped for slow clients"]
-    for client in (slow, quick):
-        client.close()
 
 
 def test_stalled_client_is_closed_after_a_timeout():
@@ -381,6 +365,15 @@ def test_tcp_client_reconnects_after_server_restart(monkeypatch):
 pty = pytest.mark.skipif(not hasattr(os, "openpty"), reason="no pseudo-terminals here")
 
 
+@pytest.fixture
+def line():
+    """Yield the other end of a serial line, and a link on it."""
+    ours, theirs = os.openpty()
+    yield ours, link_of(Serial(os.ttyname(theirs), 57600))
+    os.close(ours)
+    os.close(theirs)
+
+
 def come_to(terminal, count, station=None):
     """Return the given number of messages from the other end of a line, which may be slow."""
     os.set_blocking(terminal, False)
@@ -398,9 +391,8 @@ def come_to(terminal, count, station=None):
 
 
 @pty
-def test_serial_line_is_bidirectional_and_8_bit_clean():
-    ours, theirs = os.openpty()
-    link = link_of(Serial(os.ttyname(theirs), 57600))
+def test_serial_line_is_bidirectional_and_8_bit_clean(line):
+    ours, link = line
     for message in (odometry(0x0D0A1113), attitude(0x03040D1A)):  # bytes that terminals like to eat
         send_now(link, message)
     assert [m.get_type() for m in come_to(ours, 2)] == ["ODOMETRY", "ATTITUDE"]
@@ -412,14 +404,11 @@ def test_serial_line_is_bidirectional_and_8_bit_clean():
     found = []
     assert until(lambda: found.extend(received(link)) or len(found) == 2)
     assert [m.get_type() for m in found] == ["ENCAPSULATED_DATA", "HEARTBEAT"]
-    os.close(ours)
-    os.close(theirs)
 
 
 @pty
-def test_blocked_serial_line_drops_whole_frames():
-    ours, theirs = os.openpty()
-    link = link_of(Serial(os.ttyname(theirs), 57600))
+def test_blocked_serial_line_drops_whole_frames(line):
+    ours, link = line
     sent = [link.send(attitude(i)) for i in range(2000)]
     station, found = Station(), []
 
@@ -433,8 +422,6 @@ def test_blocked_serial_line_drops_whole_frames():
     assert 0 < sent.count(True) < len(sent)
     link.channel.close()
     assert link.loss_reports() == [f"{sent.count(False)} frames dropped on a slow line"]
-    os.close(ours)
-    os.close(theirs)
 
 
 @pty
