@@ -5,7 +5,6 @@ import pty
 import re
 import select
 import signal
-import socket
 import subprocess
 import sys
 import time
@@ -20,7 +19,7 @@ from cosim.mavlink.listening.table_text import mode_name
 from cosim.mavlink.listening.telemetry_table import MAX_ROWS, MAX_TEXTS
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink, ReceivedMessage
-from tests.cosim.mavlink.stubs import free_port
+from tests.cosim.mavlink.stubs import Station, free_port, udp_socket
 
 ESCAPE = "\x1b[31mred\x07"
 
@@ -39,23 +38,10 @@ def link():
         yield link
 
 
-class Vehicle:
-    """Sends from a socket of its own, with pymavlink's encoder alone."""
-
-    def __init__(self, port, system=1):
-        self.codec = mavlink.MAVLink(None, srcSystem=system, srcComponent=1)
-        self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self.address = ("127.0.0.1", port)
-
-    def send(self, message, **kwargs):
-        self.socket.sendto(message.pack(self.codec, **kwargs), self.address)
-        self.codec.seq = (self.codec.seq + 1) % 256
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.socket.close()
+def vehicle(port):
+    """Return a function that sends messages to a port, with pymavlink's encoder alone."""
+    station, sender = Station(1, 1), udp_socket()
+    return lambda message, v1=False: sender.sendto(station.pack(message, v1), ("127.0.0.1", port))
 
 
 def test_display_shows_vehicle_position_texts_and_messages(link):
@@ -179,14 +165,13 @@ def test_modes_have_their_names(autopilot, number, told, name):
 
 def test_broken_frames_are_ignored_and_mavlink_1_is_received(link):
     port = int(link.name.rpartition(":")[2])
-    with Vehicle(port) as vehicle:
-        vehicle.socket.sendto(b"\xfd\xff\x00" + bytes(30), vehicle.address)
-        vehicle.send(heartbeat(), force_mavlink1=True)
-        vehicle.socket.sendto(b"rubbish", vehicle.address)
-        vehicle.send(mavlink.MAVLink_attitude_message(0, 0, 0, 0, 0, 0, 0))
-        found = []
-        while len(found) < 2:
-            found += link.receive(2.0)
+    send, rubbish, found = vehicle(port), udp_socket(), []
+    rubbish.sendto(b"\xfd\xff\x00" + bytes(30), ("127.0.0.1", port))
+    send(heartbeat(), v1=True)
+    rubbish.sendto(b"rubbish", ("127.0.0.1", port))
+    send(mavlink.MAVLink_attitude_message(0, 0, 0, 0, 0, 0, 0))
+    while len(found) < 2:
+        found += link.receive(2.0)
     assert [h.name for h in found] == ["HEARTBEAT", "ATTITUDE"]
     assert link.v1_frames == 1 and link.stats.malformed == 2
 
@@ -206,27 +191,21 @@ def test_with_a_key_only_signed_frames_are_received():
 
 def test_follow_ends_after_the_given_messages_or_seconds(link):
     port = int(link.name.rpartition(":")[2])
-    with Vehicle(port) as vehicle:
-        for _ in range(9):
-            vehicle.send(heartbeat())
-        watch = TelemetryTable()
-        assert len(list(follow(link, watch, period=60.0, count=5))) == 1
-        assert watch.total == 5
+    send, watch = vehicle(port), TelemetryTable()
+    for _ in range(9):
+        send(heartbeat())
+    assert len(list(follow(link, watch, period=60.0, count=5))) == 1
+    assert watch.total == 5
     assert len(list(follow(link, watch, period=0.05, seconds=0.2))) >= 2
 
 
 @pytest.mark.slow
 def test_listen_command_prints_the_display():
     port = free_port()
-    with (
-        Vehicle(port) as vehicle,
-        subprocess.Popen(
-            [sys.executable, "-m", "cosim", "mavlink", "listen", f"udpin:127.0.0.1:{port}", "--count", "3"],
-            stdout=subprocess.PIPE,
-        ) as process,
-    ):
+    send, command = vehicle(port), [sys.executable, "-m", "cosim", "mavlink", "listen", f"udpin:127.0.0.1:{port}"]
+    with subprocess.Popen([*command, "--count", "3"], stdout=subprocess.PIPE) as process:
         while process.poll() is None:
-            vehicle.send(heartbeat())
+            send(heartbeat())
             time.sleep(0.05)
         text = process.stdout.read().decode()
     assert process.returncode == 0
@@ -251,15 +230,13 @@ def test_invalid_endpoint_gives_one_line_error(arguments, text, capsys):
 @pytest.mark.slow
 def test_terminal_display_redraws_in_place_and_ctrl_c_restores_the_cursor():
     port = free_port()
+    send, command = vehicle(port), [sys.executable, "-m", "cosim", "mavlink", "listen", f"udpin:127.0.0.1:{port}"]
     leader, follower = pty.openpty()
-    with Vehicle(port) as vehicle, subprocess.Popen(
-        [sys.executable, "-m", "cosim", "mavlink", "listen", f"udpin:127.0.0.1:{port}"],
-        stdin=follower, stdout=follower, stderr=follower,
-    ) as process:  # fmt: skip
+    with subprocess.Popen(command, stdin=follower, stdout=follower, stderr=follower) as process:
         os.close(follower)
         seen = b""
         while b"SUBMARINE" not in seen:
-            vehicle.send(heartbeat())
+            send(heartbeat())
             if select.select([leader], [], [], 0.1)[0]:
                 seen += os.read(leader, 65536)
         process.send_signal(signal.SIGINT)
