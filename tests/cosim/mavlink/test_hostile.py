@@ -1,7 +1,6 @@
 """Hostile input causes no error, leak or delay, and valid frames in between are accepted."""
 
 import random
-import socket
 import time
 import tracemalloc
 from types import SimpleNamespace
@@ -16,7 +15,17 @@ from cosim.mavlink.thread import LinkThread
 from cosim.mavlink.wire.framing import StreamReader
 from cosim.mavlink.wire.link import Link
 from cosim.mavlink.wire.signing import SigningClock, Verifier
-from tests.cosim.mavlink.stubs import KEY, SOURCE, Station, StubVehicle, attitude, link_of, open_filter, until
+from tests.cosim.mavlink.stubs import (
+    KEY,
+    SOURCE,
+    Station,
+    StubVehicle,
+    attitude,
+    link_of,
+    open_filter,
+    udp_socket,
+    until,
+)
 
 HERE = "127.0.0.1"
 
@@ -152,17 +161,14 @@ def test_a_flooded_port_neither_starves_the_stream_nor_another_link():
     vehicle = StubVehicle()
     links = LinkThread(vehicle, [link_of(flooded), link_of(quiet)], step=0.01)
     links.start()
-    with (
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as bad,
-        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as good,
-    ):
-        for i, data in enumerate(hostile_datagrams(20_000, seed=4)):
-            bad.sendto(data, (HERE, flooded.port))
-            if i % 100 == 0:
-                links.observe(i // 100, np.array([i * 1e-4]))
-        good.sendto(Station().pack(attitude(77)), (HERE, quiet.port))
-        assert until(lambda: any(m.get_type() == "ATTITUDE" and m.time_boot_ms == 77 for m in vehicle.received))
-        assert until(lambda: len(vehicle.rows) == 200)
+    bad, good = udp_socket(), udp_socket()
+    for i, data in enumerate(hostile_datagrams(20_000, seed=4)):
+        bad.sendto(data, (HERE, flooded.port))
+        if i % 100 == 0:
+            links.observe(i // 100, np.array([i * 1e-4]))
+    good.sendto(Station().pack(attitude(77)), (HERE, quiet.port))
+    assert until(lambda: any(m.get_type() == "ATTITUDE" and m.time_boot_ms == 77 for m in vehicle.received))
+    assert until(lambda: len(vehicle.rows) == 200)
     links.close()
     assert not links.failures
     assert len(flooded.peers) <= MAX_PEERS
@@ -201,18 +207,13 @@ def test_flood_of_new_addresses_does_not_displace_a_station_that_was_heard(befor
 
 
 def test_flood_from_many_ports_leaves_the_station_its_answers():
-    link = link_of(UdpIn(HERE, 0))
-    to, sockets = (HERE, link.channel.port), []
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
-        station.settimeout(60.0)
-        station.sendto(Station().pack(attitude(0)), to)
-        for i in range(100):
-            sockets.append(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
-            sockets[-1].sendto(Station(200, 1).pack(attitude(i)), to)
-            list(link.receive(time.perf_counter() + 60.0))
-        link.send(attitude(7))
-        link.channel.poll(time.monotonic())
-        assert Station().parse(station.recv(1000))[0].time_boot_ms == 7
+    link, station = link_of(UdpIn(HERE, 0)), udp_socket()
+    to = HERE, link.channel.port
+    station.sendto(Station().pack(attitude(0)), to)
+    for i in range(100):
+        udp_socket().sendto(Station(200, 1).pack(attitude(i)), to)
+        list(link.receive(time.perf_counter() + 60.0))
+    link.send(attitude(7))
+    link.channel.poll(time.monotonic())
+    assert Station().parse(station.recv(1000))[0].time_boot_ms == 7
     assert len(link.channel.peers) == MAX_PEERS
-    for one in sockets:
-        one.close()
