@@ -103,7 +103,7 @@ class MissionProtocol(Service):
     def _receive_mission_count(self, sender: Sender, message: Any) -> None:
         context, m, mission_type = self.context, self.context.mavlink, message.mission_type
         upload = self._upload
-        if self.is_read_only():
+        if self.rejects_commands():
             self._ack(sender, m.MAV_MISSION_DENIED, mission_type)
         elif mission_type != _MISSION:
             self._ack(sender, m.MAV_MISSION_UNSUPPORTED if message.count else m.MAV_MISSION_ACCEPTED, mission_type)
@@ -209,7 +209,7 @@ class MissionProtocol(Service):
         m, mission_type = self.context.mavlink, message.mission_type
         if mission_type not in (*_SUPPORTED_TYPES, _ALL):
             self._ack(sender, m.MAV_MISSION_UNSUPPORTED, mission_type)
-        elif self.is_read_only():
+        elif self.rejects_commands():
             self._ack(sender, m.MAV_MISSION_DENIED, mission_type)
         elif mission_type in (_MISSION, _ALL):
             self._upload = None

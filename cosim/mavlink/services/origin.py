@@ -22,7 +22,7 @@ class Origin(Service):
     def _receive_set_gps_global_origin(self, sender: Sender, message: Any) -> None:
         context = self.context
         latitude, longitude = message.latitude * _E7, message.longitude * _E7
-        if self.is_read_only():
+        if self.rejects_commands():
             pass
         elif abs(latitude) > 90.0 or abs(longitude) > 180.0:
             context.reject(f"origin at {latitude:g}, {longitude:g} deg", "origin")

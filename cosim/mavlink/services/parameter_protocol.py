@@ -75,14 +75,14 @@ class ParameterProtocol(Service):
 
     def restart(self) -> None:
         """Reset the values to the vehicle's settings."""
-        self.settings = {setting.key: setting.value for setting in self.context.settings}
+        self.setting_values = {setting.key: setting.value for setting in self.context.settings}
 
     # ---- for other services ----
 
     def value(self, name: str) -> float:
         """Return a parameter's value, limited to the range of float32."""
         parameter = self._link_parameters.get(name)
-        return clip_to_float32(self.settings[self._keys[name]] if parameter is None else parameter.read())
+        return clip_to_float32(self.setting_values[self._keys[name]] if parameter is None else parameter.read())
 
     def list_values(self) -> list[tuple[str, float]]:
         """Return names and values of all parameters, in the order of the list."""
@@ -90,7 +90,7 @@ class ParameterProtocol(Service):
 
     def change(self, key: str, value: float) -> Result:
         """Submit a new value of a setting; an invalid value is denied with the reason."""
-        context, before = self.context, self.settings[key]
+        context, before = self.context, self.setting_values[key]
         if not context.accepts_commands:
             return context.submit()
         try:
@@ -102,14 +102,14 @@ class ParameterProtocol(Service):
         if result != Result.ACCEPTED:
             context.settings.change(key, before)
             return result
-        self.settings[key] = value
+        self.setting_values[key] = value
         return result
 
     def record(self, key: str, value: float) -> None:
         """Record the value of a setting that a mission has changed."""
         with contextlib.suppress(CommandError):  # as the command handler does, which logs it
             self.context.settings.change(key, value)
-            self.settings[key] = value
+            self.setting_values[key] = value
 
     # ---- the list ----
 
@@ -185,7 +185,7 @@ class ParameterProtocol(Service):
         parameter = self._link_parameters.get(name)
         if parameter is not None and parameter.write is None:
             return int(m.MAV_PARAM_ERROR_READ_ONLY)
-        if self.is_read_only():
+        if self.rejects_commands():
             return int(m.MAV_PARAM_ERROR_PERMISSION_DENIED)
         if kind != m.MAV_PARAM_TYPE_REAL32 and not context.profile.casts_parameters:
             context.reject(f"{name} has type {kind}, expected REAL32 ({m.MAV_PARAM_TYPE_REAL32})", "value")

@@ -43,7 +43,7 @@ class ReceivedObstacles(Service):
 
     def _receive_obstacle_distance_3d(self, sender: Sender, message: Any) -> None:
         context = self.context
-        if self.is_read_only():
+        if self.rejects_commands():
             return
         position = self._position(message.frame, (message.x, message.y, message.z))
         if position is None:

@@ -69,7 +69,7 @@ class Service:
             self.context.active_gcs.record_command(sender.system)
         return result
 
-    def is_read_only(self) -> bool:
+    def rejects_commands(self) -> bool:
         """Return True if commands are off, and report the refusal."""
         if self.context.accepts_commands:
             return False
@@ -79,7 +79,7 @@ class Service:
     def accept_control(self, sender: Sender) -> bool:
         """Return True if the vehicle accepts set-points and sticks of a sender; report a refusal."""
         context = self.context
-        if self.is_read_only():
+        if self.rejects_commands():
             return False
         if not context.active_gcs.request_control(sender.system, context.now):
             context.reject("another station controls the vehicle", "active gcs")

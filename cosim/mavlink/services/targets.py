@@ -202,7 +202,7 @@ class Targets(Service):
 
     def _execute_do_change_speed(self, request: CommandRequest) -> Result:
         context = self.context
-        if SPEED not in self._parameters.settings:
+        if SPEED not in self._parameters.setting_values:
             return Result.UNSUPPORTED
         try:
             speed = resolve_speed(context, shorten_float32(request[2]) if math.isfinite(request[2]) else request[2])

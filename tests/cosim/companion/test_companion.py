@@ -33,6 +33,12 @@ EVENT = 3.0  # s of the stand-in's time, while it is steered
 STICKS = ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE", "SET_POSITION_TARGET_LOCAL_NED", "SET_ATTITUDE_TARGET")
 
 
+@pytest.fixture
+def link():
+    """A vehicle of profile `generic` whose own frame is off."""
+    return StandIn(profile="generic", shift=SHIFT)
+
+
 class Flight:
     """A flight, its states with their times, and its record."""
 
@@ -234,8 +240,7 @@ FAULTS = {
 
 @pytest.mark.medium
 @pytest.mark.parametrize("reason", FAULTS)
-def test_fault_holds_the_vehicle_within_one_second(tmp_path, reason):
-    link = StandIn(profile="generic", shift=SHIFT)
+def test_fault_holds_the_vehicle_within_one_second(tmp_path, reason, link):
     flight = Flight(tmp_path, link=link, events=[lambda: FAULTS[reason](link)], least_battery=20.0)
     flight.held(reason)
     if reason != "lost link":
@@ -243,8 +248,7 @@ def test_fault_holds_the_vehicle_within_one_second(tmp_path, reason):
 
 
 @pytest.mark.medium
-def test_rejected_mode_holds_within_one_second(tmp_path):
-    link = StandIn(profile="generic", shift=SHIFT)
+def test_rejected_mode_holds_within_one_second(tmp_path, link):
     link.refused_commands.add(176)
     with pytest.raises(RunError, match="a command to resume after: refused mode"):
         Flight(tmp_path, link=link)
@@ -294,9 +298,8 @@ def test_a_px4_that_refuses_hold_gets_no_forces_any_more(tmp_path):
 
 
 @pytest.mark.medium
-def test_a_velocity_that_is_off_does_not_shift_the_position(tmp_path):
+def test_a_velocity_that_is_off_does_not_shift_the_position(tmp_path, link):
     """By 3 cm/s, as a drifting gyroscope does: a filter that trusts it puts the vehicle 6 cm aside."""
-    link = StandIn(profile="generic", shift=SHIFT)
     link.tamper["LOCAL_POSITION_NED"] = lambda m: setattr(m, "vx", m.vx + 0.03)
     flight = Flight(tmp_path, 8.0, link=link)
     estimate = flight.run.table()["law.position.x"].to_numpy()
@@ -308,8 +311,7 @@ def test_a_velocity_that_is_off_does_not_shift_the_position(tmp_path):
 
 
 @pytest.mark.medium
-def test_frame_drift_holds_the_vehicle(tmp_path):
-    link = StandIn(profile="generic", shift=SHIFT)
+def test_frame_drift_holds_the_vehicle(tmp_path, link):
     flight = Flight(tmp_path, 8.0, link=link, events=[lambda: position_off(link, 10.0, 0.4)])
     assert flight.status == "held: frame drift" and flight.companion.session.alignment.drift > 0.5
 
@@ -324,9 +326,8 @@ def margins(monkeypatch):
 
 
 @pytest.mark.medium
-def test_frame_drift_widens_margins(tmp_path, margins):
+def test_frame_drift_widens_margins(tmp_path, margins, link):
     """Of sources that come apart by 0.3 m, the margins of all regions are as much wider, and it goes on."""
-    link = StandIn(profile="generic", shift=SHIFT)
     flight = Flight(tmp_path, 8.0, link=link, events=[lambda: position_off(link, 0.3, 0.15)])
     assert flight.status == "completed"
     assert 0.2 < flight.companion.session.alignment.drift < 0.4
@@ -334,8 +335,7 @@ def test_frame_drift_widens_margins(tmp_path, margins):
     assert margins[-1] == pytest.approx(UNSEEN + 0.3, abs=0.1)
 
 
-def test_dead_reckoning_widens_margins_with_distance(tmp_path, margins):
-    link = StandIn(profile="generic", shift=SHIFT)
+def test_dead_reckoning_widens_margins_with_distance(tmp_path, margins, link):
     link.tamper["EKF_STATUS_REPORT"] = link.tamper["ESTIMATOR_STATUS"] = lambda m: setattr(m, "flags", 8)
     flight = Flight(tmp_path, 6.0, link=link, reckoning_error=0.05)
     table = flight.run.table()
@@ -379,8 +379,7 @@ PILOTS = {
 
 @pytest.mark.medium
 @pytest.mark.parametrize("reason", PILOTS)
-def test_pilot_takes_over_within_one_second(tmp_path, reason):
-    link = StandIn(profile="generic", shift=SHIFT)
+def test_pilot_takes_over_within_one_second(tmp_path, reason, link):
     flight = Flight(tmp_path, link=link, events=[lambda: PILOTS[reason](link)])
     since = flight.time_of("pilot")
     assert flight.status == f"pilot: {reason}" and EVENT < since <= EVENT + 1.0
@@ -416,8 +415,7 @@ def test_overridden_channels_rest_in_the_middle_and_are_then_given_back(tmp_path
     assert link.autopilot._context.sticks == (0.0,) * 6
 
 
-def test_conflicting_system_id_is_reported_once(tmp_path, caplog):
-    link = StandIn(profile="generic", shift=SHIFT)
+def test_conflicting_system_id_is_reported_once(tmp_path, caplog, link):
     beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
     told = [lambda: link.hear(beat), lambda: link.hear(beat), lambda: link.hear(beat, 250)]
     flight = Flight(tmp_path, 4.0, link=link, events=told)
@@ -428,8 +426,7 @@ def test_conflicting_system_id_is_reported_once(tmp_path, caplog):
 
 
 @pytest.mark.medium
-def test_control_can_be_resumed_after_a_takeover(tmp_path):
-    link = StandIn(profile="generic", shift=SHIFT)
+def test_control_can_be_resumed_after_a_takeover(tmp_path, link):
     ours = {"system": IDENTITY[0], "component": IDENTITY[1]}
     later = [(EVENT, lambda: command(link, 193, 0.0, **ours)), (EVENT + 2.0, lambda: command(link, 193, 1.0, **ours))]
     flight = Flight(tmp_path, 10.0, link=link, events=[lambda: link.events.extend(later)])
