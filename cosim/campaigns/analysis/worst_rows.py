@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shlex
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,15 +18,8 @@ def violated_column(results: Results) -> str:
     return "violation" if "violation" in results.schema.names else "violated"
 
 
-class Worst(NamedTuple):
-    """A row with the reason why it is among the worst."""
-
-    key: int  # key of the row
-    why: str  # reason, such as "not reached"
-
-
-def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
-    """Return the worst rows of a sweep or of a campaign of scenes, without refused ones."""
+def worst_table(results: Results, folder: Path, count: int = LISTED) -> list[dict[str, Any]]:
+    """Return the worst rows but refused ones, each with its key, the reason, and the command that repeats it."""
     names = results.schema.names
     keys, reached = results[names[0]], results.fact("reached")
     stopped = results.number("stopped_at")
@@ -48,13 +41,8 @@ def worst_rows(results: Results, count: int = LISTED) -> list[Worst]:
             why = f"not reached, {far[i]:.2f} m short" if far[i] > 0.0 else "not reached"
         else:
             why = f"reached at {time[i]:.2f} s"
-        worst.append(Worst(int(keys[i]), why))
+        worst.append({"row": int(keys[i]), "why": why, "command": rerun_command(folder, int(keys[i]))})
     return worst
-
-
-def worst_table(results: Results, folder: Path, count: int = LISTED) -> list[dict[str, Any]]:
-    """Return the worst rows for a summary, each with the command that repeats it."""
-    return [{"row": key, "why": why, "command": rerun_command(folder, key)} for key, why in worst_rows(results, count)]
 
 
 def rerun_command(folder: Path, key: int) -> str:

@@ -16,7 +16,6 @@ from cosim.campaigns.pages.comparison_page import write_comparison_page
 from cosim.campaigns.pages.figures import distributions, shares_up_to
 from cosim.campaigns.pages.sections import SECTIONS
 from cosim.campaigns.pages.sweep_page import write_sweep_page
-from cosim.campaigns.scenes.conditions import Conditions
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.report.web_page import number
@@ -318,17 +317,3 @@ def test_cumulative_shares_count_unreached_rows():
     values, shares = shares_up_to(np.array([3.0, np.nan, 1.0, np.nan]))
     assert values.tolist() == [1.0, 3.0] and shares.tolist() == [0.25, 0.5]
     assert [a.size for a in shares_up_to(np.zeros(0))] == [0, 0]
-
-
-@pytest.mark.slow
-def test_a_scene_of_a_campaign_becomes_a_run(tmp_path, capsys):
-    conditions = Conditions(duration=3.0, settled=1.0)
-    inside = HARD[0] | {"goal": {"centre": HARD[0]["start"], "radius": 40.0}}
-    out = tmp_path / "out"
-    run_campaign(write(tmp_path / "s.jsonl", [inside]), "ismail_dunnigan", out, conditions)
-    assert main(["rerun", str(out), "20000", "--out", str(tmp_path / "run")]) == 0
-    said = capsys.readouterr()
-    assert said.out.startswith("row 20000: flown again, identical to the last bit\n") and said.err == ""
-    assert {"record.parquet", "report.html", "replay.html", "scenario.toml"} <= {
-        p.name for p in (tmp_path / "run").iterdir()
-    }

@@ -2,6 +2,7 @@
 
 import json
 import math
+import shutil
 
 import pyarrow as pa
 import pyarrow.parquet as pq
@@ -9,13 +10,14 @@ import pytest
 
 from cosim.campaigns import Design, run_campaign, run_sweep, vary_from
 from cosim.campaigns.reruns.rerun import rerun
+from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.store.folder import RESULTS
 from cosim.campaigns.workers.dispatch import KILLED
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
-from tests.cosim.campaigns.scene_data import BRIEF, PLAIN, write
+from tests.cosim.campaigns.scene_data import PLAIN, write
 
 VARY = ["initial.position.1=-2:2", "regions.SR1.gain=500:5000:log", "plant.parameters.weight=1150:1280"]
 BRIEFLY = ["arbiter.engine=closed", "time.duration=0.3", "sensing.position_noise=0.02"]
@@ -43,8 +45,6 @@ def swept(tmp_path_factory):
 @pytest.fixture
 def folder(swept, tmp_path):
     """Return a copy of it."""
-    import shutil
-
     return shutil.copytree(swept, tmp_path / "swept")
 
 
@@ -140,15 +140,15 @@ def test_changed_scenario_is_rejected(folder):
 @pytest.mark.slow
 def test_scene_rerun_is_bit_identical(tmp_path, capsys):
     out = tmp_path / "out"
-    run_campaign(
-        write(tmp_path / "s.jsonl", [*PLAIN[:2], PLAIN[2] | {"weight_minus_buoyancy": 1e6}]),
-        "ismail_dunnigan",
-        out,
-        BRIEF,
-    )
+    inside = PLAIN[1] | {"goal": {"centre": PLAIN[1]["start"], "radius": 40.0}}
+    scenes = [PLAIN[0], inside, PLAIN[2] | {"weight_minus_buoyancy": 1e6}]
+    run_campaign(write(tmp_path / "s.jsonl", scenes), "ismail_dunnigan", out, Conditions(duration=3.0, settled=1.0))
     for seed in (20000, 20001, 20002):
         assert main(["rerun", str(out), str(seed), "--out", str(tmp_path / str(seed))]) == 0
-        assert capsys.readouterr().out.startswith(f"row {seed}: flown again, identical to the last bit\n")
+        said = capsys.readouterr()
+        assert said.out.startswith(f"row {seed}: flown again, identical to the last bit\n") and said.err == ""
+    files = {p.name for p in (tmp_path / "20001").iterdir()}
+    assert {"record.parquet", "report.html", "replay.html", "scenario.toml"} <= files
     changed(out, "effort", 1, 1.0)
     assert list(rerun(out, 20001, tmp_path / "again").differing) == ["effort"]
     with pytest.raises(RunError, match="has no row 7, expected one from 20000 to 20002"):

@@ -9,7 +9,7 @@ from scipy.stats import f as f_test
 from scipy.stats import f_oneway, spearmanr
 
 from cosim.campaigns.analysis.statistics import bins, effect, median_difference, paired, rate
-from cosim.campaigns.analysis.worst_rows import worst_rows
+from cosim.campaigns.analysis.worst_rows import worst_table
 from cosim.campaigns.scenes.flyer import Score
 from cosim.campaigns.scenes.rows import row_of
 from tests.cosim.campaigns.scene_data import results_of
@@ -174,8 +174,8 @@ def test_worst_rows_are_ranked_in_the_documented_order(tmp_path):
         7: Score(False, math.inf, 0.1, 1.0, 1.0, 0.0, -1),
     }
     results = results_of(tmp_path / "r.parquet", [row_of(seed, s, 0.01) for seed, s in scores.items()])
-    worst = worst_rows(results)
-    assert [w.key for w in worst] == [5, 4, 6, 3, 7, 2, 1]
-    assert [w.why for w in worst[:3]] == ["violated, 0.400 m deep", "violated, 0.100 m deep", "stopped at 1.50 s"]
-    assert worst[3].why == "not reached" and worst[5].why == "reached at 50.00 s"
-    assert worst_rows(results, 2) == worst[:2] and worst_rows(results, 0) == []
+    worst = worst_table(results, tmp_path)
+    assert [w["row"] for w in worst] == [5, 4, 6, 3, 7, 2, 1]
+    assert [w["why"] for w in worst[:3]] == ["violated, 0.400 m deep", "violated, 0.100 m deep", "stopped at 1.50 s"]
+    assert worst[3]["why"] == "not reached" and worst[5]["why"] == "reached at 50.00 s"
+    assert worst_table(results, tmp_path, 2) == worst[:2] and worst_table(results, tmp_path, 0) == []

@@ -1,7 +1,6 @@
 """Sweeps in worker processes and on Dask: worker crashes neither lose nor duplicate rows."""
 
 import contextlib
-import logging
 import os
 import signal
 import subprocess
@@ -16,12 +15,11 @@ from cosim.batch.outcome import FIELDS
 from cosim.campaigns import run_sweep
 from cosim.campaigns.store.folder import PARTS, RESULTS
 from cosim.campaigns.store.results import Results
-from cosim.campaigns.workers.cluster import _quiet
 from cosim.campaigns.workers.dispatch import KILLED
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from tests.cosim.campaigns.command import ROOT, command, command_cache, needs_posix
-from tests.cosim.campaigns.fake import KEYS, VARY, Deadly, Poisoned, Slow, design, expected, fakes, paper
+from tests.cosim.campaigns.fake import KEYS, VARY, Poisoned, Slow, design, expected, fakes, paper
 from tests.cosim.campaigns.scene_data import batches_of, many, rows, write
 
 __all__ = ["command", "command_cache", "fakes"]
@@ -36,9 +34,8 @@ def rows_of(folder):
 
 @needs_posix
 @pytest.mark.slow
-@pytest.mark.parametrize("workers", [1, 2])
-def test_killed_sweep_resumes_with_the_same_command(command, workers):
-    words = [*SLOW, "--workers", workers]
+def test_killed_sweep_resumes_with_the_same_command(command):
+    words = [*SLOW, "--workers", 2]
     killed = command(*words)
     killed.wait_for_rows(4)
     os.kill(killed.process.pid, signal.SIGKILL)
@@ -90,23 +87,6 @@ def check_poisoned(folder, n):
     assert poisoned
 
 
-@pytest.mark.slow
-def test_rows_that_crash_workers_are_rejected_and_others_complete(tmp_path, fakes, caplog, monkeypatch):
-    batches_of(monkeypatch, 4)  # each halving costs processes
-    fakes(Poisoned)
-    done = run_sweep(paper(), design(60), tmp_path / "out", workers=2)
-    check_poisoned(tmp_path / "out", 60)
-    assert done.summary["refused"] > 0 and f"refused: {KILLED}" in caplog.text
-
-
-@pytest.mark.slow
-def test_crash_of_every_worker_rejects_no_row(tmp_path, fakes):
-    fakes(Deadly)
-    with pytest.raises(RunError, match="every process crashed, with any rows"):
-        run_sweep(paper(), design(1), tmp_path / "out", workers=2)
-    assert not (tmp_path / "out" / RESULTS).exists()
-
-
 # ---- Dask ----
 
 
@@ -117,6 +97,17 @@ def cluster():
 
     with cluster_executor(None, 2) as executor:
         yield executor
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", ["processes", "dask"])
+def test_rows_that_crash_workers_are_rejected_and_others_complete(tmp_path, fakes, request, caplog, monkeypatch, where):
+    batches_of(monkeypatch, 4)  # each halving costs processes
+    fakes(Poisoned)
+    by = {"workers": 2} if where == "processes" else {"executor": request.getfixturevalue("cluster")}
+    done = run_sweep(paper(), design(60), tmp_path / "out", **by)
+    check_poisoned(tmp_path / "out", 60)
+    assert done.summary["refused"] > 0 and f"refused: {KILLED}" in caplog.text
 
 
 @pytest.mark.slow
@@ -142,14 +133,6 @@ def test_campaign_on_dask_gives_the_same_rows(tmp_path, cluster, capfd):
     assert rows(Results(tmp_path / "one" / RESULTS)) == rows(Results(tmp_path / "two" / RESULTS))
     assert main([*words, "--scheduler", address, "--workers", "2", "--out", str(tmp_path / "three")]) == 2
     assert capfd.readouterr().err == "cosim: --workers: expected none with --scheduler: the cluster sets their number\n"
-
-
-@pytest.mark.slow
-def test_rows_that_crash_dask_workers_are_rejected_and_others_complete(tmp_path, fakes, cluster, monkeypatch):
-    batches_of(monkeypatch, 4)
-    fakes(Poisoned)
-    run_sweep(paper(), design(60), tmp_path / "out", executor=cluster)
-    check_poisoned(tmp_path / "out", 60)
 
 
 @needs_posix
@@ -213,14 +196,3 @@ def test_unreachable_scheduler_gives_one_line_error(tmp_path, capsys, monkeypatc
     assert main([*words, "--scheduler", "nonsense://x"]) == 2
     assert "cannot be used" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.slow
-def test_library_log_records_are_suppressed_while_in_use(caplog):
-    client = logging.getLogger("library.client")
-    client.setLevel(logging.WARNING)
-    with _quiet("library"):
-        client.error("lost")
-    assert not caplog.records
-    client.error("lost again")
-    assert [record.message for record in caplog.records] == ["lost again"]

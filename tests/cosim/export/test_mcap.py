@@ -72,16 +72,13 @@ def test_every_signal_is_there_to_the_last_bit(which, request):
     read = request.getfixturevalue("read" if which == "run" else "read_killed")
     record, where = load_record(request.getfixturevalue(which)), channels_of_signals(read)
     assert where.keys() == record.units.keys()
+    (position,) = (c for c in read.summary.channels.values() if c.topic == "/signals/position")
+    assert position.metadata["x"].startswith("position.x [m]: ")
     for name, (group, field) in where.items():
         got, expected = read.signal(group, field), record[name]
         known = ~np.isnan(expected)
         assert np.array_equal(np.isnan(got), ~known), name
         assert np.array_equal(got[known].view(np.uint64), expected[known].view(np.uint64)), name
-
-
-def test_channel_metadata_holds_units(read, run):
-    (position,) = (c for c in read.summary.channels.values() if c.topic == "/signals/position")
-    assert position.metadata["x"].startswith("position.x [m]: ")
 
 
 def test_times_are_simulated_nanoseconds_in_order(read, run):
@@ -99,11 +96,13 @@ def test_signals_have_no_field_that_plotjuggler_takes_for_a_time_stamp(read):
             assert "timestamp" not in channel.metadata
 
 
-def test_scene_uses_foxglove_message_schemas(read):
+def test_scene_uses_foxglove_message_schemas(read, run):
     schemas = read.summary.schemas
     topics = {c.topic: schemas[c.schema_id].name for c in read.summary.channels.values()}
     assert {topic: name for topic, name in topics.items() if not topic.startswith("/signals/")} == WELL_KNOWN
     assert read.messages.keys() == topics.keys()
+    assert read.attached["scenario.toml"] == (run / "scenario.toml").read_text()
+    assert '"status": "completed"' in read.attached["summary.json"]
 
 
 def turn(message):
@@ -196,11 +195,6 @@ def test_commanded_change_is_drawn_from_its_time(run, tmp_path, monkeypatch):
     sizes = {at: m.entities[0].spheres[0].size.x for at, m in Read(path).messages["/scene"]}
     assert {size for at, size in sizes.items() if at < 500_000_000} == {0.6}
     assert sizes[500_000_000] == 1.8
-
-
-def test_scenario_and_summary_are_attached(read, run):
-    assert read.attached["scenario.toml"] == (run / "scenario.toml").read_text()
-    assert '"status": "completed"' in read.attached["summary.json"]
 
 
 def test_signal_selection_keeps_the_scene_complete(run, tmp_path):

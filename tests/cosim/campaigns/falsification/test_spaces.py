@@ -112,15 +112,6 @@ def test_near_points_are_near_scenes():
     assert here != there
 
 
-def test_cube_center_maps_to_range_centers():
-    space = SceneSpace("plain")
-    scene = scene_at(space, np.full(space.dimension, 0.5))
-    assert scene.start == (0.0, 0.0, 2.75) and scene.goal.centre == (10.0, 0.0, 3.0)
-    assert scene.current == (0.125, 0.0, 0.0) and scene.weight_minus_buoyancy == 0.0 and scene.righting_moment == 36.0
-    assert [ball.centre for ball in scene.obstacles] == [(5.0, 0.0, 2.875)] * 4
-    assert [ball.radius for ball in scene.obstacles] == pytest.approx([0.6] * 4)
-
-
 def numbers(conflict):
     """Return numbers of a conflict that its parameters decide."""
     table = conflict["scenario"]
