@@ -19,7 +19,7 @@ from cosim.campaigns.store.results import Results
 from cosim.campaigns.workers.batch_sizing import Batches
 from cosim.campaigns.workers.dispatch import fly_all
 from cosim.campaigns.workers.work import Rows, Task, Work
-from cosim.campaigns.workers.worker import flyer_held
+from cosim.campaigns.workers.worker import hold_flyer
 from cosim.campaigns.workers.worker_pools import ExternalExecutor, Processes, WorkerPool
 from cosim.errors import RunError
 from cosim.run.progress import ProgressBar
@@ -95,7 +95,7 @@ def open_flights(
         )
     if workers < 1:
         raise RunError(f"workers is {workers}, expected 1 or more")
-    with flyer_held(work.task), campaign_folder(out, work) as folder:
+    with hold_flyer(work.task), campaign_folder(out, work) as folder:
         done = len(work) if folder.complete else len(folder.log.keys())
         with (
             contextlib.closing(open_pool(work.task, workers, executor) if done < len(work) else WorkerPool()) as pool,

@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from cosim.campaigns.scenes.conflicts import CONFLICTS, draw_conflict
-from cosim.campaigns.scenes.generator import MOST_OBSTACLES, draw_scene
+from cosim.campaigns.scenes.generator import MAX_OBSTACLES, draw_scene
 
-FAMILIES = (*MOST_OBSTACLES, *CONFLICTS)
+FAMILIES = (*MAX_OBSTACLES, *CONFLICTS)
 _CHANCES = 2**31  # number of seeds of noise, and of obstacles that are drawn again
 _CONFLICTS = 64  # number of conflicts that are drawn to find the number of their coordinates
-_OF_AN_OBSTACLE = 5  # coordinates of an obstacle: radius, position along the straight line, three of its offset from it
+_OBSTACLE_COORDINATES = (
+    5  # coordinates of an obstacle: radius, position along the straight line, three of its offset from it
+)
 
 Point = NDArray[np.float64]  # (dimension,) coordinates from 0 to 1
 
@@ -69,15 +71,15 @@ class SceneSpace:
         self.family, self._limit = family, np.inf if limit is None else limit
         self._chance_in_point = limit is None
         rng = np.random.default_rng(0)
-        if family in MOST_OBSTACLES:
+        if family in MAX_OBSTACLES:
             several = [Shares(np.empty(0), rng)]
-            draw_scene(several[0], [Shares(np.empty(0), rng)] * MOST_OBSTACLES[family], 0, family)
+            draw_scene(several[0], [Shares(np.empty(0), rng)] * MAX_OBSTACLES[family], 0, family)
         else:
             several = [Shares(np.empty(0), rng) for _ in range(_CONFLICTS)]
             for shares in several:
                 draw_conflict(shares, 0, family)
         self._others = max(shares.drawn for shares in several)
-        self._of_obstacles = _OF_AN_OBSTACLE * MOST_OBSTACLES.get(family, 0)
+        self._of_obstacles = _OBSTACLE_COORDINATES * MAX_OBSTACLES.get(family, 0)
         self.dimension = self._others + self._of_obstacles + self._chance_in_point
 
     def line(self, point: Point, seed: int) -> bytes:
@@ -85,8 +87,8 @@ class SceneSpace:
         chance = int(point[-1] * _CHANCES) if self._chance_in_point else seed
         rest = np.random.default_rng([chance, 2])
         others = Shares(point[: self._others], rest, self._limit)
-        if self.family in MOST_OBSTACLES:
-            obstacles = point[self._others : self._others + self._of_obstacles].reshape(-1, _OF_AN_OBSTACLE)
+        if self.family in MAX_OBSTACLES:
+            obstacles = point[self._others : self._others + self._of_obstacles].reshape(-1, _OBSTACLE_COORDINATES)
             # one generator per obstacle: redrawing one does not change another
             again = [
                 np.random.default_rng([chance, 2, i]) if self._chance_in_point else rest for i in range(len(obstacles))

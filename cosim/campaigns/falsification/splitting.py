@@ -20,7 +20,7 @@ _ACCEPTED = 0.3  # desired acceptance rate of the moves, to which the step is ad
 _GAIN = 2.0  # gain of that adaptation
 _SHORTEST = 0.02  # least step of a move [standard deviations]
 _TAIL = 0.025  # probability outside the interval on each side
-LEAST_BUDGET = 100  # least number of points
+MIN_BUDGET = 100  # least number of points
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: 
     # The interval is that of the logarithm, by Student's distribution. Its variance is the sum over the fractions, each
     # between the families of first particles: copies of one are not independent.
     rng = np.random.default_rng(seed)
-    n = max(LEAST_BUDGET // 5, budget // _PARTICLES)
+    n = max(MIN_BUDGET // 5, budget // _PARTICLES)
     z = rng.standard_normal((n, dimension))
     costs, families = evaluate(ndtr(z)), np.arange(n)
     left, step, reached, variance, bound = budget - n, 0.5, 1.0, 0.0, 1.0

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from cosim.campaigns.campaign import run_campaign
 from cosim.campaigns.falsification.search import import_cma
 from cosim.campaigns.falsification.spaces import FAMILIES, SceneSpace
-from cosim.campaigns.falsification.splitting import LEAST_BUDGET
+from cosim.campaigns.falsification.splitting import MIN_BUDGET
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.rows import SCHEMA, refused_row, table_of
 from cosim.campaigns.scenes.work import SceneTask
@@ -30,7 +30,7 @@ from plant_fmu.toml_tables import hint
 Objective = Literal["clearance", "violation", "arrival"]
 OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
 _LIMIT = 3.0  # standard deviations of a normal number within which a search stays
-_MOST = 1_000_000  # greatest number of rows
+_MAX_BUDGET = 1_000_000  # greatest number of rows
 
 
 @dataclass(frozen=True)
@@ -47,9 +47,9 @@ class SearchSettings:
     def __post_init__(self) -> None:
         if self.objective not in OBJECTIVES:
             raise RunError(f"objective {self.objective!r} is unknown; {hint(self.objective, OBJECTIVES)}")
-        least = LEAST_BUDGET if self.rare_event else 1
-        if not least <= self.budget <= _MOST:
-            raise RunError(f"budget is {self.budget}, expected {least} to {_MOST} flights")
+        least = MIN_BUDGET if self.rare_event else 1
+        if not least <= self.budget <= _MAX_BUDGET:
+            raise RunError(f"budget is {self.budget}, expected {least} to {_MAX_BUDGET} flights")
         if not 0 <= self.seed < 2**31:
             raise RunError(f"seed is {self.seed}, expected a whole number from 0 to 2^31 - 1")
         if self.rare_event and self.objective != "clearance":

@@ -15,7 +15,7 @@ from cosim.campaigns.pages.sections import LABELS
 from cosim.campaigns.reruns.repeat import complete_results, require_complete
 from cosim.campaigns.scenes.kinds import FEATURES, SceneKinds, scene_kinds
 from cosim.campaigns.scenes.rows import SCHEMA
-from cosim.campaigns.store.folder import SUMMARY, held
+from cosim.campaigns.store.folder import SUMMARY, lock_folder
 from cosim.campaigns.store.plan import SCENES
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
@@ -37,7 +37,7 @@ def write_campaign_page(folder: Path, replays: int) -> Path:
     if summary.get("kind") != SCENES:
         raise RunError(f"{folder / SUMMARY}: holds no campaign of scenes")
     results = complete_results(folder, SCHEMA)
-    with held(folder):
+    with lock_folder(folder):
         kinds, worst = scene_kinds(results), worst_table(results, folder, max(LISTED, replays))
         with understood(folder / SUMMARY):
             groups = {"all": summary} | summary["kinds"]

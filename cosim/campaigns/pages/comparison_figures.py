@@ -11,13 +11,13 @@ from cosim.campaigns.pages.figures import WIDTH, legend_above
 from cosim.campaigns.store.results import Results
 from cosim.report.figures.style import BLACK, BLUE, GREEN, ORANGE, RED
 
-_MOST = 1500  # greatest number of scenes that are drawn
+_MAX_SCENES = 1500  # greatest number of scenes that are drawn
 _NEVER = 1.12  # distance of missing numbers from the least number, as a multiple of the range of the numbers
 
 
 def side_by_side(one: str, results: Results, other: str, others: Results, columns: Sequence[tuple[str, str]]) -> Figure:
     """Draw each scene as a marker at the numbers of both laws, by which of them completes it."""
-    some = np.unique(np.linspace(0, len(results) - 1, min(len(results), _MOST)).astype(int))
+    some = np.unique(np.linspace(0, len(results) - 1, min(len(results), _MAX_SCENES)).astype(int))
     mine, theirs = (rows["reached"] & ~rows["violation"] for rows in (results, others))
     figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     panels = figure.subplots(1, len(columns), squeeze=False)[0]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from cosim.campaigns.pages.replays import write_page_with_replays
 from cosim.campaigns.reruns.repeat import require_complete
-from cosim.campaigns.store.folder import SUMMARY, held
+from cosim.campaigns.store.folder import SUMMARY, lock_folder
 from cosim.errors import RunError
 from cosim.io.strict_json import read_json, understood
 from cosim.report.web_page import number
@@ -28,7 +28,7 @@ def write_falsification_page(folder: Path, replays: int) -> Path:
     summary = read_json(folder / SUMMARY)
     if not isinstance(summary.get("search"), dict):
         raise RunError(f"{folder / SUMMARY}: holds no search")
-    with held(folder):
+    with lock_folder(folder):
         with understood(folder / SUMMARY):
             random = summary["random"]["worst"] if summary["random"] else []
             values = {

@@ -17,7 +17,7 @@ from cosim.simulation.signals import Array
 
 WIDTH = 5.6  # in, width of a figure, which is readable on a phone too
 _ACROSS = 2  # number of panels per row
-_MOST_KEYS = 8  # greatest number of keys that are drawn
+_MAX_KEYS = 8  # greatest number of keys that are drawn
 _POINTS = 700  # greatest number of points in a panel
 _TICKS = 5  # greatest number of intervals across a panel, so that labels of five digits fit
 _WIDE = 30.0  # ratio of a logarithmic range from which on only powers of ten have ticks
@@ -119,7 +119,7 @@ def shares_up_to(values: Array) -> tuple[Array, Array]:
 
 def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
     """Draw the rate of each fact in bins of each key, with 95 % intervals by Wilson; facts (n,)."""
-    figure, panels = _panels(min(len(keys), _MOST_KEYS), 2.1)
+    figure, panels = _panels(min(len(keys), _MAX_KEYS), 2.1)
     for axes, key in zip(panels, keys, strict=False):
         parts = list(bins(key.values))
         for fact, happened in facts.items():
@@ -141,7 +141,7 @@ def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, viol
     some = np.flatnonzero(np.isfinite(values))
     if len(some) > _POINTS:
         some = some[np.unique(np.linspace(0, len(some) - 1, _POINTS).astype(int))]
-    figure, panels = _panels(min(len(keys), _MOST_KEYS), 2.1)
+    figure, panels = _panels(min(len(keys), _MAX_KEYS), 2.1)
     for axes, key in zip(panels, keys, strict=False):
         for what, of, colour, mark in (
             ("reached, nothing violated", reached & ~violated, GREEN, "o"),

@@ -14,7 +14,7 @@ from cosim.campaigns.analysis.worst_rows import LISTED, worst_table
 from cosim.campaigns.pages.replays import write_page_with_replays
 from cosim.campaigns.pages.sections import LABELS
 from cosim.campaigns.reruns.repeat import complete_results, require_complete
-from cosim.campaigns.store.folder import SUMMARY, held
+from cosim.campaigns.store.folder import SUMMARY, lock_folder
 from cosim.campaigns.store.plan import SWEEP
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.rows import schema_of
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
 
 PAGE = "sweep.html"
-_LEAST_SHARE, _LEAST_RHO = 0.01, 0.1  # least effects and rank correlations in the table
+_MIN_SHARE, _MIN_RHO = 0.01, 0.1  # least effects and rank correlations in the table
 _SHOWN, _VALUES = 8, 12  # greatest numbers of keys in figures and table, and of values listed for a key
 
 
@@ -40,14 +40,14 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
     with understood(folder / SUMMARY):
         schema = schema_of(tuple(summary["vary"]))
     results = complete_results(folder, schema)
-    with held(folder):
+    with lock_folder(folder):
         worst = worst_table(results, folder, max(LISTED, replays))
         with understood(folder / SUMMARY):
             most = set(_by_weight(summary)[:_SHOWN])
             ranked = [key for key in summary["vary"] if key in most]
             rates = {fact: summary[fact] for fact in FACTS}
             values = {
-                "s": summary, "worst": worst, "min_rho": _LEAST_RHO, "max_values": _VALUES,
+                "s": summary, "worst": worst, "min_rho": _MIN_RHO, "max_values": _VALUES,
                 "groups": {"all": {"scenes": summary["flown"], "rates": rates, "quantiles": summary["quantiles"]}},
                 "ranked": [summary["words"][key] for key in ranked], "effects": list(_effects(summary, ranked)),
             }  # fmt: skip
@@ -125,9 +125,9 @@ def _effects(s: dict[str, Any], ranked: list[str]) -> Iterator[list[str]]:
 def _effect(effect: dict[str, float] | None, correlation: dict[str, float] | None) -> str:
     """Format effect and rank correlation of a key and an outcome; an empty text if they are not significant."""
     measures = []
-    if effect is not None and effect["share"] >= max(effect["floor"], _LEAST_SHARE):
+    if effect is not None and effect["share"] >= max(effect["floor"], _MIN_SHARE):
         measures.append(_percent(effect["share"]))
-    if correlation is not None and abs(correlation["rho"]) >= _LEAST_RHO and correlation["p"] < CHANCE:
+    if correlation is not None and abs(correlation["rho"]) >= _MIN_RHO and correlation["p"] < CHANCE:
         measures.append(f"ρ\N{NO-BREAK SPACE}{correlation['rho']:+.2f}".replace("-", "−"))
     return ", ".join(measures)
 

@@ -28,7 +28,7 @@ Kinds = dict[str, Callable[[Generator], tuple[Table, list[Table]]]]
 # s, lag of each vehicle's thrusters; None: that of its file
 _LAGS = {"odin": 0.0, "bluerov2_heavy": 0.15, "rexrov": None}
 _PRIORITY = 4.0  # ratio of priorities of successive criteria
-_NET_WEIGHT = 50.0  # N, greatest magnitude of the net weight of a light vehicle
+_MAX_NET_WEIGHT = 50.0  # N, greatest magnitude of the net weight of a light vehicle
 _WEIGHT_FRACTION = 0.025  # greatest magnitude as a fraction of the weight, where that is more: of a heavy vehicle
 _CURRENT = 0.4  # m/s, greatest speed of the current
 _CRITERIA = ("obstacle", "shape", "depth", "visibility")
@@ -67,7 +67,7 @@ def _scale(vehicle: Vehicle) -> float:
 
 
 def _parameters(rng: Generator, vehicle: Vehicle) -> dict[str, float]:
-    most = max(_NET_WEIGHT, _WEIGHT_FRACTION * vehicle.weight)
+    most = max(_MAX_NET_WEIGHT, _WEIGHT_FRACTION * vehicle.weight)
     parameters = {"buoyancy": float(vehicle.weight - rng.uniform(-most, most))}
     lag = _LAGS[vehicle.name]
     if lag is not None:

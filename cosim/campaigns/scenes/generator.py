@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.scenes.trials import make_trial
 
-MOST_OBSTACLES = {"plain": 6, "hard": 14}  # greatest number of obstacles of each kind of scene
+MAX_OBSTACLES = {"plain": 6, "hard": 14}  # greatest number of obstacles of each kind of scene
 _GOAL_RADIUS = 0.5  # m
 _FREE = 0.6  # m, least distance of an obstacle from the start and from the goal region
 
@@ -63,7 +63,7 @@ def draw_scene(rng: Any, of_obstacles: Iterable[Any], seed: int, kind: str) -> d
     hard = kind == "hard"
     start = np.array([0.0, 0.0, rng.uniform(1.5, 4.0)])
     goal = np.array([rng.uniform(8.0, 12.0), rng.uniform(-3.0, 3.0), rng.uniform(1.5, 4.5)])
-    n_obstacles = int(rng.integers(6 if hard else 1, MOST_OBSTACLES[kind] + 1))
+    n_obstacles = int(rng.integers(6 if hard else 1, MAX_OBSTACLES[kind] + 1))
     obstacles = [_make_obstacle(of, start, goal) for of in itertools.islice(of_obstacles, n_obstacles)]
     heading, speed = rng.uniform(-np.pi, np.pi), rng.uniform(0.0, 0.4 if hard else 0.25)
     if hard:

@@ -73,7 +73,7 @@ def campaign_folder(path: Path, work: Work) -> Iterator[CampaignFolder]:
             raise RunError(f"{path}: exists and holds no campaign, expected a new folder or that of a campaign")
     except OSError as error:
         raise RunError(f"{path}: {error.strerror or error}") from error
-    with held(path):
+    with lock_folder(path):
         folder = CampaignFolder(path, work)
         with contextlib.closing(folder.log):
             try:
@@ -84,7 +84,7 @@ def campaign_folder(path: Path, work: Work) -> Iterator[CampaignFolder]:
 
 
 @contextlib.contextmanager
-def held(path: Path) -> Iterator[None]:
+def lock_folder(path: Path) -> Iterator[None]:
     """Lock the folder of a campaign during a block that writes into it; convert the system's errors to a RunError."""
     try:
         lock = _lock(path / LOCK)

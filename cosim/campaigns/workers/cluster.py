@@ -12,7 +12,7 @@ from typing import Any
 
 from cosim.campaigns.workers.work import Task
 from cosim.campaigns.workers.worker import fly, release
-from cosim.campaigns.workers.worker_pools import QUEUED, Flight, WorkerCrash, WorkerPool, interrupts_held, lost_work
+from cosim.campaigns.workers.worker_pools import QUEUED, Flight, WorkerCrash, WorkerPool, block_interrupts, lost_work
 from cosim.errors import RunError
 from plant_fmu.installing import install_hint
 
@@ -92,7 +92,7 @@ class Cluster(WorkerPool):
     def _recover(self) -> None:
         """Wait for replacements of crashed workers; restart the workers of a local cluster if none join."""
         if not self._wait(_WORKER_TIMEOUT / 3.0) and self._local:
-            with interrupts_held():
+            with block_interrupts():
                 self._client.cluster.scale(0)
                 self._client.cluster.scale(int(self._most))
             self._wait(_WORKER_TIMEOUT)
@@ -142,7 +142,7 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
         try:
             if scheduler is None:
                 stack.enter_context(dask.config.set(_LOW_OVERHEAD))
-                with interrupts_held():
+                with block_interrupts():
                     cluster = untyped.LocalCluster(
                         n_workers=workers, threads_per_worker=1, processes=True, silence_logs=logging.CRITICAL,
                         scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},

@@ -57,7 +57,7 @@ def release(patience: float) -> None:
 
 
 @contextlib.contextmanager
-def flyer_held(task: Task) -> Iterator[None]:
+def hold_flyer(task: Task) -> Iterator[None]:
     """Hold a flyer in this process during a block: it raises errors of the task, and builds what is built once."""
     with _held.lock:
         _held.flyer_of(task)

@@ -56,7 +56,7 @@ class Processes(WorkerPool):
 
     def __init__(self, n: int, task: Task) -> None:
         self._n, self._task, self.width = n, task, QUEUED * n
-        with interrupts_held():
+        with block_interrupts():
             self._start()
 
     def _start(self) -> None:
@@ -65,7 +65,7 @@ class Processes(WorkerPool):
 
     def submit(self, task: Task, batch: Any) -> Flight:
         """Submit a batch, which may start a process."""
-        with interrupts_held():
+        with block_interrupts():
             try:
                 return self._pool.submit(fly, task, batch)
             except BrokenProcessPool:
@@ -112,7 +112,7 @@ def lost_work(message: str, *errors: type[BaseException]) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def interrupts_held() -> Iterator[None]:
+def block_interrupts() -> Iterator[None]:
     """Block SIGINT and SIGHUP while a process is started, which inherits the blocked signals."""
     # Python's resource tracker inherits them too.
     if not hasattr(signal, "pthread_sigmask"):

@@ -20,7 +20,7 @@ from cosim.campaigns.scenes.rows import SCHEMA, row_of
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.campaigns.scenes.work import SceneTask
-from cosim.campaigns.store.folder import PARTS, RESULTS, SUMMARY, CampaignFolder, held
+from cosim.campaigns.store.folder import PARTS, RESULTS, SUMMARY, CampaignFolder, lock_folder
 from cosim.campaigns.store.plan import difference
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError, ScenarioError
@@ -151,7 +151,7 @@ def test_a_damaged_plan_is_refused(tmp_path, scenes, content):
 
 def test_a_folder_in_use_is_refused(tmp_path, scenes):
     (tmp_path / "out").mkdir()
-    with held(tmp_path / "out"), pytest.raises(RunError, match="another process is at work"):
+    with lock_folder(tmp_path / "out"), pytest.raises(RunError, match="another process is at work"):
         run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     assert run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF).flown == 20
 

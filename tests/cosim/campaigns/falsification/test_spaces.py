@@ -11,7 +11,7 @@ from cosim.campaigns.falsification.spaces import SceneSpace, Shares
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.conflicts import CONFLICTS, make_conflict
-from cosim.campaigns.scenes.generator import MOST_OBSTACLES, make_scene
+from cosim.campaigns.scenes.generator import MAX_OBSTACLES, make_scene
 from cosim.campaigns.scenes.scene_file import decode_scene
 
 
@@ -44,7 +44,7 @@ def features(scene):
 
 
 @pytest.mark.medium
-@pytest.mark.parametrize("kind", MOST_OBSTACLES)
+@pytest.mark.parametrize("kind", MAX_OBSTACLES)
 def test_points_drawn_evenly_are_scenes_of_the_generator(kind):
     space, rng = SceneSpace(kind), np.random.default_rng(1)
     drawn = [features(scene_at(space, rng.random(space.dimension), i)) for i in range(700)]
@@ -54,7 +54,7 @@ def test_points_drawn_evenly_are_scenes_of_the_generator(kind):
         assert ks_2samp(*values).pvalue > 1e-3, name
 
 
-@pytest.mark.parametrize("kind", MOST_OBSTACLES)
+@pytest.mark.parametrize("kind", MAX_OBSTACLES)
 def test_no_point_leaves_the_family(kind):
     space, rng = SceneSpace(kind, 3.0), np.random.default_rng(2)
     corners = rng.integers(0, 2, (60, space.dimension)).astype(float)
