@@ -28,7 +28,8 @@ def approach_speed(distance: float, deceleration: float, slope: float) -> float:
 
 def desired_velocity(plan: PathPlan, position: Array, goal_velocity: Array, gains: DeployableGains, out: Array) -> None:
     """Write the velocity [m/s], NED, shape (3,), that follows the path from a position [m, NED], shape (3,)."""
-    count, path = plan.counts[0], plan.path
+    waits, path = plan.waits[0], plan.path
+    count = 1 if waits else plan.counts[0]
     speed, remaining, travelled, heading = gains.speed, 0.0, 0.0, zeros(3)
     to_go, before = _AHEAD, zeros(3)
     for leg in range(count):
@@ -54,7 +55,9 @@ def desired_velocity(plan: PathPlan, position: Array, goal_velocity: Array, gain
     speed = min(speed, approach_speed(remaining, gains.acceleration, gains.position_bandwidth))
     size = length3(heading[0], heading[1], heading[2])
     for axis in range(3):
-        out[axis] = goal_velocity[axis] + (speed * heading[axis] / size if size > 1e-9 else 0.0)
+        out[axis] = 0.0 if waits else goal_velocity[axis]
+        if size > 1e-9:
+            out[axis] += speed * heading[axis] / size
 
 
 def desired_acceleration(desired: Array, velocity: Array, gains: DeployableGains, out: Array) -> None:

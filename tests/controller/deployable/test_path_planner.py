@@ -51,7 +51,7 @@ def length_of(way, count, start=START):
 def path_cost(way, count, regions):
     """Return what a way costs."""
     cost = empty_cost(regions.kinds.size)
-    begin_cost(cost, START, np.zeros(3))
+    begin_cost(cost, START, np.zeros(3), False)
     while not add_cost(cost, way, count, regions, GAINS, np.inf):
         pass
     return cost.cost[0]
@@ -192,6 +192,23 @@ def test_path_end_follows_a_moving_goal():
         assert clearance_at(packed, 0, plan.path[plan.counts[0] - 1]) > 0.05
 
 
+@pytest.mark.parametrize("velocity", [(-0.9, 0.0, 0.0), (0.0, 0.5, 0.0), (0.4, -0.4, 0.0)])
+def test_vehicle_at_rest_steps_aside_from_a_fast_region_and_returns(velocity):
+    """A ball through its place, and a vehicle that does no more than 0.5 m/s."""
+    at, velocity, desired = np.array([9.0, 0.0, 2.5]), np.array(velocity), np.zeros(3)
+    ball = Region("ball", Sphere(tuple(at - 12.0 * velocity), 1.5), "out", tuple(velocity))
+    regions, packed = pack([ball, Region("band", DepthBand(3.65, 3.35), "in")]), pack([GOAL])
+    plan, least, waited = empty_plan(2, 1), np.inf, False
+    for k in range(1500):
+        regions.move_to(0.02 * k)
+        improve(plan, at, packed, regions, GAINS, 0.02)
+        desired_velocity(plan, at, np.zeros(3), GAINS, desired)
+        at = at + 0.02 * desired * min(1.0, 0.5 / max(np.linalg.norm(desired), 1e-9))
+        least, waited = min(least, clearance_at(regions, 0, at)), waited or bool(plan.waits[0])
+    assert least > 0.2 and waited and not plan.waits[0]
+    assert clearance_at(packed, 0, at) > 0.2
+
+
 def arrays_of(plan):
     """Yield all arrays of a plan."""
     for part in plan:
@@ -233,7 +250,7 @@ def test_clearance_evaluations_are_bounded(monkeypatch):
     way = np.zeros((CORNERS + 1, 3))
     way[:] = [(100.0 * (i + 1), 50.0 * (-1.0) ** i, 2.5) for i in range(CORNERS + 1)]
     cost, calls = empty_cost(3), [0]
-    begin_cost(cost, START, np.zeros(3))
+    begin_cost(cost, START, np.zeros(3), False)
     while not add_cost(cost, way, CORNERS + 1, regions, GAINS, np.inf):
         calls.append(len(looked))
     assert max(np.diff(calls)) <= 64 * 3 and len(looked) == 512 * 3

@@ -33,10 +33,11 @@ GOAL = Region("goal", Sphere((8.0, 0.5, 2.5), 0.5), "in")
 PLACES = [0, 1, 2]  # hard regions of place
 
 
-def clearance(packed, point, later=0.0):
-    """Return the least clearance of the hard regions of place, each where it will be, less three deviations."""
+def clearance(packed, point, later=0.0, regions=PLACES):
+    """Return the least clearance of hard regions of place, each where it will be, less three deviations."""
     return min(
-        clearance_at(packed, i, point - packed.velocities[i] * later) - 3.0 * packed.deviations[i].max() for i in PLACES
+        (clearance_at(packed, i, point - packed.velocities[i] * later) - 3.0 * packed.deviations[i].max())
+        for i in regions
     )
 
 
@@ -55,7 +56,7 @@ def near_price(free, gains=GAINS):
     return 3.0 * (lack / gains.clearance) ** 2 + 200.0 * (min(deep / 0.1, 1.0) + deep)
 
 
-def expected_stay(end, packed, drift=0.0):
+def expected_stay(end, packed, drift):
     """Look at the end now; if it drifts, also at hard regions, and a second, three and nine seconds later."""
     drifts, prices = np.any(drift), []
     for later in (0.0, 1.0, 3.0, 9.0) if drifts else (0.0,):
@@ -65,22 +66,41 @@ def expected_stay(end, packed, drift=0.0):
     return 3.0 * np.mean(prices)
 
 
-def expected_cost(points, packed, gains=GAINS, drift=0.0):
-    """Look at all regions at each stride. Return the cost, what hard regions add, and soft ones on the way."""
+def is_fast(packed, i, gains):
+    return np.linalg.norm(packed.velocities[i]) > 0.25 * gains.speed
+
+
+def expected_rest(place, packed, arrival, gains):
+    """Look at each fast region from the arrival to 8 s from now, at least each half second."""
+    free = gains.clearance
+    for i in (i for i in PLACES if is_fast(packed, i, gains)):
+        later, speed = arrival, np.linalg.norm(packed.velocities[i])
+        while later < 8.0:
+            near = clearance(packed, place, later, [i])
+            free, later = min(free, near), later + max((near - gains.clearance) / speed, 0.5)
+    return 3.0 * near_price(free, gains)
+
+
+def expected_cost(points, packed, gains=GAINS, drift=(0.0, 0.0, 0.0), waits=False):
+    """Look at all regions at each stride. Return the cost; what hard regions add, soft ones, hard ones at a stay."""
     points = np.asarray(points)
     lengths = np.linalg.norm(np.diff(points, axis=0), axis=1)
     enough, total, penalty, through, samples = gains.clearance + 3.0 / 0.7, lengths.sum(), 0.0, 0.0, 0
-    stay = expected_stay(points[-1], packed, drift)
+    stay, met = expected_stay(points[-1], packed, drift), 0.0
+    if waits or not np.any(drift):
+        place, until = (points[1], lengths[0]) if waits else (points[-1], lengths.sum())
+        met = expected_rest(place, packed, until / gains.speed, gains)
+    stay += met + 0.5 * waits
     for leg, length in enumerate(lengths):
-        s = 0.0
+        s, ahead = 0.0, [i for i in PLACES if not (waits and leg and is_fast(packed, i, gains))]
         while s < length:
             if samples == 512:
                 penalty += 200.0 * (length - s + lengths[leg + 1 :].sum())
-                return total + penalty + through + stay, penalty, through
+                return total + penalty + through + stay, penalty, through, met
             samples += 1
             gone = lengths[:leg].sum() + s
             at = points[leg] + (points[leg + 1] - points[leg]) * s / length
-            free = min(enough, clearance(packed, at, gone / gains.speed))
+            free = min(enough, clearance(packed, at, gone / gains.speed, ahead)) if ahead else enough
             soft = soft_clearance(packed, at, gone / gains.speed)
             room = min(3.0, max(0.25, abs(soft)))
             stride = max(0.7 * (free - gains.clearance), 0.5 * (free - gains.margin), 0.08)
@@ -88,13 +108,13 @@ def expected_cost(points, packed, gains=GAINS, drift=0.0):
             through += stride * packed.crossing_costs[3] * price(-soft)
             penalty += stride * near_price(free)
             s += stride
-    return total + penalty + through + stay, penalty, through
+    return total + penalty + through + stay, penalty, through, met
 
 
-def cost_of(way, count, packed, start=START, most=np.inf, drift=(0.0, 0.0, 0.0)):
+def cost_of(way, count, packed, start=START, most=np.inf, drift=(0.0, 0.0, 0.0), waits=False):
     """Return what the planner makes of a way, and in how many calls."""
     cost, calls = empty_cost(packed.kinds.size), 1
-    begin_cost(cost, start, np.array(drift))
+    begin_cost(cost, start, np.array(drift), waits)
     while not add_cost(cost, way, count, packed, GAINS, most):
         calls += 1
     return cost.cost, calls
@@ -116,9 +136,10 @@ def test_path_cost_matches_dense_evaluation():
         packed.deviations[:3] = rng.uniform(0.0, 0.05, size=(3, 3))
         packed.crossing_costs[3] = rng.uniform(0.2, 10.0)
         drift = rng.normal(0.0, 0.2, 3) * (k % 2)
-        expected, penalty, through = expected_cost([START, *way[:count]], packed, drift=drift)
-        found, took = cost_of(way, count, packed, drift=drift)
-        assert found == pytest.approx([expected, penalty, through], rel=1e-9)
+        waits = k % 3 == 0
+        expected, penalty, through, met = expected_cost([START, *way[:count]], packed, drift=drift, waits=waits)
+        found, took = cost_of(way, count, packed, drift=drift, waits=waits)
+        assert found == pytest.approx([expected, penalty, through, met], rel=1e-9)
         calls.append(took)
         length = np.linalg.norm(np.diff([START, *way[:count]], axis=0), axis=1).sum()
         dear, long = dear + (penalty > 0.2 * length), long + (penalty > 50.0 * length)
@@ -152,15 +173,15 @@ def test_soft_region_cost_trades_against_the_detour():
     round_it[0] = 4.0, 1.9, 2.5
     deep = np.maximum(1.5 - np.abs(np.linspace(-4.0, 4.0, 8001)), 0.0)
     exact = 8.0 + 2.0 * np.mean(deep + 0.5 * np.minimum(deep / 0.2, 1.0)) * 8.0
-    assert cost_of(through, 1, disc)[0] == pytest.approx([exact, 0.0, exact - 8.0], rel=0.15)
-    assert cost_of(round_it, 2, disc)[0] == pytest.approx([2.0 * np.hypot(4.0, 1.7), 0.0, 0.0], abs=0.3)
+    assert cost_of(through, 1, disc)[0] == pytest.approx([exact, 0.0, exact - 8.0, 0.0], rel=0.15)
+    assert cost_of(round_it, 2, disc)[0] == pytest.approx([2.0 * np.hypot(4.0, 1.7), 0.0, 0.0, 0.0], abs=0.3)
 
 
 def test_path_end_in_a_soft_region_costs_three_metres_of_crossing():
     ball = pack([Region("ball", Sphere((4.0, 0.2, 2.5), 1.5), "out", hard=False, crossing_cost=7.0)])
     way = np.zeros((CORNERS + 1, 3))
     way[0] = 3.0, 0.2, 2.5
-    cost, penalty, through = cost_of(way, 1, ball)[0]
+    cost, penalty, through, _ = cost_of(way, 1, ball)[0]
     assert cost - through - 3.0 == pytest.approx(3.0 * 7.0 * (0.5 + 0.5), rel=1e-12) and penalty == 0.0
     for outside, part in ((0.0, 0.25), (0.02, 0.15), (0.05, 0.0), (0.5, 0.0)):
         way[0] = 2.5 - outside, 0.2, 2.5
@@ -553,9 +574,9 @@ def test_path_is_updated_and_replaced_by_a_sufficiently_cheaper_one():
 def test_found_path_is_the_next_candidate():
     plan, goal = empty_plan(0, 1), pack([GOAL])
     plan.counts[:], plan.path[0], plan.found[:2] = (1, 0, 2), (8.0, 0.5, 2.5), [(4.0, 1.0, 2.5), (8.0, 0.5, 2.5)]
-    way_round._choose_candidate(plan, START, goal, GAINS)
+    way_round._choose_candidate(plan, START, goal, pack([]), GAINS)
     assert plan.counts.tolist() == [1, 2, -1] and np.array_equal(plan.candidate[:2], plan.found[:2])
-    way_round._choose_candidate(plan, START, goal, GAINS)
+    way_round._choose_candidate(plan, START, goal, pack([]), GAINS)
     assert not np.array_equal(plan.candidate[:2], plan.found[:2])
 
 
@@ -591,7 +612,7 @@ def test_distant_regions_are_not_reevaluated(monkeypatch):
     ):  # fmt: skip
         evaluated.clear()
         regions = pack([Region("ball", Sphere((3.0, 0.2 + aside, 2.5), 0.3), "out", hard=hard)])
-        assert cost_of(way, 1, regions)[0] == pytest.approx([6.0, 0.0, 0.0])
+        assert cost_of(way, 1, regions)[0] == pytest.approx([6.0, 0.0, 0.0, 0.0])
         assert least <= len(evaluated) <= most
 
 

@@ -34,6 +34,10 @@ _STAY = 3.0  # m, length of path that the stay at its end counts for
 _STAY_SAMPLES = 4  # number of evaluations of a stay that moves with the goal, the first for the present time
 _FIRST_LATER = 1.0  # s from now, time of the second evaluation
 _LATER_RATIO = 3.0  # ratio of the time of each further evaluation to the one before
+_FAST = 0.25  # fraction of the vehicle's speed above which a hard region may run into a vehicle at rest
+_FORESIGHT = 8.0  # s from now, to which such regions are predicted there
+_PREDICTIONS = 16  # greatest number of predictions of one of them
+_WAIT = 0.5  # m, cost of a wait
 _AWAY = 0.05  # m, distance from a soft region within which a stay counts as inside: keeps the end off its surface
 _COARSE = 0.25  # m, least distance between two evaluations near the surface of a soft region
 _SPHERE = Sphere.kind
@@ -46,22 +50,25 @@ class PathCost(NamedTuple):
     start: Array  # (3,) m, NED: start of the path when the evaluation began
     drift: Array  # (3,) m/s, NED: velocity of the path's end, which moves with the goal
     counts: NDArray[np.int64]  # (2,) index of the next leg to evaluate; number of evaluations so far
+    waits: NDArray[np.bool_]  # (1,) True if the vehicle waits at the first corner until fast regions have passed
     travelled: Array  # (2,) m: length of the evaluated legs; evaluated length of the present leg
-    cost: Array  # (3,) m: cost so far; its part by hard regions; its part by soft regions on the way
+    cost: Array  # (4,) m: cost so far; parts by hard regions and soft ones on the way; by fast ones at rest
     clear_until: Array  # (n,) m: length of path before which each region needs no evaluation
 
 
 def empty_cost(n_regions: int) -> PathCost:
     """Return the state before the first evaluation, for `n_regions`."""
     return PathCost(
-        np.zeros(3), np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(2), np.zeros(3), np.zeros(n_regions)
-    )
+        np.zeros(3), np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(1, dtype=np.bool_), np.zeros(2), np.zeros(4),
+        np.zeros(n_regions),
+    )  # fmt: skip
 
 
-def begin_cost(cost: PathCost, start: Array, drift: Array) -> None:
+def begin_cost(cost: PathCost, start: Array, drift: Array, waits: bool) -> None:
     """Begin the evaluation of a path from a start [m, NED] to an end that drifts [m/s, NED], shape (3,) each."""
     copy(start, cost.start)
     copy(drift, cost.drift)
+    cost.waits[0] = waits
     cost.counts[:] = 0
     cost.travelled[:] = 0.0
     cost.cost[:] = 0.0
@@ -78,6 +85,8 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
             return True
         if leg == count:
             cost.cost[0] += _STAY * _stay_cost(path[count - 1], cost.drift, regions, limits)
+            if not (cost.waits[0] or _drifts(cost.drift)):
+                _add_stay(cost, path[count - 1], regions, limits)
             return True
         begin = cost.start if leg == 0 else path[leg - 1]
         length = length3(path[leg, 0] - begin[0], path[leg, 1] - begin[1], path[leg, 2] - begin[2])
@@ -85,6 +94,9 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
             cost.counts[0] += 1
             cost.travelled[0] += length
             cost.travelled[1] = 0.0
+            if leg == 0 and cost.waits[0]:
+                cost.cost[0] += _WAIT
+                _add_stay(cost, path[0], regions, limits)
             continue
         if cost.counts[1] == _SAMPLES[1]:
             _add_stride(cost, length - s, 0.0, _INSIDE)
@@ -118,6 +130,8 @@ def _evaluate_place(
     for i in range(regions.kinds.size):
         if travelled < cost.clear_until[i] or regions.kinds[i] >= _ATTITUDE:
             continue
+        if cost.waits[0] and cost.counts[0] > 0 and is_fast(regions, i, limits):
+            continue  # it has passed by then
         own = 0.0  # m/s, speed of the region, summed over the axes
         for axis in range(3):
             point[axis] = place[axis] - regions.velocities[i, axis] * later
@@ -157,11 +171,41 @@ def _near_cost(free: float, limits: PathLimits) -> float:
     return cost
 
 
+def _drifts(drift: Array) -> bool:
+    return bool(drift[0] != 0.0 or drift[1] != 0.0 or drift[2] != 0.0)
+
+
+def is_fast(regions: PackedRegions, i: int, limits: PathLimits) -> bool:
+    """Return True if region `i` is a hard one of position that barriers alone may not escape from."""
+    v = regions.velocities
+    speed = length3(v[i, 0], v[i, 1], v[i, 2])
+    return bool(regions.hard[i] and regions.kinds[i] < _ATTITUDE and speed > _FAST * limits.speed)
+
+
+def _add_stay(cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits) -> None:
+    """Add the cost of fast regions that meet a vehicle at rest after the evaluated legs, at a place [m, NED]."""
+    free, point, room = limits.clearance, zeros(3), zeros(3)
+    for i in range(regions.kinds.size):
+        if not is_fast(regions, i, limits):
+            continue
+        v, later = regions.velocities[i], cost.travelled[0] / limits.speed
+        speed = length3(v[0], v[1], v[2])
+        while later < _FORESIGHT:
+            for axis in range(3):
+                point[axis] = place[axis] - v[axis] * later
+            clearance = clearance_of_place(regions, i, point, room) - uncertainty(regions, i)
+            free = min(free, clearance)
+            later += max((clearance - limits.clearance) / speed, _FORESIGHT / _PREDICTIONS)
+    price = _STAY * _near_cost(free, limits)
+    cost.cost[0] += price
+    cost.cost[3] += price
+
+
 def _stay_cost(end: Array, drift: Array, regions: PackedRegions, limits: PathLimits) -> float:
     """Return the cost per metre of a stay at the end of a path [m, NED]."""
     # An end that drifts [m/s, NED] with the goal is also evaluated at later positions, and against hard regions, which
     # it may meet there. The cost is the mean over these times.
-    drifts = drift[0] != 0.0 or drift[1] != 0.0 or drift[2] != 0.0
+    drifts = _drifts(drift)
     samples, later, total, place, room = _STAY_SAMPLES if drifts else 1, 0.0, 0.0, zeros(3), zeros(3)
     for _ in range(samples):
         free = limits.clearance

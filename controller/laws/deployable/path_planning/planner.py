@@ -14,7 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import exponential, length3
-from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost, empty_cost
+from controller.laws.deployable.path_planning.cost import (
+    PathCost,
+    add_cost,
+    begin_cost,
+    empty_cost,
+    is_fast,
+)
 from controller.laws.deployable.path_planning.search import (
     ROOM,
     PathLimits,
@@ -45,6 +51,8 @@ _CLIMBS = 12  # greatest number of steps from a point into the goal region
 _PAYS = 0.05  # least gain in depth per metre of such a step; it gains 1 where the gradient does not turn
 _DEEP_ENOUGH = 1e-3  # m, tolerance of the depth of an end
 _BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: no evaluation under way; the path is evaluated; the candidate is
+_MET = 1.0  # m, cost by hard regions from which the path may wait for them to pass
+_WAITING = 0.4  # fraction of the candidates that then wait
 _USED = -1  # value of `counts[2]` while the found path is the candidate
 _LESS = 0.5  # m by which random corners stay closer to start and end than random nodes of the trees
 
@@ -56,7 +64,10 @@ class PathPlan(NamedTuple):
     candidate: Array  # (CORNERS + 1, 3) m, NED: path that may replace it
     found: Array  # (CORNERS + 1, 3) m, NED: path found by the search
     counts: NDArray[np.int64]  # (3,) number of points of path, candidate and found, the end included; 0: none yet
-    cost: Array  # (3,) m: cost of the path; its part by hard regions; its part by soft regions on the way
+    cost: Array  # (4,) m: cost of the path and its parts, as in `PathCost`
+    waits: NDArray[
+        np.bool_
+    ]  # (2,) True if path, and candidate, wait at their first corner until fast regions have passed
     new_cost: PathCost  # evaluation under way, of path or candidate
     search: Search
     closed: NDArray[np.bool_]  # (n,) True for regions that the search keeps out of
@@ -76,7 +87,8 @@ def empty_plan(n_regions: int, seed: int) -> PathPlan:
         candidate=np.zeros((n, 3)),
         found=np.zeros((n, 3)),
         counts=np.zeros(3, dtype=np.int64),
-        cost=np.zeros(3),
+        cost=np.zeros(4),
+        waits=np.zeros(2, dtype=np.bool_),
         new_cost=empty_cost(n_regions),
         search=empty_search(),
         closed=np.zeros(n_regions, dtype=np.bool_),
@@ -230,7 +242,7 @@ def _follow(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimit
             path[end, axis] += goal.velocities[0, axis] * period
         if not clearance_at(goal, 0, path[end]) > 0.0:
             nearest_goal_point(goal, path[end], limits.depth, path[end])
-    while plan.counts[0] > 1 and _distance(path[0], start) < _PASSED:
+    while plan.counts[0] > 1 and not plan.waits[0] and _distance(path[0], start) < _PASSED:
         for i in range(plan.counts[0] - 1):
             copy(path[i + 1], path[i])
         plan.counts[0] -= 1
@@ -242,13 +254,13 @@ def _evaluate(plan: PathPlan, start: Array, goal: PackedRegions, regions: Packed
     """Continue the evaluation of path or candidate, in turn; the candidate becomes the path if it costs less."""
     cost = plan.new_cost
     if plan.phase[0] == _BEGIN:
-        begin_cost(cost, start, goal.velocities[0])
+        begin_cost(cost, start, goal.velocities[0], plan.waits[0])
         plan.phase[0] = _PATH
     if plan.phase[0] == _PATH:
         if add_cost(cost, plan.path, plan.counts[0], regions, limits, np.inf):
             copy(cost.cost, plan.cost)
-            _choose_candidate(plan, start, goal, limits)
-            begin_cost(cost, cost.start, goal.velocities[0])
+            _choose_candidate(plan, start, goal, regions, limits)
+            begin_cost(cost, cost.start, goal.velocities[0], plan.waits[1])
             plan.phase[0] = _CANDIDATE
         return
     most = plan.cost[0] - _BETTER - _BETTER_PART * plan.cost[0]
@@ -256,7 +268,7 @@ def _evaluate(plan: PathPlan, start: Array, goal: PackedRegions, regions: Packed
         plan.phase[0] = _BEGIN
         if cost.cost[0] < most:
             _copy_path(plan.candidate, plan.path)
-            plan.counts[0] = plan.counts[1]
+            plan.counts[0], plan.waits[0] = plan.counts[1], plan.waits[1]
             copy(cost.cost, plan.cost)
 
 
@@ -284,15 +296,38 @@ def search_path(
             return
 
 
-def _choose_candidate(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
+def _choose_candidate(
+    plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, limits: PathLimits
+) -> None:
     """Choose the next candidate: the path that the search found, once, or else a mutation of the path."""
+    plan.waits[1] = False
     if plan.counts[2] > 0:
         _copy_path(plan.found, plan.candidate)
         plan.counts[1] = plan.counts[2]
         plan.counts[2] = _USED
+        return
+    plan.counts[2] = 0
+    met = False
+    if plan.cost[1] + plan.cost[3] > _MET:
+        for i in range(regions.kinds.size):
+            met = met or is_fast(regions, i, limits)
+    if (plan.waits[0] or met) and uniform(plan.random) < _WAITING:
+        _choose_wait(plan, start)
     else:
         _mutate_path(plan, start, goal, limits)
-        plan.counts[2] = 0
+
+
+def _choose_wait(plan: PathPlan, start: Array) -> None:
+    """Write the path into `candidate`, with a wait at a random first corner."""
+    added = 0 if plan.waits[0] or plan.counts[0] > CORNERS else 1
+    for i in range(CORNERS, added - 1, -1):
+        copy(plan.path[i - added], plan.candidate[i])
+    about = plan.path[0] if plan.waits[0] else start
+    reach = 0.2 * exponential(_LN_30 * uniform(plan.random))
+    for axis in range(3):
+        plan.candidate[0, axis] = about[axis] + reach * _bell_shaped(plan.random)
+    plan.candidate[0, 2] = max(plan.candidate[0, 2], min(start[2], 0.0))
+    plan.counts[1], plan.waits[1] = plan.counts[0] + added, True
 
 
 def _copy_path(path: Array, out: Array) -> None:
