@@ -2,7 +2,8 @@
 
 # A potential alone leads into pockets between obstacles. So the law keeps a path of a few corners, and tries random
 # changes: a corner moved, added or dropped, or another end in the goal region. While the path is blocked, or soft
-# regions make it costly, paths found by `search.py` are candidates, too. The path of lower cost by `cost.py` stays.
+# regions make it costly, paths found by `search.py` are candidates, too; where a fast region comes, so are waits aside.
+# The path of lower cost by `cost.py` stays.
 # Each period does a bounded part of the work. The law has its own random numbers, so that a run repeats bit for bit.
 # The path only sets the direction: the barriers keep the vehicle out of hard regions for any path.
 
@@ -14,13 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import exponential, length3
-from controller.laws.deployable.path_planning.cost import (
-    PathCost,
-    add_cost,
-    begin_cost,
-    empty_cost,
-    is_fast,
-)
+from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost, empty_cost, is_fast
 from controller.laws.deployable.path_planning.search import (
     ROOM,
     PathLimits,
