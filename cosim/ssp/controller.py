@@ -14,10 +14,10 @@ from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
 from cosim.ssp.documentation import contents
-from cosim.ssp.normal_tables import ziggurat
 from cosim.ssp.shape_parameters import shape_numbers
 from cosim.ssp.translated import Places, Translated, translate_loop
 from plant_fmu import quantities as q
+from plant_fmu.compiling.sources import plant_sources
 from plant_fmu.component import Component
 from plant_fmu.quantities import UNITS, Quantity
 from plant_fmu.variables import AXES, FORCES, VELOCITIES, Role, Variable, variables
@@ -75,13 +75,12 @@ def prefixes(regions: Sequence[Region]) -> list[str]:
 
 
 def _sources(translated: Translated) -> dict[str, bytes]:
-    files = c_files("cosim.ssp", "csrc/controller")
-    generated = {name: text.encode() for name, text in translated.files.items()}
+    plant = plant_sources()
     return {
-        **files,
-        **under_own_names({"normal.c": files["normal.c"], **generated}),
+        **c_files("cosim.ssp", "csrc/controller"),
+        **under_own_names({name: text.encode() for name, text in translated.files.items()}),
         "ticks.h": c_files("cosim.ssp", "csrc")["ticks.h"],
-        "ziggurat.h": ziggurat().encode(),
+        **{name: plant[name] for name in ("random.c", "random.h", "elementary.c", "elementary.h")},
     }
 
 

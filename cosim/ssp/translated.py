@@ -18,10 +18,8 @@ from controller.translator.program import Program
 from controller.translator.types import type_of
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.sensor import STREAM
 from cosim.ssp.loop import Loop
 from cosim.ssp.memory import Memory, Named, arrays_of
-from cosim.ssp.normal_tables import generator_state
 
 _AXIS = np.array([0.48, 0.6, 0.64])  # rotation axis of an attitude that no law has initially
 _NONE = -1  # place of an array that a law does not have
@@ -183,7 +181,6 @@ def _scene(
     outages = zip(setup.outage_steps, setup.outage_sensors, setup.outage_losses, strict=True)
     goal_places = [[0.0, 0.0, 0.0], *setup.goal_places.tolist()]
     deviations = [sensing.position_noise] * 3 + [sensing.velocity_noise] * 3
-    upper, lower, increment, rest = generator_state(sensing.seed, STREAM)
     return {
         "REGION_OFFSETS": _braced([0, *setup.regions.offsets]),
         "REGION_CRITERIA": _braced([0, *scenario.criterion_places]),
@@ -204,8 +201,7 @@ def _scene(
         "SCENE_GOAL_PLACES": _braced(_braced(map(number, place)) for place in goal_places),
         "SCENE_N_PLACES": str(len(goal_places) - 1),
         "SCENE_STAY": number(scenario.goal_stay if math.isfinite(scenario.goal_stay) else 0.0),
-        "SCENE_RANDOM": f"{{{{UINT64_C({upper}), UINT64_C({lower})}}, {{UINT64_C({increment}), UINT64_C({rest})}}}}",
-        "SCENE_NOISE": str(int(not sensing.exact and not setup.through_sensors)),
+        "SCENE_SEED": str(sensing.seed % 2**31),
         "SCENE_DEVIATIONS": _braced(map(number, deviations)),
         "SCENE_DEAD_FROM": number(setup.dead_from),
         "SCENE_DEAD_UNTIL": number(setup.dead_until),

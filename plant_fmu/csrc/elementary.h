@@ -3,7 +3,7 @@
 #ifndef ELEMENTARY_H
 #define ELEMENTARY_H
 
-#include "plant.h" /* names the functions */
+#include "model.h" /* names the functions */
 
 double elementary_log(double x); /* of a finite number above 0 */
 double elementary_expm1(double x); /* exp(x) - 1 of a number up to 0 */

@@ -2,6 +2,7 @@
 
 #include "coupling.h"
 #include "elementary.h"
+#include "random.h"
 
 #include <math.h>
 #include <string.h>

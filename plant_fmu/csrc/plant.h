@@ -236,16 +236,7 @@ int sensors_sample(const Parameters *parameters, int sensor, unsigned long long 
 /* Returns the sensor of a channel. */
 int sensors_of_channel(int channel);
 
-/* ---- random.c ---- */
-
 /* Streams of random numbers: noise of each channel, three of the current's knots, three of its first knot, then chances. */
 enum { CURRENT_STREAM = N_MEASURED, CHANCE_STREAM = CURRENT_STREAM + 6 };
-
-/* Writes two independent numbers, uniform in [0, 1), at index `count` of a seeded stream. */
-void random_uniform(int seed, unsigned stream, unsigned long long count, double out[2]);
-
-/* Returns the standard normal number at index `count` of a seeded stream: the same at every call (Philox 4x32-10,
- * Box-Muller). */
-double random_normal(int seed, unsigned stream, unsigned long long count);
 
 #endif

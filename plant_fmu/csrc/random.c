@@ -1,9 +1,11 @@
 /* Random numbers without a state: a keyed hash of stream and index. Runs repeat with any step size, saved states need no
  * generator, and streams are independent. */
-#include "elementary.h"
+#include "random.h"
 
 #include <math.h>
 #include <stdint.h>
+
+#include "elementary.h"
 
 /* Philox 4x32-10 (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", SC11). */
 static void philox(uint32_t c[4], uint32_t key0, uint32_t key1)

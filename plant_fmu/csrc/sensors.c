@@ -4,6 +4,7 @@
 #include <math.h>
 
 #include "linear.h"
+#include "random.h"
 
 static const int SENSOR[N_MEASURED] = {DEPTH_SENSOR, DVL,     DVL,  DVL,  DVL,  IMU, IMU, IMU,
                                        IMU,          IMU,     IMU,  COMPASS, USBL, USBL, USBL};

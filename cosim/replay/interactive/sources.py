@@ -10,14 +10,13 @@ import numpy as np
 from controller.law import NOTHING_EXPECTED
 from controller.translator.operands import number
 from controller.translator.program import Program
+from controller.translator.static_data import array_data
 from controller.translator.types import type_of
 from cosim.batch.fused_loop import fly
 from cosim.replay.interactive.flight import Flight
-from cosim.scenario.scenario import Scenario
 from cosim.simulation.sensor import STREAM
 from cosim.ssp.c_sources import c_files
 from cosim.ssp.memory import Memory, Named
-from cosim.ssp.normal_tables import OUTERMOST, generator_state, ziggurat
 from fuzzy_arbiter import Constant, Output, Rule, System, Term
 from fuzzy_arbiter.export import to_c
 from plant_fmu.variables import variables
@@ -93,14 +92,11 @@ def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, byte
         *_scene(flight, token),
         _CALLS,
     ])  # fmt: skip
-    ssp_files = c_files("cosim.ssp", "csrc/controller")
     return {
         **c_files("cosim.replay.interactive", "csrc"),
         "loop.h": text.encode(),
         "rules.c": to_c(dataclasses.replace(system, name="rules")).encode(),
         "strengths.c": to_c(_strengths(system)).encode(),
-        "ziggurat.h": ziggurat().encode(),
-        **{name: ssp_files[name] for name in ("normal.c", "normal.h")},
     }
 
 
@@ -132,7 +128,7 @@ def _strengths(system: System) -> System:
 
 
 def _scene(flight: Flight, token: str) -> Iterator[str]:
-    """Yield the plant's start values, and the state and tail draws of the noise generator, as C."""
+    """Yield the plant's start values, and the random numbers of the noise, as C."""
     scenario = flight.scenario
     table = {v.name: (i, v.type) for i, v in enumerate(variables(scenario.vehicle))}
     yield f'#define PLANT_TOKEN "{token}"'
@@ -147,18 +143,8 @@ def _scene(flight: Flight, token: str) -> Iterator[str]:
         references = [str(at) for at, _ in given] or ["0"]
         yield f"static const fmi3ValueReference {prefix}_REFERENCES[] = {_braced(references)};"
         yield f"static const {c} {prefix}_VALUES[] = {_braced(values or ['0'])};"
-    upper, lower, increment, rest = generator_state(scenario.sensing.seed, STREAM)
-    words = [f"UINT64_C({word})" for word in (upper, lower, increment, rest)]
-    yield f"#define SCENE_RANDOM {{{{{words[0]}, {words[1]}}}, {{{words[2]}, {words[3]}}}}}"
-    drawn = tail_draws(scenario, len(flight.noise))
-    yield f"static const int TAIL_PLACES[] = {_braced([*(str(at) for at, _ in drawn), '-1'])};"
-    yield f"static const double TAIL_VALUES[] = {_braced([*(number(x) for _, x in drawn), '0.0'])};"
-
-
-def tail_draws(scenario: Scenario, rows: int) -> list[tuple[int, float]]:
-    """Return the places and values of the noise's tail draws, for which NumPy's generator takes logarithms."""
-    drawn = np.random.default_rng([scenario.sensing.seed, STREAM]).standard_normal(6 * rows)
-    return [(int(i), float(drawn[i])) for i in np.flatnonzero(np.abs(drawn) >= OUTERMOST)]
+    drawn = np.random.default_rng([scenario.sensing.seed, STREAM]).standard_normal(6 * len(flight.noise) + 1)
+    yield array_data(drawn, "NORMAL", "static const")  # of standard deviation 1
 
 
 def _braced(values: Sequence[str]) -> str:

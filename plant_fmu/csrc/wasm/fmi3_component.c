@@ -133,6 +133,8 @@ AFTER("do-step", do_step)
 #undef NONE_GOT
 #undef NONE_SET
 #undef NO_VALUES
+#undef VALUES
+#undef DERIVATIVE
 #include "methods.h"
 
 __attribute__((import_module("[export]fmi:fmi3/model-exchange@3.0.0"), import_name("[resource-new]" RESOURCE)))

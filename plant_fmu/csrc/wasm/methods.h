@@ -68,44 +68,22 @@ AFTER("update-discrete-states", update_discrete_states)
 
 /* ---- variables --------------------------------------------------------------------------------------------- */
 
-METHOD("get-float64") Result *NAME(get_float64)(Handle *self, const unsigned references[], size_t n)
-{
-    double *values = allocate(n * sizeof *values);
+#define VALUES(type, x, Type, c_type)                                                                                        \
+    METHOD("get-" type) Result *NAME(get_##x)(Handle *self, const unsigned references[], size_t n)                          \
+    {                                                                                                                       \
+        c_type *values = allocate(n * sizeof *values);                                                                      \
+                                                                                                                            \
+        return list(fmi3Get##Type(self->fmu, references, n, values, n), values, n);                                         \
+    }                                                                                                                       \
+    AFTER("get-" type, get_##x)                                                                                             \
+    METHOD("set-" type) int NAME(set_##x)(Handle *self, const unsigned r[], size_t n, const c_type values[], size_t nv)     \
+    {                                                                                                                       \
+        return finish(fmi3Set##Type(self->fmu, r, n, values, nv));                                                          \
+    }
 
-    return list(fmi3GetFloat64(self->fmu, references, n, values, n), values, n);
-}
-AFTER("get-float64", get_float64)
-
-METHOD("set-float64") int NAME(set_float64)(Handle *self, const unsigned r[], size_t n, const double values[], size_t nv)
-{
-    return finish(fmi3SetFloat64(self->fmu, r, n, values, nv));
-}
-
-METHOD("get-int32") Result *NAME(get_int32)(Handle *self, const unsigned references[], size_t n)
-{
-    int *values = allocate(n * sizeof *values);
-
-    return list(fmi3GetInt32(self->fmu, references, n, values, n), values, n);
-}
-AFTER("get-int32", get_int32)
-
-METHOD("set-int32") int NAME(set_int32)(Handle *self, const unsigned r[], size_t n, const int values[], size_t nv)
-{
-    return finish(fmi3SetInt32(self->fmu, r, n, values, nv));
-}
-
-METHOD("get-boolean") Result *NAME(get_boolean)(Handle *self, const unsigned references[], size_t n)
-{
-    bool *values = allocate(n * sizeof *values);
-
-    return list(fmi3GetBoolean(self->fmu, references, n, values, n), values, n);
-}
-AFTER("get-boolean", get_boolean)
-
-METHOD("set-boolean") int NAME(set_boolean)(Handle *self, const unsigned r[], size_t n, const bool values[], size_t nv)
-{
-    return finish(fmi3SetBoolean(self->fmu, r, n, values, nv));
-}
+VALUES("float64", float64, Float64, double)
+VALUES("int32", int32, Int32, int)
+VALUES("boolean", boolean, Boolean, bool)
 
 /* types without a variable in this FMU: only an empty list succeeds */
 #define NONE_GOT(method, x, ...)                                                             \
@@ -165,25 +143,18 @@ AFTER("get-variable-dependencies", get_dependencies)
 
 /* ---- derivatives ------------------------------------------------------------------------------------------- */
 
-METHOD("get-directional-derivative")
-Result *NAME(get_directional_derivative)(Handle *self, const unsigned unknowns[], size_t nu, const unsigned knowns[],
-                                         size_t nk, const double seed[], size_t ns)
-{
-    double *values = allocate(nu * sizeof *values);
+#define DERIVATIVE(method, x, function, n_values)                                                                  \
+    METHOD(method) Result *NAME(x)(Handle *self, const unsigned unknowns[], size_t nu, const unsigned knowns[],    \
+                                   size_t nk, const double seed[], size_t ns)                                      \
+    {                                                                                                              \
+        double *values = allocate(n_values * sizeof *values);                                                      \
+                                                                                                                   \
+        return list(function(self->fmu, unknowns, nu, knowns, nk, seed, ns, values, n_values), values, n_values);  \
+    }                                                                                                              \
+    AFTER(method, x)
 
-    return list(fmi3GetDirectionalDerivative(self->fmu, unknowns, nu, knowns, nk, seed, ns, values, nu), values, nu);
-}
-AFTER("get-directional-derivative", get_directional_derivative)
-
-METHOD("get-adjoint-derivative")
-Result *NAME(get_adjoint_derivative)(Handle *self, const unsigned unknowns[], size_t nu, const unsigned knowns[],
-                                     size_t nk, const double seed[], size_t ns)
-{
-    double *values = allocate(nk * sizeof *values);
-
-    return list(fmi3GetAdjointDerivative(self->fmu, unknowns, nu, knowns, nk, seed, ns, values, nk), values, nk);
-}
-AFTER("get-adjoint-derivative", get_adjoint_derivative)
+DERIVATIVE("get-directional-derivative", get_directional_derivative, fmi3GetDirectionalDerivative, nu)
+DERIVATIVE("get-adjoint-derivative", get_adjoint_derivative, fmi3GetAdjointDerivative, nk)
 
 /* ---- FMU state --------------------------------------------------------------------------------------------- */
 

@@ -4,32 +4,16 @@
 #include "instance.h" /* names the functions, before */
 #include "fmi3Functions.h"
 
+#define FMI(x) fmi3##x
+#include "common_functions.h"
+
 static void log_message(const Instance *instance, Status status, const char *category, const char *message)
 {
     if (instance->logger)
         ((fmi3LogMessageCallback)instance->logger)(instance->environment, (fmi3Status)status, category, message);
 }
 
-/* Refuses a call without an instance, or with NULL as one of the pointers to n values each. */
-#define REFUSE_NULL(n, ...)                                    \
-    do {                                                       \
-        if (!CHECK_POINTERS(instance, n, __VA_ARGS__))         \
-            return fmi3Error;                                  \
-    } while (0)
-
 /* ---- version, logging, life -------------------------------------------------------------------------------- */
-
-const char *fmi3GetVersion(void)
-{
-    return fmi3Version;
-}
-
-fmi3Status fmi3SetDebugLogging(fmi3Instance instance, fmi3Boolean loggingOn, size_t nCategories,
-                               const fmi3String categories[])
-{
-    REFUSE_NULL(nCategories, categories);
-    return (fmi3Status)instance_set_logging(instance, loggingOn, nCategories, categories);
-}
 
 static fmi3Instance refuse_instance(fmi3InstanceEnvironment environment, fmi3LogMessageCallback logMessage,
                                 const char *message)
@@ -79,11 +63,6 @@ fmi3Instance fmi3InstantiateScheduledExecution(fmi3String instanceName, fmi3Stri
     return refuse_instance(instanceEnvironment, logMessage, COMPONENT.apply_unlagged ? both : "this FMU offers co-simulation alone");
 }
 
-void fmi3FreeInstance(fmi3Instance instance)
-{
-    instance_free(instance);
-}
-
 fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean toleranceDefined, fmi3Float64 tolerance,
                                        fmi3Float64 startTime, fmi3Boolean stopTimeDefined, fmi3Float64 stopTime)
 {
@@ -92,22 +71,6 @@ fmi3Status fmi3EnterInitializationMode(fmi3Instance instance, fmi3Boolean tolera
         instance_set_experiment(instance, startTime, stopTimeDefined ? stopTime : INFINITY) != STATUS_OK)
         return fmi3Error;
     return (fmi3Status)instance_enter_initialization(instance);
-}
-
-fmi3Status fmi3ExitInitializationMode(fmi3Instance instance)
-{
-    return (fmi3Status)instance_exit_initialization(instance);
-}
-
-fmi3Status fmi3Terminate(fmi3Instance instance)
-{
-    return (fmi3Status)instance_terminate(instance);
-}
-
-fmi3Status fmi3Reset(fmi3Instance instance)
-{
-    REFUSE_NULL(1, instance);
-    return (fmi3Status)instance_reset(instance);
 }
 
 /* ---- variables --------------------------------------------------------------------------------------------- */
@@ -191,45 +154,6 @@ fmi3Status fmi3GetAdjointDerivative(fmi3Instance instance, const fmi3ValueRefere
     return (fmi3Status)instance_adjoint_derivative(instance, unknowns, nUnknowns, knowns, nKnowns, seed, sensitivity);
 }
 
-/* ---- FMU state --------------------------------------------------------------------------------------------- */
-
-fmi3Status fmi3GetFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
-{
-    REFUSE_NULL(1, FMUState);
-    return (fmi3Status)instance_save(instance, (Saved **)FMUState);
-}
-
-fmi3Status fmi3SetFMUState(fmi3Instance instance, fmi3FMUState FMUState)
-{
-    REFUSE_NULL(1, FMUState);
-    return (fmi3Status)instance_restore(instance, FMUState);
-}
-
-fmi3Status fmi3FreeFMUState(fmi3Instance instance, fmi3FMUState *FMUState)
-{
-    REFUSE_NULL(1, instance);
-    return (fmi3Status)instance_free_saved(instance, (Saved **)FMUState);
-}
-
-fmi3Status fmi3SerializedFMUStateSize(fmi3Instance instance, fmi3FMUState FMUState, size_t *size)
-{
-    REFUSE_NULL(1, FMUState, size);
-    return (fmi3Status)instance_serialized_size(instance, FMUState, size);
-}
-
-fmi3Status fmi3SerializeFMUState(fmi3Instance instance, fmi3FMUState FMUState, fmi3Byte serializedState[], size_t size)
-{
-    REFUSE_NULL(1, FMUState, serializedState);
-    return (fmi3Status)instance_serialize(instance, FMUState, serializedState, size);
-}
-
-fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte serializedState[], size_t size,
-                                   fmi3FMUState *FMUState)
-{
-    REFUSE_NULL(1, serializedState, FMUState);
-    return (fmi3Status)instance_deserialize(instance, serializedState, size, (Saved **)FMUState);
-}
-
 /* ---- co-simulation ------------------------------------------------------------------------------------------ */
 
 fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 currentCommunicationPoint, fmi3Float64 communicationStepSize,
@@ -277,58 +201,6 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *discrete
     *nextEventTimeDefined = isfinite(next);
     *nextEventTime = isfinite(next) ? next : 0.0;
     return (fmi3Status)status;
-}
-
-fmi3Status fmi3EnterContinuousTimeMode(fmi3Instance instance)
-{
-    return (fmi3Status)instance_enter_continuous_mode(instance);
-}
-
-fmi3Status fmi3CompletedIntegratorStep(fmi3Instance instance, fmi3Boolean noSetFMUStatePriorToCurrentPoint,
-                                       fmi3Boolean *enterEventMode, fmi3Boolean *terminateSimulation)
-{
-    REFUSE_NULL(1, enterEventMode, terminateSimulation);
-    (void)noSetFMUStatePriorToCurrentPoint;
-    *enterEventMode = fmi3False;
-    *terminateSimulation = fmi3False;
-    return (fmi3Status)instance_require(instance, MODE_CONTINUOUS, "completing an integrator step");
-}
-
-fmi3Status fmi3SetTime(fmi3Instance instance, fmi3Float64 time)
-{
-    return (fmi3Status)instance_set_time(instance, time);
-}
-
-fmi3Status fmi3SetContinuousStates(fmi3Instance instance, const fmi3Float64 continuousStates[],
-                                   size_t nContinuousStates)
-{
-    REFUSE_NULL(nContinuousStates, continuousStates);
-    return (fmi3Status)instance_set_states(instance, continuousStates, nContinuousStates);
-}
-
-fmi3Status fmi3GetContinuousStateDerivatives(fmi3Instance instance, fmi3Float64 derivatives[], size_t nContinuousStates)
-{
-    REFUSE_NULL(nContinuousStates, derivatives);
-    return (fmi3Status)instance_get_derivatives(instance, derivatives, nContinuousStates);
-}
-
-fmi3Status fmi3GetEventIndicators(fmi3Instance instance, fmi3Float64 eventIndicators[], size_t nEventIndicators)
-{
-    REFUSE_NULL(nEventIndicators, eventIndicators);
-    return nEventIndicators == 0 ? fmi3OK
-                                 : (fmi3Status)instance_refuse(instance, "fmi3GetEventIndicators: there are none");
-}
-
-fmi3Status fmi3GetContinuousStates(fmi3Instance instance, fmi3Float64 continuousStates[], size_t nContinuousStates)
-{
-    REFUSE_NULL(nContinuousStates, continuousStates);
-    return (fmi3Status)instance_get_states(instance, continuousStates, nContinuousStates);
-}
-
-fmi3Status fmi3GetNominalsOfContinuousStates(fmi3Instance instance, fmi3Float64 nominals[], size_t nContinuousStates)
-{
-    REFUSE_NULL(nContinuousStates, nominals);
-    return (fmi3Status)instance_get_nominals(instance, nominals, nContinuousStates);
 }
 
 fmi3Status fmi3GetNumberOfEventIndicators(fmi3Instance instance, size_t *nEventIndicators)

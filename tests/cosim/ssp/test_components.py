@@ -19,6 +19,7 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.checking.check import check_fmu
 from plant_fmu.running.co_simulation_instance import CoSimulationInstance
 from tests.cosim.ssp.jacobi import Parts
+from tests.cosim.ssp.noise import Noise
 from tests.plant_fmu.importers import installed
 
 ALL_SHAPES = Path(__file__).parent / "all-shapes.toml"
@@ -84,6 +85,24 @@ def test_controller_is_the_python_law_over_random_inputs(controller, scenario):
         send(controller, ["weight.obstacle", "weight.shape", "weight.depth"], weights)
         assert_step(controller, parts, k, motion, weights)
     assert abs(read(controller, "estimate.")).min() > 0.01
+
+
+@pytest.mark.parametrize("seed", [0, 7, 2**31 - 1, 2**31 + 7])
+def test_noise_of_the_controller_is_philox(seed, fmi):
+    """White from tick to tick of the law, which comes at every third step."""
+    noisy = load_scenario(
+        ALL_SHAPES, ["sensing.position_noise=0.02", "sensing.velocity_noise=0.01", f"sensing.seed={seed}"]
+    )
+    drawn, parts, rng = Noise(seed), Parts(noisy), np.random.default_rng(8)
+    with CoSimulationInstance(cached_fmu(controller_component(noisy), fmi)) as slave:
+        slave.initialise()
+        for k in range(30):
+            if k % noisy.control_every == 0:
+                noise = np.repeat([0.02, 0.01], 3) * drawn.standard_normal(6)
+            motion = random_motion(rng)
+            send(slave, MOTION, motion)
+            motion[[0, 1, 2, 7, 8, 9]] += noise
+            assert_step(slave, parts, k, motion, np.zeros(3))
 
 
 def test_controller_uses_the_initial_state_while_inputs_are_zero(controller, scenario):

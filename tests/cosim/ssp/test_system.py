@@ -3,7 +3,6 @@
 import io
 import re
 import shlex
-import subprocess
 import zipfile
 from importlib import resources
 from pathlib import Path
@@ -18,15 +17,14 @@ from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
+from cosim.simulation.sensor import STREAM
 from cosim.ssp import package_system
-from cosim.ssp.c_sources import c_files
-from cosim.ssp.normal_tables import generator_state, ziggurat
 from cosim.ssp.system import MOTION
-from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.running.co_simulation_instance import CoSimulationInstance
 from tests.cosim.scenario.test_criteria import RULES, SCENARIO
 from tests.cosim.ssp.masters import fmpy as run_in_fmpy
 from tests.cosim.ssp.masters import in_master
+from tests.cosim.ssp.noise import Noise
 
 ROOT = Path(__file__).parents[3]
 ALL_SHAPES = Path(__file__).parent / "all-shapes.toml"
@@ -62,8 +60,12 @@ class Motion:
 
 
 def jacobi(name, settings=()):
-    """Fly a scenario in our own master in Jacobi's order."""
-    with Master(load_scenario(name, [*settings, "master.order=jacobi"])) as master:
+    """Fly a scenario in our own master in Jacobi's order, with the packaged controller's noise in place of NumPy's."""
+    scenario, numpys = load_scenario(name, [*settings, "master.order=jacobi"]), np.random.default_rng
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(np.random, "default_rng", lambda seed: Noise(seed[0]) if seed[1] == STREAM else numpys(seed))
+        master = Master(scenario)
+    with master:
         motion = Motion(master.signals)
         master.run([motion])
     return np.array(motion.rows)
@@ -154,28 +156,6 @@ def test_every_law_equals_its_python_run(name, settings, tmp_path):
     scenario = load_scenario(name, settings)
     path = package_system(scenario, tmp_path / "s.ssp")
     compared(jacobi(name, settings), run_in_fmpy(path, scenario.steps, scenario.time.step))
-
-
-@pytest.mark.slow
-def test_noise_is_that_of_numpy(tmp_path):
-    """Two hundred thousand numbers, in which every layer of the ziggurat and its tail occur."""
-    files = c_files("cosim.ssp", "csrc/controller")
-    for name in ("normal.c", "normal.h"):
-        (tmp_path / name).write_bytes(files[name])
-    (tmp_path / "ziggurat.h").write_text(ziggurat())
-    state = [f"UINT64_C({word})" for word in generator_state(2, 1)]
-    (tmp_path / "main.c").write_text(
-        '#include <stdio.h>\n#include "normal.h"\nint main(void)\n{\n'
-        f"    Normal random = {{{{{state[0]}, {state[1]}}}, {{{state[2]}, {state[3]}}}}};\n"
-        '    for (int i = 0; i < 200000; i++)\n        printf("%.17g\\n", normal_draw(&random));\n}\n'
-    )
-    program = tmp_path / "main"
-    sources = [str(tmp_path / name) for name in ("main.c", "normal.c")]
-    subprocess.run([*find_compiler(), "-std=c99", *sources, "-o", str(program), "-lm"], check=True)
-    done = subprocess.run([program], capture_output=True, text=True, check=True)
-    numbers = np.random.default_rng([2, 1]).standard_normal(200_000)
-    assert abs(numbers).max() > 3.66  # in the tail
-    np.testing.assert_allclose(np.array(done.stdout.split(), float), numbers, rtol=0.0, atol=1e-13)
 
 
 # ---- the file ----

@@ -7,7 +7,6 @@
 #include <string.h>
 
 #include "fmi3Functions.h"
-#include "normal.h"
 
 #define EXPORT(name) __attribute__((export_name(#name)))
 
@@ -54,26 +53,13 @@ EXPORT(set_start) int set_start(unsigned reference, double value)
     return fmi3SetFloat64(PLANT, &reference, 1, &value, 1) <= fmi3Warning;
 }
 
-/* The numbers that NumPy's generator draws, but for those of the tail, which are made of logarithms: these are a table. */
-static void draw_noise(double position, double velocity)
-{
-    Normal random = SCENE_RANDOM;
-    int next = 0;
-
-    for (int i = 0; i < 6 * N_NOISE; i++) {
-        double drawn = normal_draw(&random);
-        if (i == TAIL_PLACES[next])
-            drawn = TAIL_VALUES[next++];
-        NOISE[i] = (i % 6 < 3 ? position : velocity) * drawn;
-    }
-}
-
 /* Flies from start to end, with noise of these standard deviations [m, m/s] if the state is measured. Returns 0 if the plant
  * refused its start; a refusal on the way is in the metrics. */
 EXPORT(fly) int fly(double position_noise, double velocity_noise)
 {
     MODEL.exact = position_noise == 0.0 && velocity_noise == 0.0;
-    draw_noise(position_noise, velocity_noise);
+    for (int i = 0; i < 6 * N_NOISE; i++)
+        NOISE[i] = (i % 6 < 3 ? position_noise : velocity_noise) * NORMAL[i];
     memset(TRACE, 0, sizeof TRACE);
     memset(REASONS, 0, sizeof REASONS);
     if (fmi3EnterInitializationMode(PLANT, false, 0.0, 0.0, false, 0.0) > fmi3Warning ||

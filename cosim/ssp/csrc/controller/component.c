@@ -6,6 +6,7 @@
 
 #include "instance.h"
 #include "loop.h" /* generated: the translated functions, and the scene */
+#include "random.h"
 
 static const int OFFSETS[N_ALL + 1] = REGION_OFFSETS;
 static const int CRITERIA[N_ALL] = REGION_CRITERIA;
@@ -38,6 +39,7 @@ typedef struct { /* the last is at INFINITY */
 
 static const Outage OUTAGES[] = SCENE_OUTAGES;
 static const double GOAL_PLACES[][3] = SCENE_GOAL_PLACES; /* m, next places of the goal, in turn; one more than there are */
+enum { NOISE_STREAM = 64 };                                /* and five more; the plant has those before it */
 static const double HAIR = 1e-6 * SCENE_STEP;             /* s: tolerance for rounding of summed steps */
 
 /* ---- numbers ----------------------------------------------------------------------------------------------- */
@@ -88,10 +90,7 @@ static bool holds(const Model *m, const Constraint *c)
 
 static void rewind_memory(Model *m)
 {
-    static const Normal BEGINNING = SCENE_RANDOM;
-
     memset(&m->memory, 0, sizeof m->memory);
-    m->memory.random = BEGINNING;
     m->memory.inside_since = -1.0;
     control_rewind(m);
 }
@@ -165,15 +164,21 @@ static void report_failures(Model *m)
     }
 }
 
-/* Writes the state that law and arbiter receive of a true motion: with noise, held, or lost. */
-static void sense_state(Model *m, const double motion[13], bool anew)
+/* Returns the noise of a coordinate of position or velocity, which is constant until the law's next tick [m, m/s]. */
+static double noise(const Model *m, int i)
 {
     static const double DEVIATIONS[6] = SCENE_DEVIATIONS;
+
+    if (!(DEVIATIONS[i] > 0.0))
+        return 0.0;
+    return DEVIATIONS[i] * random_normal(SCENE_SEED, NOISE_STREAM + (unsigned)i, (uint64_t)m->memory.control.count - 1);
+}
+
+/* Writes the state that law and arbiter receive of a true motion: with noise, held, or lost. */
+static void sense_state(Model *m, const double motion[13])
+{
     double *position = m->numbers + AT_POSITION, *velocity = m->numbers + AT_VELOCITY;
 
-    if (SCENE_NOISE && anew)
-        for (int i = 0; i < 6; i++)
-            m->memory.noise[i] = DEVIATIONS[i] * normal_draw(&m->memory.random);
     memcpy(m->numbers + AT_QUATERNION, motion + 3, 4 * sizeof(double));
     memcpy(velocity + 3, motion + 10, 3 * sizeof(double));
     if (m->time >= SCENE_DEAD_FROM && m->time < SCENE_DEAD_UNTIL) {
@@ -186,8 +191,8 @@ static void sense_state(Model *m, const double motion[13], bool anew)
         return;
     }
     for (int i = 0; i < 3; i++) {
-        position[i] = motion[i] + m->memory.noise[i];
-        velocity[i] = motion[7 + i] + m->memory.noise[3 + i];
+        position[i] = motion[i] + noise(m, i);
+        velocity[i] = motion[7 + i] + noise(m, 3 + i);
     }
 }
 
@@ -316,7 +321,7 @@ static Status take_step(Instance *instance, double end)
     sense_samples(m);
     (void)sense_state;
 #else
-    sense_state(m, motion, due);
+    sense_state(m, motion);
 #endif
     move_regions(m);
     decide(m, end);
@@ -365,7 +370,7 @@ static bool valid_state(const Model *m)
     return ticks_valid(&memory->control) && counts(memory->reported, sizeof FAILURES / sizeof FAILURES[0] - 1) &&
            counts(memory->failed, sizeof FAILURES / sizeof FAILURES[0] - 1) &&
            counts(memory->changed, sizeof OUTAGES / sizeof OUTAGES[0] - 1) && counts(memory->place, SCENE_N_PLACES) &&
-           counts(m->numbers[AT_STAGE], SCENE_STAGES - 1) && is_finite(memory->noise, 6) &&
+           counts(m->numbers[AT_STAGE], SCENE_STAGES - 1) &&
            is_finite((const double *)&m->outputs, (int)(sizeof m->outputs / sizeof(double)));
 }
 

@@ -7,7 +7,6 @@
 
 #include "variables.h" /* generated: sizes, and the table of variables */
 
-#include "normal.h"
 #include "ticks.h"
 
 enum { N_STATES = 0 };
@@ -30,8 +29,6 @@ typedef struct {
 
 typedef struct {
     Ticks control;
-    Normal random;                    /* of the noise */
-    double noise[6];                  /* m, m/s: of position and velocity, since the last tick */
     double reported, failed, changed; /* numbers of failures reported and happened, and of changes of outages */
     double stuck[N_THRUSTERS];        /* 1: its force stays constant */
     double place;                     /* of the goal, from 0 */

@@ -1,7 +1,6 @@
 """What a page that flies offers, before anything is compiled: numbers and their places, and what it refuses."""
 
 import importlib.util
-import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,11 +13,10 @@ from cosim.replay.interactive.data import flight_data
 from cosim.replay.interactive.flight import Flight
 from cosim.replay.interactive.module import flight_module
 from cosim.replay.interactive.scenario_template import scenario_template
-from cosim.replay.interactive.sources import flight_sources, tail_draws
+from cosim.replay.interactive.sources import flight_sources
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.environment import shape_center
 from cosim.ssp.memory import Memory
-from cosim.ssp.normal_tables import OUTERMOST, ziggurat
 from plant_fmu.errors import BuildError
 
 pytestmark = pytest.mark.medium
@@ -116,29 +114,6 @@ def test_filled_template_equals_the_scenario(docking, tmp_path):
     again = load_scenario(tmp_path / "again.toml")
     assert again.title == "Again"
     assert again.table | {"title": ""} == flight.scenario.table | {"title": ""}
-
-
-def test_ziggurat_widths_match_numpy():
-    text, checked = ziggurat(), 0
-    widths = [float(x) for x in text.partition("WIDTHS[] = {")[2].partition("}")[0].split(",")]
-    inner = [int(x) for x in re.findall(r"UINT64_C\((\d+)\)", text)]
-    for seed in range(30):
-        generator = np.random.Generator(np.random.PCG64(seed))
-        for word in np.random.PCG64(seed).random_raw(400).tolist():
-            size, layer = word >> 9 & 0xFFFFFFFFFFFFF, word & 0xFF
-            drawn = generator.standard_normal()
-            if size >= inner[layer]:  # it may be refused, and another word drawn
-                break
-            checked += 1
-            assert drawn == (-1) ** (word >> 8 & 1) * size * widths[layer]
-    assert checked > 1000
-
-
-def test_tail_draws_of_the_noise_are_tabulated():
-    scenario = load_scenario("docking")
-    drawn = np.random.default_rng([scenario.sensing.seed, 1]).standard_normal(18000)
-    tail = dict(tail_draws(scenario, 3000))
-    assert tail == {i: x for i, x in enumerate(drawn.tolist()) if abs(x) >= OUTERMOST} and tail
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,18 @@
+"""Noise of a packaged controller, by an independent Philox."""
+
+import numpy as np
+
+from tests.plant_fmu.philox import normal
+
+STREAM = 64  # of the first coordinate
+
+
+class Noise:
+    """Standard normal numbers, six at each tick of the law."""
+
+    def __init__(self, seed):
+        self.seed, self.tick = seed, -1
+
+    def standard_normal(self, n):
+        self.tick += 1
+        return np.array([normal(self.seed % 2**31, STREAM + i, self.tick) for i in range(n)])
