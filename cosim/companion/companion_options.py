@@ -28,7 +28,7 @@ class CompanionOptions:
     origin: SceneOrigin = field(default_factory=SceneOrigin)
     dry_run: bool = False  # True to compute and record the law, and send no sticks, set-points, modes or arming
     arm: bool = False  # True to arm the vehicle; False leaves arming to the pilot
-    pilot_gain: float = 0.5  # fraction of the greatest wrench that full sticks command; ArduSub's JS_GAIN_DEFAULT
+    pilot_gain: float = 0.5  # fraction of the maximum wrench that full sticks command; ArduSub's JS_GAIN_DEFAULT
     velocity_lag: float = 2.0  # s, horizontal lag of the autopilot's velocity loop
     vertical_lag: float = 0.5  # s, vertical lag of the autopilot's velocity loop
     reckoning_error: float = 0.03  # position error without a fix, as a fraction of the distance traveled

@@ -250,11 +250,11 @@ class Companion:
         return "completed" if session.supervisor.is_steering else f"{state}: {reason}"
 
     def _clearance(self, position: Array) -> float:
-        """Return the least clearance of hard regions [m] at a position of the autopilot's local frame."""
+        """Return the minimum clearance of hard regions [m] at a position of the autopilot's local frame."""
         return self._scene.clearance(self.session.alignment.to_scene(position), self.session.reported.quaternion)
 
     def _position_uncertainty(self) -> float:
-        """Return the greatest expected position error [m]: undetected error, drift, and dead reckoning."""
+        """Return the maximum expected position error [m]: undetected error, drift, and dead reckoning."""
         alignment = self.session.alignment
         drift = alignment.drift if alignment.drift > _DRIFT_NOISE else 0.0
         return _MIN_UNCERTAINTY + drift + self._options.reckoning_error * alignment.reckoned

@@ -16,7 +16,7 @@ from cosim.scenario.region_tables import Vector3
 from cosim.simulation.signals import Array
 
 _SAMPLES = 10  # consecutive samples of the offset that must agree before it is known
-_SPREAD = 0.15  # m, greatest standard deviation of each coordinate among them
+_SPREAD = 0.15  # m, maximum standard deviation of each coordinate among them
 _GRAVITY = 9.80665  # m/s2
 _MIN_JUMP = 0.3  # m, change between two positions that the velocity does not explain, above which it is a jump
 _SMOOTHING = 0.1  # weight of a new sample in the exponential mean of the drift
@@ -51,7 +51,7 @@ class FrameAlignment:
         self._samples: deque[Array] = deque(maxlen=_SAMPLES)
         # position of the autopilot's local origin in the scene [m, NED]; None until it is known
         self.offset: Array | None = None if origin.surveyed is None else np.array(origin.surveyed, dtype=float)
-        # greatest jump of the position since the frame is known [m], without the motion that the velocity explains
+        # maximum jump of the position since the frame is known [m], without the motion that the velocity explains
         self.jump = self.reckoned = 0.0
         self._reference: Array | None = None  # first mean offset, which later samples are compared with
         self._drift: Array = np.zeros(3)

@@ -28,7 +28,7 @@ class HeadingWatch:
     """Finds leaps of the reported heading: turns about the vertical that the reported rates do not explain."""
 
     def __init__(self) -> None:
-        self.leap = 0.0  # greatest leap since the last `restart` [rad]
+        self.leap = 0.0  # maximum leap since the last `restart` [rad]
         self._before: tuple[float, Array, Array] | None = None
 
     def restart(self) -> None:

@@ -31,12 +31,12 @@ class Placement:
         self._corners: Array = np.concatenate([bounded, np.repeat(points, 2, axis=1)])  # (n, 2, 2) m, NE, low and high
 
     def distance(self, position: Array) -> float:
-        """Return the least horizontal distance [m] of a position [m, NED] from the start, goal and bounded regions."""
+        """Return the minimum horizontal distance [m] of a position [m, NED] from start, goal and bounded regions."""
         outside = np.maximum(self._corners[:, 0] - position[:2], position[:2] - self._corners[:, 1])
         return float(np.min(np.linalg.norm(np.maximum(outside, 0.0), axis=1)))
 
     def clearance(self, position: Array, quaternion: Array) -> float:
-        """Return the least clearance of hard regions [m] at a pose; infinite if there are none."""
+        """Return the minimum clearance of hard regions [m] at a pose; infinite if there are none."""
         return float(np.min(self._environment.clearances(position, quaternion)[self.hard], initial=math.inf))
 
     def describe(self, position: Array, quaternion: Array) -> str:

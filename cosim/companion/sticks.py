@@ -42,10 +42,10 @@ _RELEASED, _LEFT_ALONE = 0, 0xFFFF  # values that release a channel, and leave i
 class StickScale:
     """Relation between sticks and wrench of a vehicle."""
 
-    # (n, 6) Fraction of each thruster's greatest force, for a unit wrench along or about each body axis [1/N, 1/(N
+    # (n, 6) Fraction of each thruster's maximum force, for a unit wrench along or about each body axis [1/N, 1/(N
     # m)]
     efforts: Array
-    forces: Array  # (6, n) Wrench of each thruster's greatest force [N, N m], body frame
+    forces: Array  # (6, n) Wrench of each thruster's maximum force [N, N m], body frame
     # (n, 6) Command of each thruster, 1, 0 or -1, by a full stick of each axis at a gain of 1. For an autopilot that
     # allocates forces itself, both have a row for each axis in place of each thruster
     mixer: Array

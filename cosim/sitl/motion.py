@@ -23,7 +23,7 @@ _NAMES = (
 )
 _GRAVITY = 9.81  # m/s2, close to ArduPilot's and PX4's
 _SURFACE_TIME = 4.0  # s, in which an autopilot calibrates its sensors
-_MAX_SPEED, _MAX_DURATION = 1.0, 6.0  # m/s, s: greatest speed of lowering, unless it would take longer
+_MAX_SPEED, _MAX_DURATION = 1.0, 6.0  # m/s, s: maximum speed of lowering, unless it would take longer
 
 
 class Motion(NamedTuple):

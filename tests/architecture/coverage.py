@@ -37,7 +37,7 @@ _MAVLINK_TESTS = (
     "modes",
     "parameters",
 )
-_MAVLINK_TESTS += ("received_obstacles", "signing", "streams", "targets")
+_MAVLINK_TESTS += ("event_texts", "received_obstacles", "signing", "streams", "targets")
 
 PARTS = (
     Part("fuzzy_arbiter", 98, ("tests/fuzzy_arbiter",), ("fuzzy_arbiter/*",)),
@@ -71,7 +71,14 @@ PARTS = (
         tuple(f"tests/cosim/mavlink/test_{name}.py" for name in _MAVLINK_TESTS),
         tuple(
             f"cosim/mavlink/{name}"
-            for name in ("encode.py", "framing.py", "layout.py", "messages/*", "services/*", "signing.py")
+            for name in (
+                "wire/encode.py",
+                "wire/framing.py",
+                "wire/signing.py",
+                "vehicle/row_layout.py",
+                "messages/*",
+                "services/*",
+            )
         ),
     ),
 )

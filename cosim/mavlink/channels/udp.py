@@ -63,7 +63,7 @@ class UdpOut(_Udp):
 
     def __init__(self, host: str, port: int) -> None:
         super().__init__(f"udpout:{host}:{port}", lambda s: s.connect((host, port)))
-        self._version = 0  # the greatest received; 0 for none yet
+        self._version = 0  # the highest received; 0 for none yet
 
     def receive(self) -> tuple[Hashable, bytes] | None:
         """Return a datagram, or None if there is none."""
@@ -91,7 +91,7 @@ class UdpOut(_Udp):
 
 @dataclass
 class _Peer:
-    """When accepted frames of an address were received, and their greatest version."""
+    """When accepted frames of an address were received, and their highest version."""
 
     first: float  # s, monotonic
     last: float
@@ -124,7 +124,7 @@ class UdpIn(_Udp):
         return address, data
 
     def record_version(self, peer: Hashable, version: int) -> None:
-        """Add this address to the peers, or renew it; count the frame if there is no place."""
+        """Add this address to the peers, or renew it; count the frame if there is no room."""
         assert isinstance(peer, tuple)
         now, entry = time.monotonic(), self._peers.get(peer)
         if entry is not None:

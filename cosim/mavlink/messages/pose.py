@@ -54,7 +54,7 @@ def global_position_int(context: VehicleContext) -> Iterator[Fields]:
 
 
 def vfr_hud(context: VehicleContext) -> Iterator[Fields]:
-    """VFR_HUD: throttle is the greatest ratio of a thruster's force to its limit."""
+    """VFR_HUD: throttle is the maximum ratio of a thruster's force to its limit."""
     view = context.view
     north, east, down = view.velocity_ned
     speed = math.hypot(*view.velocity_body)

@@ -18,7 +18,7 @@ _PASCAL = 100.0  # Pa in a hPa
 _DEEPEST_BOTTOM = 655.0  # m below the vehicle; the range of DISTANCE_SENSOR
 _CENTI = 100.0  # cm in a m
 _HIGHRES_FIELDS = 0b111111 | 1 << 9 | 1 << 11  # accelerations, rates, pressure, pressure altitude
-_MAX_OBSTACLES = 8  # greatest number of nearest obstacles, each in a message
+_MAX_OBSTACLES = 8  # maximum number of nearest obstacles, each in a message
 _MAX_DISTANCE = 1000.0  # m
 _INCREMENT = 360 // SECTORS  # degrees
 

@@ -34,7 +34,7 @@ _NEUTRAL: Vector6 = (0.0,) * 6
 
 
 class ManualControlService(Service):
-    """Convert sticks to fractions of the greatest wrench, in the modes of manual control."""
+    """Convert sticks to fractions of the maximum wrench, in the modes of manual control."""
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
@@ -97,7 +97,7 @@ class ManualControlService(Service):
             context.sticks = sticks
 
     def _wrench_fractions(self, sticks: Vector6, by_gain: bool) -> Vector6:
-        """Return the fractions of the greatest wrench that the sticks command, before the pilot gain."""
+        """Return the fractions of the maximum wrench that the sticks command, before the pilot gain."""
         # ArduSub commands its thrusters by gain times stick, and their force is proportional to the square of the sum.
         # The gain does not apply to overridden channels.
         context, mode = self.context, self.context.mode_ahead

@@ -9,7 +9,7 @@ from cosim.mavlink.messages.message_table import build_messages
 from cosim.mavlink.services.service import CommandRequest, Service, to_local_position
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender
-from cosim.scenario.tables import Vector3
+from cosim.scenario.region_tables import Vector3
 
 _E7 = 1e-7
 _MM = 1e-3

@@ -8,7 +8,7 @@ from cosim.scenario.region_tables import Vector3
 
 _SEMI_MAJOR = 6_378_137.0  # m, WGS84
 _ECCENTRICITY_SQUARED = 6.69437999014e-3
-_LEAST_COSINE = 1e-6  # keeps longitudes finite at the poles
+_MIN_COSINE = 1e-6  # keeps longitudes finite at the poles
 
 
 class LocalFrame:
@@ -21,7 +21,7 @@ class LocalFrame:
         meridian = _SEMI_MAJOR * (1.0 - _ECCENTRICITY_SQUARED) / inside**1.5
         normal = _SEMI_MAJOR / math.sqrt(inside)
         self._north = math.radians(1.0) * meridian  # m in a degree of latitude
-        self._east = math.radians(1.0) * normal * max(cosine, _LEAST_COSINE)  # m in a degree of longitude
+        self._east = math.radians(1.0) * normal * max(cosine, _MIN_COSINE)  # m in a degree of longitude
 
     def to_global(self, position: Vector3) -> Vector3:
         """Return latitude and longitude [deg] and altitude [m] of a position [m, NED]; NaN stays."""

@@ -47,5 +47,5 @@ class KeepInRegions:
             packed.shifts[:] = shifts
         values, gradients, rotation_gradients, clearances = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
         packed.evaluate(np.array(position), _LEVEL, values, gradients, rotation_gradients, clearances)
-        found: list[float] = clearances.tolist()
-        return found
+        result: list[float] = clearances.tolist()
+        return result

@@ -35,32 +35,26 @@ class RowLayout:
         starts = {v.name: v.start for v in variables(scenario.vehicle)}
         row = np.array([starts.get(name, 0.0) for name in self.index])
         initial, commands = scenario.initial, scenario.commands
-        roll, pitch, yaw = quaternion_to_euler(initial.quaternion)
+        euler = quaternion_to_euler(initial.quaternion)
         depth = initial.position[2]
-        values_by_name = {
-            "attitude.roll": roll,
-            "attitude.pitch": pitch,
-            "attitude.yaw": yaw,
-            "measured.depth": depth,
-            "measured.heading": yaw,
-            "measured.acceleration.z": -9.81,
-            "altitude": _bottom(scenario) - depth,
-            "measured.altitude": _bottom(scenario) - depth,
-            "commands.armed": float(not commands.await_arm),
-            "commands.mode": float(MODES.index("reach")),
-            "commands.item": -1.0,
+        values: dict[str, Sequence[float]] = {  # by the first of their columns
+            "position.x": initial.position,
+            "quaternion.e0": initial.quaternion,
+            "velocity.u": initial.velocity,
+            "attitude.roll": euler,
+            "measured.depth": (depth,),
+            "measured.heading": (euler[2],),
+            "measured.acceleration.z": (-9.81,),
+            "altitude": (_bottom(scenario) - depth,),
+            "measured.altitude": (_bottom(scenario) - depth,),
+            "commands.armed": (float(not commands.await_arm),),
+            "commands.mode": (float(MODES.index("reach")),),
+            "commands.item": (-1.0,),
+            "target.x": self.goal_center,
         }
-        for first, values in (
-            ("position.x", initial.position),
-            ("quaternion.e0", initial.quaternion),
-            ("velocity.u", initial.velocity),
-            ("target.x", self.goal_center),
-        ):
+        for first, numbers in values.items():
             if first in self.index:
-                row[self.index[first] : self.index[first] + len(values)] = values
-        for name, value in values_by_name.items():
-            if name in self.index:
-                row[self.index[name]] = value
+                row[self.index[first] : self.index[first] + len(numbers)] = numbers
         return row
 
 
