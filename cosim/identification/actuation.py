@@ -17,7 +17,7 @@ from plant_fmu.vehicle import Vehicle
 
 Array = NDArray[np.float64]
 
-_LEAST_LAG = 1e-4  # s; a shorter one is none
+_MIN_LAG = 1e-4  # s; a shorter one is none
 _TAIL = 3.0  # time constants, after which an impulse has passed the lag
 _DIPOLE = 4.0  # forces of -4 and 4 in the halves of a period have first moment 1 about its middle, per period squared
 
@@ -61,9 +61,9 @@ class CommandedForces:
             middles = self._times + 0.5 * np.diff(self._times, append=self._times[-1])
             halves = np.column_stack([self._times, middles]).ravel()
             signs = np.tile([[-1.0], [1.0]], (len(changes), 1))
-            moved = (-np.repeat(changes, 2, axis=0), _DIPOLE * np.repeat(changes, 2, axis=0) * signs)
+            moments = (-np.repeat(changes, 2, axis=0), _DIPOLE * np.repeat(changes, 2, axis=0) * signs)
             bends = np.diff(changes, axis=0, prepend=changes[:1])
-            self._mean_changes = [self._means(x, halves) for x in moved]
+            self._mean_changes = [self._means(x, halves) for x in moments]
             self._mean_changes.append(self._means(bends / 12.0, np.append(self._times[:1], middles[:-1])))
 
     def _means(self, forces: Array, held_from: Array | None = None) -> Array:
@@ -93,11 +93,8 @@ class CommandedForces:
         wrench = force @ matrix
         by_changes = np.zeros((len(CHANGES) if self._sampled else 0, *wrench.shape))
         if self._sampled:
-            moved: list[Array] = []
-            for mean in self._mean_changes:
-                from_rest = np.concatenate([np.zeros_like(mean[:1]), mean])
-                moved.append(_lagged(from_rest, lag, self.step)[0][1:] @ matrix)
-            late, spread, by_changes[12] = moved
+            from_rest = (np.concatenate([np.zeros_like(mean[:1]), mean]) for mean in self._mean_changes)
+            late, spread, by_changes[12] = (_lagged(mean, lag, self.step)[0][1:] @ matrix for mean in from_rest)
             by_changes[range(6), ..., range(6)] = np.moveaxis(late, 2, 0)
             by_changes[range(6, 12), ..., range(6)] = np.moveaxis(spread, 2, 0)
             if changes is not None:
@@ -129,17 +126,16 @@ def error_wrenches(impulses: Impulses, lag: float, step: float, begin: float, st
     for b, e, root, shifted in zip(
         *(x[used] for x in (impulses.begins, impulses.ends, impulses.roots, impulses.shifted)), strict=True
     ):
-        first, second = (_shares(grid, x, x + 0.5 * (e - b)) for x in (b, 0.5 * (b + e)))
+        first, second = (_overlaps(grid, x, x + 0.5 * (e - b)) for x in (b, 0.5 * (b + e)))
         shares.append(np.column_stack([0.5 * (first + second), shifted * (first - second)]))
         roots.append(np.stack([root, root]))
     course = _lagged(np.concatenate(shares, axis=1) / step, lag, step)[0][before:]
-    found = np.einsum("ksc,cij->cjksi", course, np.concatenate(roots))
-    result: Array = found.reshape(-1, steps, 2, 6)
+    result: Array = np.einsum("ksc,cij->cjksi", course, np.concatenate(roots)).reshape(-1, steps, 2, 6)
     return result
 
 
-def _shares(grid: Any, begin: float, end: float) -> Array:
-    """Return the part of a span that lies in each step of a grid."""
+def _overlaps(grid: Any, begin: float, end: float) -> Array:
+    """Return the fraction of a span that overlaps each step of a grid."""
     inside = np.minimum(grid[1:], end) - np.maximum(grid[:-1], begin)
     result: Array = np.clip(inside, 0.0, None) / max(end - begin, 1e-9)
     return result
@@ -149,7 +145,7 @@ def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
     """Return forces behind a lag as they are over each step of a grid, and the same by the lag; forces [N], lag [s]."""
     # with step [s], returns [N]
     zero = np.zeros((1, forces.shape[1]))
-    if lag < _LEAST_LAG:
+    if lag < _MIN_LAG:
         behind = np.diff(forces, axis=0, prepend=forces[:1]) / step
         return np.stack([forces, 0.0 * forces], axis=1), np.stack([-behind, 0.0 * behind], axis=1)
     pole = math.exp(-step / lag)

@@ -20,8 +20,8 @@ _SHIFTED = 0.25, 0.5  # part of an error that goes from the first half to the se
 _AROUND = 0.5  # s, to either side, over which squared changes are averaged
 _SIZES = np.concatenate([[0.0], np.geomspace(0.02, 10.0, 80)])  # of the errors, in those of steps at any time
 _UPDATES, _EVERY = 3, 4  # updates of the noise of each topic; every fourth window is used for them
-_LEAST_PART = 0.05  # least part of the noise from differences of samples that a topic has
-_LEAST = 1e-2  # of the noise's variance: smaller ones hardly change a weight
+_MIN_FACTOR = 0.05  # least part of the noise from differences of samples that a topic has
+_MIN_VARIANCE = 1e-2  # of the noise's variance: smaller ones hardly change a weight
 
 
 @dataclass(frozen=True)
@@ -79,9 +79,9 @@ def _mean_about(values: Array, count: int) -> Array:
 def whitener(by_impulse: Array, size: float) -> Whitener:
     """Return the inverse root of the covariance of residuals under impulses of a size; by_impulse (rows, n)."""
     variances, axes = np.linalg.eigh(size**2 * (by_impulse.T @ by_impulse))
-    kept = variances > _LEAST
-    directions = size * (by_impulse @ axes[:, kept]) / np.sqrt(variances[kept])
-    return Whitener(directions, variances[kept])
+    large = variances > _MIN_VARIANCE
+    directions = size * (by_impulse @ axes[:, large]) / np.sqrt(variances[large])
+    return Whitener(directions, variances[large])
 
 
 def most_likely_size(residuals: Sequence[Array], by_impulses: Sequence[Array]) -> float:
@@ -89,9 +89,9 @@ def most_likely_size(residuals: Sequence[Array], by_impulses: Sequence[Array]) -
     lost = np.zeros(len(_SIZES))
     for residual, by in zip(residuals, by_impulses, strict=True):
         variances, axes = np.linalg.eigh(by.T @ by)
-        kept = variances > _LEAST
-        squares = np.square((by @ axes[:, kept]).T @ residual) / variances[kept]
-        total = 1.0 + np.square(_SIZES)[:, None] * variances[kept]
+        large = variances > _MIN_VARIANCE
+        squares = np.square((by @ axes[:, large]).T @ residual) / variances[large]
+        total = 1.0 + np.square(_SIZES)[:, None] * variances[large]
         lost += np.sum(np.log(total) + squares / total, axis=1)
     return float(_SIZES[int(np.argmin(lost))])
 
@@ -122,7 +122,7 @@ def most_likely_errors(
         size = most_likely_size(residuals[::_EVERY], by_impulses[::_EVERY])
         whiteners = [whitener(by, size) for by in by_impulses[::_EVERY]]
         for name, part in noise_parts(residuals[::_EVERY], whiteners, topics[::_EVERY]).items():
-            new = float(np.clip(parts[name] * part, _LEAST_PART, 1.0))
+            new = float(np.clip(parts[name] * part, _MIN_FACTOR, 1.0))
             for residual, by, own in zip(residuals, by_impulses, topics, strict=True):
                 residual[own == name] *= parts[name] / new
                 by[own == name] *= parts[name] / new

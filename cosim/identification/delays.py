@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 _SPAN = 0.3  # s, time between the two samples of a change of velocity
 _GRID = np.arange(-0.1, 0.601, 0.02)  # s, candidate delays
 _LAGS = (0.0, 0.1, 0.2)  # s, candidate lags of the thrusters; the most likely one is used
-_FEWEST = 50  # least number of changes for an estimate
+_MIN_CHANGES = 50  # least number of changes for an estimate
 _DECIDED = 20.0  # twice the gain of log-likelihood above which a topic gets a delay of its own
 _SLOW = ("depth", "position")  # topics whose second differences are noise: they get the least delay of the others
 
@@ -37,18 +37,17 @@ def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str,
         impulses = [np.concatenate([np.zeros((1, 6)), step * np.cumsum(w, axis=0)]) for w in wrenches]
         edges = forces.start + step * np.arange(forces.steps + 1)
         for topic in (t for t in log.topics if t.name not in _SLOW):
-            found = _unexplained(*_velocities(topic), log, edges, impulses)
-            if found is not None:
-                evidence[topic.name] = evidence.get(topic.name, 0.0) + found
-    against = {name: part.min(axis=0) for name, part in evidence.items()}
-    against = {name: part for name, part in against.items() if 0 < np.argmin(part) < len(_GRID) - 1}  # a real minimum
-    if not against:
+            loss = _unexplained(*_velocities(topic), log, edges, impulses)
+            if loss is not None:
+                evidence[topic.name] = evidence.get(topic.name, 0.0) + loss
+    losses = {name: loss.min(axis=0) for name, loss in evidence.items()}
+    losses = {name: loss for name, loss in losses.items() if 0 < np.argmin(loss) < len(_GRID) - 1}  # a real minimum
+    if not losses:
         return {}
-    common = int(np.argmin(np.sum(list(against.values()), axis=0)))
-    places = {name: int(np.argmin(part)) for name, part in against.items()}
+    common = int(np.argmin(np.sum(list(losses.values()), axis=0)))
     delays = {
-        name: float(_GRID[places[name] if part[common] - part[places[name]] > _DECIDED else common])
-        for name, part in against.items()
+        name: float(_GRID[np.argmin(loss) if loss[common] - loss.min() > _DECIDED else common])
+        for name, loss in losses.items()
     }
     present = (name for name in TOPICS if any(log.topic(name) for log in logs))
     return {name: delays.get(name, min(delays.values())) for name in present}
@@ -97,17 +96,17 @@ def _unexplained(times: Array, velocity: Array, log: Log, edges: Array, impulses
     sums = np.concatenate([np.zeros((1, pieces.shape[1])), np.cumsum(pieces, axis=0)])
     inside = (times[:-m] - _GRID[-1] > edges[0]) & (times[m:] - _GRID[0] < edges[-1])
     inside &= times[m:] - times[:-m] < 2.0 * _SPAN  # no gap
-    if inside.sum() < _FEWEST:
+    if inside.sum() < _MIN_CHANGES:
         return None
     begin, end = times[:-m][inside], times[m:][inside]
     change = (velocity[m:] - velocity[:-m])[inside]
     known = np.column_stack([(sums[m:] - sums[:-m])[inside], end - begin])
-    apart = float(np.median(np.diff(times))) / _SPAN  # independent fraction of each change, since they overlap
-    left = np.empty((len(impulses), len(_GRID)))
+    independent = float(np.median(np.diff(times))) / _SPAN  # independent fraction of each change, since they overlap
+    losses = np.empty((len(impulses), len(_GRID)))
     for i, impulse in enumerate(impulses):
         for j, delay in enumerate(_GRID):
             both = (np.column_stack([np.interp(t - delay, edges, x) for x in impulse.T]) for t in (end, begin))
-            pushed = np.column_stack([np.subtract(*both), known])
-            found, *_ = np.linalg.lstsq(pushed, change)
-            left[i, j] = float(np.log(np.square(change - pushed @ found).sum(axis=0) + 1e-12).sum())
-    return apart * len(change) * left
+            regressors = np.column_stack([np.subtract(*both), known])
+            solution, *_ = np.linalg.lstsq(regressors, change)
+            losses[i, j] = float(np.log(np.square(change - regressors @ solution).sum(axis=0) + 1e-12).sum())
+    return independent * len(change) * losses

@@ -80,9 +80,9 @@ def _jackknife(information: Array, inverse: Array, pieces: Sequence[tuple[Array,
     own = [jacobian.T @ jacobian for jacobian, _ in pieces]
     left_out = [np.linalg.inv(information - part) for part in own]  # (p, p) each, symmetric
     scores = [jacobian.T @ residual for jacobian, residual in pieces]
-    moved = np.stack([inv @ score for inv, score in zip(left_out, scores, strict=True)])
+    shifts = np.stack([inv @ score for inv, score in zip(left_out, scores, strict=True)])
     n = len(pieces)
-    deviations: Array = np.sqrt((n - 1.0) / n * np.sum(np.square(moved), axis=0))
+    deviations: Array = np.sqrt((n - 1.0) / n * np.sum(np.square(shifts), axis=0))
     reached = np.stack([part @ inv for part, inv in zip(own, left_out, strict=True)])  # (n, p, p)
     across = -np.einsum("gkj,kl,hlj->jgh", reached, inverse, reached, optimize=True)  # covariances of moves of pieces
     alone = np.einsum("gkj,gkj->gj", np.stack(left_out), reached)

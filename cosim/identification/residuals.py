@@ -103,14 +103,12 @@ class Residuals:
             if full:
                 self._add_errors(jacobian, topic, sampled, setting, window.run)
             rows.append(jacobian)
-        less = self._per_noise(window)
-        found = (
-            less * np.concatenate(residuals),
-            less[:, None] * np.concatenate(starts),
-            less[:, None] * np.concatenate(rows),
+        per_noise, whiten = self._per_noise(window), self.whiteners[i] or (lambda values: values)
+        return (
+            whiten(per_noise * np.concatenate(residuals)),
+            whiten(per_noise[:, None] * np.concatenate(starts)),
+            whiten(per_noise[:, None] * np.concatenate(rows)),
         )
-        whiten = self.whiteners[i]
-        return found if whiten is None else (whiten(found[0]), whiten(found[1]), whiten(found[2]))
 
     def _sampled(
         self, i: int, setting: Setting, start: Array, directions: Directions
@@ -134,10 +132,7 @@ class Residuals:
             size, several = len(topic.times), len(topic.offsets)
             at = back[count : count + several * size].reshape(several, size)
             count += several * size
-            one = several == 1
-            sampled = Motion(*(
-                x[at[0]] if one else x[at].mean(axis=0) for x in (motion.states, motion.rates, motion.tangents)
-            ))  # fmt: skip
+            sampled = Motion(*(x[at].mean(axis=0) for x in (motion.states, motion.rates, motion.tangents)))
             along = measurements.derivative(topic, sampled.states, sampled.tangents, setting.errors)
             yield topic, sampled, along.reshape(size * len(topic.components), -1)
 
@@ -184,8 +179,8 @@ class Residuals:
         pushed = error_wrenches(impulses, setting.actuation.lag, self._step, window.first * self._step, window.steps)
         n = len(pushed)
         directions = Directions(np.zeros((n, STATE_SIZE)), [None] * n, range(n), np.zeros((n, 3)), pushed)
-        found = np.concatenate([along for _, _, along in self._sampled(i, setting, start, directions)])
-        result: Array = self._per_noise(window)[:, None] * found
+        along = np.concatenate([along for _, _, along in self._sampled(i, setting, start, directions)])
+        result: Array = self._per_noise(window)[:, None] * along
         return result
 
     @staticmethod
@@ -282,8 +277,6 @@ class Residuals:
         if added := len(left) - len(times):
             jacobian = np.concatenate([jacobian, np.zeros((added, jacobian.shape[1]))])
             times = np.concatenate([times, np.zeros(added)])
-        q: Any
-        r: Any
         q, r = np.linalg.qr(np.concatenate([by_start, self._start_prior()]))
         top = q[: len(by_start)]
         slope: Array = -np.linalg.solve(r, top.T @ jacobian)

@@ -94,8 +94,8 @@ class Shooter:
         along = directions or NO_DIRECTIONS
         d, n = len(along.parameters), len(times)
         references = [self._references[name] for name in parameters]
-        moved = [-1 if name is None else self._references[name] for name in along.parameters]
-        found = Motion(np.empty((n, STATE_SIZE)), np.empty((n, STATE_SIZE)), np.empty((n, d, STATE_SIZE)))
+        directed = [-1 if name is None else self._references[name] for name in along.parameters]
+        motion = Motion(np.empty((n, STATE_SIZE)), np.empty((n, STATE_SIZE)), np.empty((n, d, STATE_SIZE)))
         arrays: dict[str, NDArray[Any]] = {
             "references": np.array(references, np.uint32),
             "values": np.array(list(parameters.values()), float),
@@ -103,23 +103,23 @@ class Shooter:
             "wrench": np.ascontiguousarray(wrench, float).reshape(len(wrench), 2, 6),
             "force": np.zeros(3) if force is None else np.ascontiguousarray(force, float),
             "start_tangents": np.ascontiguousarray(along.start, float),
-            "parameter_directions": np.array(moved, np.intc),
+            "parameter_directions": np.array(directed, np.intc),
             "input_directions": np.array([-1 if i is None else i for i in along.inputs], np.intc),
             "force_tangents": np.ascontiguousarray(along.force, float),
             "wrench_tangents": np.ascontiguousarray(along.wrench, float).reshape(*along.wrench.shape[:2], 2, 6),
             "times": np.ascontiguousarray(times, float),
-            "states": found.states,
-            "rates": found.rates,
-            "state_tangents": found.tangents,
+            "states": motion.states,
+            "rates": motion.rates,
+            "state_tangents": motion.tangents,
             "work": np.empty((6, d, STATE_SIZE)),
         }
         request = _Request(len(references), len(wrench), d, len(along.wrench), n, step)
         for name, array in arrays.items():
             setattr(request, name, array.ctypes.data)
-        wrong = self._predict(ctypes.byref(request))
-        if wrong:
-            raise IdentificationError(f"prediction: {wrong.decode()}")
-        return found
+        message = self._predict(ctypes.byref(request))
+        if message:
+            raise IdentificationError(f"prediction: {message.decode()}")
+        return motion
 
 
 NO_DIRECTIONS = Directions(np.empty((0, STATE_SIZE)), (), (), np.empty((0, 3)), np.empty((0, 0, 2, 6)))
@@ -141,7 +141,8 @@ def load_tuned_library(
 ) -> ctypes.CDLL:
     """Load a library of C files for this machine's processor; compile it if it is not in the user's cache."""
     compiler = find_compiler()
-    flags = (*_tuned(compiler), *flags)
+    tuning = "-mcpu=native" if "ziglang" in compiler else "-march=native"  # all instructions of this processor
+    flags = (tuning, *flags)
     made_from = hashlib.sha256(
         repr((native_platform().name, compiler, FLAGS, flags, _machine(compiler, flags))).encode()
     )
@@ -159,17 +160,12 @@ def load_tuned_library(
         return ctypes.CDLL(str(keep(built, path.parent)))
 
 
-def _tuned(compiler: Sequence[str]) -> tuple[str, ...]:
-    """Return the compiler flags that enable all instructions of this machine's processor."""
-    return ("-mcpu=native",) if "ziglang" in compiler else ("-march=native",)
-
-
 def _machine(compiler: Sequence[str], flags: Sequence[str]) -> str:
     """Return the macros that the compiler predefines, which identify it and the processor's instructions."""
     try:
-        said = subprocess.run(  # noqa: S603 -- the compiler that the user has, and flags of ours
+        process = subprocess.run(  # noqa: S603 -- the compiler that the user has, and flags of ours
             [*compiler, *flags, "-dM", "-E", "-x", "c", os.devnull], capture_output=True, text=True, check=True
         )
     except (OSError, subprocess.CalledProcessError) as error:
         raise BuildError(f"C compiler {compiler[0]}: {error}") from error
-    return said.stdout
+    return process.stdout

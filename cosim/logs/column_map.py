@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.errors import ImportLogError
-from cosim.logs.frames import BODIES, UNITS, WORLDS, quaternions_of_angles, turn_quaternions
+from cosim.logs.frames import BODIES, UNITS, WORLDS, convert_quaternions, quaternions_of_angles
 from cosim.logs.quantities import QUANTITIES
 from cosim.logs.spool import LogContents
 from cosim.simulation.signals import Array
@@ -19,7 +19,7 @@ from plant_fmu.errors import TableError
 from plant_fmu.toml_tables import Table, decode, read_toml
 
 _ORDER = re.compile(r"[XYZ]{3}|[xyz]{3}")
-_MOST_ODD = 0.1  # greatest fraction of quaternions of a length other than 1, which are treated as missing
+_MAX_ODD = 0.1  # greatest fraction of quaternions of a length other than 1, which are treated as missing
 World = Literal["NED", "ENU", "NWU"]
 Body = Literal["FRD", "FLU", "RFU"]
 
@@ -75,8 +75,8 @@ class ColumnMap(Table, frozen=True):
     @property
     def quantities(self) -> dict[str, MappedQuantity]:
         """Mapped quantities, by name."""
-        found = {name: getattr(self, name, None) for name in QUANTITIES}
-        return {name: mapped for name, mapped in found.items() if mapped is not None}
+        entries = {name: getattr(self, name, None) for name in QUANTITIES}
+        return {name: mapped for name, mapped in entries.items() if mapped is not None}
 
     def time_of(self, name: str) -> TimeColumn | None:
         """Return the time column of a quantity, or None if it has none."""
@@ -126,7 +126,7 @@ def _attitudes(mapped: MappedQuantity, values: Array, world: str, body: str) -> 
         quaternions = values[known] if mapped.quaternion == "wxyz" else values[known][:, [3, 0, 1, 2]]
         length = np.hypot.reduce(quaternions, axis=1)
         odd = np.abs(length - 1.0) > 0.05
-        if odd.sum() > _MOST_ODD * len(odd):
+        if odd.sum() > _MAX_ODD * len(odd):
             worst = float(length[np.argmax(np.abs(length - 1.0))])
             raise ImportLogError(
                 f"{source_name(mapped)}: quaternion of length {worst:.4g}, expected 1; for angles set euler"
@@ -137,15 +137,15 @@ def _attitudes(mapped: MappedQuantity, values: Array, world: str, body: str) -> 
         quaternions = quaternions * np.array([1.0, -1.0, -1.0, -1.0])
     result = np.full((len(values), 4), np.nan)
     if known.any():
-        result[known] = turn_quaternions(quaternions, world, body)
+        result[known] = convert_quaternions(quaternions, world, body)
     return result
 
 
 def _require_angles(mapped: MappedQuantity, angles: Array) -> None:
-    most = float(np.abs(angles).max(initial=0.0))
-    if most > 2.0 * np.pi + 0.01:
+    size = float(np.abs(angles).max(initial=0.0))
+    if size > 2.0 * np.pi + 0.01:
         raise ImportLogError(
-            f"{source_name(mapped)}: attitude reaches {most:.4g} rad, expected at most 6.293 rad: "
+            f"{source_name(mapped)}: attitude reaches {size:.4g} rad, expected at most 6.293 rad: "
             'check its unit, such as unit = "deg"'
         )
 
@@ -170,11 +170,11 @@ def read_map(path: Path) -> ColumnMap:
 def _check(name: str, mapped: MappedQuantity) -> None:
     quantity = QUANTITIES[name]
     size = 3 if mapped.euler else quantity.size
-    given = len(mapped.columns)
-    if size and given != size:
+    count = len(mapped.columns)
+    if size and count != size:
         more = " (or 3 with euler)" if name == "attitude" and not mapped.euler else ""
-        raise TableError(f"{name}.columns has {given} names, expected {size}{more}: {quantity.what}")
-    if not given:
+        raise TableError(f"{name}.columns has {count} names, expected {size}{more}: {quantity.what}")
+    if not count:
         raise TableError(f"{name}.columns has no names, expected one for each thruster: {quantity.what}")
     if mapped.euler and (name != "attitude" or not _valid_order(mapped.euler)):
         raise TableError(

@@ -38,17 +38,16 @@ UNITS = {  # factors to SI units, by the SI unit
 
 def quaternions_of_angles(angles: Array, order: str) -> Array:
     """Return unit quaternions of Euler angles; angles (n, 3) [rad], returns (n, 4)."""
-    x, y, z, w = Rotation.from_euler(order, angles).as_quat().T
-    return np.column_stack([w, x, y, z])
+    quaternions: Array = Rotation.from_euler(order, angles).as_quat(scalar_first=True)
+    return quaternions
 
 
-def turn_quaternions(quaternions: Array, world: str, body: str) -> Array:
+def convert_quaternions(quaternions: Array, world: str, body: str) -> Array:
     """Convert attitudes between other frames to attitudes from FRD to NED; quaternions (n, 4), returns (n, 4)."""
-    e0, e1, e2, e3 = quaternions.T
-    R = Rotation.from_quat(np.column_stack([e1, e2, e3, e0]))
-    turned = Rotation.from_matrix(WORLDS[world]) * R * Rotation.from_matrix(BODIES[body].T)
-    x, y, z, w = turned.as_quat().T
-    return np.column_stack([w, x, y, z])
+    R = Rotation.from_quat(quaternions, scalar_first=True)
+    to_ned = Rotation.from_matrix(WORLDS[world]) * R * Rotation.from_matrix(BODIES[body].T)
+    result: Array = to_ned.as_quat(scalar_first=True)
+    return result
 
 
 def euler_zyx(quaternions: Array) -> Array:
@@ -64,8 +63,8 @@ def rotate_to_body(quaternions: Array, vectors: Array) -> Array:
     """Rotate vectors from world to body, shape (n, 3), by quaternions from body to world, shape (n, 4)."""
     w, r = quaternions[:, :1], -quaternions[:, 1:]
     t = 2.0 * np.cross(r, vectors)
-    turned: Array = vectors + w * t + np.cross(r, t)
-    return turned
+    rotated: Array = vectors + w * t + np.cross(r, t)
+    return rotated
 
 
 def unit_quaternion(components: Sequence[float]) -> list[float]:

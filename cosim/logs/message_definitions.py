@@ -31,10 +31,10 @@ def parse_definition(text: str, name: str, language: str) -> dict[str, Any]:
     """Parse the definition of a type and its nested types; raise ImportLogError if rosbags cannot."""
     from rosbags.typesys import TypesysError, get_types_from_idl, get_types_from_msg
 
-    slow, most = _SIGNS["ros2idl" if language == "ros2idl" else "ros2msg"]
+    slow, max_count = _SIGNS["ros2idl" if language == "ros2idl" else "ros2msg"]
     code = _plain_idl(text) if language == "ros2idl" else text
-    if len(text) > _MAX_TEXT or sum(map(code.count, slow)) > most:
-        raise ImportLogError(f"is too long, expected at most {_MAX_TEXT} characters and {most} of {slow!r}")
+    if len(text) > _MAX_TEXT or sum(map(code.count, slow)) > max_count:
+        raise ImportLogError(f"is too long, expected at most {_MAX_TEXT} characters and {max_count} of {slow!r}")
     try:
         if language != "ros2idl":
             return dict(get_types_from_msg(text, name))
@@ -49,14 +49,14 @@ def parse_definition(text: str, name: str, language: str) -> dict[str, Any]:
 def _plain_idl(text: str) -> str:
     """Return IDL without comments and texts; refuse arithmetic, which rosbags would evaluate whatever its size."""
     code = _IDL_ANNOTATION.sub(r"\1", _IDL_QUOTED.sub(" ", text))
-    if found := _IDL_ARITHMETIC.search(code):
-        raise ImportLogError(f"has the operator {found[0].strip()!r}, expected constants without arithmetic")
+    if operator := _IDL_ARITHMETIC.search(code):
+        raise ImportLogError(f"has the operator {operator[0].strip()!r}, expected constants without arithmetic")
     return code
 
 
 def reachable_types(types: Types, name: str, empty_size: int) -> dict[str, Any]:
     """Return a type and all types that it nests; `empty_size` is the size of one without fields [bytes]."""
-    return _Walk(types, empty_size).visit(name, ()).found
+    return _Walk(types, empty_size).visit(name, ()).reachable
 
 
 class _Walk:
@@ -66,12 +66,12 @@ class _Walk:
         self._types, self._empty_size = types, empty_size
         self._sizes: dict[str, int] = {}  # least size of each type [bytes]
         self._count = self._copies = 0
-        self.found: dict[str, Any] = {}
+        self.reachable: dict[str, Any] = {}
 
     def visit(self, name: str, parents: tuple[str, ...]) -> _Walk:
         if name in parents or len(parents) >= _MAX_DEPTH:
             raise ImportLogError(f"nests {name!r} in itself, or deeper than {_MAX_DEPTH} types")
-        if name in self.found:
+        if name in self.reachable:
             return self
         if not _TYPE_NAME.fullmatch(name):
             raise ImportLogError(f"names the type {name!r}, expected identifiers such as package/msg/Name")
@@ -89,7 +89,7 @@ class _Walk:
         for field, kind in fields:
             self._require_identifier(field)
             self._sizes[name] += self._size(kind, (*parents, name))
-        self.found[name] = self._types[name]
+        self.reachable[name] = self._types[name]
         return self
 
     def _size(self, kind: Any, parents: tuple[str, ...]) -> int:

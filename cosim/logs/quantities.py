@@ -18,7 +18,7 @@ class Quantity:
     unit: str  # unit of each component
     # ``state``: interpolated between samples; ``command``, ``sensor`` or ``voltage``: held until the next sample
     kind: Kind
-    most: float  # greatest plausible magnitude of a component; a greater one indicates wrong units
+    max: float  # greatest plausible magnitude of a component; a greater one indicates wrong units
     frame: str  # ``world``, ``body`` or empty: frame that a column map converts
     what: str  # description in words
 

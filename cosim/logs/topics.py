@@ -19,8 +19,8 @@ Convert = Callable[[Array], Array]
 
 _EDGES = np.logspace(-6, 5, 4401)  # s, edges of the histogram of periods; neighbors differ by 0.6 %
 _AROUND = 8  # number of bins on either side of the median whose mean is the period
-_GAP_PERIODS, _LEAST_GAP = 3.0, 0.3  # periods, s: a pause longer than both is a gap
-_LISTED = 100  # greatest number of listed gaps
+_GAP_PERIODS, _MIN_GAP = 3.0, 0.3  # periods, s: a pause longer than both is a gap
+_MAX_LISTED = 100  # greatest number of listed gaps
 _RUNS, _REGULAR = 10, 0.6  # held values have at least so many runs of equal ones, and this fraction of similar lengths
 _LONGEST_RUN = 1000  # samples, length from which on runs count as equally long
 _QUICK, _BURSTING = 0.2, 0.3  # bursts: greatest distance of samples in mean periods; least fraction of such samples
@@ -48,7 +48,7 @@ class Topic:
     @property
     def longest(self) -> float:
         """Longest time between samples [s] that is not a gap."""
-        return max(_GAP_PERIODS * self.period, _LEAST_GAP)
+        return max(_GAP_PERIODS * self.period, _MIN_GAP)
 
     @property
     def rate(self) -> float:
@@ -81,8 +81,8 @@ def clean(source: Source, times: Callable[[Array, Array], Array], convert: Conve
             values = values if convert is None else convert(values)
             _require_plausible(source, values)
             steps = np.diff(at, prepend=np.nan if first else topic.end)
-            for i in np.flatnonzero(steps > _LEAST_GAP):
-                push = heapq.heappush if len(heap) < 10 * _LISTED else heapq.heappushpop
+            for i in np.flatnonzero(steps > _MIN_GAP):
+                push = heapq.heappush if len(heap) < 10 * _MAX_LISTED else heapq.heappushpop
                 push(heap, (float(steps[i]), float(at[i])))
             periods.add(steps)
             topic.start = float(at[0]) if first else topic.start
@@ -91,7 +91,7 @@ def clean(source: Source, times: Callable[[Array, Array], Array], convert: Conve
             np.column_stack([at, values]).tofile(file)
     topic.period = periods.median()
     topic.gap_count = periods.above(topic.longest)
-    topic.gaps = sorted((end - size, end) for size, end in heapq.nlargest(_LISTED, heap) if size > topic.longest)
+    topic.gaps = sorted((end - size, end) for size, end in heapq.nlargest(_MAX_LISTED, heap) if size > topic.longest)
     return topic
 
 
@@ -143,14 +143,14 @@ def _survey(source: Source, times: Callable[[Array, Array], Array]) -> tuple[int
         spans.append(float(steps[(steps > 0.0) & (steps < 2.0)].sum()))
         counted += int(np.count_nonzero(steps < 2.0))
         previous, last = values[-1], at[-1]
-    stretch = _held_for(runs) if QUANTITIES[source.quantity].kind in ("sensor", "state") else 1
+    stretch = _hold_length(runs) if QUANTITIES[source.quantity].kind in ("sensor", "state") else 1
     mean = sum(spans) / counted if counted else 0.0
     quick_count = source.count - 1 - steps_all.above(_QUICK * mean) if mean else 0
-    bursting = mean > 0.0 and quick_count > _BURSTING * source.count and _comes_in_groups(source, times, 0.5 * mean)
+    bursting = mean > 0.0 and quick_count > _BURSTING * source.count and _is_grouped(source, times, 0.5 * mean)
     return stretch, mean if bursting else 0.0
 
 
-def _comes_in_groups(source: Source, times: Callable[[Array, Array], Array], apart: float) -> bool:
+def _is_grouped(source: Source, times: Callable[[Array, Array], Array], apart: float) -> bool:
     """Return True if most groups, more than `apart` [s] from each other, have several samples: these are bursts."""
     groups = alone = 0
     last = -np.inf
@@ -162,7 +162,7 @@ def _comes_in_groups(source: Source, times: Callable[[Array, Array], Array], apa
     return alone < 0.5 * groups
 
 
-def _held_for(runs: NDArray[np.int64]) -> int:
+def _hold_length(runs: NDArray[np.int64]) -> int:
     """Return the number of samples for which a value is held, from counts of run lengths; 1 if it is not held."""
     total = int(runs.sum())
     if total < _RUNS:
@@ -214,11 +214,9 @@ def _evenly(at: Array, before: float, period: float, topic: Topic) -> Array:
 
 
 def _require_plausible(source: Source, values: Array) -> None:
-    most = QUANTITIES[source.quantity].most
-    size = float(np.abs(values).max(initial=0.0))
-    if not size <= most:
-        unit = QUANTITIES[source.quantity].unit
+    quantity, size = QUANTITIES[source.quantity], float(np.abs(values).max(initial=0.0))
+    if not size <= quantity.max:
         raise ImportLogError(
-            f"{source.name}: {source.quantity} reaches {size:.4g} {unit}".rstrip()
-            + f", expected at most {most:.4g}: check its unit and frame"
+            f"{source.name}: {source.quantity} reaches {size:.4g} {quantity.unit}".rstrip()
+            + f", expected at most {quantity.max:.4g}: check its unit and frame"
         )

@@ -12,9 +12,9 @@ from cosim.mavlink.replay import replay as stream
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.replay.pages import replay
-from cosim.results.record import PARTS, RECORD, load_record
+from cosim.results.record import PARTS, RECORD
 from cosim.results.required_columns import require_columns
-from cosim.results.run_result import SUMMARY, load_run
+from cosim.results.run_result import SUMMARY
 from cosim.run.run_folder import report_again
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios
@@ -85,7 +85,7 @@ def test_d6_each_missing_column_is_named(kind, monkeypatch, caplog):
             assert f"has no column {name!r}" in said and Table.file in said
     require_columns(scenario, Table(names))
     require_columns(scenario, Table([*names, "of another"]))
-    assert len(names) > 90 and 0 < taken_along < 25
+    assert len(names) > 90 and 0 < taken_along <= 25
 
 
 def test_d6_the_names_are_those_of_the_run(kind):
@@ -133,15 +133,11 @@ def lacking(tmp_path, ordered_run):
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("read", READERS.values(), ids=READERS)
 def test_d6_every_reader_names_the_column_and_the_file(read, lacking):
-    for name in (
-        "target.x",
-        "commands.mode",
-        "thruster_force[1]",
-        "attitude.yaw",
-        "membership.depth",
-        "seen 2.shift.y",
+    names = (
+        "target.x", "commands.mode", "thruster_force[1]", "attitude.yaw", "membership.depth", "seen 2.shift.y",
         "time",
-    ):
+    )  # fmt: skip
+    for name in names:
         folder = lacking(name)
         before = sorted(folder.iterdir())
         with pytest.raises(RunError) as caught:
@@ -165,20 +161,3 @@ def test_d6_unfinished_run_is_checked(lacking):
     (folder / RECORD).rename(folder / PARTS / "000000.parquet")
     with pytest.raises(RunError, match=r"000000\.parquet: has no column 'membership.depth'"):
         list(looks(str(folder), None))
-
-
-@pytest.mark.slow
-def test_d6_every_column_of_a_file_dropped_singly(lacking, ordered_run, caplog, monkeypatch):
-    names = list(load_record(ordered_run).units)
-    monkeypatch.setattr("cosim.simulation.columns.column_names", lambda _: names)
-    summary, refused = load_run(ordered_run).summary, 0
-    for name in names:
-        caplog.clear()
-        folder = lacking(name)
-        if said := error_of(load_run, folder):
-            refused += 1
-            assert said == f"{folder / RECORD}: has no column {name!r}, which its scenario calls for"
-        else:
-            assert f"has no column {name!r}" in caplog.text
-            assert load_run(folder).summary == summary
-    assert refused > 100

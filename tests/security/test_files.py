@@ -9,8 +9,6 @@ import stat
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from controller.compiling import library
 from cosim.campaigns.store.folder import PLAN, read_plan
@@ -45,15 +43,12 @@ def read_all(folder):
 @pytest.mark.parametrize(
     "table",
     [
-        pa.table({"time": ["a", "b"]}),
-        pa.table({"time": pa.array([None, None], pa.float64())}),
-        pa.table({"time": [1, 2]}),
-        pa.table({"time": [[1.0], [2.0]]}),
-        pa.table({}),
+        pa.table({"time": ["a", "b"]}), pa.table({"time": pa.array([None, None], pa.float64())}),
+        pa.table({"time": [1, 2]}), pa.table({"time": [[1.0], [2.0]]}), pa.table({}),
         pa.table([pa.array([1.0]), pa.array([2.0])], names=["time", "time"]),
         pa.table([pa.array([1.0])], schema=pa.schema([pa.field("time", pa.float64(), metadata={b"unit": b"\xff"})])),
     ],
-)
+)  # fmt: skip
 def test_invalid_tables_are_rejected(tmp_path, table):
     with pytest.raises(RunError, match="record"):
         read_all(written(tmp_path, table))
@@ -73,23 +68,6 @@ def test_every_part_of_a_killed_run_is_checked(tmp_path, monkeypatch, odd):
         pq.write_table(table, tmp_path / PARTS / f"{i:06}.parquet")
     with pytest.raises(RunError, match="expected"):
         load_record(tmp_path)
-
-
-@pytest.mark.medium
-@given(st.data())
-def test_mutated_record_is_read_or_rejected(tmp_path_factory, data):
-    folder = tmp_path_factory.mktemp("record")
-    content = bytearray((written(folder, pa.table(ROWS)) / RECORD).read_bytes())
-    for _ in range(data.draw(st.integers(1, 4))):
-        content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    (folder / RECORD).write_bytes(content)
-    said = ""
-    try:
-        read_all(folder)
-    except RunError as error:
-        said = str(error)
-    assert "\n" not in said and len(said) < 1500 + len(str(folder))
-    shutil.rmtree(folder)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="names of files are no bytes here")
@@ -140,19 +118,11 @@ def test_d5_invalid_summary_value_is_rejected_by_key(tmp_path, ordered_run, key,
         for read in (load_run, report_again, lambda of: replay([of]), lambda of: list(looks(str(of), None))):
             with pytest.raises(RunError, match=f"{key} is ") as caught:
                 read(folder)
-            said = str(caught.value)
-            assert said.startswith(f"{folder / SUMMARY}: {key} is ") and said.isprintable()
-
-
-@pytest.mark.parametrize("key", ["law", "status", "scenario"])
-def test_d5_a_summary_that_lacks_a_key_names_it(tmp_path, ordered_run, key):
-    folder = tmp_path / "run"
-    shutil.copytree(ordered_run, folder)
-    sound = json.loads((folder / SUMMARY).read_text())
-    del sound[key]
-    (folder / SUMMARY).write_text(json.dumps(sound))
-    with pytest.raises(RunError, match=f"{SUMMARY}: {key} is missing"):
-        load_run(folder)
+            assert str(caught.value).startswith(f"{folder / SUMMARY}: {key} is ") and str(caught.value).isprintable()
+    if key != "wall_time":
+        (folder / SUMMARY).write_text(json.dumps({name: x for name, x in sound.items() if name != key}))
+        with pytest.raises(RunError, match=f"{SUMMARY}: {key} is missing"):
+            load_run(folder)
 
 
 @pytest.mark.medium

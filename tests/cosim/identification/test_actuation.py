@@ -51,22 +51,22 @@ def test_wrench_matches_the_plant(vehicle):
             assert found[k] == pytest.approx(middle, abs=2e-2)  # mean and middle differ by h^2/24 of the curvature
 
 
-@pytest.mark.parametrize("lag", [0.03, 0.1, 0.4])
-def test_wrench_derivatives_match_central_differences(vehicle, lag):
-    forces, scales, h = CommandedForces(log_of(vehicle), vehicle, STEP), np.linspace(0.9, 1.1, 8), 1e-6
-    found = forces.actuation(lag, scales)
-    both = [forces.actuation(lag + by, scales).wrench for by in (h, -h)]
-    assert found.by_lag == pytest.approx((both[0] - both[1]) / (2.0 * h), rel=1e-6, abs=1e-4)
-    for i in range(8):
-        bit = np.where(np.arange(8) == i, h, 0.0)
-        both = [forces.actuation(lag, scales + sign * bit).wrench for sign in (1, -1)]
-        assert found.by_scale[i] == pytest.approx((both[0] - both[1]) / (2.0 * h), abs=1e-6)
-    losses = np.linspace(0.0, 0.2, 8)
-    found = forces.actuation(lag, scales, losses)
-    for i in range(8):
-        bit = np.where(np.arange(8) == i, h, 0.0)
-        both = [forces.actuation(lag, scales, losses + sign * bit).wrench for sign in (1, -1)]
-        assert found.by_loss[i] == pytest.approx((both[0] - both[1]) / (2.0 * h), abs=1e-6)
+@pytest.mark.parametrize(("lag", "is_sampled"), [(0.03, False), (0.1, True), (0.4, False)])
+def test_wrench_derivatives_match_central_differences(vehicle, lag, is_sampled):
+    log = dataclasses.replace(log_of(vehicle, period=0.1 if is_sampled else 0.05), sampled=is_sampled)
+    forces, h = CommandedForces(log, vehicle, STEP), 1e-6
+    arguments = [np.array(lag), np.linspace(0.9, 1.1, 8), np.linspace(0.0, 0.2, 8), np.zeros(13)]
+    found = forces.actuation(lag, *arguments[1:])
+    exact = found.by_lag[None], found.by_scale, found.by_loss, found.by_changes
+    assert len(found.by_changes) == (13 if is_sampled else 0)
+    for k, derivatives in enumerate(exact):
+        for i, derivative in enumerate(derivatives):
+            bit = h * (np.arange(arguments[k].size) == i).reshape(arguments[k].shape)
+            ahead, back = (
+                forces.actuation(*(x + sign * bit if n == k else x for n, x in enumerate(arguments))).wrench
+                for sign in (1, -1)
+            )
+            assert derivative == pytest.approx((ahead - back) / (2.0 * h), rel=1e-6, abs=1e-4 if k == 0 else 1e-6)
 
 
 def test_a_loss_backward_is_one_of_negative_commands_alone(vehicle):
@@ -116,19 +116,6 @@ def test_changes_between_samples_may_be_steps(vehicle, phase):
         )
     )  # fmt: skip
     assert np.abs(near - behind).max() < 0.5 * np.abs(far - behind).max()
-
-
-def test_derivatives_by_changes_between_samples(vehicle):
-    log = dataclasses.replace(log_of(vehicle, period=0.1), sampled=True)
-    forces, scales, h = CommandedForces(log, vehicle, STEP), np.linspace(0.9, 1.1, 8), 1e-6
-    changes = np.linspace(-0.1, 0.1, 13)
-    found = forces.actuation(0.15, scales, changes=changes).by_changes
-    for i in range(13):
-        bit = np.where(np.arange(13) == i, h, 0.0)
-        both = [forces.actuation(0.15, scales, changes=changes + sign * bit).wrench for sign in (1, -1)]
-        assert found[i] == pytest.approx((both[0] - both[1]) / (2.0 * h), abs=1e-6)
-    held = CommandedForces(dataclasses.replace(log, sampled=False), vehicle, STEP)
-    assert not held.actuation(0.15, scales).by_changes.any()
 
 
 def test_smoothness_is_a_second_moment(vehicle):

@@ -10,9 +10,10 @@ from controller.quaternion import rotation_matrix
 from cosim.errors import IdentificationError
 from cosim.identification.delays import find_delays
 from cosim.identification.findings import require_apart, slow_commands, warnings
-from cosim.identification.fit import fit, integration_step
-from cosim.identification.log import Log, make_topic
+from cosim.identification.fit import Problem, fit, integration_step
+from cosim.identification.log import TOPICS, Log, make_topic
 from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisances, with_mean_nuisances, with_values
+from cosim.identification.residuals import Residuals
 from cosim.identification.validation import validate
 from cosim.identification.windows import cut_windows
 from plant_fmu import Plant, load_vehicle
@@ -102,9 +103,6 @@ def test_nominal_intervals_follow_from_the_information_matrix(found):
 @pytest.mark.slow
 def test_gradient_matches_the_cost(log, vehicle, found):
     """The start of each window is eliminated; cost and gradient are still those of all."""
-    from cosim.identification.fit import Problem
-    from cosim.identification.residuals import Residuals
-
     windows, _ = cut_windows([log], vehicle, found.step, 20.0)
     problem = Problem(Residuals([log], vehicle, found.parameters, windows, found.step))
     deviations = found.intervals.nominal
@@ -131,23 +129,15 @@ def test_uninformed_parameter_keeps_its_prior(log, vehicle):
     assert [found.parameters[i].name for i in found.undetermined()] == ["thrusters.time_constant"]
 
 
-@pytest.mark.slow
-def test_topic_delay_is_estimated(log, vehicle):
-    """All samples of velocity are 0.1 s late by their stamps."""
-    late = tuple(dataclasses.replace(t, times=t.times + 0.1) if t.name == "velocity" else t for t in log.topics)
-    delayed = dataclasses.replace(log, topics=late)
-    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias", "delay"), [delayed])
-    done = fit([delayed], vehicle, parameters)
-    found = {p.plant: x for p, x in zip(parameters, done.values, strict=True) if p.kind == "delay"}
-    assert found["velocity"] == pytest.approx(0.1, abs=0.01)
-    assert [found[name] for name in ("angular_velocity", "depth")] == pytest.approx([0.0, 0.0], abs=0.01)
-    assert done.values[0] == pytest.approx(TRUTH["quadratic_damping[1]"], rel=0.02)
+def shift_times(log, names, delay):
+    """Return a log whose samples of some topics come late."""
+    late = (dataclasses.replace(t, times=t.times + delay) if t.name in names else t for t in log.topics)
+    return dataclasses.replace(log, topics=tuple(late))
 
 
 @pytest.fixture(scope="module")
 def late(log):
-    """A run of which all samples come 0.2 s late."""
-    return dataclasses.replace(log, topics=tuple(dataclasses.replace(t, times=t.times + 0.2) for t in log.topics))
+    return shift_times(log, TOPICS, 0.2)
 
 
 @pytest.mark.medium
@@ -159,11 +149,15 @@ def test_delays_are_found_before_any_number_is_fitted(log, late, vehicle):
 
 
 @pytest.mark.slow
-def test_samples_that_are_all_late_are_found_late(late, vehicle):
-    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias", "delay"), [late])
-    done = fit([late], vehicle, parameters)
-    delays = [x for p, x in zip(parameters, done.values, strict=True) if p.kind == "delay"]
-    assert delays == pytest.approx([0.2] * 4, abs=0.01)
+@pytest.mark.parametrize(("topics", "delay"), [(("velocity",), 0.1), (TOPICS, 0.2)])
+def test_delays_are_estimated(log, vehicle, topics, delay):
+    """Samples of some topics, or of all, are late by their stamps."""
+    delayed = shift_times(log, topics, delay)
+    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias", "delay"), [delayed])
+    done = fit([delayed], vehicle, parameters)
+    for p, x in zip(parameters, done.values, strict=True):
+        if p.kind == "delay" and (topics == TOPICS or p.plant != "attitude"):
+            assert x == pytest.approx(delay if p.plant in topics else 0.0, abs=0.01)
     assert done.values[0] == pytest.approx(TRUTH["quadratic_damping[1]"], rel=0.02)
     assert done.intervals.chi2 < 1.1 and not done.causes
 
@@ -251,6 +245,7 @@ def test_fitted_values_are_applied_to_the_vehicle(vehicle):
 
 def test_windows_that_tumble_or_have_gaps_are_rejected(log, vehicle):
     step = integration_step([log])
+    assert step == pytest.approx(PERIOD / 2)
     rates = next(t for t in log.topics if t.name == "angular_velocity")
     fast = dataclasses.replace(rates, values=np.where(rates.times[:, None] > 30.0, 4.0, rates.values))
     tumbling = dataclasses.replace(log, topics=tuple(fast if t.name == rates.name else t for t in log.topics))
@@ -288,10 +283,6 @@ def test_held_out_runs_have_the_mean_nuisances(log):
         "current x": -0.1, "current y": 0.02, "DVL scale error": 0.02,
     })  # fmt: skip
     assert all(p.run is None for p in shared)
-
-
-def test_integration_grid_matches_the_command_period(log):
-    assert integration_step([log]) == pytest.approx(PERIOD / 2)
 
 
 def test_noise_is_estimated_from_fourth_differences():

@@ -32,12 +32,9 @@ PLAIN = "float64 x\nfloat64 y\nfloat64 z\n"
 SEPARATOR = "=" * 80 + "\nMSG: "
 START = 1_700_000_000 * 10**9
 PACK = {
-    "": bytes,
-    "none": bytes,
-    "bz2": bz2.compress,
-    "lz4": lz4.frame.compress,
+    "": bytes, "none": bytes, "bz2": bz2.compress, "lz4": lz4.frame.compress,
     "zstd": zstandard.ZstdCompressor().compress,
-}
+}  # fmt: skip
 ZEROS = bz2.compress(bytes(1 << 26))
 
 

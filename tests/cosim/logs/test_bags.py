@@ -21,43 +21,7 @@ rosbag1 = pytest.importorskip("rosbags.rosbag1")
 rosbag2 = pytest.importorskip("rosbags.rosbag2")
 typesys = pytest.importorskip("rosbags.typesys")
 
-ODOMETRY = """std_msgs/Header header
-string child_frame_id
-geometry_msgs/Pose pose
-geometry_msgs/Twist twist
-================================================================================
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-================================================================================
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-================================================================================
-MSG: geometry_msgs/Pose
-geometry_msgs/Point position
-geometry_msgs/Quaternion orientation
-================================================================================
-MSG: geometry_msgs/Twist
-geometry_msgs/Vector3 linear
-geometry_msgs/Vector3 angular
-================================================================================
-MSG: geometry_msgs/Point
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: geometry_msgs/Vector3
-float64 x
-float64 y
-float64 z
-================================================================================
-MSG: geometry_msgs/Quaternion
-float64 x
-float64 y
-float64 z
-float64 w
-"""
+ODOMETRY, _ = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE).generate_msgdef("nav_msgs/msg/Odometry", ros_version=2)
 FORCES = "float64[] data\n"
 MAP = """
 world = "ENU"
@@ -65,18 +29,18 @@ body = "FLU"
 
 [position]
 topic = "/odom"
-columns = ["pose.position.x", "pose.position.y", "pose.position.z"]
+columns = ["pose.pose.position.x", "pose.pose.position.y", "pose.pose.position.z"]
 time = { column = "header.stamp" }
 
 [attitude]
 topic = "/odom"
-columns = ["pose.orientation.x", "pose.orientation.y", "pose.orientation.z", "pose.orientation.w"]
+columns = ["pose.pose.orientation.x", "pose.pose.orientation.y", "pose.pose.orientation.z", "pose.pose.orientation.w"]
 quaternion = "xyzw"
 time = { column = "header.stamp" }
 
 [velocity]
 topic = "/odom"
-columns = ["twist.linear.x", "twist.linear.y", "twist.linear.z"]
+columns = ["twist.twist.linear.x", "twist.twist.linear.y", "twist.twist.linear.z"]
 time = { column = "header.stamp" }
 
 [thrust]
@@ -101,8 +65,14 @@ def messages_of(dive):
         odometry = {
             "header": {"stamp": {"sec": START + stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": "odom"},
             "child_frame_id": "base_link",
-            "pose": {"position": {"x": e, "y": n, "z": -d}, "orientation": {"x": x, "y": y, "z": z, "w": w}},
-            "twist": {"linear": {"x": u, "y": v, "z": up}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}},
+            "pose": {
+                "pose": {"position": {"x": e, "y": n, "z": -d}, "orientation": {"x": x, "y": y, "z": z, "w": w}},
+                "covariance": [0.0] * 36,
+            },
+            "twist": {
+                "twist": {"linear": {"x": u, "y": v, "z": up}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}},
+                "covariance": [0.0] * 36,
+            },
         }
         yield "/odom", odometry, START * 10**9 + stamp + 80_000_000
         yield "/thrusters", {"data": dive.thrust[k].tolist()}, START * 10**9 + stamp
@@ -324,9 +294,9 @@ def test_truncated_bag_is_read_to_its_end(bag, columns, tmp_path):
     ("old", "new", "what"),
     [
         ('topic = "/thrusters"', 'topic = "/thruster"', "has no topic '/thruster', .*did you mean '/thrusters'"),
-        ("pose.position.z", "pose.position.zz", r"/odom has no field 'pose\.position\.zz'"),
-        ("pose.position.z", "header.frame_id", "/odom: header.frame_id is str, expected a number"),
-        ("pose.position.z", "pose position", "is no path, expected one such as"),
+        ("pose.pose.position.z", "pose.pose.position.zz", r"/odom has no field 'pose\.pose\.position\.zz'"),
+        ("pose.pose.position.z", "header.frame_id", "/odom: header.frame_id is str, expected a number"),
+        ("pose.pose.position.z", "pose position", "is no path, expected one such as"),
         ('topic = "/thrusters"\n', "", r"the map says no topic for \[thrust\]"),
         ("data[7]", "data[8]", r"/thrusters has no field 'data\[8\]'"),
     ],

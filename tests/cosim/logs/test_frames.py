@@ -10,11 +10,11 @@ from controller.quaternion import rotation_matrix
 from cosim.logs.frames import (
     BODIES,
     WORLDS,
+    convert_quaternions,
     euler_zyx,
     quaternion_of_angles,
     quaternions_of_angles,
     rotate_to_body,
-    turn_quaternions,
 )
 
 ANGLES = st.tuples(*[st.floats(-3.0, 3.0)] * 3)
@@ -52,10 +52,10 @@ def test_roll_pitch_yaw_match_pymavlink(roll, pitch, yaw):
 def test_heading_north_in_enu_is_heading_north_in_ned():
     """In ENU and FLU, yaw counts from east to north: north is a yaw of 90 degrees; in NED and FRD it is none."""
     north = quaternions_of_angles(np.array([[np.pi / 2.0, 0.0, 0.0]]), "ZYX")
-    q = turn_quaternions(north, "ENU", "FLU")
+    q = convert_quaternions(north, "ENU", "FLU")
     np.testing.assert_allclose(euler_zyx(q)[0], 0.0, atol=1e-12)
     bow_up = quaternions_of_angles(np.array([[np.pi / 2.0, -0.3, 0.0]]), "ZYX")  # about the axis to port
-    np.testing.assert_allclose(euler_zyx(turn_quaternions(bow_up, "ENU", "FLU"))[0], (0.0, 0.3, 0.0), atol=1e-12)
+    np.testing.assert_allclose(euler_zyx(convert_quaternions(bow_up, "ENU", "FLU"))[0], (0.0, 0.3, 0.0), atol=1e-12)
 
 
 @pytest.mark.medium(fast=5)
@@ -66,7 +66,7 @@ def test_vector_rotation_commutes_with_frame_conversion(world, body, angles):
     q = quaternions_of_angles(np.array([angles]), "ZYX")
     vector = np.array([0.3, -0.7, 1.1])  # in that body frame
     expected = WORLDS[world] @ rotation_matrix(q[0]) @ vector
-    turned = rotation_matrix(turn_quaternions(q, world, body)[0]) @ (BODIES[body] @ vector)
+    turned = rotation_matrix(convert_quaternions(q, world, body)[0]) @ (BODIES[body] @ vector)
     np.testing.assert_allclose(turned, expected, atol=1e-12)
 
 

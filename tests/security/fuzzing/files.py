@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import shutil
 import zipfile
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -135,9 +136,25 @@ def _zipped(description: bytes) -> bytes:
     return made.getvalue()
 
 
+def _refusal(read: Callable[[Path], object], path: Path) -> Exception | None:
+    try:
+        read(path)
+    except KINDS as error:
+        return error
+    return None
+
+
 @reader("FMU", "zip", "plant_fmu.unpacking:open_fmu", "plant_fmu.unpacking:_parse_member")
 def fmu(seeds: Seeds) -> Case:
-    return seeds.file("it.fmu", read_fmu, _zipped(SMALL))
+    """What `check` refuses, a plant refuses with the same line; it also needs a binary, which these have not."""
+
+    def read(path: Path) -> None:
+        refusal, refusal_of_plant = (_refusal(opened, path) for opened in (read_fmu, Plant))
+        assert refusal is None or str(refusal) == str(refusal_of_plant)
+        if refusal:
+            raise refusal
+
+    return seeds.file("it.fmu", read, _zipped(SMALL))
 
 
 @reader("model description, checked", "xml", "plant_fmu.unpacking:_parse_tree")
@@ -196,10 +213,13 @@ def _log(seeds: Seeds, name: str, *contents: bytes, columns: bytes = b"") -> Cas
     def read(path: Path) -> None:
         out = folder / "run"
         try:
-            import_log(path, "bluerov2_heavy", out, columns=folder / "map.toml" if columns else None, report=False)
+            run = import_log(
+                path, "bluerov2_heavy", out, columns=folder / "map.toml" if columns else None, report=False
+            )
         except KINDS:
             assert not out.exists()
             raise
+        assert np.all(np.diff(run.record["time"]) > 0.0)
         shutil.rmtree(out)
 
     return seeds.file(name, read, *contents)
@@ -255,3 +275,23 @@ def recording(seeds: Seeds) -> Case:
     path = seeds.folder() / "it.mcap"
     write_recording(path, 5.0)
     return _log(seeds, "it.mcap", path.read_bytes())
+
+
+_DEFINITIONS = "cosim.logs.message_definitions:parse_definition"
+
+
+def _bag(suffix: str, seeds: Seeds) -> Case:
+    from tests.cosim.logs import test_bags
+    from tests.cosim.logs.dive import Dive
+
+    folder, dive = seeds.folder(), Dive(np.arange(0.0, 4.0, 0.05))
+    path = folder / f"it.{suffix}"
+    if suffix == "db3":
+        test_bags.write_database(folder / "bag", dive).rename(path)
+    else:
+        {"mcap": test_bags.write_bag, "bag": test_bags.write_ros1}[suffix](path, dive)
+    return _log(seeds, path.name, path.read_bytes(), columns=test_bags.MAP.encode())
+
+
+for _suffix, _parser in (("mcap", "_mcap_records"), ("db3", "_sqlite_messages"), ("bag", "_ros1_messages")):
+    reader(f"bag in {_suffix}", "bytes", f"cosim.logs.bag_storage:{_parser}", _DEFINITIONS)(partial(_bag, _suffix))

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pyarrow.parquet as pq
 import pytest
 
@@ -52,7 +53,7 @@ def summary(seeds: Seeds) -> Case:
 def log_facts(seeds: Seeds) -> Case:
     topic = TopicFacts("depth", "BARO", 9, 10.0, 0.3, 1, ((1.0, 2.0),), 0, 0, 0, 0)
     facts = LogFacts("it.bin", 99, 0.5, 10.0, "pulses", (topic,), {"GPS": 3}, ("a remark",))
-    return seeds.file(IMPORT, lambda path: load_log_facts(path.parent), json_text(asdict(facts)).encode())
+    return seeds.file(IMPORT, lambda path: load_log_facts(path.parent), json_text(msgspec.to_builtins(facts)).encode())
 
 
 @reader("commands of a run", "jsonl", "cosim.simulation.commands.sources:read_log")

@@ -41,8 +41,8 @@ TOKENS = [
 # ---- of bytes ------------------------------------------------------------------------------------------------------
 
 
-def _span(content: bytes, choose: random.Random, longest: int = 40) -> tuple[int, int]:
-    first = choose.randrange(len(content) + 1)
+def _span(content: bytes, choose: random.Random) -> tuple[int, int]:
+    first, longest = choose.randrange(len(content) + 1), choose.choice([40, 40, 40, max(40, len(content) // 10)])
     return first, min(len(content), first + choose.randrange(1, longest))
 
 
@@ -73,9 +73,17 @@ def _without(content: bytes, choose: random.Random) -> bytes:
     return content[:first] + content[end:]
 
 
+def _overwritten(content: bytes, choose: random.Random) -> bytes:
+    """Write zeros, ones or noise over a span, as where a card loses blocks."""
+    first, end = _span(content, choose)
+    return (
+        content[:first] + choose.choice([bytes, lambda n: b"\xff" * n, choose.randbytes])(end - first) + content[end:]
+    )
+
+
 def _repeated(content: bytes, choose: random.Random) -> bytes:
     first, end = _span(content, choose)
-    return content[:end] + content[first:end] * choose.choice([1, 2, 50]) + content[end:]
+    return content[:end] + content[first:end] * choose.choice([1, 2, 50 if end - first < 100 else 3]) + content[end:]
 
 
 def _moved(content: bytes, choose: random.Random) -> bytes:
@@ -111,25 +119,25 @@ def _other_lines(content: bytes, choose: random.Random) -> bytes:
     return b"".join(lines)
 
 
-BYTES: list[Bytes] = [_flipped, _cut, _inserted, _with_token, _without, _repeated, _moved]
+BYTES: list[Bytes] = [_flipped, _cut, _inserted, _with_token, _without, _overwritten, _repeated, _moved]
 TEXT: list[Bytes] = [*BYTES, _with_token, _other_number, _other_lines]
 
 
 # ---- of tables -----------------------------------------------------------------------------------------------------
 
 
-def places(value: Any, where: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """Return where in a table values stand, tables and lists among them."""
+def paths_in(value: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Return the paths of all values in a table, tables and lists among them."""
     items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    inner = [place for key, item in items for place in places(item, (*where, key))]
-    return [where, *inner] if where else inner
+    inner = [inside for key, item in items for inside in paths_in(item, (*path, key))]
+    return [path, *inner] if path else inner
 
 
 def changed_table(table: Any, choose: random.Random, values: list[Any]) -> Any:
     """Return a table with one or two changes of a value, a key or an item."""
     table = copy.deepcopy(table)
     for _ in range(choose.choice([1, 1, 2])):
-        found = places(table)
+        found = paths_in(table)
         if not found:
             return copy.deepcopy(choose.choice(values))
         *path, last = choose.choice(found)
@@ -274,22 +282,7 @@ _OF_CONTENT: dict[str, list[Bytes]] = {
 
 
 def mutated(content: bytes, kind: str, number: int) -> bytes:
-    """Return a change of a sound file.
-
-    Parameters
-    ----------
-    content : bytes
-        The file.
-    kind : str
-        What stands in it: ``json``, ``jsonl``, ``toml``, ``xml``, ``zip``, ``parquet``, ``text`` or ``bytes``.
-    number : int
-        Of the change; every other one is of what stands in the file, if that is known, and the others of its bytes.
-
-    Returns
-    -------
-    bytes
-        It may be sound as well.
-    """
+    """Change a valid file of a kind in `_OF_CONTENT`: every other change is of its values, the others of its bytes."""
     choose = random.Random(number)
     changes = BYTES if kind in ("zip", "parquet", "bytes") else TEXT
     if number % 2 and _OF_CONTENT[kind]:

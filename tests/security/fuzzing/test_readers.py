@@ -7,11 +7,12 @@ import resource
 import traceback
 from collections import Counter
 from pathlib import Path
+from random import Random
 
 import pytest
 
 from tests.security.fuzzing import files, folders, talkers
-from tests.security.fuzzing.mutations import mutated
+from tests.security.fuzzing.mutations import BYTES, mutated
 from tests.security.fuzzing.registry import KINDS, READERS, ROOT, Case
 
 FEW = 40  # changes of each reader's examples among the medium tests,
@@ -22,12 +23,14 @@ MEMORY = 400  # MB that all changes of a reader may take
 assert files and folders and talkers  # which register
 
 
-def fault_of(case: Case, content: bytes) -> str:
+def fault_of(case: Case, content: bytes, is_refusal_a_fault: bool = False) -> str:
     """Return the error in reading a content, "" if none."""
     try:
         case.read(content)
     except KINDS as error:
         said = str(error)
+        if is_refusal_a_fault:
+            return said
         if not said.isprintable():
             return "the message is not printable"
         if len(said.replace(case.named, "")) >= LONGEST:
@@ -76,3 +79,11 @@ def test_unmodified_files_are_accepted(name, seeds):
                 case.read(content)
         else:
             case.read(content)
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("name", ["telemetry log", "dataflash log", "log of PX4"])
+def test_most_logs_with_flipped_bits_are_read(name, seeds):
+    case = READERS[name].case(seeds)
+    (content,) = case.contents
+    assert [fault_of(case, BYTES[0](content, Random(k)), is_refusal_a_fault=True) for k in range(8)].count("") >= 4
