@@ -170,8 +170,7 @@ def _descriptions() -> tuple[bytes, ...]:
     return SMALL, *(model_description(component, fmi, "token").encode() for fmi in (2, 3))
 
 
-@reader("model description, run", "xml", "plant_fmu.unpacking:_parse_tree", "plant_fmu.running.instance:Instance._load",
-        "plant_fmu.running.instance:_described")  # fmt: skip
+@reader("model description, run", "xml", "plant_fmu.unpacking:_parse_tree", "plant_fmu.running.instance:Instance._load")
 def description_run(seeds: Seeds) -> Case:
     """Up to the binary, which these have not: their code is not run."""
     case = description(seeds)
@@ -268,7 +267,7 @@ def ulog(seeds: Seeds) -> Case:
     return _log(seeds, "it.ulg", path.read_bytes())
 
 
-@reader("recording of BlueOS", "bytes", "cosim.logs.blueos:_parts")
+@reader("recording of BlueOS", "bytes", "cosim.logs.blueos:_parts", "cosim.logs.bag_storage:_mcap_records")
 def recording(seeds: Seeds) -> Case:
     from tests.cosim.logs.test_blueos import write_recording
 
@@ -293,5 +292,5 @@ def _bag(suffix: str, seeds: Seeds) -> Case:
     return _log(seeds, path.name, path.read_bytes(), columns=test_bags.MAP.encode())
 
 
-for _suffix, _parser in (("mcap", "_mcap_records"), ("db3", "_sqlite_messages"), ("bag", "_ros1_messages")):
+for _suffix, _parser in (("mcap", "_mcap_messages"), ("db3", "_sqlite_messages"), ("bag", "_ros1_messages")):
     reader(f"bag in {_suffix}", "bytes", f"cosim.logs.bag_storage:{_parser}", _DEFINITIONS)(partial(_bag, _suffix))

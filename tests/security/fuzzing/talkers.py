@@ -224,7 +224,7 @@ def change(seeds: Seeds) -> Case:
     )  # fmt: skip
 
 
-@reader("what varies", "text", "cosim.campaigns.sweeps.design:_vary")
+@reader("what varies", "text", "cosim.campaigns.sweeps.design:_parse_vary")
 def varied(seeds: Seeds) -> Case:
     return _argument(lambda text: vary_from([text]), "limit.force=50:500:4:log", "a.b=-1:1", "c=1,2.5,1e3")
 
