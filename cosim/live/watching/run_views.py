@@ -207,7 +207,7 @@ def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
                         msgspec.convert(content["run"], _Header)
                         header, row = content["run"], None
                     elif content["type"] == "end" and header is not None:
-                        yield Look(header, row, f"live at {url}", (content["status"], content["verdict"]))
+                        yield Look(header, row, f"live at {url}", (str(content["status"]), str(content["verdict"])))
                         if content["status"] != "reset":
                             return
                 if header is not None and time.monotonic() - shown >= _FRAME:
