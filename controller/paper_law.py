@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.arithmetic import length3, square
+from controller.arithmetic import length3
 from controller.quaternion import Vector3, error_parts, rotation_rows
 
 Array = NDArray[np.float64]
@@ -41,20 +41,6 @@ def positive_part(value: float) -> float:
     """Return max(0, g) of a `value` g, as in (16), (17), (20) and (22)."""
     # NaN stays NaN, so that a lost measurement does not look like safety.
     return 0.0 if value <= 0.0 else value
-
-
-def primary_potential(value: float, k_p1: float) -> float:
-    """Return P_p [N m]: (16), of f, the `value` of the goal, and `k_p1`."""
-    return 0.5 * k_p1 * square(positive_part(value))
-
-
-def secondary_potential(values: Array, alphas: Array) -> float:
-    """Return P_s: (17), of the g_i, `values`, and the alpha_i, `alphas`, each of shape (n,)."""
-    # The law follows its gradient only where |dg_i/dp| = 1: (19) normalizes each gradient.
-    total = 0.0
-    for i in range(values.size):
-        total += 0.5 * alphas[i] * square(positive_part(values[i]))
-    return total
 
 
 def primary_error(value: float, gradient: Array) -> Array:

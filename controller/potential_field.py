@@ -7,14 +7,14 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from controller.arithmetic import length3
 from controller.law import Array, VehicleState
 from controller.paper_law import positive_part
-from controller.quaternion import Vector3
+from controller.quaternion import Vector3, error_parts, write_rotation
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, evaluate_packed
 
@@ -50,6 +50,52 @@ def empty_field(n_regions: int) -> Field:
         error=np.zeros(3),
         push=np.zeros(3),
     )
+
+
+class PotentialMemory(NamedTuple):
+    """State between steps, and work arrays, of a law for comparison."""
+
+    desired_quaternion: Array  # (4,)
+    period: Array  # (1,) s
+    estimate: Array  # (4,) phi-hat [N, N m]; zeros of a law that estimates nothing
+    report: Array  # (0,)
+    theta: Array  # (9,) parameters of a law with other ones than phi
+    drive: Array  # (6,) what drives the adaptation
+    field: Field
+
+
+def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> PotentialMemory:
+    """Return the memory before the first step; `period` [s] has shape (1,)."""
+    field = empty_field(n_regions)
+    return PotentialMemory(desired_quaternion, period, np.zeros(4), np.zeros(0), np.zeros(9), np.zeros(6), field)
+
+
+def write_set_point_wrench(
+    state: VehicleState, goal: PackedRegions, regions: PackedRegions, gains: Any, memory: PotentialMemory, R: Array,
+    forces: Array,
+) -> Vector3:  # fmt: skip
+    """Write the wrench of pull, push and damping, and the rotation `R`, (3, 3); return the attitude error (23)."""
+    # with gains that have limit, inset, repulsion, reach, k_p1, k_p2, k_v1 and k_v2
+    field = memory.field
+    write_rotation(state.quaternion, R)
+    evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
+    set_point_error(field, gains.inset, gains.limit / gains.k_p1)
+    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    write_damping(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
+    add_turned(R, field.error, -gains.k_p1, forces)
+    add_turned(R, field.push, 1.0, forces)
+    return e_att
+
+
+def write_drive(
+    state: VehicleState, R: Array, e_att: Vector3, sigma_p: float, sigma_a: float, memory: PotentialMemory
+) -> None:
+    """Write nu + [sigma_p R^T e; sigma_a e_att], which drives an adaptation, into `memory.drive`."""
+    for i in range(6):
+        memory.drive[i] = state.velocity_body[i]
+    add_turned(R, memory.field.error, sigma_p, memory.drive)
+    for i in range(3):
+        memory.drive[3 + i] += sigma_a * e_att[i]
 
 
 def evaluate_field(

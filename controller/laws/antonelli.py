@@ -18,19 +18,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.potential_field import (
-    Field,
-    add_turned,
-    clip_estimate,
-    empty_field,
-    evaluate_field,
-    set_point_error,
-    write_damping,
-)
-from controller.quaternion import down_parts, error_parts, write_rotation
+from controller.potential_field import PotentialMemory, clip_estimate, make_memory, write_drive, write_set_point_wrench
+from controller.quaternion import down_parts
 from controller.regions.region_set import PackedRegions
 from controller.stack_array import zeros
 
@@ -54,18 +44,6 @@ class AntonelliGains(NamedTuple):
     reach: float = 1.499  # m, clearance at which regions begin to push
 
 
-class AntonelliMemory(NamedTuple):
-    """State between steps, and work arrays."""
-
-    desired_quaternion: Array  # (4,)
-    period: Array  # (1,) s
-    theta: Array  # (9,) first moments [N m], force [N, NED], moment [N m, NED]
-    estimate: Array  # (4,) phi-hat from theta: the current's vertical force counts as weight
-    report: Array  # (0,)
-    drive: Array  # (6,) the vector s
-    field: Field
-
-
 def write_regressor(quaternion: Array, R: Array, Phi: Array) -> None:
     """Write Phi, shape (6, 9), of a unit quaternion, shape (4,), and its rotation, shape (3, 3), over zeros."""
     x, y, z = down_parts(quaternion)
@@ -83,30 +61,18 @@ def step(
     regions: PackedRegions,
     weights: Array,
     gains: AntonelliGains,
-    memory: AntonelliMemory,
+    memory: PotentialMemory,
     forces: Array,
 ) -> None:
     """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
-    R, Phi = zeros(3, 3), zeros(6, 9)
-    write_rotation(state.quaternion, R)
+    R, Phi, drive, theta = zeros(3, 3), zeros(6, 9), memory.drive, memory.theta
+    e_att = write_set_point_wrench(state, goal, regions, gains, memory, R, forces)
     write_regressor(state.quaternion, R, Phi)
-    field, drive, theta = memory.field, memory.drive, memory.theta
-    evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
-    set_point_error(field, gains.inset, gains.limit / gains.k_p1)
-    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
-    # the wrench
-    write_damping(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
-    add_turned(R, field.error, -gains.k_p1, forces)
-    add_turned(R, field.push, 1.0, forces)
     for i in range(6):
         for j in range(9):
             forces[i] += Phi[i, j] * theta[j]
     # the estimate
-    for i in range(6):
-        drive[i] = state.velocity_body[i]
-    add_turned(R, field.error, gains.lambda_p, drive)
-    for i in range(3):
-        drive[3 + i] += gains.lambda_a * e_att[i]
+    write_drive(state, R, e_att, gains.lambda_p, gains.lambda_a, memory)
     for j in range(9):
         k_theta = gains.k_theta if 3 <= j < 6 else gains.k_theta_moment
         for i in range(6):
@@ -117,19 +83,6 @@ def step(
     memory.estimate[0] = -theta[5]
     for i in range(3):
         memory.estimate[1 + i] = theta[i]
-
-
-def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> AntonelliMemory:
-    """Return the memory before the first step; `period` [s] has shape (1,)."""
-    return AntonelliMemory(
-        desired_quaternion=desired_quaternion,
-        period=period,
-        theta=np.zeros(9),
-        estimate=np.zeros(4),
-        report=np.zeros(0),
-        drive=np.zeros(6),
-        field=empty_field(n_regions),
-    )
 
 
 class AntonelliLaw(WrenchLaw):

@@ -12,18 +12,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.potential_field import (
-    Field,
-    add_turned,
-    empty_field,
-    evaluate_field,
-    set_point_error,
-    write_damping,
-)
-from controller.quaternion import error_parts, write_rotation
+from controller.potential_field import PotentialMemory, make_memory, write_set_point_wrench
 from controller.regions.region_set import PackedRegions
 from controller.stack_array import zeros
 
@@ -41,43 +31,17 @@ class PdGains(NamedTuple):
     reach: float = 1.354  # m, clearance at which regions begin to push
 
 
-class PdMemory(NamedTuple):
-    """Work arrays; there is no state between steps."""
-
-    desired_quaternion: Array  # (4,)
-    estimate: Array  # (4,) zeros: the law estimates nothing
-    report: Array  # (0,)
-    field: Field
-
-
 def step(
     state: VehicleState,
     goal: PackedRegions,
     regions: PackedRegions,
     weights: Array,
     gains: PdGains,
-    memory: PdMemory,
+    memory: PotentialMemory,
     forces: Array,
 ) -> None:
     """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
-    R, field = zeros(3, 3), memory.field
-    write_rotation(state.quaternion, R)
-    evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
-    set_point_error(field, gains.inset, gains.limit / gains.k_p1)
-    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
-    write_damping(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
-    add_turned(R, field.error, -gains.k_p1, forces)
-    add_turned(R, field.push, 1.0, forces)
-
-
-def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> PdMemory:
-    """Return the memory before the first step; `period` [s] has shape (1,)."""
-    return PdMemory(
-        desired_quaternion=desired_quaternion,
-        estimate=np.zeros(4),
-        report=np.zeros(0),
-        field=empty_field(n_regions),
-    )
+    write_set_point_wrench(state, goal, regions, gains, memory, zeros(3, 3), forces)
 
 
 class PdLaw(WrenchLaw):

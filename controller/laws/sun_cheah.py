@@ -14,19 +14,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.potential_field import (
-    Field,
-    add_turned,
-    clip_estimate,
-    empty_field,
-    evaluate_field,
-    set_point_error,
-    write_damping,
-)
-from controller.quaternion import error_parts, write_rotation
+from controller.potential_field import PotentialMemory, clip_estimate, make_memory, write_drive, write_set_point_wrench
 from controller.regions.region_set import PackedRegions
 from controller.restoring import write_regressor
 from controller.stack_array import zeros
@@ -50,64 +39,29 @@ class SunCheahGains(NamedTuple):
     reach: float = 1.499  # m, clearance at which regions begin to push
 
 
-class SunCheahMemory(NamedTuple):
-    """State between steps, and work arrays."""
-
-    desired_quaternion: Array  # (4,)
-    period: Array  # (1,) s
-    estimate: Array  # (4,) phi-hat [N, N m]
-    report: Array  # (0,)
-    drive: Array  # (6,) nu + sigma J^T s(e)
-    field: Field
-
-
 def step(
     state: VehicleState,
     goal: PackedRegions,
     regions: PackedRegions,
     weights: Array,
     gains: SunCheahGains,
-    memory: SunCheahMemory,
+    memory: PotentialMemory,
     forces: Array,
 ) -> None:
     """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
-    R, Z = zeros(3, 3), zeros(6, 4)
-    write_rotation(state.quaternion, R)
+    R, Z, drive, estimate = zeros(3, 3), zeros(6, 4), memory.drive, memory.estimate
+    e_att = write_set_point_wrench(state, goal, regions, gains, memory, R, forces)
     write_regressor(state.quaternion, Z)  # (12)
-    field, drive, estimate = memory.field, memory.drive, memory.estimate
-    evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
-    set_point_error(field, gains.inset, gains.limit / gains.k_p1)
-    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
-    # the wrench
-    write_damping(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
-    add_turned(R, field.error, -gains.k_p1, forces)
-    add_turned(R, field.push, 1.0, forces)
     for i in range(6):
         for j in range(4):
             forces[i] += Z[i, j] * estimate[j]
     # the estimate
-    for i in range(6):
-        drive[i] = state.velocity_body[i]
-    add_turned(R, field.error, gains.sigma_p, drive)
-    for i in range(3):
-        drive[3 + i] += gains.sigma_a * e_att[i]
+    write_drive(state, R, e_att, gains.sigma_p, gains.sigma_a, memory)
     for j in range(4):
         for i in range(6):
             estimate[j] -= memory.period[0] / gains.gamma * Z[i, j] * drive[i]
     clip_estimate(estimate, 0, 1, gains.bound)
     clip_estimate(estimate, 1, 4, gains.bound_moment)
-
-
-def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> SunCheahMemory:
-    """Return the memory before the first step; `period` [s] has shape (1,)."""
-    return SunCheahMemory(
-        desired_quaternion=desired_quaternion,
-        period=period,
-        estimate=np.zeros(4),
-        report=np.zeros(0),
-        drive=np.zeros(6),
-        field=empty_field(n_regions),
-    )
 
 
 class SunCheahLaw(WrenchLaw):

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from controller import paper_law
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.paper_law import Gains, positive_part
-from controller.potential_field import Field, clip_estimate, empty_field, evaluate_field, shorten
+from controller.potential_field import PotentialMemory, clip_estimate, evaluate_field, make_memory, shorten
 from controller.quaternion import error_parts, rotation_rows
 from controller.regions.region_set import PackedRegions
 
@@ -36,23 +34,13 @@ class UnarbitratedGains(NamedTuple):
     reach: float = 0.6542  # m, clearance at which regions begin to push
 
 
-class UnarbitratedMemory(NamedTuple):
-    """State between steps, and work arrays."""
-
-    desired_quaternion: Array  # (4,)
-    period: Array  # (1,) s
-    estimate: Array  # (4,) phi-hat [N, N m]
-    report: Array  # (0,)
-    field: Field
-
-
 def step(
     state: VehicleState,
     goal: PackedRegions,
     regions: PackedRegions,
     weights: Array,
     gains: UnarbitratedGains,
-    memory: UnarbitratedMemory,
+    memory: PotentialMemory,
     forces: Array,
 ) -> None:
     """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
@@ -71,17 +59,6 @@ def step(
     paper_law.apply(e_p, e_s, e_att, R, state.velocity_body, g, memory.period[0], estimate, forces)  # (25), (27)
     clip_estimate(estimate, 0, 1, gains.bound)
     clip_estimate(estimate, 1, 4, gains.bound_moment)
-
-
-def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> UnarbitratedMemory:
-    """Return the memory before the first step; `period` [s] has shape (1,)."""
-    return UnarbitratedMemory(
-        desired_quaternion=desired_quaternion,
-        period=period,
-        estimate=np.zeros(4),
-        report=np.zeros(0),
-        field=empty_field(n_regions),
-    )
 
 
 class UnarbitratedLaw(WrenchLaw):

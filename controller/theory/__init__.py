@@ -3,7 +3,6 @@
 Imports: nothing.
 """
 
-from controller.theory.bounds import decay_bound, norm_bound, square_bound
 from controller.theory.conditions import (
     Fit,
     damping_fit,
@@ -34,21 +33,18 @@ __all__ = [
     "coriolis",
     "damping",
     "damping_fit",
-    "decay_bound",
     "error_jacobian_bound",
     "gain_fits",
     "greatest_gradient",
     "lower_bound",
     "mapped_error",
     "mapped_error_rate",
-    "norm_bound",
     "normalized_secondary",
     "potential_fits",
     "primary_value",
     "printed_secondary",
     "secondary_fit",
     "sphere_radii",
-    "square_bound",
     "unit_gradient_secondary",
     "value_rate",
 ]

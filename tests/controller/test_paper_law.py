@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controller import Gains, IsmailDunniganLaw, LawError, VehicleState
-from controller.paper_law import primary_error, primary_potential, secondary_error, secondary_potential, step
+from controller.paper_law import primary_error, secondary_error, step
 from controller.regions import Region, Sphere, pack
 from tests.controller.test_baseline_laws import random_unit
 
@@ -87,11 +87,11 @@ def test_force_at_the_papers_start():
 def test_errors_are_gradients_of_the_potentials():
     """(18) of (16); (19) of (17) where the gradient of g has length 1."""
     h, alphas = 1e-6, np.array([3.0, 5.0])
-    slope = (primary_potential(2.0 + h, 18.8) - primary_potential(2.0 - h, 18.8)) / (2 * h)
+    slope = 18.8 * (max(0.0, 2.0 + h) ** 2 - max(0.0, 2.0 - h) ** 2) / (4 * h)  # (16)
     assert slope == pytest.approx(18.8 * primary_error(2.0, np.ones(1))[0])
     values, unit = np.array([0.3, -0.2]), np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    pushed = [(secondary_potential(values + s * h * axis, alphas)) for axis in np.eye(2) for s in (1, -1)]
-    slopes = np.array([pushed[0] - pushed[1], pushed[2] - pushed[3], 0.0]) / (2 * h)
+    sums = [alphas @ np.maximum(0.0, values + s * h * axis) ** 2 for axis in np.eye(2) for s in (1, -1)]  # (17)
+    slopes = np.array([sums[0] - sums[1], sums[2] - sums[3], 0.0]) / (4 * h)
     assert slopes == pytest.approx(100.0 * secondary_error(values, unit, alphas / 100.0), abs=1e-8)
 
 
