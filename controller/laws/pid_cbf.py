@@ -35,15 +35,7 @@ import numpy as np
 
 from controller import quadratic_program
 from controller.arithmetic import square
-from controller.law import (
-    Array,
-    CompiledLaw,
-    Output,
-    VehicleModel,
-    VehicleState,
-    validate_period,
-    validate_quaternion,
-)
+from controller.law import Array, CompiledLaw, Output, VehicleModel, VehicleState, validate_period, validate_quaternion
 from controller.laws.deployable import model
 from controller.laws.deployable.barrier import (
     RegionObservation,

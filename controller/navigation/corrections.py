@@ -26,15 +26,7 @@ from controller.navigation.estimate import (
     set_first_covariance,
 )
 from controller.navigation.inertial import estimate_at, rotate
-from controller.navigation.measurements import (
-    DEPTH,
-    DEPTH_SENSOR,
-    DVL,
-    HEADING,
-    USBL,
-    Measurements,
-    SensorModel,
-)
+from controller.navigation.measurements import DEPTH, DEPTH_SENSOR, DVL, HEADING, USBL, Measurements, SensorModel
 from controller.navigation.measurements import POSITION as MEASURED_POSITION
 from controller.navigation.measurements import VELOCITY as MEASURED_VELOCITY
 from controller.quaternion import write_rotation

@@ -15,13 +15,7 @@ from numpy.typing import NDArray
 from controller.compiling.function import BoundCall, CompiledFunction
 from controller.errors import RegionError
 from controller.regions.entry import Entry
-from controller.regions.kinds import (
-    DEPTH_BAND,
-    FIRST_OF_ATTITUDE,
-    SPHERE,
-    evaluate_shape,
-    evaluate_shape_of_attitude,
-)
+from controller.regions.kinds import DEPTH_BAND, FIRST_OF_ATTITUDE, SPHERE, evaluate_shape, evaluate_shape_of_attitude
 from controller.regions.mesh import Mesh
 from controller.regions.shape import (
     Array,

@@ -195,10 +195,7 @@ def _always_fires(arbiter: Arbiter) -> bool:
 
 
 def _signals(
-    setup: ArbiterSetup,
-    names: Sequence[str],
-    criteria: Sequence[CriterionSetup],
-    regions: Sequence[SecondaryRegion],
+    setup: ArbiterSetup, names: Sequence[str], criteria: Sequence[CriterionSetup], regions: Sequence[SecondaryRegion]
 ) -> Iterator[InputSignal]:
     places = {"goal": (0, "m")} | {
         region.region.name: (i, "rad" if of_attitude(region.region.shape) else "m")

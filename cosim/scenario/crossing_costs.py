@@ -67,12 +67,7 @@ def _costs(
 
 
 def _input(
-    signal: InputSignal,
-    far: float,
-    asking: set[str],
-    criteria: Sequence[str],
-    of_regions: Sequence[str],
-    depth: float,
+    signal: InputSignal, far: float, asking: set[str], criteria: Sequence[str], of_regions: Sequence[str], depth: float
 ) -> float:
     """Return the value of an input while the criteria `asking` have membership 1; `far` is its upper bound."""
     if signal.kind == "membership":

@@ -119,8 +119,7 @@ class RegionEntry(Table, frozen=True):
     velocity: Annotated[Vector3, key("velocity, north east down; the law receives it", "m/s")] = (0.0, 0.0, 0.0)
     streamed: Annotated[bool, key("moved from outside during the run", more=", below")] = False
     hard: Annotated[
-        bool,
-        key("must not be violated", more="; the paper's law and laws of plain potentials do not use it"),
+        bool, key("must not be violated", more="; the paper's law and laws of plain potentials do not use it")
     ] = True
     deviation: Annotated[
         float | tuple[float, float, float],  # a range beside a tuple makes msgspec read memory that is not its own
@@ -131,10 +130,7 @@ class RegionEntry(Table, frozen=True):
     ] = 0.0  # fmt: skip
     priority: Annotated[
         NonNegative,
-        key(
-            "factor of its violation in the score",
-            more=" `weighted_violation`; neither arbiter nor law receives it",
-        ),
+        key("factor of its violation in the score", more=" `weighted_violation`; neither arbiter nor law receives it"),
     ] = 1.0
 
     def __post_init__(self) -> None:

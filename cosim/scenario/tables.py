@@ -64,8 +64,7 @@ class ArbiterSetup(Table, frozen=True):
         key("`closed`, `exact`, `grid` or `skfuzzy`", more="; see [arbiter.md](arbiter.md#engines)"),
     ] = "closed"
     ramp: Annotated[
-        NonNegative,
-        key("width over which a membership falls outside its region; rad for regions of attitude", "m"),
+        NonNegative, key("width over which a membership falls outside its region; rad for regions of attitude", "m")
     ] = 0.2
     points: Annotated[int, key("samples of the output universe, for `grid` and `skfuzzy`", ge=3, le=MAX_POINTS)] = 101
     rules: Annotated[
@@ -110,8 +109,7 @@ class Actuation(Table, frozen=True):
         ),
     ] = "wrench"
     limits: Annotated[
-        Literal["direction", "per-thruster"],
-        key("`direction` scales all thrusters together, `per-thruster` cuts each"),
+        Literal["direction", "per-thruster"], key("`direction` scales all thrusters together, `per-thruster` cuts each")
     ] = "direction"
 
 
@@ -187,8 +185,7 @@ class Commands(Table, frozen=True):
     ] = False
     await_arm: Annotated[bool, key("nothing moves before it is armed", more="; `--await-arm` sets it")] = False
     obstacles: Annotated[
-        int,
-        key("greatest number of obstacles that commands add during the run, up to 100", ge=0, le=MAX_OBSTACLES),
+        int, key("greatest number of obstacles that commands add during the run, up to 100", ge=0, le=MAX_OBSTACLES)
     ] = 8
     obstacle_radius: Annotated[Positive, key("radius of an obstacle whose size is not given", "m")] = 0.5
     obstacle_gain: Annotated[NonNegative, key("gain of each obstacle, per unit of g", "N")] = 100.0
@@ -197,8 +194,7 @@ class Commands(Table, frozen=True):
         float, key("depth of that sphere's centre in mode surface", "m", ge=0.0, le=1e3)
     ] = 0.5  # fmt: skip
     pilot_gain: Annotated[
-        float,
-        key("part of the greatest wrench along an axis that a full stick commands", ge=0.0, le=1.0),
+        float, key("part of the greatest wrench along an axis that a full stick commands", ge=0.0, le=1.0)
     ] = 0.5
 
 
@@ -319,8 +315,7 @@ class File(Table, frozen=True):
     ] = ()
     compare: Annotated[Literal["", "paper"], key('`"paper"` puts the paper\'s claims beside the run')] = ""
     intersection: Annotated[
-        tuple[str, ...],
-        key("names of the regions, to be kept out of, whose overlap is reported", default="all"),
+        tuple[str, ...], key("names of the regions, to be kept out of, whose overlap is reported", default="all")
     ] = ()
     report_failures: Annotated[bool, key("law and allocation are informed when a thruster fails")] = False
     plant: PlantSetup = PlantSetup()
@@ -338,8 +333,7 @@ class File(Table, frozen=True):
     actuation: Actuation = Actuation()
     sensing: Sensing = Sensing()
     failures: Annotated[
-        tuple[Failure, ...],
-        key("thrusters that fail; only where `thrusters` carry the wrench", default="none"),
+        tuple[Failure, ...], key("thrusters that fail; only where `thrusters` carry the wrench", default="none")
     ] = ()
     outages: Annotated[
         tuple[Outage, ...],

@@ -56,12 +56,7 @@ class Cylinder:
 
     def numbers(self) -> tuple[Number, ...]:
         """Return name and unit of each number of `packed`."""
-        return (
-            *vector("middle", LENGTH),
-            *vector("axis", PART),
-            Number("half_length", *SIZE),
-            Number("radius", *SIZE),
-        )
+        return (*vector("middle", LENGTH), *vector("axis", PART), Number("half_length", *SIZE), Number("radius", *SIZE))
 
     def bounds(self) -> Bounds:
         """Return the corners of the upright box about it."""
