@@ -8,10 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from controller import LAWS, LawError, VehicleState
 from controller.regions import DepthBand, Region, Sphere, pack
+from tests.controller.deployable.scenery import ODIN
 
 IDENTITY = np.array([1.0, 0.0, 0.0, 0.0])
 NAMES = ("pd", "sun_cheah", "unarbitrated", "antonelli")
 ADAPTIVE = NAMES[1:]
+EVERY = (*NAMES, "pid_cbf")
 PERIOD = 0.02
 GOAL = Region("goal", Sphere((8.0, 1.0, 3.0), 0.5), "in")
 ROCK = Region("rock", Sphere((4.0, 0.6, 2.4), 0.8), "out", gain=1.5)
@@ -23,7 +25,7 @@ ADAPTING = {"sun_cheah": QUICK, "unarbitrated": QUICK, "antonelli": {"lambda_p":
 
 def law_of(name, regions=(), desired=IDENTITY, **gains):
     law = LAWS[name]
-    return law.for_vehicle(None, law.gains_type(**gains), desired, PERIOD, len(regions))
+    return law.for_vehicle(ODIN, law.gains_type(**gains), desired, PERIOD, len(regions))
 
 
 def random_unit(rng):
@@ -187,15 +189,16 @@ def test_obstacle_beside_the_path_is_passed_without_contact(name):
     assert np.linalg.norm(positions[-1] - [8.0, 1.0, 3.0]) < 0.5
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", EVERY)
 def test_arbiter_weights_do_not_affect_the_law(name):
-    taus = []
+    given = []
     for weight in (0.0, 1.0):
-        law, tau = law_of(name, (ROCK,)), np.empty(6)
+        law = law_of(name, (ROCK,))
+        forces = np.empty(8 if law.output == "thrusters" else 6)
         state = VehicleState(np.array([3.3, 0.3, 2.2]), IDENTITY, np.zeros(6), np.ones(8))
-        law.step(state, pack([GOAL]), pack([ROCK]), np.array([weight]), tau)
-        taus.append(tau)
-    assert (taus[0] == taus[1]).all()
+        law.step(state, pack([GOAL]), pack([ROCK]), np.array([weight]), forces)
+        given.append(forces)
+    assert (given[0] == given[1]).all() and np.abs(given[0]).max() > 1.0
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -206,21 +209,17 @@ def test_missing_position_gives_nan_force(name):
     assert np.isnan(tau[:3]).all()
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_invalid_gains_are_rejected_by_name(name):
-    fields = LAWS[name].gains_type._fields
-    for gain in fields:
+@pytest.mark.parametrize("name", EVERY)
+def test_invalid_gains_and_setup_are_rejected_by_name(name):
+    law = LAWS[name]
+    for gain in law.gains_type._fields:
         for value in (-1.0, math.nan, math.inf):
             with pytest.raises(LawError, match=rf"law\.gains\.{gain} is"):
                 law_of(name, **{gain: value})
-    for gain in {"k_p1", "gamma", "k_theta", "k_theta_moment"} & set(fields):
+    positive = {"k_p1", "gamma", "k_theta", "k_theta_moment", "observer", "pull_in", "brake"}
+    for gain in positive.intersection(law.gains_type._fields):
         with pytest.raises(LawError, match=rf"{gain} is 0.0, expected a finite number above 0"):
             law_of(name, **{gain: 0.0})
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_invalid_setup_is_rejected(name):
-    law = LAWS[name]
     for attitude, period in ((np.ones(4), PERIOD), (IDENTITY, 0.0)):
-        with pytest.raises(LawError):
-            law.for_vehicle(None, law.gains_type(), attitude, period, 0)
+        with pytest.raises(LawError, match="attitude|quaternion|period"):
+            law.for_vehicle(ODIN, law.gains_type(), attitude, period, 0)
