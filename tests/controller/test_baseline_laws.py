@@ -221,5 +221,5 @@ def test_invalid_gains_and_setup_are_rejected_by_name(name):
         with pytest.raises(LawError, match=rf"{gain} is 0.0, expected a finite number above 0"):
             law_of(name, **{gain: 0.0})
     for attitude, period in ((np.ones(4), PERIOD), (IDENTITY, 0.0)):
-        with pytest.raises(LawError, match="attitude|quaternion|period"):
+        with pytest.raises(LawError, match=r"quaternion|period"):
             law.for_vehicle(ODIN, law.gains_type(), attitude, period, 0)
