@@ -1,15 +1,11 @@
 """Probabilities of rare events against closed forms and plain counting."""
 
-import json
-
 import numpy as np
 import pytest
 from scipy.special import ndtri
 from scipy.stats import chi2, norm
 
-from cosim.campaigns.falsification.spaces import SceneSpace
 from cosim.campaigns.falsification.splitting import estimate_probability
-from cosim.campaigns.scenes.generator import make_scene
 
 DIMENSION = 40
 
@@ -57,32 +53,6 @@ def test_estimates_and_intervals_meet_the_closed_form(cost, probability):
     inside = sum(one.low <= probability <= one.high for one in found)
     assert inside >= 50  # of 60; 95 % would be 57, and P(at most 49 | 90 %) is 3 %
     assert all(one.low < one.probability < one.high for one in found)
-
-
-def crowding(scene):
-    """Return how wide the way is where it is narrowest [m], with what noise, current and failed thruster take of it."""
-    start, goal = np.array(scene["start"]), np.array(scene["goal"]["centre"])
-    way = goal - start
-    centres = np.array([ball["centre"] for ball in scene["obstacles"]])
-    along = np.clip((centres - start) @ way / (way @ way), 0.0, 1.0)
-    gaps = np.linalg.norm(centres - start - along[:, None] * way, axis=1) - [b["radius"] for b in scene["obstacles"]]
-    failed = 0.15 if scene["failed_thruster"]["index"] in (1, 5) else 0.0
-    noise = np.random.default_rng(scene["noise"].get("seed", scene["seed"])).standard_normal()
-    return np.sort(gaps)[:3].mean() - 0.8 * np.hypot(*scene["current"][:2]) - failed + 0.1 * noise
-
-
-@pytest.mark.slow
-def test_intervals_on_scenes_meet_plain_counting():
-    """Scenes have numbers that are whole, obstacles that are drawn again, and noise: the cost has steps."""
-    level = np.quantile([crowding(make_scene(seed, "hard")) for seed in range(5000)], 0.01)
-    space = SceneSpace("hard")
-
-    def cost(points):
-        return np.array([crowding(json.loads(space.line(point, 0))) - level for point in points])
-
-    found = [estimate_probability(cost, space.dimension, 600, seed) for seed in range(8)]
-    assert sum(one.low <= 0.01 <= one.high for one in found) >= 6
-    assert 0.4 < np.mean([one.probability for one in found]) / 0.01 < 2.5
 
 
 def test_large_rate_equals_plain_counting():
