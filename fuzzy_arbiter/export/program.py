@@ -1,7 +1,5 @@
 """Exported code as statements, before they are written in a language; C and Python share the expressions."""
 
-# `least`, `greatest` and `either` are functions of two degrees: their minimum, maximum and probabilistic sum.
-
 from __future__ import annotations
 
 import math
@@ -29,7 +27,13 @@ from fuzzy_arbiter.terms.expressions import code
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.terms.values import Formula, Value
 
-_JOINS = {name: norm.code for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
+# product and sum are written as such, other norms are called
+_JOINS = {
+    name: norm.formula.replace("a", "({0}").replace("b", "{1})")
+    if norm.formula in ("a * b", "a + b")
+    else f"{norm.name}({{}}, {{}})"
+    for name, norm in {**T_NORMS, **AGGREGATIONS}.items()
+}
 _DEEPEST = 20  # greatest number of nested parentheses; parsers accept some hundred
 TABLES = tuple(map(str.upper, Outline._fields))  # names of an outline's tables in code
 _LONGEST = 16  # greatest number of branches of one choice; parsers accept some hundred
@@ -84,7 +88,7 @@ class Program:
     @property
     def mathematical(self) -> bool:
         """True if the program needs functions beyond arithmetic."""
-        plain = {"least", "greatest", "either"}
+        plain = {"least", "greatest", "probabilistic_sum"}
         return not set(self.functions) <= plain or any(o.weighted for o in self.system.outputs)
 
 
