@@ -38,8 +38,8 @@ class Arbiter:
         A Mamdani system, in place of all of the above.
     engine : {"auto", "closed", "exact", "grid", "skfuzzy"}
         ``closed`` is the exact centroid in closed form, for outputs of two complementary terms; ``exact`` the exact
-        centroid of any system; ``grid`` what scikit-fuzzy's sampling gives, without the sampling; ``skfuzzy`` is
-        scikit-fuzzy itself. ``auto`` takes ``closed`` where that is possible, else ``exact``.
+        centroid of any system; ``grid`` sums over samples, as MATLAB does; ``skfuzzy`` is scikit-fuzzy. ``auto`` takes
+        ``closed`` where that is possible, else ``exact``.
 
     Raises
     ------

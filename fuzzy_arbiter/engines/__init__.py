@@ -8,9 +8,11 @@ from __future__ import annotations
 from typing import Literal, get_args
 
 from fuzzy_arbiter.definition import System
+from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
 from fuzzy_arbiter.engines.closed import ClosedEngine, NoClosedFormError
 from fuzzy_arbiter.engines.engine import Engine
-from fuzzy_arbiter.engines.exact import EXACTLY, ExactEngine
+from fuzzy_arbiter.engines.exact import ExactEngine
+from fuzzy_arbiter.engines.grid import GridEngine
 from fuzzy_arbiter.errors import EngineError
 
 EngineName = Literal["auto", "closed", "exact", "grid", "skfuzzy"]
@@ -25,27 +27,17 @@ def choose(system: System, engine: str) -> tuple[Engine, str]:
                 system
             ), "the outputs' cuts are h and 1 - h for all inputs, so that there is a closed form"
         except NoClosedFormError as error:
-            engine_found = ExactEngine(system)
-            said = [f"{name!r}: {how}" for name, how in engine_found.methods.items() if how != EXACTLY]
-            return engine_found, "; ".join([f"there is no closed form: {error.reason}", *said])
+            exact = ExactEngine(system)
+            inexact = [f"{name!r}: {method}" for name, method in exact.methods.items() if method != Centroid.method]
+            return exact, "; ".join([f"there is no closed form: {error.reason}", *inexact])
     if engine not in ENGINES:
         raise EngineError(f"engine is {engine!r}, expected one of {', '.join(ENGINES)}")
-    return _engine(engine)(system), "it was asked for"
-
-
-def _engine(name: str) -> type[Engine]:
-    if name == "closed":
-        return ClosedEngine
-    if name == "exact":
-        return ExactEngine
-    if name == "grid":
-        from fuzzy_arbiter.engines.grid import GridEngine
-
-        return GridEngine
-    try:
-        from fuzzy_arbiter.engines.scikit import ScikitEngine  # a second of imports, for those who ask for it
-    except ModuleNotFoundError as error:
-        raise EngineError(
-            f"engine 'skfuzzy': {error.name} is not installed, expected the extra fuzzy-arbiter[skfuzzy]"
-        ) from None
-    return ScikitEngine
+    if engine == "skfuzzy":
+        try:
+            from fuzzy_arbiter.engines.scikit import ScikitEngine  # a second of imports
+        except ModuleNotFoundError as error:
+            raise EngineError(
+                f"engine 'skfuzzy': {error.name} is not installed, expected the extra fuzzy-arbiter[skfuzzy]"
+            ) from None
+        return ScikitEngine(system), "requested"
+    return {"closed": ClosedEngine, "exact": ExactEngine, "grid": GridEngine}[engine](system), "requested"

@@ -24,8 +24,8 @@ from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.engine import Engine, Shortcut, normalize_weights, normalize_weights_of_many
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.engines.normal_form import Clause, Literal, high_clauses, ladder
-from fuzzy_arbiter.engines.pieces import Piece, pieces
-from fuzzy_arbiter.engines.plain import beyond_plain
+from fuzzy_arbiter.engines.rational_pieces import Piece, pieces
+from fuzzy_arbiter.engines.supported import unsupported_reason
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
@@ -41,6 +41,23 @@ class NoClosedFormError(EngineError):
         self.reason = reason
 
 
+class _OfCut:
+    """C(h) of one output, whose cuts are 1 - h and h."""
+
+    method = "closed form"
+
+    def __init__(self, forms: tuple[Piece, ...]) -> None:
+        self._forms = forms
+
+    def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
+        """Return the value for one sample."""
+        return _value(self._forms, cuts[1])
+
+    def values(self, cuts: Array, inputs: Array) -> Array:
+        """Return the values for many samples."""
+        return _values(self._forms, cuts[1])
+
+
 class ClosedEngine(Engine):
     """Evaluate C(h) for outputs of two terms whose cuts are 1 - h and h, which is proved from the rules."""
 
@@ -54,7 +71,7 @@ class ClosedEngine(Engine):
         self.ladder = ladder(system, clauses)
         self.raw, scaled = _pieces(system.outputs)
         self.scaled = self.raw if system.normalization == "none" else scaled
-        super().__init__(system)
+        super().__init__(system, [_OfCut(forms) for forms in self.raw])
         self._index = {v.name: i for i, v in enumerate(system.inputs)}
         self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
         self._cubic = _one_cubic(self.scaled)
@@ -66,14 +83,6 @@ class ClosedEngine(Engine):
             name, term, affirmed = step
             plain = name == variable.name and affirmed and variable.universe == (0.0, 1.0)
             self._plain = self._plain and plain and self._shapes[name, term] == DEGREE
-
-    def centroid(self, k: int, cuts: Sequence[float]) -> float:
-        """Return C(h) of an output, of which the cuts are 1 - h and h."""
-        return _value(self.raw[k], cuts[1])
-
-    def centroid_of_many(self, k: int, cuts: Array) -> Array:
-        """Return C(h) of an output for many samples, of which the cuts are 1 - h and h."""
-        return _values(self.raw[k], cuts[1])
 
     def centroids(self, inputs: Sequence[float]) -> list[float]:
         """Return the raw value of each output for one sample; see `Engine`."""
@@ -138,8 +147,9 @@ class ClosedEngine(Engine):
             degrees = np.stack([self._degrees(step, inputs) for step in self.ladder])
         else:
             known = {x: self._degrees(x, inputs) for forms in self.clauses for clause in forms for x in clause}
-            least = [[np.min([known[x] for x in clause], axis=0) for clause in forms] for forms in self.clauses]
-            return np.stack([np.max(clauses, axis=0) for clauses in least])
+            return np.stack(
+                [np.max([np.min([known[x] for x in c], axis=0) for c in forms], axis=0) for forms in self.clauses]
+            )
         unclaimed = np.ones(len(inputs))
         rest = np.empty(len(inputs))
         for m in degrees:  # the degrees become the cuts
@@ -156,7 +166,7 @@ class ClosedEngine(Engine):
 
 def _proved(system: System) -> tuple[tuple[Clause, ...], ...] | str:
     """Return the clauses of each output's h, or the reason why there is no h."""
-    if reason := beyond_plain(system, curved_inputs=True):
+    if reason := unsupported_reason(system, curved_inputs=True):
         return reason
     if (system.conjunction, system.disjunction, system.implication) != ("min", "max", "min"):
         return f"norms are {system.conjunction}, {system.disjunction}, {system.implication}, expected min, max, min"

@@ -5,14 +5,13 @@ from __future__ import annotations
 import functools
 import math
 import operator
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
-from fuzzy_arbiter.engines.firing import Array, Firing
+from fuzzy_arbiter.engines.firing import Array, Degrees, Firing
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.terms.values import Constant, Value
 
@@ -21,60 +20,53 @@ _BLOCK = 8192  # number of samples that are evaluated together, so that they sta
 _EACH_BY_ITSELF = ("range", "none")  # normalizations that use one output at a time
 
 
-class Engine(ABC):
-    """A way to evaluate a system; it never changes, so that threads may share it."""
+class Defuzzifier(Protocol):
+    """One value of an output, from the cuts of its slots; inputs and earlier outputs matter to values alone."""
 
-    # Subclasses compute the centroid of one output from the cuts of its terms; this class does the rest.
+    method: str  # how the value is computed, with its error bound
+
+    def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
+        """Return the value for one sample."""
+
+    def values(self, cuts: Array, inputs: Array) -> Array:
+        """Return the values for many samples; cuts (slots, n), inputs (n, inputs and earlier outputs), returns (n,)."""
+
+
+class Engine:
+    """A way to evaluate a system; it never changes, so that threads may share it."""
 
     name: ClassVar[str]
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, defuzzifiers: Sequence[Defuzzifier], degrees: Degrees | None = None) -> None:
         self.system = system
-        self.firing = Firing(system)
+        self.defuzzifiers = defuzzifiers
+        self.firing = Firing(system, degrees)
         self.scale = [] if system.normalization == "none" else [self._ends(k) for k in range(len(system.outputs))]
-
-    @abstractmethod
-    def centroid(self, k: int, cuts: Sequence[float]) -> float:
-        """Return the centroid of an output."""
-
-    @abstractmethod
-    def centroid_of_many(self, k: int, cuts: Array) -> Array:
-        """Return the centroids of an output for many samples; cuts (terms, n), returns (n,)."""
 
     def centroids(self, inputs: Sequence[float]) -> list[float]:
         """Return the raw value of each output for one sample."""
         cuts = self.firing.cuts(self.firing.strengths(inputs))
         result: list[float] = []
-        for k, (output, cut) in enumerate(zip(self.system.outputs, cuts, strict=True)):
-            value = self.value(k, cut, (*inputs, *result)) if any(cut) else math.nan
+        for output, cut, defuzzifier in zip(self.system.outputs, cuts, self.defuzzifiers, strict=True):
+            value = defuzzifier.value(cut, (*inputs, *result)) if any(cut) else math.nan
             if not math.isfinite(value):
                 value = default_of(output)
             result.append(min(max(value, output.universe[0]), output.universe[1]) if output.lock_range else value)
         return result
 
-    def value(self, k: int, cuts: Sequence[float], inputs: Sequence[float]) -> float:
-        """Return the raw value of an output for one sample."""
-        return self.centroid(k, cuts)
-
-    def values(self, k: int, cuts: Array, inputs: Array) -> Array:
-        """Return the raw values of an output for many samples; inputs (n, inputs and k outputs), returns (n,)."""
-        return self.centroid_of_many(k, cuts)
-
     def centroids_of_many(self, inputs: Array) -> Array:
         """Return the raw value of each output for many samples; inputs (n, inputs), returns (n, outputs)."""
         outputs = self.system.outputs
-        if not any(output.weighted for output in outputs):  # whose values may depend on those before
-            result = np.empty((len(inputs), len(outputs)))
-            for start in range(0, len(inputs), _BLOCK):
-                block = slice(start, start + _BLOCK)
-                for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs[block]))):
-                    self._fill_fired(k, cuts, inputs[block], result[block, k])
-            for k in range(len(outputs)):
-                self._fill_defaults(k, result[:, k])
-            return result
         result = np.empty((len(inputs), len(outputs)))
-        for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(inputs))):
-            self._fill_fired(k, cuts, np.column_stack([inputs, result[:, :k]]), result[:, k])
+        sequential = any(output.weighted for output in outputs)  # values may depend on the outputs before them
+        size = max(1, len(inputs)) if sequential else _BLOCK
+        for start in range(0, len(inputs), size):
+            known, block = inputs[start : start + size], result[start : start + size]
+            for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(known))):
+                self._fill_fired(k, cuts, np.column_stack([known, block[:, :k]]) if sequential else known, block[:, k])
+                if sequential:
+                    self._fill_defaults(k, block[:, k])
+        for k in range(0 if sequential else len(outputs)):
             self._fill_defaults(k, result[:, k])
         return result
 
@@ -82,10 +74,10 @@ class Engine(ABC):
         """Fill in the values of an output where rules fire, and NaN where none does."""
         fires = np.asarray(cuts.any(axis=0))
         if fires.all():
-            values[:] = self.values(k, cuts, known)
+            values[:] = self.defuzzifiers[k].values(cuts, known)
         else:
             values[:] = math.nan
-            values[fires] = self.values(k, cuts[:, fires], known[fires])
+            values[fires] = self.defuzzifiers[k].values(cuts[:, fires], known[fires])
 
     def _fill_defaults(self, k: int, values: Array) -> None:
         """Fill in the values before or the default of an output where it has no value, and hold it in its range."""
@@ -122,10 +114,6 @@ class Engine(ABC):
     def __reduce__(self) -> tuple[Any, ...]:
         return type(self), (self.system,)
 
-    def _concluded(self, k: int) -> Sequence[int]:
-        """Return the terms of an output that can be joined alone."""
-        return sorted({slot.term for slot in self.firing.slots[k]})
-
     def _ends(self, k: int) -> tuple[float, float]:
         """Return the centroids that become 0 and 1: of the least and of the greatest term, each alone and whole."""
         output = self.system.outputs[k]
@@ -134,7 +122,9 @@ class Engine(ABC):
                 f"output {output.name!r}: its terms depend on the inputs, which leaves no range to normalize; expected "
                 "normalization 'none'"
             )
-        alone = [self.centroid(k, [float(slot.term == j) for slot in self.firing.slots[k]]) for j in self._concluded(k)]
+        slots, unknown = self.firing.slots[k], [math.nan] * (len(self.system.inputs) + k)
+        terms = sorted({slot.term for slot in slots})
+        alone = [self.defuzzifiers[k].value([float(slot.term == j) for slot in slots], unknown) for j in terms]
         low, high = min(alone), max(alone)
         if not low < high:
             raise EngineError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
@@ -16,6 +16,7 @@ from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
 
 Array = NDArray[np.float64]
+Degrees = Mapping[tuple[str, str], Callable[[float], float]]  # of each input's terms, by the names of both
 D = TypeVar("D")
 
 
@@ -94,11 +95,12 @@ def slots_of(system: System, output: Output) -> tuple[Slot, ...]:
 class Firing:
     """The first half of every engine: degrees of input terms, strengths of rules, cuts of output terms."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, degrees: Degrees | None = None) -> None:
         self.system = system
         self.slots = tuple(slots_of(system, output) for output in system.outputs)
         self._inputs = {v.name: i for i, v in enumerate(system.inputs)}
         self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
+        self._degrees = degrees or self._shapes
         logics = {o: number_logic(o or system) for o in {rule.operators for rule in system.rules}}
         self._rules = [(rule.condition, logics[rule.operators], rule.weight) for rule in system.rules]
         self._joins = [AGGREGATIONS[output.aggregation] for output in system.outputs]
@@ -107,10 +109,10 @@ class Firing:
         """Return the firing strength of each rule for one sample."""
 
         def of(statement: Is) -> float:
-            place = self._inputs.get(statement.variable)
-            if place is None:  # an output: its degree by the rules before this one
+            index = self._inputs.get(statement.variable)
+            if index is None:  # an output: its degree by the rules before this one
                 return float(self._concluded(statement, result, number=True))
-            return self._shapes[statement.variable, statement.term](inputs[place])
+            return self._degrees[statement.variable, statement.term](inputs[index])
 
         result: list[float] = []
         for condition, logic, weight in self._rules:
@@ -119,11 +121,11 @@ class Firing:
 
     def _concluded(self, statement: Is, strengths: Sequence[Any], number: bool) -> Any:
         """Return the joined strength of the rules so far that conclude a statement on an output."""
-        found = [s for s, rule in zip(strengths, self.system.rules, strict=False) if statement in rule.conclusions]
-        if not found:
+        earlier = [s for s, rule in zip(strengths, self.system.rules, strict=False) if statement in rule.conclusions]
+        if not earlier:
             return 0.0 if number else np.zeros_like(strengths[0])
         k = next(k for k, output in enumerate(self.system.outputs) if output.name == statement.variable)
-        return functools.reduce(self._joins[k].number if number else self._joins[k].array, found)
+        return functools.reduce(self._joins[k].number if number else self._joins[k].array, earlier)
 
     def strengths_of_many(self, inputs: Array) -> list[Array]:
         """Return the firing strength of each rule for many samples; inputs (n, inputs), returns (n,)."""

@@ -124,11 +124,11 @@ class Quadrature:
         bound = max(BOUND, 4 * self.precision / self.width)  # places far from 0 are rounded more
         return f"adaptive quadrature, within {bound:g} of the universe's width"
 
-    def value(self, cuts: Sequence[float]) -> float:
-        """Return the output's value for the strengths of the slots of one sample, as `values` does."""
+    def value(self, cuts: Sequence[float], inputs: Sequence[float] = ()) -> float:
+        """Return the output's value for one sample, as `values` does."""
         return float(self.values(np.array(cuts, dtype=np.float64)[:, None])[0])
 
-    def values(self, cuts: Array) -> Array:
+    def values(self, cuts: Array, inputs: Array | None = None) -> Array:
         """Return the output's values for many samples; cuts (slots, n), returns (n,)."""
         count = max(1, _BLOCK // (len(POINTS) * len(self.edges) * max(1, len(cuts))))
         result = np.empty(cuts.shape[1])

@@ -17,6 +17,8 @@ from fuzzy_arbiter.terms.values import Constant, Value, place_of
 class Weighted:
     """The value of one output whose terms are values."""
 
+    method = "weighted values, to rounding"
+
     def __init__(self, output: Output, inputs: Sequence[str], outputs: Sequence[str]) -> None:
         self._mean = output.defuzzifier == "average"
         shapes = [term.shape for term in output.terms]

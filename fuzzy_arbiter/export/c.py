@@ -105,7 +105,7 @@ def _block(
                 known.add(name)
                 yield f"{indent}{kind}{name} = {expression};" + (f" /* {_safe(words)} */" if words else "")
             case Sweep(name, k, cuts, scales):
-                pieces = f"sizeof PLACES_{k} / sizeof *PLACES_{k} - 1"
+                pieces = f"sizeof BREAKPOINTS_{k} / sizeof *BREAKPOINTS_{k} - 1"
                 tables = f"{pieces}, {', '.join(f'{table}_{k}' for table in TABLES)}"
                 yield f"{indent}const double cuts_{k}[] = {{{', '.join(cuts)}}};"
                 function = f"centroid_of_{'scaled' if scales else 'clipped'}"

@@ -11,12 +11,12 @@ from itertools import accumulate
 from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines import choose
+from fuzzy_arbiter.engines.clipped_centroid import Outline, outline
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.engine import Engine
-from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.firing import Logic
-from fuzzy_arbiter.engines.pieces import Piece
-from fuzzy_arbiter.engines.sweep import Outline, outline
+from fuzzy_arbiter.engines.quadrature import Quadrature
+from fuzzy_arbiter.engines.rational_pieces import Piece
 from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
 from fuzzy_arbiter.export.functions import called
 from fuzzy_arbiter.hierarchy import DEGREE
@@ -118,11 +118,11 @@ def _texts(statements: Sequence[Statement]) -> Iterator[str]:
 
 def _require_sayable(system: System, engine: Engine) -> None:
     """Require that the exported code supports a system."""
-    for output, slots in zip(system.outputs, engine.firing.slots, strict=True):
+    for output, slots, defuzzifier in zip(system.outputs, engine.firing.slots, engine.defuzzifiers, strict=True):
         what = f"export: output {output.name!r}"
         if output.lock_previous:
             raise UnsupportedError(f"{what} keeps its previous value, which a function of one sample has not")
-        if isinstance(engine, ExactEngine) and engine.quadrature(output.name):
+        if isinstance(defuzzifier, Quadrature):
             raise UnsupportedError(
                 f"{what} is integrated by quadrature; expected the centroid of piecewise-linear terms under min or "
                 "prod, joined by max, or values"

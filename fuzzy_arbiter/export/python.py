@@ -6,7 +6,7 @@ import inspect
 from collections.abc import Iterator, Sequence
 
 from fuzzy_arbiter.definition import System, variable_names
-from fuzzy_arbiter.engines import sweep
+from fuzzy_arbiter.engines import clipped_centroid
 from fuzzy_arbiter.export.functions import in_python
 from fuzzy_arbiter.export.program import TABLES, Assign, Choose, Program, Return, Statement, Sweep, program
 
@@ -72,13 +72,13 @@ def _module(code: Program) -> Iterator[str]:
     for name in code.functions:
         yield f"\n\n{in_python(name)}"
     if any(code.outlines):
-        yield f"\n\nTINY = {sweep.TINY!r}\nLARGER = {sweep.LARGER!r}"
+        yield f"\n\nTINY = {clipped_centroid.TINY!r}\nLARGER = {clipped_centroid.LARGER!r}"
         for k, shape in enumerate(code.outlines, 1):
             if shape is None:
                 continue
             yield f"\n# knots of the terms of {system.outputs[k - 1].name}, and degrees right and left of them"
             yield from (f"{name}_{k} = {side!r}" for name, side in zip(TABLES, shape, strict=True))
-        for function in (sweep.clipped, sweep.scaled, sweep.centroid):
+        for function in (clipped_centroid.clipped, clipped_centroid.scaled, clipped_centroid.centroid):
             yield f"\n\n{inspect.getsource(function).rstrip()}"
     yield "\n\ndef evaluate(inputs, outputs):"
     yield '    """Fill the outputs; return 0, or -i if the i-th input is bad, or k if the k-th output is undefined."""'

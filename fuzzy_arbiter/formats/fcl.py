@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from fuzzy_arbiter.definition import Output, System, Variable, variable_names
-from fuzzy_arbiter.engines.plain import bent
+from fuzzy_arbiter.engines.supported import bent
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fcl_reader import system_of
 from fuzzy_arbiter.formats.fcl_terms import say_shape, universe_of

@@ -6,7 +6,7 @@ from dataclasses import replace
 from fractions import Fraction
 
 from fuzzy_arbiter.definition import Output, System
-from fuzzy_arbiter.engines.sweep import alone
+from fuzzy_arbiter.engines.clipped_centroid import term_centroids
 from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.term import Term
@@ -59,7 +59,7 @@ def fold_normalization(system: System) -> System:
 
 def range_ends(output: Output) -> tuple[Fraction, Fraction]:
     """Return the centroids that range normalization maps to 0 and 1."""
-    centroids = alone(output, Fraction)
+    centroids = term_centroids(output, Fraction)
     return min(centroids), max(centroids)
 
 

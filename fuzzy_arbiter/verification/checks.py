@@ -10,7 +10,7 @@ import numpy as np
 
 from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.engines.firing import Firing, array_logic
-from fuzzy_arbiter.engines.plain import beyond_plain
+from fuzzy_arbiter.engines.supported import unsupported_reason
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.rule import Operators
@@ -68,7 +68,7 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
     >>> verify(system).complete
     True
     """
-    if reason := beyond_plain(system):
+    if reason := unsupported_reason(system):
         raise UnsupportedError(f"verify: {reason}")
     for variable in (*system.inputs, *system.outputs):
         if len(variable.terms) > MAX_TERMS:

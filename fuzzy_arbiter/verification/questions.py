@@ -10,8 +10,8 @@ from typing import Literal
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
+from fuzzy_arbiter.engines.clipped_centroid import term_centroids
 from fuzzy_arbiter.engines.firing import Firing
-from fuzzy_arbiter.engines.sweep import alone
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.verification.cells import Domain, crisp, graded, rank
@@ -46,7 +46,7 @@ class Effort:
 
 def greatest_term(output: Output) -> str:
     """Return the term of an output with the greatest centroid."""
-    centroids = alone(output)
+    centroids = term_centroids(output)
     return output.term_names[max(range(len(centroids)), key=lambda j: (centroids[j], j))]
 
 

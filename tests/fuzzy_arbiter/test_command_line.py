@@ -77,7 +77,7 @@ def test_show_prints_the_complete_definition(run):
         "engine         closed: ",
     ):
         assert part in out
-    assert "engine         exact: it was asked for" in run("show", "section-vi", "--engine", "exact")[1]
+    assert "engine         exact: requested" in run("show", "section-vi", "--engine", "exact")[1]
 
 
 @pytest.mark.parametrize(

@@ -157,16 +157,16 @@ def test_the_complete_table_differs_by_a_sixth_at_the_most():
 
 
 def test_scikit_fuzzy_error_is_within_the_documented_bound():
-    inputs = np.random.default_rng(0).random((5000, 3))
+    inputs = np.random.default_rng(0).random((200, 3))
     inputs[0] = 1e-4, 0.0, 0.0  # the bound is come near to where h is next to 0
     for points in (3, 11, 101):
         step = 1.0 / (points - 1)
         for normalization, bound in (("none", step**2 / 6.0), ("range", step**2 / 2.0)):
             gap = [
                 Arbiter(points=points, normalization=normalization, engine=engine).batch(inputs)
-                for engine in ("grid", "exact")
+                for engine in ("skfuzzy", "exact")
             ]
-            assert 0.3 * bound < abs(gap[0] - gap[1]).max() <= bound + 1e-15
+            assert 0.3 * bound < abs(gap[0] - gap[1]).max() <= bound + 1e-13
 
 
 def changed(what):

@@ -10,7 +10,7 @@ import pytest
 
 from fuzzy_arbiter import Arbiter, prioritised
 from fuzzy_arbiter.engines.scikit import ScikitEngine
-from tests.fuzzy_arbiter.engines.test_grid import exact_centroid
+from tests.fuzzy_arbiter import reference
 from tests.fuzzy_arbiter.engines.test_scikit import TIP, TIPPING
 
 DATA = Path(__file__).parents[1] / "data" / "fuzzy" / "libraries"
@@ -44,6 +44,14 @@ def test_other_libraries_match_within_their_error(library, system):
     assert errors["100"] / errors["1000"] == pytest.approx(10**order, rel=0.1)
 
 
+@pytest.mark.parametrize("system", SYSTEMS)
+def test_grid_engine_sums_as_simpful_does(system):
+    kept = table("simpful", system)
+    for resolution, theirs in kept["outputs"].items():
+        ours = Arbiter(system=replace(SYSTEMS[system], points=int(resolution)), engine="grid").batch(kept["inputs"])
+        assert ours == pytest.approx(np.array(theirs), abs=1e-12)
+
+
 @pytest.mark.medium
 @pytest.mark.parametrize(("library", "system"), TABLES)
 def test_recorded_tables_match_the_libraries(library, system):
@@ -60,7 +68,7 @@ def test_recorded_tables_match_the_libraries(library, system):
 def test_the_tip_of_scikit_fuzzys_example():
     """Quality 6.5, service 9.8: the documentation says 19.8476 at 26 points, other tools up to 19.9525."""
     exact = Fraction(12118694, 610275)
-    assert exact_centroid(TIP, [0, Fraction(1, 25), Fraction(24, 25)]) == exact
+    assert reference.centroid(TIP, [0, Fraction(1, 25), Fraction(24, 25)]) == exact
     rounding = 16 * np.finfo(float).eps  # moment over area, each the sum of a few parts above zero
     assert Arbiter(system=TIPPING, engine="exact")([6.5, 9.8])[0] == pytest.approx(float(exact), rel=rounding)
     theirs = {points: ScikitEngine(replace(TIPPING, points=points)).centroids([6.5, 9.8])[0] for points in (26, 251)}

@@ -24,7 +24,7 @@ from fuzzy_arbiter import (
 )
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.exact import ExactEngine
-from fuzzy_arbiter.engines.pieces import pieces
+from fuzzy_arbiter.engines.rational_pieces import pieces
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Or
 from tests.examples import examples

@@ -20,8 +20,8 @@ from fuzzy_arbiter import (
     rising,
     triangle,
 )
+from fuzzy_arbiter.engines.clipped_centroid import centroid, outline
 from fuzzy_arbiter.engines.exact import ExactEngine
-from fuzzy_arbiter.engines.sweep import centroid, outline
 from fuzzy_arbiter.errors import EngineError
 from tests.examples import examples
 from tests.fuzzy_arbiter import reference
@@ -87,7 +87,7 @@ def test_cuts_of_any_size_are_exact(terms, data, scaled):
     rule = "if x is on then y is t0"
     on = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
     engine = ExactEngine(System(on, (output,), (rule,), normalization="none", implication="prod" if scaled else "min"))
-    assert engine.centroid_of_many(0, np.array([cuts, cuts]).T).tolist() == [found, found]
+    assert engine.defuzzifiers[0].values(np.array([cuts, cuts]).T, ()).tolist() == [found, found]
 
 
 @pytest.mark.parametrize("cut", [1e-6, 1e-9, 1e-12, 1e-17, 1e-60, 1e-200, 5e-324])
@@ -158,7 +158,7 @@ def test_an_outline_grows_with_the_number_of_terms():
     for n in (10, 1000):
         terms = {f"t{j}": triangle(j - 1.0, float(j), j + 1.0) for j in range(n)}
         shape = outline(Output("y", (0.0, n - 1.0), terms))
-        assert len(shape.places) == 2 * n - 1
+        assert len(shape.breakpoints) == 2 * n - 1
         assert len(shape.term) == 4 * (n - 1)
 
 

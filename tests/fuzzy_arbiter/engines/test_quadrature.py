@@ -271,7 +271,7 @@ def test_piecewise_linear_terms_match_the_exact_sweep(drawn, data):
     output = Output("y", (0.0, 1.0), tuple(Term(f"t{j}", shape) for j, shape in enumerate(drawn)))
     cuts = [data.draw(st.integers(1, 16)) / 16 for _ in drawn]
     engine = ExactEngine(system(output))
-    engine._ways[0] = Quadrature(output, engine.firing.slots[0])
+    engine.defuzzifiers[0] = Quadrature(output, engine.firing.slots[0])
     exact = reference.centroid(output, list(map(Fraction, cuts)))
     assert engine.centroids(cuts)[0] == pytest.approx(float(exact), abs=1e-12)
 
@@ -294,7 +294,12 @@ def test_every_defuzzifier_is_the_limit_of_dense_sampling(defuzzifier, implicati
         expected, off = {"mom": top.mean(), "som": top[0], "lom": top[-1]}[defuzzifier], 6e-3
     if implication == "drastic_product" and not (y > 0).sum() > 3:
         return
-    assert ExactEngine(system(output, implication)).centroids(cuts)[0] == pytest.approx(expected, abs=off)
+    made = system(output, implication)
+    assert ExactEngine(made).centroids(cuts)[0] == pytest.approx(expected, abs=off)
+    made = replace(made, points=4001)
+    grid = Arbiter(system=made, engine="grid")
+    assert grid(cuts)[0] == pytest.approx(expected, abs=max(off, 6e-3))
+    assert grid.batch([cuts, cuts]) == pytest.approx(np.array([grid(cuts)] * 2), abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -1,21 +1,14 @@
 """The scikit-fuzzy engine equals scikit-fuzzy and avoids its known defects."""
 
-import gc
-import multiprocessing
 import pickle
 import subprocess
 import sys
-import threading
-import tracemalloc
-import warnings
 from functools import reduce
 from operator import and_, or_
 
 import numpy as np
 import pytest
 from skfuzzy import control
-from skfuzzy.control.term import Term as ScikitTerm
-from skfuzzy.control.term import WeightedTerm
 
 from fuzzy_arbiter import (
     Criterion,
@@ -36,15 +29,7 @@ from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Not, Or
 from fuzzy_arbiter.rule_text import parse_rule
 
-STATES = (
-    control.Antecedent.input,
-    control.Consequent.output,
-    control.Rule.aggregate_firing,
-    ScikitTerm.membership_value,
-    ScikitTerm.cuts,
-    WeightedTerm.activation,
-)
-
+DEGREE = [Criterion("degree")]
 QUALITY = Variable(
     "quality", (0, 10), (Term("poor", falling(0, 5)), Term("average", triangle(0, 5, 10)), Term("good", rising(5, 10)))
 )
@@ -132,10 +117,6 @@ def stock(system):
     return control.ControlSystem(rules)
 
 
-def sizes():
-    return [len(state.data) for state in STATES]
-
-
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     "system",
@@ -161,15 +142,6 @@ def test_engine_equals_stock_scikit_fuzzy_bit_for_bit(system):
         assert engine.centroids(row) == expected
 
 
-@pytest.mark.slow
-def test_repeated_evaluations_keep_all_inputs():
-    """scikit-fuzzy forgets all inputs when it clears its cache, after 1000 runs."""
-    engine = ScikitEngine(prioritised(points=3))
-    first = engine.centroids([0.1, 0.25, 0.75])
-    for x in np.linspace(0.2, 0.9, 1100).tolist():
-        assert engine.centroids([x, 0.25, 0.75])[0] > first[0]
-
-
 @pytest.mark.parametrize("n", range(1, 6))
 def test_crisp_rows_give_exactly_zero_and_one(n):
     engine = ScikitEngine(prioritised([Criterion(f"c{i}") for i in range(n)], points=50))
@@ -177,6 +149,15 @@ def test_crisp_rows_give_exactly_zero_and_one(n):
         row = [number >> i & 1 for i in range(n)]
         floor = row.index(1) if 1 in row else None
         assert engine.weights(row) == tuple(float(k == floor) for k in range(n))
+
+
+@pytest.mark.parametrize("points", [3, 11, 101, 1001])
+def test_section_vi_is_off_the_exact_centroid_by_a_sixth_of_the_squared_step_at_most(points):
+    step, (sampled,) = 1 / (points - 1), ScikitEngine(prioritised(DEGREE, points=points)).defuzzifiers
+    strengths = np.random.default_rng(points).random(60).tolist()
+    errors = [abs(sampled.value([1 - h, h], ()) - (1 / 3 + h**2 - 2 / 3 * h**3)) for h in strengths]
+    # and no better than half of that, so that the bound means something
+    assert step**2 / 12 <= max(errors) <= step**2 / 6 + 1e-13
 
 
 def gap(default=None):
@@ -243,92 +224,13 @@ def test_systems_unsupported_by_scikit_fuzzy_are_rejected_by_name(system, words)
 def test_edges_at_the_ends_of_an_input_are_no_jumps():
     x = Variable("x", (0, 1), (Term("low", triangle(0, 0, 1)), Term("high", triangle(0, 1, 1))))
     engine = ScikitEngine(System((x,), (TIP,), ("if x is low then tip is low",), normalization="none"))
-    assert engine.centroids([0.0]) == [engine.centroid(0, [1, 0, 0])]
+    assert engine.centroids([0.0]) == [engine.defuzzifiers[0].value([1, 0, 0], ())]
 
 
-@pytest.mark.slow
-def test_threads_do_not_disturb_each_other():
-    engine = ScikitEngine(prioritised(points=11))
-    inputs = np.random.default_rng(0).random((4, 60, 3))
-    expected = engine.centroids_of_many(inputs.reshape(-1, 3)).reshape(4, 60, 3)
-    engine = ScikitEngine(engine.system)
-    found = np.zeros_like(expected)
-
-    def work(i):
-        for row in range(60):
-            found[i, row] = engine.centroids(inputs[i, row])
-
-    threads = [threading.Thread(target=work, args=(i,)) for i in range(4)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    assert found.tolist() == expected.tolist()
-
-
-@pytest.mark.slow
-def test_engines_and_threads_leak_no_memory():
-    """scikit-fuzzy keeps each system that was ever run, 51 KB of it, in dictionaries of its classes."""
-    system = prioritised(points=11)
-
-    def use(engine):
-        engine.weights([0.2, 0.3, 0.4])
-
-    use(ScikitEngine(system))
-    gc.collect()
-    before = sizes(), sum(type(thing) is ScikitTerm for thing in gc.get_objects())
-    kept = ScikitEngine(system)
-    tracemalloc.start()
-    for i in range(60):
-        use(ScikitEngine(system))
-        thread = threading.Thread(target=use, args=(kept,))
-        thread.start()
-        thread.join()
-        if i == 9:
-            gc.collect()
-            early = tracemalloc.get_traced_memory()[0]
-    gc.collect()
-    growth = tracemalloc.get_traced_memory()[0] - early
-    tracemalloc.stop()
-    assert (sizes(), sum(type(thing) is ScikitTerm for thing in gc.get_objects())) == before
-    assert growth < 51_000
-
-
-def test_evaluations_leak_no_state():
-    engine = ScikitEngine(prioritised(points=3))
-    engine.weights([0.1, 0.2, 0.3])
-    before = sizes()
-    for x in np.random.default_rng(2).random((30, 3)):
-        engine.weights(x.tolist())
-    assert sizes() == before
-    mine = list(engine._local.runner._simulation.ctrl.antecedents)
-    for state in STATES:
-        assert all(len(kept._sim_data) == 1 for key, kept in state.data.items() if key in mine)
-
-
-def test_result_cache_is_bounded(monkeypatch):
-    monkeypatch.setattr("fuzzy_arbiter.engines.scikit._REMEMBERED", 5)
-    engine = ScikitEngine(prioritised(points=3))
-    for x in np.linspace(0, 1, 23):
-        engine.weights([x, 0, 0])
-        assert len(engine._local.runner._known) <= 5
-
-
-def test_an_engine_can_be_sent_to_another_process_and_forked():
+def test_an_engine_can_be_sent_to_another_process():
     engine = ScikitEngine(mixed(points=11))
     here = engine.centroids([3.0, 4.0])
     assert pickle.loads(pickle.dumps(engine)).centroids([3.0, 4.0]) == here
-    if "fork" in multiprocessing.get_all_start_methods():
-        ours, theirs = multiprocessing.Pipe()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", DeprecationWarning)  # that this process has threads
-            process = multiprocessing.get_context("fork").Process(
-                target=lambda: theirs.send([engine.centroids([3.0, 4.0]), engine.centroids([3.5, 4.0])])
-            )
-            process.start()
-        assert ours.poll(30)
-        assert ours.recv() == [here, engine.centroids([3.5, 4.0])]
-        process.join()
 
 
 @pytest.mark.slow

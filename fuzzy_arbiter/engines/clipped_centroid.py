@@ -1,4 +1,4 @@
-"""The exact centroid of one output: a sweep over the straight pieces of its joined terms."""
+"""The exact centroid of one output, piece by piece of its straight terms, clipped or scaled."""
 
 # Between two neighbouring knots, or places where two terms' lines meet, the lines l_1, l_2, .. have one order, the
 # highest first. Clipped at their cuts c_1, c_2, .. and joined by the maximum they are a sum of single clipped lines:
@@ -31,7 +31,7 @@ MAX_LINES = 200_000  # greatest number of lines of an outline
 class Outline(NamedTuple):
     """The straight pieces of a variable's terms over its universe."""
 
-    places: tuple[Any, ...]  # knots of the variable
+    breakpoints: tuple[Any, ...]  # knots of the variable
     # index of each piece's first line, and the number of lines; a term that is 0 in a piece has no line there
     first: tuple[int, ...]
     term: tuple[int, ...]  # term of each line, in rising order within a piece
@@ -43,7 +43,7 @@ class Outline(NamedTuple):
 def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outline:
     """Return the straight pieces of a variable's terms over its universe."""
     knots = tuple(map(number, variable.knots))
-    places, first, left, right = [knots[0]], [0], list[Any](), list[Any]()
+    breakpoints, first, left, right = [knots[0]], [0], list[Any](), list[Any]()
     term, order = list[int](), list[int]()
     for a, b, lines in zip(knots, knots[1:], _lines(variable, knots, number), strict=False):
         terms, starts, ends = ([line[k] for line in lines] for k in range(3))
@@ -52,7 +52,7 @@ def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outli
         shares = sorted({knots[0] * 0, knots[0] * 0 + 1, *(share for share in meet if share is not None)})
         for s0, s1 in zip(shares, shares[1:], strict=False):
             at, to = _between(starts, ends, s0), _between(starts, ends, s1)
-            places.append(b if s1 == 1 else a + s1 * (b - a))
+            breakpoints.append(b if s1 == 1 else a + s1 * (b - a))
             order += sorted(
                 range(len(left), len(left) + len(at)), key=lambda i: -(at[i - first[-1]] + to[i - first[-1]])
             )
@@ -61,7 +61,7 @@ def outline(variable: Variable, number: Callable[[float], Any] = float) -> Outli
             right += to
             first.append(len(left))
             _require_few(len(left), variable.name)
-    return Outline(*map(tuple, (places, first, term, left, right, order)))
+    return Outline(*map(tuple, (breakpoints, first, term, left, right, order)))
 
 
 def _lines(variable: Variable, knots: Numbers, number: Callable[[float], Any]) -> list[list[tuple[int, Any, Any]]]:
@@ -120,7 +120,7 @@ def _between(starts: Numbers, ends: Numbers, share: Any) -> list[Any]:
 
 def clipped(
     cuts: Numbers,
-    places: Numbers,
+    breakpoints: Numbers,
     first: Sequence[int],
     term: Sequence[int],
     left: Numbers,
@@ -131,9 +131,9 @@ def clipped(
     zero = cuts[0] * 0
     one = zero + 1
     area = moment = zero
-    for piece in range(len(places) - 1):
-        width = places[piece + 1] - places[piece]
-        start = places[piece] - places[0]
+    for piece in range(len(breakpoints) - 1):
+        width = breakpoints[piece + 1] - breakpoints[piece]
+        start = breakpoints[piece] - breakpoints[0]
         below = zero  # the greatest cut of the lines above
         for i in range(first[piece], first[piece + 1]):
             line = order[i]
@@ -158,15 +158,15 @@ def clipped(
 
 
 def scaled(
-    cuts: Numbers, places: Numbers, first: Sequence[int], term: Sequence[int], left: Numbers, right: Numbers
+    cuts: Numbers, breakpoints: Numbers, first: Sequence[int], term: Sequence[int], left: Numbers, right: Numbers
 ) -> tuple[Any, Any]:
     """Return the area under the envelope of scaled terms, and its moment."""
     zero = cuts[0] * 0
     one = zero + 1
     area = moment = zero
-    for piece in range(len(places) - 1):
-        width = places[piece + 1] - places[piece]
-        start = places[piece] - places[0]
+    for piece in range(len(breakpoints) - 1):
+        width = breakpoints[piece + 1] - breakpoints[piece]
+        start = breakpoints[piece] - breakpoints[0]
         # where the envelope may break, in shares of the piece
         breaks = [zero, one]
         for i in range(first[piece], first[piece + 1]):
@@ -195,7 +195,7 @@ def scaled(
 
 def centroid(
     cuts: Numbers,
-    places: Numbers,
+    breakpoints: Numbers,
     first: Sequence[int],
     term: Sequence[int],
     left: Numbers,
@@ -210,17 +210,17 @@ def centroid(
     if largest < TINY:
         larger = [cut * LARGER for cut in cuts]
         if scales:
-            area, moment = scaled(larger, places, first, term, left, right)
+            area, moment = scaled(larger, breakpoints, first, term, left, right)
         else:
-            area, moment = clipped(larger, places, first, term, left, right, order)
+            area, moment = clipped(larger, breakpoints, first, term, left, right, order)
     elif scales:
-        area, moment = scaled(cuts, places, first, term, left, right)
+        area, moment = scaled(cuts, breakpoints, first, term, left, right)
     else:
-        area, moment = clipped(cuts, places, first, term, left, right, order)
-    return places[0] + moment / area
+        area, moment = clipped(cuts, breakpoints, first, term, left, right, order)
+    return breakpoints[0] + moment / area
 
 
-def alone(output: Variable, number: Callable[[float], Any] = float) -> list[Any]:
+def term_centroids(output: Variable, number: Callable[[float], Any] = float) -> list[Any]:
     """Return the centroid of each of an output's terms, alone and whole."""
     shape = outline(output, number)
     n = len(output.terms)

@@ -10,7 +10,7 @@ from fuzzy_arbiter.terms.curves import Curve
 PLAIN = {"conjunction": ("min", "prod"), "disjunction": ("max", "probor"), "implication": ("min", "prod")}
 
 
-def beyond_plain(system: System, curved_inputs: bool = False) -> str:
+def unsupported_reason(system: System, curved_inputs: bool = False) -> str:
     """Return the first reason why a system is not of the plain kind, which some engines and checks require."""
     for key, known in PLAIN.items():
         if getattr(system, key) not in known:
@@ -33,12 +33,12 @@ def beyond_plain(system: System, curved_inputs: bool = False) -> str:
         if output.lock_previous:
             return f"output {output.name!r} keeps its previous value, expected none that does"
     for variable in (*(() if curved_inputs else system.inputs), *system.outputs):
-        if reason := curved(variable):
+        if reason := curved_term(variable):
             return reason
     return ""
 
 
-def curved(variable: Variable) -> str:
+def curved_term(variable: Variable) -> str:
     """Describe the first term of a variable that is not piecewise linear."""
     for term in variable.terms:
         if not isinstance(term.shape, Shape):

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 from fuzzy_arbiter.definition import Output
-from fuzzy_arbiter.engines.sweep import Outline, alone, clipped, outline
+from fuzzy_arbiter.engines.clipped_centroid import Outline, clipped, outline, term_centroids
 
 Polynomial = tuple[Fraction, ...]  # coefficients of t^0, t^1, ..
 
@@ -44,12 +44,12 @@ def pieces(output: Output) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
         fit = (_fitted(at, areas), _fitted(at, moments))
         if not fits or fit != fits[-1][1:]:
             fits.append((start, *fit))
-    ends = alone(output, Fraction)  # C(0) is of the first term alone, C(1) of the second
-    raw = _forms(fits, shape.places[0], Fraction(1), ends[1])
+    ends = term_centroids(output, Fraction)  # C(0) is of the first term alone, C(1) of the second
+    raw = _forms(fits, shape.breakpoints[0], Fraction(1), ends[1])
     low, high = min(ends), max(ends)
     if low == high:
         return raw, ()
-    return raw, _forms(fits, shape.places[0] - low, high - low, (ends[1] - low) / (high - low))
+    return raw, _forms(fits, shape.breakpoints[0] - low, high - low, (ends[1] - low) / (high - low))
 
 
 def _forms(
