@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
 from collections.abc import Iterable
 
 from fuzzy_arbiter.errors import UnsupportedError
-from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, T_NORMS, conditional
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, T_NORMS, formula
 
 # each by IEEE 754, where Python raises
 _PYTHON = {
@@ -40,29 +42,49 @@ _CALL = re.compile(r"\b([a-z_][a-z_0-9]*)\(")
 def called(texts: Iterable[str]) -> list[str]:
     """Return the functions that some expressions call."""
     names = {name for text in texts for name in _CALL.findall(text) if name not in ("or", "and", "not")}
-    names |= {inner for name in names if name in _OPERATORS for inner in _CALL.findall(_OPERATORS[name].formula)}
+    names |= {inner for name in names if name in _OPERATORS for inner in _CALL.findall(_body_in_c(name))} - {
+        "sqrt",
+        "pow",
+    }
     for name in names:
         if name not in (*_OPERATORS, *_PYTHON, *_COMPARED, *_C_MATH):
             raise UnsupportedError(f"export: the function {name!r} of a formula is not exported")
-    return sorted(names, key=lambda name: (name in _OPERATORS, name))  # an operator calls those before it
+    return sorted(names)  # an operator calls those before it
 
 
 def in_python(name: str) -> str:
     """Return a function as a definition in Python."""
-    if name in _OPERATORS:
-        return f"def {name}({_OPERATORS[name].arguments}):\n    return {conditional(_OPERATORS[name].formula)}"
     if name in _PYTHON:
         return f"def {name}(a, b):\n    " + _PYTHON[name].replace("|", "\n    ")
+    if name in _PYTHON_OF_ONE:
+        return f'def {name}(a):\n    """Return {name} of a number."""\n    {_PYTHON_OF_ONE[name]}'
     if name in _COMPARED:
         said = f"a {_COMPARED[name]} b"
         return f'def {name}(a, b):\n    """Return 1 if {said}, else 0."""\n    return 1.0 if {said} else 0.0'
-    return f'def {name}(a):\n    """Return {name} of a number."""\n    {_PYTHON_OF_ONE[name]}'
+    source = inspect.getsource(_OPERATORS[name].number).rstrip()
+    return re.sub(r"(?<=[ab]): float|( -> float)(?=:)", "", source)
 
 
 def in_c(name: str) -> str:
     """Return a function as a definition in C; empty for one of ``math.h``."""
-    if name in _OPERATORS:
-        arguments = ", ".join(f"double {argument}" for argument in _OPERATORS[name].arguments.split(", "))
-        return f"static inline double {name}({arguments}) {{ return {_OPERATORS[name].formula}; }}"
-    body = _C.get(name) or (f"a {_COMPARED[name]} b" if name in _COMPARED else "")
-    return f"static inline double {name}(double a, double b) {{ return {body}; }}" if body else ""
+    arguments = "double a" if name in HEDGES else "double a, double b"
+    body = _body_in_c(name) if name in _OPERATORS else f"a {_COMPARED[name]} b" if name in _COMPARED else _C.get(name)
+    return f"static inline double {name}({arguments}) {{ return {body}; }}" if body else ""
+
+
+def _body_in_c(name: str) -> str:
+    return _expression_in_c(formula(_OPERATORS[name].number)).replace("math.", "")
+
+
+def _expression_in_c(node: ast.expr) -> str:
+    if isinstance(node, ast.IfExp):
+        return " ".join(
+            (
+                ast.unparse(node.test).replace(" and ", " && "),
+                "?",
+                ast.unparse(node.body),
+                ":",
+                _expression_in_c(node.orelse),
+            )
+        )
+    return ast.unparse(node)

@@ -27,13 +27,8 @@ from fuzzy_arbiter.terms.expressions import code
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.terms.values import Formula, Value
 
-# product and sum are written as such, other norms are called
-_JOINS = {
-    name: norm.formula.replace("a", "({0}").replace("b", "{1})")
-    if norm.formula in ("a * b", "a + b")
-    else f"{norm.name}({{}}, {{}})"
-    for name, norm in {**T_NORMS, **AGGREGATIONS}.items()
-}
+_JOINS = {name: f"{norm.name}({{}}, {{}})" for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
+_JOINS |= {"prod": "({} * {})", "sum": "({} + {})"}
 _DEEPEST = 20  # greatest number of nested parentheses; parsers accept some hundred
 TABLES = tuple(map(str.upper, Outline._fields))  # names of an outline's tables in code
 _LONGEST = 16  # greatest number of branches of one choice; parsers accept some hundred

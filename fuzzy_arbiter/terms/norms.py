@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,53 +15,73 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-# what a formula may call, on numbers and on arrays; norms join these when they are defined
-_NUMBERS: dict[str, Any] = {"sqrt": math.sqrt, "power": math.pow}
-_ARRAYS: dict[str, Any] = {
-    "sqrt": np.sqrt,
-    "power": np.power,
-    "where": np.where,
-    "minimum": np.minimum,
-    "maximum": np.maximum,
-}
+_ARITHMETIC: dict[type[ast.AST], Any] = {
+    ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide,
+    ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal, ast.Eq: np.equal,
+}  # fmt: skip
+_FUNCTIONS: dict[str, Any] = {"sqrt": np.sqrt, "pow": np.power}
 
 
-def conditional(formula: str) -> str:
-    """Format a formula as Python: ``c ? a : b`` is a conditional expression."""
-    condition, sign, rest = formula.partition(" ? ")
-    yes, _, no = rest.partition(" : ")
-    return f"{yes} if {condition.replace('&&', 'and')} else {conditional(no)}" if sign else formula
+@cache
+def formula(number: Callable[..., float]) -> ast.expr:
+    """Return the expression that a function of numbers returns."""
+    (function,) = ast.parse(inspect.getsource(number)).body
+    assert isinstance(function, ast.FunctionDef)
+    returned = function.body[-1]
+    assert isinstance(returned, ast.Return) and returned.value is not None
+    return returned.value
 
 
-def _vectorized(formula: str) -> str:
-    """Format a formula as NumPy, which evaluates both branches."""
-    condition, sign, rest = formula.partition(" ? ")
-    yes, _, no = rest.partition(" : ")
-    for comparison, function in ((" < ", "minimum"), (" > ", "maximum")):
-        if condition.split(comparison) == [yes, no]:
-            return f"{function}({yes}, {no})"
-    masks = " & ".join(f"({part})" for part in condition.split(" && "))
-    return f"where({masks}, {yes}, {_vectorized(no)})" if sign else formula
+@cache
+def _on_arrays(number: Callable[..., float]) -> Callable[[dict[str, Any]], Any]:
+    return _vectorized(formula(number))
+
+
+def _vectorized(node: ast.expr) -> Callable[[dict[str, Any]], Any]:
+    """Return a function that evaluates an expression on arrays by name, both branches of a condition."""
+    match node:
+        case ast.Constant(value):
+            return lambda values: value
+        case ast.Name(name):
+            return lambda values: values[name]
+        case ast.Call(ast.Name(name), arguments):
+            called = globals()[name]
+            names, inner = list(inspect.signature(called).parameters), [_vectorized(part) for part in arguments]
+            body = _on_arrays(called)
+            return lambda values: body({key: part(values) for key, part in zip(names, inner, strict=True)})
+        case ast.Call(ast.Attribute(_, name), arguments):
+            function, parts = _FUNCTIONS[name], [_vectorized(part) for part in arguments]
+        case ast.IfExp(ast.Compare(left, [ast.Lt() | ast.Gt() as sign], [right]), yes, no) if ast.dump(
+            left
+        ) == ast.dump(yes) and ast.dump(right) == ast.dump(no):
+            function = np.minimum if isinstance(sign, ast.Lt) else np.maximum
+            parts = [_vectorized(yes), _vectorized(no)]
+        case ast.IfExp(test, yes, no):
+            function, parts = np.where, [_vectorized(part) for part in (test, yes, no)]
+        case ast.BoolOp(ast.And(), [left, right]):
+            function, parts = np.logical_and, [_vectorized(left), _vectorized(right)]
+        case ast.BinOp(left, sign, right) | ast.Compare(left, [sign], [right]):
+            function, parts = _ARITHMETIC[type(sign)], [_vectorized(left), _vectorized(right)]
+        case _:
+            raise NotImplementedError(ast.dump(node))
+    return lambda values: function(*[part(values) for part in parts])
 
 
 @dataclass(frozen=True, slots=True)
 class Operator:
     """An operator on degrees ``a`` and, for a norm, ``b``."""
 
-    name: str  # name of the function in exported code
-    formula: str  # in the arithmetic that C and Python share, with C's conditional expressions
-    arguments: str
-    number: Callable[..., float] = field(init=False, compare=False)
-    array: Callable[..., Array] = field(init=False, compare=False)  # on arrays, or an array and a float
+    number: Callable[..., float]  # on numbers, in one expression, from which all else follows
 
-    def __post_init__(self) -> None:
-        number = eval(f"lambda {self.arguments}: {conditional(self.formula)}", _NUMBERS)  # noqa: S307
-        array = eval(f"lambda {self.arguments}: {_vectorized(self.formula)}", _ARRAYS)  # noqa: S307
-        if "/" in self.formula:
-            array = np.errstate(all="ignore")(array)
-        _NUMBERS[self.name], _ARRAYS[self.name] = number, array
-        object.__setattr__(self, "number", number)
-        object.__setattr__(self, "array", array)
+    @property
+    def name(self) -> str:
+        """Name of the function in exported code."""
+        return self.number.__name__
+
+    def array(self, *degrees: Any) -> Array:
+        """Return the result for arrays, or an array and a number, of each as `number` gives it."""
+        with np.errstate(all="ignore"):
+            return np.asarray(_on_arrays(self.number)(dict(zip("ab", degrees, strict=False))))
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,47 +90,148 @@ class Norm(Operator):
 
     fll: str
     fcl: str
-    fis: str  # Octave's word, and MATLAB's where it has one
+    own_fis: str = ""
+
+    @property
+    def fis(self) -> str:
+        """Octave's word, and MATLAB's where it has one."""
+        return self.own_fis or self.name
 
 
-def _norm(name: str, formula: str, fll: str, fcl: str, fis: str = "") -> Norm:
-    return Norm(name, formula, "a, b", fll, fcl, fis or name)
+def least(a: float, b: float) -> float:
+    """Return the lesser degree."""
+    return a if a < b else b
+
+
+def product(a: float, b: float) -> float:
+    """Return a b."""
+    return a * b
+
+
+def bounded_difference(a: float, b: float) -> float:
+    """Return max(0, a + b - 1)."""
+    return a + b - 1.0 if a + b > 1.0 else 0.0
+
+
+def drastic_product(a: float, b: float) -> float:
+    """Return the other degree where one is 1, else 0."""
+    return b if a == 1.0 else a if b == 1.0 else 0.0
+
+
+def einstein_product(a: float, b: float) -> float:
+    """Return a b / (1 + (1 - a) (1 - b))."""
+    return a * b / (1.0 + (1.0 - a) * (1.0 - b))
+
+
+def hamacher_product(a: float, b: float) -> float:
+    """Return 1 / (1/a + 1/b - 1), and 0 where one is 0."""
+    return 1.0 / (1.0 / a + 1.0 / b - 1.0) if a > 1e-308 and b > 1e-308 else 0.0
+
+
+def nilpotent_minimum(a: float, b: float) -> float:
+    """Return the lesser degree where both sum to more than 1, else 0."""
+    return 0.0 if a + b <= 1.0 else a if a < b else b
+
+
+def greatest(a: float, b: float) -> float:
+    """Return the greater degree."""
+    return a if a > b else b
+
+
+def probabilistic_sum(a: float, b: float) -> float:
+    """Return a + b - a b."""
+    return a + b - a * b
+
+
+def bounded_sum(a: float, b: float) -> float:
+    """Return min(1, a + b)."""
+    return a + b if a + b < 1.0 else 1.0
+
+
+def drastic_sum(a: float, b: float) -> float:
+    """Return the other degree where one is 0, else 1."""
+    return b if a == 0.0 else a if b == 0.0 else 1.0
+
+
+def einstein_sum(a: float, b: float) -> float:
+    """Return (a + b) / (1 + a b)."""
+    return (a + b) / (1.0 + a * b)
+
+
+def hamacher_sum(a: float, b: float) -> float:
+    """Return (a + b - 2 a b) / (1 - a b); near two ones that is 1 less the product of what lacks."""
+    return (a * (1.0 - b) + b * (1.0 - a)) / (1.0 - a * b) if a + b <= 1.0 else 1.0 - hamacher_product(1.0 - a, 1.0 - b)
+
+
+def nilpotent_maximum(a: float, b: float) -> float:
+    """Return the greater degree where both sum to less than 1, else 1."""
+    return 1.0 if a + b >= 1.0 else a if a > b else b
+
+
+def normalized_sum(a: float, b: float) -> float:
+    """Return (a + b) / max(1, a + b)."""
+    return (a + b) / greatest(1.0, a + b)
+
+
+def unbounded_sum(a: float, b: float) -> float:
+    """Return a + b."""
+    return a + b
+
+
+def very(a: float) -> float:
+    """Return a^2."""
+    return a * a
+
+
+def somewhat(a: float) -> float:
+    """Return the square root."""
+    return math.sqrt(a)
+
+
+def extremely(a: float) -> float:
+    """Return 2 a^2 up to 1/2, and from there 1 - 2 (1 - a)^2."""
+    return 2.0 * a * a if a <= 0.5 else 1.0 - 2.0 * (1.0 - a) * (1.0 - a)
+
+
+def seldom(a: float) -> float:
+    """Return sqrt(a / 2) up to 1/2, and from there 1 - sqrt((1 - a) / 2)."""
+    return math.sqrt(0.5 * a) if a <= 0.5 else 1.0 - math.sqrt(0.5 * (1.0 - a))
+
+
+def cubed(a: float) -> float:
+    """Return a^3."""
+    return a * a * a
+
+
+def cube_root(a: float) -> float:
+    """Return the cube root."""
+    return math.pow(a, 1.0 / 3.0)
 
 
 T_NORMS: dict[str, Norm] = {
-    "min": _norm("least", "a < b ? a : b", "Minimum", "MIN", "min"),
-    "prod": _norm("product", "a * b", "AlgebraicProduct", "PROD", "prod"),
-    "bounded_difference": _norm("bounded_difference", "a + b > 1.0 ? a + b - 1.0 : 0.0", "BoundedDifference", "BDIF"),
-    "drastic_product": _norm("drastic_product", "a == 1.0 ? b : b == 1.0 ? a : 0.0", "DrasticProduct", "DMIN"),
-    "einstein_product": _norm("einstein_product", "a * b / (1.0 + (1.0 - a) * (1.0 - b))", "EinsteinProduct", "EPROD"),
-    "hamacher_product": _norm(
-        "hamacher_product",
-        "a > 1e-308 && b > 1e-308 ? 1.0 / (1.0 / a + 1.0 / b - 1.0) : 0.0",
-        *("HamacherProduct", "HAMACHER"),
-    ),
-    "nilpotent_minimum": _norm("nilpotent_minimum", "a + b <= 1.0 ? 0.0 : a < b ? a : b", "NilpotentMinimum", "NIPMIN"),
+    "min": Norm(least, "Minimum", "MIN", "min"),
+    "prod": Norm(product, "AlgebraicProduct", "PROD", "prod"),
+    "bounded_difference": Norm(bounded_difference, "BoundedDifference", "BDIF"),
+    "drastic_product": Norm(drastic_product, "DrasticProduct", "DMIN"),
+    "einstein_product": Norm(einstein_product, "EinsteinProduct", "EPROD"),
+    "hamacher_product": Norm(hamacher_product, "HamacherProduct", "HAMACHER"),
+    "nilpotent_minimum": Norm(nilpotent_minimum, "NilpotentMinimum", "NIPMIN"),
 }
 """Those for *and* and for implication, by name."""
 
 S_NORMS: dict[str, Norm] = {
-    "max": _norm("greatest", "a > b ? a : b", "Maximum", "MAX", "max"),
-    "probor": _norm("probabilistic_sum", "a + b - a * b", "AlgebraicSum", "ASUM", "probor"),
-    "bounded_sum": _norm("bounded_sum", "a + b < 1.0 ? a + b : 1.0", "BoundedSum", "BSUM"),
-    "drastic_sum": _norm("drastic_sum", "a == 0.0 ? b : b == 0.0 ? a : 1.0", "DrasticSum", "DMAX"),
-    "einstein_sum": _norm("einstein_sum", "(a + b) / (1.0 + a * b)", "EinsteinSum", "EINSTEIN"),
-    # near two ones it is 1 less the product of what lacks, which does not cancel
-    "hamacher_sum": _norm(
-        "hamacher_sum",
-        "a + b <= 1.0 ? (a * (1.0 - b) + b * (1.0 - a)) / (1.0 - a * b) : 1.0 - hamacher_product(1.0 - a, 1.0 - b)",
-        *("HamacherSum", "HSUM"),
-    ),
-    "nilpotent_maximum": _norm("nilpotent_maximum", "a + b >= 1.0 ? 1.0 : a > b ? a : b", "NilpotentMaximum", "NIPMAX"),
-    "normalized_sum": _norm("normalized_sum", "(a + b) / greatest(1.0, a + b)", "NormalizedSum", "NSUM"),
+    "max": Norm(greatest, "Maximum", "MAX", "max"),
+    "probor": Norm(probabilistic_sum, "AlgebraicSum", "ASUM", "probor"),
+    "bounded_sum": Norm(bounded_sum, "BoundedSum", "BSUM"),
+    "drastic_sum": Norm(drastic_sum, "DrasticSum", "DMAX"),
+    "einstein_sum": Norm(einstein_sum, "EinsteinSum", "EINSTEIN"),
+    "hamacher_sum": Norm(hamacher_sum, "HamacherSum", "HSUM"),
+    "nilpotent_maximum": Norm(nilpotent_maximum, "NilpotentMaximum", "NIPMAX"),
+    "normalized_sum": Norm(normalized_sum, "NormalizedSum", "NSUM"),
 }
 """Those for *or* and for aggregation, by name."""
 
-SUM = _norm("unbounded_sum", "a + b", "UnboundedSum", "SUM", "sum")
-AGGREGATIONS: dict[str, Norm] = {**S_NORMS, "sum": SUM}
+AGGREGATIONS: dict[str, Norm] = {**S_NORMS, "sum": Norm(unbounded_sum, "UnboundedSum", "SUM", "sum")}
 """Those that join the terms of an output: of these a plain sum may exceed 1."""
 
 
@@ -118,15 +242,12 @@ class Hedge(Operator):
     fll: bool = True  # True if fuzzylite has the hedge
 
 
-_FORMULAS = {
-    "very": "a * a",
-    "somewhat": "sqrt(a)",
-    "extremely": "a <= 0.5 ? 2.0 * a * a : 1.0 - 2.0 * (1.0 - a) * (1.0 - a)",
-    "seldom": "a <= 0.5 ? sqrt(0.5 * a) : 1.0 - sqrt(0.5 * (1.0 - a))",
-    "cubed": "a * a * a",  # Octave's *extremely*
-    "cube_root": "power(a, 1.0 / 3.0)",
-}
 HEDGES: dict[str, Hedge] = {
-    name: Hedge(name, formula, "a", fll=not name.startswith("cube")) for name, formula in _FORMULAS.items()
+    "very": Hedge(very),
+    "somewhat": Hedge(somewhat),
+    "extremely": Hedge(extremely),
+    "seldom": Hedge(seldom),
+    "cubed": Hedge(cubed, fll=False),  # Octave's *extremely*
+    "cube_root": Hedge(cube_root, fll=False),
 }
 """Hedges by their word; *not* and *any* are propositions of their own."""
