@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from controller import CompiledLaw, LawError
 from controller.navigation.measurements import SENSORS
@@ -14,8 +14,7 @@ from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
 from cosim.ssp.documentation import contents
-from cosim.ssp.shape_parameters import shape_numbers
-from cosim.ssp.translated import Places, Translated, translate_loop
+from cosim.ssp.translated import Translated, translate_loop
 from plant_fmu import quantities as q
 from plant_fmu.compiling.sources import plant_sources
 from plant_fmu.component import Component
@@ -49,7 +48,7 @@ def controller_component(scenario: Scenario) -> Component:
     """Make the component of a scenario's controller."""
     regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
     translated = translate_loop(scenario, regions, prefixes(regions))
-    rows = tuple(_variables(scenario, regions, translated.places))
+    rows = tuple(_variables(scenario, regions, translated.constants))
     return Component(
         name="controller",
         description=f"Law {scenario.law.name} of the scenario: {scenario.title}",
@@ -84,7 +83,7 @@ def _sources(translated: Translated) -> dict[str, bytes]:
     }
 
 
-def _variables(scenario: Scenario, regions: Sequence[Region], places: Places) -> Iterator[Variable]:
+def _variables(scenario: Scenario, regions: Sequence[Region], indices: Mapping[str, int]) -> Iterator[Variable]:
     yield Variable("time", "time", "time", q.TIME, "Simulated time")
     yield from _motion("", "input", "inputs.motion", [0.0] * 13, "The vehicle's")
     if scenario.sensing.through == "sensors":
@@ -92,8 +91,8 @@ def _variables(scenario: Scenario, regions: Sequence[Region], places: Places) ->
     for i, name in enumerate(scenario.criterion_names):
         yield Variable(f"weight.{name}", "input", f"inputs.weights[{i}]", q.FRACTION, f"Weight of criterion {name}")
     yield from _outputs(scenario, regions)
-    yield from _parameters(scenario, places)
-    yield from _region_parameters(regions, places)
+    yield from _parameters(scenario, indices)
+    yield from _region_parameters(regions, indices)
 
 
 def _samples(scenario: Scenario) -> Iterator[Variable]:
@@ -157,7 +156,7 @@ def _parameter(name: str, member: str, quantity: Quantity, description: str, sta
     return Variable(name, "parameter", member, quantity, description, float(start))
 
 
-def _parameters(scenario: Scenario, places: Places) -> Iterator[Variable]:
+def _parameters(scenario: Scenario, indices: Mapping[str, int]) -> Iterator[Variable]:
     law, said = law_of(scenario), comments(scenario.law.name, scenario.vehicle)
     for i, (name, start) in enumerate(law.gains._asdict().items()):
         unit = unit_of_gain(law.name, name).replace(" ", ".")
@@ -169,7 +168,7 @@ def _parameters(scenario: Scenario, places: Places) -> Iterator[Variable]:
         yield _parameter(f"law.gains.{name}", f"parameters.gains[{i}]", quantity, description, start)
     for i, start in enumerate(scenario.law.desired_quaternion):
         description = f"Attitude to be kept, as unit quaternion from body to world, part {i}"
-        member = f"numbers[{places.desired + i}]"
+        member = f"numbers[{indices['AT_DESIRED'] + i}]"
         yield _parameter(f"law.desired_quaternion.e{i}", member, q.QUATERNION, description, start)
     description = "Width over which a membership falls from 1 to 0 outside a region [m], rad for regions of attitude"
     ramp = Quantity("", 0.0, 1e6)
@@ -195,22 +194,22 @@ def _without_unit(comment: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _region_parameters(regions: Sequence[Region], places: Places) -> Iterator[Variable]:
+def _region_parameters(regions: Sequence[Region], indices: Mapping[str, int]) -> Iterator[Variable]:
     number = 0
     for i, (region, prefix) in enumerate(zip(regions, prefixes(regions), strict=True)):
         if i:
             quantity = Quantity(_GAIN_UNITS[region.shape.unit], 0.0, _MOST)
-            member = f"numbers[{places.region_gains + i - 1}]"
+            member = f"numbers[{indices['AT_REGION_GAINS'] + i - 1}]"
             yield _parameter(f"{prefix}.gain", member, quantity, f"Gain of {region.name}", region.gain)
-        first = places.region_velocities + 3 * (i - 1) if i else places.goal_velocities
+        first = indices["AT_REGION_VELOCITIES"] + 3 * (i - 1) if i else indices["AT_GOAL_VELOCITIES"]
         for j, axis in enumerate(AXES):
             description = f"How fast {region.name} moves, {('north', 'east', 'down')[j]}"
             yield _parameter(
                 f"{prefix}.velocity.{axis}", f"numbers[{first + j}]", q.SPEED, description, region.velocity[j]
             )
-        first = places.region_numbers if i else places.goal_numbers
-        for (name, quantity), start in zip(shape_numbers(region.shape), region.shape.packed(), strict=True):
-            description = f"Of the shape of {region.name}, where it is at time 0"
+        first = indices["AT_REGION_NUMBERS"] if i else indices["AT_GOAL_NUMBERS"]
+        for (name, unit, low, high, _), start in zip(region.shape.numbers(), region.shape.packed(), strict=True):
+            description, quantity = f"Of the shape of {region.name}, where it is at time 0", Quantity(unit, low, high)
             yield _parameter(f"{prefix}.shape.{name}", f"numbers[{first + number}]", quantity, description, start)
             number += 1
         if not i:

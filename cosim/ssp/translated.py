@@ -26,32 +26,18 @@ _NONE = -1  # place of an array that a law does not have
 
 
 @dataclass(frozen=True)
-class Places:
-    """Places of arrays in the model's numbers; `constants` by their names in C."""
-
-    constants: dict[str, int]
-    goal_numbers: int
-    region_numbers: int
-    region_gains: int
-    goal_velocities: int
-    region_velocities: int
-    desired: int
-
-
-@dataclass(frozen=True)
 class Translated:
-    """C files, and the places of their arrays."""
+    """C files, with the constants of their header."""
 
     files: dict[str, str]  # C files and headers by name
-    constants: dict[str, int]  # macros of the generated header
-    places: Places
+    constants: dict[str, int]  # sizes, and as AT_ the index of each array in the model's numbers
 
 
 def translate_loop(scenario: Scenario, regions: Sequence[Region], names: Sequence[str]) -> Translated:
     """Translate the loop of a scenario."""
     loop = Loop(scenario)
     memory = Memory()
-    places = _place(loop, memory, scenario)
+    indices = _index_arrays(loop, memory, scenario)
     program, declared, calls = Program(), [], []
     for name, (function, arguments) in loop.functions.items():
         program.export(f"translated_{name}", function, tuple(map(type_of, arguments)))
@@ -81,7 +67,7 @@ def translate_loop(scenario: Scenario, regions: Sequence[Region], names: Sequenc
         "",
     ])  # fmt: skip
     constants = {
-        **places.constants,
+        **indices,
         **memory.sizes(),
         "N_GAINS": max(len(loop.law.gains), 1),
         "N_THRUSTERS": scenario.vehicle.n_thrusters,
@@ -89,7 +75,7 @@ def translate_loop(scenario: Scenario, regions: Sequence[Region], names: Sequenc
         "N_CRITERIA": len(scenario.criteria),
         "N_RULE_INPUTS": loop.signals.inputs.size,
     }
-    return Translated({"loop.c": code, "loop.h": header}, constants, places)
+    return Translated({"loop.c": code, "loop.h": header}, constants)
 
 
 _REWIND = """\
@@ -103,29 +89,21 @@ void control_rewind(Model *m)
 """
 
 
-def _place(loop: Loop, memory: Memory, scenario: Scenario) -> Places:
-    """Place all arrays: parameters, then variables; other arrays of regions, inputs and allocation are constants."""
+def _index_arrays(loop: Loop, memory: Memory, scenario: Scenario) -> dict[str, int]:
+    """Index all arrays: parameters, then variables; other arrays of regions, inputs and allocation are constants."""
     keep, (goal, regions), law = memory.keep, (loop.setup.goal, loop.setup.regions), loop.law
     desired, period = _desired(law, scenario), getattr(law.memory, "period", None)
-    parameters = {
-        "goal_numbers": keep(goal.numbers),
-        "region_numbers": keep(regions.numbers),
-        "region_gains": keep(regions.gains),
-        "goal_velocities": keep(goal.velocities),
-        "region_velocities": keep(regions.velocities),
-        "desired": keep(desired),
-    }
-    size = memory.size
     ramps, state, inputs = loop.setup.inputs.memberships.ramps, loop.state, loop.setup.inputs
     expects = law.expected if any(law.expected is array for array in arrays_of(law.memory)) else None
     navigates = loop.setup.through_sensors
-    constants = {
-        "N_PARAMETERS": size,
-        "AT_GOAL_NUMBERS": parameters["goal_numbers"],
-        "AT_REGION_NUMBERS": parameters["region_numbers"],
-        "AT_GOAL_VELOCITIES": parameters["goal_velocities"],
-        "AT_REGION_VELOCITIES": parameters["region_velocities"],
-        "AT_DESIRED": parameters["desired"],
+    indices = {
+        "AT_GOAL_NUMBERS": keep(goal.numbers),
+        "AT_REGION_NUMBERS": keep(regions.numbers),
+        "AT_REGION_GAINS": keep(regions.gains),
+        "AT_GOAL_VELOCITIES": keep(goal.velocities),
+        "AT_REGION_VELOCITIES": keep(regions.velocities),
+        "AT_DESIRED": keep(desired),
+        "N_PARAMETERS": memory.size,  # before any variable
         "AT_PERIOD": _NONE if period is None else keep(period),
         "AT_RAMPS": keep(ramps),
         "AT_POSITION": keep(state.position),
@@ -156,7 +134,7 @@ def _place(loop: Loop, memory: Memory, scenario: Scenario) -> Places:
     for array in arrays_of((law.memory, state)):
         keep(array)
     memory.fix(goal, regions, inputs, loop.allocator)
-    return Places(constants, **parameters)
+    return indices
 
 
 def _desired(law: CompiledLaw, scenario: Scenario) -> np.ndarray:

@@ -112,12 +112,10 @@ def _pe(data: bytes) -> Library:
 
 
 def _mach_o(data: bytes) -> Library:
-    magic, processor, _, kind, count, _, _, _ = struct.unpack_from("<8I", data)
+    magic, processor, _, kind = struct.unpack_from("<4I", data)
     assert magic == 0xFEEDFACF and kind == 6  # a dynamic library of 64 bits
     library = Library({0x01000007: "x86_64", 0x0100000C: "aarch64"}[processor])
-    at = 32
-    for _ in range(count):
-        command, size = struct.unpack_from("<II", data, at)
+    for command, at, _ in commands(data):
         if command in (0xC, 0xD):  # a library it loads, its own name
             name = _text(data, at + struct.unpack_from("<I", data, at + 8)[0])
             if command == 0xC:
@@ -133,7 +131,6 @@ def _mach_o(data: bytes) -> Library:
         elif command == 0x80000033:  # exports on their own
             start, length = struct.unpack_from("<II", data, at + 8)
             library.exports |= _exports(data[start : start + length])
-        at += size
     return library
 
 
@@ -162,3 +159,12 @@ def _exports(trie: bytes) -> set[str]:
             child, at = number(at + len(label) + 1)
             waiting.append((child, prefix + label))
     return found
+
+
+def commands(library):
+    """Yield number, offset and size of each load command of a Mach-O."""
+    at = 32
+    for _ in range(struct.unpack_from("<I", library, 16)[0]):
+        command, size = struct.unpack_from("<2I", library, at)
+        yield command, at, size
+        at += size

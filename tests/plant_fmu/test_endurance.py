@@ -35,14 +35,19 @@ def library(tmp_path):
     return loaded, description.guid.encode()
 
 
-def live(library, token):
-    """Make, step, save and free one instance."""
+def make(library, token):
+    """Make one instance."""
     nothing = ctypes.c_void_p()
     made = library.fmi3InstantiateCoSimulation(
         b"x", token, None, *[ctypes.c_bool()] * 4, None, ctypes.c_size_t(0), *[nothing] * 3
     )
-    instance = ctypes.c_void_p(made)
-    assert instance
+    assert made
+    return ctypes.c_void_p(made)
+
+
+def live(library, token):
+    """Make, step, save and free one instance."""
+    instance = make(library, token)
     assert (
         library.fmi3EnterInitializationMode(
             instance, False, ctypes.c_double(), ctypes.c_double(), False, ctypes.c_double()
@@ -95,15 +100,7 @@ def test_repeated_loading_leaks_little_memory():
 
 def test_simultaneous_instances_are_independent(library):
     loaded, token = library
-    nothing = ctypes.c_void_p()
-    made = [
-        ctypes.c_void_p(
-            loaded.fmi3InstantiateCoSimulation(
-                b"x", token, None, *[ctypes.c_bool()] * 4, None, ctypes.c_size_t(0), *[nothing] * 3
-            )
-        )
-        for _ in range(1000)
-    ]
+    made = [make(loaded, token) for _ in range(1000)]
     reference = (ctypes.c_uint * 1)(1)  # position.x
     one = ctypes.c_size_t(1)
     for i, instance in enumerate(made):

@@ -20,7 +20,7 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import PLATFORMS
 from plant_fmu.errors import BuildError
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
-from tests.plant_fmu.libraries import parts, read_libraries
+from tests.plant_fmu.libraries import commands, parts, read_libraries
 
 pytestmark = pytest.mark.timeout(900)  # libraries for all platforms take minutes beside other tests
 
@@ -125,13 +125,7 @@ def test_arm_mac_signatures_are_valid(all_platforms, fmi):
     """They load no library without one; it holds a hash of each page (Apple's cs_blobs.h)."""
     data = binaries(all_platforms(fmi))["darwin64" if fmi == 2 else "aarch64-darwin"]
     library = parts(data)[1] if fmi == 2 else data
-    at, signature = 32, None
-    for _ in range(struct.unpack_from("<I", library, 16)[0]):
-        command, size = struct.unpack_from("<II", library, at)
-        if command == 0x1D:
-            (signature,) = struct.unpack_from("<I", library, at + 8)
-        at += size
-    assert signature is not None
+    ((signature,),) = [struct.unpack_from("<I", library, at + 8) for kind, at, _ in commands(library) if kind == 0x1D]
     directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
     magic, _, _, _, hashes, _, _, slots, limit = struct.unpack_from(">9I", library, directory)
     size, kind, _, page = struct.unpack_from(">4B", library, directory + 36)
@@ -147,9 +141,8 @@ def test_mac_stub_symbols_match_their_pointers(all_platforms, fmi):
     """Each call leaps through a pointer, and both have their symbol's number: ziglang's linker forgets some with -x."""
     found = [data for folder, data in binaries(all_platforms(fmi)).items() if "darwin" in folder]
     for library in [part for data in found for part in (parts(data) if data[0] == 0xCA else [data])]:
-        numbers, sections, at = (), {}, 32
-        for _ in range(struct.unpack_from("<I", library, 16)[0]):
-            kind, size = struct.unpack_from("<2I", library, at)
+        numbers, sections = (), {}
+        for kind, at, size in commands(library):
             if kind == 0x0B:  # dynamic symbols
                 place, n = struct.unpack_from("<2I", library, at + 56)
                 numbers = struct.unpack_from(f"<{n}I", library, place)
@@ -159,7 +152,6 @@ def test_mac_stub_symbols_match_their_pointers(all_platforms, fmi):
                     length, first, step = (struct.unpack_from("<Q", library, i + 40)[0],
                                            *struct.unpack_from("<2I", library, i + 68))  # fmt: skip
                     sections[name] = (first, length // (step or 8))
-            at += size
         calls, pointers = (
             numbers[first : first + n] for first, n in (sections["__stubs"], sections["__la_symbol_ptr"])
         )

@@ -19,6 +19,7 @@ from plant_fmu.description import token
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
+from tests.plant_fmu.libraries import commands
 
 HERE = native_platform()
 
@@ -220,14 +221,6 @@ def identity(platform, library):
         for place, _ in pages(library)[:1]:
             found |= set(range(place, place + 32))
     return found
-
-
-def commands(library):
-    at = 32
-    for _ in range(struct.unpack_from("<I", library, 16)[0]):
-        command, size = struct.unpack_from("<2I", library, at)
-        yield command, at, size
-        at += size
 
 
 def pages(library):
