@@ -125,6 +125,10 @@ class Engine:
         slots, unknown = self.firing.slots[k], [math.nan] * (len(self.system.inputs) + k)
         terms = sorted({slot.term for slot in slots})
         alone = [self.defuzzifiers[k].value([float(slot.term == j) for slot in slots], unknown) for j in terms]
+        if not alone:
+            raise EngineError(
+                f"output {output.name!r}: no rule concludes on it, which leaves no range to normalize; expected one"
+            )
         low, high = min(alone), max(alone)
         if not low < high:
             raise EngineError(

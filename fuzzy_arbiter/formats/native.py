@@ -64,6 +64,11 @@ def range_ends(output: Output) -> tuple[Fraction, Fraction]:
 
 
 def _mapped(output: Output) -> Output:
+    if (output.defuzzifier, output.aggregation) != ("centroid", "max"):
+        raise UnsupportedError(
+            f"output {output.name!r} has the defuzzifier {output.defuzzifier} and the aggregation "
+            f"{output.aggregation}, which no universe can fold; expected centroid and max"
+        )
     low, high = range_ends(output)
     if low == high:
         raise UnsupportedError(
@@ -76,7 +81,8 @@ def _mapped(output: Output) -> Output:
     try:
         terms = tuple(Term(t.name, Shape(tuple((place(x), y) for x, y in t.straight.points))) for t in output.terms)
         default = None if output.default is None else min(max(place(output.default), 0.0), 1.0)
-        return Output(output.name, (place(output.universe[0]), place(output.universe[1])), terms, default)
+        low_end, high_end = map(place, output.universe)
+        return replace(output, universe=(low_end, high_end), terms=terms, default=default)
     except (OverflowError, DefinitionError):
         raise UnsupportedError(
             f"output {output.name!r}: its terms lie too far apart, or too close, to be mapped in floating point"

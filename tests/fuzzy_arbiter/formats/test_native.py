@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Output, Term, falling, prioritised, rising, trapezoid, triangle
+from fuzzy_arbiter import Arbiter, Output, System, Term, Variable, falling, prioritised, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
-from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.errors import EngineError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, fold_normalization, reads, writes
 from fuzzy_arbiter.formats.native import range_ends
 
@@ -80,3 +80,25 @@ def test_folded_normalization_round_trips_in_every_format(format):
     system = fold_normalization(prioritised(form="minimal"))
     assert reads(writes(system, format), format) == system
     assert reads(writes(system, format), format) == replace(system, normalization="none")
+
+
+@pytest.mark.parametrize("defuzzifier", ["bisector", "average"])
+def test_what_no_universe_can_fold_is_refused(defuzzifier):
+    terms = {"low": falling(-2, -1), "high": rising(0, 1)}
+    output = Output("y", (0, 1), terms if defuzzifier == "average" else {"high": rising(0, 1)}, defuzzifier=defuzzifier)
+    made = System((Variable("x", (0, 1), {"on": rising(0, 1)}),), (output,), ("if x is on then y is high",))
+    with pytest.raises(UnsupportedError, match=f"'y' has the defuzzifier {defuzzifier}"):
+        fold_normalization(replace(made, normalization="range"))
+
+
+def test_locks_survive_folding():
+    made = prioritised()
+    locked = replace(made, outputs=tuple(replace(v, lock_range=True, lock_previous=True) for v in made.outputs))
+    assert all(v.lock_range and v.lock_previous for v in fold_normalization(locked).outputs)
+
+
+def test_an_output_without_rules_has_no_range():
+    y, z = (Output(name, (0, 1), {"high": rising(0, 1)}, aggregation="probor") for name in "yz")
+    made = System((Variable("x", (0, 1), {"on": rising(0, 1)}),), (y, z), ("if x is on then y is high",))
+    with pytest.raises(EngineError, match="output 'z': no rule concludes on it"):
+        Arbiter(system=replace(made, outputs=(z, y), normalization="range"))
