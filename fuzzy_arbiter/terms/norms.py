@@ -90,12 +90,7 @@ class Norm(Operator):
 
     fll: str
     fcl: str
-    own_fis: str = ""
-
-    @property
-    def fis(self) -> str:
-        """Octave's word, and MATLAB's where it has one."""
-        return self.own_fis or self.name
+    fis: str  # Octave's word, and MATLAB's where it has one
 
 
 def least(a: float, b: float) -> float:
@@ -211,23 +206,23 @@ def cube_root(a: float) -> float:
 T_NORMS: dict[str, Norm] = {
     "min": Norm(least, "Minimum", "MIN", "min"),
     "prod": Norm(product, "AlgebraicProduct", "PROD", "prod"),
-    "bounded_difference": Norm(bounded_difference, "BoundedDifference", "BDIF"),
-    "drastic_product": Norm(drastic_product, "DrasticProduct", "DMIN"),
-    "einstein_product": Norm(einstein_product, "EinsteinProduct", "EPROD"),
-    "hamacher_product": Norm(hamacher_product, "HamacherProduct", "HAMACHER"),
-    "nilpotent_minimum": Norm(nilpotent_minimum, "NilpotentMinimum", "NIPMIN"),
+    "bounded_difference": Norm(bounded_difference, "BoundedDifference", "BDIF", "bounded_difference"),
+    "drastic_product": Norm(drastic_product, "DrasticProduct", "DMIN", "drastic_product"),
+    "einstein_product": Norm(einstein_product, "EinsteinProduct", "EPROD", "einstein_product"),
+    "hamacher_product": Norm(hamacher_product, "HamacherProduct", "HAMACHER", "hamacher_product"),
+    "nilpotent_minimum": Norm(nilpotent_minimum, "NilpotentMinimum", "NIPMIN", "nilpotent_minimum"),
 }
 """Those for *and* and for implication, by name."""
 
 S_NORMS: dict[str, Norm] = {
     "max": Norm(greatest, "Maximum", "MAX", "max"),
     "probor": Norm(probabilistic_sum, "AlgebraicSum", "ASUM", "probor"),
-    "bounded_sum": Norm(bounded_sum, "BoundedSum", "BSUM"),
-    "drastic_sum": Norm(drastic_sum, "DrasticSum", "DMAX"),
-    "einstein_sum": Norm(einstein_sum, "EinsteinSum", "EINSTEIN"),
-    "hamacher_sum": Norm(hamacher_sum, "HamacherSum", "HSUM"),
-    "nilpotent_maximum": Norm(nilpotent_maximum, "NilpotentMaximum", "NIPMAX"),
-    "normalized_sum": Norm(normalized_sum, "NormalizedSum", "NSUM"),
+    "bounded_sum": Norm(bounded_sum, "BoundedSum", "BSUM", "bounded_sum"),
+    "drastic_sum": Norm(drastic_sum, "DrasticSum", "DMAX", "drastic_sum"),
+    "einstein_sum": Norm(einstein_sum, "EinsteinSum", "EINSTEIN", "einstein_sum"),
+    "hamacher_sum": Norm(hamacher_sum, "HamacherSum", "HSUM", "hamacher_sum"),
+    "nilpotent_maximum": Norm(nilpotent_maximum, "NilpotentMaximum", "NIPMAX", "nilpotent_maximum"),
+    "normalized_sum": Norm(normalized_sum, "NormalizedSum", "NSUM", "normalized_sum"),
 }
 """Those for *or* and for aggregation, by name."""
 
