@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 from typing import get_args
 
+import msgspec
 import pytest
 
 from controller.regions.shapes import ENTRIES
@@ -47,7 +48,7 @@ def test_keys_of_the_autopilot_table_are_documented_with_their_defaults():
     for keys, _, defaults, _ in rows("sitl.md", "keys of plant_fmu/autopilot.py"):
         names = re.findall(r"`(\w+)`", keys)
         documented |= dict(zip(names, defaults.replace("`", "").split(", "), strict=True))
-    fields = {field.name: field.default for field in dataclasses.fields(Autopilot)}
+    fields = {field.name: field.default for field in msgspec.structs.fields(Autopilot)}
     fields |= {"frame": "required", "channels": "1 2 3 …"}
     assert documented == {name: str(default) for name, default in fields.items()}
 
@@ -77,7 +78,7 @@ def test_modes_and_sticks_of_each_profile_are_documented():
 def test_quantities_of_a_column_map_are_documented():
     tables = rows("howto/logs.md", "quantities of cosim/logs/column_map.py")
     documented = [name for keys, *_ in tables for name in re.findall(r"`(\w+)`", keys)]
-    assert sorted(documented) == sorted(set(QUANTITIES) & {field.name for field in dataclasses.fields(ColumnMap)})
+    assert sorted(documented) == sorted(set(QUANTITIES) & {field.name for field in msgspec.structs.fields(ColumnMap)})
 
 
 def test_variants_of_an_ablation_are_documented():
