@@ -117,10 +117,10 @@ def test_the_command_line_page_has_every_verb_and_flag_of_the_help(command, caps
 
     verbs = re.findall(rf"^### {title} (.*)$", text, re.M)
     everywhere = text.partition(f"\n## {title}\n")[2].partition("\n##")[0]  # flags of the command stand there alone
-    assert re.findall(r"^    ([a-z-]+)(?=  |$)", help_of(), re.M) == verbs
+    assert re.findall(r"^    ([a-z-]+)(?=  |$)", help_of(), re.M) == list(dict.fromkeys(v.split()[0] for v in verbs))
     for verb in verbs:
         section = everywhere + text.partition(f"\n### {title} {verb}\n")[2].partition("\n##")[0]
-        for flag in re.findall(r"^  (?:-\w, )?(--[a-z][a-z-]+)\b", help_of(verb), re.M):
+        for flag in re.findall(r"^  (?:-\w, )?(--[a-z][a-z-]+)\b", help_of(*verb.split()), re.M):
             assert flag == "--help" or re.search(rf"^\| .*`{flag}[ `]", section, re.M), f"{verb} {flag}"
 
 
