@@ -8,7 +8,7 @@ from dataclasses import fields
 from typing import Any
 
 from cosim.command_line.flags import add_changes, add_remote, add_run_folder, add_verb, flag, number, whole
-from cosim.command_line.link_flags import add_live_flag, open_live, origin
+from cosim.command_line.link_flags import add_live_flag, network_endpoint, open_live, origin
 from cosim.command_line.process import INTERRUPTED, print_run, print_status
 from cosim.mavlink.wire.options import PROFILES
 
@@ -66,19 +66,13 @@ def companion(options: argparse.Namespace) -> int:
     from cosim.companion.companion_options import CompanionOptions
     from cosim.companion.companion_run import Companion
     from cosim.companion.frame_alignment import SceneOrigin
-    from cosim.errors import TelemetryError
-    from cosim.mavlink.wire.endpoint import parse_endpoint
-    from cosim.mavlink.wire.signing import load_key
     from cosim.scenario.scenario import load_scenario
 
-    endpoint = parse_endpoint(options.endpoint, options.allow_remote)
-    if endpoint.kind == "tlog":
-        raise TelemetryError(f"endpoint {options.endpoint!r}: expected a network or a serial device, not a file")
+    endpoint, key = network_endpoint(options)
     scene = SceneOrigin(options.scene_origin, options.surveyed_origin, options.surface_pressure, options.water_density)
     names = {field.name for field in fields(CompanionOptions)} - {"origin"}
     chosen = CompanionOptions(origin=scene, **{name: getattr(options, name) for name in names})
     scenario = load_scenario(options.scenario, options.set)
-    key = load_key(options.signing_key) if options.signing_key else None
     with contextlib.ExitStack() as stack:
         link = stack.enter_context(NetworkLink(endpoint, key, (options.system_id, _COMPONENT), options.speedup))
         companion = Companion(scenario, link, chosen)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from cosim.command_line.flags import add_remote, flag, number, refuse_flags, whole
 from cosim.command_line.process import print_status
+from cosim.errors import TelemetryError
 from cosim.live.address import HOST, PORT, parse_live
 from cosim.mavlink.wire.options import LOSS_ACTIONS, PROFILES, MavlinkOptions
 
@@ -63,6 +64,17 @@ def links_from(options: argparse.Namespace) -> tuple[list[Endpoint], MavlinkOpti
         loss_action=options.link_loss or usual.loss_action,
         loss_timeout=options.link_timeout or usual.loss_timeout,
     )
+
+
+def network_endpoint(options: argparse.Namespace) -> tuple[Endpoint, bytes | None]:
+    """Return the endpoint and the key of a link to a vehicle from the flags."""
+    from cosim.mavlink.wire.endpoint import parse_endpoint
+    from cosim.mavlink.wire.signing import load_key
+
+    endpoint = parse_endpoint(options.endpoint, options.allow_remote)
+    if endpoint.kind == "tlog":
+        raise TelemetryError(f"endpoint {options.endpoint!r}: expected a network or a serial device, not a file")
+    return endpoint, load_key(options.signing_key) if options.signing_key else None
 
 
 def _systems(text: str) -> frozenset[int]:

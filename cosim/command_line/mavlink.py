@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.command_line.flags import add_remote, add_verb, flag, number, rate, whole
-from cosim.command_line.link_flags import add_link_flags, links_from
+from cosim.command_line.link_flags import add_link_flags, links_from, network_endpoint
 from cosim.command_line.process import print_status, say
 
 _REDRAW, _SNAPSHOT = 0.25, 1.0  # s between pictures, on a terminal and elsewhere
@@ -48,37 +48,22 @@ def add_verbs(verbs: Any) -> None:
     flag(verb, "--rate N|max", "simulated seconds per second", rate, 1.0)
 
 
-def _ground_link(options: argparse.Namespace) -> Any:
-    from cosim.errors import TelemetryError
-    from cosim.mavlink.wire.endpoint import parse_endpoint
-    from cosim.mavlink.wire.ground_end import GroundLink
-    from cosim.mavlink.wire.signing import load_key
-
-    endpoint = parse_endpoint(options.endpoint, options.allow_remote)
-    if endpoint.kind == "tlog":
-        raise TelemetryError(f"endpoint {options.endpoint!r}: expected a network or a serial device, not a file")
-    return GroundLink(endpoint, load_key(options.signing_key) if options.signing_key else None)
-
-
 # ---- listen --------------------------------------------------------------------------------------------------------
 
 
 def listen(options: argparse.Namespace) -> int:
     """Run ``cosim mavlink listen``."""
     from cosim.mavlink.listening import TelemetryTable, follow, format_table
+    from cosim.mavlink.wire.ground_end import GroundLink
 
     watch = TelemetryTable()
     live = sys.stdout.isatty() and not options.once
     seconds = options.seconds or (_ONCE if options.once else None)
     period = _REDRAW if live else max(_SNAPSHOT, (seconds or 0.0) + 1.0 if options.once else 0.0)
-    with _ground_link(options) as link, _screen(live) as show:
+    with GroundLink(*network_endpoint(options)) as link, _screen(live) as show:
         for now in follow(link, watch, period, seconds, options.count):
             size = shutil.get_terminal_size((_WIDE, 24))
-            show(
-                format_table(link, watch, now, size.columns, size.lines)
-                if live
-                else format_table(link, watch, now, _WIDE)
-            )
+            show(format_table(link, watch, now, *((size.columns, size.lines) if live else (_WIDE,))))
     return 0 if watch.total else 1
 
 

@@ -24,7 +24,7 @@ def add_verbs(verbs: Any) -> None:
         help="a run folder, finished or not; or the address of a live view, such as ws://127.0.0.1:8765, or its port",
     )  # fmt: skip
     flag(verb, "--rate N|max", "simulated seconds per second in the playback of a finished run", rate, 1.0)
-    flag(verb, "--once", "print one picture of the newest row, and end")
+    flag(verb, "--once", "print one table of the newest row, and end")
 
 
 def watch(options: argparse.Namespace) -> int:
@@ -32,7 +32,7 @@ def watch(options: argparse.Namespace) -> int:
     from rich.console import Console
     from rich.live import Live
 
-    from cosim.live.watching import looks, picture
+    from cosim.live.watching import snapshot_table, snapshots
 
     class Screen(Console):
         def on_broken_pipe(self) -> None:
@@ -44,10 +44,10 @@ def watch(options: argparse.Namespace) -> int:
     try:
         with contextlib.ExitStack() as stack:
             live = None if once else stack.enter_context(Live(console=console, screen=True, auto_refresh=False))
-            for last in looks(options.run, None if options.rate == math.inf else options.rate, once):
+            for last in snapshots(options.run, None if options.rate == math.inf else options.rate, once):
                 if live is not None:
-                    live.update(picture(last), refresh=True)
+                    live.update(snapshot_table(last), refresh=True)
     finally:
-        if last is not None:  # the last picture stays on the terminal
-            console.print(picture(last))
+        if last is not None:  # the last table stays on the terminal
+            console.print(snapshot_table(last))
     return 0

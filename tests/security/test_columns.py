@@ -7,7 +7,7 @@ import pytest
 
 from cosim.errors import RunError
 from cosim.export import export_run
-from cosim.live.watching import looks
+from cosim.live.watching import snapshots
 from cosim.mavlink.replay import replay as stream
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
@@ -35,7 +35,7 @@ def kind_of(overrides):
 READERS = {
     "report": report_again,
     "replay": lambda folder: replay([folder]),
-    "watch": lambda folder: list(looks(str(folder), None)),
+    "watch": lambda folder: list(snapshots(str(folder), None)),
     "export csv": lambda folder: export_run(folder, "csv", folder / "it.csv"),
     "export mcap": lambda folder: export_run(folder, "mcap", folder / "it.mcap"),
     "export tlog": lambda folder: export_run(folder, "tlog", folder / "it.tlog"),
@@ -160,4 +160,4 @@ def test_d6_unfinished_run_is_checked(lacking):
     (folder / SUMMARY).unlink()
     (folder / RECORD).rename(folder / PARTS / "000000.parquet")
     with pytest.raises(RunError, match=r"000000\.parquet: has no column 'membership.depth'"):
-        list(looks(str(folder), None))
+        list(snapshots(str(folder), None))

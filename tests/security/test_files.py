@@ -15,7 +15,7 @@ from cosim.campaigns.store.folder import PLAN, read_plan
 from cosim.errors import RunError
 from cosim.io.atomic_file import atomic_file, write_atomic
 from cosim.io.strict_json import read_json
-from cosim.live.watching import looks
+from cosim.live.watching import snapshots
 from cosim.replay.page import write_page
 from cosim.replay.pages import replay
 from cosim.results.record import PARTS, RECORD, Record, load_record
@@ -115,7 +115,7 @@ def test_d5_invalid_summary_value_is_rejected_by_key(tmp_path, ordered_run, key,
     sound = json.loads((folder / SUMMARY).read_text())
     for value in values:
         (folder / SUMMARY).write_text(json.dumps(sound | {key: value}))
-        for read in (load_run, report_again, lambda of: replay([of]), lambda of: list(looks(str(of), None))):
+        for read in (load_run, report_again, lambda of: replay([of]), lambda of: list(snapshots(str(of), None))):
             with pytest.raises(RunError, match=f"{key} is ") as caught:
                 read(folder)
             assert str(caught.value).startswith(f"{folder / SUMMARY}: {key} is ") and str(caught.value).isprintable()

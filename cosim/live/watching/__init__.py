@@ -5,7 +5,7 @@ Sources: a live view, the folder of a run that is being recorded, or of a finish
 Imports: replay, results, scenario, simulation, simulation.commands.
 """
 
-from cosim.live.watching.run_views import Look, looks
-from cosim.live.watching.terminal_view import picture
+from cosim.live.watching.run_views import Snapshot, snapshots
+from cosim.live.watching.terminal_view import snapshot_table
 
-__all__ = ["Look", "looks", "picture"]
+__all__ = ["Snapshot", "snapshot_table", "snapshots"]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import itertools
 import json
 import math
 import socket
@@ -28,8 +29,8 @@ from cosim.scenario.criteria import MAX_CRITERIA
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.signals import Array
 
-_FRAME = 0.1  # s of the wall clock, between pictures
-_FAST = 200  # number of pictures of a run that is played back at full speed
+_FRAME = 0.1  # s of the wall clock, between snapshots
+_FAST = 200  # number of snapshots of a run that is played back at full speed
 _ROWS = 10_000  # greatest number of rows of a finished run
 _FRESH = 5.0  # s; a run whose newest rows are older is not being recorded
 _ANSWER = 5.0  # s, timeout of a connection to a live view
@@ -77,7 +78,7 @@ class _Header(msgspec.Struct):
 
 
 @dataclass(frozen=True)
-class Look:
+class Snapshot:
     """A run at one instant."""
 
     header: dict[str, Any]
@@ -92,37 +93,34 @@ class Look:
         return float(self.row[names.index(name)]) if self.row is not None and name in names else math.nan
 
 
-def looks(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[Look]:
+def snapshots(what: str, rate: float | None = 1.0, once: bool = False) -> Iterator[Snapshot]:
     """Iterate over instants of a run until it is over."""
     if what.isdecimal() or "://" in what:
-        found = _live(_endpoint(what))
-        return _newest(found) if once else found
-    path = Path(what)
-    if _is_being_recorded(path):
-        found = _recording(path)
-        return _newest(found) if once else found
-    return _finished(path, rate, once)
-
-
-def _newest(found: Iterator[Look]) -> Iterator[Look]:
-    yield next(look for look in found if look.row is not None or look.ended or look.silent)
+        running = _live(_endpoint(what))
+    elif _is_being_recorded(path := Path(what)):
+        running = _recording(path)
+    else:
+        return _finished(path, rate, once)
+    if not once:
+        return running
+    return itertools.islice((one for one in running if one.row is not None or one.ended or one.silent), 1)
 
 
 # ---- folders -------------------------------------------------------------------------------------------------------
 
 
-def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Look]:
+def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Snapshot]:
     run = load_run(path)
     view_columns = ViewColumns(run.scenario, run.record.columns)
     record, steps = run.record, len(run.record)
-    # a picture needs no more rows than these, and all rows of a long run would not fit into memory
+    # a table needs no more rows than these, and all rows of a long run would not fit into memory
     rows = np.arange(steps - 1, -1, -max(1, steps // _ROWS))[::-1] if not once else np.array([steps - 1])
     picked = record.take(rows, [record.columns[i].name for i in view_columns.picked]).to_array()
     times, ended = picked[:, 0], (str(run.summary["status"]), verdict(run.summary))
     header = header_of(run.scenario, view_columns.columns)
 
-    def at(k: int, note: str, end: tuple[str, str] | None = None) -> Look:
-        return Look(header, view_columns.compute_rows(picked[k : k + 1])[0], note, end)
+    def at(k: int, note: str, end: tuple[str, str] | None = None) -> Snapshot:
+        return Snapshot(header, view_columns.compute_rows(picked[k : k + 1])[0], note, end)
 
     began, k = time.monotonic(), 0
     note = "replay" if rate is None else f"replay, {rate:g} times real time"
@@ -146,7 +144,7 @@ def _is_being_recorded(path: Path) -> bool:
     return False
 
 
-def _recording(path: Path) -> Iterator[Look]:
+def _recording(path: Path) -> Iterator[Snapshot]:
     scenario = load_scenario(path / SCENARIO)
     header: dict[str, Any] = header_of(scenario, ())
     row: Array | None = None
@@ -165,7 +163,7 @@ def _recording(path: Path) -> Iterator[Look]:
         silent = time.monotonic() - since
         wait = f"no new rows for {silent:.0f} s: waiting, writing its report, or killed"
         fresh = silent < _FRESH
-        yield Look(header, row, "being recorded" if fresh else wait, silent=not fresh)
+        yield Snapshot(header, row, "being recorded" if fresh else wait, silent=not fresh)
         time.sleep(_FRAME)
     yield from _finished(path, None, once=True)
 
@@ -185,7 +183,7 @@ def _endpoint(what: str) -> tuple[str, int]:
     return host, port
 
 
-def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
+def _live(endpoint: tuple[str, int]) -> Iterator[Snapshot]:
     from websockets.exceptions import WebSocketException
     from websockets.sync.client import connect
 
@@ -207,12 +205,12 @@ def _live(endpoint: tuple[str, int]) -> Iterator[Look]:
                         msgspec.convert(content["run"], _Header)
                         header, row = content["run"], None
                     elif content["type"] == "end" and header is not None:
-                        yield Look(header, row, f"live at {url}", (str(content["status"]), str(content["verdict"])))
+                        yield Snapshot(header, row, f"live at {url}", (str(content["status"]), str(content["verdict"])))
                         if content["status"] != "reset":
                             return
                 if header is not None and time.monotonic() - shown >= _FRAME:
                     shown = time.monotonic()
-                    yield Look(header, row, f"live at {url}")
+                    yield Snapshot(header, row, f"live at {url}")
     except (OSError, WebSocketException) as error:
         raise TelemetryError(f"{url}: {_reason(error)}") from error
     except (ValueError, LookupError, TypeError, RecursionError) as error:

@@ -20,7 +20,7 @@ from rich.console import Console
 
 from cosim.command_line.cli import main
 from cosim.errors import RunError, TelemetryError
-from cosim.live.watching import Look, looks, picture
+from cosim.live.watching import Snapshot, snapshot_table, snapshots
 from cosim.results.record import RECORD, STREAM, load_record
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import SCENARIO
@@ -38,13 +38,13 @@ def paper(shipped_run):
 
 def drawn(look, width=100, **options):
     console = Console(file=io.StringIO(), width=width, **options)
-    console.print(picture(look))
+    console.print(snapshot_table(look))
     return console.file.getvalue()
 
 
 @pytest.fixture(scope="module")
 def frames(paper):
-    return list(looks(str(paper.folder), rate=None))
+    return list(snapshots(str(paper.folder), rate=None))
 
 
 @pytest.mark.medium
@@ -104,7 +104,7 @@ def test_colors_are_omitted_if_unwanted(frames, monkeypatch):
 
 def test_names_cannot_inject_terminal_codes(frames):
     header = frames[-1].header | {"title": "a\x1b[2Jb\x07"}
-    assert "\x1b" not in drawn(Look(header, frames[-1].row, "\x1b]0;x\x07"))
+    assert "\x1b" not in drawn(Snapshot(header, frames[-1].row, "\x1b]0;x\x07"))
 
 
 @pytest.mark.medium
@@ -133,13 +133,13 @@ def test_a_run_that_is_being_written_is_followed_to_its_end(paper, tmp_path):
     record = load_record(paper.folder)
     rows = record.to_array()
     recorder = Recorder(folder, record.columns, batch_rows=1000)
-    frames = looks(str(folder))
+    frames = snapshots(str(folder))
     assert next(frames).row is None
     for k in range(2001):
         recorder.observe(k, rows[k])
     frame = next(frames)
     assert (frame["time"], frame.note) == (1.999, "being recorded")
-    assert [look["time"] for look in looks(str(folder), once=True)] == [1.999]
+    assert [look["time"] for look in snapshots(str(folder), once=True)] == [1.999]
     for k in range(2001, len(rows)):
         recorder.observe(k, rows[k])
     recorder.close()
@@ -155,7 +155,10 @@ def test_a_live_run_is_watched_to_its_end(live):
     with running.viewer() as viewer:
         viewer.until("header")
         seen = []
-        watching = threading.Thread(target=lambda: seen.extend(looks(running.url.replace("http", "ws"))), daemon=True)
+        source = running.url.replace("http", "ws")
+        watching = threading.Thread(target=lambda: seen.extend(snapshots(source)), daemon=True)
+            target=lambda: seen.extend(snapshots(running.url.replace("http", "ws"))), daemon=True
+        )
         watching.start()
         viewer.command(**ARM)
         viewer.until("end")
@@ -173,16 +176,16 @@ def test_missing_run_gives_one_line_error(what, capsys):
 
 def test_missing_run_or_server_is_reported():
     with pytest.raises(Exception, match="holds no run"):
-        next(looks("no/such/folder"))
+        next(snapshots("no/such/folder"))
     with pytest.raises(TelemetryError, match="cannot be watched"):
-        next(looks("1"))
+        next(snapshots("1"))
 
 
 def test_run_killed_before_its_first_rows_does_not_block_watch(paper, tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.live.watching.run_views._FRESH", 0.0)
     (tmp_path / STREAM).touch()
     shutil.copy(paper.folder / SCENARIO, tmp_path)
-    (look,) = looks(str(tmp_path), once=True)
+    (look,) = snapshots(str(tmp_path), once=True)
     assert look.row is None
     assert "no new rows" in look.note
 
@@ -193,4 +196,4 @@ def test_rows_of_another_run_give_one_line_error(paper, tmp_path):
     for k in range(2):
         recorder.observe(k, np.zeros(1))
     with pytest.raises(RunError, match="which its scenario calls for"):
-        next(iter(looks(str(tmp_path))))
+        next(iter(snapshots(str(tmp_path))))

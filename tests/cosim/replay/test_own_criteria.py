@@ -8,7 +8,7 @@ from rich.console import Console
 
 from cosim.export.excerpt import Excerpt
 from cosim.export.scene import Scene
-from cosim.live.watching import looks, picture
+from cosim.live.watching import snapshot_table, snapshots
 from cosim.replay.events import events_of
 from cosim.replay.header import header_of
 from cosim.replay.view_columns import ViewColumns
@@ -68,9 +68,9 @@ def test_events_and_report_name_the_active_criterion(four):
 
 
 def test_terminal_view_lists_all_criteria(four):
-    *_, last = looks(str(four.folder), rate=None)
+    *_, last = snapshots(str(four.folder), rate=None)
     console = Console(file=io.StringIO(), width=80, height=40)
-    console.print(picture(last))
+    console.print(snapshot_table(last))
     shown = console.file.getvalue()
     for name, _ in CRITERIA:
         weight, asks = (four.record[f"{of}.{name}"][-1] for of in ("weight", "membership"))

@@ -17,7 +17,7 @@ from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.live.address import foreign_origin, parse_live
 from cosim.live.command_desk import MAX_LENGTH, CommandDesk
 from cosim.live.viewer_messages import format_message, write_rows
-from cosim.live.watching import looks, picture
+from cosim.live.watching import snapshot_table, snapshots
 from cosim.mavlink.listening import TelemetryTable
 from cosim.mavlink.listening import format_table as table
 from cosim.mavlink.wire.endpoint import parse_endpoint
@@ -92,8 +92,8 @@ def live_view(seeds: Seeds) -> Case:
         messages[1:1] = [rows]
         seeds.patch.setattr("socket.create_connection", lambda *_, **__: None)
         seeds.patch.setattr("websockets.sync.client.connect", lambda *_, **__: _Connection(messages))
-        for look in looks("ws://127.0.0.1:8765"):
-            console.print(picture(look))
+        for look in snapshots("ws://127.0.0.1:8765"):
+            console.print(snapshot_table(look))
 
     return Case(("\n".join(texts).encode() + b"\n",), read, "ws://127.0.0.1:8765")
 
