@@ -157,8 +157,6 @@ def test_a_live_run_is_watched_to_its_end(live):
         seen = []
         source = running.url.replace("http", "ws")
         watching = threading.Thread(target=lambda: seen.extend(snapshots(source)), daemon=True)
-            target=lambda: seen.extend(snapshots(running.url.replace("http", "ws"))), daemon=True
-        )
         watching.start()
         viewer.command(**ARM)
         viewer.until("end")
