@@ -86,16 +86,10 @@ def test_paths_may_be_texts_and_scenarios_names(tmp_path, monkeypatch):
     design = cosim.Design(cosim.vary_from(["initial.position.1=-1,1"]), "grid")
     assert cosim.run_sweep("short.toml", design, "sweep").folder == Path("sweep")
     assert len(list(cosim.read_scenes("scenes.jsonl"))) == 1
-    with pytest.raises(ScenarioError, match="scenario 'dokcing' is unknown; did you mean 'docking'"):
-        cosim.run_scenario("dokcing")
-
-
-@pytest.mark.medium
-def test_campaigns_take_texts_as_paths(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(1)))
     assert cosim.run_campaign("scenes.jsonl", "pd", "campaign").folder == Path("campaign")
     assert cosim.compare("scenes.jsonl", ["pd", "sun_cheah"], "comparison").folder == Path("comparison")
+    with pytest.raises(ScenarioError, match="scenario 'dokcing' is unknown; did you mean 'docking'"):
+        cosim.run_scenario("dokcing")
 
 
 def test_record_is_a_table_with_units_and_a_data_frame(run):

@@ -126,15 +126,3 @@ def test_interrupted_verb_is_repeated_by_the_same_command(tmp_path, command):
 def test_every_verb_that_writes_is_covered():
     writing = {name for name, verb in all_verbs(_parser()) if "--out" in verb._option_string_actions}
     assert writing == {command.split()[0] for command in WRITING.values()} | ELSEWHERE
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is full")
-@pytest.mark.parametrize(
-    "words", ["show paper", "show", "scenes --count 3 --seed 0", "help --completion bash", "help falsify"]
-)
-def test_full_standard_output_is_named(capsys, words):
-    with open("/dev/full", "w") as full, contextlib.redirect_stdout(full):
-        assert main(shlex.split(words)) == 2
-        with contextlib.suppress(OSError):
-            full.close()
-    assert capsys.readouterr().err == "cosim: standard output: No space left on device\n"
