@@ -209,7 +209,7 @@ def test_missing_position_gives_nan_force(name):
     assert np.isnan(tau[:3]).all()
 
 
-@pytest.mark.parametrize("name", EVERY)
+@pytest.mark.parametrize("name", LAWS)
 def test_invalid_gains_and_setup_are_rejected_by_name(name):
     law = LAWS[name]
     for gain in law.gains_type._fields:
@@ -220,6 +220,6 @@ def test_invalid_gains_and_setup_are_rejected_by_name(name):
     for gain in positive.intersection(law.gains_type._fields):
         with pytest.raises(LawError, match=rf"{gain} is 0.0, expected a finite number above 0"):
             law_of(name, **{gain: 0.0})
-    for attitude, period in ((np.ones(4), PERIOD), (IDENTITY, 0.0)):
+    for attitude, period in ((np.ones(4), PERIOD), (np.r_[IDENTITY, 0.0], PERIOD), (IDENTITY, 0.0), (IDENTITY, np.inf)):
         with pytest.raises(LawError, match=r"quaternion|period"):
             law.for_vehicle(ODIN, law.gains_type(), attitude, period, 0)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
 from controller.laws.deployable import attitude as loop
@@ -90,16 +89,6 @@ def apart(e, expected):
     return np.linalg.norm((rotation(e).inv() * expected).as_rotvec())
 
 
-def test_attitude_integration_matches_the_exponential_map():
-    rng = np.random.default_rng(5)
-    e, omega = random_unit(rng), rng.normal(size=3)
-    before = rotation(e).as_matrix()
-    loop.integrate_attitude(e, omega, 1e-3, e)
-    S = np.array([[0, -omega[2], omega[1]], [omega[2], 0, -omega[0]], [-omega[1], omega[0], 0]])
-    assert rotation(e).as_matrix() == pytest.approx(before @ expm(1e-3 * S), abs=1e-8)
-    assert np.linalg.norm(e) == pytest.approx(1.0, abs=1e-14)
-
-
 def test_held_attitude_returns_at_one_fifth_per_second():
     rng, gains = np.random.default_rng(6), GAINS._replace(tilt=np.pi)
     for _ in range(10):
@@ -155,14 +144,6 @@ def test_desired_attitude_moves_into_attitude_regions():
             attitude, pack([Region("ball", Sphere((1.0, 1.0, 1.0), 1.0), "out"), *regions]), position, gains, 1e-4
         )
         assert apart(attitude.desired, expected) < 1e-7
-
-
-def test_turning_rate_is_limited():
-    attitude = loop.empty_attitude(np.array([1.0, 0.0, 0.0, 0.0]))
-    before = attitude.desired.copy()
-    aside = Region("aside", Orientation((np.cos(0.75), 0.0, 0.0, np.sin(0.75)), 0.1), "in")
-    loop.update_desired(attitude, pack([aside]), NOWHERE, GAINS, PERIOD)
-    assert apart(attitude.desired, after(before, np.array([0.0, 0.0, GAINS.turning_rate]))) < 1e-6
 
 
 def test_half_a_turn_away_the_rotation_is_about_the_vertical():

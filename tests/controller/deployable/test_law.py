@@ -221,14 +221,6 @@ def test_region_uncertainty_widens_its_clearance():
 
 
 @pytest.mark.medium
-def test_goal_is_reached_without_regions():
-    law, sea = law_for([]), Sea()
-    forces = fly(law, sea, regions=[], steps=1200)
-    assert np.isfinite(forces).all()
-    assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
-
-
-@pytest.mark.medium
 def test_contradictory_regions_give_finite_forces_within_limits():
     """The vehicle within one ball, and two more closing it in from either side."""
     walls = [Region(f"{x}", Sphere((x, 0.0, 2.5), 1.2), "out") for x in (-1.0, 0.05, 1.0)]

@@ -147,46 +147,12 @@ def test_path_cost_matches_dense_evaluation():
     assert dear > 20 and long > 1 and soft > 3 and min(calls) == 1 and max(calls) > 1
 
 
-def test_approaching_region_is_evaluated_before_the_path_meets_it():
-    """Head-on, at half the vehicle's speed, from 23 m."""
-    packed, start, way = pack(REGIONS), np.array([-20.0, 0.2, 2.4]), np.zeros((CORNERS + 1, 3))
-    packed.velocities[:], way[0] = 0.0, (2.0, 0.2, 2.4)
-    packed.velocities[0, 0] = -0.5 * GAINS.speed
-    expected = expected_cost([start, way[0]], packed)
-    assert expected[1] > 10.0
-    assert cost_of(way, 1, packed, start)[0] == pytest.approx(expected, rel=1e-9)
-
-
 def test_evaluation_of_a_too_costly_path_stops_early():
     wall = pack([Region("wall", Box((2.0, 0.0, 2.5), (1.0, 9.0, 9.0)), "out")])
     way = np.zeros((CORNERS + 1, 3))
     way[0], way[1] = (4.0, 0.2, 2.5), (-900.0, 0.2, 2.5)
     most = 50.0
     assert most < cost_of(way, 2, wall, most=most)[0][0] < 300.0 < cost_of(way, 2, wall)[0][0]
-
-
-def test_soft_region_cost_trades_against_the_detour():
-    """A ball across the way: 2 m more for each metre within it, times its depth and half a metre for being entered."""
-    disc = pack([Region("disc", Sphere((4.0, 0.2, 2.5), 1.5), "out", hard=False)])
-    through, round_it = np.zeros((2, CORNERS + 1, 3))
-    through[0] = round_it[1] = 8.0, 0.2, 2.5
-    round_it[0] = 4.0, 1.9, 2.5
-    deep = np.maximum(1.5 - np.abs(np.linspace(-4.0, 4.0, 8001)), 0.0)
-    exact = 8.0 + 2.0 * np.mean(deep + 0.5 * np.minimum(deep / 0.2, 1.0)) * 8.0
-    assert cost_of(through, 1, disc)[0] == pytest.approx([exact, 0.0, exact - 8.0, 0.0], rel=0.15)
-    assert cost_of(round_it, 2, disc)[0] == pytest.approx([2.0 * np.hypot(4.0, 1.7), 0.0, 0.0, 0.0], abs=0.3)
-
-
-def test_path_end_in_a_soft_region_costs_three_metres_of_crossing():
-    ball = pack([Region("ball", Sphere((4.0, 0.2, 2.5), 1.5), "out", hard=False, crossing_cost=7.0)])
-    way = np.zeros((CORNERS + 1, 3))
-    way[0] = 3.0, 0.2, 2.5
-    cost, penalty, through, _ = cost_of(way, 1, ball)[0]
-    assert cost - through - 3.0 == pytest.approx(3.0 * 7.0 * (0.5 + 0.5), rel=1e-12) and penalty == 0.0
-    for outside, part in ((0.0, 0.25), (0.02, 0.15), (0.05, 0.0), (0.5, 0.0)):
-        way[0] = 2.5 - outside, 0.2, 2.5
-        cost = cost_of(way, 1, ball)[0][0]
-        assert cost - (2.5 - outside) == pytest.approx(3.0 * 7.0 * 0.5 * part, abs=1e-8)
 
 
 @pytest.mark.medium(fast=1)
@@ -259,14 +225,6 @@ def test_free_length_ends_before_a_wall():
     assert 3.8 < search.free_length(begin, end, wall, 0.13) <= 4.0 - 0.13
     assert search.free_length(np.array([4.0, 0.0, 2.5]), end, wall, 0.13) == -1.0
     assert search.free_length(begin, np.array([3.0, 0.0, 2.5]), wall, 0.13) == 3.0
-
-
-def test_line_check_steps_stay_within_known_clearance():
-    """Past a small ball, 0.45 m from it at the nearest: a longer look from the start would land behind it."""
-    packed = pack([Region("ball", Sphere((1.0, 0.55, 0.0), 0.1), "out")])
-    begin, end = np.zeros(3), np.array([3.0, 0.0, 0.0])
-    assert not search.is_line_free(begin, end, packed, 0.5)
-    assert search.is_line_free(begin, end, packed, 0.4)
 
 
 def looks(state, start, end, packed, number, rng, way):
@@ -365,7 +323,7 @@ def shortened(start, points, packed):
     return kept
 
 
-def walk(seed, packed, steps, end=(8.0, 0.5, 2.5)):
+def walk(seed, packed, steps, end):
     """Search beside a transcription of it, and return the points of paths found."""
     rng, state, way, found = np.random.default_rng(seed), search.empty_search(), np.zeros((9, 3)), []
     start, end, room, trees = START.copy(), np.array(end), 3.0, []
@@ -400,14 +358,10 @@ def walk(seed, packed, steps, end=(8.0, 0.5, 2.5)):
 
 
 @pytest.mark.medium
-def test_search_matches_the_reference_transcription():
-    found = walk(4, pack(REGIONS), 240)
-    assert max(found) >= 3 and found.count(0) > 20
-
-
-@pytest.mark.medium
-def test_search_takes_longer_edges_towards_a_farther_end():
-    assert max(walk(4, pack(REGIONS), 60, (20.0, 9.0, 4.5))) > 0
+@pytest.mark.parametrize(("steps", "end", "points"), [(240, (8.0, 0.5, 2.5), 3), (60, (20.0, 9.0, 4.5), 1)])  # with longer edges
+def test_search_matches_the_reference_transcription(steps, end, points):
+    found = walk(4, pack(REGIONS), steps, end)
+    assert max(found) >= points and found.count(0) > 20
 
 
 def test_root_closer_to_a_region_than_the_line_margin_keeps_its_tree():
@@ -578,15 +532,6 @@ def test_found_path_is_the_next_candidate():
     assert plan.counts.tolist() == [1, 2, -1] and np.array_equal(plan.candidate[:2], plan.found[:2])
     way_round._choose_candidate(plan, START, goal, pack([]), GAINS)
     assert not np.array_equal(plan.candidate[:2], plan.found[:2])
-
-
-def test_passed_corners_are_dropped_in_sequence():
-    plan, corners = empty_plan(0, 1), [(1.0, 0.0, 2.5), (1.1, 0.1, 2.5), (4.0, 1.0, 2.5), (8.0, 0.5, 2.5)]
-    plan.counts[0], plan.path[:4] = 4, corners
-    improve_path(plan, np.array([1.05, 0.05, 2.5]), pack([GOAL]), pack([]), GAINS, 0.02)
-    assert plan.counts[0] == 2
-    assert plan.path[:2].tolist() == [list(corner) for corner in corners[2:]]
-    assert way_round._length(plan.path, 2, START) == pytest.approx(np.hypot(4.0, 0.8) + np.hypot(4.0, 0.5))
 
 
 def test_first_corner_of_a_full_path_is_dropped():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from controller.errors import RegionError
-from controller.regions import Orientation, Prism
+from controller.regions import Prism
 from controller.regions.rays import _circle_about, _is_convex
 
 SOUND = {
@@ -50,7 +50,3 @@ def test_simple_outline_is_accepted(name):
         x, y, radius = _circle_about(packed)
         assert (x, y) == pytest.approx(points.mean(axis=0))
         assert radius == pytest.approx(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
-
-
-def test_an_attitude_has_no_bounds():
-    assert Orientation((1.0, 0.0, 0.0, 0.0), 0.1).bounds() == ((-np.inf,) * 3, (np.inf,) * 3)
