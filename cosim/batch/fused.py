@@ -26,7 +26,7 @@ from cosim.batch.fused_loop import fly_law
 from cosim.batch.outcome import OUTCOME, BatchResult, empty_outcomes
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
-from cosim.results.summary import SETTLED_FOR
+from cosim.results.spans import SETTLED_FOR
 from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model

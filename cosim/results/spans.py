@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from cosim.simulation.signals import Array
 
 Flags = NDArray[np.bool_]
+SETTLED_FOR = 10.0  # s, minimum time in the goal at the end of a run that counts as settled
 
 
 @dataclass

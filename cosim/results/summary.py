@@ -13,12 +13,10 @@ from cosim.results.goal_miss import explain_miss
 from cosim.results.law_reports import ISOLATED, REJECTED, Isolations
 from cosim.results.lyapunov_summary import summarise_lyapunov
 from cosim.results.record import Rows
-from cosim.results.spans import Span, Spans
+from cosim.results.spans import SETTLED_FOR, Span, Spans
 from cosim.results.water_surface import heights_above_surface, hull_radius, is_submerged_model
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
-
-SETTLED_FOR = 10.0  # s, least time in the goal at the end of a run that counts as settled
 
 _SUM_SIZE = 2**18  # numbers that are summed at once
 

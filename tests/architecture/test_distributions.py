@@ -2,7 +2,10 @@
 
 import itertools
 import re
+import subprocess
+import sys
 import tomllib
+from importlib import metadata
 
 from tests.architecture.modules import ROOT
 
@@ -31,3 +34,23 @@ def test_arbiter_depends_on_numpy_alone_with_one_bound():
 
 def test_both_distributions_have_the_same_licence():
     assert (ROOT / "fuzzy_arbiter" / "LICENSE").read_bytes() == (ROOT / "LICENSE").read_bytes()
+
+
+def test_what_a_build_compiles_imports_only_what_the_build_installs():
+    texts = [
+        *project("pyproject.toml")["dependencies"],
+        *itertools.chain(*project("pyproject.toml")["optional-dependencies"].values()),
+    ]
+    distributions = {re.split(r"[^\w-]", text)[0].lower() for text in texts}
+    modules = {
+        m for m, owners in metadata.packages_distributions().items() if {o.lower() for o in owners} & distributions
+    }
+    program = re.search(r'_COMPILE = """(.*?)"""', (ROOT / "hatch_build.py").read_text(), re.S)[1].partition(
+        "platforms"
+    )[0]
+    installed = re.search(r"_NEEDED = \((.*?)\)", (ROOT / "hatch_build.py").read_text(), re.S)[1]
+    ours = {"plant_fmu", "controller", "cosim", "fuzzy_arbiter"}
+    missing = modules - ours - {name.replace("-", "_") for name in re.findall(r'"(.*?)"', installed)}
+    blocked = f"import sys\nsys.modules |= dict.fromkeys({sorted(missing)!r})\n"
+    assert "pyarrow" in missing and "numpy" not in missing
+    subprocess.run([sys.executable, "-c", blocked + program], cwd=ROOT, check=True)

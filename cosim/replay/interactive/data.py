@@ -18,7 +18,7 @@ from cosim.replay.interactive.module import flight_module
 from cosim.replay.interactive.scenario_template import scenario_template
 from cosim.replay.interactive.signals import signal_sources
 from cosim.results.run_result import Run
-from cosim.results.summary import SETTLED_FOR
+from cosim.results.spans import SETTLED_FOR
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array, Column
