@@ -1,7 +1,10 @@
 """The Mamdani system by its definition, in rational numbers, independent of the engines."""
 
+import functools
 import itertools
 from fractions import Fraction
+
+import numpy as np
 
 from fuzzy_arbiter.propositions import And, Is, Not
 
@@ -21,37 +24,50 @@ def degree(shape, x):
     return points[-1][1]
 
 
-def holds(system, proposition, inputs):
+def degrees_at(system, inputs):
+    """Exact degree of a statement at inputs."""
+    known = {
+        Is(v.name, term.name): degree(term.shape, x)
+        for v, x in zip(system.inputs, inputs, strict=True)
+        for term in v.terms
+    }
+    return known.__getitem__
+
+
+def holds(system, proposition, degrees):
+    """Strength of a proposition, from the degrees of its statements: rational numbers, or arrays."""
     if isinstance(proposition, Is):
-        i = [v.name for v in system.inputs].index(proposition.variable)
-        (shape,) = (t.shape for t in system.inputs[i].terms if t.name == proposition.term)
-        return degree(shape, inputs[i])
+        return degrees(proposition)
     if isinstance(proposition, Not):
-        return 1 - holds(system, proposition.part, inputs)
-    parts = [holds(system, part, inputs) for part in proposition.parts]
-    result = parts[0]
-    for other in parts[1:]:
-        if isinstance(proposition, And):
-            result = min(result, other) if system.conjunction == "min" else result * other
-        else:
-            result = max(result, other) if system.disjunction == "max" else result + other - result * other
-    return result
+        return 1 - holds(system, proposition.part, degrees)
+    parts = [holds(system, part, degrees) for part in proposition.parts]
+    if isinstance(proposition, And):
+        join = {"min": np.minimum, "prod": lambda a, b: a * b}[system.conjunction]
+    else:
+        join = {"max": np.maximum, "probor": lambda a, b: 1 - (1 - a) * (1 - b)}[system.disjunction]
+    return functools.reduce(join, parts)
 
 
-def cuts(system, k, inputs):
+def cuts(system, k, degrees):
     """Cut of each term of the k-th output."""
     output = system.outputs[k]
-    result = dict.fromkeys(output.term_names, Fraction(0))
+    result = dict.fromkeys(output.term_names, 0)
     for rule in system.rules:
         for conclusion in rule.conclusions:
             if conclusion.variable == output.name:
-                strength = holds(system, rule.condition, inputs) * Fraction(rule.weight)
-                result[conclusion.term] = max(result[conclusion.term], strength)
+                strength = holds(system, rule.condition, degrees)
+                weight = Fraction(rule.weight) if isinstance(strength, Fraction) else rule.weight
+                result[conclusion.term] = np.maximum(result[conclusion.term], strength * weight)
     return list(result.values())
 
 
 def centroid(output, levels, scaled=False):
-    """Exact centroid: between all places where anything can bend, the envelope is a straight line."""
+    area, moment = integrals(output, levels, scaled)
+    return moment / area
+
+
+def integrals(output, levels, scaled=False):
+    """Exact area and moment: between all places where anything can bend, the envelope is a straight line."""
     low, high = map(Fraction, output.universe)
     shapes = [t.shape for t in output.terms]
     knots = {low, high, *(Fraction(x) for s in shapes for x, _ in s.points if low < x < high)}
@@ -78,14 +94,14 @@ def centroid(output, levels, scaled=False):
             y0, y1 = height(x0), height(x1)
             area += (x1 - x0) * (y0 + y1) / 2
             moment += (x1 - x0) * (x0 * (2 * y0 + y1) + x1 * (y0 + 2 * y1)) / 6
-    return moment / area
+    return area, moment
 
 
 def centroids(system, inputs):
     """Exact raw value of every output; None where no rule fires and there is no default."""
     result = []
     for k, output in enumerate(system.outputs):
-        levels = cuts(system, k, inputs)
+        levels = cuts(system, k, degrees_at(system, inputs))
         empty = output.default if output.default is None else Fraction(output.default)
         result.append(centroid(output, levels, system.implication == "prod") if any(levels) else empty)
     return result

@@ -2,7 +2,7 @@
 
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable
+from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, rising
 from fuzzy_arbiter.propositions import And, Is, Not, Or
 
 grid = st.integers(0, 16).map(lambda i: i / 16.0)
@@ -35,11 +35,14 @@ def variables(kind, prefix, jumps=True):
     return build()
 
 
+LOW_HIGH = tuple(Output(name, (0, 1), {"low": falling(0, 1), "high": rising(0, 1)}) for name in "yz")
+
+
 @st.composite
-def systems(draw, jumps=True, norms=True):
+def systems(draw, jumps=True, norms=True, outputs=None):
     """A system with normalization none and random rules."""
     inputs = draw(variables(Variable, "x", jumps))
-    outputs = draw(variables(Output, "y", jumps))
+    outputs = outputs[: draw(st.integers(1, len(outputs)))] if outputs else draw(variables(Output, "y", jumps))
     statements = st.sampled_from([Is(v.name, t) for v in inputs for t in v.term_names])
     conditions = st.recursive(
         statements,

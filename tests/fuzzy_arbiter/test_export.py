@@ -100,6 +100,7 @@ SYSTEMS = {
         conjunction="prod",
         normalization="none",
     ),
+    "forty criteria": prioritised([Criterion(f"c{i}") for i in range(40)]),
     "many points": System(
         (Variable("v", (0, 10), (Term("t", Shape(tuple((i / 10, i % 7 / 7) for i in range(100)))),)),),
         (Output("o", (0, 1), (Term("h", rising(0, 1)),), default=0.0),),
@@ -108,140 +109,6 @@ SYSTEMS = {
     ),
     "wide, products": replace(WIDE, conjunction="prod", disjunction="probor", implication="prod"),
 }
-
-
-@pytest.fixture(params=SYSTEMS)
-def system(request):
-    return SYSTEMS[request.param]
-
-
-def samples(system):
-    """Random samples, some of them on whole numbers, where the terms have their knots."""
-    rng = np.random.default_rng(0)
-    low, high = np.array([v.universe for v in system.inputs]).T
-    x = rng.uniform(low, high, (150, len(low)))
-    x[:50] = np.where(rng.random((50, len(low))) < 0.5, np.round(x[:50]), x[:50])
-    x[:3] = low, high, (low + high) / 2
-    return x
-
-
-def expected(system):
-    """Weights of the arbiter, or the number of the output that is undefined."""
-    arbiter = Arbiter(system=system)
-    for x in samples(system).tolist():
-        undefined = np.flatnonzero(np.isnan(arbiter(x)))
-        yield x, int(undefined[0]) + 1 if len(undefined) else arbiter(x)
-
-
-def bad(system):
-    """Samples that are refused, and by which input."""
-    good = [v.universe[0] for v in system.inputs]
-    for i, variable in enumerate(system.inputs):
-        values = [float("nan")]
-        if system.outside == "refuse":
-            values += [np.nextafter(variable.universe[0], -np.inf), variable.universe[1] + 1, float("inf")]
-        yield from (([*good[:i], value, *good[i + 1 :]], -i - 1) for value in values)
-
-
-@pytest.mark.medium(fast=3)
-@pytest.mark.parametrize(
-    "system",
-    [pytest.param(name, marks=pytest.mark.slow) if name == "long" else name for name in SYSTEMS],
-    indirect=True,
-)
-def test_exported_c_matches_the_arbiter(system, tmp_path):
-    source = tmp_path / "arbiter.c"
-    source.write_text(to_c(system))
-    name = re.search(r"int (\w+)\(", source.read_text()).group(1)
-    library = tmp_path / "arbiter.so"
-    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fPIC", "-shared"]
-    flags += ["-Wconversion", "-Wshadow"]
-    subprocess.run([*compiler(), *flags, "-o", library, source], check=True)
-    evaluate = getattr(ctypes.CDLL(str(library)), name)
-    inputs = (ctypes.c_double * len(system.inputs))()
-    outputs = (ctypes.c_double * len(system.outputs))()
-    for x, weights in expected(system):
-        inputs[:] = x
-        status = evaluate(inputs, outputs)
-        assert status == (weights if isinstance(weights, int) else 0)
-        assert isinstance(weights, int) or tuple(outputs) == weights
-    for x, status in bad(system):
-        inputs[:] = x
-        assert evaluate(inputs, outputs) == status
-
-
-def test_systems_of_several_files_go_into_one_program(tmp_path):
-    sources = []
-    for i, system in enumerate((SYSTEMS["one"], WIDE, replace(WIDE, name="日本"))):
-        sources.append(tmp_path / f"{i}.c")
-        sources[-1].write_text(to_c(replace(system, name=f"{system.name}{i}")))
-    flags = ["-std=c99", "-fPIC", "-shared", "-o", tmp_path / "all.so"]
-    subprocess.run([*compiler(), *flags, *sources], check=True)
-
-
-@pytest.mark.medium(fast=5)
-def test_exported_python_matches_the_arbiter(system):
-    module = {}
-    exec(compile(to_python(system).encode(), "<arbiter>", "exec"), module)  # from bytes, as of a file
-    inputs, outputs = variable_names(system.inputs), variable_names(system.outputs)
-    for x, weights in expected(system):
-        if isinstance(weights, int):
-            with pytest.raises(ValueError, match=re.escape(f"output {outputs[weights - 1]} is undefined")):
-                module["weights"](x)
-        else:
-            assert module["weights"](x) == weights
-    for x, status in bad(system):
-        with pytest.raises(ValueError, match=re.escape(f"input {inputs[-status - 1]} is")):
-            module["weights"](x)
-
-
-@pytest.mark.medium
-@pytest.mark.parametrize(
-    "name", ["section VI", *(pytest.param(name, marks=pytest.mark.slow) for name in ("rational", "wide, shared"))]
-)
-def test_compiled_arbiter_works_in_a_compiled_loop(name):
-    numba = pytest.importorskip("numba")
-    system = SYSTEMS[name]
-    evaluate = Arbiter(system=system).compiled()
-
-    @numba.njit
-    def loop(rows, results):
-        status = np.zeros(len(rows), np.int64)
-        for i in range(len(rows)):
-            status[i] = evaluate(rows[i], results[i])
-        return status
-
-    x = samples(system)
-    results = np.zeros((len(x), len(system.outputs)))
-    status = loop(x, results)
-    for (_, weights), row, fault in zip(expected(system), results.tolist(), status.tolist(), strict=True):
-        assert fault == (weights if isinstance(weights, int) else 0)
-        assert isinstance(weights, int) or tuple(row) == weights
-    assert all(evaluate(np.array(x), results[0]) == fault for x, fault in bad(system))
-
-
-def test_forty_criteria_are_exported_to_python():
-    system = prioritised([Criterion(f"c{i}") for i in range(40)])
-    module = {}
-    exec(to_python(system), module)
-    x = np.random.default_rng(0).random(40).tolist()
-    assert module["weights"](x) == Arbiter(system=system)(x)
-
-
-def test_exported_python_module_has_no_dependencies(tmp_path):
-    (tmp_path / "mine.py").write_text(to_python(WIDE))
-    code = (
-        "import sys; n = set(sys.modules); import mine; mine.weights([1.0, 0.5]); print(sorted(set(sys.modules) - n))"
-    )
-    done = subprocess.run([sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {code}"],
-                          capture_output=True, text=True, check=True)  # fmt: skip
-    assert done.stdout.strip() == "['__future__', 'mine']"
-
-
-def test_missing_numba_is_reported(monkeypatch):
-    monkeypatch.setitem(sys.modules, "numba", None)
-    with pytest.raises(EngineError, match="Numba is not installed"):
-        Arbiter().compiled()
 
 
 CURVED = System(
@@ -296,33 +163,121 @@ JOINED = {
 }
 
 
-@pytest.mark.medium(fast=1)
-@pytest.mark.parametrize("system", JOINED.values(), ids=JOINED)
-def test_curves_hedges_norms_and_values_are_exported(system, tmp_path):
-    rows = [*np.linspace(0.0, 10.0, 201).tolist(), 4.999999999]
-    expected = [Arbiter(system=system)([x]) for x in rows]
-    module = {}
-    exec(to_python(system), module)
-    assert [module["weights"]([x]) for x in rows] == [pytest.approx(row, rel=1e-11, abs=1e-11) for row in expected]
-    source = tmp_path / "arbiter.c"
+def samples(system):
+    """Random samples, some of them on whole numbers, where the terms have their knots."""
+    rng = np.random.default_rng(0)
+    low, high = np.array([v.universe for v in system.inputs]).T
+    x = rng.uniform(low, high, (150, len(low)))
+    x[:50] = np.where(rng.random((50, len(low))) < 0.5, np.round(x[:50]), x[:50])
+    x[:3] = low, high, (low + high) / 2
+    return x
+
+
+def in_c(system, folder):
+    """The exported C, compiled without warnings, as a function of a sample: its status and the outputs."""
+    source, library = folder / "arbiter.c", folder / "arbiter.so"
     source.write_text(to_c(system))
-    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-Wconversion"]
-    library = tmp_path / "arbiter.so"
-    subprocess.run([*compiler(), *flags, "-fPIC", "-shared", "-o", library, source, "-lm"], check=True)
-    evaluate = ctypes.CDLL(str(library)).arbiter_evaluate
-    inputs, outputs = (ctypes.c_double * 1)(), (ctypes.c_double * 2)()
-    for x, row in zip(rows, expected, strict=True):
-        inputs[0] = x
-        assert evaluate(inputs, outputs) == 0
-        assert list(outputs) == pytest.approx(row, rel=1e-11, abs=1e-11)
+    flags = ["-std=c99", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-fPIC", "-shared"]
+    flags += ["-Wconversion", "-Wshadow"]
+    subprocess.run([*compiler(), *flags, "-o", library, source, "-lm"], check=True)
+    function = getattr(ctypes.CDLL(str(library)), re.search(r"int (\w+)\(", source.read_text()).group(1))
+    inputs, outputs = (ctypes.c_double * len(system.inputs))(), (ctypes.c_double * len(system.outputs))()
+
+    def evaluate(x):
+        inputs[:] = x
+        return function(inputs, outputs), tuple(outputs)
+
+    return evaluate
 
 
-@pytest.mark.slow
-def test_curves_hedges_norms_and_values_are_compiled():
-    evaluate, outputs = Arbiter(system=CURVED).compiled(), np.zeros(2)
-    for x in (0.0, 3.3, 4.999, 5.0, 8.75):
-        assert evaluate(np.array([x]), outputs) == 0
-        assert outputs == pytest.approx(Arbiter(system=CURVED)([x]), rel=1e-11, abs=1e-11)
+def in_python(system, folder):
+    """The exported Python; its errors name the output or input of which the status has the number."""
+    module = {}
+    exec(compile(to_python(system).encode(), "<arbiter>", "exec"), module)  # from bytes, as of a file
+    faults = {f"output {name} is undefined": k + 1 for k, name in enumerate(variable_names(system.outputs))}
+    faults |= {f"input {name} is": -k - 1 for k, name in enumerate(variable_names(system.inputs))}
+
+    def evaluate(x):
+        try:
+            return 0, module["weights"](x)
+        except ValueError as error:
+            (status,) = {status for fault, status in faults.items() if fault in str(error)}
+            return status, ()
+
+    return evaluate
+
+
+def in_numba(system, folder):
+    """The compiled arbiter, called from a compiled loop."""
+    numba = pytest.importorskip("numba")
+    function = Arbiter(system=system).compiled()
+
+    @numba.njit
+    def loop(rows, results):
+        return [function(rows[i], results[i]) for i in range(len(rows))]
+
+    def evaluate(x):
+        results = np.zeros((1, len(system.outputs)))
+        (status,) = loop(np.array([x], dtype=float), results)
+        return status, tuple(results[0].tolist())
+
+    return evaluate
+
+
+COMPILED = ("section VI", "rational", "wide, shared", "curves and values")
+SLOW = {(in_c, "long"), *((in_numba, name) for name in COMPILED[1:])}
+CASES = [
+    pytest.param(make, name, marks=pytest.mark.slow if (make, name) in SLOW else (), id=f"{make.__name__}-{name}")
+    for make in (in_c, in_python, in_numba)
+    for name in (COMPILED if make is in_numba else {**SYSTEMS, **JOINED})
+]
+
+
+@pytest.mark.medium(fast=9)
+@pytest.mark.parametrize(("make", "name"), CASES)
+def test_exported_code_matches_the_arbiter(make, name, tmp_path):
+    """Bit for bit, but for functions of which libraries differ; refused samples and undefined outputs by number."""
+    system = {**SYSTEMS, **JOINED}[name]
+    evaluate, arbiter = make(system, tmp_path), Arbiter(system=system)
+    for x in samples(system).tolist():
+        expected = tuple(arbiter(x))
+        undefined = np.flatnonzero(np.isnan(expected))
+        status, outputs = evaluate(x)
+        assert status == (undefined[0] + 1 if len(undefined) else 0)
+        if not status:
+            assert outputs == (pytest.approx(expected, rel=1e-11, abs=1e-11) if name in JOINED else expected)
+    good = [v.universe[0] for v in system.inputs]
+    for i, variable in enumerate(system.inputs):
+        values = [float("nan")]
+        if system.outside == "refuse":
+            values += [np.nextafter(variable.universe[0], -np.inf), variable.universe[1] + 1, float("inf")]
+        for value in values:
+            assert evaluate([*good[:i], value, *good[i + 1 :]])[0] == -i - 1
+
+
+def test_systems_of_several_files_go_into_one_program(tmp_path):
+    sources = []
+    for i, system in enumerate((SYSTEMS["one"], WIDE, replace(WIDE, name="日本"))):
+        sources.append(tmp_path / f"{i}.c")
+        sources[-1].write_text(to_c(replace(system, name=f"{system.name}{i}")))
+    flags = ["-std=c99", "-fPIC", "-shared", "-o", tmp_path / "all.so"]
+    subprocess.run([*compiler(), *flags, *sources], check=True)
+
+
+def test_exported_python_module_has_no_dependencies(tmp_path):
+    (tmp_path / "mine.py").write_text(to_python(WIDE))
+    code = (
+        "import sys; n = set(sys.modules); import mine; mine.weights([1.0, 0.5]); print(sorted(set(sys.modules) - n))"
+    )
+    done = subprocess.run([sys.executable, "-I", "-c", f"import sys; sys.path.insert(0, {str(tmp_path)!r}); {code}"],
+                          capture_output=True, text=True, check=True)  # fmt: skip
+    assert done.stdout.strip() == "['__future__', 'mine']"
+
+
+def test_missing_numba_is_reported(monkeypatch):
+    monkeypatch.setitem(sys.modules, "numba", None)
+    with pytest.raises(EngineError, match="Numba is not installed"):
+        Arbiter().compiled()
 
 
 def values(first, second):

@@ -1,5 +1,6 @@
 """Verification against brute force: random small systems, all rows, and dense samples of graded inputs."""
 
+import functools
 import itertools
 
 import numpy as np
@@ -7,119 +8,53 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, rising
-from fuzzy_arbiter.propositions import And, Is, Not, Or
+from fuzzy_arbiter import Variable
+from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.verification import verify
 from fuzzy_arbiter.verification.cells import stretches
 from tests.examples import examples
+from tests.fuzzy_arbiter import reference
+from tests.fuzzy_arbiter.systems import LOW_HIGH, shapes, systems
 
 NAMES = ("complete", "consistent", "exclusive", "graded_complete", "graded_consistent", "graded_exclusive")
+small = systems(norms=False, outputs=LOW_HIGH)
 
 
 def verdicts(verification):
     return tuple(getattr(verification, name) for name in NAMES)
 
 
-def output(name):
-    return Output(name, (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
+def cuts(s, degrees):
+    return {
+        Is(output.name, term): cut
+        for k, output in enumerate(s.outputs)
+        for term, cut in zip(output.term_names, reference.cuts(s, k, degrees), strict=True)
+    }
 
 
-def degree(shape, x):
-    """Degree by the shape's definition, in another way than the package."""
-    points = shape.points
-    at = [y for px, y in points if px == x]
-    if at:
-        return max(at)
-    before, after = [p for p in points if p[0] < x], [p for p in points if p[0] > x]
-    if not before or not after:
-        return (before[-1] if before else after[0])[1]
-    (a, ya), (b, yb) = before[-1], after[0]
-    return ya * (b - x) / (b - a) + yb * (x - a) / (b - a)
-
-
-def held(proposition, of, conjunction="min", disjunction="max"):
-    if isinstance(proposition, Is):
-        return of(proposition)
-    if isinstance(proposition, Not):
-        return 1 - held(proposition.part, of, conjunction, disjunction)
-    parts = [held(part, of, conjunction, disjunction) for part in proposition.parts]
-    if isinstance(proposition, And):
-        return np.minimum.reduce(parts) if conjunction == "min" else np.multiply.reduce(parts)
-    return np.maximum.reduce(parts) if disjunction == "max" else 1 - np.multiply.reduce([1 - p for p in parts])
-
-
-def cuts(s, of, n=1):
-    """Cut of every output term, for n samples."""
-    result = {Is(v.name, t): np.zeros(n) for v in s.outputs for t in v.term_names}
-    for rule in s.rules:
-        strength = held(rule.condition, of, s.conjunction, s.disjunction) * rule.weight
-        for conclusion in rule.conclusions:
-            result[conclusion] = np.maximum(result[conclusion], strength)
-    return result
-
-
-def at(s, places):
-    """Cuts at many places, an array of shape (n, inputs)."""
+def at(s, positions):
+    """Cuts at many positions, an array of shape (n, inputs)."""
     known = {}
     for i, v in enumerate(s.inputs):
-        values, index = np.unique(places[:, i], return_inverse=True)
+        values, index = np.unique(positions[:, i], return_inverse=True)
         for term in v.terms:
-            known[Is(v.name, term.name)] = np.array([degree(term.shape, x) for x in values.tolist()])[index]
-    return cuts(s, known.__getitem__, len(places))
+            known[Is(v.name, term.name)] = np.array([float(reference.degree(term.shape, x)) for x in values])[index]
+    return cuts(s, known.__getitem__)
 
 
 def faults(s, cut, above):
     """Undefined outputs, outputs in two terms, and whether two are in their greatest term, for each sample."""
     undefined = [sum(cut[Is(v.name, t)] for t in v.term_names) == 0 for v in s.outputs]
     double = [sum(cut[Is(v.name, t)] > above for t in v.term_names) >= 2 for v in s.outputs]
-    high = sum((cut[Is(v.name, "high")] > above).astype(int) for v in s.outputs) >= 2
-    return np.any(undefined, axis=0), np.any(double, axis=0), high
-
-
-quarters = st.integers(0, 4).map(lambda q: q / 4)
-
-
-@st.composite
-def shapes(draw):
-    places = sorted(draw(st.lists(st.integers(0, 4), min_size=1, max_size=4)))
-    places = [x for i, x in enumerate(places) if places[max(0, i - 2) : i] != [x, x]]
-    return Shape(tuple((x, draw(quarters)) for x in places))
-
-
-@st.composite
-def systems(draw, connectives=False):
-    inputs = tuple(
-        Variable(name, (0, 4), tuple(Term(f"t{j}", draw(shapes())) for j in range(draw(st.integers(1, 3)))))
-        for name in "abc"[: draw(st.integers(2, 3))]
-    )
-    outputs = tuple(map(output, "yz"[: draw(st.integers(1, 2))]))
-    statements = st.sampled_from([v[t] for v in inputs for t in v.term_names])
-    conditions = st.recursive(
-        statements,
-        lambda inner: st.one_of(
-            inner.map(Not), st.lists(inner, min_size=2, max_size=3).flatmap(
-                lambda parts: st.sampled_from([And(tuple(parts)), Or(tuple(parts))])
-            )
-        ),
-        max_leaves=5,
-    )  # fmt: skip
-    conclusions = st.sampled_from([o[t] for o in outputs for t in o.term_names])
-    weights = st.sampled_from([1.0, 1.0, 0.75, 0.5])
-    rules = draw(
-        st.lists(st.builds(Rule, conditions, conclusions.map(lambda c: (c,)), weights), min_size=1, max_size=6)
-    )
-    settings = {}
-    if connectives:
-        settings = {"conjunction": draw(st.sampled_from(["min", "prod"]))}
-        settings["disjunction"] = draw(st.sampled_from(["max", "probor"]))
-    return System(inputs, outputs, tuple(rules), **settings)
+    high = sum((cut[Is(v.name, "high")] > above) + np.int64(0) for v in s.outputs) >= 2
+    return functools.reduce(np.logical_or, undefined), functools.reduce(np.logical_or, double), high
 
 
 def samples(s):
-    """Knots and places between them in all combinations, and random ones."""
-    grid = np.linspace(0, 4, 17 if len(s.inputs) == 2 else 9)
+    """Knots and positions between them in all combinations, and random ones."""
+    grid = np.linspace(0, 1, 17 if len(s.inputs) < 3 else 9)
     product = np.stack(np.meshgrid(*[grid] * len(s.inputs)), axis=-1).reshape(-1, len(s.inputs))
-    return np.vstack([product, np.random.default_rng(7).uniform(0, 4, (300, len(s.inputs)))])
+    return np.vstack([product, np.random.default_rng(7).uniform(0, 1, (100, len(s.inputs)))])
 
 
 def check_graded(s, v):
@@ -135,48 +70,41 @@ def check_graded(s, v):
 
 
 @pytest.mark.medium
-@settings(max_examples=examples(150))
-@given(systems())
-def test_verdicts_on_graded_inputs_against_brute_force(s):
+@settings(max_examples=examples(150), deadline=None)
+@given(small)
+def test_verdicts_against_brute_force(s):
+    """On crisp rows against all rows, on graded inputs against dense samples."""
     v = verify(s)
     assert None not in verdicts(v)
     check_graded(s, v)
+    rows = list(itertools.product(*(i.term_names for i in s.inputs)))
+    seen = [False] * 3
+    for row in rows:
+        terms = {Is(i.name, t) for i, t in zip(s.inputs, row, strict=True)}
+        cut = cuts(s, lambda statement, terms=terms: np.float64(statement in terms))
+        undefined, _, high = faults(s, cut, 0.5)
+        found = undefined, faults(s, cut, 0.999)[1], high
+        seen = [before or bool(now) for before, now in zip(seen, found, strict=True)]
+    assert v.row_count == len(rows)
+    assert verdicts(v)[:3] == tuple(not found for found in seen)
 
 
 @pytest.mark.medium
-@settings(max_examples=examples(80))
-@given(systems(connectives=True))
+@settings(max_examples=examples(80), deadline=None)
+@given(systems(outputs=LOW_HIGH))
 def test_verdicts_with_other_connectives_against_brute_force(s):
     v = verify(s)
     assert v.graded_complete is not None
     check_graded(s, v)
 
 
-@pytest.mark.medium
-@settings(max_examples=examples(100))
-@given(systems())
-def test_verdicts_on_crisp_rows_against_all_rows(s):
-    v = verify(s)
-    seen = dict.fromkeys(NAMES[:3], False)
-    rows = list(itertools.product(*(i.term_names for i in s.inputs)))
-    for row in rows:
-        terms = {Is(i.name, t) for i, t in zip(s.inputs, row, strict=True)}
-        cut = cuts(s, lambda statement, terms=terms: np.array([float(statement in terms)]))
-        undefined, _, high = (bool(np.any(x)) for x in faults(s, cut, 0.5))
-        full = bool(np.any(faults(s, cut, 0.999)[1]))
-        for name, found in zip(NAMES[:3], (undefined, full, high), strict=True):
-            seen[name] |= found
-    assert v.row_count == len(rows)
-    assert {name: getattr(v, name) for name in NAMES[:3]} == {name: not found for name, found in seen.items()}
-
-
 @settings(max_examples=examples(100))
 @given(st.lists(shapes(), min_size=1, max_size=3))
-def test_stretches_against_samples(terms):
-    v = Variable("x", (0, 4), tuple(Term(f"t{i}", shape) for i, shape in enumerate(terms)))
+def test_stretches_against_samples(drawn):
+    v = Variable("x", (0, 1), {f"t{i}": shape for i, shape in enumerate(drawn)})
     found = stretches(v)
-    for x in np.linspace(0, 4, 65).tolist():
-        total = sum(degree(t.shape, x) for t in v.terms)
+    for x in np.linspace(0, 1, 65).tolist():
+        total = float(sum(reference.degree(t.shape, x) for t in v.terms))
         inside = {
             s.kind: s
             for s in found

@@ -42,25 +42,6 @@ def test_centroid_is_exact_for_any_system(system, data):
     assert np.array_equal(arbiter.batch([inputs])[0], arbiter(inputs), equal_nan=True)
 
 
-def test_tipping_example_is_exact():
-    """Of scikit-fuzzy's example, whose exact centroid is 12118694/610275."""
-    poor, middling, good = triangle(0, 0, 5), triangle(0, 5, 10), triangle(5, 10, 10)
-    words = (Term("poor", poor), Term("average", middling), Term("good", good))
-    tip = (Term("low", triangle(0, 0, 13)), Term("medium", triangle(0, 13, 25)), Term("high", triangle(13, 25, 25)))
-    system = System(
-        (Variable("quality", (0, 10), words), Variable("service", (0, 10), words)),
-        (Output("tip", (0, 25), tip),),
-        (
-            "if quality is poor or service is poor then tip is low",
-            "if service is average then tip is medium",
-            "if service is good or quality is good then tip is high",
-        ),
-        normalization="none",
-    )
-    assert Arbiter(system=system, engine="exact")([6.5, 9.8])[0] == pytest.approx(12118694 / 610275, abs=8 * EPS * 20)
-    assert reference.centroids(system, [Fraction(13, 2), Fraction(49, 5)]) == [Fraction(12118694, 610275)]
-
-
 @pytest.mark.parametrize("implication", ["min", "prod"])
 def test_tiny_degrees_do_not_underflow(implication):
     """As both cuts vanish alike, the centroid goes to the middle of the joined supports."""

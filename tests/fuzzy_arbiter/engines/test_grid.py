@@ -1,7 +1,5 @@
 """The grid engine: sums over samples of an output's joined terms; see also test_quadrature, test_other_libraries."""
 
-import pickle
-
 import numpy as np
 import pytest
 
@@ -44,8 +42,3 @@ def test_universes_that_cannot_be_sampled_are_refused():
         arbiter(thin=triangle(5.1, 5.5, 5.9))
     with pytest.raises(EngineError, match="1000000000 points are too many"):
         arbiter(1_000_000_000, thin=triangle(5.1, 5.5, 5.9))
-
-
-def test_an_engine_can_be_sent_to_another_process():
-    made = arbiter(low=triangle(0, 2, 4))
-    assert pickle.loads(pickle.dumps(made)).engine == "grid"

@@ -1,8 +1,8 @@
 """The scikit-fuzzy engine equals scikit-fuzzy and avoids its known defects."""
 
-import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from functools import reduce
 from operator import and_, or_
 
@@ -11,7 +11,6 @@ import pytest
 from skfuzzy import control
 
 from fuzzy_arbiter import (
-    Criterion,
     Output,
     Rule,
     Shape,
@@ -27,30 +26,10 @@ from fuzzy_arbiter import (
 from fuzzy_arbiter.engines.scikit import ScikitEngine
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Not, Or
-from fuzzy_arbiter.rule_text import parse_rule
+from tests.fuzzy_arbiter.formats.systems import TIPPING as SYSTEM
 
-DEGREE = [Criterion("degree")]
-QUALITY = Variable(
-    "quality", (0, 10), (Term("poor", falling(0, 5)), Term("average", triangle(0, 5, 10)), Term("good", rising(5, 10)))
-)
-SERVICE = Variable(
-    "service", (0, 10), (Term("poor", falling(0, 5)), Term("average", triangle(0, 5, 10)), Term("good", rising(5, 10)))
-)
-TIP = Output(
-    "tip", (0, 25), (Term("low", falling(0, 13)), Term("medium", triangle(0, 13, 25)), Term("high", rising(13, 25)))
-)
-TIPPING = System(
-    (QUALITY, SERVICE),
-    (TIP,),
-    (
-        parse_rule("if quality is poor or service is poor then tip is low"),
-        parse_rule("if service is average then tip is medium"),
-        parse_rule("if service is good or quality is good then tip is high"),
-    ),
-    name="tipping",
-    normalization="none",
-    points=26,
-)
+TIPPING = replace(SYSTEM, points=26)
+QUALITY, SERVICE, (TIP,) = *TIPPING.inputs, TIPPING.outputs
 # nested conditions, weights, two conclusions, knots off the grid, a jump, a term that no rule concludes
 MIXED_OUTPUTS = (
     Output(
@@ -142,24 +121,6 @@ def test_engine_equals_stock_scikit_fuzzy_bit_for_bit(system):
         assert engine.centroids(row) == expected
 
 
-@pytest.mark.parametrize("n", range(1, 6))
-def test_crisp_rows_give_exactly_zero_and_one(n):
-    engine = ScikitEngine(prioritised([Criterion(f"c{i}") for i in range(n)], points=50))
-    for number in range(2**n):
-        row = [number >> i & 1 for i in range(n)]
-        floor = row.index(1) if 1 in row else None
-        assert engine.weights(row) == tuple(float(k == floor) for k in range(n))
-
-
-@pytest.mark.parametrize("points", [3, 11, 101, 1001])
-def test_section_vi_is_off_the_exact_centroid_by_a_sixth_of_the_squared_step_at_most(points):
-    step, (sampled,) = 1 / (points - 1), ScikitEngine(prioritised(DEGREE, points=points)).defuzzifiers
-    strengths = np.random.default_rng(points).random(60).tolist()
-    errors = [abs(sampled.value([1 - h, h], ()) - (1 / 3 + h**2 - 2 / 3 * h**3)) for h in strengths]
-    # and no better than half of that, so that the bound means something
-    assert step**2 / 12 <= max(errors) <= step**2 / 6 + 1e-13
-
-
 def gap(default=None):
     """No rule fires between 4 and 6."""
     x = Variable("x", (0, 10), (Term("a", falling(0, 4)), Term("b", rising(6, 10))))
@@ -174,13 +135,6 @@ def test_output_without_a_firing_rule_is_never_stale():
         assert np.isnan(engine.centroids([5.0])).tolist() == [True]
     assert np.isnan(engine.weights_of_many(np.array([[1.0], [9.0], [4.0], [5.0]]))[:, 0]).tolist() == [0, 0, 1, 1]
     assert ScikitEngine(gap(default=5.5)).centroids_of_many(np.array([[5.0], [1.0]]))[:, 0] == pytest.approx([5.5, 5.2])
-
-
-def test_batch_equals_its_rows_and_may_be_empty():
-    engine = ScikitEngine(mixed())
-    rows = np.random.default_rng(3).random((20, 2)) * 10
-    assert engine.centroids_of_many(rows).tolist() == [engine.centroids(row) for row in rows.tolist()]
-    assert engine.weights_of_many(np.empty((0, 2))).shape == (0, 2)
 
 
 @pytest.mark.parametrize(
@@ -225,12 +179,6 @@ def test_edges_at_the_ends_of_an_input_are_no_jumps():
     x = Variable("x", (0, 1), (Term("low", triangle(0, 0, 1)), Term("high", triangle(0, 1, 1))))
     engine = ScikitEngine(System((x,), (TIP,), ("if x is low then tip is low",), normalization="none"))
     assert engine.centroids([0.0]) == [engine.defuzzifiers[0].value([1, 0, 0], ())]
-
-
-def test_an_engine_can_be_sent_to_another_process():
-    engine = ScikitEngine(mixed(points=11))
-    here = engine.centroids([3.0, 4.0])
-    assert pickle.loads(pickle.dumps(engine)).centroids([3.0, 4.0]) == here
 
 
 @pytest.mark.slow

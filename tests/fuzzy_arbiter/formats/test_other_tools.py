@@ -2,7 +2,6 @@
 
 import json
 from dataclasses import replace
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -25,12 +24,6 @@ NEEDED = {
 
 def centroids(system, samples):
     return np.array([ExactEngine(replace(system, normalization="none")).centroids(sample) for sample in samples])
-
-
-def test_tipping_example_matches_the_manuals():
-    """Moment over area, each the sum of a few parts above zero: a rounding or two for every part."""
-    rounding = 16 * np.finfo(float).eps
-    assert centroids(TIPPING, [[6.5, 9.8]])[0, 0] == pytest.approx(float(Fraction(12118694, 610275)), rel=rounding)
 
 
 @pytest.mark.parametrize("format", FORMATS)
