@@ -27,7 +27,7 @@ from controller.regions import (
     Visibility,
     pack,
 )
-from controller.regions.region_set import SHAPES, clearances_at, of_attitude
+from controller.regions.region_set import SHAPES, clearances_at, of_attitude, surface_of
 from controller.regions.shapes import ENTRIES
 
 TURNED = tuple(np.array([0.9, 0.1, -0.3, 0.2]) / np.linalg.norm([0.9, 0.1, -0.3, 0.2]))
@@ -43,9 +43,10 @@ attitudes = turns.filter(lambda e: np.linalg.norm(e) > 0.1).map(lambda e: e / np
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 
 
-def evaluated(shape, p, e=LEVEL, keep="in"):
-    """Return g, its derivatives by position and by rotation, and the clearance."""
-    packed = pack([Region("r", shape, keep)])
+def evaluated(shape, p, e=LEVEL, keep="in", velocity=(0.0, 0.0, 0.0)):
+    """Return g, its derivatives by position and by rotation, and the clearance, after 1.5 s."""
+    packed = pack([Region("r", shape, keep, velocity)])
+    packed.move_to(1.5)
     values, gradients, rotation_gradients, clearances = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
     packed.evaluate(np.asarray(p, float), np.asarray(e, float), values, gradients, rotation_gradients, clearances)
     return values[0], gradients[0], rotation_gradients[0], clearances[0]
@@ -116,38 +117,24 @@ def test_sign_of_clearance_matches_containment(shape, p, e):
         assert (clearance > 0.0) == contains(shape, p, e)
 
 
-@pytest.mark.medium(fast=2)
-@each_shape
-@given(p=points, e=attitudes)
-def test_gradients_match_central_differences(shape, p, e):
-    h = 1e-6
-    g, gradient, turning, _ = evaluated(shape, p, e)
-    derivatives = np.concatenate([gradient, turning])
-    moves = [(p + s * h * axis, e) for s in (1.0, -1.0) for axis in np.eye(3)]
-    rotations = [(p, turned(e, s * h * axis)) for s in (1.0, -1.0) for axis in np.eye(3)]
-    near = [evaluated(shape, *pose)[0] for pose in (*moves[:3], *rotations[:3], *moves[3:], *rotations[3:])]
-    ahead, behind = np.split(np.array(near), 2)
-    one_sided = np.array([(ahead - g) / h, (g - behind) / h])
-    kink = np.abs(one_sided[0] - one_sided[1]).max()
-    if kink > 1e-3 * max(1.0, np.abs(derivatives).max()):
-        return  # a ridge, where there is no gradient
-    assert derivatives == pytest.approx((ahead - behind) / (2 * h), abs=0.5 * kink + 1e-6)
-
-
 @pytest.mark.medium(fast=6)
 @each_shape
-def test_most_poses_are_away_from_ridges(shape):
-    """Keep the test above from passing by looking away."""
-    rng = np.random.default_rng(3)
-    h, smooth = 1e-6, 0
+def test_gradients_match_central_differences(shape):
+    """At nearly all poses; at ridges, where a gradient has two sides, it is one of them."""
+    rng, h, smooth = np.random.default_rng(3), 1e-6, 0
     for _ in range(60):
         p, e = rng.uniform(-4.0, 5.0, 3), rng.normal(size=4)
         e /= np.linalg.norm(e)
-        move, turn = rng.normal(size=(2, 3))
         g, gradient, turning, _ = evaluated(shape, p, e)
-        ahead = evaluated(shape, p + h * move, turned(e, h * turn))[0]
-        slope = gradient @ move + turning @ turn
-        smooth += abs((ahead - g) / h - slope) < 1e-3 * max(1.0, np.abs(gradient).max())
+        ahead, behind = (
+            [evaluated(shape, p + s * axis, e)[0] for axis in np.eye(3)]
+            + [evaluated(shape, p, turned(e, s * axis))[0] for axis in np.eye(3)]
+            for s in (h, -h)
+        )
+        kink = np.abs(np.array(ahead) + behind - 2.0 * g).max() / h
+        derivatives, rough = np.r_[gradient, turning], kink > 1e-3 * max(1.0, np.abs(gradient).max())
+        smooth += not rough
+        assert rough or derivatives == pytest.approx(np.subtract(ahead, behind) / (2.0 * h), abs=0.5 * kink + 1e-6)
     assert smooth >= 58
 
 
@@ -203,28 +190,21 @@ def test_keep_out_negates_keep_in(shape, p, e):
         assert np.array_equal(kept_in, -kept_out)
 
 
-@pytest.mark.parametrize(
-    ("shape", "p"),
-    [
-        (Sphere((1.0, 1.0, 1.0), 0.5), (1.0, 1.0, 1.0)),
-        (DepthBand(2.0, 1.0), (0.0, 0.0, 2.0)),
-        (Box((0.0, 0.0, 0.0), (2.0, 2.0, 2.0)), (0.0, 0.0, 0.0)),
-        (Box((0.0, 0.0, 0.0), (2.0, 2.0, 2.0)), (1.0, 1.0, 1.0)),
-        (Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 2.0), 0.5), (0.0, 0.0, 1.0)),
-        (Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 2.0), 0.5), (0.0, 0.0, 3.0)),
-        (Ellipsoid((0.0, 0.0, 0.0), (3.0, 2.0, 1.0)), (0.0, 0.0, 0.0)),
-        (Ellipsoid((0.0, 0.0, 0.0), (3.0, 2.0, 1.0)), (2.9, 0.0, 0.0)),
-        (Prism(((0.0, 0.0), (2.0, 0.0), (0.0, 2.0)), 0.0, 1.0), (0.0, 0.0, 0.0)),
-        (Prism(((0.0, 0.0), (2.0, 0.0), (0.0, 2.0)), 0.0, 1.0), (1.0, 0.0, 0.5)),
-        (Pipe(((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)), 0.4), (1.0, 0.0, 0.0)),
-        (Cone((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.5, 2.0), (0.0, 0.0, 0.0)),
-        (Cone((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 0.5, 2.0), (1.0, 0.0, 0.0)),
-        (Cone((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), math.pi / 2, 2.0), (-1.0, 0.0, 0.0)),
-    ],
-)
-def test_values_are_finite_at_centres_axes_and_corners(shape, p):
-    g, gradient, clearance = at(shape, p)
-    assert np.isfinite([g, *gradient, clearance]).all()
+EDGES = [
+    *IN_SPACE,
+    Ellipsoid((0.0, 0.0, 0.0), (3.0, 2.0, 1.0)),
+    Cone((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), math.pi / 2, 2.0),
+]
+
+
+@pytest.mark.parametrize("shape", EDGES, ids=lambda shape: type(shape).__name__)
+def test_values_are_finite_at_centers_axes_and_corners(shape):
+    """At corners of the surface and between each two of them, where axes and ridges lie."""
+    corners = surface_of(shape, ((-4.0,) * 3, (5.0,) * 3)).vertices[:24]
+    centers = [np.array(getattr(shape, name)) for name in ("centre", "feature", "start") if hasattr(shape, name)]
+    for p in [*(a + b for a in 0.5 * corners for b in 0.5 * corners), *centers]:
+        g, gradient, clearance = at(shape, p)
+        assert np.isfinite([g, *gradient, clearance]).all()
 
 
 @pytest.mark.parametrize(
@@ -263,11 +243,6 @@ def test_paper_regions_have_the_paper_values():
         (lambda: Cylinder((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 1.0), "end"),
         (lambda: Ellipsoid((0.0, 0.0, 0.0), (1.0, -1.0, 1.0)), "semi_axes"),
         (lambda: Prism(((0.0, 0.0), (1.0, 0.0)), 0.0, 1.0), "corners"),
-        (lambda: Prism(((0.0, 0.0), (1.0, 1.0), (1.0, 0.0), (0.0, 1.0)), 0.0, 1.0), "corners"),
-        (lambda: Prism(((0.0, 0.0), (1.0, 1.0), (2.0, 2.0), (2.0, 0.0), (1.0, 1.0), (0.0, 3.0)), 0.0, 1.0), "corners"),
-        (lambda: Prism(((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (2.0, 4.0), (2.0, 2.0), (0.0, 2.0)), 0.0, 1.0), "corners"),
-        (lambda: Prism(((0.0, 0.0), (2.0, 0.0), (2.0, 0.0), (0.0, 2.0)), 0.0, 1.0), "corners"),
-        (lambda: Prism(((0.0, 0.0), (2.0, 0.0), (2.0, 2.0), (1.0, 0.0), (0.0, 2.0)), 0.0, 1.0), "corners"),
         (lambda: Prism(((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)), 1.0, 1.0), "bottom"),
         (lambda: Pipe(((0.0, 0.0, 0.0),), 1.0), "points"),
         (lambda: Pipe(((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 1.0), "points"),
@@ -331,14 +306,9 @@ def test_visibility_has_numbers_on_its_axis(feature, angle):
 def test_moving_region_is_evaluated_at_its_present_position(shape, p, e, velocity):
     if isinstance(shape, Orientation):
         return  # at no place
-    packed = pack([Region("r", shape, "in", tuple(velocity))])
-    packed.move_to(1.5)
-    values, gradients, rotation_gradients, clearances = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
-    packed.evaluate(p + 1.5 * velocity, e, values, gradients, rotation_gradients, clearances)
-    g, gradient, turning, clearance = evaluated(shape, (p + 1.5 * velocity) - 1.5 * velocity, e)
-    assert (values[0], clearances[0]) == (g, clearance)
-    assert np.array_equal(gradients[0], gradient)
-    assert np.array_equal(rotation_gradients[0], turning)
+    moving = evaluated(shape, p + 1.5 * velocity, e, velocity=tuple(velocity))
+    for now, still in zip(moving, evaluated(shape, (p + 1.5 * velocity) - 1.5 * velocity, e), strict=True):
+        assert np.array_equal(now, still)
 
 
 @pytest.mark.parametrize("shape", [shape for shape in EXAMPLES if of_attitude(shape)])
