@@ -6,33 +6,30 @@ import math
 import numpy as np
 import pytest
 
-from controller import LAWS, VehicleState
+from controller import VehicleState
 from controller.laws import pid_cbf
 from controller.laws.deployable import model
 from controller.quaternion import error_parts, rotation_matrix
 from controller.regions import DepthBand, Region, Sphere, pack
-from tests.controller.deployable.scenery import GOAL, LEVEL, ODIN, Sea
+from tests.controller.deployable import scenery
+from tests.controller.deployable.scenery import GOAL, LEVEL, Sea
+from tests.controller.test_baseline_laws import law_of as baseline
 
 PERIOD = 0.02
 BAND = Region("band", DepthBand(3.65, 3.35), "in")
 BALL = Region("ball", Sphere((4.0, 0.6, 2.3), 0.7), "out")
 
 
-def law_of(regions=(), period=PERIOD, **gains):
-    kind = LAWS["pid_cbf"]
-    return kind.for_vehicle(ODIN, kind.gains_type(**gains), LEVEL, period, len(regions))
+def law_of(regions=(), **gains):
+    return baseline("pid_cbf", regions, **gains)
 
 
-def fly(law, sea, seconds, regions=(), goal=GOAL):
-    """Fly in a sea; return positions, velocities and forces at each period, before its motion."""
-    primary, packed, forces = pack([goal]), pack(regions), np.zeros(8)
-    rows = []
-    for k in range(round(seconds / PERIOD)):
-        packed.move_to(k * PERIOD)
-        law.step(sea.measured(), primary, packed, np.ones(len(regions)), forces)
-        rows.append((sea.position.copy(), sea.velocity.copy(), forces.copy()))
-        sea.step(forces, PERIOD)
-    return (np.array(column) for column in zip(*rows, strict=True))
+def fly(law, sea, seconds, regions=()):
+    """Fly in a sea; return positions before each period, and forces."""
+    positions = []
+    steps = round(seconds / PERIOD)
+    forces = scenery.fly(law, sea, regions=regions, steps=steps, each=lambda _: positions.append(sea.position.copy()))
+    return np.array(positions), forces
 
 
 @pytest.mark.parametrize(
@@ -91,7 +88,7 @@ def test_step_is_its_equations(ball):
 @pytest.mark.parametrize("net_weight", [-14.0, 9.0])
 def test_net_weight_and_current_leave_no_steady_error(net_weight):
     law, sea = law_of(), Sea(current=(0.1, -0.2, 0.0), restoring=net_weight)
-    positions, _, _ = fly(law, sea, 60.0)
+    positions, _ = fly(law, sea, 60.0)
     assert positions[-1] == pytest.approx(GOAL.shape.centre, abs=5e-3)
     assert law.estimate[0] == pytest.approx(net_weight, abs=0.1)
 
@@ -105,7 +102,7 @@ def test_clearances_satisfy_the_barrier_inequality(velocity, center):
     gains = {"pull_in": 0.6, "brake": 1.5, "margin": 0.1, "repulsion": 0.0, "limit": 60.0}
     region = Region("ball", Sphere(center, 0.7), "out", velocity)
     law, sea = law_of((region,), **gains), Sea(current=(0.0, 0.0, 0.0), restoring=0.0)
-    positions, _, forces = fly(law, sea, 14.0, (region,))
+    positions, forces = fly(law, sea, 14.0, (region,))
     times = PERIOD * np.arange(len(positions))
     h = np.linalg.norm(positions - center - np.outer(times, velocity), axis=1) - 0.7 - 0.1
     rate = (h[2:] - h[:-2]) / (2.0 * PERIOD)
@@ -120,14 +117,14 @@ def test_clearances_satisfy_the_barrier_inequality(velocity, center):
 @pytest.mark.medium
 def test_without_barrier_the_same_obstacle_is_hit():
     region = Region("ball", Sphere((2.5, 0.05, 2.5), 0.7), "out", hard=False)
-    positions, _, _ = fly(law_of((region,), repulsion=0.0, limit=60.0), Sea((0.0, 0.0, 0.0), 0.0), 14.0, (region,))
+    positions, _ = fly(law_of((region,), repulsion=0.0, limit=60.0), Sea((0.0, 0.0, 0.0), 0.0), 14.0, (region,))
     assert np.linalg.norm(positions - [2.5, 0.05, 2.5], axis=1).min() < 0.6
 
 
 @pytest.mark.medium
 def test_obstacles_are_avoided_under_noise_and_goal_is_reached():
     regions = (BALL, Region("drifting", Sphere((5.8, -0.9, 2.2), 0.5), "out", (-0.03, 0.05, 0.0)), BAND)
-    positions, _, forces = fly(law_of(regions), Sea(noise=(0.02, 0.01), seed=3), 60.0, regions)
+    positions, forces = fly(law_of(regions), Sea(noise=(0.02, 0.01), seed=3), 60.0, regions)
     assert np.linalg.norm(positions - BALL.shape.centre, axis=1).min() > 0.7
     assert np.linalg.norm(positions[-200:] - GOAL.shape.centre, axis=1).max() < 0.5
     assert np.abs(forces).max() <= 27.0
@@ -137,7 +134,7 @@ def test_obstacles_are_avoided_under_noise_and_goal_is_reached():
 def test_attitude_is_held_against_a_righting_moment():
     law, sea = law_of(observer=3.0), Sea(current=(0.0, 0.0, 0.0), restoring=0.0)
     sea.quaternion = np.array([math.cos(0.2), math.sin(0.2), 0.0, 0.0])
-    list(fly(law, sea, 45.0))
+    fly(law, sea, 45.0)
     assert sea.quaternion == pytest.approx(LEVEL, abs=1e-3)
 
 
@@ -162,7 +159,7 @@ def test_observer_ignores_a_measurement_with_a_number_that_is_not_finite(at):
 
 def test_missing_position_is_propagated_by_the_model():
     law, sea, goal, forces = law_of(), Sea(current=(0.0, 0.0, 0.0), restoring=5.0), pack([GOAL]), np.zeros(8)
-    list(fly(law, sea, 5.0))
+    fly(law, sea, 5.0)
     for _ in range(50):
         measured = sea.measured()
         measured.position[1] = math.nan

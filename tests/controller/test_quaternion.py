@@ -29,14 +29,6 @@ def test_rotation_matrix_is_scipys(e):
     assert q.rotation_matrix(e) == pytest.approx(scipy_of(e).as_matrix(), abs=1e-14)
 
 
-@given(units())
-def test_rotation_matrix_is_the_papers_form_with_corrected_sign(e):
-    """(3): (e0^2 - e.e) I + 2 e e^T + 2 e0 S(e)."""
-    v = e[1:]
-    printed = (e[0] ** 2 - v @ v) * np.eye(3) + 2 * np.outer(v, v) + 2 * e[0] * q.skew(v)
-    assert q.rotation_matrix(e) == pytest.approx(printed, abs=1e-14)
-
-
 @given(vectors, vectors)
 def test_skew_is_the_cross_product(a, b):
     assert q.skew(a) @ b == pytest.approx(np.cross(a, b), abs=1e-14)

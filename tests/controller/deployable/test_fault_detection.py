@@ -87,18 +87,6 @@ def test_dead_thruster_misjudged_as_stuck_does_not_displace_the_vehicle():
     assert np.linalg.norm(sea.position - (8.0, 0.5, 2.5)) < 0.6
 
 
-@pytest.mark.medium
-def test_wrongly_isolated_thruster_is_retried():
-    law, sea = law_for(REGIONS), Sea(noise=NOISE)
-    fly(law, sea, steps=100)
-    memory = law.memory
-    memory.fault_state.tentative[3], memory.thrusters.health[3] = 1, 0.0
-    reallocate(memory.thrusters)
-    sea.left[0] = 0.0
-    fly(law, sea, steps=500, first=100)
-    assert isolated(law) == [0]
-
-
 def test_certain_or_reported_failure_is_not_retried():
     for tentative in (0, 2):
         estimate, thrusters, state = started()

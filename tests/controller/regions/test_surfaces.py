@@ -22,7 +22,7 @@ from controller.regions import (
     Region,
     Sphere,
 )
-from controller.regions.mesh import ball, closed_grid, patches, sector
+from controller.regions.mesh import closed_grid, patches, sector
 from controller.regions.region_set import clearances_at, surface_of
 from controller.regions.shapes import ENTRIES
 
@@ -58,6 +58,12 @@ def signed_volume(mesh):
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 
 
+def assert_closed(mesh):
+    """Assert that each edge is there once in each direction."""
+    edges = Counter((a, b) for t in mesh.triangles.tolist() for a, b in zip(t, [*t[1:], t[0]], strict=True))
+    assert set(edges.values()) == {1} and all((b, a) in edges and a != b for a, b in edges)
+
+
 def distances(shape, mesh):
     return np.abs(clearances_at(mesh.vertices, Region("shape", shape, "in")))
 
@@ -71,10 +77,7 @@ def test_every_corner_is_on_the_surface(name):
 @pytest.mark.parametrize("name", SOLIDS)
 def test_solids_are_closed_and_face_outward(name):
     mesh = surface_of(SOLIDS[name][0], LIMITS)
-    ways = Counter((a, b) for t in mesh.triangles.tolist() for a, b in zip(t, [*t[1:], t[0]], strict=True))
-    assert set(ways.values()) == {1}  # each edge once in each direction
-    assert all((b, a) in ways for a, b in ways)
-    assert all(a != b for a, b in ways)
+    assert_closed(mesh)
     places = np.round(mesh.vertices, 7)
     assert len(np.unique(places, axis=0)) == len(places)  # one corner at each place
     assert signed_volume(mesh) > 0.0
@@ -136,41 +139,15 @@ def test_a_sector_of_more_than_half_a_turn_is_closed_too():
     assert signed_volume(mesh) == pytest.approx(math.tau / 3.0 * (1.0 - math.cos(2.5)), rel=0.05)
 
 
-def edges(mesh):
-    return Counter((a, b) for t in mesh.triangles.tolist() for a, b in zip(t, [*t[1:], t[0]], strict=True))
-
-
 def test_a_ring_is_closed_faces_outward_and_has_its_volume():
     turn, around = (np.linspace(0.0, math.tau, n, endpoint=False) for n in (24, 16))
     turn, around = np.meshgrid(turn, around, indexing="ij")
     out = 3.0 + 0.5 * np.cos(around)
     mesh = closed_grid(np.stack([out * np.cos(turn), out * np.sin(turn), 0.5 * np.sin(around)], axis=-1))
-    ways = edges(mesh)
-    assert set(ways.values()) == {1} and all((b, a) in ways for a, b in ways)
+    assert_closed(mesh)
     sides = np.linalg.norm(np.diff(mesh.vertices[mesh.triangles], axis=1), axis=2)
     assert sides.max() < 1.0  # of neighbours alone
     assert signed_volume(mesh) == pytest.approx(2.0 * math.pi**2 * 3.0 * 0.5**2, rel=0.05)
-
-
-def test_a_ball_is_of_triangles_of_about_one_size_that_face_outward():
-    mesh = ball()
-    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
-    assert len(mesh.triangles) == 20 * 4**2
-    assert (np.einsum("ij,ij->i", np.cross(b - a, c - a), a + b + c) > 0.0).all()
-    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2.0
-    assert areas.max() < 1.7 * areas.min()
-
-
-def test_a_sector_is_a_cone_whose_end_is_rounded_in_even_steps():
-    mesh = sector((1.0, 0.0, 0.0), (0.0, 0.0, 2.0), 0.6, 2.0)
-    ways = mesh.vertices - [1.0, 0.0, 0.0]
-    on_end = ways[np.linalg.norm(ways, axis=1) > 1.0]
-    angles = np.unique(np.round(np.arccos(np.clip(on_end[:, 2] / 2.0, -1.0, 1.0)), 6))
-    assert (
-        len(on_end) == len(ways) - 1
-        and angles.max() == pytest.approx(0.6)
-        and np.ptp(np.diff(angles[angles > 0.0])) < 1e-5
-    )
 
 
 def test_patches_are_squares_about_the_middle_that_reach_across_the_limits():
