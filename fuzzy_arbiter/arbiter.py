@@ -156,55 +156,20 @@ class Arbiter:
         return tuple.__new__(self._result, weights.T) if by_name else weights
 
     def centroids(self, inputs: Sample | None = None, /, **named: float) -> Result[float]:
-        """Return the raw value of each output for one sample, before normalization.
+        """Return the raw value of each output, before normalization; `inputs` or `named` are a sample, as for a call.
 
-        Parameters
-        ----------
-        inputs, **named
-            Sample, as for a call.
-
-        Returns
-        -------
-        Result of float
-            Centroids in the outputs' universes; where no rule fires the default, or NaN.
-
-        Raises
-        ------
-        InputError
-            If the sample is invalid, as for a call.
+        Where no rule fires it is the default, or NaN.
         """
         return tuple.__new__(self._result, self._engine.centroids(self._samples.one(_one_of(inputs, named))))
 
     def explain(self, inputs: Sample | None = None, /, **named: float) -> Explanation:
-        """Explain the decision for one sample: the strength of each rule, and the rules that decided.
-
-        Parameters
-        ----------
-        inputs, **named
-            Sample, as for a call.
-
-        Returns
-        -------
-        Explanation
-            Result as data; its `str` is a text for people.
-
-        Raises
-        ------
-        InputError
-            If the sample is invalid, as for a call.
-        """
+        """Explain the decision for a sample, `inputs` or `named`: each rule's strength, and the rules that decided."""
         from fuzzy_arbiter.explanation import explain
 
         return explain(self._engine, self._samples.one(_one_of(inputs, named)))
 
     def verify(self) -> Verification:
-        """Check that the rules are complete, consistent and exclusive, and that the terms have no gaps.
-
-        Returns
-        -------
-        Verification
-            Result as data; its `str` is a text for people.
-        """
+        """Check that the rules are complete, consistent and exclusive, and that the terms have no gaps."""
         from fuzzy_arbiter.verification import verify
 
         return verify(self._system)
@@ -223,28 +188,19 @@ class Arbiter:
 
         Parameters
         ----------
-        path : str or Path
-            JSON, TOML, FCL, FIS or FLL file; its suffix selects the format.
+        path, block
+            File and function block, as for `fuzzy_arbiter.formats.load`.
         engine : str
             Name of the engine, as for `Arbiter`.
         outside : {"refuse", "clip"}, optional
             Treatment of an input outside its universe, in place of the file's.
         default : float or mapping from output's name to float, optional
             Value of all outputs, or of the named ones, where no rule fires, in place of the file's.
-        block : str, optional
-            Name of the FUNCTION_BLOCK in a FCL file; needed where there are several.
-
-        Returns
-        -------
-        Arbiter
-            Arbiter of the file's system.
 
         Raises
         ------
-        FormatError
-            If the file cannot be read, is not of its format, or uses an unsupported part of it.
-        DefinitionError
-            If the file's definition is invalid.
+        FormatError, DefinitionError
+            If the file or its definition is invalid, as for `fuzzy_arbiter.formats.load`.
         """
         from fuzzy_arbiter.formats import load
 
@@ -257,56 +213,23 @@ class Arbiter:
         return cls(system=system, engine=engine)
 
     def save(self, path: str | Path) -> None:
-        """Write the definition to a file.
-
-        Parameters
-        ----------
-        path : str or Path
-            JSON, TOML, FCL, FIS or FLL file; its suffix selects the format.
-
-        Raises
-        ------
-        UnsupportedError
-            If the format cannot represent the definition; nothing is written then.
-        FormatError
-            If the file cannot be written.
-        """
+        """Write the definition to the file `path`, as `fuzzy_arbiter.formats.save` does."""
         from fuzzy_arbiter.formats import save
 
         save(self._system, path)
 
     def compiled(self) -> Any:
-        """Return the arbiter as a function that compiled loops can call; Numba is needed.
+        """Return ``evaluate(inputs, outputs) -> int``, which compiled loops can call; it needs Numba.
 
-        Returns
-        -------
-        numba dispatcher
-            ``evaluate(inputs, outputs) -> int`` on arrays of float64: fills the outputs with what a call gives, and
-            returns 0, or -i if the i-th input is not in its universe, or k if no rule fires for the k-th output and
-            that has no default; the outputs are then as they were.
-
-        Raises
-        ------
-        EngineError
-            If Numba is not installed.
+        It fills an array of float64 with what a call gives, and returns 0; or -i if the i-th input is not in its
+        universe, or k if no rule fires for the k-th output and that has no default; the outputs are then as they were.
         """
         from fuzzy_arbiter.export.compiled import compiled
 
         return compiled(self._system)
 
     def with_engine(self, engine: str) -> Arbiter:
-        """Return an arbiter of the same system with another engine.
-
-        Parameters
-        ----------
-        engine : str
-            Name of the engine, as for `Arbiter`.
-
-        Returns
-        -------
-        Arbiter
-            New arbiter with that engine.
-        """
+        """Return an arbiter of the same system with another `engine`, as for `Arbiter`."""
         return Arbiter(system=self._system, engine=engine)
 
     def __reduce__(self) -> tuple[Any, ...]:

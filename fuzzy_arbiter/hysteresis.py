@@ -134,7 +134,7 @@ class HysteresisArbiter:
         return weights
 
     def scan(self, inputs: ArrayLike, times: ArrayLike | None = None) -> Array:
-        """Return the weights for a sequence of samples, which continues the samples before.
+        """Return the weights for a sequence of samples, shape (n, outputs); it continues the samples before.
 
         Parameters
         ----------
@@ -142,11 +142,6 @@ class HysteresisArbiter:
             One sample in each row.
         times : array_like, shape (n,), optional
             Times of the measurements [s]; they never decrease. Only a dwell needs them.
-
-        Returns
-        -------
-        ndarray, shape (n, outputs)
-            Weights, in each row those that a call gives, to rounding.
 
         Raises
         ------
@@ -170,18 +165,7 @@ class HysteresisArbiter:
         return weights
 
     def batch(self, inputs: ArrayLike) -> NoReturn:
-        """Refuse a batch, whose rows are independent of each other.
-
-        Parameters
-        ----------
-        inputs : array_like, shape (n, inputs)
-            Not used: the error names `scan` instead.
-
-        Raises
-        ------
-        InputError
-            Always.
-        """
+        """Refuse any inputs with an `InputError`: the rows of a batch are independent; `scan` keeps their order."""
         raise InputError("batch: its rows are independent, but latches need an order; expected scan(inputs, times)")
 
     def _next(

@@ -95,24 +95,9 @@ class Rule:
 
     @staticmethod
     def parse(text: str, operators: Operators | None = None) -> Rule:
-        """Parse a text as a rule.
+        """Parse a text such as ``if wind is calm then sail is full with 0.5``; `operators` are those of its block.
 
-        Parameters
-        ----------
-        text : str
-            Text such as ``if wind is calm then sail is full with 0.5``.
-        operators : Operators, optional
-            Operators of its block.
-
-        Returns
-        -------
-        Rule
-            The rule; only a system checks that its variables and terms exist.
-
-        Raises
-        ------
-        DefinitionError
-            If the text is not a rule.
+        A text that is not a rule raises `DefinitionError`; only a system checks that its variables and terms exist.
         """
         from fuzzy_arbiter.rule_text import parse_rule
 

@@ -133,18 +133,7 @@ class Shape(Membership):
         return left + (right - left) * ((x - a) / (b - a))
 
     def of_many(self, places: Array) -> Array:
-        """Return the degrees at many places, each as a call gives it.
-
-        Parameters
-        ----------
-        places : ndarray, shape (n,)
-            Finite places.
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            Degrees in [0, 1].
-        """
+        """Return the degrees at many places, each as a call gives it; places (n,), returns (n,)."""
         x, y = np.array(self.points).T
         if len(x) == 1:
             return np.full(len(places), y[0])
@@ -179,18 +168,7 @@ class Shape(Membership):
         return any(a == b for (a, _), (b, _) in zip(self.points, self.points[1:], strict=False))
 
     def complement(self) -> Shape:
-        """Return the shape that has one minus this one's degree everywhere.
-
-        Returns
-        -------
-        Shape
-            Shape of the same places.
-
-        Raises
-        ------
-        DefinitionError
-            If this shape jumps: where it does, both would have the greater degree.
-        """
+        """Return the shape with one minus this one's degree everywhere; raise `DefinitionError` if this one jumps."""
         if self.jumps:
             raise DefinitionError(
                 f"shape {self.points}: a shape that jumps has no complement, expected a continuous one"
@@ -200,16 +178,7 @@ class Shape(Membership):
     def within(self, universe: tuple[float, float]) -> Shape:
         """Return the shape without the points that do not matter in a universe; nothing is rounded.
 
-        Parameters
-        ----------
-        universe : (float, float)
-            Least and greatest place that matter.
-
-        Returns
-        -------
-        Shape
-            The same degrees in the universe, at most one point beyond each of its ends; a shape that is the same
-            everywhere in it has its one point at the universe's start.
+        At most one point remains beyond each end; a constant shape has its one point at the universe's start.
         """
         points = list(self.points)
         low, high = universe
@@ -224,18 +193,7 @@ class Shape(Membership):
         return inside if len(inside.points) > 1 else Shape(((low, inside.points[0][1]),))
 
     def area(self, universe: tuple[float, float]) -> float:
-        """Return the integral of the degree over a universe.
-
-        Parameters
-        ----------
-        universe : (float, float)
-            Least and greatest place.
-
-        Returns
-        -------
-        float
-            Area, to rounding.
-        """
+        """Return the integral of the degree over a universe, to rounding."""
         low, high = map(Fraction, universe)
         points = [(Fraction(x), Fraction(degree)) for x, degree in self.points]
         points = [(min(low, points[0][0]), points[0][1]), *points, (max(high, points[-1][0]), points[-1][1])]
@@ -253,17 +211,7 @@ def _place(point: Point) -> float:
 
 
 def triangle(left: float, peak: float, right: float) -> Shape:
-    """Return a triangle; two equal places make a vertical edge.
-
-    Parameters
-    ----------
-    left, peak, right : float
-        Places of degree 0, 1, 0.
-
-    Returns
-    -------
-    Shape
-        Shape as ``trimf`` of other tools.
+    """Return a triangle of degree 0 at left, 1 at peak, 0 at right; two equal places make a vertical edge.
 
     Examples
     --------
@@ -275,17 +223,7 @@ def triangle(left: float, peak: float, right: float) -> Shape:
 
 
 def trapezoid(left: float, rise: float, fall: float, right: float) -> Shape:
-    """Return a trapezoid; two equal places make a vertical edge.
-
-    Parameters
-    ----------
-    left, rise, fall, right : float
-        Places of degree 0, 1, 1, 0.
-
-    Returns
-    -------
-    Shape
-        Shape as ``trapmf`` of other tools.
+    """Return a trapezoid of degree 0 at left, 1 from rise to fall, 0 at right; two equal places make a vertical edge.
 
     Examples
     --------
@@ -298,17 +236,7 @@ def trapezoid(left: float, rise: float, fall: float, right: float) -> Shape:
 
 
 def rising(start: float, end: float) -> Shape:
-    """Return a shoulder that rises from 0 to 1.
-
-    Parameters
-    ----------
-    start, end : float
-        Last place of degree 0, first of degree 1.
-
-    Returns
-    -------
-    Shape
-        Shape with degree 0 below the start and 1 above the end.
+    """Return a shoulder of degree 0 up to start, which rises to 1 at end and beyond.
 
     Examples
     --------
@@ -320,17 +248,7 @@ def rising(start: float, end: float) -> Shape:
 
 
 def falling(start: float, end: float) -> Shape:
-    """Return a shoulder that falls from 1 to 0.
-
-    Parameters
-    ----------
-    start, end : float
-        Last place of degree 1, first of degree 0.
-
-    Returns
-    -------
-    Shape
-        Shape with degree 1 below the start and 0 above the end.
+    """Return a shoulder of degree 1 up to start, which falls to 0 at end and beyond.
 
     Examples
     --------

@@ -117,7 +117,7 @@ def writes(system: System, format: str) -> str:
 
 
 def load(path: str | Path, block: str | None = None) -> System:
-    """Load the system of a file.
+    """Load a file, and return its system.
 
     Parameters
     ----------
@@ -126,17 +126,10 @@ def load(path: str | Path, block: str | None = None) -> System:
     block : str, optional
         Name of the block, as for `reads`.
 
-    Returns
-    -------
-    System
-        System of the file, as from `reads`.
-
     Raises
     ------
-    FormatError
-        If the file cannot be read, is not of its format, or uses an unsupported part of it.
-    DefinitionError
-        If the definition is invalid.
+    FormatError, DefinitionError
+        If the file cannot be read, and as for `reads`.
 
     Examples
     --------
@@ -174,14 +167,12 @@ def save(system: System, path: str | Path) -> None:
     system : System
         System to write.
     path : str or Path
-        JSON, TOML, FCL, FIS or FLL file; its suffix, in any case, selects the format. An older file is replaced.
+        File, as for `load`; an older one is replaced.
 
     Raises
     ------
-    UnsupportedError
-        If the format cannot represent the system; nothing is written then.
-    FormatError
-        If the file cannot be written.
+    FormatError, UnsupportedError
+        If the file cannot be written, or the format cannot represent the system; nothing is written then.
 
     Examples
     --------

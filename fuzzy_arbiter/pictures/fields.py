@@ -33,16 +33,12 @@ def surface(
 
     Parameters
     ----------
-    arbiter : Arbiter
-        Arbiter to draw.
+    arbiter, at, ax
+        As for `fuzzy_arbiter.pictures.profile`; with axes of ``projection="3d"`` a relief is drawn.
     output : str
         Name of the output, in results or its own.
     over : (str, str)
         Names of the inputs along the two axes.
-    at : mapping from str to float, optional
-        Values of the others, which the picture shows; default: the middle of each universe.
-    ax : Axes, optional
-        Axes to draw into; default: those of a new figure. With ``projection="3d"`` a relief is drawn.
     points : int
         Number of points along each axis.
 
@@ -50,13 +46,6 @@ def surface(
     -------
     Axes
         Axes of the picture, blank where an output is undefined.
-
-    Raises
-    ------
-    DefinitionError
-        If there is no such output or input.
-    InputError
-        If a value is not a number in its universe.
 
     Examples
     --------
@@ -102,16 +91,8 @@ def decisions(
 
     Parameters
     ----------
-    arbiter : Arbiter
-        Arbiter to draw, with two outputs or more.
-    over : (str, str)
-        Names of the inputs along the two axes.
-    at : mapping from str to float, optional
-        Values of the others, which the picture shows; default: the middle of each universe.
-    ax : Axes, optional
-        Axes to draw into; default: those of a new figure.
-    points : int
-        Number of points along each axis.
+    arbiter, over, at, ax, points
+        As for `surface`; the arbiter has two outputs or more.
 
     Returns
     -------
@@ -122,8 +103,6 @@ def decisions(
     ------
     DefinitionError
         If there is no such input, or one output only.
-    InputError
-        If a value is not a number in its universe.
 
     Examples
     --------

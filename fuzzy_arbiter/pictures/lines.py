@@ -165,16 +165,12 @@ def normalizations(
     at: Mapping[str, float] | None = None,
     axes: Mapping[Normalization, Axes] | None = None,
 ) -> dict[Normalization, Axes]:
-    """Draw all weights along one input, once under each normalization.
+    """Draw all weights along one input, once under each normalization; the arbiter's own does not matter.
 
     Parameters
     ----------
-    arbiter : Arbiter
-        Arbiter to draw; its own normalization does not matter.
-    over : str
-        Name of the input along the axis.
-    at : mapping from str to float, optional
-        Values of the others; default: the middle of each universe.
+    arbiter, over, at
+        As for `profile`.
     axes : mapping from str to Axes, optional
         Axes of each normalization to draw; default: four of a new figure.
 
@@ -185,10 +181,8 @@ def normalizations(
 
     Raises
     ------
-    DefinitionError
-        If there is no such input, or no such normalization.
-    InputError
-        If a value is not a number in its universe.
+    DefinitionError, InputError
+        As for `profile`, and if there is no such normalization.
 
     Examples
     --------

@@ -139,18 +139,7 @@ class Curve(Membership):
         return KINDS[self.kind].monotonic
 
     def place_of(self, degree: float) -> float:
-        """Return the place at which a monotonic curve has a degree, for Tsukamoto's method.
-
-        Parameters
-        ----------
-        degree : float
-            Degree, above 0 and at most the height.
-
-        Returns
-        -------
-        float
-            Place, which may be infinite.
-        """
+        """Return the place, perhaps infinite, where a monotonic curve has a degree, for Tsukamoto's method."""
         inverse = KINDS[self.kind].inverse
         assert inverse is not None, self.kind
         named = dict(zip(KINDS[self.kind].parameters, self.parameters, strict=True))

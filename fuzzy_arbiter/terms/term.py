@@ -46,13 +46,7 @@ class Term:
 
     @property
     def membership(self) -> Membership:
-        """Its membership function.
-
-        Raises
-        ------
-        DefinitionError
-            If the term is a value.
-        """
+        """Its membership function; a value has none and raises `DefinitionError`."""
         value = isinstance(self.shape, Formula) and self.shape.names - {"x"}
         if value or not isinstance(self.shape, Membership):
             raise DefinitionError(f"term {shown(self.name)} is a value, expected a membership function")
@@ -60,13 +54,7 @@ class Term:
 
     @property
     def straight(self) -> Shape:
-        """Its shape, piecewise linear.
-
-        Raises
-        ------
-        DefinitionError
-            If the shape is not piecewise linear.
-        """
+        """Its shape, if that is piecewise linear; any other raises `DefinitionError`."""
         if not isinstance(self.shape, Shape):
             raise DefinitionError(f"term {shown(self.name)} is {self.kind}, expected a piecewise-linear one")
         return self.shape

@@ -106,13 +106,7 @@ class Linear(Value):
         object.__setattr__(self, "constant", numbers[-1])
 
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
-        """Return the sum, with arguments as `Value.expression`.
-
-        Raises
-        ------
-        DefinitionError
-            If there are not as many inputs as coefficients.
-        """
+        """Return the sum, with arguments as `Value.expression`; `DefinitionError` for another number of inputs."""
         if len(inputs) != len(self.coefficients):
             raise DefinitionError(
                 f"linear of {len(self.coefficients)} coefficients, expected one for each input: {', '.join(inputs)}"
@@ -128,20 +122,7 @@ class Linear(Value):
 
     @classmethod
     def of(cls, tree: Node, inputs: Sequence[str]) -> Linear | None:
-        """Return the linear value of a tree that has the form of `expression`.
-
-        Parameters
-        ----------
-        tree : Node
-            Tree of an expression.
-        inputs : sequence of str
-            Names of the inputs.
-
-        Returns
-        -------
-        Linear or None
-            Linear value; None if the tree has another form.
-        """
+        """Return the linear value of the tree of an expression of `inputs`; None if the tree has another form."""
         coefficients = dict.fromkeys(inputs, 0.0)
         constant = 0.0
         node: Node | None = tree
@@ -192,13 +173,7 @@ class Formula(Value, Membership):
         return self._whole.names
 
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
-        """Return it, with arguments as `Value.expression`.
-
-        Raises
-        ------
-        DefinitionError
-            If the formula uses other names than these.
-        """
+        """Return it, with arguments as `Value.expression`; raise `DefinitionError` for other names than these."""
         whole, known = self._whole, (*inputs, *outputs)
         unknown = sorted(whole.names - set(known))
         if unknown:
@@ -218,23 +193,11 @@ class Formula(Value, Membership):
         return np.clip(np.broadcast_to(np.asarray(values, dtype=np.float64), np.shape(places)), 0.0, 1.0)
 
     def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
-        """Return (): the places where an expression bends are not known.
-
-        Parameters
-        ----------
-        universe : tuple of float
-            Lower and upper limit.
-        """
+        """Return (): where an expression bends in a universe is not known."""
         return ()
 
     def within(self, universe: tuple[float, float]) -> Formula:
-        """Return the formula itself, if its values in a universe are degrees.
-
-        Raises
-        ------
-        DefinitionError
-            If at one of 1001 places its value is not a number, or above 1; below 0 it counts as 0.
-        """
+        """Return the formula itself; raise `DefinitionError` if it is NaN or above 1 in a universe, at 1001 places."""
         places = np.linspace(*universe, 1001)
         values = np.broadcast_to(self.expression(["x"]).of_many({"x": places}), places.shape)
         bad = ~(values <= 1.0 + 1e-9) | ~np.isfinite(values)

@@ -111,10 +111,7 @@ class Verification:
 
     @property
     def ok(self) -> bool:
-        """True if there is no fault, and the checks that find faults are decided.
-
-        These are `complete`, `consistent` and `graded_complete`.
-        """
+        """True if there is no fault, and `complete`, `consistent` and `graded_complete` are decided."""
         decided = (self.complete, self.consistent, self.graded_complete)
         return None not in decided and all(finding.severity != "fault" for finding in self.findings)
 
@@ -122,13 +119,7 @@ class Verification:
         return next(check.holds for check in self.checks if check.name == name)
 
     def as_dict(self) -> dict[str, Any]:
-        """Convert the verification to values that JSON can represent.
-
-        Returns
-        -------
-        dict
-            Texts, numbers, Booleans, lists and dicts.
-        """
+        """Convert the verification to texts, numbers, Booleans, lists and dicts, which JSON can represent."""
         return {
             "ok": self.ok,
             "checks": {check.name: {"holds": check.holds, "how": check.how} for check in self.checks},
