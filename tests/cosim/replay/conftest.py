@@ -16,16 +16,7 @@ from cosim.replay.trace import trace_of
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands.commands import (
-    AddObstacle,
-    ChangeSetting,
-    MissionItem,
-    RemoveObstacle,
-    SetCurrentItem,
-    SetMission,
-    SetMode,
-    SetTarget,
-)
+from cosim.simulation.commands import commands as cmd
 from tests.cosim.replay.browser import CHROMEDRIVER, CHROMIUM, Browser
 from tests.cosim.replay.decoding import read_page
 
@@ -33,22 +24,26 @@ CLOSED = "arbiter.engine=closed"
 GAPS = ("position.x", "quaternion.e0", "heading.clearance", "membership.obstacle", "weight.shape", "command.X")
 RADIUS = "regions.pile 1.shape.radius"
 ITEMS = (
-    MissionItem((2.0, 0.0, 2.0), 50.0),
-    MissionItem(None, commands=(ChangeSetting(RADIUS, 0.5), ChangeSetting("regions.ship.gain", 55.0))),
-    MissionItem(None, commands=(ChangeSetting("goal.radius", 0.9),)),
-    MissionItem((3.0, -1.0, 2.0), stay=None, commands=(ChangeSetting("regions.quay.shape.point.1", 6.0),)),
+    cmd.MissionItem((2.0, 0.0, 2.0), 50.0),
+    cmd.MissionItem(None, commands=(cmd.ChangeSetting(RADIUS, 0.5), cmd.ChangeSetting("regions.ship.gain", 55.0))),
+    cmd.MissionItem(None, commands=(cmd.ChangeSetting("goal.radius", 0.9),)),
+    cmd.MissionItem((3.0, -1.0, 2.0), stay=None, commands=(cmd.ChangeSetting("regions.quay.shape.point.1", 6.0),)),
 )
 COMMANDS_LOG = {
-    20: [ChangeSetting("goal.radius", 0.75), ChangeSetting("goal.radius", -1.0), ChangeSetting("law.gains.speed", 0.3)],
-    40: [SetTarget((4.0, -1.0, 2.0), 0.6)],
-    60: [AddObstacle(7, (5.0, 0.0, 2.0), 0.4), AddObstacle(9, (-3.0, 0.0, 2.0), 0.3)],
-    90: [ChangeSetting("regions.ship.shape.semi_axes.0", 3.5)],
-    120: [AddObstacle(7, (5.0, 0.2, 2.0), 0.4, (0.1, 0.0, 0.0))],
-    140: [AddObstacle(7, (5.0, 0.3, 2.0), 0.8)],
-    160: [RemoveObstacle(7)],
-    180: [SetTarget((4.0, 0.0, 2.0)), ChangeSetting("goal.centre.0", 12.5)],
-    200: [SetMission(ITEMS), SetMode("mission")],
-    260: [ChangeSetting(RADIUS, 0.7), SetCurrentItem(1)],
+    20: [
+        cmd.ChangeSetting("goal.radius", 0.75),
+        cmd.ChangeSetting("goal.radius", -1.0),
+        cmd.ChangeSetting("law.gains.speed", 0.3),
+    ],
+    40: [cmd.SetTarget((4.0, -1.0, 2.0), 0.6)],
+    60: [cmd.AddObstacle(7, (5.0, 0.0, 2.0), 0.4), cmd.AddObstacle(9, (-3.0, 0.0, 2.0), 0.3)],
+    90: [cmd.ChangeSetting("regions.ship.shape.semi_axes.0", 3.5)],
+    120: [cmd.AddObstacle(7, (5.0, 0.2, 2.0), 0.4, (0.1, 0.0, 0.0))],
+    140: [cmd.AddObstacle(7, (5.0, 0.3, 2.0), 0.8)],
+    160: [cmd.RemoveObstacle(7)],
+    180: [cmd.SetTarget((4.0, 0.0, 2.0)), cmd.ChangeSetting("goal.centre.0", 12.5)],
+    200: [cmd.SetMission(ITEMS), cmd.SetMode("mission")],
+    260: [cmd.ChangeSetting(RADIUS, 0.7), cmd.SetCurrentItem(1)],
 }
 
 

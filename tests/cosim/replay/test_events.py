@@ -9,20 +9,7 @@ import pytest
 from cosim.replay.command_words import command_events, command_words
 from cosim.replay.events import events_of
 from cosim.results.record import Rows
-from cosim.simulation.commands.commands import (
-    AddObstacle,
-    Arm,
-    ChangeSetting,
-    ManualControl,
-    MissionItem,
-    RemoveObstacle,
-    Reset,
-    SetCurrentItem,
-    SetHeading,
-    SetMission,
-    SetMode,
-    SetTarget,
-)
+from cosim.simulation.commands import commands as cmd
 from cosim.simulation.signals import Column
 
 
@@ -89,7 +76,7 @@ def test_chatter_is_summarized(paper):
         paper, np.arange(n) * 0.01, **signals, membership__obstacle=odd * 1.0, weight__obstacle=odd * 1.0,
         wrench_saturated=odd * 1.0,
     )  # fmt: skip
-    log = [(k, ChangeSetting("arbiter.ramp", 0.1 + k)) for k in range(0, n, 2)]
+    log = [(k, cmd.ChangeSetting("arbiter.ramp", 0.1 + k)) for k in range(0, n, 2)]
     events = events_of(run, log)
     assert len(events) <= 60
     assert told(run, "saturation")[0][0] == 0.01
@@ -147,19 +134,19 @@ def test_end_event_states_the_status(paper, status, text):
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        (Arm(True), "Armed"),
-        (Arm(False), "Disarmed"),
-        (SetMode("hold"), "Holds its place"),
-        (SetTarget((7.0, 0.0, 4.5)), "Target at (7, 0, 4.5) m"),
-        (SetTarget((7.0, 0.0, 4.5), 0.3), "Target at (7, 0, 4.5) m, radius 0.3 m"),
-        (SetHeading(-math.pi / 2), "Heading 270°"),
-        (ManualControl((0.0,) * 6), "Sticks moved"),
-        (AddObstacle(4, (1.0, 2.0, 3.0), 0.5), "Obstacle 4 at (1, 2, 3) m, radius 0.5 m"),
-        (RemoveObstacle(4), "Obstacle 4 gone"),
-        (ChangeSetting("law.gains.k_p1", 1500.0), "law.gains.k_p1 is 1500"),
-        (SetMission((MissionItem(None),) * 3), "Mission of 3 items"),
-        (SetCurrentItem(2), "Mission goes on with item 2"),
-        (Reset(), "Reset"),
+        (cmd.Arm(True), "Armed"),
+        (cmd.Arm(False), "Disarmed"),
+        (cmd.SetMode("hold"), "Holds its place"),
+        (cmd.SetTarget((7.0, 0.0, 4.5)), "Target at (7, 0, 4.5) m"),
+        (cmd.SetTarget((7.0, 0.0, 4.5), 0.3), "Target at (7, 0, 4.5) m, radius 0.3 m"),
+        (cmd.SetHeading(-math.pi / 2), "Heading 270°"),
+        (cmd.ManualControl((0.0,) * 6), "Sticks moved"),
+        (cmd.AddObstacle(4, (1.0, 2.0, 3.0), 0.5), "Obstacle 4 at (1, 2, 3) m, radius 0.5 m"),
+        (cmd.RemoveObstacle(4), "Obstacle 4 gone"),
+        (cmd.ChangeSetting("law.gains.k_p1", 1500.0), "law.gains.k_p1 is 1500"),
+        (cmd.SetMission((cmd.MissionItem(None),) * 3), "Mission of 3 items"),
+        (cmd.SetCurrentItem(2), "Mission goes on with item 2"),
+        (cmd.Reset(), "Reset"),
     ],
 )
 def test_every_command_has_a_description(command, words):
@@ -168,22 +155,22 @@ def test_every_command_has_a_description(command, words):
 
 def test_simultaneous_commands_are_one_event():
     log = [
-        (0, Arm(True)),
-        (0, SetMode("hold")),
-        *((k, ManualControl((0.1,) * 6)) for k in range(100, 300)),
-        (900, Reset()),
+        (0, cmd.Arm(True)),
+        (0, cmd.SetMode("hold")),
+        *((k, cmd.ManualControl((0.1,) * 6)) for k in range(100, 300)),
+        (900, cmd.Reset()),
     ]
     assert command_events(log, 0.01, 3) == [
         (0.0, "Commanded: Armed; Holds its place"),
         (1.0, "Commanded: Sticks moved"),
         (9.0, "Commanded: Reset"),
     ]
-    many = [(0, ChangeSetting(f"key.{i}", 1.0)) for i in range(9)]
+    many = [(0, cmd.ChangeSetting(f"key.{i}", 1.0)) for i in range(9)]
     assert command_events(many, 0.01, 3) == [(0.0, "Commanded: key.0 is 1; key.1 is 1; key.2 is 1; 6 more commands")]
 
 
 def test_commands_after_the_last_row_are_omitted(paper):
     run = made(paper, [0.0, 0.001, 0.002], status="killed")
-    log = [(1, Arm(True)), (3, Reset()), (900, Arm(False))]
+    log = [(1, cmd.Arm(True)), (3, cmd.Reset()), (900, cmd.Arm(False))]
     assert told(run, "command", log) == [(0.001, "Commanded: Armed"), (0.002, "Commanded: Reset")]
     assert events_of(run, log)[-1].kind == "end"

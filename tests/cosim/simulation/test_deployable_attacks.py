@@ -9,8 +9,6 @@ from hypothesis import strategies as st
 
 from controller import VehicleState
 from controller.laws.deployable import DeployableGains, DeployableLaw
-from controller.laws.deployable.barrier import empty_observation, gradient_rate, observe_regions, pose_gradient
-from controller.laws.deployable.faces import face_ahead
 from controller.regions import (
     Box,
     Cone,
@@ -129,20 +127,6 @@ def test_estimate_recovers_from_a_false_first_measurement():
     assert forces.any()
 
 
-def test_hundreds_of_regions_give_bounded_forces():
-    rng = np.random.default_rng(3)
-    regions = [
-        Region(str(i), Sphere(tuple(HERE + rng.normal(size=3) * 2.0), 0.4), "out", velocity=tuple(rng.normal(size=3)))
-        for i in range(300)
-    ]
-    law, packed, forces = law_for(300), pack(regions), np.zeros(8)
-    goal = pack([Region("goal", Sphere((6.0, 0.0, 2.0), 0.5), "in")])
-    for k in range(20):
-        packed.move_to(k * PERIOD)
-        law.step(VehicleState(HERE, LEVEL, np.zeros(6), np.ones(8)), goal, packed, np.full(300, 0.5), forces)
-        assert_sound(law, forces)
-
-
 def test_single_false_rate_does_not_change_the_moment_estimate():
     law, goal, forces = law_for(0), pack([Region("goal", Sphere((0.0, 0.0, 2.0), 0.5), "in")]), np.zeros(8)
     for k in range(50):
@@ -189,52 +173,6 @@ def test_vehicle_passes_through_the_only_opening(width):
     flight = fly(walls, Region("goal", Sphere((8.0, 1.0, 2.0), 0.5), "in"), start=(0.0, -1.0, 2.0), duration=50.0)
     assert reached(flight) and within_limits(flight)
     assert min(flight.clearance(each).min() for each in walls) > 0.0
-
-
-@pytest.mark.parametrize(
-    ("shape", "at", "nearest", "velocity", "distance", "face"),
-    [
-        (Box((0, 0, 0), (8, 2, 2)), (0, 0.9, 0), (0, -1, 0), (1.0, 0.1, 0), 4.0, (-1, 0, 0)),
-        (Box((0, 0, 0), (8, 2, 2)), (3.5, 0.9, 0.2), (0, -1, 0), (0.1, 0, -1.0), 1.2, (0, 0, 1)),
-        (Cylinder((-1, 0, 0), (5, 0, 0), 0.5), (0, 0, 0.4), (0, 0, -1), (0.8, 0, 0.1), 5.0, (-1, 0, 0)),
-        (DepthBand(0, 0.3), (0, 0, -0.2), (0, 0, 1), (0.3, 0, 0.4), 0.5, (0, 0, -1)),
-        (Box((0, 0, 0), (8, 2, 2)), (0, 0.9, 0), (0, -1, 0), (0, 0.1, 0), np.inf, None),
-        (Box((0, 0, 0), (80, 2, 2)), (0, 0.9, 0), (0, -1, 0), (1, 0, 0), np.inf, None),
-    ],
-)
-def test_face_ahead_is_located(shape, at, nearest, velocity, distance, face):
-    found, packed = np.empty(3), pack([Region("cage", shape, "in")])
-    plane = face_ahead(packed, 0, np.array(at, float), np.array(nearest, float), np.array(velocity, float), 6.0, found)
-    assert plane == pytest.approx(distance, abs=1e-12)
-    if face is not None:
-        assert found == pytest.approx(np.array(face, float), abs=1e-12)
-
-
-def test_gradient_rate_follows_relative_motion():
-    """The rate is zero beside a ball of equal velocity, and matches finite differences otherwise."""
-    for own in ((0.0, 0.0, 0.0), (0.0, 0.3, 0.0), (0.0, -0.1, 0.05)):
-        packed = pack([Region("ball", Sphere((2.0, 0.0, 2.0), 0.5), "out", velocity=own)])
-        velocity, sight, n, later = (
-            np.array([0.05, 0.3, 0.0, 0.0, 0.0, 0.0]),
-            empty_observation(1),
-            np.empty(6),
-            np.empty(6),
-        )
-        observe_regions(sight, packed, HERE, LEVEL, velocity)
-        assert pose_gradient(sight.gradients, sight.rotation_gradients, 0, False, n)
-        assert pose_gradient(sight.later_gradients, sight.later_rotation_gradients, 0, False, later)
-        relative = velocity - np.r_[own, np.zeros(3)]
-        line, step = HERE - [2.0, 0.0, 2.0], 1e-3
-        distances = [np.linalg.norm(line + k * step * relative[:3]) for k in (-1, 0, 1)]
-        truth = (distances[0] - 2.0 * distances[1] + distances[2]) / step**2
-        assert gradient_rate(Sphere.kind, -1.0, n, later, relative) == pytest.approx(truth, abs=0.003)
-
-
-def test_gradient_rate_is_zero_at_a_face_switch():
-    """In the middle between two walls the slope leaps to the opposite, which is no acceleration."""
-    one, other = np.array([0.0, 1.0, 0.0, 0.0, 0.0, 0.0]), np.array([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
-    for kind in (Box.kind, DepthBand.kind, Cylinder.kind, Sphere.kind):
-        assert gradient_rate(kind, 1.0, one, other, 0.5 * one) == 0.0
 
 
 @pytest.mark.medium(fast=1)

@@ -17,19 +17,13 @@ def run(name="paper-limited", *overrides):
     return kept_rows(load_scenario(name, [*SHORT, *overrides]))
 
 
-def test_time_is_a_count_of_steps():
+def test_time_counts_steps_and_the_first_row_is_the_start_and_the_first_decision():
     kept = run()
-    assert len(kept.rows) == 501
     assert np.array_equal(kept["time"], np.arange(501) * 0.001)
-
-
-def test_first_row_is_the_start_and_the_first_decision():
-    kept = run()
     assert [kept[f"position.{a}"][0] for a in "xyz"] == [0.0, 0.0, 1.0]
     assert kept["command.X"][0] > 2e4
     assert kept["wrench.X"][0] == kept["command.X"][0]  # Gauss-Seidel: this step's measurement, this step's force
-    force = np.array([kept[f"actuation.{a}"][0] for a in "XYZ"])
-    assert np.linalg.norm(force) == pytest.approx(108.0)
+    assert np.linalg.norm([kept[f"actuation.{a}"][0] for a in "XYZ"]) == pytest.approx(108.0)
 
 
 def test_a_step_is_newtons_law_from_row_to_row():
@@ -38,19 +32,13 @@ def test_a_step_is_newtons_law_from_row_to_row():
     assert kept["velocity.u"][1] == pytest.approx(kept["actuation.X"][0] / 187.5 * 0.001, rel=1e-6)
 
 
-def test_control_and_arbiter_hold_between_their_periods():
+def test_control_arbiter_and_estimate_hold_between_their_periods():
     kept = run("paper-limited", "time.control=0.010", "time.arbiter=0.050")
     commands = np.array([kept[f"command.{a}"] for a in "XZ"]).T
     changes = np.flatnonzero(np.any(np.diff(commands, axis=0) != 0.0, axis=1)) + 1
     assert np.all(changes % 10 == 0) and len(changes) > 40
-    memberships = kept["membership.depth"]
-    assert np.all(np.flatnonzero(np.diff(memberships)) % 50 == 49)
-
-
-def test_estimate_moves_once_a_control_period():
-    kept = run("paper-limited", "time.control=0.010")
-    changes = np.flatnonzero(np.diff(kept["estimate.phi1"])) + 1
-    assert np.all(changes % 10 == 0)
+    assert np.all((np.flatnonzero(np.diff(kept["estimate.phi1"])) + 1) % 10 == 0)
+    assert np.all(np.flatnonzero(np.diff(kept["membership.depth"])) % 50 == 49)
 
 
 @pytest.mark.parametrize("limits", ["direction", "per-thruster"])
@@ -63,17 +51,6 @@ def test_thruster_forces_realize_the_wrench(limits):
     assert not kept["wrench.X"].any()
     x, z = (kept[f"actuation.{a}"][:-1] / kept[f"command.{a}"][:-1] for a in "XZ")
     assert np.allclose(x, z, rtol=1e-9) == (limits == "direction")
-
-
-def test_criterion_membership_is_that_of_its_most_critical_region():
-    kept = run("paper", "regions.SR2.criterion=obstacle")
-    clearance = np.minimum(kept["SR1.clearance"], kept["SR2.clearance"])
-    assert kept["membership.obstacle"] == pytest.approx(np.clip(1.0 - clearance / 0.2, 0.0, 1.0), abs=1e-12)
-
-
-def test_empty_scene_is_valid():
-    kept = run("paper", "regions=[]", "intersection=[]")
-    assert not kept["weight.obstacle"].any()
 
 
 def test_current_and_parameters_reach_the_plant():
@@ -111,22 +88,6 @@ def test_closed_masters_leave_no_temporary_files(tmp_path, monkeypatch):
         with Master(load_scenario("paper", [*SHORT, "time.duration=0.005"])) as master:
             master.run()
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.slow
-def test_paced_run_does_not_catch_up_after_a_stall():
-    walls = []
-
-    class Stalling:
-        def observe(self, k, row):
-            if k == 10:
-                time.sleep(0.6)
-            walls.append(time.perf_counter())
-
-    with Master(load_scenario("paper-limited", ["arbiter.engine=closed", "time.duration=0.5"])) as master:
-        master.run([Stalling()], rate=1.0)
-    # the steps after the stall would otherwise go by at once; a tenth of a second is made up for
-    assert walls[-1] - walls[10] > 0.3
 
 
 def test_rate_paces_by_the_wall_clock():

@@ -10,53 +10,36 @@ from hypothesis import strategies as st
 from cosim.errors import CommandError, RunError
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import CommandQueue, LiveSettings, LoggedCommands, ReplayedCommands, sources
-from cosim.simulation.commands.commands import (
-    MODES,
-    AddObstacle,
-    Arm,
-    ChangeSetting,
-    ManualControl,
-    MissionItem,
-    RemoveObstacle,
-    Reset,
-    SetAttitude,
-    SetCurrentItem,
-    SetHeading,
-    SetMission,
-    SetMode,
-    SetTarget,
-    ShiftRegion,
-    validate_command,
-)
+from cosim.simulation.commands import commands as cmd
 from cosim.simulation.commands.sources import QUEUED
 
 number = st.floats(-1e4, 1e4)
 place = st.tuples(number, number, number)
 radius = st.floats(1e-3, 1e3)
 ITEMS = st.builds(
-    MissionItem,
+    cmd.MissionItem,
     st.none() | place,
     st.none() | radius,
     st.none() | st.floats(0, 99),
-    st.lists(st.builds(SetHeading, number) | st.builds(ChangeSetting, st.text(max_size=9), number), max_size=2).map(
-        tuple
-    ),
+    st.lists(
+        st.builds(cmd.SetHeading, number) | st.builds(cmd.ChangeSetting, st.text(max_size=9), number), max_size=2
+    ).map(tuple),
     st.none() | st.just(0),
     st.none() | st.integers(0, 9),
 )
 COMMANDS_LOG = st.one_of(
-    st.builds(Arm, st.booleans()),
-    st.builds(SetMode, st.sampled_from(MODES)),
-    st.builds(SetTarget, place, st.none() | radius, st.tuples(*[st.floats(-9, 9)] * 3)),
-    st.builds(SetHeading, number),
-    st.builds(ManualControl, st.tuples(*[st.floats(-1, 1)] * 6)),
-    st.builds(AddObstacle, st.integers(0, 1 << 16), place, radius),
-    st.builds(RemoveObstacle, st.integers(0, 1 << 16)),
-    st.builds(ShiftRegion, st.text(max_size=30), place),
-    st.builds(ChangeSetting, st.text(max_size=30), number),
-    st.builds(SetMission, st.lists(ITEMS).map(tuple)),
-    st.builds(SetCurrentItem, st.integers(0, 99)),
-    st.just(Reset()),
+    st.builds(cmd.Arm, st.booleans()),
+    st.builds(cmd.SetMode, st.sampled_from(cmd.MODES)),
+    st.builds(cmd.SetTarget, place, st.none() | radius, st.tuples(*[st.floats(-9, 9)] * 3)),
+    st.builds(cmd.SetHeading, number),
+    st.builds(cmd.ManualControl, st.tuples(*[st.floats(-1, 1)] * 6)),
+    st.builds(cmd.AddObstacle, st.integers(0, 1 << 16), place, radius),
+    st.builds(cmd.RemoveObstacle, st.integers(0, 1 << 16)),
+    st.builds(cmd.ShiftRegion, st.text(max_size=30), place),
+    st.builds(cmd.ChangeSetting, st.text(max_size=30), number),
+    st.builds(cmd.SetMission, st.lists(ITEMS).map(tuple)),
+    st.builds(cmd.SetCurrentItem, st.integers(0, 99)),
+    st.just(cmd.Reset()),
 )
 
 
@@ -82,8 +65,8 @@ def test_log_replays_every_command_at_its_step(tmp_path_factory, given_commands)
 
 def test_full_queue_rejects_commands():
     queue = CommandQueue()
-    assert all(queue.submit(Arm(True)) for _ in range(QUEUED))
-    assert not queue.submit(Arm(False))
+    assert all(queue.submit(cmd.Arm(True)) for _ in range(QUEUED))
+    assert not queue.submit(cmd.Arm(False))
     assert len(queue.take(0)) == QUEUED
 
 
@@ -91,13 +74,13 @@ def test_resets_of_a_session_are_bounded(monkeypatch):
     monkeypatch.setattr(sources, "RUNS", 3)
     queue = CommandQueue()
     for run in range(3):
-        assert queue.submit(Reset(), run) == (run < 2)
-        assert queue.submit(Arm(True), run)
+        assert queue.submit(cmd.Reset(), run) == (run < 2)
+        assert queue.submit(cmd.Arm(True), run)
         if run == 2:
-            assert queue.refusal(Reset(), run) == "no further reset: a session has 3 runs at most"
+            assert queue.refusal(cmd.Reset(), run) == "no further reset: a session has 3 runs at most"
             break
         queue.end_run()
-    assert queue.take(0) == [Arm(True)]
+    assert queue.take(0) == [cmd.Arm(True)]
 
 
 @given(st.lists(COMMANDS_LOG, max_size=30), st.integers(1, 400))
@@ -113,100 +96,62 @@ def test_log_of_a_run_is_bounded(tmp_path_factory, commands, bound):
     assert sum(sizes[:-1]) < bound and (refused or sum(sizes) < bound)
     assert refused or accepted == commands
     queue.end_run()
-    assert queue.submit(Arm(True))
+    assert queue.submit(cmd.Arm(True))
 
 
 def test_commands_for_a_finished_run_are_rejected():
     queue = CommandQueue()
-    assert queue.submit(Arm(True), run=0)
+    assert queue.submit(cmd.Arm(True), run=0)
     queue.end_run()
-    assert not queue.submit(Arm(True), run=0)
+    assert not queue.submit(cmd.Arm(True), run=0)
     assert queue.run == 1 and not queue.take(0)
-    assert queue.submit(Arm(False), run=1) and queue.submit(Arm(True))
-    assert queue.take(0) == [Arm(False), Arm(True)]
-    assert queue.submit(Arm(False))
+    assert queue.submit(cmd.Arm(False), run=1) and queue.submit(cmd.Arm(True))
+    assert queue.take(0) == [cmd.Arm(False), cmd.Arm(True)]
+    assert queue.submit(cmd.Arm(False))
 
 
 @pytest.mark.parametrize(
     "command",
     [
-        SetTarget((math.nan, 0.0, 0.0)),
-        SetTarget((0.0, math.inf, 0.0)),
-        SetTarget((0.0, 0.0, 0.0), radius=0.0),
-        SetTarget((0.0, 0.0, 0.0), velocity=(1e3, 0.0, 0.0)),
-        AddObstacle(1, (0.0, 0.0, 1e9), 1.0),
-        AddObstacle(1, (0.0, 0.0, 0.0), math.nan),
-        ManualControl((1.1, 0.0, 0.0, 0.0, 0.0, 0.0)),
-        ManualControl((math.nan,) * 6),
-        SetHeading(math.inf),
-        SetAttitude((1.0, 1.0, 0.0, 0.0)),
-        SetAttitude((1.0, 0.0, 0.0, 0.0), (0.0, 1.5, 0.0)),
-        SetAttitude((1.0, 0.0, 0.0, 0.0), (0.0, math.nan, 0.0)),
-        SetAttitude((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), math.nan),
-        ShiftRegion("SR1", (0.0, math.nan, 0.0)),
-        ShiftRegion("SR1", (0.0, 0.0, 2e5)),
-        ChangeSetting("goal.radius", math.nan),
-        SetMission((MissionItem((0.0, 0.0, 0.0), stay=-1.0),)),
-        SetMission((MissionItem((0.0, 0.0, math.nan)),)),
-        SetMission((MissionItem(None, jump=1),)),
-        SetMission((MissionItem(None, jump=0, times=-1),)),
-        SetMission((MissionItem(None, commands=(SetHeading(math.nan),)),)),
+        cmd.SetTarget((math.nan, 0.0, 0.0)),
+        cmd.SetTarget((0.0, math.inf, 0.0)),
+        cmd.SetTarget((0.0, 0.0, 0.0), radius=0.0),
+        cmd.SetTarget((0.0, 0.0, 0.0), velocity=(1e3, 0.0, 0.0)),
+        cmd.AddObstacle(1, (0.0, 0.0, 1e9), 1.0),
+        cmd.AddObstacle(1, (0.0, 0.0, 0.0), math.nan),
+        cmd.ManualControl((1.1, 0.0, 0.0, 0.0, 0.0, 0.0)),
+        cmd.ManualControl((math.nan,) * 6),
+        cmd.SetHeading(math.inf),
+        cmd.SetAttitude((1.0, 1.0, 0.0, 0.0)),
+        cmd.SetAttitude((1.0, 0.0, 0.0, 0.0), (0.0, 1.5, 0.0)),
+        cmd.SetAttitude((1.0, 0.0, 0.0, 0.0), (0.0, math.nan, 0.0)),
+        cmd.SetAttitude((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), math.nan),
+        cmd.ShiftRegion("SR1", (0.0, math.nan, 0.0)),
+        cmd.ShiftRegion("SR1", (0.0, 0.0, 2e5)),
+        cmd.ChangeSetting("goal.radius", math.nan),
+        cmd.SetMission((cmd.MissionItem((0.0, 0.0, 0.0), stay=-1.0),)),
+        cmd.SetMission((cmd.MissionItem((0.0, 0.0, math.nan)),)),
+        cmd.SetMission((cmd.MissionItem(None, jump=1),)),
+        cmd.SetMission((cmd.MissionItem(None, jump=0, times=-1),)),
+        cmd.SetMission((cmd.MissionItem(None, commands=(cmd.SetHeading(math.nan),)),)),
     ],
 )
 def test_non_finite_or_out_of_range_numbers_are_rejected(command):
     with pytest.raises(CommandError, match=r"is .*, expected"):
-        validate_command(command)
+        cmd.validate_command(command)
     with pytest.raises(CommandError):
         CommandQueue().submit(command)
 
 
-@pytest.mark.parametrize(
-    "line",
-    [b"no JSON", b'{"step":1}', b'{"step":1,"command":{"command":"fly"}}', b'{"step":1,"command":{"command":"arm"}}',
-     b'{"step":1,"command":{"command":"set_heading","heading":1,"and":2}}',
-     b'{"step":1,"command":{"command":"set_heading","heading":null}}',
-     b'{"step":1,"command":{"command":"set_target","position":[1e9,0,0]}}'],
-)  # fmt: skip
-def test_a_broken_log_names_the_line(tmp_path, line):
-    file = tmp_path / "commands.jsonl"
-    file.write_bytes(b'{"step":0,"command":{"command":"reset"}}\n' + line + b"\n")
-    with pytest.raises(RunError, match="line 2"):
-        ReplayedCommands(file)
-
-
-@pytest.mark.parametrize("size", [1, 30, 62])
-def test_truncated_last_line_is_ignored(tmp_path, size):
-    file, line = (
-        tmp_path / "commands.jsonl",
-        b'{"step":1,"command":{"command":"set_target","position":[1.25,0.0,0.0]}}\n',
-    )
-    file.write_bytes(line + line[:size])
-    assert ReplayedCommands(file).take(1) == [SetTarget((1.25, 0.0, 0.0))] * (1 + (size >= len(line) - 1))
-    file.write_bytes(line + line[:30] + b"\n")
-    with pytest.raises(RunError, match="line 2"):
-        ReplayedCommands(file)
-    file.write_bytes(line + b'{"step":1,"command":{"command":"set_target","position":[1e9,0,0]}}')
-    with pytest.raises(RunError, match="line 2"):
-        ReplayedCommands(file)
-
-
-def test_missing_log_gives_one_line_error(tmp_path):
-    with pytest.raises(RunError, match="No such file"):
-        ReplayedCommands(tmp_path / "none.jsonl")
-
-
-def test_log_line_is_readable_json(tmp_path):
-    logged = LoggedCommands(queue := CommandQueue(), tmp_path / "log")
-    queue.submit(SetTarget((1.0, 2.0, 3.0), 0.5))
-    logged.take(7)
-    assert msgspec.json.decode((tmp_path / "log").read_bytes()) == {
-        "step": 7,
-        "command": {"command": "set_target", "position": [1.0, 2.0, 3.0], "radius": 0.5, "velocity": [0.0, 0.0, 0.0]},
-    }
-
-
 ARMED = b'{"step":0,"command":{"command":"arm","armed":true}}\n'
-UNREADABLE = {
+BROKEN = {
+    "no JSON": b"no JSON",
+    "no command": b'{"step":1}',
+    "another command": b'{"step":1,"command":{"command":"fly"}}',
+    "no argument": b'{"step":1,"command":{"command":"arm"}}',
+    "one argument more": b'{"step":1,"command":{"command":"set_heading","heading":1,"and":2}}',
+    "null": b'{"step":1,"command":{"command":"set_heading","heading":null}}',
+    "out of range": b'{"step":1,"command":{"command":"set_target","position":[1e9,0,0]}}',
     "bad UTF-8": b'{"step":1,"command":{"command":"shift_region","region":"\xff","by":[0,0,0]}}',
     "bad UTF-8 in a key": b'{"step":1,"ord\xffer":{"command":"reset"}}',
     "5,000 nested braces": b'{"step":1,"command":' + b'{"a":' * 5000,
@@ -217,30 +162,41 @@ UNREADABLE = {
 }
 
 
-@pytest.mark.parametrize("line", UNREADABLE.values(), ids=UNREADABLE)
-def test_d3_unparsable_log_is_rejected_with_its_line(tmp_path, line):
+@pytest.mark.parametrize("line", BROKEN.values(), ids=BROKEN)
+def test_broken_log_is_rejected_with_its_line(tmp_path, line):
     file = tmp_path / "commands.jsonl"
     file.write_bytes(ARMED + line + b"\n" + ARMED)
     with pytest.raises(RunError) as caught:
         ReplayedCommands(file)
-    said = str(caught.value)
-    assert said.startswith(f"{file}, line 2: ") and said.isprintable() and len(said) < 300 + len(str(file))
+    message = str(caught.value)
+    assert message.startswith(f"{file}, line 2: ") and message.isprintable() and len(message) < 300 + len(str(file))
 
 
-@pytest.mark.parametrize("cut", range(1, 7))
-def test_d3_last_line_truncated_within_a_character_is_ignored(tmp_path, cut):
-    line = '{"step":1,"command":{"command":"shift_region","region":"ΩΩΩ"'.encode()[:-1]
-    (tmp_path / "commands.jsonl").write_bytes(ARMED + line[:-cut])
-    assert len(ReplayedCommands(tmp_path / "commands.jsonl").take(9)) == 1
+def test_missing_log_and_one_of_an_older_version_give_one_line_errors(tmp_path):
+    with pytest.raises(RunError, match="No such file"):
+        ReplayedCommands(tmp_path / "none.jsonl")
+    (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"arm","armed":true}}\n')
+    with pytest.raises(RunError, match=r"orders\.jsonl: is a log of an older version \('order'\), expected"):
+        ReplayedCommands(log)
+
+
+LAST = '{"step":1,"command":{"command":"shift_region","region":"ΩΩΩ","by":[1.25,0.0,0.0]}}'.encode()
+
+
+@pytest.mark.parametrize("size", [1, 30, *range(len(LAST) - 34, len(LAST) - 26), len(LAST) - 1, len(LAST)])
+def test_truncated_last_line_is_ignored(tmp_path, size):
+    (file := tmp_path / "commands.jsonl").write_bytes(ARMED + LAST[:size])
+    assert len(ReplayedCommands(file).take(1)) == 1 + (size == len(LAST))
+
+
+@pytest.mark.parametrize("line", [BROKEN["out of range"], LAST[:30] + b"\n"], ids=["whole", "cut, with its end"])
+def test_last_line_that_is_whole_or_has_its_end_is_checked(tmp_path, line):
+    (file := tmp_path / "commands.jsonl").write_bytes(ARMED + line)
+    with pytest.raises(RunError, match="line 2"):
+        ReplayedCommands(file)
 
 
 @pytest.mark.parametrize("index", ["9" * 5000, "٣", "-1", "01", "", "0.0"])
 def test_d4_invalid_index_is_rejected(index):
     with pytest.raises(CommandError, match="no setting"):
         LiveSettings(load_scenario("paper")).change(f"goal.centre.{index}", 1.0)
-
-
-def test_log_of_an_older_version_is_rejected_by_its_key(tmp_path):
-    (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"arm","armed":true}}\n')
-    with pytest.raises(RunError, match=r"orders\.jsonl: is a log of an older version \('order'\), expected"):
-        ReplayedCommands(log)

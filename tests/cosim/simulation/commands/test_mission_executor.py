@@ -26,14 +26,32 @@ def followed(items, clearance=1.0, steps=12, start=0):
     return seen
 
 
-def test_items_follow_each_other_and_the_last_one_stays():
-    assert followed([PLACE, AT_ONCE, PLACE]) == [0, 1, 2]
-    assert followed([PLACE, AT_ONCE]) == [0, 1]
+WAIT = MissionItem(None, stay=3.0)
 
 
-def test_only_position_items_must_be_reached():
-    assert followed([AT_ONCE, AT_ONCE, PLACE, PLACE], clearance=-0.1) == [0, 1, 2]
-    assert followed([PLACE, PLACE], clearance=math.nan) == [0]
+def jump(to, times=None):
+    return MissionItem(None, jump=to, times=times)
+
+
+@pytest.mark.parametrize(
+    ("items", "visited", "changes"),
+    [
+        ([PLACE, AT_ONCE, PLACE], [0, 1, 2], {}),
+        ([PLACE, AT_ONCE], [0, 1], {}),  # the last one stays
+        ([AT_ONCE, AT_ONCE, PLACE, PLACE], [0, 1, 2], {"clearance": -0.1}),
+        ([PLACE, PLACE], [0], {"clearance": math.nan}),
+        ([WAIT, PLACE], [0], {"clearance": -1.0, "steps": 3}),
+        ([WAIT, PLACE], [0, 1], {"clearance": -1.0, "steps": 4}),
+        ([MissionItem(None, stay=None), PLACE], [0], {}),
+        ([PLACE, jump(0, 2), PLACE], [0, 1, 0, 1, 0, 1, 2], {}),
+        ([PLACE, jump(0, 0), PLACE], [0, 1, 2], {}),
+        ([PLACE, jump(0)], [0, 1, 0, 1, 0, 1], {"steps": 5}),
+        ([jump(0)], [0] * 4, {"steps": 3}),  # one a step, for ever
+        ([PLACE, jump(3, 1), PLACE, PLACE], [0, 1, 3], {}),
+    ],
+)
+def test_items_follow_each_other(items, visited, changes):
+    assert followed(items, **changes) == visited
 
 
 def test_stay_time_restarts_after_leaving_the_region():
@@ -41,19 +59,7 @@ def test_stay_time_restarts_after_leaving_the_region():
     course.set_items((MissionItem((0.0, 0.0, 0.0), stay=2.0), PLACE))
     course.begin(0)
     clearances = [-1.0, 0.1, -0.1, 0.0, 0.1, 0.1]
-    following = [course.following(float(time), clearance) for time, clearance in enumerate(clearances)]
-    assert following == [None] * 5 + [1]
-    assert followed([MissionItem(None, stay=3.0), PLACE], clearance=-1.0, steps=3) == [0]
-    assert followed([MissionItem(None, stay=3.0), PLACE], clearance=-1.0, steps=4) == [0, 1]
-    assert followed([MissionItem(None, stay=None), PLACE]) == [0]
-
-
-def test_jumps_repeat_their_stated_count():
-    assert followed([PLACE, MissionItem(None, jump=0, times=2), PLACE]) == [0, 1, 0, 1, 0, 1, 2]
-    assert followed([PLACE, MissionItem(None, jump=0, times=0), PLACE]) == [0, 1, 2]
-    assert followed([PLACE, MissionItem(None, jump=0)], steps=5) == [0, 1, 0, 1, 0, 1]
-    assert followed([MissionItem(None, jump=0)], steps=3) == [0] * 4  # one a step, for ever
-    assert followed([PLACE, MissionItem(None, jump=3, times=1), PLACE, PLACE]) == [0, 1, 3]
+    assert [course.following(float(t), c) for t, c in enumerate(clearances)] == [None] * 5 + [1]
 
 
 def test_restarting_the_mission_resets_jump_counts():
@@ -76,16 +82,20 @@ def test_current_region_is_that_of_the_last_position_item():
     assert course.region() is None
 
 
-def test_path_between_items_includes_immediate_items():
-    items = [PLACE, AT_ONCE, MissionItem(None, jump=0, times=2), PLACE, PLACE]
-    assert (
-        passed_items(items, 0, 1) == [1] and passed_items(items, 0, 3) == [1, 2, 3] and passed_items(items, 3, 4) == [4]
-    )
-    assert passed_items(items, 1, 0) == [2, 0]
-    assert passed_items(items, -1, 0) == [0]
-    assert passed_items(items, 0, 4) is None and passed_items(items, 4, 0) is None and passed_items(items, 3, 1) is None
+@pytest.mark.parametrize(
+    ("begin", "end", "path"),
+    [
+        (0, 1, [1]),
+        (0, 3, [1, 2, 3]),
+        (3, 4, [4]),
+        (1, 0, [2, 0]),
+        (-1, 0, [0]),
+        (0, 4, None),
+        (4, 0, None),
+        (3, 1, None),
+    ],
+)
+def test_path_between_items_includes_immediate_items(begin, end, path):
+    assert passed_items([PLACE, AT_ONCE, jump(0, 2), PLACE, PLACE], begin, end) == path
     assert passed_items([], 0, 5) is None
-    assert (
-        passed_items([MissionItem(None, jump=0)], -1, 1) == [0, 1]
-        and passed_items([MissionItem(None, jump=0)], -1, 7) is None
-    )
+    assert passed_items([jump(0)], -1, 1) == [0, 1] and passed_items([jump(0)], -1, 7) is None
