@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import IO
+from typing import IO, Any
 
 import msgspec
 
@@ -31,6 +31,20 @@ def decode_scene(line: bytes) -> AnyScene:
     elif not scene.depth_band[0] < scene.depth_band[1]:
         raise ScenarioError(f"depth_band is {scene.depth_band}, expected two depths, the shallow one first")
     return scene
+
+
+def encode_scene(scene: AnyScene, line: bytes) -> bytes:
+    """Encode a scene in the order of its fields, with the keys of its line alone."""
+    # Campaigns are identified by this text, so a key that is new here must not appear in scenes of earlier files.
+    return msgspec.json.encode(_select_keys(msgspec.to_builtins(scene), msgspec.json.decode(line)))
+
+
+def _select_keys(value: Any, given: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _select_keys(item, given[key]) for key, item in value.items() if key in given}
+    if isinstance(value, list | tuple):
+        return [_select_keys(*pair) for pair in zip(value, given, strict=True)]
+    return value
 
 
 def read_scenes(path: str | Path) -> Iterator[AnyScene]:
@@ -61,18 +75,18 @@ def read_scenes(path: str | Path) -> Iterator[AnyScene]:
     """
     try:
         with Path(path).open("rb") as file:
-            yield from scenes_in(file, str(path))
+            yield from (scene for scene, _ in scenes_in(file, str(path)))
     except OSError as error:
         raise ScenarioError(f"{path}: {error.strerror or error}") from error
 
 
-def scenes_in(file: IO[bytes], name: str) -> Iterator[AnyScene]:
-    """Read scenes from an open file."""
+def scenes_in(file: IO[bytes], name: str) -> Iterator[tuple[AnyScene, bytes]]:
+    """Read scenes from an open file, each with its line."""
     for number, line in enumerate(iter(lambda: file.readline(_MAX_BYTES + 1), b""), 1):
         if len(line) > _MAX_BYTES:
             raise ScenarioError(f"{name}, line {number}: has more than {_MAX_BYTES} bytes, expected a scene")
         if line.strip():
             try:
-                yield decode_scene(line)
+                yield decode_scene(line), line
             except ScenarioError as error:
                 raise ScenarioError(f"{name}, line {number}: {error}") from error

@@ -9,9 +9,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import IO
 
-import msgspec
-
-from cosim.campaigns.scenes.scene_file import scenes_in
+from cosim.campaigns.scenes.scene_file import encode_scene, scenes_in
 from cosim.errors import ScenarioError
 
 STANDARD_INPUT = Path("-")
@@ -40,10 +38,10 @@ class SceneStore:
     def _read(self, file: IO[bytes], name: str) -> None:
         self._places: dict[int, tuple[int, int]] = {}  # offset and length [bytes] of each scene's line, by seed
         digest, offset = hashlib.sha256(), 0
-        for scene in scenes_in(file, name):
+        for scene, text in scenes_in(file, name):
             if scene.seed in self._places:
                 raise ScenarioError(f"{name}: seed {scene.seed} comes twice, expected each once")
-            line = msgspec.json.encode(scene) + b"\n"
+            line = encode_scene(scene, text) + b"\n"
             self._file.write(line)
             digest.update(line)
             self._places[scene.seed] = offset, len(line)

@@ -1,8 +1,11 @@
 """Scenes: parsed by line, rejected by line and key, and passed to the law without undisclosed conditions."""
 
+import hashlib
+import itertools
 import json
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 from msgspec.structs import replace
@@ -11,8 +14,10 @@ from controller import LAWS, IsmailDunniganLaw
 from controller.regions.region_set import PackedRegions
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer
+from cosim.campaigns.scenes.generator import MAKERS, generate_scenes
 from cosim.campaigns.scenes.scene import Failure, plant_parameters
 from cosim.campaigns.scenes.scene_file import read_scenes
+from cosim.campaigns.scenes.scene_store import SceneStore
 from cosim.errors import ScenarioError
 from plant_fmu import load_vehicle
 
@@ -76,6 +81,46 @@ def test_invalid_scene_line_is_rejected_by_key(tmp_path, text, words):
 def test_unreadable_file_is_rejected(tmp_path, name):
     with pytest.raises(ScenarioError, match=r"No such file|directory"):
         list(read_scenes(tmp_path / name))
+
+
+# ---- the text that campaigns store: their folders are known by its SHA-256 ----
+
+
+def stored(path, lines):
+    path.write_text("\n".join(lines))
+    with SceneStore(path) as store:
+        return b"".join(store.lines(store.seeds)), store.digest
+
+
+@pytest.mark.parametrize("kind", MAKERS)
+def test_stored_scene_is_the_line_without_spaces(kind, tmp_path):
+    lines = list(generate_scenes(3, 5, kind))
+    text, digest = stored(tmp_path / "scenes.jsonl", lines)
+    assert text == b"".join(msgspec.json.encode(msgspec.json.decode(line)) + b"\n" for line in lines)
+    assert digest == hashlib.sha256(text).hexdigest()
+
+
+def _scenes_with_and_without_each_optional_key():
+    noises = ({}, {"position": 0.1}, {"velocity": 0, "position": 0}, {"seed": None}, {"seed": 7, "velocity": 0.2})
+    obstacles = ([], [{"radius": 1, "centre": [1, 2, 3]}], [{"velocity": [0, 0, 0], "centre": [1, 2, 3], "radius": 1}])
+    failures = ({}, {"failed_thruster": None}, {"failed_thruster": {"time": 1, "index": 2}})
+    goal = {"goal": {"radius": 0.5, "centre": [9, 0, 2]}, "weight_minus_buoyancy": 1, "righting_moment": 20}
+    rest = {"start": [0, 0, 2.0], **goal, "depth_band": [0.3, 7], "current": [0, 0, 0]}
+    tables = itertools.product([{}, *({"noise": noise} for noise in noises)], obstacles, failures)
+    return [n | f | rest | {"obstacles": o, "seed": seed} for seed, (n, o, f) in enumerate(tables)]
+
+
+STORED = {  # SHA-256 that commit 8838699d writes to campaign.json for the same lines
+    "plain": (SCENES / "plain.jsonl", "48daca105dd5c2dc05ce176a4d7755d28615378811e37879cd6543cb55930384"),
+    "hard": (SCENES / "hard.jsonl", "81291bcf97775a8bdd2f89e01e3a75ba931026bab92886feffda73d690a9978d"),
+    "by hand": (None, "a873ec55858d6b48befb9466914534060aa83d3baa3933e5e1d444f7904363b2"),
+}
+
+
+@pytest.mark.parametrize(("file", "digest"), STORED.values(), ids=STORED)
+def test_campaigns_know_the_scenes_of_earlier_folders(file, digest, tmp_path):
+    lines = file.read_text().splitlines() if file else map(json.dumps, _scenes_with_and_without_each_optional_key())
+    assert stored(tmp_path / "scenes.jsonl", lines)[1] == digest
 
 
 def test_plant_parameters_match_the_scene():
