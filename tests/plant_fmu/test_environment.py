@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from fmpy.fmi1 import FMICallException
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
@@ -10,6 +9,20 @@ from tests.plant_fmu.conftest import STATES
 from tests.plant_fmu.philox import normal
 
 NEUTRAL = {"weight": 1228.25, "r_G.z": 0.0}
+GAUSS_MARKOV = {
+    "current_correlation_time": 5.0,
+    "current_variation_period": 0.5,
+    "current_variation.y": 0.2,
+    "seed": 42,
+}
+UNDAMPED = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
+
+
+def run(slave, n, h):
+    """Step n times; yield after each."""
+    for k in range(n):
+        slave.fmu.doStep(k * h, h)
+        yield
 
 
 # ---- current ----
@@ -26,16 +39,10 @@ def test_a_sinking_vehicle_follows_the_sheared_current(make_slave):
     """Mean drift of a heavily damped body is the current at its depth."""
     slave = make_slave().start(
         **NEUTRAL,
-        **{
-            "current_shear.x": 0.05,
-            "wrench.Z": 20.0,
-            "position.z": 1.0,
-            "quadratic_damping[1]": 5e3,
-            "linear_damping[1]": 500.0,
-        },
+        **{"current_shear.x": 0.05, "wrench.Z": 20.0, "position.z": 1.0},
+        **{"quadratic_damping[1]": 5e3, "linear_damping[1]": 500.0},
     )
-    for k in range(60):
-        slave.fmu.doStep(k * 0.5, 0.5)
+    slave.step(30.0)
     z, u = slave.get("position.z", "velocity.u")
     assert u == pytest.approx(0.05 * z, rel=0.05)
 
@@ -43,15 +50,7 @@ def test_a_sinking_vehicle_follows_the_sheared_current(make_slave):
 def test_the_variation_is_a_gauss_markov_process(make_slave, fmi):
     """Knot by knot: w' = w exp(-dt/T) + s sqrt(1 - exp(-2 dt/T)) n, straight between the knots."""
     T, dt, s = 5.0, 0.5, 0.2
-    slave = make_slave(fmi=fmi).start(
-        **{
-            "current_variation.y": s,
-            "current_correlation_time": T,
-            "current_variation_period": dt,
-            "seed": 42,
-            "current.y": 0.1,
-        }
-    )
+    slave = make_slave(fmi=fmi).start(**GAUSS_MARKOV, **{"current.y": 0.1})
     kept, fresh = np.exp(-dt / T), s * np.sqrt(1 - np.exp(-2 * dt / T))
     stream, knots = 15 + 1, [s * normal(42, 16, 0)]
     for k in range(1, 30):
@@ -66,9 +65,7 @@ def test_the_variation_is_a_gauss_markov_process(make_slave, fmi):
 def test_axis_variation_switched_on_late_starts_from_the_stationary_distribution(make_slave, fmi):
     """At once, which makes a knot of that time, by numbers of a stream of its own."""
     T, dt, s = 5.0, 0.5, 0.3
-    slave = make_slave(fmi=fmi).start(
-        **{"current_variation.y": 0.2, "current_correlation_time": T, "current_variation_period": dt, "seed": 42}
-    )
+    slave = make_slave(fmi=fmi).start(**GAUSS_MARKOV)
     slave.fmu.doStep(0.0, 0.7)
     slave.set_values({"current_variation.z": s})
     slave.fmu.doStep(0.7, 0.4)
@@ -81,18 +78,9 @@ def test_axis_variation_switched_on_late_starts_from_the_stationary_distribution
 def test_current_variation_has_its_deviation_and_correlation_time(make_slave):
     T, s = 2.0, 0.3
     slave = make_slave().start(
-        **{
-            "current_variation.x": s,
-            "current_correlation_time": T,
-            "current_variation_period": 0.1,
-            "substep": 0.5,
-        }
+        **{"current_variation.x": s, "current_correlation_time": T, "current_variation_period": 0.1, "substep": 0.5}
     )
-    w = []
-    for k in range(20000):
-        slave.fmu.doStep(k * 0.5, 0.5)
-        w.append(slave.get("water_velocity.x")[0])
-    w = np.array(w)
+    w = np.array([slave.get("water_velocity.x")[0] for _ in run(slave, 20_000, 0.5)])
     assert np.std(w) == pytest.approx(s, rel=0.05)
     assert np.corrcoef(w[4:], w[:-4])[0, 1] == pytest.approx(np.exp(-1.0), abs=0.05)
 
@@ -111,26 +99,14 @@ def test_floating_hull_draft_follows_archimedes(make_slave, fmi):
     """Afloat with three quarters of the volume under water."""
     r = 0.3
     slave = make_slave(fmi=fmi).start(
-        **{
-            "weight": 0.75 * 1228.25,
-            "r_G.z": 0.05,
-            "free_surface": True,
-            "hull_radius": r,
-            "position.z": 1.0,
-            "linear_damping[3]": 200.0,
-        }
+        weight=0.75 * 1228.25,
+        free_surface=True,
+        hull_radius=r,
+        **{"r_G.z": 0.05, "position.z": 1.0, "linear_damping[3]": 200.0},
     )
-    for k in range(100):
-        slave.fmu.doStep(k * 1.0, 1.0)
+    slave.step(100.0)
     h = brentq(lambda h: h * h * (3 * r - h) / (4 * r**3) - 0.75, 0, 2 * r)
     assert slave.get("position.z")[0] == pytest.approx(h - r, abs=1e-6)
-
-
-def test_a_surface_needs_a_hull(make_slave, fmi):
-    slave = make_slave(fmi=fmi)
-    with pytest.raises(FMICallException):
-        slave.start(free_surface=True, hull_radius=0.0)
-    assert "free_surface needs hull_radius" in slave.said[-1][1]
 
 
 # ---- bottom ----
@@ -140,8 +116,7 @@ SINKING = {"weight": 1300.0, "bottom_depth": 10.0, "hull_radius": 0.3}
 
 def test_a_heavy_vehicle_comes_to_rest_on_the_bottom(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**SINKING, **{"position.z": 8.0, "velocity.u": 0.5})
-    for k in range(300):
-        slave.fmu.doStep(k * 0.1, 0.1)
+    slave.step(30.0)
     assert slave.get("velocity.w", "velocity.u") == pytest.approx([0.0, 0.0], abs=1e-6)
     sinks_in = (1300.0 - 1228.25) * 0.02**2 / (125.0 + 62.5)  # the contact's spring
     assert slave.get("altitude")[0] == pytest.approx(0.3 - sinks_in, rel=1e-3)
@@ -155,39 +130,20 @@ def test_a_heavy_vehicle_comes_to_rest_on_the_bottom(make_slave, fmi):
 def test_bottom_contact_is_stable(make_slave, substep, speed, time_constant):
     """Thrown at the bottom, at any speed and substep: no energy is gained, nor depth beyond a flight of T."""
     slave = make_slave().start(
-        **SINKING
-        | NEUTRAL
-        | {
-            "position.z": 9.0,
-            "velocity.w": speed,
-            "velocity.u": speed,
-            "substep": substep,
-            "bottom_time_constant": time_constant,
-            "bottom_friction": 1.0,
-            **{f"quadratic_damping[{i}]": 0.0 for i in range(1, 7)},
-            **{f"linear_damping[{i}]": 0.0 for i in range(1, 7)},
-        }
+        **SINKING | NEUTRAL | UNDAMPED | {"position.z": 9.0, "velocity.w": speed, "velocity.u": speed},
+        **{"substep": substep, "bottom_time_constant": time_constant, "bottom_friction": 1.0},
     )
-    fastest, deepest = 0.0, 0.0
-    for k in range(400):
-        slave.fmu.doStep(k * 0.2, 0.2)
-        u, v, w, z = slave.get("velocity.u", "velocity.v", "velocity.w", "position.z")
-        fastest, deepest = max(fastest, np.hypot(np.hypot(u, v), w)), max(deepest, z)
-    assert fastest <= speed * np.sqrt(2) * (1 + 1e-9)
-    assert deepest - 9.7 <= speed * max(time_constant, 4 * substep)
+    motion = ("position.z", "velocity.u", "velocity.v", "velocity.w")
+    rows = np.array([slave.get(*motion) for _ in run(slave, 400, 0.2)])
+    assert np.linalg.norm(rows[:, 1:], axis=1).max() <= speed * np.sqrt(2) * (1 + 1e-9)
+    assert rows[:, 0].max() - 9.7 <= speed * max(time_constant, 4 * substep)
 
 
 def test_coulomb_friction_decelerates_a_slide(make_slave):
     slave = make_slave().start(
         **SINKING,
-        **{
-            "position.z": 9.7,
-            "velocity.u": 1.0,
-            "bottom_friction": 0.5,
-            "substep": 0.001,
-            **{f"quadratic_damping[{i}]": 0.0 for i in range(1, 7)},
-            "r_G.z": 0.0,
-        },
+        **UNDAMPED,
+        **{"position.z": 9.7, "velocity.u": 1.0, "bottom_friction": 0.5, "substep": 0.001, "r_G.z": 0.0},
     )
     slave.step(1.0)
     slowing = 0.5 * (1300.0 - 1228.25) / (125.0 + 62.5)
@@ -204,11 +160,7 @@ def test_hull_starting_inside_the_bottom_is_pushed_out_slowly(make_slave, fmi):
     """However it got there: the bottom's spring is no catapult."""
     slave = make_slave(fmi=fmi, logging_on=True).start(**SINKING | NEUTRAL | {"position.z": 12.0})
     assert "the hull starts 2.3 m deep in the bottom" in [text for _, text in slave.said]
-    fastest = 0.0
-    for k in range(2000):
-        slave.fmu.doStep(k * 0.005, 0.005)
-        fastest = min(fastest, slave.get("velocity.w")[0])
-    assert -2.5 < fastest < -0.5
+    assert -2.5 < min(slave.get("velocity.w")[0] for _ in run(slave, 2000, 0.005)) < -0.5
     assert slave.get("altitude")[0] > 0.3
 
 
@@ -218,8 +170,7 @@ def test_energy_of_a_rolling_float_is_conserved(make_slave):
     r_B = np.array([0.0, 0.1, -0.1])
     slave = make_slave().start(**{
         "weight": W, "r_G.z": 0.05, "r_B.y": r_B[1], "r_B.z": r_B[2], "free_surface": True, "hull_radius": r,
-        "position.z": 0.2, "quaternion.e0": np.cos(0.4), "quaternion.e1": np.sin(0.4), "substep": 0.001,
-        **{f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)},
+        "position.z": 0.2, "quaternion.e0": np.cos(0.4), "quaternion.e1": np.sin(0.4), "substep": 0.001, **UNDAMPED,
     })  # fmt: skip
     M = np.diag([187.5] * 3 + [8.0] * 3)
     S = np.array([[0, -0.05, 0], [0.05, 0, 0], [0, 0, 0]])  # of r_G
@@ -233,11 +184,8 @@ def test_energy_of_a_rolling_float_is_conserved(make_slave):
         lifted = 2 * r * (part**3 - part**4 / 2) + max(z_B - r, 0.0)
         return 0.5 * x[7:] @ M @ x[7:] - W * z_G + B * lifted
 
-    before, energies = energy(), []
-    for k in range(600):
-        slave.fmu.doStep(k * 0.1, 0.1)
-        energies.append(energy())
-    assert energies == pytest.approx([before] * 600, abs=1e-4)
+    before = energy()
+    assert [energy() for _ in run(slave, 600, 0.1)] == pytest.approx([before] * 600, abs=1e-4)
 
 
 # ---- changes on the way ----
@@ -247,8 +195,7 @@ VARYING = {"current_variation.x": 1.0, "current_correlation_time": 1000.0, "curr
 
 def test_changed_knot_period_keeps_the_current_continuous(make_slave, fmi):
     slave = make_slave(fmi=fmi).start(**VARYING)
-    for _ in range(50):
-        slave.step(1.0)
+    slave.step(50.0)
     before = slave.get("water_velocity.x")[0]
     slave.set_values({"current_variation_period": 1.0})
     slave.step(1e-6)

@@ -15,19 +15,23 @@ from plant_fmu.build import cached_fmu
 from tests.plant_fmu.conftest import STATES
 
 MOVING = {
-    "velocity.u": 0.4,
-    "velocity.v": -0.3,
-    "velocity.r": 0.3,
-    "position.z": 2.0,
-    "current.x": 0.2,
-    "wrench.X": 20.0,
-    "wrench.Z": -8.0,
-    "wrench.K": 3.0,
-    "wrench.N": 4.0,
-    "thrust[1]": 12.0,
-    "thrust[6]": -9.0,
-}
+    "velocity.u": 0.4, "velocity.v": -0.3, "velocity.r": 0.3, "position.z": 2.0, "current.x": 0.2, "wrench.X": 20.0,
+    "wrench.Z": -8.0, "wrench.K": 3.0, "wrench.N": 4.0, "thrust[1]": 12.0, "thrust[6]": -9.0,
+}  # fmt: skip
 LAGS = {"thrust_time_constant[1]": 0.3, "thrust_rate_limit[6]": 15.0, "wrench_time_constant": 0.5}
+
+
+@pytest.fixture
+def make_model(make_slave, fmi):
+    """Return a function that makes a model for model exchange in continuous-time mode."""
+
+    def make(**values):
+        model = make_slave(fmi=fmi, interface="me", logging_on=True).start(**values)
+        model.update_discrete()
+        model.fmu.enterContinuousTimeMode()
+        return model
+
+    return make
 
 
 def by_cvode(fmi, values, end, interval, output):
@@ -60,13 +64,8 @@ def test_cvode_ends_where_co_simulation_does(make_slave, fmi, more):
 
 def test_a_drifting_current_is_the_same_in_both(make_slave, fmi):
     """Its knots are time events: the same values at the same times for any integrator."""
-    drift = {
-        "current_variation.x": 0.3,
-        "current_variation.y": 0.2,
-        "current_correlation_time": 4.0,
-        "seed": 5,
-        "current_variation_period": 0.37,
-    }
+    drift = {"current_variation.x": 0.3, "current_variation.y": 0.2, "seed": 5}
+    drift |= {"current_correlation_time": 4.0, "current_variation_period": 0.37}
     result = by_cvode(fmi, MOVING | drift, 10.0, 0.01, [*STATES, "water_velocity.x"])
     slave = cosimulated(make_slave, fmi, MOVING | drift, 10.0, substep=0.0025)
     assert np.abs(end_of(result) - slave.get(*STATES)).max() < 1e-7
@@ -91,11 +90,9 @@ def test_samples_are_the_same_in_both(make_slave, fmi):
 
 
 @pytest.mark.medium(fast=1)
-def test_scipy_integrates_the_derivatives(make_slave, fmi):
+def test_scipy_integrates_the_derivatives(make_model, make_slave, fmi):
     """Through the plain functions alone: set time, set states, get derivatives."""
-    model = make_slave(fmi=fmi, interface="me").start(**MOVING, **LAGS)
-    model.update_discrete()
-    model.fmu.enterContinuousTimeMode()
+    model = make_model(**MOVING, **LAGS)
 
     def rates(t, x):
         model.fmu.setTime(t)
@@ -103,7 +100,7 @@ def test_scipy_integrates_the_derivatives(make_slave, fmi):
         return model.rates()
 
     end = solve_ivp(rates, (0.0, 5.0), model.states(), method="DOP853", rtol=1e-11, atol=1e-11).y[:, -1]
-    slave = cosimulated(make_slave, fmi, MOVING | LAGS, 5.0, substep=0.0025)
+    slave = cosimulated(make_model, MOVING | LAGS, 5.0, substep=0.0025)
     assert np.abs(end[:13] - slave.get(*STATES)).max() < 1e-7
 
 
@@ -123,13 +120,9 @@ def test_events_occur_on_the_sample_grid(make_slave, fmi):
     )
 
 
-def test_no_events_without_samples(make_slave, fmi):
-    model = make_slave(fmi=fmi, interface="me").start()
-    assert model.update_discrete() == (False, None)
-
-
 def test_a_lag_switched_on_starts_from_the_present_force(make_slave, fmi):
     model = make_slave(fmi=fmi, interface="me").start()
+    assert model.update_discrete() == (False, None)
     model.set_values({"thrust[1]": 20.0})
     assert model.update_discrete() == (True, None)  # the command is followed at once
     model.fmu.enterContinuousTimeMode()
@@ -151,11 +144,9 @@ def test_parameters_change_only_in_event_mode(make_slave, fmi):
     assert "mass: not allowed in continuous-time mode" in model.said[-1][1]
 
 
-def test_states_may_also_be_set_one_by_one(make_slave, fmi):
+def test_states_may_also_be_set_one_by_one(make_model):
     """As CasADi does, which calls neither fmi2SetContinuousStates nor fmi3SetContinuousStates."""
-    model = make_slave(fmi=fmi, interface="me").start()
-    model.update_discrete()
-    model.fmu.enterContinuousTimeMode()
+    model = make_model()
     model.set_values({"position.x": 1.0})
     assert model.get("position.x") == [1.0]
     with pytest.raises(FMICallException):
@@ -164,11 +155,9 @@ def test_states_may_also_be_set_one_by_one(make_slave, fmi):
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, 1e7])
-def test_invalid_states_are_discarded(make_slave, fmi, value):
+def test_invalid_states_are_discarded(make_model, value):
     """The status makes an integrator try a shorter step; the model is unchanged."""
-    model = make_slave(fmi=fmi, interface="me", logging_on=True).start()
-    model.update_discrete()
-    model.fmu.enterContinuousTimeMode()
+    model = make_model()
     x = model.states()
     with pytest.raises(FMICallException) as caught:
         model.put_states(np.r_[value, x[1:]])
@@ -223,11 +212,9 @@ def test_interfaces_reject_functions_of_the_other(make_slave, fmi):
         assert slave.said[-1][1] == f"{action}: not offered in co-simulation"
 
 
-def test_boolean_outputs_change_only_at_events(make_slave, fmi):
+def test_boolean_outputs_change_only_at_events(make_model):
     """As the standards ask of discrete variables."""
-    model = make_slave(fmi=fmi, interface="me").start(hull_radius=0.3, bottom_depth=50.0)
-    model.update_discrete()
-    model.fmu.enterContinuousTimeMode()
+    model = make_model(hull_radius=0.3, bottom_depth=50.0)
     model.set_values({"thrust[1]": 1e3})
     x = model.states()
     x[2] = 49.9
