@@ -131,7 +131,9 @@ def test_bottom_contact_is_stable(make_slave, substep, speed, time_constant):
     """Thrown at the bottom, at any speed and substep: no energy is gained, nor depth beyond a flight of T."""
     slave = make_slave().start(
         **SINKING | NEUTRAL | UNDAMPED | {"position.z": 9.0, "velocity.w": speed, "velocity.u": speed},
-        **{"substep": substep, "bottom_time_constant": time_constant, "bottom_friction": 1.0},
+        substep=substep,
+        bottom_time_constant=time_constant,
+        bottom_friction=1.0,
     )
     motion = ("position.z", "velocity.u", "velocity.v", "velocity.w")
     rows = np.array([slave.get(*motion) for _ in run(slave, 400, 0.2)])

@@ -100,7 +100,7 @@ def test_scipy_integrates_the_derivatives(make_model, make_slave, fmi):
         return model.rates()
 
     end = solve_ivp(rates, (0.0, 5.0), model.states(), method="DOP853", rtol=1e-11, atol=1e-11).y[:, -1]
-    slave = cosimulated(make_model, MOVING | LAGS, 5.0, substep=0.0025)
+    slave = cosimulated(make_slave, fmi, MOVING | LAGS, 5.0, substep=0.0025)
     assert np.abs(end[:13] - slave.get(*STATES)).max() < 1e-7
 
 
