@@ -101,14 +101,13 @@ def _parser() -> argparse.ArgumentParser:
         help="table whose first line names the inputs, - for standard input; others are ignored",
     )
     evaluate.add_argument("--out", metavar="FILE", help="file to write (default: standard output)")
-    evaluate.add_argument("--json", action="store_true", help="JSON in the place of text")
 
     explain = verb("explain", "which rules fire for a sample, how strongly, and which decide")
     explain.add_argument("values", nargs="*", metavar="VALUE", help=values)
-    explain.add_argument("--json", action="store_true", help="JSON in the place of text")
 
     verify = verb("verify", "whether the rules are complete and consistent; exit status 1 if not", engine=False)
-    verify.add_argument("--json", action="store_true", help="JSON in the place of text")
+    for with_json in (evaluate, explain, verify):
+        with_json.add_argument("--json", action="store_true", help="JSON in the place of text")
 
     other = verb("convert", "write a definition in another format, or as source code", engine=False)
     other.add_argument(

@@ -77,16 +77,16 @@ def _batch(arbiter: Arbiter, samples: Array) -> Callable[[int], object]:
     return work
 
 
-def _median(work: Callable[[int], object], most: int) -> tuple[float, int]:
+def _median(work: Callable[[int], object], max_count: int) -> tuple[float, int]:
     """Return the median time of one of n things [us], and the n that takes about a repeat's time."""
-    work(min(4, most))  # warm up: caches and lazy imports
+    work(min(4, max_count))  # warm up: caches and lazy imports
     n, spent = 1, 0.0
     while True:
         spent = _timed(work, n)
-        if spent > _SECONDS / 4.0 or n >= most:
+        if spent > _SECONDS / 4.0 or n >= max_count:
             break
-        n = min(most, n * 4)
-    n = max(1, min(most, int(n * _SECONDS / max(spent, 1e-9))))
+        n = min(max_count, n * 4)
+    n = max(1, min(max_count, int(n * _SECONDS / max(spent, 1e-9))))
     return statistics.median(_timed(work, n) for _ in range(REPEATS)) / n * 1e6, n
 
 

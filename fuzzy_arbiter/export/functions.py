@@ -59,8 +59,10 @@ def in_python(name: str) -> str:
     if name in _PYTHON_OF_ONE:
         return f'def {name}(a):\n    """Return {name} of a number."""\n    {_PYTHON_OF_ONE[name]}'
     if name in _COMPARED:
-        said = f"a {_COMPARED[name]} b"
-        return f'def {name}(a, b):\n    """Return 1 if {said}, else 0."""\n    return 1.0 if {said} else 0.0'
+        comparison = f"a {_COMPARED[name]} b"
+        return (
+            f'def {name}(a, b):\n    """Return 1 if {comparison}, else 0."""\n    return 1.0 if {comparison} else 0.0'
+        )
     source = inspect.getsource(_OPERATORS[name].number).rstrip()
     return re.sub(r"(?<=[ab]): float|( -> float)(?=:)", "", source)
 

@@ -8,10 +8,10 @@ from fuzzy_arbiter.definition import Output, System, Variable, variable_names
 from fuzzy_arbiter.engines.supported import bent
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fcl_reader import system_of
-from fuzzy_arbiter.formats.fcl_terms import say_shape, universe_of
+from fuzzy_arbiter.formats.fcl_terms import format_shape, universe_of
 from fuzzy_arbiter.formats.fcl_words import METHODS, RESERVED, chosen_block, cut
-from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_word, require_words, say_number, word_of
-from fuzzy_arbiter.formats.settings import read_settings, say_settings
+from fuzzy_arbiter.formats.notation import blocks, format_number, require_word, require_words, unsupported_rule, word_of
+from fuzzy_arbiter.formats.settings import format_settings, read_settings
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
@@ -25,22 +25,22 @@ def write(system: System) -> str:
     require_word(system.name, "fcl", RESERVED)
     require_words(system, "fcl", RESERVED)
     _require_one_case(system)
-    lines = [f"(* {text} *)" for text in say_settings(system, _SETTINGS)]
+    lines = [f"(* {text} *)" for text in format_settings(system, _SETTINGS)]
     lines += [f"FUNCTION_BLOCK {system.name}", "", "VAR_INPUT"]
     names = variable_names(system.inputs)
     for v in system.inputs:
         # jFuzzyLogic's place for it; the standard has none for inputs
         points = [x for t in v.terms if isinstance(t.shape, Shape) for x, _ in t.shape.points]
         known = universe_of(points) == v.universe and all(isinstance(t.shape, Shape) for t in v.terms)
-        lines.append(f"  {v.name} : REAL;" + ("" if known else f" {_say_range(v)}"))
+        lines.append(f"  {v.name} : REAL;" + ("" if known else f" {_format_range(v)}"))
     lines += ["END_VAR", "", "VAR_OUTPUT", *(f"  {v.name} : REAL;" for v in system.outputs), "END_VAR", ""]
     for v in system.inputs:
-        lines += [f"FUZZIFY {v.name}", *_say_terms(v, names), "END_FUZZIFY", ""]
+        lines += [f"FUZZIFY {v.name}", *_format_terms(v, names), "END_FUZZIFY", ""]
     for output in system.outputs:
         lines += [
             f"DEFUZZIFY {output.name}",
-            *_say_terms(output, names),
-            *_say_output(output, system),
+            *_format_terms(output, names),
+            *_format_output(output, system),
             "END_DEFUZZIFY",
             "",
         ]
@@ -51,20 +51,20 @@ def write(system: System) -> str:
         lines.append(f"  OR : {word_of('fcl', 'disjunction', operators.disjunction, S_NORMS)};")
         lines.append(f"  ACT : {word_of('fcl', 'implication', operators.implication, T_NORMS)};")
         lines += [f"  ACCU : {word};" for word in accumulations if len(accumulations) == 1]
-        lines += [f"  RULE {i + 1} : {_say_rule(i, rule)};" for i, rule in rules]
+        lines += [f"  RULE {i + 1} : {_format_rule(i, rule)};" for i, rule in rules]
         lines += ["END_RULEBLOCK", ""]
     return "\n".join([*lines, "END_FUNCTION_BLOCK", ""])
 
 
-def _say_range(v: Variable) -> str:
-    return f"RANGE := ({say_number(v.universe[0])} .. {say_number(v.universe[1])});"
+def _format_range(v: Variable) -> str:
+    return f"RANGE := ({format_number(v.universe[0])} .. {format_number(v.universe[1])});"
 
 
-def _say_terms(v: Variable, inputs: tuple[str, ...]) -> list[str]:
-    return [f"  TERM {term.name} := {say_shape(term.shape, term.name, inputs)};" for term in v.terms]
+def _format_terms(v: Variable, inputs: tuple[str, ...]) -> list[str]:
+    return [f"  TERM {term.name} := {format_shape(term.shape, term.name, inputs)};" for term in v.terms]
 
 
-def _say_output(output: Output, system: System) -> list[str]:
+def _format_output(output: Output, system: System) -> list[str]:
     method = next(word for word, name in METHODS.items() if name == output.defuzzifier)
     if method == "COGSS":
         raise UnsupportedError(f"fcl cannot say the defuzzifier 'sum' of output {output.name!r}: expected 'average'")
@@ -74,18 +74,18 @@ def _say_output(output: Output, system: System) -> list[str]:
     # an aggregation that is not that of all outputs is said here, as fuzzylite does
     if len({other.aggregation for other in system.outputs}) > 1:
         lines.append(f"  ACCU : {word_of('fcl', 'aggregation', output.aggregation, AGGREGATIONS)};")
-    lines.append(f"  DEFAULT := {'NC' if output.default is None else say_number(output.default)};")
+    lines.append(f"  DEFAULT := {'NC' if output.default is None else format_number(output.default)};")
     locks = [word for word, on in (("PREVIOUS", output.lock_previous), ("RANGE", output.lock_range)) if on]
-    return [*lines, *([f"  LOCK : {' | '.join(locks)};"] if locks else []), f"  {_say_range(output)}"]
+    return [*lines, *([f"  LOCK : {' | '.join(locks)};"] if locks else []), f"  {_format_range(output)}"]
 
 
-def _say_rule(i: int, rule: Rule) -> str:
+def _format_rule(i: int, rule: Rule) -> str:
     if bent(rule.condition):
-        raise cannot_say("fcl", i, rule, "no hedges")
+        raise unsupported_rule("fcl", i, rule, "no hedges")
     text = str(Rule(rule.condition, rule.conclusions[:1]))
     text = re.sub(r"\b(if|then|and|or|not|is)\b", lambda m: m[0].upper(), text)  # no name is one of these words
     text += "".join(f", {c.variable} IS {c.term}" for c in rule.conclusions[1:])
-    return text if rule.weight == 1.0 else f"{text} WITH {say_number(rule.weight)}"
+    return text if rule.weight == 1.0 else f"{text} WITH {format_number(rule.weight)}"
 
 
 def _require_one_case(system: System) -> None:

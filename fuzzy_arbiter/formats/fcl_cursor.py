@@ -22,17 +22,17 @@ class Cursor:
     """A position among the tokens of a text."""
 
     tokens: list[Token]  # all tokens of the text
-    at: int = 0  # index of the next token
+    index: int = 0  # index of the next token
     fuzzylite: bool = False  # true if a construct so far is one of fuzzylite's, and not of the standard or jFuzzyLogic
 
     @property
     def here(self) -> Token:
         """The next token."""
-        return self.tokens[self.at]
+        return self.tokens[self.index]
 
     def unexpected(self, expected: str) -> NoReturn:
         """Refuse the next token."""
-        before = f" after {self.tokens[self.at - 1].text!r}" if self.at else ""
+        before = f" after {self.tokens[self.index - 1].text!r}" if self.index else ""
         found = self.here.text if self.here.kind == "end" else repr(self.here.text)
         refuse(self.here.line, f"{found} came{before}, expected {expected}")
 
@@ -40,7 +40,7 @@ class Cursor:
         """Take the next token if it is one of these words or signs."""
         token = self.here
         if token.kind in ("name", "sign") and token.text.upper() in words:
-            self.at += 1
+            self.index += 1
             return token
         return None
 
@@ -52,15 +52,15 @@ class Cursor:
         """Take a name."""
         if self.here.kind != "name" or self.here.text.lower() in RESERVED:
             self.unexpected(what)
-        self.at += 1
-        return self.tokens[self.at - 1]
+        self.index += 1
+        return self.tokens[self.index - 1]
 
     def number(self, what: str) -> float:
         """Take a number."""
         if self.here.kind != "number":
             self.unexpected(f"a number, {what}")
-        self.at += 1
-        return read_number(self.tokens[self.at - 1].text, self.tokens[self.at - 1].line, what)
+        self.index += 1
+        return read_number(self.tokens[self.index - 1].text, self.tokens[self.index - 1].line, what)
 
     def choice(self, words: Mapping[str, _T]) -> _T:
         """Take a colon, one of some words, and the end of the statement."""
@@ -91,10 +91,10 @@ class Cursor:
 
     def rest(self) -> str:
         """Take all tokens up to the end of the statement, as text."""
-        start = self.at
+        start = self.index
         while self.here.text != ";" and self.here.kind != "end":
-            self.at += 1
-        return " ".join(token.text for token in self.tokens[start : self.at])
+            self.index += 1
+        return " ".join(token.text for token in self.tokens[start : self.index])
 
     def shape(self, inputs: int | None) -> tuple[Membership | Value, list[float]]:
         """Take a term's shape, and the least and greatest place in it."""
@@ -103,7 +103,7 @@ class Cursor:
             return Constant(value) if inputs is not None else Curve("singleton", (value,)), [value]
         if self.here.kind == "name":
             token = self.here
-            self.at += 1
+            self.index += 1
             word = token.text.upper()
             if word in COUNTS and token.text not in TYPES:
                 return read_curve(word, [self.number("a parameter") for _ in range(COUNTS[word])])

@@ -19,7 +19,7 @@ from fuzzy_arbiter.formats.fcl_words import (
     Token,
     block_name,
 )
-from fuzzy_arbiter.formats.notation import assembled, located, refuse
+from fuzzy_arbiter.formats.notation import assembled, join_rule_blocks, located, refuse
 from fuzzy_arbiter.propositions import Is, quoted
 from fuzzy_arbiter.rule import Operators, Rule
 from fuzzy_arbiter.rule_text import parse_rules
@@ -53,13 +53,13 @@ class _Block:
     """The statements of a rule block."""
 
     line: int
-    said: dict[str, str] = field(default_factory=dict)
+    norms: dict[str, str] = field(default_factory=dict)
     rules: list[tuple[int, Rule]] = field(default_factory=list)
 
     def operators(self) -> Operators:
         """Return the operators; AND and OR imply each other, and a missing ACT is MIN."""
-        conjunction = self.said.get("AND") or next((a for a, b in PAIRS.items() if b == self.said.get("OR")), "min")
-        return Operators(conjunction, self.said.get("OR", PAIRS[conjunction]), self.said.get("ACT", "min"))
+        conjunction = self.norms.get("AND") or next((a for a, b in PAIRS.items() if b == self.norms.get("OR")), "min")
+        return Operators(conjunction, self.norms.get("OR", PAIRS[conjunction]), self.norms.get("ACT", "min"))
 
 
 def _on_first_of_value(rule: Rule, outputs: list[Output]) -> Rule:
@@ -92,9 +92,9 @@ class _Reader(Cursor):
 
     def system(self, settings: dict[str, Any]) -> System:
         begin = self.take("FUNCTION_BLOCK")
-        name = block_name(self.tokens[self.at :])
+        name = block_name(self.tokens[self.index :])
         while name and self.here.line == begin.line and self.here.text.upper() not in SECTIONS:
-            self.at += 1
+            self.index += 1
         sections: dict[str, Callable[[], None]] = {
             "VAR_INPUT": lambda: self.variables(self.inputs),
             "VAR_OUTPUT": lambda: self.variables(self.outputs),
@@ -106,7 +106,7 @@ class _Reader(Cursor):
             sections[self.take(*sections, "END_FUNCTION_BLOCK").text.upper()]()
         if self.here.kind != "end":
             self.unexpected("the end of the file")
-        accumulations = {block.said["ACCU"]: block.line for block in self.blocks if "ACCU" in block.said}
+        accumulations = {block.norms["ACCU"]: block.line for block in self.blocks if "ACCU" in block.norms}
         if len(accumulations) > 1:
             refuse(max(accumulations.values()), "RULEBLOCK has another ACCU than that before it, expected the same")
         accumulation = next(iter(accumulations), None)
@@ -116,16 +116,9 @@ class _Reader(Cursor):
                 inputs.append(Variable(*self.parts(variable, draft, "FUZZIFY", False)))
         for variable, draft in self.outputs.items():
             outputs.append(self.output(variable, draft, accumulation))
-        operators = [block.operators() for block in self.blocks]
-        first = operators[0] if operators else Operators()
-        rules = [
-            (line, rule if own == first else replace(rule, operators=own))
-            for block, own in zip(self.blocks, operators, strict=True)
-            for line, rule in block.rules
-        ]
+        norms, rules = join_rule_blocks([(block.operators(), block.rules) for block in self.blocks])
         if not self.fuzzylite:
             rules = [(line, _on_first_of_value(rule, outputs)) for line, rule in rules]
-        norms = {key: getattr(first, key) for key in ("conjunction", "disjunction", "implication")}
         return assembled(begin.line, inputs, outputs, rules, name=name or "arbiter", **norms, **settings)
 
     def output(self, name: str, draft: _Draft, accumulation: str | None) -> Output:
@@ -255,27 +248,27 @@ class _Reader(Cursor):
                 self.rule(key.line, block)
             elif word == "ENABLED":
                 self.choice({"TRUE": True})
-            elif word in block.said:
+            elif word in block.norms:
                 refuse(key.line, f"{word} came twice")
             else:
-                block.said[word] = self.choice(choices[word])
+                block.norms[word] = self.choice(choices[word])
 
     def rule(self, line: int, block: _Block) -> None:
         if self.here.kind in ("name", "number"):
-            self.at += 1
+            self.index += 1
         elif self.here.text != ":":
             self.unexpected("the rule's number")
         self.take(":")
-        start = self.at
+        start = self.index
         while self.here.text != ";" and self.here.kind != "end":
-            if self.at > start and self.here.line > self.tokens[self.at - 1].line and self.next_statement():
+            if self.index > start and self.here.line > self.tokens[self.index - 1].line and self.next_statement():
                 self.fuzzylite = True  # fuzzylite ends a rule with its line
                 break
-            self.at += 1
+            self.index += 1
         # read as names, except the words of rules, since the language has no other words
         words = [
             token if token.text.lower() in _RULE_WORDS else self.as_name(token)
-            for token in self.tokens[start : self.at]
+            for token in self.tokens[start : self.index]
         ]
         if not self.fuzzylite or self.here.text == ";":
             self.take(";")
@@ -284,7 +277,7 @@ class _Reader(Cursor):
 
     def next_statement(self) -> bool:
         """Return True if another statement of a rule block begins here."""
-        after = self.tokens[self.at + 1] if self.here.kind != "end" else self.here
+        after = self.tokens[self.index + 1] if self.here.kind != "end" else self.here
         word = self.here.text.upper()
         return word in ("RULE", "END_RULEBLOCK") and (word != "RULE" or after.kind in ("name", "number", "sign"))
 

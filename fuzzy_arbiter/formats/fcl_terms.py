@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fuzzy_arbiter.errors import UnsupportedError
-from fuzzy_arbiter.formats.notation import say_number, say_numbers
+from fuzzy_arbiter.formats.notation import format_number, format_numbers
 from fuzzy_arbiter.shapes import Membership, Shape, trapezoid, triangle
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.kinds import KINDS
@@ -27,7 +27,7 @@ def read_curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[fl
         half, center = numbers
         return Curve("cosine", (center, 2.0 * half)), [center - half, center + half]
     if word == "DSIGM" and not _rises_first(*numbers):
-        rising, left, falling, right = map(say_number, numbers)  # where jFuzzyLogic takes 0 for what is below 0
+        rising, left, falling, right = map(format_number, numbers)  # where jFuzzyLogic takes 0 for what is below 0
         first, second = f"1/(1+exp(-({rising})*(x-({left}))))", f"1/(1+exp(-({falling})*(x-({right}))))"
         return Formula(f"max({first} - {second}, 0)"), _extent(
             "sigmoid_difference", (numbers[1], *numbers[::2], numbers[3])
@@ -58,12 +58,12 @@ def _extent(name: str, p: Sequence[float]) -> list[float]:
     return [min(p[0] - reaches[0], p[3] - reaches[1]), max(p[0] + reaches[0], p[3] + reaches[1])]
 
 
-def say_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) -> str:
+def format_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) -> str:
     """Format a term's shape in the words of the standard and jFuzzyLogic."""
     if isinstance(shape, Shape):
-        return " ".join(f"({say_number(x)}, {say_number(degree)})" for x, degree in shape.points)
+        return " ".join(f"({format_number(x)}, {format_number(degree)})" for x, degree in shape.points)
     if isinstance(shape, Constant):
-        return say_number(shape.value)
+        return format_number(shape.value)
     if isinstance(shape, Formula | Linear):
         text = shape.text if isinstance(shape, Formula) else shape.expression(inputs).text
         return f"FUNCTION {text}"
@@ -71,9 +71,9 @@ def say_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) -> st
     if shape.height != 1.0:
         raise UnsupportedError(f"fcl cannot say the height {shape.height!r} of term {term!r}: expected 1")
     if shape.kind == "cosine":
-        return f"COSINE {say_numbers((shape.parameters[1] / 2.0, shape.parameters[0]))}"
+        return f"COSINE {format_numbers((shape.parameters[1] / 2.0, shape.parameters[0]))}"
     if shape.kind == "singleton":
-        return f"TRIAN {say_numbers(shape.parameters * 3)}"
+        return f"TRIAN {format_numbers(shape.parameters * 3)}"
     spelled = KINDS[shape.kind].fcl
     if spelled is None:
         raise UnsupportedError(
@@ -85,7 +85,7 @@ def say_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) -> st
         raise UnsupportedError(
             f"fcl cannot say term {term!r}, a sigmoid_difference of which the second sigmoid may be above the first"
         )
-    return f"{word} {say_numbers(shape.parameters[i] for i in order)}"
+    return f"{word} {format_numbers(shape.parameters[i] for i in order)}"
 
 
 def universe_of(places: Sequence[float]) -> tuple[float, float] | None:

@@ -8,8 +8,8 @@ from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable, variabl
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fis_reader import read
 from fuzzy_arbiter.formats.fis_words import DEFUZZIFIERS, MATLAB, SETTINGS
-from fuzzy_arbiter.formats.notation import cannot_say, say_number, say_numbers, word_of
-from fuzzy_arbiter.formats.settings import say_settings
+from fuzzy_arbiter.formats.notation import format_number, format_numbers, unsupported_rule, word_of
+from fuzzy_arbiter.formats.settings import format_settings
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.curves import Curve
@@ -27,7 +27,7 @@ def write(system: System) -> str:
     """Format a system as MATLAB's text."""
     _require_names(system)
     kind, method, aggregation = _method(system)
-    lines = [f"% {text}" for text in say_settings(system, SETTINGS)]
+    lines = [f"% {text}" for text in format_settings(system, SETTINGS)]
     lines += ["[System]", f"Name='{system.name}'", f"Type='{kind}'", "Version=2.0"]
     lines += [f"NumInputs={len(system.inputs)}", f"NumOutputs={len(system.outputs)}", f"NumRules={len(system.rules)}"]
     lines += [f"AndMethod='{word_of('fis', 'conjunction', system.conjunction, T_NORMS)}'"]
@@ -45,8 +45,10 @@ def _method(system: System) -> tuple[str, str, str]:
     """Return the type of a system, and the words of its defuzzifier and aggregation, which all outputs share."""
     pairs = dict.fromkeys((o.defuzzifier, o.aggregation) for o in system.outputs)
     if len(pairs) > 1:
-        said = "; ".join(f"{defuzzifier}, {aggregation}" for defuzzifier, aggregation in pairs)
-        raise UnsupportedError(f"fis cannot say outputs of several defuzzifiers and aggregations, {said}: expected one")
+        pairs_text = "; ".join(f"{defuzzifier}, {aggregation}" for defuzzifier, aggregation in pairs)
+        raise UnsupportedError(
+            f"fis cannot say outputs of several defuzzifiers and aggregations, {pairs_text}: expected one"
+        )
     ((defuzzifier, aggregation),) = pairs
     method = next(word for word, name in DEFUZZIFIERS.items() if name == defuzzifier)
     if defuzzifier not in WEIGHTED:
@@ -69,7 +71,7 @@ def _variable(v: Variable, system: System) -> list[str]:
         for key in ("default", "lock_range", "lock_previous"):
             if getattr(v, key) is not (None if key == "default" else False):
                 raise UnsupportedError(f"fis cannot say the {key} {getattr(v, key)!r} of output {v.name!r}")
-    lines = [f"Name='{v.name}'", f"Range=[{say_numbers(v.universe)}]", f"NumMFs={len(v.terms)}"]
+    lines = [f"Name='{v.name}'", f"Range=[{format_numbers(v.universe)}]", f"NumMFs={len(v.terms)}"]
     for j, term in enumerate(v.terms):
         lines.append(f"MF{j + 1}='{term.name}':{_function(term, v)}")
     return lines
@@ -93,7 +95,7 @@ def _function(term: Term, v: Variable) -> str:
         if max(degree for _, degree in term.shape.points) != 1.0:
             raise UnsupportedError(_no_function(term, v))
         foot, top = places if term.shape.points[0][1] == 0.0 else reversed(places)
-        return f"'rampmf',[{say_number(foot)} {say_number(top)}]"
+        return f"'rampmf',[{format_number(foot)} {format_number(top)}]"
     match [degree for _, degree in term.shape.points]:
         case [0.0, 1.0, 0.0] | [0.0, 1.0, 1.0, 0.0]:
             pass
@@ -111,31 +113,31 @@ def _function(term: Term, v: Variable) -> str:
             raise UnsupportedError(_no_function(term, v))
     if not all(map(math.isfinite, places)):
         raise UnsupportedError(_no_function(term, v))
-    return f"'{'trimf' if len(places) == 3 else 'trapmf'}',[{say_numbers(places)}]"
+    return f"'{'trimf' if len(places) == 3 else 'trapmf'}',[{format_numbers(places)}]"
 
 
 def _named(term: Term, v: Variable) -> str:
     """Format a curve or a value."""
     shape, what = term.shape, f"fis cannot say the term {term.name!r} of {v.name!r}"
     if isinstance(shape, Constant):
-        return f"'constant',[{say_number(shape.value)}]"
+        return f"'constant',[{format_number(shape.value)}]"
     if isinstance(shape, Linear):
-        return f"'linear',[{say_numbers((*shape.coefficients, shape.constant))}]"
+        return f"'linear',[{format_numbers((*shape.coefficients, shape.constant))}]"
     if not isinstance(shape, Curve):
         raise UnsupportedError(f"{what}, a formula: expected a function of MATLAB's, a constant or a linear term")
     if shape.kind == "singleton" and shape.height == 1.0:
-        return f"'trimf',[{say_numbers(shape.parameters * 3)}]"
+        return f"'trimf',[{format_numbers(shape.parameters * 3)}]"
     word, order = KINDS[shape.kind].fis
     if word not in MATLAB or shape.height != 1.0:
         raise UnsupportedError(
             f"{what}, {shape.kind} of the height {shape.height:g}: expected one of {', '.join(MATLAB)}"
         )
-    return f"'{word}',[{say_numbers(shape.parameters[i] for i in order)}]"
+    return f"'{word}',[{format_numbers(shape.parameters[i] for i in order)}]"
 
 
 def _no_function(term: Term, v: Variable) -> str:
     assert isinstance(term.shape, Shape)
-    points = " ".join(f"({say_number(x)}, {say_number(degree)})" for x, degree in term.shape.points)
+    points = " ".join(f"({format_number(x)}, {format_number(degree)})" for x, degree in term.shape.points)
     return f"fis cannot say the term {term.name!r} of {v.name!r}, {points}: expected a triangle, a trapezoid or a half"
 
 
@@ -143,7 +145,7 @@ def _rule(system: System, i: int) -> str:
     rule = system.rules[i]
     condition = rule.condition
     if rule.operators is not None:
-        raise cannot_say("fis", i, rule, "those of the system", "operators")
+        raise unsupported_rule("fis", i, rule, "those of the system", "operators")
     parts = condition.parts if isinstance(condition, And | Or) else (condition,)
     row = [0] * len(system.inputs)
     names = variable_names(system.inputs)
@@ -151,21 +153,21 @@ def _rule(system: System, i: int) -> str:
     for part in parts:
         statement = _statement(part)
         if statement is None or statement.variable not in names:
-            raise cannot_say("fis", i, rule, "one connective per rule, and only terms negated")
+            raise unsupported_rule("fis", i, rule, "one connective per rule, and only terms negated")
         k = names.index(statement.variable)
         if k <= last:
-            raise cannot_say("fis", i, rule, "each input once, in the order of the inputs")
+            raise unsupported_rule("fis", i, rule, "each input once, in the order of the inputs")
         last = k
         row[k] = (system.inputs[k].term_names.index(statement.term) + 1) * (1 if statement is part else -1)
     concluded = [0] * len(system.outputs)
     outputs = variable_names(system.outputs)
     order = [outputs.index(c.variable) for c in rule.conclusions]
     if order != sorted(order):
-        raise cannot_say("fis", i, rule, "each output in the order of the outputs", "conclusions")
+        raise unsupported_rule("fis", i, rule, "each output in the order of the outputs", "conclusions")
     for k, conclusion in zip(order, rule.conclusions, strict=True):
         concluded[k] = system.outputs[k].term_names.index(conclusion.term) + 1
     numbers = f"{' '.join(map(str, row))}, {' '.join(map(str, concluded))}"
-    return f"{numbers} ({say_number(rule.weight)}) : {2 if isinstance(condition, Or) else 1}"
+    return f"{numbers} ({format_number(rule.weight)}) : {2 if isinstance(condition, Or) else 1}"
 
 
 def _statement(part: Proposition) -> Is | None:

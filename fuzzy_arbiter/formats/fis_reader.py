@@ -129,7 +129,7 @@ def _norms(system: _Section) -> dict[str, str]:
     for key, (line, _) in system.entries.items():
         if key not in _SYSTEM_KEYS:
             refuse(line, f"{key} is not known in [System], expected one of {', '.join(_SYSTEM_KEYS)}")
-    said: dict[str, str] = {}
+    norms: dict[str, str] = {}
     for key, known in METHODS.items():
         value = system.string(key)
         if value is not None and value not in known:
@@ -137,14 +137,14 @@ def _norms(system: _Section) -> dict[str, str]:
                 system.entries[key][0],
                 f"{key} is {value!r}, which is not known here; expected {' or '.join(filter(None, known))}",
             )
-        said[key] = known[value or ""]
-    if not system.string("AndMethod") and said["OrMethod"] == "probor":
-        said["AndMethod"] = "prod"
+        norms[key] = known[value or ""]
+    if not system.string("AndMethod") and norms["OrMethod"] == "probor":
+        norms["AndMethod"] = "prod"
     return {
-        "conjunction": said["AndMethod"],
-        "disjunction": said["OrMethod"],
-        "implication": said["ImpMethod"],
-        "aggregation": said["AggMethod"],
+        "conjunction": norms["AndMethod"],
+        "disjunction": norms["OrMethod"],
+        "implication": norms["ImpMethod"],
+        "aggregation": norms["AggMethod"],
     }
 
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.formats.fis_words import CURVES, FUNCTIONS, SHOULDERS, STRAIGHT, VALUES
 from fuzzy_arbiter.formats.fll_terms import curve_of, read_shape, read_value
-from fuzzy_arbiter.formats.notation import read_number, refuse, say_numbers
+from fuzzy_arbiter.formats.notation import format_numbers, read_number, refuse
 from fuzzy_arbiter.shapes import Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.expressions import Expression
@@ -39,7 +39,7 @@ def read_function(function: str, text: str, line: int, term: str, inputs: int | 
         return SHOULDERS[function](*numbers)
     if function == "trapmf" and numbers[1] > numbers[2]:
         return _crossed(*numbers)
-    return read_shape(kind, say_numbers(numbers), line)
+    return read_shape(kind, format_numbers(numbers), line)
 
 
 def complement(shape: Membership) -> Membership:

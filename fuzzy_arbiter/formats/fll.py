@@ -5,10 +5,17 @@ from __future__ import annotations
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fll_reader import read
-from fuzzy_arbiter.formats.fll_terms import RESERVED, say_shape
+from fuzzy_arbiter.formats.fll_terms import RESERVED, format_shape
 from fuzzy_arbiter.formats.fll_words import DEFUZZIFIERS, settings_of
-from fuzzy_arbiter.formats.notation import blocks, cannot_say, require_words, say_number, say_numbers, word_of
-from fuzzy_arbiter.formats.settings import say_settings
+from fuzzy_arbiter.formats.notation import (
+    blocks,
+    format_number,
+    format_numbers,
+    require_words,
+    unsupported_rule,
+    word_of,
+)
+from fuzzy_arbiter.formats.settings import format_settings
 from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
@@ -22,13 +29,13 @@ def write(system: System) -> str:
         raise UnsupportedError(f"fll cannot say the name {system.name!r}: what follows # is a comment")
     require_words(system, "fll", RESERVED)
     lock = "true" if system.outside == "clip" else "false"
-    lines = [f"# {text}" for text in say_settings(system, settings_of(system.outputs))]
+    lines = [f"# {text}" for text in format_settings(system, settings_of(system.outputs))]
     lines.append(f"Engine: {system.name}")
     for v in system.inputs:
-        lines += [f"InputVariable: {v.name}", "  enabled: true", f"  range: {say_numbers(v.universe)}"]
+        lines += [f"InputVariable: {v.name}", "  enabled: true", f"  range: {format_numbers(v.universe)}"]
         lines += [f"  lock-range: {lock}", *_terms(v)]
     for output in system.outputs:
-        lines += [f"OutputVariable: {output.name}", "  enabled: true", f"  range: {say_numbers(output.universe)}"]
+        lines += [f"OutputVariable: {output.name}", "  enabled: true", f"  range: {format_numbers(output.universe)}"]
         lines += [f"  lock-range: {_truth(output.lock_range)}"]
         lines += [
             f"  aggregation: {word_of('fll', 'aggregation', output.aggregation, AGGREGATIONS)}",
@@ -57,16 +64,16 @@ def _defuzzifier(output: Output, system: System) -> str:
 
 
 def _terms(v: Variable) -> list[str]:
-    return [f"  term: {term.name} {say_shape(term.shape)}" for term in v.terms]
+    return [f"  term: {term.name} {format_shape(term.shape)}" for term in v.terms]
 
 
 def _default(output: Output) -> str:
-    return "nan" if output.default is None else say_number(output.default)
+    return "nan" if output.default is None else format_number(output.default)
 
 
 def _rule(i: int, rule: Rule) -> str:
     conclusions = " and ".join(map(str, rule.conclusions))
-    weight = "" if rule.weight == 1.0 else f" with {say_number(rule.weight)}"
+    weight = "" if rule.weight == 1.0 else f" with {format_number(rule.weight)}"
     return f"if {_condition(rule.condition, i, rule)} then {conclusions}{weight}"
 
 
@@ -78,9 +85,9 @@ def _condition(p: Proposition, i: int, rule: Rule) -> str:
     bends: list[str] = []
     while isinstance(p, Not | Hedged):
         if isinstance(p, Hedged) and not HEDGES[p.hedge].fll:
-            raise cannot_say("fll", i, rule, "a hedge of fuzzylite's, such as very, somewhat or extremely")
+            raise unsupported_rule("fll", i, rule, "a hedge of fuzzylite's, such as very, somewhat or extremely")
         bends.append(p.hedge if isinstance(p, Hedged) else "not")
         p = p.part
     if not isinstance(p, Is | Anything):
-        raise cannot_say("fll", i, rule, "only terms negated")
+        raise unsupported_rule("fll", i, rule, "only terms negated")
     return f"{p.variable} is {' '.join([*bends, p.term if isinstance(p, Is) else 'any'])}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any
 
 from fuzzy_arbiter.definition import Output, System, Variable
@@ -21,10 +21,10 @@ from fuzzy_arbiter.formats.fll_words import (
     RESOLUTION,
     settings_of,
 )
-from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
+from fuzzy_arbiter.formats.notation import NumberedRule, assembled, join_rule_blocks, located, read_number, refuse
 from fuzzy_arbiter.formats.settings import read_settings
 from fuzzy_arbiter.propositions import And, Not, Or, Proposition
-from fuzzy_arbiter.rule import Operators, Rule
+from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.rule_text import parse_rules
 from fuzzy_arbiter.terms.term import Term
 
@@ -62,26 +62,18 @@ def read(text: str) -> System:
         raise FormatError(f"expected one Engine in a FLL file, {len(engines) or 'none'} came")
     inputs = [b for b in blocks if b.kind == "InputVariable"]
     outputs = [b for b in blocks if b.kind == "OutputVariable"]
-    rule_blocks = [b for b in blocks if b.kind == "RuleBlock"]
     variables = [Variable(*_variable(b)) for b in inputs]
     made = [_output(b, len(inputs)) for b in outputs]
     results = [output for output, _ in made]
     clips = _alike(inputs, [b.word("lock-range", {"true": "clip", "false": "refuse"}, "false") for b in inputs])
     settings = read_settings(comments, settings_of(results))
     values = {output.name for output in results if output.weighted}
-    said = [_rules(block, values) for block in rule_blocks]
-    # the system has the operators of the first block, and a rule of another its own
-    first = said[0][1] if said else Operators()
-    rules = [
-        (line, rule if norms == first else replace(rule, operators=norms))
-        for found, norms in said
-        for line, rule in found
-    ]
+    norms, rules = join_rule_blocks([_rules(b, values) for b in blocks if b.kind == "RuleBlock"])
     name = engines[0].name or "arbiter"
     options = {
         "outside": clips or "refuse",
         "points": max((points for _, points in made), default=0) or RESOLUTION,
-        **{key: getattr(first, key) for key in ("conjunction", "disjunction", "implication")},
+        **norms,
         **settings,
     }
     return assembled(engines[0].line, variables, results, rules, name=name, **options)
@@ -182,10 +174,10 @@ def _defuzzifier(block: _Block) -> tuple[Any, int]:
     return name, int(option or RESOLUTION)
 
 
-def _rules(block: _Block, values: set[str]) -> tuple[list[tuple[int, Rule]], Operators]:
-    """Return the rules of a block, and its operators; one that no rule needs may be missing."""
+def _rules(block: _Block, values: set[str]) -> tuple[Operators, list[NumberedRule]]:
+    """Return the operators of a block, of which one that no rule needs may be missing, and its rules."""
     block.require_enabled()
-    rules: list[tuple[int, Rule]] = []
+    rules: list[NumberedRule] = []
     for line, content in block.many:
         with located(f"line {line}"):
             rules += [(line, rule) for rule in parse_rules(content)]
@@ -196,11 +188,12 @@ def _rules(block: _Block, values: set[str]) -> tuple[list[tuple[int, Rule]], Ope
     implied = any(c.variable not in values for _, rule in rules for c in rule.conclusions)
     none_and = {} if And in joins else {"none": "min", "": "min"}
     none_or = {} if Or in joins else {"none": "max", "": "max"}
-    return rules, Operators(
+    operators = Operators(
         block.word("conjunction", CONJUNCTIONS | none_and),
         block.word("disjunction", DISJUNCTIONS | none_or),
         block.word("implication", CONJUNCTIONS | ({} if implied else {"none": "min", "": "min"})),
     )
+    return operators, rules
 
 
 def _joins(p: Proposition) -> set[type[Proposition]]:

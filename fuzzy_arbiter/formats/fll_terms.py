@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from fuzzy_arbiter.errors import UnsupportedError
-from fuzzy_arbiter.formats.notation import read_number, refuse, say_number, say_numbers
+from fuzzy_arbiter.formats.notation import format_number, format_numbers, read_number, refuse
 from fuzzy_arbiter.shapes import Membership, Point, Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.functions import WORDS
@@ -20,21 +20,23 @@ RESERVED = frozenset(
 )
 # number of places of each; a height may follow
 _PLACES = {"Triangle": 3, "Trapezoid": 4, "Ramp": 2, "Rectangle": 2, "Binary": 2}
-CURVES = {kind.fll[0]: (name, kind.fll[1]) for name, kind in KINDS.items() if kind.fll[0]}
+CURVES = {kind.fll: (name, range(len(kind.parameters))) for name, kind in KINDS.items() if kind.fll}
 VALUES = ("Constant", "Linear", "Function")
 TYPES = (*_PLACES, "Discrete", *CURVES, *VALUES)
 
 
-def say_shape(shape: Membership | Value) -> str:
+def format_shape(shape: Membership | Value) -> str:
     """Format a term's shape as its type and numbers."""
     if isinstance(shape, Curve):
-        word, order = ("Triangle", (0, 0, 0)) if shape.kind == "singleton" else KINDS[shape.kind].fll
-        height = "" if shape.height == 1.0 else f" {say_number(shape.height)}"
-        return f"{word} {say_numbers(shape.parameters[i] for i in order)}{height}"
+        word, numbers = KINDS[shape.kind].fll, shape.parameters
+        if shape.kind == "singleton":
+            word, numbers = "Triangle", shape.parameters * 3
+        height = "" if shape.height == 1.0 else f" {format_number(shape.height)}"
+        return f"{word} {format_numbers(numbers)}{height}"
     if isinstance(shape, Constant):
-        return f"Constant {say_number(shape.value)}"
+        return f"Constant {format_number(shape.value)}"
     if isinstance(shape, Linear):
-        return f"Linear {say_numbers((*shape.coefficients, shape.constant))}"
+        return f"Linear {format_numbers((*shape.coefficients, shape.constant))}"
     if isinstance(shape, Formula):
         return f"Function {shape.text}"
     if not isinstance(shape, Shape):
@@ -42,14 +44,14 @@ def say_shape(shape: Membership | Value) -> str:
     places = [x for x, _ in shape.points]
     match [degree for _, degree in shape.points]:
         case [0.0, 1.0, 0.0]:
-            return f"Triangle {say_numbers(places)}"
+            return f"Triangle {format_numbers(places)}"
         case [0.0, 1.0, 1.0, 0.0]:
-            return f"Trapezoid {say_numbers(places)}"
+            return f"Trapezoid {format_numbers(places)}"
         case [0.0, 1.0] if not shape.jumps:
-            return f"Ramp {say_numbers(places)}"
+            return f"Ramp {format_numbers(places)}"
         case [1.0, 0.0] if not shape.jumps:
-            return f"Ramp {say_numbers(reversed(places))}"
-    return f"Discrete {say_numbers(x for point in shape.points for x in point)}"
+            return f"Ramp {format_numbers(reversed(places))}"
+    return f"Discrete {format_numbers(x for point in shape.points for x in point)}"
 
 
 def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Membership | Value:

@@ -107,8 +107,8 @@ def _rule(rule: Rule, sign: str, key: Callable[[str], str]) -> str:
     text = _text(str(rule))
     if rule.operators is None:
         return text
-    said = [f"{key(name)}{sign}{_text(getattr(rule.operators, name))}" for name in _OPERATORS]
-    return "{" + ", ".join([f"{key('rule')}{sign}{text}", *said]) + "}"
+    operators = [f"{key(name)}{sign}{_text(getattr(rule.operators, name))}" for name in _OPERATORS]
+    return "{" + ", ".join([f"{key('rule')}{sign}{text}", *operators]) + "}"
 
 
 def _shape(shape: Membership | Value, sign: str, key: Callable[[str], str]) -> str:

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import asdict, replace
 from typing import Any, NoReturn
 
 from fuzzy_arbiter.definition import Output, System, Variable
@@ -17,7 +18,7 @@ from fuzzy_arbiter.terms.norms import Norm
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
 
-def say_number(x: float) -> str:
+def format_number(x: float) -> str:
     """Format a number as the shortest text that parses as the same number."""
     text = repr(float(x))
     if "e" in text and "." not in text:
@@ -25,9 +26,9 @@ def say_number(x: float) -> str:
     return text.removesuffix(".0")
 
 
-def say_numbers(xs: Iterable[float]) -> str:
+def format_numbers(xs: Iterable[float]) -> str:
     """Format numbers with spaces between them."""
-    return " ".join(map(say_number, xs))
+    return " ".join(map(format_number, xs))
 
 
 def read_number(text: str, line: int, what: str) -> float:
@@ -57,12 +58,24 @@ def located(where: str) -> Iterator[None]:
         raise type(error)(f"{shortened(where)}: {shortened(str(error))}") from None
 
 
+NumberedRule = tuple[int, Rule]  # line in the file, and rule
+
+
+def join_rule_blocks(
+    rule_blocks: Sequence[tuple[Operators, Sequence[NumberedRule]]],
+) -> tuple[dict[str, str], list[NumberedRule]]:
+    """Return the operators of the first block as the system's, and the rules; those of another block keep their own."""
+    first = rule_blocks[0][0] if rule_blocks else Operators()
+    rules = [
+        (line, rule if operators == first else replace(rule, operators=operators))
+        for operators, numbered in rule_blocks
+        for line, rule in numbered
+    ]
+    return asdict(first), rules
+
+
 def assembled(
-    line: int,
-    inputs: Sequence[Variable],
-    outputs: Sequence[Output],
-    rules: Sequence[tuple[int, Rule]],
-    **options: Any,
+    line: int, inputs: Sequence[Variable], outputs: Sequence[Output], rules: Sequence[NumberedRule], **options: Any
 ) -> System:
     """Build the system of a file."""
     try:
@@ -97,7 +110,7 @@ def word_of(format: str, what: str, name: str, norms: Mapping[str, Norm]) -> str
     return word
 
 
-def cannot_say(format: str, i: int, rule: Rule, expected: str, what: str = "condition") -> UnsupportedError:
+def unsupported_rule(format: str, i: int, rule: Rule, expected: str, what: str = "condition") -> UnsupportedError:
     """Return the error for a rule that a format cannot represent."""
     return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {expected}")
 

@@ -10,7 +10,7 @@ from typing import Any
 from fuzzy_arbiter.definition import CHOICES, System
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.native import range_ends
-from fuzzy_arbiter.formats.notation import refuse, say_number
+from fuzzy_arbiter.formats.notation import format_number, refuse
 
 MARK = "fuzzy_arbiter:"
 # settings of a file without such a comment
@@ -19,18 +19,18 @@ _NAMES = "weights_of"
 _PART = re.compile(r'(?:[^,"]|"[^"]*"|")+')  # between commas outside of quotes
 
 
-def say_settings(system: System, keys: Sequence[str]) -> list[str]:
+def format_settings(system: System, keys: Sequence[str]) -> list[str]:
     """Format the comments that a system needs."""
-    said = [f"{key} = {getattr(system, key)}" for key in keys if getattr(system, key) != PLAIN[key]]
+    pairs = [f"{key} = {getattr(system, key)}" for key in keys if getattr(system, key) != PLAIN[key]]
     if system.weights_of:
-        said.append(f"{_NAMES} = {' '.join(map(_quoted, system.weights_of))}")
-    texts = [f"{MARK} {', '.join(said)}"] if said else []
+        pairs.append(f"{_NAMES} = {' '.join(map(_quoted, system.weights_of))}")
+    texts = [f"{MARK} {', '.join(pairs)}"] if pairs else []
     if system.normalization == "none":
         return texts
     texts.append("other tools give the raw centroid c of each output; the weights are")
     for output in system.outputs:
         low, high = map(float, range_ends(output))
-        zero, scale = say_number(low), say_number(high - low)
+        zero, scale = format_number(low), format_number(high - low)
         texts.append(f"  (c - {zero}) / {scale}, held within [0, 1], for {output.name}")
     if system.normalization in ("sum", "max"):
         whole = "sum" if system.normalization == "sum" else "greatest"

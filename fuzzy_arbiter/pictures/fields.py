@@ -10,7 +10,7 @@ import numpy as np
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, output_place, said, weights_at
+from fuzzy_arbiter.pictures.places import fixed_inputs, format_values, index_of, output_index, weights_at
 from fuzzy_arbiter.pictures.style import INK, colour, hatch, new_axes, require_matplotlib, room, wrapped
 
 if TYPE_CHECKING:
@@ -54,7 +54,7 @@ def surface(
     >>> surface(Arbiter(), "obstacle", over=("obstacle", "shape")).get_xlabel()
     'obstacle'
     """
-    k = output_place(arbiter.system, output)
+    k = output_index(arbiter.system, output)
     x, y, weights, where = _field(arbiter, over, at, points)
     z = np.ma.masked_invalid(weights[..., k])
     relief = ax is not None and ax.name == "3d"
@@ -176,10 +176,10 @@ def _field(
         raise DefinitionError(f"over is {over!r}, expected the names of two inputs")
     fixed = fixed_inputs(arbiter, over, at)
     inputs = arbiter.system.inputs
-    x, y = (np.linspace(*inputs[one_of(inputs, name, "input")].universe, points) for name in over)
+    x, y = (np.linspace(*inputs[index_of(inputs, name, "input")].universe, points) for name in over)
     across, along = np.meshgrid(x, y)
     weights = weights_at(arbiter, fixed, {over[0]: across.ravel(), over[1]: along.ravel()})
-    return x, y, weights.reshape(points, points, -1), f"  (at {said(fixed)})" if fixed else ""
+    return x, y, weights.reshape(points, points, -1), f"  (at {format_values(fixed)})" if fixed else ""
 
 
 def _relief(ax: Any, x: Array, y: Array, z: Array, over: tuple[str, str], output: str) -> None:

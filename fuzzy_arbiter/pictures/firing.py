@@ -12,7 +12,7 @@ from fuzzy_arbiter.definition import Output, variable_names
 from fuzzy_arbiter.engines.firing import Array, Firing
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.pictures.lines import corners
-from fuzzy_arbiter.pictures.places import output_place, places_in, said
+from fuzzy_arbiter.pictures.places import format_values, output_index, points_along
 from fuzzy_arbiter.pictures.style import FAINT, INK, colour, hatch, new_axes, wrapped
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.samples import Sample
@@ -66,7 +66,7 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     'alpha_1'
     """
     system = arbiter.system
-    k = 0 if output is None else output_place(system, output)
+    k = 0 if output is None else output_index(system, output)
     drawn = system.outputs[k]
     values = arbiter.samples.one(inputs)
     firing = Firing(system)
@@ -93,7 +93,7 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     lines = sum(label.count("\n") for label in labels)
     ax = new_axes(7.2, 1.3 + 0.58 * len(rows) + 0.1 * lines + 0.95) if ax is None else ax
 
-    x = places_in(drawn, 801)
+    x = points_along(drawn, 801)
     scaled = implications == {"prod"}
     clipped = [_cut(term.membership.of_many(x), cut, scaled) for term, cut in zip(drawn.terms, cuts, strict=True)]
     for place, row in enumerate(rows):  # rows are counted downwards
@@ -113,7 +113,7 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     ax.tick_params(axis="y", length=0, pad=8, labelsize=9)
     ax.set(xlim=drawn.universe, ylim=(foot + 0.02, -1.0 + 0.15), xlabel=drawn.name)
     ax.spines[["top", "right", "left"]].set_visible(False)
-    heading = f"{said(dict(zip(variable_names(system.inputs), values, strict=True)))}  →  {text}"
+    heading = f"{format_values(dict(zip(variable_names(system.inputs), values, strict=True)))}  →  {text}"
     ax.set_title(wrapped(heading, 64), fontsize=10, loc="right", pad=8)
     return ax
 

@@ -11,7 +11,7 @@ import numpy as np
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Normalization, Output
 from fuzzy_arbiter.errors import DefinitionError, InputError, UnsupportedError
-from fuzzy_arbiter.pictures.places import fixed_inputs, one_of, places_in, said, weights_at
+from fuzzy_arbiter.pictures.places import fixed_inputs, format_values, index_of, points_along, weights_at
 from fuzzy_arbiter.pictures.style import (
     FAINT,
     INK,
@@ -73,7 +73,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     'degree'
     """
     variables = (*arbiter.system.inputs, *arbiter.system.outputs)
-    drawn = variables[one_of(variables, variable, "variable")]
+    drawn = variables[index_of(variables, variable, "variable")]
     low, high = drawn.universe
     if at is not None and not low <= at <= high:
         raise InputError(f"{variable}: place is {at!r}, expected a number in [{low:g}, {high:g}]")
@@ -144,9 +144,9 @@ def profile(
     """
     system = arbiter.system
     fixed = fixed_inputs(arbiter, (over,), at)
-    variable = system.inputs[one_of(system.inputs, over, "input")]
+    variable = system.inputs[index_of(system.inputs, over, "input")]
     low, high = variable.universe
-    x = places_in(variable, 301)
+    x = points_along(variable, 301)
     weights = weights_at(arbiter, fixed, {over: x})
     ax = new_axes(6.0, 3.2) if ax is None else ax
     for k, name in enumerate(system.result_names):
@@ -155,7 +155,7 @@ def profile(
     if system.normalization != "none":
         ax.set_ylim(0.0, 1.0)
     tidy(ax)
-    legend_above(ax, system.result_names, f"at {said(fixed)}" if fixed else "")
+    legend_above(ax, system.result_names, f"at {format_values(fixed)}" if fixed else "")
     return ax
 
 
@@ -214,7 +214,7 @@ def normalizations(
             ax.label_outer()
     first = next(iter(axes.values()))
     handles, labels = first.get_legend_handles_labels()
-    where = f"at {said(fixed)}" if fixed else ""
+    where = f"at {format_values(fixed)}" if fixed else ""
     if new:
         style = legend_style(labels, where, 2 * room(first))
         first.figure.legend(handles, labels, loc="outside upper left", frameon=False, **style)

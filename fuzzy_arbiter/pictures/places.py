@@ -12,7 +12,7 @@ from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
 
 
-def one_of(variables: Sequence[Variable], name: str, kind: str) -> int:
+def index_of(variables: Sequence[Variable], name: str, kind: str) -> int:
     """Return the index of a variable by name."""
     names = variable_names(variables)
     if name not in names:
@@ -20,7 +20,7 @@ def one_of(variables: Sequence[Variable], name: str, kind: str) -> int:
     return names.index(name)
 
 
-def output_place(system: System, name: str) -> int:
+def output_index(system: System, name: str) -> int:
     """Return the index of an output by name."""
     for names in (system.result_names, variable_names(system.outputs)):
         if name in names:
@@ -33,7 +33,7 @@ def fixed_inputs(arbiter: Arbiter, over: Sequence[str], at: Mapping[str, float] 
     inputs = arbiter.system.inputs
     at = dict(at or {})
     for name in (*over, *at):
-        one_of(inputs, name, "input")
+        index_of(inputs, name, "input")
     for name in over:
         if name in at:
             raise DefinitionError(f"{name!r} is at {at[name]!r}, and the picture goes over it; expected one of the two")
@@ -54,12 +54,12 @@ def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, 
     return arbiter.batch(samples)
 
 
-def said(values: Mapping[str, float]) -> str:
+def format_values(values: Mapping[str, float]) -> str:
     """Format values as text."""
     return ", ".join(f"{name} = {value:.4g}" for name, value in values.items())
 
 
-def places_in(variable: Variable, count: int) -> Array:
+def points_along(variable: Variable, count: int) -> Array:
     """Return places close enough for a line, with both sides of every break of the variable's terms."""
     low, high = variable.universe
     knots = np.array(variable.knots)

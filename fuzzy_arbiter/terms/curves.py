@@ -67,7 +67,7 @@ class Curve(Membership):
         height = finite(self.height)
         if height is None or not 0.0 < height <= 1.0:
             raise DefinitionError(f"{words}: height is {shown(self.height)}, expected above 0 and at most 1")
-        if not kind.good(*numbers):
+        if not kind.is_valid(*numbers):
             raise DefinitionError(f"{words}: {shown(numbers)} came, expected {kind.expected}")
         named = dict(zip(kind.parameters, numbers, strict=True))
         pieces = [(end, _tree(text, named, height)) for end, text in kind.pieces(*numbers)]

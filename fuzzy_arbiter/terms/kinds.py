@@ -19,11 +19,11 @@ class CurveKind:
     parameters: tuple[str, ...]  # names of the parameters, in the order of `Curve.parameters`
     # function from the parameters to the smooth pieces, whose expressions use ``x`` and the parameters' names
     pieces: Callable[..., Pieces]
-    good: Callable[..., bool]  # predicate: True if the parameters are valid
-    expected: str  # valid parameters, in words
-    fll: Word  # word of fuzzylite, of MATLAB or fuzzylite, and of jFuzzyLogic; empty if there is none
-    fis: Word  # word of fuzzylite, of MATLAB or fuzzylite, and of jFuzzyLogic; empty if there is none
-    fcl: Word | None = None  # word of fuzzylite, of MATLAB or fuzzylite, and of jFuzzyLogic; empty if there is none
+    fll: str  # word of fuzzylite, which has the parameters in the same order; empty if there is none
+    fis: Word  # word of MATLAB or fuzzylite; empty if there is none
+    fcl: Word | None = None  # word of jFuzzyLogic; None if there is none
+    is_valid: Callable[..., bool] = lambda *parameters: True  # predicate on the parameters
+    expected: str = "finite numbers"  # valid parameters, in words
     polynomial: bool = False  # true if the pieces are polynomials
     # function for a kind that only rises or only falls: from the parameters to pieces over the degree ``w``, which
     # give the place
@@ -32,10 +32,6 @@ class CurveKind:
     # the last, it only rises or only falls, unless `monotonic` is False. Places that are not finite do not count
     features: Callable[..., list[float]] = lambda *parameters: list(parameters)
     monotonic: bool = True  # false if the curve may turn at places that `features` does not give
-
-
-def _same(count: int) -> tuple[int, ...]:
-    return tuple(range(count))
 
 
 def _multiplied(first: Pieces, second: Pieces) -> Pieces:
@@ -101,6 +97,11 @@ def _ellipse(start: float, end: float) -> Pieces:
     return [(min(start, end), "0"), (max(start, end), curve), (_END, "0")]
 
 
+def _peaked(center: float, text: str) -> Pieces:
+    """Return one expression in two pieces, which meet at a center where it bends."""
+    return [(center, text), (_END, text)]
+
+
 def _around(center: float, scale: float) -> list[float]:
     """Return places on both sides of a center at which a curve of that scale has changed."""
     return [center + share * scale for share in (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0)]
@@ -125,9 +126,9 @@ KINDS: dict[str, CurveKind] = {
     "gaussian": CurveKind(
         ("mean", "deviation"),
         lambda mean, deviation: [(_END, _gaussian("mean", "deviation"))],
-        lambda mean, deviation: deviation != 0.0,
-        "a deviation other than 0",
-        fll=("Gaussian", (0, 1)),
+        fll="Gaussian",
+        is_valid=lambda mean, deviation: deviation != 0.0,
+        expected="a deviation other than 0",
         fis=("gaussmf", (1, 0)),
         fcl=("GAUSS", (0, 1)),
         features=_around,
@@ -138,22 +139,19 @@ KINDS: dict[str, CurveKind] = {
             [(mean1, _gaussian("mean1", "deviation1")), (_END, "1")],
             [(mean2, "1"), (_END, _gaussian("mean2", "deviation2"))],
         ),
-        lambda mean1, deviation1, mean2, deviation2: deviation1 != 0.0 and deviation2 != 0.0,
-        "deviations other than 0",
-        fll=("GaussianProduct", (0, 1, 2, 3)),
+        fll="GaussianProduct",
+        is_valid=lambda mean1, deviation1, mean2, deviation2: deviation1 != 0.0 and deviation2 != 0.0,
+        expected="deviations other than 0",
         fis=("gauss2mf", (1, 0, 3, 2)),
         fcl=("GAUSS2", (0, 1, 2, 3)),
         features=_product_of_gaussians,
     ),
     "bell": CurveKind(
         ("center", "width", "slope"),
-        lambda center, width, slope: [
-            (center, "1 / (1 + abs((x - center) / width) ^ (2 * slope))"),
-            (_END, "1 / (1 + abs((x - center) / width) ^ (2 * slope))"),
-        ],
-        lambda center, width, slope: width != 0.0,
-        "a width other than 0",
-        fll=("Bell", (0, 1, 2)),
+        lambda center, width, slope: _peaked(center, "1 / (1 + abs((x - center) / width) ^ (2 * slope))"),
+        fll="Bell",
+        is_valid=lambda center, width, slope: width != 0.0,
+        expected="a width other than 0",
         fis=("gbellmf", (1, 2, 0)),
         fcl=("GBELL", (1, 2, 0)),
         features=lambda center, width, slope: [
@@ -165,9 +163,7 @@ KINDS: dict[str, CurveKind] = {
     "sigmoid": CurveKind(
         ("inflection", "slope"),
         lambda inflection, slope: [(_END, _sigmoid("inflection", "slope"))],
-        lambda inflection, slope: True,
-        "two numbers",
-        fll=("Sigmoid", (0, 1)),
+        fll="Sigmoid",
         fis=("sigmf", (1, 0)),
         fcl=("SIGM", (1, 0)),
         inverse=lambda inflection, slope: [(_END, "inflection - log(1 / w - 1) / slope")],
@@ -176,9 +172,7 @@ KINDS: dict[str, CurveKind] = {
     "sigmoid_difference": CurveKind(
         ("left", "rising", "falling", "right"),
         _difference,
-        lambda left, rising, falling, right: True,
-        "four numbers",
-        fll=("SigmoidDifference", (0, 1, 2, 3)),
+        fll="SigmoidDifference",
         fis=("dsigmf", (1, 0, 2, 3)),
         fcl=("DSIGM", (1, 0, 2, 3)),
         features=_two_inflections,
@@ -189,9 +183,7 @@ KINDS: dict[str, CurveKind] = {
         lambda left, rising, falling, right: [
             (_END, f"({_sigmoid('left', 'rising')}) * ({_sigmoid('right', 'falling')})")
         ],
-        lambda left, rising, falling, right: True,
-        "four numbers",
-        fll=("SigmoidProduct", (0, 1, 2, 3)),
+        fll="SigmoidProduct",
         fis=("psigmf", (1, 0, 2, 3)),
         features=_two_inflections,
         monotonic=False,
@@ -199,9 +191,9 @@ KINDS: dict[str, CurveKind] = {
     "z_shape": CurveKind(
         ("start", "end"),
         _z,
-        lambda start, end: start <= end,
-        "a start that is not above the end",
-        fll=("ZShape", (0, 1)),
+        fll="ZShape",
+        is_valid=lambda start, end: start <= end,
+        expected="a start that is not above the end",
         fis=("zmf", (0, 1)),
         polynomial=True,
         inverse=lambda start, end: [
@@ -212,9 +204,9 @@ KINDS: dict[str, CurveKind] = {
     "s_shape": CurveKind(
         ("start", "end"),
         _s,
-        lambda start, end: start <= end,
-        "a start that is not above the end",
-        fll=("SShape", (0, 1)),
+        fll="SShape",
+        is_valid=lambda start, end: start <= end,
+        expected="a start that is not above the end",
         fis=("smf", (0, 1)),
         polynomial=True,
         inverse=lambda start, end: [
@@ -227,9 +219,9 @@ KINDS: dict[str, CurveKind] = {
         lambda foot1, top1, top2, foot2: _multiplied(
             _s(foot1, top1, ("foot1", "top1")), _z(top2, foot2, ("top2", "foot2"))
         ),
-        lambda foot1, top1, top2, foot2: foot1 <= top1 and top2 <= foot2,
-        "each foot on the outer side of its top",
-        fll=("PiShape", (0, 1, 2, 3)),
+        fll="PiShape",
+        is_valid=lambda foot1, top1, top2, foot2: foot1 <= top1 and top2 <= foot2,
+        expected="each foot on the outer side of its top",
         fis=("pimf", (0, 1, 2, 3)),
         polynomial=True,
         monotonic=False,  # where its tops overlap
@@ -241,30 +233,25 @@ KINDS: dict[str, CurveKind] = {
             (center + width / 2, "0.5 * (1 + cos(2 / width * pi * (x - center)))"),
             (_END, "0"),
         ],
-        lambda center, width: width > 0.0,
-        "a width above 0",
-        fll=("Cosine", (0, 1)),
+        fll="Cosine",
+        is_valid=lambda center, width: width > 0.0,
+        expected="a width above 0",
         fis=("cosinemf", (0, 1)),
         features=lambda center, width: [center],
     ),
     "spike": CurveKind(
         ("center", "width"),
-        lambda center, width: [
-            (center, "exp(-abs(10 / width * (x - center)))"),
-            (_END, "exp(-abs(10 / width * (x - center)))"),
-        ],
-        lambda center, width: width != 0.0,
-        "a width other than 0",
-        fll=("Spike", (0, 1)),
+        lambda center, width: _peaked(center, "exp(-abs(10 / width * (x - center)))"),
+        fll="Spike",
+        is_valid=lambda center, width: width != 0.0,
+        expected="a width other than 0",
         fis=("spikemf", (0, 1)),
         features=lambda center, width: _around(center, width / 10.0),
     ),
     "concave": CurveKind(
         ("inflection", "end"),
         _concave,
-        lambda inflection, end: True,
-        "two numbers",
-        fll=("Concave", (0, 1)),
+        fll="Concave",
         fis=("concavemf", (0, 1)),
         inverse=lambda inflection, end: [(_END, "(inflection - end) / w + 2 * end - inflection")],
         features=lambda inflection, end: [end],
@@ -272,9 +259,9 @@ KINDS: dict[str, CurveKind] = {
     "arc": CurveKind(
         ("start", "end"),
         _arc,
-        lambda start, end: start != end,
-        "two places",
-        fll=("Arc", (0, 1)),
+        fll="Arc",
+        is_valid=lambda start, end: start != end,
+        expected="two places",
         fis=("arcmf", (0, 1)),
         inverse=lambda start, end: [
             (_END, f"end {'-' if start < end else '+'} sqrt((end - start) ^ 2 * (1 - w ^ 2))"),
@@ -283,17 +270,15 @@ KINDS: dict[str, CurveKind] = {
     "singleton": CurveKind(
         ("place",),
         lambda place: [(place, "eq(x, place)"), (_END, "0")],
-        lambda place: True,
-        "a place",
-        fll=("", (0,)),
+        fll="",
         fis=("", (0,)),
     ),
     "semi_ellipse": CurveKind(
         ("start", "end"),
         _ellipse,
-        lambda start, end: start != end,
-        "two places",
-        fll=("SemiEllipse", (0, 1)),
+        fll="SemiEllipse",
+        is_valid=lambda start, end: start != end,
+        expected="two places",
         fis=("semiellipsemf", (0, 1)),
         features=lambda start, end: [(start + end) / 2.0],
     ),

@@ -113,7 +113,7 @@ class _Checks:
         for output, answer in zip(self._terms, answers, strict=True):
             for place in map(ask.places, answer.boxes):
                 causes = reasons(self.system, row_strengths(self.system, place), self._terms[output], 1.0)
-                text = f"output {output!r}: rules contradict each other where {_said(place)}: {causes}"
+                text = f"output {output!r}: rules contradict each other where {_format_place(place)}: {causes}"
                 self._found("fault", "consistent", text, place)
         self._decided("consistent", answers, "on every crisp row")
         high = tuple(map(ask.above_half, self._high))
@@ -121,7 +121,7 @@ class _Checks:
         for place in map(ask.places, answer.boxes):
             causes = reasons(self.system, row_strengths(self.system, place), self._high, 0.5)
             self._found(
-                "warning", "exclusive", f"two outputs are {self._highs()} where {_said(place)}: {causes}", place
+                "warning", "exclusive", f"two outputs are {self._highs()} where {_format_place(place)}: {causes}", place
             )
         self._decided("exclusive", [answer], "on every crisp row")
         exclusive = answer.all_found and not answer.boxes
@@ -129,7 +129,7 @@ class _Checks:
             return
         (answer,) = ask.ask([Goal(high, 0, 0)], NAMED_ROWS)
         for place in map(ask.places, answer.boxes):
-            text = f"no output is {self._highs()} where {_said(place)}"
+            text = f"no output is {self._highs()} where {_format_place(place)}"
             self._found("note", "exclusive", text + (": at most one is, not exactly one" if exclusive else ""), place)
         if not answer.all_found:
             self._found("note", "exclusive", "there may be more rows like that, which were not looked for")
@@ -160,7 +160,7 @@ class _Checks:
                 if place is not None:
                     inputs = [float(place.get(v.name, v.universe[0])) for v in self.system.inputs]
                     causes = reasons(self.system, Firing(self.system).strengths(inputs), terms, 0.5)
-                    self._found("warning", name, f"{text.format(output)} where {_said(place)}: {causes}", place)
+                    self._found("warning", name, f"{text.format(output)} where {_format_place(place)}: {causes}", place)
             holds = False if False in verdicts else None if None in verdicts else True
             how = "by an example" if holds is False else "; ".join(sorted(hows))
             self.checks.append(Check(name, holds, how))
@@ -187,7 +187,7 @@ class _Checks:
         answers = ask.ask([Goal(tuple(map(ask.firing, terms)), 0, 0) for terms in self._terms.values()])
         for output, answer in zip(self.system.outputs, answers, strict=True):
             for place in map(ask.places, answer.boxes):
-                said = f"output {output.name!r}: no rule fires where {_said(place)}"
+                said = f"output {output.name!r}: no rule fires where {_format_place(place)}"
                 if output.default is None:
                     self._found("fault", name, f"{said}; it has no default", place)
                 else:
@@ -218,7 +218,7 @@ def _count(n: int) -> str:
     return str(n) if n < 10**6 else f"about 10^{len(str(n)) - 1}"
 
 
-def _said(place: dict[str, float | str]) -> str:
+def _format_place(place: dict[str, float | str]) -> str:
     if not place:
         return "the inputs are anything"
     parts = (f"{name} is {x}" if isinstance(x, str) else f"{name} = {x:.6g}" for name, x in place.items())

@@ -31,8 +31,8 @@ class Goal:
     """A combination to look for."""
 
     groups: tuple[Group, ...]  # A group fires where any of its propositions has a rank above the number beside it
-    least: int  # least and greatest number of groups that fire
-    most: int  # least and greatest number of groups that fire
+    min_count: int  # bounds of the number of groups that fire
+    max_count: int
 
     def inputs(self) -> frozenset[str]:
         """Return the names of the inputs that the groups speak of."""
@@ -139,8 +139,8 @@ class Search:
         for goal, members in zip(self._goals, self._members, strict=True):
             lower_count = surely[members].sum(axis=0)
             upper_count = maybe[members].sum(axis=0)
-            sure.append((lower_count >= goal.least) & (upper_count <= goal.most))
-            possible.append((upper_count >= goal.least) & (lower_count <= goal.most))
+            sure.append((lower_count >= goal.min_count) & (upper_count <= goal.max_count))
+            possible.append((upper_count >= goal.min_count) & (lower_count <= goal.max_count))
         return sure, possible
 
 
