@@ -14,6 +14,7 @@ from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.commands import AddObstacle, ChangeSetting, SetTarget
+from tests.cosim.export.conftest import assert_same_bits
 
 mcap_reader = pytest.importorskip("mcap.reader")
 decoder = pytest.importorskip("mcap_protobuf.decoder")
@@ -45,16 +46,18 @@ class Read:
         return np.array([getattr(decoded, field) for _, decoded in self.messages[f"/signals/{group}"]])
 
 
+def exported(run, folder, **choice):
+    return Read(*export_run(run, "mcap", folder / "out.mcap", **choice))
+
+
 @pytest.fixture(scope="module")
 def read(run, tmp_path_factory):
-    (path,) = export_run(run, "mcap", tmp_path_factory.mktemp("mcap") / "out.mcap")
-    return Read(path)
+    return exported(run, tmp_path_factory.mktemp("run"))
 
 
 @pytest.fixture(scope="module")
 def read_killed(killed, tmp_path_factory):
-    (path,) = export_run(killed, "mcap", tmp_path_factory.mktemp("mcap") / "out.mcap")
-    return Read(path)
+    return exported(killed, tmp_path_factory.mktemp("killed"))
 
 
 def channels_of_signals(read):
@@ -72,13 +75,11 @@ def test_every_signal_is_there_to_the_last_bit(which, request):
     read = request.getfixturevalue("read" if which == "run" else "read_killed")
     record, where = load_record(request.getfixturevalue(which)), channels_of_signals(read)
     assert where.keys() == record.units.keys()
+    assert "timestamp" not in {field for _, field in where.values()}  # PlotJuggler takes it for a time stamp
     (position,) = (c for c in read.summary.channels.values() if c.topic == "/signals/position")
     assert position.metadata["x"].startswith("position.x [m]: ")
     for name, (group, field) in where.items():
-        got, expected = read.signal(group, field), record[name]
-        known = ~np.isnan(expected)
-        assert np.array_equal(np.isnan(got), ~known), name
-        assert np.array_equal(got[known].view(np.uint64), expected[known].view(np.uint64)), name
+        assert_same_bits(read.signal(group, field), record[name], name)
 
 
 def test_times_are_simulated_nanoseconds_in_order(read, run):
@@ -87,13 +88,6 @@ def test_times_are_simulated_nanoseconds_in_order(read, run):
     assert logged == [round(t * 1e9) for t in time]
     assert read.summary.statistics.message_start_time == 0
     assert [at for at, _ in read.messages["/tf"]] == logged
-
-
-def test_signals_have_no_field_that_plotjuggler_takes_for_a_time_stamp(read):
-    """PlotJuggler reads a field of this name as a time stamp."""
-    for channel in read.summary.channels.values():
-        if channel.topic.startswith("/signals/"):
-            assert "timestamp" not in channel.metadata
 
 
 def test_scene_uses_foxglove_message_schemas(read, run):
@@ -177,8 +171,7 @@ def test_shapes_use_foxglove_primitives(read):
 
 
 def test_regions_that_move_have_frames_of_their_own(moving_run, tmp_path):
-    (path,) = export_run(moving_run, "mcap", tmp_path / "out.mcap")
-    read, record = Read(path), load_record(moving_run)
+    read, record = exported(moving_run, tmp_path), load_record(moving_run)
     _, message = read.messages["/tf"][-1]
     moved = {t.child_frame_id: vector(t.translation) for t in message.transforms}
     shift = [record[f"crossing buoy.shift.{axis}"][-1] for axis in "xyz"]
@@ -188,18 +181,8 @@ def test_regions_that_move_have_frames_of_their_own(moving_run, tmp_path):
     assert {e.id: e.frame_id for e in scene.entities}["crossing buoy"] == "region crossing buoy"
 
 
-def test_commanded_change_is_drawn_from_its_time(run, tmp_path, monkeypatch):
-    change = {"time": 0.5, "region": 0, "shape": {"kind": "sphere", "centre": (7.0, 0.0, 4.0), "radius": 0.9}}
-    monkeypatch.setattr("cosim.export.scene.changes_of", lambda *_: [change])
-    (path,) = export_run(run, "mcap", tmp_path / "out.mcap")
-    sizes = {at: m.entities[0].spheres[0].size.x for at, m in Read(path).messages["/scene"]}
-    assert {size for at, size in sizes.items() if at < 500_000_000} == {0.6}
-    assert sizes[500_000_000] == 1.8
-
-
 def test_signal_selection_keeps_the_scene_complete(run, tmp_path):
-    (path,) = export_run(run, "mcap", tmp_path / "out.mcap", signals=["*.clearance"], every=10)
-    read = Read(path)
+    read = exported(run, tmp_path, signals=["*.clearance"], every=10)
     assert [t for t in read.messages if t.startswith("/signals/")] == ["/signals/step", "/signals/clearance"]
     assert (
         read.signal("clearance", valid_names(["port wall"])[0]).tolist()
@@ -225,10 +208,14 @@ def steered(tmp_path_factory):
     return run_scenario(scenario, folder / "run", report=False, commands_log=log).folder
 
 
-def test_spheres_as_they_are_drawn_give_the_recorded_clearances(steered, tmp_path):
+@pytest.fixture(scope="module")
+def read_steered(steered, tmp_path_factory):
+    return exported(steered, tmp_path_factory.mktemp("steered"))
+
+
+def test_spheres_as_they_are_drawn_give_the_recorded_clearances(read_steered, steered):
     """Through commands that bring them, move them and change their size."""
-    (path,) = export_run(steered, "mcap", tmp_path / "out.mcap")
-    read, record = Read(path), load_record(steered)
+    read, record = read_steered, load_record(steered)
     scenes, sizes = dict(read.messages["/scene"]), set()
     scene = scenes[0]
     for k, (at, frames) in enumerate(read.messages["/tf"]):
@@ -248,9 +235,8 @@ def test_spheres_as_they_are_drawn_give_the_recorded_clearances(steered, tmp_pat
     assert ("goal", 1.2) in sizes
 
 
-def test_parked_obstacle_does_not_widen_the_scene(steered, tmp_path):
-    (path,) = export_run(steered, "mcap", tmp_path / "out.mcap")
-    _, scene = Read(path).messages["/scene"][0]
+def test_parked_obstacle_does_not_widen_the_scene(read_steered):
+    _, scene = read_steered.messages["/scene"][0]
     planes = [vector(p) for e in scene.entities for drawn in e.triangles for p in drawn.points]
     assert planes
     assert np.abs(planes).max() < 200.0

@@ -5,6 +5,7 @@ import pytest
 
 from cosim.export import export_run
 from cosim.results.record import load_record
+from tests.cosim.export.conftest import assert_same_bits
 
 pytest.importorskip("rerun", reason="rerun-sdk is not installed")
 chunks_of = pytest.importorskip("rerun.chunk", reason="rerun-sdk is too old to read its files in Python").RrdReader
@@ -53,10 +54,7 @@ def test_every_signal_is_a_series_to_the_last_bit(which, read, request, tmp_path
     for name in record.units:
         rows = read[read.path_of(name), "scalars"]
         assert np.allclose([time for time, _ in rows], record["time"] * 1e9, rtol=0.0, atol=1.0)
-        got, expected = np.array([value for _, (value,) in rows]), record[name]
-        known = ~np.isnan(expected)
-        assert np.array_equal(np.isnan(got), ~known), name
-        assert np.array_equal(got[known].view(np.uint64), expected[known].view(np.uint64)), name
+        assert_same_bits(np.array([value for _, (value,) in rows]), record[name], name)
 
 
 def test_the_pose_is_that_of_the_record_in_single_precision(read, run):

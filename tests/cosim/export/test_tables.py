@@ -11,16 +11,7 @@ from hypothesis import strategies as st
 from cosim.export import export_run
 from cosim.export.names import group_columns, valid_names
 from cosim.results.record import load_record
-
-
-def bits(array):
-    return np.asarray(array, dtype=float).view(np.uint64)
-
-
-def same(a, b):
-    """Whether two signals are equal to the last bit, but for which NaN it is."""
-    a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    return a.shape == b.shape and bool(((bits(a) == bits(b)) | (np.isnan(a) & np.isnan(b))).all())
+from tests.cosim.export.conftest import assert_same_bits
 
 
 @pytest.mark.parametrize("which", ["run", "killed"])
@@ -33,7 +24,8 @@ def test_pandas_reads_the_record_to_the_last_bit(which, request, tmp_path):
     table, about, record = pandas.read_csv(path, **exact), pandas.read_csv(units, index_col="name"), load_record(folder)
     assert list(table) == list(record.units)
     assert set(table.dtypes) == {np.dtype(float)}
-    assert all(same(table[name], record[name]) for name in record.units)
+    for name in record.units:
+        assert_same_bits(table[name].to_numpy(), record[name], name)
     assert about["unit"].fillna("").to_dict() == record.units
     assert list(about["description"]) == [column.description for column in record.columns]
 
