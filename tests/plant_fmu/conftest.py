@@ -25,6 +25,7 @@ STATES = [
     *(f"velocity.{a}" for a in "uvwpqr"),
 ]
 WRENCH = [f"wrench.{a}" for a in "XYZKMN"]
+UNDAMPED = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
 
 
 @functools.cache
@@ -105,10 +106,17 @@ class CoSimulationInstance:
 
     def start(self, **values):
         self.set_values(values)
+        return self.begin()
+
+    def begin(self, time=0.0, stop=None):
+        """Initialize at a time."""
         if self.fmi == 2:
-            self.fmu.setupExperiment(startTime=0.0)
-        self.fmu.enterInitializationMode()
+            self.fmu.setupExperiment(startTime=time, stopTime=stop)
+            self.fmu.enterInitializationMode()
+        else:
+            self.fmu.enterInitializationMode(startTime=time, stopTime=stop)
         self.fmu.exitInitializationMode()
+        self.time = time
         return self
 
     def step(self, h):
@@ -194,6 +202,19 @@ def make_slave():
     yield make
     for slave in slaves:
         slave.close()
+
+
+@pytest.fixture
+def make_model(make_slave, fmi):
+    """Return a function that makes a model for model exchange in continuous-time mode."""
+
+    def make(**values):
+        model = make_slave(fmi=fmi, interface="me", logging_on=True).start(**values)
+        model.update_discrete()
+        model.fmu.enterContinuousTimeMode()
+        return model
+
+    return make
 
 
 @pytest.fixture

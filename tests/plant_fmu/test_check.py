@@ -4,7 +4,6 @@ import dataclasses
 import shutil
 import stat
 import zipfile
-from pathlib import Path
 
 import pytest
 
@@ -18,7 +17,7 @@ from plant_fmu.checking.process import run_importer
 from plant_fmu.checking.task import Task
 from plant_fmu.compiling.compiler import compile_library, find_compiler
 from plant_fmu.compiling.platforms import native_platform
-from plant_fmu.errors import FmuFileError, TaskError
+from plant_fmu.errors import TaskError
 from tests.plant_fmu import importers
 
 FMPY = next(importer for importer in IMPORTERS if importer.name == "FMPy")
@@ -233,8 +232,3 @@ def test_invalid_tasks_are_rejected(odin):
         check_fmu(odin, -1.0)
     with pytest.raises(TaskError, match="did you mean 'mass'"):
         check_fmu(odin, start={"masss": 1.0})
-
-
-def test_errors_are_of_the_package():
-    with pytest.raises(FmuFileError):
-        read_fmu(Path("none.fmu"))

@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
-from tests.plant_fmu.conftest import STATES
+from tests.plant_fmu.conftest import STATES, UNDAMPED
 from tests.plant_fmu.philox import normal
 
 NEUTRAL = {"weight": 1228.25, "r_G.z": 0.0}
@@ -15,7 +15,6 @@ GAUSS_MARKOV = {
     "current_variation.y": 0.2,
     "seed": 42,
 }
-UNDAMPED = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
 
 
 def run(slave, n, h):

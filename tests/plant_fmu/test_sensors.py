@@ -156,8 +156,7 @@ def test_sample_just_after_a_step_end_does_not_lengthen_the_step(make_slave):
 def test_sample_just_before_a_step_end_keeps_its_time_at_large_times(make_slave):
     slave = make_slave(fmi=3)
     slave.set_values({"depth_sensor.rate": 1.0 / (0.01 - 1e-6), "velocity.w": 10.0, "position.z": 5.0})
-    slave.fmu.enterInitializationMode(startTime=1000.0)
-    slave.fmu.exitInitializationMode()
+    slave.begin(1000.0)
     slave.fmu.doStep(1000.0, 0.01)
     measured, depth, speed = slave.get("measured.depth", "position.z", "der(position.z)")
     assert depth - measured == pytest.approx(1e-6 * speed, rel=1e-3)

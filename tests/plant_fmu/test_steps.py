@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from tests.plant_fmu.conftest import STATES
-from tests.plant_fmu.test_limits import begin
+from tests.plant_fmu.conftest import STATES, UNDAMPED
 
+CENTERED, SPHERE = {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"}, {f"inertia.{a}{a}": 8.0 for a in "xyz"}
 MOVING = {"velocity.u": 0.8, "velocity.v": -0.5, "velocity.r": 0.4, "thrust_time_constant[1]": 0.0}
 
 
 def after_one(make_slave, start, length, substep):
     slave = make_slave()
     slave.set_values(MOVING | {"substep": substep})
-    begin(slave, start)
+    slave.begin(start)
     slave.fmu.doStep(start, length)
     return slave.get(*STATES)
 
@@ -56,9 +56,8 @@ def test_stability_limit_uses_relative_velocity_in_body_axes(make_slave, ahead):
     Its thrusters hold it where it is; where it goes with the water, there is nothing to follow.
     """
     e = dict(zip((f"quaternion.e{i}" for i in range(4)), LOOKING[ahead], strict=True))
-    damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
-    damping |= {"quadratic_damping[1]": 2000.0, "weight": 1226.25, "buoyancy": 1226.25, "position.z": 20.0}
-    damping |= {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"}
+    damping = UNDAMPED | {"quadratic_damping[1]": 2000.0, "weight": 1226.25, "buoyancy": 1226.25, "position.z": 20.0}
+    damping |= CENTERED
     damping |= {"wrench_time_constant": 0.0, "wrench_force_limit": 1e9}
     for axis in "xyz":
         for sign in (1.0, -1.0):
@@ -74,17 +73,23 @@ def test_stability_limit_depends_on_velocity(make_slave, axis, sign):
     """Linear and quadratic add up: h (d1 + 2 d2 |v|) / m on either side of 2.5."""
     mass = 187.5 if axis < 3 else 8.0
     for rate, taken in ((10.0, True), (14.0, False)):
-        damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
-        damping |= {f"linear_damping[{axis + 1}]": 4.0 * mass, f"quadratic_damping[{axis + 1}]": (rate - 4.0) * mass}
-        damping |= {f"inertia.{a}{a}": 8.0 for a in "xyz"} | {f"velocity.{'uvwpqr'[axis]}": 0.5 * sign}
-        damping |= {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"} | {"position.z": 20.0}
+        damping = UNDAMPED | {
+            f"linear_damping[{axis + 1}]": 4.0 * mass,
+            f"quadratic_damping[{axis + 1}]": (rate - 4.0) * mass,
+        }
+        damping |= SPHERE | {f"velocity.{'uvwpqr'[axis]}": 0.5 * sign}
+        damping |= CENTERED | {"position.z": 20.0}
         assert fares(make_slave, 0.2, **damping) == taken
 
 
 def test_stability_limit_includes_bottom_contact(make_slave):
     """2 / T beside the damping, T four substeps at the least: half of what is allowed."""
-    damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
-    damping |= {"linear_damping[3]": 11.0 * 187.5, "bottom_time_constant": 0.0, "hull_radius": 0.3, "position.z": 9.75}
+    damping = UNDAMPED | {
+        "linear_damping[3]": 11.0 * 187.5,
+        "bottom_time_constant": 0.0,
+        "hull_radius": 0.3,
+        "position.z": 9.75,
+    }
     assert fares(make_slave, 0.2, **damping, bottom_depth=10.1)
     assert not fares(make_slave, 0.2, **damping, bottom_depth=10.0)
 
@@ -99,8 +104,7 @@ def test_stability_limit_includes_the_righting_frequency(make_slave, free_surfac
     S = np.array([[0, -r_G[2], r_G[1]], [r_G[2], 0, -r_G[0]], [-r_G[1], r_G[0], 0]])
     M = np.block([[187.5 * np.eye(3), -125.0 * S], [125.0 * S, 8.0 * np.eye(3)]])
     swing = np.sqrt(k * np.abs(np.linalg.inv(M)).sum(axis=1).max())
-    values = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
-    values |= {f"inertia.{a}{a}": 8.0 for a in "xyz"} | {"weight": W, "buoyancy": W, "hull_radius": 0.3}
+    values = UNDAMPED | SPHERE | {"weight": W, "buoyancy": W, "hull_radius": 0.3}
     values |= {f"r_G.{a}": x for a, x in zip("xyz", r_G, strict=True)}
     values |= {f"r_B.{a}": x for a, x in zip("xyz", r_B, strict=True)}
     values |= {"free_surface": free_surface, "position.z": 20.0, "bottom_depth": 100.0}
@@ -109,8 +113,7 @@ def test_stability_limit_includes_the_righting_frequency(make_slave, free_surfac
 
 
 def test_stability_limit_includes_the_angular_rate(make_slave):
-    values = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
-    values |= {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"} | {f"inertia.{a}{a}": 8.0 for a in "xyz"}
+    values = UNDAMPED | CENTERED | SPHERE
     for spin in ((6.0, 0.0, 0.0), (0.0, -6.0, 0.0), (0.0, 0.0, 6.0), (2.0, 4.0, -4.0)):
         rates = {f"velocity.{a}": x for a, x in zip("pqr", spin, strict=True)}
         assert fares(make_slave, 0.99 / 6.0, **values, **rates)
@@ -119,10 +122,9 @@ def test_stability_limit_includes_the_angular_rate(make_slave):
 
 def test_stability_limit_uses_the_current_at_the_step_end(make_slave):
     """Held in place by its thrusters: the speed through the water is the current's, which falls all the way."""
-    damping = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
     values = {"current_variation.x": 1.0, "current_variation_period": 10.0, "current_correlation_time": 20.0}
-    values |= damping | {"position.z": 20.0, "wrench_time_constant": 0.0, "wrench_force_limit": 1e9}
-    values |= {f"r_{p}.{a}": 0.0 for p in "GB" for a in "xyz"}
+    values |= UNDAMPED | {"position.z": 20.0, "wrench_time_constant": 0.0, "wrench_force_limit": 1e9}
+    values |= CENTERED
     for seed in range(40):
         slave = make_slave().start(**values, substep=1.0, seed=seed)
         before = slave.get("water_velocity.x")[0]
