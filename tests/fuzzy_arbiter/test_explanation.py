@@ -43,20 +43,6 @@ def test_strengths_and_decisions_by_hand():
     assert e.margin == pytest.approx(0.648 - 0.352)
 
 
-@pytest.mark.parametrize(
-    ("sample", "fired"),
-    [
-        ((1, 1, 0), "R1 R3 R6 R7"),
-        ((1, 0, 1), "R1 R3 R4 R6"),
-        ((0, 1, 1), "R2 R5 R6"),
-        ((0, 0, 1), "R2 R4 R8"),
-        ((0, 0, 0), "R2 R4 R7"),
-    ],
-)
-def test_crisp_samples_fire_the_truth_table_rules(sample, fired):
-    assert " ".join(r.label for r in Arbiter().explain(sample).rules if r.fired) == fired
-
-
 @pytest.mark.parametrize("sample", SAMPLES)
 @pytest.mark.parametrize("engine", ["auto", "exact", "grid", "skfuzzy"])
 def test_weights_are_those_of_the_arbiter(sample, engine):

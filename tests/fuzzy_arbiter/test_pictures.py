@@ -185,11 +185,6 @@ def test_a_legend_is_no_wider_than_its_axes(arbiter):
     assert not any(text.startswith("=") or text.endswith("=") for text in texts)
 
 
-def test_an_output_s_vertical_edge_stays_vertical(arbiter):
-    lines = {line.get_label(): line.get_xydata() for line in pictures.terms(arbiter, "alpha_1").get_lines()}
-    assert lines["low"].tolist() == [[0, 1], [1, 0]]
-
-
 def test_lines_of_a_profile_are_the_arbiter_s_weights(arbiter):
     ax = pictures.profile(arbiter, "shape", {"obstacle": 0.25, "depth": 1.0})
     for k, line in enumerate(ax.get_lines()):
