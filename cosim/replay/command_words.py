@@ -8,22 +8,7 @@ from collections.abc import Sequence
 from typing import assert_never
 
 from cosim.scenario.region_tables import Vector3
-from cosim.simulation.commands.commands import (
-    AddObstacle,
-    Arm,
-    ChangeSetting,
-    Command,
-    ManualControl,
-    RemoveObstacle,
-    Reset,
-    SetAttitude,
-    SetCurrentItem,
-    SetHeading,
-    SetMission,
-    SetMode,
-    SetTarget,
-    ShiftRegion,
-)
+from cosim.simulation.commands import commands as cmd
 
 _LISTED = 3  # commands of one moment that are listed
 _MODES = {
@@ -37,7 +22,7 @@ _MODES = {
 }
 
 
-def command_events(log: Sequence[tuple[int, Command]], step: float, max_moments: int) -> list[tuple[float, str]]:
+def command_events(log: Sequence[tuple[int, cmd.Command]], step: float, max_moments: int) -> list[tuple[float, str]]:
     """List times and texts of the commands, grouped by moments; step [s], returns [s]."""
     steps = sorted({k for k, _ in log})
     gaps = [later - earlier for earlier, later in zip(steps, steps[1:], strict=False)]
@@ -56,35 +41,35 @@ def _joined(words: Sequence[str]) -> str:
     return "Commanded: " + "; ".join(kinds[:_LISTED]) + more
 
 
-def command_words(command: Command) -> str:
+def command_words(command: cmd.Command) -> str:
     """Format a command as text."""
     match command:
-        case Arm():
+        case cmd.Arm():
             return "Armed" if command.armed else "Disarmed"
-        case SetMode():
+        case cmd.SetMode():
             return _MODES[command.mode]
-        case SetTarget():
+        case cmd.SetTarget():
             size = "" if command.radius is None else f", radius {command.radius:.3g} m"
             return f"Target at {_place(command.position)}{size}"
-        case SetHeading():
+        case cmd.SetHeading():
             return f"Heading {math.degrees(command.heading) % 360.0:.0f}°"
-        case ManualControl():
+        case cmd.ManualControl():
             return "Sticks moved"
-        case SetAttitude():
+        case cmd.SetAttitude():
             return "Attitude given" if command.quaternion is not None else "Attitude free"
-        case AddObstacle():
+        case cmd.AddObstacle():
             return f"Obstacle {command.number} at {_place(command.position)}, radius {command.radius:.3g} m"
-        case RemoveObstacle():
+        case cmd.RemoveObstacle():
             return f"Obstacle {command.number} gone"
-        case ShiftRegion():
+        case cmd.ShiftRegion():
             return f"{command.region} moved by {_place(command.by)}"
-        case ChangeSetting():
+        case cmd.ChangeSetting():
             return f"{command.key} is {command.value:.6g}"
-        case SetMission():
+        case cmd.SetMission():
             return f"Mission of {len(command.items)} items"
-        case SetCurrentItem():
+        case cmd.SetCurrentItem():
             return f"Mission goes on with item {command.item}"
-        case Reset():
+        case cmd.Reset():
             return "Reset"
         case _:
             assert_never(command)

@@ -63,57 +63,31 @@ def test_summary_of_a_record_with_gaps_is_valid_json(docking, copy_of, spoil):
     assert header["gaps"]["roof.clearance"] == 6001
 
 
-def _no_record(folder):
-    (folder / "record.parquet").unlink()
+def _rewritten(change):
+    def rewrite(folder):
+        file = folder / "record.parquet"
+        pq.write_table(change(pq.read_table(file)), file)
+
+    return rewrite
 
 
-def _empty(folder):
-    pq.write_table(pq.read_table(folder / "record.parquet").slice(0, 0), folder / "record.parquet")
-
-
-def _cut(folder):
-    file = folder / "record.parquet"
-    file.write_bytes(file.read_bytes()[:5000])
-
-
-def _other_columns(folder):
-    pq.write_table(pq.read_table(folder / "record.parquet").drop_columns("weight.shape"), folder / "record.parquet")
-
-
-def _backwards(folder):
-    table = pq.read_table(folder / "record.parquet")
-    pq.write_table(table.take(list(range(len(table)))[::-1]), folder / "record.parquet")
-
-
-def _no_summary(folder):
-    (folder / "summary.json").write_text("{")
-
-
-def _no_scenario(folder):
-    (folder / "scenario.toml").unlink()
-
-
-def _bad_scenario(folder):
-    (folder / "scenario.toml").write_text("vehicle = 7\n")
+SPOILT = {
+    "holds no record of a run": lambda folder: (folder / "record.parquet").unlink(),
+    "the record of the run is empty": _rewritten(lambda table: table.slice(0, 0)),
+    "record.parquet: cannot be read": lambda folder: os.truncate(folder / "record.parquet", 5000),
+    "has no column 'weight.shape'": _rewritten(lambda table: table.drop_columns("weight.shape")),
+    "the times of the record do not rise": _rewritten(lambda table: table.take(list(range(len(table)))[::-1])),
+    "summary.json: cannot be read": lambda folder: (folder / "summary.json").write_text("{"),
+    "holds no run (scenario.toml is missing)": lambda folder: (folder / "scenario.toml").unlink(),
+    "scenario.toml: ": lambda folder: (folder / "scenario.toml").write_text("vehicle = 7\n"),
+}
 
 
 @pytest.mark.medium(fast=5)
-@pytest.mark.parametrize(
-    ("spoilt", "text"),
-    [
-        (_no_record, "holds no record of a run"),
-        (_empty, "the record of the run is empty"),
-        (_cut, "record.parquet: cannot be read"),
-        (_other_columns, "has no column 'weight.shape'"),
-        (_backwards, "the times of the record do not rise"),
-        (_no_summary, "summary.json: cannot be read"),
-        (_no_scenario, "holds no run (scenario.toml is missing)"),
-        (_bad_scenario, "scenario.toml: "),
-    ],
-)
-def test_invalid_run_gives_one_line_error_and_keeps_the_page(spoilt, text, docking, copy_of, capsys):
+@pytest.mark.parametrize("text", SPOILT)
+def test_invalid_run_gives_one_line_error_and_keeps_the_page(text, docking, copy_of, capsys):
     folder = copy_of(docking)
-    spoilt(folder)
+    SPOILT[text](folder)
     before = sorted(folder.rglob("*"))
     with pytest.raises(CosimError):
         load_run(folder)

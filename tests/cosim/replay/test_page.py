@@ -8,7 +8,7 @@ import subprocess
 
 import pytest
 
-from cosim.replay.page import is_page, replay_page, write_page
+from cosim.replay.page import replay_page
 from cosim.replay.trace import trace_of
 from cosim.results.run_result import load_run
 from tests.cosim.replay.conftest import CLOSED
@@ -88,18 +88,3 @@ def test_page_script_decodes_the_same_numbers(page, tmp_path):
     assert at == [axis[3] for axis in place]
     assert between == pytest.approx([(axis[3] + axis[4]) / 2 for axis in place], abs=1e-12)
     assert after == [axis[-1] for axis in place] and before == [axis[0] for axis in place]
-
-
-def test_page_is_written_atomically(docking, tmp_path, monkeypatch):
-    file = tmp_path / "replay.html"
-    write_page(file, [], "live")
-    assert is_page(file) and [p.name for p in tmp_path.iterdir()] == ["replay.html"]
-    before = file.read_bytes()
-
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr("pathlib.Path.replace", full)
-    with pytest.raises(OSError, match="No space"):
-        write_page(file, [], "live")
-    assert file.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["replay.html"]

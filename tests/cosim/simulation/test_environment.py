@@ -73,14 +73,16 @@ def test_streamed_region_is_at_its_streamed_position(name):
 
 def test_streamed_region_extrapolates_its_velocity():
     """Before the run, with a velocity: from then on that is its motion, which the law receives."""
-    told = []
-    kept = run(
-        "regions.SR2.streamed=true",
-        before=lambda master: (master.move_region("SR2", [1.0, 0.0, 0.0], [0.0, 0.5, 0.0]), told.append(master)),
-    )
-    t = kept["time"][:, None]
-    assert shift(kept, "SR2") == pytest.approx([1.0, 0.0, 0.0] + t * [0.0, 0.5, 0.0], abs=1e-12)
-    assert list(told[0].environment.regions.velocities[1]) == [0.0, 0.5, 0.0]
+    masters = []
+
+    def move(master):
+        master.move_region("SR2", [1.0, 0.0, 0.0], [0.0, 0.5, 0.0])
+        masters.append(master)
+
+    kept = run("regions.SR2.streamed=true", before=move)
+    expected = [1.0, 0.0, 0.0] + kept["time"][:, None] * [0.0, 0.5, 0.0]
+    assert shift(kept, "SR2") == pytest.approx(expected, abs=1e-12)
+    assert list(masters[0].environment.regions.velocities[1]) == [0.0, 0.5, 0.0]
 
 
 @pytest.mark.parametrize(

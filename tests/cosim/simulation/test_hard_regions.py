@@ -58,6 +58,11 @@ def unit(rng, n=3):
     return unit_of(rng.normal(size=n))
 
 
+def scenario_text(vehicle, seed, start, goal, duration=240.0, noise=0.02):
+    given = {"vehicle": vehicle, "seed": seed, "start": text(start), "goal": text(goal), "duration": duration}
+    return FLIGHT.format(**given, noise=noise, half=noise / 2.0)
+
+
 def room(kind, rng):
     """Return the shape of a room, a start within it, and a goal that lies beyond its surface or near it."""
     quaternion, way = unit(rng, 4), unit(rng)
@@ -91,9 +96,7 @@ def kept_in(kind, vehicle, seed):
     rng = np.random.default_rng([seed, *kind.encode()])
     shape, start, goal = room(kind, rng)
     noise = 0.02 * rng.integers(2)
-    flight = FLIGHT.format(
-        vehicle=vehicle, duration=40.0, start=text(start), goal=text(goal), noise=noise, half=noise / 2.0, seed=seed
-    )
+    flight = scenario_text(vehicle, seed, start, goal, duration=40.0, noise=noise)
     return flight + REGION.format(name="room", keep="in", shape=shape)
 
 
@@ -118,10 +121,7 @@ def barred(kind, vehicle, seed):
         for i in range(int(rng.integers(1, 5))):
             half = [rng.uniform(0.2, 1.0), rng.uniform(1.5, 4.0), rng.uniform(2.0, 12.0)]
             blocks += block(f"slab {i}", rng.uniform(5.0, length - 5.0), rng.uniform(-1.0, 1.0), half)
-    flight = FLIGHT.format(
-        vehicle=vehicle, duration=240.0, start=[0.0, 0.0, 12.0], goal=[length, rng.uniform(-2.0, 2.0), 12.0],
-        noise=0.02, half=0.01, seed=seed,
-    )  # fmt: skip
+    flight = scenario_text(vehicle, seed, [0.0, 0.0, 12.0], [length, rng.uniform(-2.0, 2.0), 12.0])
     return flight + blocks
 
 
@@ -134,9 +134,7 @@ def pocket(vehicle, seed):
     for name, side in (("left", -1.0), ("right", 1.0)):
         walls += block(name, 1.5 - depth / 2.0, y + side * (width / 2.0 + thick), [depth / 2.0, thick, tall])
     goal = [rng.uniform(6.0, 12.0), rng.uniform(-3.0, 3.0), 12.0]
-    flight = FLIGHT.format(
-        vehicle=vehicle, duration=240.0, start=[0.0, y, 12.0], goal=goal, noise=0.02, half=0.01, seed=seed
-    )
+    flight = scenario_text(vehicle, seed, [0.0, y, 12.0], goal)
     return flight + walls
 
 
@@ -155,10 +153,8 @@ def bent_pipe(vehicle, seed):
                 break
         way = turned
     shape = f'type = "pipe", points = [{", ".join(map(text, points))}], radius = {rng.uniform(1.0, 1.6)}'
-    goal = text(points[-1] - 0.2 * unit_of(points[-1] - points[-2]))
-    flight = FLIGHT.format(
-        vehicle=vehicle, duration=240.0, start=[0.3, 0.0, 20.0], goal=goal, noise=0.02, half=0.01, seed=seed
-    )
+    goal = points[-1] - 0.2 * unit_of(points[-1] - points[-2])
+    flight = scenario_text(vehicle, seed, [0.3, 0.0, 20.0], goal)
     return flight + REGION.format(name="pipe", keep="in", shape=shape)
 
 
@@ -171,9 +167,7 @@ def rocks(vehicle, seed):
         if min(np.linalg.norm(centre - start), np.linalg.norm(centre - goal)) > radius + 1.4:
             shape = f'type = "sphere", centre = {text(centre)}, radius = {radius}'
             rocks, count = rocks + REGION.format(name=f"rock {count}", keep="out", shape=shape), count + 1
-    flight = FLIGHT.format(
-        vehicle=vehicle, duration=120.0, start=text(start), goal=text(goal), noise=0.02, half=0.01, seed=seed
-    )
+    flight = scenario_text(vehicle, seed, start, goal, duration=120.0)
     return flight + rocks
 
 

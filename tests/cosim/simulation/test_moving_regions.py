@@ -36,15 +36,8 @@ def flight(vehicle, lag, rng, **changes):
 
 
 def hard(name, shape, keep="out", velocity=(0.0, 0.0, 0.0), **more):
-    velocity = [float(v) for v in velocity]
-    return {
-        "name": name,
-        "criterion": "obstacle",
-        "keep": keep,
-        "gain": 100.0,
-        "velocity": velocity,
-        "shape": shape,
-    } | more
+    region = {"name": name, "criterion": "obstacle", "keep": keep, "gain": 100.0, "shape": shape}
+    return region | {"velocity": [float(v) for v in velocity]} | more
 
 
 def moved_shape(kind, rng, centre):
