@@ -7,7 +7,7 @@ import pytest
 
 from controller.compiling.function import BoundCall
 from controller.laws.deployable.model import make_thrusters, reallocate
-from controller.quadratic_program import _add_product, _row_residual, empty_workspace, solve
+from controller.quadratic_program import _add_product, _row_residual, _sum_dual_force, empty_workspace, solve
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import load_vehicle
 
@@ -81,8 +81,9 @@ def test_products_are_summed_in_double_double_precision():
         assert off <= 8 * ROUNDING**2 * (abs(total) + abs(a * b) + abs(rest) / ROUNDING)
 
 
-def test_row_residual_is_accurate_under_cancellation():
-    work, rng = empty_workspace(1, 8), np.random.default_rng(4)
+def test_residual_and_dual_force_are_accurate_under_cancellation():
+    work, rng = empty_workspace(2, 8), np.random.default_rng(4)
+    work.passive[:2] = 0, 1
     for _ in range(100):
         forces, work.rows[0] = rng.normal(size=8) * 20.0, rng.normal(size=8)
         work.price[0], work.multipliers[0] = rng.uniform(0.0, 1e-6), rng.uniform(0.0, 1e6)
@@ -91,6 +92,10 @@ def test_row_residual_is_accurate_under_cancellation():
         expected -= sum(Fraction(a) * Fraction(u) for a, u in zip(work.rows[0], forces, strict=True))
         lack = _row_residual(work, 1, 0, forces, forces, forces)
         assert lack == pytest.approx(float(expected), rel=1e-9, abs=1e-28)
+        work.rows[1], work.multipliers[1] = -1.1 * work.rows[0], work.multipliers[0] / 1.1
+        a, b = (Fraction(work.rows[i, 3]) * Fraction(work.multipliers[i]) for i in range(2))
+        _sum_dual_force(work, 2, 2)
+        assert work.dual_force[3] == pytest.approx(float(a + b), rel=1e-9)
 
 
 def test_uncontrollable_row_is_paid_by_slack():
