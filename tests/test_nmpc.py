@@ -21,39 +21,35 @@ from cosim.campaigns.scenes.scene import Scene
 from plant_fmu.vehicle import load_vehicle
 
 
-class Planner:
-    """Pulls down with every vertical thruster, and keeps what it was given."""
-
-    def __init__(self):
-        self.given = []
-
-    def exchange(self, line):
-        self.given.append(json.loads(line))
-        return {
-            "forces": [0.0] * 4 + [-3.0] * 4,
-            "success": len(self.given) % 2 == 0,
-            "path": [[float(len(self.given)), 0.0, 2.0]] * 12,
-            "seconds": 0.001,
-        }
-
-
 @pytest.fixture
-def flown(monkeypatch):
-    """A hard scene of 2 s, and the planner that flew it."""
-    planner = Planner()
+def planner(monkeypatch):
+    """A planner that pulls down with every vertical thruster, and keeps what it is given."""
+
+    class Planner:
+        forces, given = [0.0] * 4 + [-3.0] * 4, []
+
+        def exchange(self, line):
+            self.given.append(json.loads(line))
+            count = len(self.given)
+            return {
+                "forces": self.forces,
+                "success": count % 2 == 0,
+                "path": [[count, 0.0, 2.0]] * 12,
+                "seconds": 0.001,
+            }
+
     monkeypatch.setitem(LAWS, "nmpc", nmpc.NmpcLaw)
-    monkeypatch.setattr(nmpc.NmpcLaw.function, "process", planner)
+    monkeypatch.setattr(nmpc.NmpcLaw.function, "process", Planner())
     monkeypatch.setattr(nmpc.NmpcLaw.function, "failures", 0)
     nmpc.NmpcLaw.function.times.clear()
-    scene = msgspec.convert(make_scene(7, "hard"), Scene)
-    with SceneFlyer("nmpc", Conditions(duration=2.0)) as flyer:
-        score, _ = flyer.fly(scene)
-    return scene, planner, score
+    return nmpc.NmpcLaw.function.process
 
 
 @pytest.mark.medium
-def test_planner_receives_law_inputs_at_10_hz(flown):
-    scene, planner, _ = flown
+def test_planner_receives_law_inputs_at_10_hz_and_its_forces_are_held_between_plans(planner):
+    scene = msgspec.convert(make_scene(7, "hard"), Scene)
+    with SceneFlyer("nmpc", Conditions(duration=2.0)) as flyer:
+        score, _ = flyer.fly(scene)
     assert len(planner.given) == 20 and len(nmpc.NmpcLaw.function.times) == 20
     assert [given["again"] for given in planner.given] == [True] + [False] * 19
     first, last = planner.given[0], planner.given[-1]
@@ -72,40 +68,16 @@ def test_planner_receives_law_inputs_at_10_hz(flown):
     assert first["position"] == pytest.approx(scene.start, abs=0.1)
     assert not {"weight_minus_buoyancy", "current", "failed_thruster"} & set(first)
     assert nmpc.NmpcLaw.function.failures == 10
-
-
-@pytest.mark.medium
-def test_planned_forces_are_held_until_the_next_plan(flown):
-    _, _, score = flown
-    assert score.effort == pytest.approx(4 * 3.0 * 2.0)
-    assert score.thrust_variation == pytest.approx(4 * 3.0)
-
-
-@pytest.mark.medium
-def test_observer_estimates_the_vertical_force(monkeypatch, flown):
-    scene, planner, _ = flown
+    assert score.effort == pytest.approx(4 * 3.0 * 2.0) and score.thrust_variation == pytest.approx(4 * 3.0)
     mass = 187.5
-    disturbance = planner.given[-1]["disturbance"][2] * mass
+    disturbance = last["disturbance"][2] * mass
     assert disturbance == pytest.approx(scene.weight_minus_buoyancy, abs=0.25 * abs(scene.weight_minus_buoyancy) + 1.0)
 
 
-class Diver:
-    """Commands the same forces in every plan, forward and down, and keeps what it was given."""
-
-    def __init__(self, forces):
-        self.forces, self.given = forces, []
-
-    def exchange(self, line):
-        self.given.append(json.loads(line))
-        return {"forces": self.forces, "success": True, "path": [[0.0, 0.0, 4.0]] * 12, "seconds": 0.001}
-
-
 @pytest.mark.medium
-def test_lag_and_munk_moment_are_compensated_as_the_plant_has_them(monkeypatch):
+def test_lag_and_munk_moment_are_compensated_as_the_plant_has_them(planner):
     lag, vehicle = 0.15, load_vehicle("bluerov2_heavy")
-    planner = Diver([10.0, 10.0, -10.0, -10.0, -11.0, -11.0, -1.0, -1.0])  # without a moment
-    monkeypatch.setitem(LAWS, "nmpc", nmpc.NmpcLaw)
-    monkeypatch.setattr(nmpc.NmpcLaw.function, "process", planner)
+    planner.forces = [10.0, 10.0, -10.0, -10.0, -11.0, -11.0, -1.0, -1.0]  # without a moment
     table = make_conflict(630005)["scenario"]
     assert table["vehicle"] == vehicle.name and table["plant"]["parameters"]["thrust_time_constant[1]"] == lag
     table |= {"sensing": {}, "regions": table["regions"][:1], "time": table["time"] | {"duration": 1.5}}
@@ -118,7 +90,6 @@ def test_lag_and_munk_moment_are_compensated_as_the_plant_has_them(monkeypatch):
     early = int(lag / 0.02)  # control steps
     for i in (6, 9, 12):
         given, later = planner.given[i], (trace[5 * i + early] + trace[5 * i + early + 1]) / 2.0
-
         assert given["position"] == pytest.approx(later[1:4], abs=0.02)
         R = np.array(given["R"])
         assert given["velocity"] == pytest.approx(R @ later[8:11], abs=0.06)
@@ -178,10 +149,7 @@ def test_spheres_and_depths_constrain_exactly_and_other_regions_by_tangents_alon
 
 
 @pytest.mark.medium
-def test_tangents_follow_the_path_of_the_plan_before(monkeypatch):
-    planner = Planner()
-    monkeypatch.setitem(LAWS, "nmpc", nmpc.NmpcLaw)
-    monkeypatch.setattr(nmpc.NmpcLaw.function, "process", planner)
+def test_tangents_follow_the_path_of_the_plan_before(monkeypatch, planner):
     paths = []
     monkeypatch.setattr(nmpc, "constraints", lambda regions, path, interval: paths.append(path.copy()) or {})
     with SceneFlyer("nmpc", Conditions(duration=0.3)) as flyer:
@@ -213,10 +181,8 @@ def test_the_search_finds_fast_settings_among_safe_ones():
 
 
 @pytest.mark.medium
-def test_flights_in_the_file_are_not_flown_again(monkeypatch, tmp_path):
-    planner, started = Planner(), []
-    monkeypatch.setitem(LAWS, "nmpc", nmpc.NmpcLaw)
-    monkeypatch.setattr(nmpc.NmpcLaw.function, "process", planner)
+def test_flights_in_the_file_are_not_flown_again(monkeypatch, tmp_path, planner):
+    started = []
     monkeypatch.setattr(nmpc.Planners, "choose", lambda self, *what: started.append(what))
     monkeypatch.setattr(nmpc_search, "DURATION", 0.2)
     path = tmp_path / "flights.jsonl"

@@ -22,7 +22,7 @@ from controller.regions import (
     Region,
     Sphere,
 )
-from controller.regions.mesh import closed_grid, patches, sector
+from controller.regions.mesh import AROUND, closed_grid, patches, sector
 from controller.regions.region_set import clearances_at, surface_of
 from controller.regions.shapes import ENTRIES
 
@@ -137,6 +137,9 @@ def test_star_shaped_polygons_are_triangulated_completely(radii):
 def test_a_sector_of_more_than_half_a_turn_is_closed_too():
     mesh = sector((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), 2.5, 1.0)
     assert signed_volume(mesh) == pytest.approx(math.tau / 3.0 * (1.0 - math.cos(2.5)), rel=0.05)
+    on_end = mesh.vertices[np.linalg.norm(mesh.vertices, axis=1) > 0.5]  # which is rounded in even steps
+    steps = np.diff(np.unique(np.round(np.arccos(on_end[:, 0]), 6)))
+    assert len(on_end) == len(mesh.vertices) - 1 and np.ptp(steps) < 1e-5 and steps.max() <= math.tau / AROUND
 
 
 def test_a_ring_is_closed_faces_outward_and_has_its_volume():
