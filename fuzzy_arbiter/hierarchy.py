@@ -161,10 +161,8 @@ def _hierarchical(on: Statements, off: Statements, outputs: Sequence[Output]) ->
 
 def _minimal(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
     """Return one rule for high and one for low for each output."""
-    rules = []
-    for k, output in enumerate(outputs):
-        rules += [_high(on, off, outputs, k), _low(_any((*on[:k], off[k])), output)]
-    return tuple(rules)
+    pairs = ((_high(on, off, outputs, k), _low(_any((*on[:k], off[k])), output)) for k, output in enumerate(outputs))
+    return tuple(itertools.chain.from_iterable(pairs))
 
 
 def _conjunctive(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:

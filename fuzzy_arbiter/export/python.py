@@ -44,10 +44,9 @@ def to_python(system: System) -> str:
     Returns
     -------
     str
-        A module with ``evaluate(inputs, outputs)``, which fills the outputs and returns 0, or -i if the i-th input is
-        not in its universe, or k if no rule fires for the k-th output and that has no default, where a call gives NaN;
-        and ``weights(inputs)``, which returns a tuple or raises ``ValueError`` with the name. Both give what the
-        arbiter's own engine does, to the last bit.
+        A module with ``evaluate(inputs, outputs)``, which returns the same as the function of `to_c`, and with
+        ``weights(inputs)``, which returns a tuple or raises ``ValueError`` with the name. Both give what the arbiter's
+        own engine does, to the last bit.
 
     Examples
     --------

@@ -36,26 +36,19 @@ def write(system: System) -> str:
         lines += [f"  lock-range: {lock}", *_terms(v)]
     for output in system.outputs:
         lines += [f"OutputVariable: {output.name}", "  enabled: true", f"  range: {format_numbers(output.universe)}"]
-        lines += [f"  lock-range: {_truth(output.lock_range)}"]
-        lines += [
-            f"  aggregation: {word_of('fll', 'aggregation', output.aggregation, AGGREGATIONS)}",
-            f"  defuzzifier: {_defuzzifier(output, system)}",
-        ]
-        lines += [f"  default: {_default(output)}", f"  lock-previous: {_truth(output.lock_previous)}", *_terms(output)]
+        lines += [f"  lock-range: {str(output.lock_range).lower()}"]
+        lines += [f"  aggregation: {word_of('fll', 'aggregation', output.aggregation, AGGREGATIONS)}"]
+        lines += [f"  defuzzifier: {_defuzzifier(output, system)}"]
+        lines += [f"  default: {'nan' if output.default is None else format_number(output.default)}"]
+        lines += [f"  lock-previous: {str(output.lock_previous).lower()}", *_terms(output)]
     for k, (operators, rules) in enumerate(blocks(system)):
         lines += [f"RuleBlock: rules{k + 1 if k else ''}", "  enabled: true"]
         lines += [f"  conjunction: {word_of('fll', 'conjunction', operators.conjunction, T_NORMS)}"]
         lines += [f"  disjunction: {word_of('fll', 'disjunction', operators.disjunction, S_NORMS)}"]
-        lines += [
-            f"  implication: {word_of('fll', 'implication', operators.implication, T_NORMS)}",
-            "  activation: General",
-        ]
+        lines += [f"  implication: {word_of('fll', 'implication', operators.implication, T_NORMS)}"]
+        lines += ["  activation: General"]
         lines += [f"  rule: {_rule(i, rule)}" for i, rule in rules]
     return "\n".join([*lines, ""])
-
-
-def _truth(value: bool) -> str:
-    return "true" if value else "false"
 
 
 def _defuzzifier(output: Output, system: System) -> str:
@@ -65,10 +58,6 @@ def _defuzzifier(output: Output, system: System) -> str:
 
 def _terms(v: Variable) -> list[str]:
     return [f"  term: {term.name} {format_shape(term.shape)}" for term in v.terms]
-
-
-def _default(output: Output) -> str:
-    return "nan" if output.default is None else format_number(output.default)
 
 
 def _rule(i: int, rule: Rule) -> str:

@@ -114,13 +114,13 @@ class _Checks:
             for place in map(ask.places, answer.boxes):
                 causes = reasons(self.system, row_strengths(self.system, place), self._terms[output], 1.0)
                 text = f"output {output!r}: rules contradict each other where {_format_place(place)}: {causes}"
-                self._found("fault", "consistent", text, place)
+                self._add_finding("fault", "consistent", text, place)
         self._decided("consistent", answers, "on every crisp row")
         high = tuple(map(ask.above_half, self._high))
         (answer,) = ask.ask([Goal(high, 2, ANY)])
         for place in map(ask.places, answer.boxes):
             causes = reasons(self.system, row_strengths(self.system, place), self._high, 0.5)
-            self._found(
+            self._add_finding(
                 "warning", "exclusive", f"two outputs are {self._highs()} where {_format_place(place)}: {causes}", place
             )
         self._decided("exclusive", [answer], "on every crisp row")
@@ -130,9 +130,11 @@ class _Checks:
         (answer,) = ask.ask([Goal(high, 0, 0)], NAMED_ROWS)
         for place in map(ask.places, answer.boxes):
             text = f"no output is {self._highs()} where {_format_place(place)}"
-            self._found("note", "exclusive", text + (": at most one is, not exactly one" if exclusive else ""), place)
+            self._add_finding(
+                "note", "exclusive", text + (": at most one is, not exactly one" if exclusive else ""), place
+            )
         if not answer.all_found:
-            self._found("note", "exclusive", "there may be more rows like that, which were not looked for")
+            self._add_finding("note", "exclusive", "there may be more rows like that, which were not looked for")
 
     def support(self) -> None:
         """Check that rules fire at all for graded inputs."""
@@ -142,7 +144,9 @@ class _Checks:
         answers = ask.ask([Goal((((condition, FIRES),),), 1, ANY) for condition in conditions])
         for (condition, label), answer in zip(conditions.items(), answers, strict=True):
             if answer.all_found and not answer.boxes:
-                self._found("warning", "rules", f"{label}: never fires, as '{condition}' holds for no real inputs")
+                self._add_finding(
+                    "warning", "rules", f"{label}: never fires, as '{condition}' holds for no real inputs"
+                )
 
     def halves(self) -> None:
         """Check that conclusions for graded inputs are not both above 1/2."""
@@ -160,12 +164,14 @@ class _Checks:
                 if place is not None:
                     inputs = [float(place.get(v.name, v.universe[0])) for v in self.system.inputs]
                     causes = reasons(self.system, Firing(self.system).strengths(inputs), terms, 0.5)
-                    self._found("warning", name, f"{text.format(output)} where {_format_place(place)}: {causes}", place)
+                    self._add_finding(
+                        "warning", name, f"{text.format(output)} where {_format_place(place)}: {causes}", place
+                    )
             holds = False if False in verdicts else None if None in verdicts else True
             how = "by an example" if holds is False else "; ".join(sorted(hows))
             self.checks.append(Check(name, holds, how))
             if holds is None:
-                self._found("warning", name, f"{name.replace('_', ' ')}: not decided, {how}")
+                self._add_finding("warning", name, f"{name.replace('_', ' ')}: not decided, {how}")
 
     def _both_above_half(
         self, ask: Questions, terms: Sequence[Is], answer: Answer
@@ -189,9 +195,9 @@ class _Checks:
             for place in map(ask.places, answer.boxes):
                 said = f"output {output.name!r}: no rule fires where {_format_place(place)}"
                 if output.default is None:
-                    self._found("fault", name, f"{said}; it has no default", place)
+                    self._add_finding("fault", name, f"{said}; it has no default", place)
                 else:
-                    self._found("warning", name, f"{said}; it has its default {output.default:g} there", place)
+                    self._add_finding("warning", name, f"{said}; it has its default {output.default:g} there", place)
         self._decided(name, answers, where)
 
     def _decided(self, name: str, answers: Sequence[Answer], where: str) -> None:
@@ -205,9 +211,11 @@ class _Checks:
         most = max(answer.combinations for answer in open_ones)
         how = f"{_count(most)} combinations are more than an effort of {self._effort.limit:g} statements settles"
         self.checks.append(Check(name, None, how))
-        self._found("warning", name, f"{name.replace('_', ' ')}: not decided, {how}")
+        self._add_finding("warning", name, f"{name.replace('_', ' ')}: not decided, {how}")
 
-    def _found(self, severity: Severity, about: str, text: str, place: dict[str, float | str] | None = None) -> None:
+    def _add_finding(
+        self, severity: Severity, about: str, text: str, place: dict[str, float | str] | None = None
+    ) -> None:
         self.findings.append(Finding(severity, about, text, place))
 
     def _highs(self) -> str:

@@ -97,7 +97,7 @@ class Questions:
             if rule.weight > 0.5
         )
 
-    def ask(self, goals: Sequence[Goal], wanted: int = 1) -> list[Answer]:
+    def ask(self, goals: Sequence[Goal], max_boxes: int = 1) -> list[Answer]:
         """Search for the goals; goals with the same inputs share a search."""
         together: dict[frozenset[str], list[int]] = {}
         for i, goal in enumerate(goals):
@@ -107,7 +107,7 @@ class Questions:
         top = 2 * len(self._levels)
         for members in together.values():
             search = Search([goals[i] for i in members], self._domains, top)
-            found, used = search.run(share.share(), wanted)
+            found, used = search.run(share.share(), max_boxes)
             share.use(used)
             self._effort.use(used)
             answers.update(zip(members, found, strict=True))

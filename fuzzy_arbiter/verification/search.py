@@ -82,13 +82,13 @@ class Search:
                 self._bounds[Is(name, domain.terms[j])] = ranks.min(keepdims=True), ranks.max(keepdims=True)
         self.combinations = math.prod(map(len, self._patterns))
 
-    def run(self, limit: int, wanted: int = 1) -> tuple[list[Answer], int]:
+    def run(self, limit: int, max_boxes: int = 1) -> tuple[list[Answer], int]:
         """Search for boxes that meet the goals."""
         found: list[list[Box]] = [[] for _ in self._goals]
-        wanting = list(range(len(self._goals)))
+        open_goals = list(range(len(self._goals)))
         stack = [np.zeros((1, 0), dtype=np.int32)]
         seen = 0
-        while stack and wanting and seen * self._cost < limit:
+        while stack and open_goals and seen * self._cost < limit:
             # few at a time in the beginning, so that an easy goal ends early
             size = min(CHUNK, max(16, seen // 8), max(1, limit // self._cost))
             boxes = stack.pop()
@@ -98,19 +98,19 @@ class Search:
             seen += len(boxes)
             sure, possible = self._judge(boxes)
             keep = np.zeros(len(boxes), dtype=np.bool_)
-            for g in wanting:
-                for row in np.flatnonzero(sure[g])[: wanted - len(found[g])]:
+            for g in open_goals:
+                for row in np.flatnonzero(sure[g])[: max_boxes - len(found[g])]:
                     found[g].append(self._box(boxes[row]))
-            wanting = [g for g in wanting if len(found[g]) < wanted]
-            for g in wanting:
+            open_goals = [g for g in open_goals if len(found[g]) < max_boxes]
+            for g in open_goals:
                 keep |= possible[g] & ~sure[g]
             boxes = boxes[keep]
             if len(boxes):
                 patterns = np.arange(len(self._patterns[boxes.shape[1]]), dtype=np.int32)
                 grown = np.repeat(boxes, len(patterns), axis=0)
                 stack.append(np.column_stack((grown, np.tile(patterns, len(boxes)))))
-        done = not stack  # for a goal that has all wanted boxes, others were left out
-        answers = [Answer(tuple(boxes), done and len(boxes) < wanted, self.combinations) for boxes in found]
+        done = not stack  # for a goal that has max_boxes, others were left out
+        answers = [Answer(tuple(boxes), done and len(boxes) < max_boxes, self.combinations) for boxes in found]
         return answers, seen * self._cost
 
     def _box(self, row: NDArray[np.int32]) -> Box:
