@@ -78,21 +78,14 @@ class CoSimulationInstance:
             getattr(self.fmu, f"set{kind}")(list(numbers), list(numbers.values()))
 
     def get(self, *names):
-        return [x for name in names for x in self._one(name)] if self._mixed(names) else self._reals(names)
-
-    def _mixed(self, names):
-        return any(self.by_name[name].type not in ("Real", "Float64") for name in names)
-
-    def _reals(self, names):
-        references = [self.by_name[name].valueReference for name in names]
-        return (self.fmu.getReal if self.fmi == 2 else self.fmu.getFloat64)(references)
-
-    def _one(self, name):
-        variable = self.by_name[name]
-        return getattr(self.fmu, f"get{variable.type}")([variable.valueReference])
+        variables = [self.by_name[name] for name in names]
+        types = {v.type for v in variables}
+        if len(types) == 1:
+            return getattr(self.fmu, f"get{types.pop()}")([v.valueReference for v in variables])
+        return [x for name in names for x in self.get(name)]
 
     def flag(self, name):
-        return bool(self._one(name)[0])
+        return bool(self.get(name)[0])
 
     def jacobian(self, unknowns, knowns):
         """Column by column, from directional derivatives."""
@@ -108,13 +101,17 @@ class CoSimulationInstance:
         self.set_values(values)
         return self.begin()
 
-    def begin(self, time=0.0, stop=None):
-        """Initialize at a time."""
+    def enter(self, time=0.0, stop=None):
+        """Enter initialization at a time."""
         if self.fmi == 2:
             self.fmu.setupExperiment(startTime=time, stopTime=stop)
             self.fmu.enterInitializationMode()
         else:
             self.fmu.enterInitializationMode(startTime=time, stopTime=stop)
+
+    def begin(self, time=0.0, stop=None):
+        """Initialize at a time."""
+        self.enter(time, stop)
         self.fmu.exitInitializationMode()
         self.time = time
         return self

@@ -92,15 +92,14 @@ def test_a_rate_limit_ramps_then_settles(make_slave, fmi):
     def rate(t, f):
         return np.clip((25.0 - f) / T, -limit, limit)
 
-    expected = solve_ivp(rate, (0, 3), [0.0], t_eval=np.arange(1, 61) * 0.05, rtol=1e-10, atol=1e-12, max_step=0.01).y[
-        0
-    ]
-    found = []
-    for _ in range(60):
+    times = np.arange(1, 61) * 0.05
+    expected = solve_ivp(rate, (0, 3), [0.0], t_eval=times, rtol=1e-10, atol=1e-12, max_step=0.01).y[0]
+    forces = []
+    for _ in times:
         slave.step(0.05)
-        found.append(slave.get("thruster_force[1]")[0])
-    assert found == pytest.approx(list(expected), abs=1e-6)
-    assert found[9] == pytest.approx(10.0, abs=1e-12)
+        forces += slave.get("thruster_force[1]")
+    assert forces == pytest.approx(list(expected), abs=1e-6)
+    assert forces[9] == pytest.approx(10.0, abs=1e-12)
 
 
 def test_a_rate_limit_alone_is_a_ramp(make_slave, fmi):

@@ -73,9 +73,7 @@ def somewhere(request, make_slave):
     seed, fmi = request.param
     rng = np.random.default_rng(seed)
     slave = make_slave("odin", fmi)
-    if fmi == 2:
-        slave.fmu.setupExperiment(startTime=0.0)
-    slave.fmu.enterInitializationMode()
+    slave.enter()
     values = random_values(slave, rng)
     slave.set_values(values | {"free_surface": bool(rng.integers(2))})
     return slave, values | {"free_surface": slave.flag("free_surface")}

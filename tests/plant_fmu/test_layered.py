@@ -41,15 +41,8 @@ def gap(fmu, folder, name, **how):
     expected = read_csv(folder / f"{name}_out.csv")
     start = {p.name: p.value for p in read_ssv(str(folder / f"{name}_start.ssv")).parameters}
     columns = expected.dtype.names
-    result = simulate_fmu(
-        str(fmu),
-        stop_time=expected["time"][-1],
-        output_interval=0.2,
-        start_values=start,
-        input=read_csv(folder / f"{name}_in.csv"),
-        output=columns[1:],
-        **how,
-    )
+    how |= {"start_values": start, "input": read_csv(folder / f"{name}_in.csv"), "output": columns[1:]}
+    result = simulate_fmu(str(fmu), stop_time=expected["time"][-1], output_interval=0.2, **how)
     got, want = (np.array(rows.tolist()) for rows in (result, expected))
     if len(got) > len(want):  # an importer that stops at events records both of their sides
         got = got[[int(np.flatnonzero(np.isclose(got[:, 0], t))[-1]) for t in want[:, 0]]]
@@ -136,12 +129,8 @@ def test_manifest_is_valid(fmi, unpacked):
     assert root.get(f"{LS}fmi-ls-name") == "org.fmi-standard.fmi-ls-ref"
     assert root.get(f"{LS}fmi-ls-version") == "1.0.0-beta.1"
     related = {r.get("source"): r.get("role") for r in root.findall("Related")}
-    assert related == {
-        "odin.ssv": "parameter",
-        "odin_start.ssv": "parameter",
-        "odin_in.csv": "testcase",
-        "odin_out.csv": "result",
-    }
+    roles = ("parameter", "parameter", "testcase", "result")
+    assert related == dict(zip(("odin.ssv", "odin_start.ssv", "odin_in.csv", "odin_out.csv"), roles, strict=True))
     assert {f.name for f in folder.iterdir()} == {*related, "fmi-ls-manifest.xml"}
     # what the standard's own schema lets be there
     assert {e.tag for e in root.iterdescendants()} == {"Related", "Label"}

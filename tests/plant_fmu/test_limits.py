@@ -115,9 +115,7 @@ def test_outputs_of_initialization_are_those_after_it(make_slave, fmi):
     slave = make_slave(fmi=fmi)
     slave.set_values({"depth_sensor.rate": 10.0, "depth_sensor.noise": 0.1, "position.z": 5.0})
     slave.set_values({"current_variation.x": 0.5, "seed": 9})
-    if fmi == 2:
-        slave.fmu.setupExperiment(startTime=0.0)
-    slave.fmu.enterInitializationMode()
+    slave.enter()
     names = ["measured.depth", "water_velocity.x", "der(velocity.u)"]
     during = slave.get(*names)
     assert slave.jacobian(["measured.depth"], ["position.z"]) == [[1.0]]

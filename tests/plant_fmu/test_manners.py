@@ -6,8 +6,6 @@ import math
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from plant_fmu import load_vehicle
-from plant_fmu.build import cached_fmu
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
 
 
@@ -175,16 +173,6 @@ def test_start_time_is_arbitrary_and_step_times_may_be_accumulated(make_slave):
     for _ in range(20_000):  # 0.1 is no binary fraction
         slave.step(0.1)
     assert slave.time != 2100.0
-
-
-def test_instances_do_not_disturb_each_other():
-    path = cached_fmu(load_vehicle("odin"), 3)
-    slaves = [CoSimulationInstance(path).start(**{"position.z": float(i)}) for i in range(3)]
-    for slave in slaves:
-        slave.step(0.1)
-    assert [round(slave.get("position.z")[0]) for slave in slaves] == [0, 1, 2]
-    for slave in slaves:
-        slave.close()
 
 
 # ---- logging ----

@@ -89,19 +89,9 @@ def test_sources_compiled_manually_give_the_same_plant(bare, fmi):
         (native,) = [name for name in archive.namelist() if name.startswith("binaries/")]
     (bare / native).parent.mkdir(parents=True)
     files = [bare / "sources" / name for name in configuration.sourceFileSets[0].sourceFiles]
-    plain = f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
-    command = [
-        *find_compiler(),
-        "-std=c99",
-        "-O1",
-        plain,
-        "-fPIC",
-        "-shared",
-        f"-I{FMPY / 'c-code'}",
-        *map(str, files),
-        "-lm",
-    ]
-    subprocess.run([*command, "-o", str(bare / native)], check=True, capture_output=True)
+    options = ["-std=c99", "-O1", f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX", "-fPIC", "-shared", f"-I{FMPY / 'c-code'}"]
+    command = [*find_compiler(), *options, *map(str, files), "-lm", "-o", str(bare / native)]
+    subprocess.run(command, check=True, capture_output=True)
     expected = trajectory(cached_fmu(load_vehicle("odin"), fmi))
     assert max(map(abs, expected)) > 1.0
     assert trajectory(packed(bare)) == pytest.approx(expected, rel=1e-10, abs=1e-10)
@@ -110,11 +100,8 @@ def test_sources_compiled_manually_give_the_same_plant(bare, fmi):
 @pytest.mark.slow
 def test_sources_compiled_by_fmpy_give_the_same_plant(bare, fmi, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", str(Path(sys.executable).parent), prepend=":")  # for the cmake of FMPy's own needs
-    missing = [
-        tools
-        for tools in (("cmake",), ("cc",), ("c++", "g++", "clang++"), ("make",))
-        if not any(map(shutil.which, tools))
-    ]
+    needed = (("cmake",), ("cc",), ("c++", "g++", "clang++"), ("make",))
+    missing = [tools for tools in needed if not any(map(shutil.which, tools))]
     if missing or native_platform().system == "windows":
         pytest.skip(f"FMPy compiles with CMake, a C and a C++ compiler and make; missing: {missing}")
     (tmp_path / "build").mkdir()

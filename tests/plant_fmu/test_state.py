@@ -32,40 +32,21 @@ def drive(slave, k0, k1):
     return rows
 
 
-def test_restored_state_continues_bit_for_bit(make_slave, fmi):
-    slave = make_slave(fmi=fmi).start(**LIVELY)
-    drive(slave, 0, 50)
-    state = slave.save()
-    first = drive(slave, 50, 120)
-    slave.restore(state)
-    assert drive(slave, 50, 120) == first
-    slave.free(state)
-
-
-def test_state_transfers_to_another_instance(make_slave, fmi):
-    """As bytes: what a cluster or a file would carry."""
+def test_state_continues_bit_for_bit_here_and_in_another_instance(make_slave, fmi):
+    """There as bytes: what a cluster or a file would carry."""
     slave, other = make_slave(fmi=fmi).start(**LIVELY), make_slave(fmi=fmi)
     drive(slave, 0, 50)
     state = slave.save()
     data = slave.serialise(state)
+    assert data[:8] == bytes(8)  # some importers hand the block, not its address, to the function that frees it
     arrived = other.deserialise(data)
     other.restore(arrived)
-    assert drive(other, 50, 120) == drive(slave, 50, 120)
-    slave.free(state)
-    other.free(arrived)
-
-
-def test_state_includes_the_mode(make_slave, fmi):
-    """A state saved before initialization restores that mode."""
-    slave = make_slave(fmi=fmi)
-    slave.set_values({"position.x": 3.0})
-    state = slave.save()
-    slave.start()
-    slave.step(0.1)
+    first = drive(slave, 50, 120)
     slave.restore(state)
-    slave.start(**{"position.y": 4.0})
-    assert slave.get("position.x", "position.y") == [3.0, 4.0]
-    slave.free(state)
+    assert drive(slave, 50, 120) == drive(other, 50, 120) == first
+    for _ in range(2):  # freeing a freed state succeeds
+        slave.free(state)
+    other.free(arrived)
 
 
 def test_get_state_overwrites_an_existing_state(make_slave, fmi):
@@ -77,21 +58,6 @@ def test_get_state_overwrites_an_existing_state(make_slave, fmi):
     drive(slave, 5, 9)
     slave.restore(state)
     assert slave.get(*STATES) == here
-    slave.free(state)
-
-
-def test_freeing_a_freed_state_succeeds(make_slave, fmi):
-    slave = make_slave(fmi=fmi).start()
-    state = slave.save()
-    slave.free(state)
-    slave.free(state)
-
-
-def test_serialized_state_starts_with_a_zero_word(make_slave, fmi):
-    """Some importers hand the block, not its address, to the function that frees it."""
-    slave = make_slave(fmi=fmi).start(**LIVELY)
-    state = slave.save()
-    assert slave.serialise(state)[:8] == bytes(8)
     slave.free(state)
 
 
