@@ -8,7 +8,7 @@ import pytest
 
 from fuzzy_arbiter import Output, Shape, System, Term, Variable, falling, prioritised, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
-from fuzzy_arbiter.formats import FORMATS, fold_normalization, load, writes
+from fuzzy_arbiter.formats import FORMATS, fold_normalization, load, reads, writes
 from tests.fuzzy_arbiter.formats.other_tools import DATA, TOOLS
 from tests.fuzzy_arbiter.formats.systems import TIPPING
 
@@ -30,7 +30,15 @@ def centroids(system, samples):
 def test_committed_files_round_trip(format):
     path = DATA / f"tipping.{format}"
     assert load(path) == TIPPING
-    assert path.read_text() == writes(TIPPING, format)
+    text = path.read_text()
+    assert text == writes(TIPPING, format)
+    for foreign in (
+        text.replace("\n", "\r"),
+        text.replace("\n", "\r\n"),
+        text.replace("\n", "  \n"),
+        text.rstrip("\n"),
+    ):
+        assert reads(foreign, format) == TIPPING
 
 
 @pytest.mark.parametrize("tool", TOOLS)
