@@ -74,7 +74,7 @@ def write_set_point_wrench(
     state: VehicleState, goal: PackedRegions, regions: PackedRegions, gains: Any, memory: PotentialMemory, R: Array,
     forces: Array,
 ) -> Vector3:  # fmt: skip
-    """Write the wrench of pull, push and damping, and the rotation `R`, (3, 3); return the attitude error (23)."""
+    """Write the wrench [N, N m] of pull, push and damping, and rotation `R`, (3, 3); return the attitude error (23)."""
     # with gains that have limit, inset, repulsion, reach, k_p1, k_p2, k_v1 and k_v2
     field = memory.field
     write_rotation(state.quaternion, R)

@@ -46,7 +46,7 @@ class ReportedState:
         self.autopilot = 0
         # position [m] and velocity [m/s], NED, in the autopilot's own local frame
         self.position: Array = np.full(3, math.nan)
-        self.velocity: Array = np.full(3, math.nan)
+        self.velocity: Array = np.full(3, math.nan)  # m/s
         # attitude from body to world, scalar first; body rates [rad/s]
         self.quaternion: Array = np.array([1.0, 0.0, 0.0, 0.0])
         self.rates: Array = np.zeros(3)

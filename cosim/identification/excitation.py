@@ -72,7 +72,7 @@ class Segment:
     sticks: Array  # (n, 6) sticks X Y Z K M N, -1 to 1, each row held for `PERIOD`
 
     def scaled(self, force: float, moment: float) -> Segment:
-        """Return the segment with factors on the sticks of the forces and of the moments."""
+        """Scale the sticks of the forces and of the moments; factors [-]."""
         return replace(self, sticks=self.sticks * np.repeat([force, moment], 3))
 
 

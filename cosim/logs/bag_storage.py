@@ -44,7 +44,7 @@ class StoredMessage(NamedTuple):
     encoding: str  # encoding of the data, such as cdr, ros1 or json
     data: bytes
     time: float  # s, time of recording, by the recorder's clock
-    position: float  # fraction of the file read so far, 0 to 1
+    progress: float  # fraction of the file read so far, 0 to 1
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -80,7 +80,7 @@ def stored_messages(path: Path, remarks: list[str], on_progress: OnProgress) -> 
                     topics.add(message.topic)
                     if len(topics) > _MAX_TOPICS:
                         raise ImportLogError(f"has more than {_MAX_TOPICS} topics")
-                on_progress((k + message.position) / len(files))
+                on_progress((k + message.progress) / len(files))
         except failures as error:
             words = str(error) or type(error).__name__
             if not topics:

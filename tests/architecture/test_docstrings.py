@@ -220,7 +220,11 @@ def test_fields_and_properties_that_are_physical_quantities_have_units():
         field = isinstance(attribute, griffe.Attribute) and attribute.parent.is_class
         if field and physical(attribute.name, attribute.annotation):
             about = dict(section(attribute.parent, Part.attributes) + section(attribute.parent, Part.parameters))
-            words = " ".join([docstring_text(attribute), comment_on(attribute), about.get(attribute.name, "")])
+            unit = re.search(
+                r"""key\((?:'[^']*'|"[^"]*"), '([^']*)'""", str(attribute.annotation)
+            )  # of a scenario's key
+            texts = [docstring_text(attribute), comment_on(attribute), about.get(attribute.name, "")]
+            words = " ".join([*texts, unit[1] if unit else ""])
             if not UNIT.search(words):
                 wrong[attribute.path] = words
     assert not wrong, shown(wrong)

@@ -17,8 +17,8 @@ def scenario_table(
     title: str,
     seed: int,
     vehicle: Vehicle,
-    duration: float,
-    current: list[float],
+    duration: float,  # s
+    current: list[float],  # m/s, NED
     parameters: dict[str, float],
     start: list[float],
     goal: Table,
@@ -49,5 +49,5 @@ def thruster_lags(vehicle: Vehicle, lag: float) -> dict[str, float]:
 
 
 def sphere_table(centre: Iterable[float], radius: float) -> Table:
-    """Return a sphere."""
+    """Return the table of a sphere [m]."""
     return {"type": "sphere", "centre": [float(x) for x in centre], "radius": float(radius)}

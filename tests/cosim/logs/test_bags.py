@@ -214,7 +214,7 @@ def test_bag_of_a_recorder_is_read():
     """By ros2 bag record 0.3; values as ``ros2 bag`` of its own tests expects them."""
     messages = list(stored_messages(LOGS / "cdr_test_0.db3", [], lambda fraction: None))
     assert [message.topic for message in messages].count("/test_topic") == 3
-    assert 0.0 < messages[0].position < messages[-1].position < 1.0
+    assert 0.0 < messages[0].progress < messages[-1].progress < 1.0
     decoder = Decoder("")
     basic = [decoder.decode(message) for message in messages if message.topic == "/test_topic"]
     assert {message.int32_value for message in basic} == {123}
