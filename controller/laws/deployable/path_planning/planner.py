@@ -60,9 +60,7 @@ class PathPlan(NamedTuple):
     found: Array  # (CORNERS + 1, 3) m, NED: path found by the search
     counts: NDArray[np.int64]  # (3,) number of points of path, candidate and found, the end included; 0: none yet
     cost: Array  # (4,) m: cost of the path and its parts, as in `PathCost`
-    waits: NDArray[
-        np.bool_
-    ]  # (2,) True if path, and candidate, wait at their first corner until fast regions have passed
+    waits: NDArray[np.bool_]  # (2,) True if path, or candidate, waits at its first corner for fast regions to pass
     new_cost: PathCost  # evaluation under way, of path or candidate
     search: Search
     closed: NDArray[np.bool_]  # (n,) True for regions that the search keeps out of
