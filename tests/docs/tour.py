@@ -46,7 +46,7 @@ class Endless:
 
 
 ENDLESS = (
-    Endless("cosim run harbour", 10.0, writes="runs/harbour-*/record.parts/*.parquet"),  # ten minutes, at real time
+    Endless("cosim run harbour", 10.0, writes="runs/harbour-*/record.arrows"),  # ten minutes, at real time
     Endless("cosim mavlink listen", 5.0, says="no vehicle found"),
     Endless("cosim sitl", 5.0, says="waiting for ArduPilot"),
 )

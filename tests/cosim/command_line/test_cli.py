@@ -334,7 +334,7 @@ def test_ctrl_c_leaves_a_readable_run(tmp_path, sent):
     """The process as a user has it: from the start of stepping to a report, no traceback."""
     out = tmp_path / "run"
     process = cosim("run", "paper", *BRIEF[:2], "--set", "time.duration=3000", "--out", str(out))
-    while not (any(out.glob("record.parts/*.parquet")) or process.poll() is not None):
+    while not (any(file.stat().st_size for file in out.glob("record.arrows")) or process.poll() is not None):
         time.sleep(0.02)
     process.send_signal(sent)
     printed, said = process.communicate(timeout=240)
