@@ -28,7 +28,7 @@ from controller.laws.pid_cbf import PidCbfGains, PidCbfLaw, observe
 from controller.quaternion import error_parts, write_rotation
 from controller.regions import DepthBand, Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
-from controller.regions.region_set import PackedRegions, place_clearance
+from controller.regions.region_set import PackedRegions, position_clearance
 
 PERIOD = 0.1  # s, time between plans
 ITERATIONS = 15  # greatest number of the solver's iterations
@@ -160,7 +160,7 @@ def constraints(regions: PackedRegions, path: Array, interval: float) -> dict[st
             rows = []
             for k, place in enumerate(path):
                 moved = (k + 1) * interval * regions.velocities[i]
-                clearance = place_clearance(regions, i, place - moved, slope)
+                clearance = position_clearance(regions, i, place - moved, slope)
                 along = float(slope @ place)
                 rows.append((*slope.tolist(), along - clearance) if slope.any() else _FREE)
             planes[hard].append(rows)

@@ -37,7 +37,7 @@ class RegionsSeen(NamedTuple):
     clearances: Array  # (n,) distance to the surface, m (rad for shapes of attitude), below 0 where violated
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
-    hard: NDArray[np.bool_]  # (n,) must not be violated
+    hard: NDArray[np.bool_]  # (n,) True for a hard region, which the vehicle must not violate
 
 
 LawFunction = Callable[[VehicleState, RegionsSeen, RegionsSeen, Array], ArrayLike]
@@ -113,8 +113,10 @@ class FunctionLaw:
         LawError
             If the function returns anything but finite numbers of the right shape.
         """
-        given = VehicleState(*(part.copy() for part in state))
-        received = self._function(given, _evaluate(goal, given), _evaluate(regions, given), weights.copy())
+        state_copy = VehicleState(*(part.copy() for part in state))
+        received = self._function(
+            state_copy, _evaluate(goal, state_copy), _evaluate(regions, state_copy), weights.copy()
+        )
         numbers = _real_numbers(received)
         if numbers.shape != forces.shape or not np.isfinite(numbers).all():
             unit = "N and N m" if self.output == "wrench" else "N"

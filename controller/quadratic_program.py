@@ -85,9 +85,9 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
     n = barriers + 2 * forces.size
     tolerance = _TOLERANCE * _prepare(work, barriers, inverse, lower, upper)
     copy(work.nominal, forces)
-    count, steps, most = 0, 0, _STEPS_A_ROW * n
+    count, steps, max_steps = 0, 0, _STEPS_A_ROW * n
     row = _most_violated(work, barriers, lower, upper, forces, tolerance)
-    while row >= 0 and steps < most:
+    while row >= 0 and steps < max_steps:
         steps += 1
         work.passive[count] = row
         added = _append_factor_row(work, barriers, count)
@@ -101,7 +101,7 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
         work.row_state[row] = _PASSIVE
         count += 1
         drop = _advance(work, count)
-        while drop >= 0 and steps < most:
+        while drop >= 0 and steps < max_steps:
             steps += 1
             count -= 1
             for k in range(drop, count):
@@ -151,18 +151,18 @@ def _prepare(work: Workspace, barriers: int, inverse: Array, lower: Array, upper
             finite += work.rows[i, j]
         if not np.isfinite(finite):
             work.rows[i, :], work.right[i], work.price[i] = 0.0, 0.0, 1.0
-        own, kept = 0.0, 0.0
+        squared_norm, nominal_value = 0.0, 0.0
         for j in range(m):
             total = 0.0
             for q in range(m):
                 total += inverse[j, q] * work.rows[i, q]
             work.mapped_rows[i, j] = total
-            own += work.rows[i, j] * total
-            kept += work.rows[i, j] * work.nominal[j]
-        work.residual[i] = work.right[i] - kept
-        work.size[i] = np.sqrt(own + work.price[i])
+            squared_norm += work.rows[i, j] * total
+            nominal_value += work.rows[i, j] * work.nominal[j]
+        work.residual[i] = work.right[i] - nominal_value
+        work.size[i] = np.sqrt(squared_norm + work.price[i])
         work.multipliers[i], work.row_state[i] = 0.0, _FREE
-        if not own > 0.0:
+        if not squared_norm > 0.0:
             work.multipliers[i] = max(work.right[i], 0.0) / work.price[i] if work.price[i] > 0.0 else 0.0
             work.row_state[i] = _NOTHING
         else:
@@ -236,20 +236,20 @@ def _refine(
 
 def _sum_dual_force(work: Workspace, barriers: int, count: int) -> None:
     """Write A^T y into `dual_force`, summed over the passive rows in twice the precision."""
-    m, dual_force, rest = work.nominal.size, work.dual_force, work.refined
+    m, dual_force, remainders = work.nominal.size, work.dual_force, work.refined
     for j in range(m):
-        dual_force[j], rest[j] = 0.0, 0.0
+        dual_force[j], remainders[j] = 0.0, 0.0
     for a in range(count):
         i = work.passive[a]
         y = work.multipliers[i]
         if i < barriers:
             for j in range(m):
-                dual_force[j], rest[j] = _add_product(dual_force[j], rest[j], work.rows[i, j], y)
+                dual_force[j], remainders[j] = _add_product(dual_force[j], remainders[j], work.rows[i, j], y)
         else:
             j, sign = (i - barriers, 1.0) if i < barriers + m else (i - barriers - m, -1.0)
-            dual_force[j], rest[j] = _add_product(dual_force[j], rest[j], sign, y)
+            dual_force[j], remainders[j] = _add_product(dual_force[j], remainders[j], sign, y)
     for j in range(m):
-        dual_force[j] += rest[j]
+        dual_force[j] += remainders[j]
 
 
 def _row_residual(work: Workspace, barriers: int, i: int, lower: Array, upper: Array, forces: Array) -> float:

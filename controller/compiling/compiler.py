@@ -46,5 +46,5 @@ def compile_file(source: Path, library: Path, compiler: Sequence[str] | None = N
         raise CompilationError(f"C compiler {command[0]}: {error.strerror or error}") from error
     if done.returncode != 0 or not library.is_file():
         lines = done.stderr.splitlines()
-        said = [line for line in lines if "error" in line] or lines or ["it wrote neither a library nor a message"]
-        raise CompilationError(f"C compiler {command[0]} failed: {said[0].strip()}")
+        messages = [line for line in lines if "error" in line] or lines or ["it wrote neither a library nor a message"]
+        raise CompilationError(f"C compiler {command[0]} failed: {messages[0].strip()}")

@@ -47,10 +47,10 @@ def _entry(function: FunctionType, types: tuple[Type, ...]) -> Any:
 
 
 def _described(argument: Any, known: Described) -> tuple[Any, Type, list[int]]:
-    found = known.get(id(argument))
-    if found is None:
-        found = known[id(argument)] = argument, type_of(argument), words_of(argument)
-    return found
+    description = known.get(id(argument))
+    if description is None:
+        description = known[id(argument)] = argument, type_of(argument), words_of(argument)
+    return description
 
 
 class BoundCall:

@@ -124,19 +124,19 @@ def _compiled(text: str, name: str) -> Path:
 
 def keep(built: Path, folder: Path) -> Path:
     """Copy a library with its checksum into a folder of the cache, atomically."""
-    kept = folder / built.name
+    cached = folder / built.name
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
         if not _is_trusted(folder):
             return built
         _remove_old_parts(folder)
         library = built.read_bytes()
-        _write_atomic(checksum_path(kept), digest_of(library).encode())
-        _write_atomic(kept, library)
+        _write_atomic(checksum_path(cached), digest_of(library).encode())
+        _write_atomic(cached, library)
     except OSError as error:
         log.warning("cache %s: %s; compiled for this process alone", folder, error.strerror or error)
         return built
-    return kept
+    return cached
 
 
 def _remove_old_parts(folder: Path) -> None:

@@ -15,14 +15,14 @@ __all__ = ["LAWS"]
 
 def _find_laws() -> dict[str, type[CompiledLaw]]:
     """Return the class of each module in this folder, with its name set."""
-    found = {}
+    laws = {}
     for module in iter_modules(__path__):
         law = getattr(import_module(f"{__name__}.{module.name}"), "LAW", None)
         if not (isinstance(law, type) and issubclass(law, CompiledLaw)):
             raise TypeError(f"{__name__}.{module.name} has no LAW, expected its class, a CompiledLaw")
         law.name = module.name
-        found[module.name] = law
-    return found
+        laws[module.name] = law
+    return laws
 
 
 LAWS: dict[str, type[CompiledLaw]] = _find_laws()

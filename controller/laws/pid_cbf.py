@@ -204,11 +204,11 @@ def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Array, gains
         turning = 0.0
         if pose_gradient(observation.later_gradients, observation.later_rotation_gradients, i, of_attitude, later):
             turning = gradient_rate(regions.kinds[i], regions.signs[i], n, later, relative)
-        h, rate, falling = observation.clearances[i] - gains.margin, 0.0, 0.0
+        h, rate, drift_term = observation.clearances[i] - gains.margin, 0.0, 0.0
         for axis in range(6):
             rate += n[axis] * relative[axis]
-            falling += n[axis] * free[axis]
-        right = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * h - falling - turning
+            drift_term += n[axis] * free[axis]
+        right = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * h - drift_term - turning
         rows = add_row(work, rows, n, memory.acceleration, right, price, lower, upper)
     return rows
 

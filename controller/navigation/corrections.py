@@ -105,25 +105,27 @@ def _predict_sample(
             rows[i, POSITION + i] = 1.0
         return max(sensors.position, _LEAST_SCALE)
     if sensor == DVL:
-        scale, seen = 1.0 + memory.constants[VELOCITY_SCALE - GYRO_BIAS], zeros(3)
+        scale, world_velocity = 1.0 + memory.constants[VELOCITY_SCALE - GYRO_BIAS], zeros(3)
         noise, unknown = max(sensors.velocity, _LEAST_SCALE), 0.0
         for k in range(3):
             unknown = max(unknown, memory.covariance[VELOCITY + k, VELOCITY + k])
-            seen[k] = velocity[k]
+            world_velocity[k] = velocity[k]
         # an error of attitude acts on the true velocity, to which the sample is nearer
         if unknown > square(_UNKNOWN * noise):
             for k in range(3):
-                seen[k] = 0.0
+                world_velocity[k] = 0.0
                 for i in range(3):
-                    seen[k] += R[k, i] * values[MEASURED_VELOCITY + i] / scale
+                    world_velocity[k] += R[k, i] * values[MEASURED_VELOCITY + i] / scale
         for i in range(3):
             body = 0.0
             for k in range(3):
                 body += R[k, i] * velocity[k]
                 rows[i, VELOCITY + k] = scale * R[k, i]
                 a, b = (k + 1) % 3, (k + 2) % 3  # R^T S(v) dtheta
-                rows[i, ATTITUDE + k] = scale * (R[a, i] * seen[b] - R[b, i] * seen[a])
-            rows[i, VELOCITY_SCALE] = R[0, i] * seen[0] + R[1, i] * seen[1] + R[2, i] * seen[2]
+                rows[i, ATTITUDE + k] = scale * (R[a, i] * world_velocity[b] - R[b, i] * world_velocity[a])
+            rows[i, VELOCITY_SCALE] = (
+                R[0, i] * world_velocity[0] + R[1, i] * world_velocity[1] + R[2, i] * world_velocity[2]
+            )
             innovation[i] = values[MEASURED_VELOCITY + i] - scale * body
         return noise
     level = square(R[0, 0]) + square(R[1, 0])  # the bow, x of the body, seen from above
@@ -179,18 +181,18 @@ def restart(memory: NavigationMemory) -> None:
 
 def _reset_covariance(memory: NavigationMemory, sensor: int, innovation: Array, sensors: SensorModel) -> None:
     """Reset the covariance to the start's; that of the position stays, and grows by a fix's or depth's innovation."""
-    kept = zeros(3)
+    variances = zeros(3)
     for i in range(3):
-        kept[i] = memory.covariance[POSITION + i, POSITION + i]
+        variances[i] = memory.covariance[POSITION + i, POSITION + i]
     if sensor == USBL:
         for i in range(3):
-            kept[i] += square(innovation[i])
+            variances[i] += square(innovation[i])
     elif sensor == DEPTH_SENSOR:
-        kept[2] += square(innovation[0])
+        variances[2] += square(innovation[0])
     set_first_covariance(memory, sensors)
     memory.accepted[sensor] = 0.0
     for i in range(3):
-        memory.covariance[POSITION + i, POSITION + i] = kept[i]
+        memory.covariance[POSITION + i, POSITION + i] = variances[i]
 
 
 def _correct_number(memory: NavigationMemory, error: Array, innovation: float, noise: float, sensor: int) -> None:

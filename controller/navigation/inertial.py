@@ -127,18 +127,18 @@ def estimate_at(memory: NavigationMemory, time: float, position: Array, velocity
         i -= 1
     if memory.imu_history[i % n, 0] > time or i == newest:
         return False
-    before, after, then = i % n, (i + 1) % n, zeros(10)
+    before, after, motion = i % n, (i + 1) % n, zeros(10)
     share = (time - memory.imu_history[before, 0]) / (memory.imu_history[after, 0] - memory.imu_history[before, 0])
     for k in range(10):
-        then[k] = memory.imu_history[before, 1 + k] + share * (
+        motion[k] = memory.imu_history[before, 1 + k] + share * (
             memory.imu_history[after, 1 + k] - memory.imu_history[before, 1 + k]
         )
     for k in range(3):
-        position[k] = memory.position[k] - (memory.imu_motion[k] - then[k])
-        velocity[k] = memory.velocity[k] - (memory.imu_motion[3 + k] - then[3 + k])
-    # attitude * imu_motion^-1 * then
+        position[k] = memory.position[k] - (memory.imu_motion[k] - motion[k])
+        velocity[k] = memory.velocity[k] - (memory.imu_motion[3 + k] - motion[3 + k])
+    # attitude * imu_motion^-1 * motion
     _multiply_by(quaternion, memory.imu_motion[6], -memory.imu_motion[7], -memory.imu_motion[8], -memory.imu_motion[9])
-    _multiply_by(quaternion, then[6], then[7], then[8], then[9])
+    _multiply_by(quaternion, motion[6], motion[7], motion[8], motion[9])
     return True
 
 

@@ -70,7 +70,7 @@ def _meet(
     notched = kind == _PRISM and not convex and outward > 0.0
     x, y, radius = _circle_about(numbers) if notched else (0.0, 0.0, 0.0)
     x, y = x - start[0], y - start[1]
-    at = zeros(3)
+    point = zeros(3)
     for k in range(distances.size):
         dx, dy, dz = directions[k, 0], directions[k, 1], directions[k, 2]
         if notched and abs(x * dy - y * dx) > radius * hypotenuse(dx, dy) + _PARALLEL:
@@ -81,8 +81,8 @@ def _meet(
             way += _stride(kind, convex, outward, here, dx, dy, dz)
             if not way < nearest:
                 break
-            at[0], at[1], at[2] = start[0] + way * dx, start[1] + way * dy, start[2] + way * dz
-            here = evaluate_shape(kind, at, numbers)
+            point[0], point[1], point[2] = start[0] + way * dx, start[1] + way * dy, start[2] + way * dz
+            here = evaluate_shape(kind, point, numbers)
             if outward * here[4] <= TOUCHING:
                 break
         if way < nearest or math.isnan(way):

@@ -39,7 +39,7 @@ SHAPES: dict[str, type[Shape]] = {name: entry.shape for name, entry in ENTRIES.i
 class Region:
     """A shape to be kept within (``"in"``), or kept out of (``"out"``), at rest or moving.
 
-    A hard region must not be violated; a soft one pushes. Each law documents if it distinguishes them.
+    The vehicle must not violate a hard region; a soft one pushes. Each law documents whether it distinguishes them.
 
     Examples
     --------
@@ -49,17 +49,17 @@ class Region:
     """
 
     name: str
-    shape: Shape  # shape at its place at time 0
+    shape: Shape  # shape at its position at time 0
     keep: Literal["in", "out"]
     velocity: Vector3 = (0.0, 0.0, 0.0)  # m/s, NED
     gain: float = 1.0  # alpha_i of section VII, in N per unit of g
     hard: bool = True
-    deviation: float | Vector3 = 0.0  # m, standard deviation of its place: in any direction, or north, east and down
+    deviation: float | Vector3 = 0.0  # m, standard deviation of its position: in any direction, or north, east and down
     crossing_cost: float = 2.0  # m, added to a path's length per metre through a soft region, half a metre deep
 
     @property
     def deviations(self) -> Vector3:
-        """Standard deviations of its place north, east and down [m]."""
+        """Standard deviations of its position, north, east and down [m]."""
         return deviations_of(self.deviation)
 
     def __post_init__(self) -> None:
@@ -123,7 +123,7 @@ class PackedRegions(NamedTuple):
     shifts: Array  # (n, 3) m, NED: displacement of each from its packed place
     velocities: Array  # (n, 3) m/s, NED
     gains: Array  # (n,) alpha_i
-    hard: NDArray[np.bool_]  # (n,) True if the region must not be violated
+    hard: NDArray[np.bool_]  # (n,) True for a hard region
     deviations: Array  # (n, 3) m, standard deviations of each place, NED
     crossing_costs: Array  # (n,) m, added to a path's length per metre through each, half a metre deep
 
@@ -142,7 +142,7 @@ class PackedRegions(NamedTuple):
         _evaluate(self, position, quaternion, values, gradients, rotation_gradients, clearances)
 
     def move_to(self, time: float) -> None:
-        """Move every region by its velocity to its place at a time [s]."""
+        """Move every region by its velocity to its position at a time [s]."""
         np.multiply(self.velocities, time, out=self.shifts)
 
 
@@ -199,7 +199,7 @@ def evaluate_packed(
     for i in range(regions.kinds.size):
         tx, ty, tz = 0.0, 0.0, 0.0
         if regions.kinds[i] < FIRST_OF_ATTITUDE:
-            g, gx, gy, gz, distance = evaluate_place(regions, i, position, at)
+            g, gx, gy, gz, distance = evaluate_at(regions, i, position, at)
         else:
             g, gx, gy, gz, tx, ty, tz = evaluate_pose(regions, i, position, quaternion, at)
             distance = g
@@ -209,9 +209,9 @@ def evaluate_packed(
         rotation_gradients[i, 0], rotation_gradients[i, 1], rotation_gradients[i, 2] = sign * tx, sign * ty, sign * tz
 
 
-def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -> Evaluation:
+def evaluate_at(regions: PackedRegions, i: int, position: Array, scratch: Array) -> Evaluation:
     """Evaluate the shape of region `i`, of position alone, where it is now, at a `position`, shape (3,) [m, NED]."""
-    # Spheres and bands of depth, the most frequent, need no array; the others use `at`, shape (3,), as scratch space.
+    # Spheres and bands of depth, the most frequent, need no array; the others use `scratch`, shape (3,).
     x = position[0] - regions.shifts[i, 0]
     y = position[1] - regions.shifts[i, 1]
     z = position[2] - regions.shifts[i, 2]
@@ -220,24 +220,24 @@ def evaluate_place(regions: PackedRegions, i: int, position: Array, at: Array) -
         return sphere_about(x - q[first], y - q[first + 1], z - q[first + 2], q[first + 3])
     if kind == DEPTH_BAND:
         return band_about(z - q[first], q[first + 1])
-    at[0], at[1], at[2] = x, y, z
-    evaluation: Evaluation = evaluate_shape(kind, at, q[first : regions.offsets[i + 1]])
+    scratch[0], scratch[1], scratch[2] = x, y, z
+    evaluation: Evaluation = evaluate_shape(kind, scratch, q[first : regions.offsets[i + 1]])
     return evaluation
 
 
-def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, at: Array) -> EvaluationOfAttitude:
+def evaluate_pose(regions: PackedRegions, i: int, position: Array, e: Array, scratch: Array) -> EvaluationOfAttitude:
     """Evaluate the shape of region `i`, of attitude, where it is now, at a `position`, shape (3,) [m, NED]."""
-    # `e` is the unit quaternion of the pose, and `at`, shape (3,), is scratch space.
+    # `e` is the unit quaternion of the pose, and `scratch` has shape (3,).
     for axis in range(3):
-        at[axis] = position[axis] - regions.shifts[i, axis]
+        scratch[axis] = position[axis] - regions.shifts[i, axis]
     numbers = regions.numbers[regions.offsets[i] : regions.offsets[i + 1]]
-    evaluation: EvaluationOfAttitude = evaluate_shape_of_attitude(regions.kinds[i], at, e, numbers)
+    evaluation: EvaluationOfAttitude = evaluate_shape_of_attitude(regions.kinds[i], scratch, e, numbers)
     return evaluation
 
 
-def clearance_of_place(regions: PackedRegions, i: int, position: Array, scratch: Array) -> float:
+def clearance_at_position(regions: PackedRegions, i: int, position: Array, scratch: Array) -> float:
     """Return the clearance [m] as `clearance_at`, of a region of position alone; `scratch` has shape (3,)."""
-    clearance: float = -regions.signs[i] * evaluate_place(regions, i, position, scratch)[4]
+    clearance: float = -regions.signs[i] * evaluate_at(regions, i, position, scratch)[4]
     return clearance
 
 
@@ -246,14 +246,14 @@ def clearance_at(regions: PackedRegions, i: int, position: Array) -> float:
     # Infinite for shapes that depend on attitude: they block no position.
     if regions.kinds[i] >= FIRST_OF_ATTITUDE:
         return math.inf
-    return clearance_of_place(regions, i, position, zeros(3))
+    return clearance_at_position(regions, i, position, zeros(3))
 
 
 def clearance_of_pose(regions: PackedRegions, i: int, position: Array, quaternion: Array, scratch: Array) -> float:
     """Return the clearance of one of the `regions`, `i`, of any kind, [m] or [rad], at a pose."""
     # The pose is a `position` [m, NED] and a unit `quaternion`; `scratch` has shape (3,).
     if regions.kinds[i] < FIRST_OF_ATTITUDE:
-        return clearance_of_place(regions, i, position, scratch)
+        return clearance_at_position(regions, i, position, scratch)
     clearance: float = -regions.signs[i] * evaluate_pose(regions, i, position, quaternion, scratch)[0]
     return clearance
 
@@ -279,10 +279,10 @@ def attitude_clearance(regions: PackedRegions, i: int, position: Array, quaterni
     return clearance
 
 
-def place_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
+def position_clearance(regions: PackedRegions, i: int, position: Array, slope: Array) -> float:
     """Return the clearance [m] of one of the `regions`, `i`, of position alone."""
     # The function writes its `slope` at the `position`, shape (3,), of length 1 or 0.
-    _, x, y, z, distance = evaluate_place(regions, i, position, zeros(3))
+    _, x, y, z, distance = evaluate_at(regions, i, position, zeros(3))
     size, sign = math.sqrt(x * x + y * y + z * z), regions.signs[i]
     scale = -sign / size if size > 0.0 else 0.0
     slope[0], slope[1], slope[2] = scale * x, scale * y, scale * z
@@ -302,7 +302,7 @@ def write_clearances(regions: PackedRegions, points: Array, scratch: Array, clea
     """Write `clearance_at` of the first of the `regions` at each of the points; `scratch` has shape (3,)."""
     for i in range(points.shape[0]):
         if regions.kinds[0] < FIRST_OF_ATTITUDE:
-            clearances[i] = clearance_of_place(regions, 0, points[i], scratch)
+            clearances[i] = clearance_at_position(regions, 0, points[i], scratch)
         else:
             clearances[i] = math.inf
 

@@ -65,11 +65,11 @@ class Calls(Subscripts):
         return self.fail(node, f"a call of {name or function!r}")
 
     def _foreign(self, operands: Sequence[Operand], node: ast.AST) -> Value:
-        address, listed, *given = operands
+        address, listed, *arguments = operands
         kinds = [kind.value for kind in self.items_of(listed, node) if isinstance(kind, Known)]
-        if len(kinds) != len(given):
+        if len(kinds) != len(arguments):
             self.fail(node, "a call of C whose kinds are no constants, one for each argument")
-        values = [self.value(operand, node) for operand in given]
+        values = [self.value(operand, node) for operand in arguments]
         codes = [_as_kind(value, kind) for value, kind in zip(values, kinds, strict=True)]
         function = f"(int (*)({', '.join(kinds)}))(intptr_t)"
         return self.temporary(INT, f"({function}{self.scalar(address, node).code})({', '.join(codes)})")

@@ -34,10 +34,10 @@ class Expressions(Operands):
         if node.id in self.globals:
             return Known(self.globals[node.id])
         builtins: Any = self.globals["__builtins__"]
-        found = builtins.get(node.id) if isinstance(builtins, dict) else getattr(builtins, node.id, None)
-        if found is None:
+        builtin = builtins.get(node.id) if isinstance(builtins, dict) else getattr(builtins, node.id, None)
+        if builtin is None:
             self.fail(node, f"{node.id} is not known here")
-        return Known(found)
+        return Known(builtin)
 
     def _attribute(self, node: ast.Attribute) -> Operand:
         owner = self.expression(node.value)
@@ -114,8 +114,8 @@ class Expressions(Operands):
         if isinstance(node.ops[0], ast.In | ast.NotIn) and len(node.ops) == 1:
             value = self.scalar(operands[0], node)
             value = value if value.simple else self.temporary(value.type, value.code)
-            found = [f"{value.code} == {self.scalar(x, node).code}" for x in self.items_of(operands[1], node)]
-            code = " || ".join(found) if found else "false"
+            equalities = [f"{value.code} == {self.scalar(x, node).code}" for x in self.items_of(operands[1], node)]
+            code = " || ".join(equalities) if equalities else "false"
             return Value(BOOL, f"!({code})" if isinstance(node.ops[0], ast.NotIn) else code)
         values = [self.scalar(operand, node) for operand in operands]
         for i in range(1, len(values) - 1):
@@ -159,16 +159,16 @@ class Expressions(Operands):
             branches.append((needed, operand))
         (first, a), (second, b) = branches
         if isinstance(a, Items) and isinstance(b, Items) and not (first or second):
-            held = condition if condition.simple else self.temporary(BOOL, condition.code)
-            return Items(tuple(self._chosen(held, x, y, node) for x, y in zip(a.items, b.items, strict=True)))
+            result = condition if condition.simple else self.temporary(BOOL, condition.code)
+            return Items(tuple(self._chosen(result, x, y, node) for x, y in zip(a.items, b.items, strict=True)))
         if not (first or second):
             return self._chosen(condition, a, b, node)
         x, y = self.value(a, node), self.value(b, node)
         kind = unified(x.type, y.type)
-        held = self.temporary(kind, "")
-        self.lines += [f"if ({condition.code}) {{", *first, f"{held.code} = {self.converted(x, kind)};", "} else {"]
-        self.lines += [*second, f"{held.code} = {self.converted(y, kind)};", "}"]
-        return held
+        result = self.temporary(kind, "")
+        self.lines += [f"if ({condition.code}) {{", *first, f"{result.code} = {self.converted(x, kind)};", "} else {"]
+        self.lines += [*second, f"{result.code} = {self.converted(y, kind)};", "}"]
+        return result
 
     def _chosen(self, condition: Value, a: Operand, b: Operand, node: ast.AST) -> Value:
         x, y = self.value(a, node), self.value(b, node)

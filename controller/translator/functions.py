@@ -88,11 +88,11 @@ class Function(Statements):
 
     def signature(self, name: str) -> str:
         """Return the head of the function."""
-        given = ", ".join(
+        parameters = ", ".join(
             self._declaration(kind, self.variable(parameter))
             for parameter, kind in zip(self.parameters, self._arguments, strict=True)
         )
-        return f"static {self._program.name(self.result)} {name}({given or 'void'})"
+        return f"static {self._program.name(self.result)} {name}({parameters or 'void'})"
 
     def _declaration(self, kind: Type, name: str) -> str:
         return f"const {self.c(kind)} *{name}" if isinstance(kind, Record) else f"{self.c(kind)} {name}"

@@ -50,11 +50,13 @@ class Program:
             raise TranslationError(f"{function!r} is no plain function, which is not translated to C")
         called, _ = self.instance(function, arguments)
         fields = "".join(f"    {self.name(kind)} a{i};\n" for i, kind in enumerate(arguments))
-        given = ", ".join(f"{'&' if isinstance(kind, Record) else ''}w->a{i}" for i, kind in enumerate(arguments))
+        arguments_text = ", ".join(
+            f"{'&' if isinstance(kind, Record) else ''}w->a{i}" for i, kind in enumerate(arguments)
+        )
         self._exports.append(
             f"typedef struct {{\n{fields}}} {name}_arguments;\n\n"
             f"void {name}(const void *words);\nvoid {name}(const void *words)\n{{\n"
-            f"    const {name}_arguments *w = words;\n    {called}({given});\n}}\n"
+            f"    const {name}_arguments *w = words;\n    {called}({arguments_text});\n}}\n"
         )
 
     def text(self) -> str:
@@ -73,12 +75,12 @@ class Program:
                 raise TranslationError(f"{function.__qualname__} calls itself, which is not translated to C")
             self._under_way.add(function)
             stem = f"{function.__module__.rpartition('.')[2]}_{function.__name__.strip('_')}"
-            taken = self._reserved.union(name for name, _ in self._instances.values())
-            name = next(n for n in _numbered(stem) if n not in taken)
-            made = Function(self, function, arguments)
-            code = made.translate(name)
+            names = self._reserved.union(name for name, _ in self._instances.values())
+            name = next(n for n in _numbered(stem) if n not in names)
+            translation = Function(self, function, arguments)
+            code = translation.translate(name)
             self._under_way.discard(function)
-            self._instances[key] = (name, made.result)
+            self._instances[key] = (name, translation.result)
             self._functions.append(code)
         return self._instances[key]
 

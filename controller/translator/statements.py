@@ -129,19 +129,19 @@ class Statements(Calls):
     def _write(self, target: ast.Subscript, operand: Operand, node: ast.AST) -> None:
         value = self.value(operand, node)
         mark = len(self.lines)
-        place = self._place(target)
+        lvalue = self._place(target)
         if len(self.lines) > mark and not value.simple:  # the value is computed before the index
             later, self.lines[mark:] = self.lines[mark:], []
             value = self.temporary(value.type, value.code)
             self.lines += later
-        if isinstance(place.type, Scalar):
-            self.lines.append(f"{place.code} = {self.converted(value, place.type)};")
+        if isinstance(lvalue.type, Scalar):
+            self.lines.append(f"{lvalue.code} = {self.converted(value, lvalue.type)};")
             return
-        assert isinstance(place.type, Array)
+        assert isinstance(lvalue.type, Array)
         if isinstance(value.type, Array):
-            self.lines.append(f"{self.c(place.type)}_copy({place.code}, {value.code});")
+            self.lines.append(f"{self.c(lvalue.type)}_copy({lvalue.code}, {value.code});")
         else:
-            self.lines.append(f"{self.c(place.type)}_fill({place.code}, {self.converted(value, place.type.item)});")
+            self.lines.append(f"{self.c(lvalue.type)}_fill({lvalue.code}, {self.converted(value, lvalue.type.item)});")
 
     def _do_augassign(self, node: ast.AugAssign) -> None:
         if isinstance(node.target, ast.Name):
@@ -157,18 +157,18 @@ class Statements(Calls):
             return
         if not isinstance(node.target, ast.Subscript):
             self.fail(node, "an operation on what is no name and no item")
-        place = self._place(node.target)
-        if not isinstance(place.type, Scalar):
+        lvalue = self._place(node.target)
+        if not isinstance(lvalue.type, Scalar):
             self.fail(node, "an operation on a whole array")
         mark = len(self.lines)
         other = self.expression(node.value)
-        before: Value = place
+        before: Value = lvalue
         if len(self.lines) > mark:
             later, self.lines[mark:] = self.lines[mark:], []
-            before = self.temporary(place.type, place.code)
+            before = self.temporary(lvalue.type, lvalue.code)
             self.lines += later
         value = self.scalar(self.arithmetic(node.op, before, other, node), node)
-        self.lines.append(f"{place.code} = {self.converted(value, place.type)};")
+        self.lines.append(f"{lvalue.code} = {self.converted(value, lvalue.type)};")
 
     def _do_if(self, node: ast.If) -> None:
         test = self.expression(node.test)

@@ -57,16 +57,18 @@ class Subscripts(Expressions):
         indices += [None] * (kind.ndim - len(indices))
         if any(isinstance(place, ast.Slice) and not _is_whole(place) for place in places):
             self.fail(node, "a slice of one of several dimensions")
-        found = [None if n is None else self.index(array, axis, n) for axis, n in enumerate(indices)]
+        offsets = [None if n is None else self.index(array, axis, n) for axis, n in enumerate(indices)]
         strides = [self._stride(array, axis) for axis in range(kind.ndim)]
-        at = " + ".join(_product(n, stride) for n, stride in zip(found, strides, strict=True) if n is not None)
-        left = [axis for axis, n in enumerate(found) if n is None]
-        if not left:
-            return Value(kind.item, f"{array.code}.data[{at}]")
-        contiguous = kind.contiguous and left == list(range(kind.ndim - len(left), kind.ndim))
-        view = Array(kind.item, len(left), contiguous)
-        sizes = [f"{array.code}.n{axis}" for axis in left] + ([] if contiguous else [strides[axis] for axis in left])
-        return Value(view, f"({self.c(view)}){{{array.code}.data + {at}, {', '.join(sizes)}}}")
+        offset = " + ".join(_product(n, stride) for n, stride in zip(offsets, strides, strict=True) if n is not None)
+        free_axes = [axis for axis, n in enumerate(offsets) if n is None]
+        if not free_axes:
+            return Value(kind.item, f"{array.code}.data[{offset}]")
+        contiguous = kind.contiguous and free_axes == list(range(kind.ndim - len(free_axes), kind.ndim))
+        view = Array(kind.item, len(free_axes), contiguous)
+        sizes = [f"{array.code}.n{axis}" for axis in free_axes] + (
+            [] if contiguous else [strides[axis] for axis in free_axes]
+        )
+        return Value(view, f"({self.c(view)}){{{array.code}.data + {offset}, {', '.join(sizes)}}}")
 
     def index(self, array: Value, axis: int, node: ast.expr) -> str:
         """Return an index of an array; one that is a negative constant counts from the end."""

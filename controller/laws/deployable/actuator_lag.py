@@ -32,10 +32,10 @@ def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> No
     """Propagate the acting forces over the last period [s], for the estimated lag and for its bracket."""
     lag, spread = estimate.state[LAG], np.sqrt(estimate.covariance[LAG, LAG])
     lags, bracket, now = estimate.lags, estimate.bracket, thrusters.acting_now
-    least, most = max(lag - spread, 0.0), lag + spread
+    min_lag, max_lag = max(lag - spread, 0.0), lag + spread
     remains, average = _of_lag(lag, period)
-    remains_least, average_least = _of_lag(least, period)
-    remains_most, average_most = _of_lag(most, period)
+    remains_min, average_min = _of_lag(min_lag, period)
+    remains_max, average_max = _of_lag(max_lag, period)
     m, by_ceiling = thrusters.forces.size, estimate.by_ceiling
     for j in range(m):
         commanded, slope, k = thrusters.stuck[j], 0.0, EFFECTIVENESS + m + j
@@ -52,16 +52,16 @@ def update_forces(estimate: Estimate, thrusters: Thrusters, period: float) -> No
         by_ceiling[1, j] = slope + remains * (by_ceiling[1, j] - slope)
         # deviation from the command, if the lag had always been the present estimate
         behind = _between(bracket[0, j], now[j], bracket[1, j], lags, lag) - commanded
-        behind_least = _between(bracket[0, j], now[j], bracket[1, j], lags, least) - commanded
-        behind_most = _between(bracket[0, j], now[j], bracket[1, j], lags, most) - commanded
+        behind_min = _between(bracket[0, j], now[j], bracket[1, j], lags, min_lag) - commanded
+        behind_max = _between(bracket[0, j], now[j], bracket[1, j], lags, max_lag) - commanded
         thrusters.acting[j] = commanded + average * behind
         now[j] = commanded + remains * behind
-        bracket[0, j] = commanded + remains_least * behind_least
-        bracket[1, j] = commanded + remains_most * behind_most
-        estimate.by_lag[j] = (average_most * behind_most - average_least * behind_least) / (most - least)
-        by_secant = average_least * behind_least + estimate.by_lag[j] * (lag - least)
+        bracket[0, j] = commanded + remains_min * behind_min
+        bracket[1, j] = commanded + remains_max * behind_max
+        estimate.by_lag[j] = (average_max * behind_max - average_min * behind_min) / (max_lag - min_lag)
+        by_secant = average_min * behind_min + estimate.by_lag[j] * (lag - min_lag)
         estimate.curvature[j] = average * behind - by_secant
-    lags[0], lags[1], lags[2] = least, lag, most
+    lags[0], lags[1], lags[2] = min_lag, lag, max_lag
 
 
 def _between(least: float, middle: float, most: float, lags: Array, lag: float) -> float:

@@ -58,12 +58,12 @@ def measure_moment(
 ) -> bool:
     """Measure the moment of thrusters and weight by the change of the rates over the period [s]; omega [rad/s]."""
     started = bool(attitude.started[0] > 0.0)
-    mean, water, known, other, rate = zeros(3), zeros(3), zeros(6), zeros(6), zeros(6)
+    mean, water, wrench, perturbed_wrench, rate = zeros(3), zeros(3), zeros(6), zeros(6), zeros(6)
     loads = Loads(water, zeros(1), zeros(3))  # only the current: weight and buoyancy are the unknowns
     copy(estimate.water_velocity, water)
     for i in range(3):
         mean[i] = 0.5 * (attitude.last_omega[i] + omega[i])
-    free_wrench(dynamics, R, estimate.velocity, mean, loads, known)
+    free_wrench(dynamics, R, estimate.velocity, mean, loads, wrench)
     for i in range(3):
         a, b = (i + 1) % 3, (i + 2) % 3
         rate[3 + i] = (omega[i] - attitude.last_omega[i]) / period
@@ -75,11 +75,11 @@ def measure_moment(
     for axis in range(2):  # Munk's moment depends on the current
         copy(estimate.water_velocity, water)
         water[axis] += _CURRENT_STEP
-        free_wrench(dynamics, R, estimate.velocity, mean, loads, other)
+        free_wrench(dynamics, R, estimate.velocity, mean, loads, perturbed_wrench)
         for i in range(3):
-            attitude.by_current[i, axis] = (other[3 + i] - known[3 + i]) / _CURRENT_STEP
+            attitude.by_current[i, axis] = (perturbed_wrench[3 + i] - wrench[3 + i]) / _CURRENT_STEP
     for i in range(3):
-        attitude.measured_moment[i] = -known[3 + i]
+        attitude.measured_moment[i] = -wrench[3 + i]
         for j in range(6):
             attitude.measured_moment[i] += dynamics.mass[3 + i, j] * rate[j]
     copy(omega, attitude.last_omega)

@@ -31,7 +31,7 @@ from controller.laws.deployable.gains import SPREADS, DeployableGains
 from controller.linear_algebra import copy
 from controller.quadratic_program import Workspace
 from controller.regions.kinds import FIRST_OF_ATTITUDE, FLAT
-from controller.regions.region_set import PackedRegions, evaluate_packed, place_clearance
+from controller.regions.region_set import PackedRegions, evaluate_packed, position_clearance
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -99,17 +99,23 @@ def observe_regions(
     """Evaluate the regions at a pose [m, NED], and at the pose `_AHEAD` later by a velocity as in `Motion`, (6,)."""
     s = observation
     evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.rotation_gradients, s.clearances)
-    r, place, attitude = regions, zeros(3), zeros(4)
+    r, later_position, attitude = regions, zeros(3), zeros(4)
     for axis in range(3):
-        place[axis] = position[axis] + _AHEAD * velocity[axis]
+        later_position[axis] = position[axis] + _AHEAD * velocity[axis]
     predict_shifts(regions, _AHEAD, s.later_shifts)
     integrate_attitude(quaternion, velocity[3:], _AHEAD, attitude)
-    moved = PackedRegions(
+    later_regions = PackedRegions(
         r.kinds, r.signs, r.offsets, r.numbers, s.later_shifts, r.velocities, r.gains, r.hard, r.deviations,
         r.crossing_costs,
     )  # fmt: skip
     evaluate_packed(
-        moved, place, attitude, s.later_values, s.later_gradients, s.later_rotation_gradients, s.later_clearances
+        later_regions,
+        later_position,
+        attitude,
+        s.later_values,
+        s.later_gradients,
+        s.later_rotation_gradients,
+        s.later_clearances,
     )
 
 
@@ -191,8 +197,8 @@ def write_rows(
     # Also write the lower bound of the clearances [m]: min(0, margin + h, psi / kappa). The `margin` covers an error of
     # the acceleration of rate kappa margin.
     rows, n, later_gradient, relative, path_velocity = 0, zeros(6), zeros(6), zeros(6), zeros(3)
-    wanted, bound = zeros(3), 0.0
-    _desired_acceleration(motion, work.nominal, wanted)
+    desired, bound = zeros(3), 0.0
+    _desired_acceleration(motion, work.nominal, desired)
     for i in range(regions.kinds.size):
         of_attitude = regions.kinds[i] >= _ATTITUDE
         if not regions.hard[i] or not pose_gradient(
@@ -215,7 +221,7 @@ def write_rows(
             turning = gradient_rate(regions.kinds[i], regions.signs[i], n, later_gradient, relative)
         distance, reach, faces = observation.clearances[i], 0.0, 1
         if not of_attitude and has_faces(regions.kinds[i], regions.signs[i]):
-            reach = margin + _stopping_distance(relative, wanted, braking, gains, path_velocity)
+            reach = margin + _stopping_distance(relative, desired, braking, gains, path_velocity)
             if 0.0 < distance < reach:
                 faces = 1 + FACES
         for face in range(faces):  # the nearest face, and those ahead
@@ -228,15 +234,15 @@ def write_rows(
                 turning = 0.0  # the gradient of a flat face is constant
 
             # h, its rate, and its second derivative without thrust
-            h, rate, falling = distance - margin, 0.0, 0.0
+            h, rate, drift_term = distance - margin, 0.0, 0.0
             for axis in range(6):
                 rate += n[axis] * relative[axis]
-                falling += n[axis] * motion.free_acceleration[axis]
+                drift_term += n[axis] * motion.free_acceleration[axis]
             allowed = approach_speed(h, braking, gains.barrier_slope)
             if not of_attitude:
                 bound = min(bound, gains.margin + h, (rate + allowed) / gains.barrier_slope)
             slope = gains.barrier_slope if h <= 0.0 else braking / (allowed + braking / gains.barrier_slope)  # phi'
-            right = -gains.barrier_rate * (rate + allowed) - slope * rate - falling - turning
+            right = -gains.barrier_rate * (rate + allowed) - slope * rate - drift_term - turning
             if face == 0:
                 if share < 1.0:
                     right = observation.asked[i] + share * (right - observation.asked[i])
@@ -278,15 +284,15 @@ def vehicle_bound(regions: PackedRegions, position: Array, motion: Motion, gains
     bound, n = 0.0, zeros(6)
     for i in range(regions.kinds.size):
         if regions.hard[i] and regions.kinds[i] < _ATTITUDE:
-            clearance = place_clearance(regions, i, position, n[:3])
+            clearance = position_clearance(regions, i, position, n[:3])
             bound = min(bound, gains.margin + clearance - _margin(n, motion, regions.deviations[i], False, gains))
     return bound
 
 
-def update_promise(promised: Array, bound: float, slack: float) -> None:
-    """Raise the promised lower bound of the clearances, shape (2,) [m], to a higher bound of this step."""
-    # A falling bound does not lower the promise, which would else follow any violation. The promise is reset if a
+def update_clearance_bound(guaranteed: Array, bound: float, slack: float) -> None:
+    """Raise the guaranteed lower bound of the clearances, shape (2,) [m], to a higher bound of this step."""
+    # A falling bound does not lower the guarantee, which would else follow any violation. The guarantee is reset if a
     # barrier yields by more than `KEPT`, or if the bound jumps, since then regions or estimate jumped.
-    if slack > KEPT or not bound >= promised[1] - _BOUND_LEAP:
-        promised[0] = bound
-    promised[0], promised[1] = max(promised[0], bound), bound
+    if slack > KEPT or not bound >= guaranteed[1] - _BOUND_LEAP:
+        guaranteed[0] = bound
+    guaranteed[0], guaranteed[1] = max(guaranteed[0], bound), bound

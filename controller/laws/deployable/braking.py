@@ -53,5 +53,5 @@ def _greatest_force(B: Array, limits: list[tuple[float, float]], direction: Arra
     cost = np.zeros(m + 1)
     cost[m] = -1.0
     equal = np.hstack([B, np.r_[-direction, np.zeros(3)][:, None]])
-    found = linprog(cost, A_eq=equal, b_eq=np.zeros(6), bounds=[*limits, (0.0, None)])
-    return float(found.x[m]) if found.status == 0 else 0.0
+    solution = linprog(cost, A_eq=equal, b_eq=np.zeros(6), bounds=[*limits, (0.0, None)])
+    return float(solution.x[m]) if solution.status == 0 else 0.0

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from controller.arithmetic import square
 from controller.regions.kinds import KINKED_INSIDE, KINKED_OUTSIDE
-from controller.regions.region_set import PackedRegions, clearance_of_place, place_clearance
+from controller.regions.region_set import PackedRegions, clearance_at_position, position_clearance
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -42,22 +42,22 @@ def face_ahead(
     speed = np.sqrt(speed)
     if not speed > 1e-6:
         return np.inf
-    point, gradient, within, beyond = zeros(3), zeros(3), 0.0, 0.0
+    point, gradient, low, high = zeros(3), zeros(3), 0.0, 0.0
     clearance = _clearance_along(regions, i, position, velocity, 0.0, point, gradient)
     while clearance > 0.0:
-        if beyond >= reach:
+        if high >= reach:
             return np.inf
-        within, beyond = beyond, min(beyond + max(clearance, reach / _LINE_SAMPLES), reach)
-        clearance = _clearance_along(regions, i, position, velocity, beyond / speed, point, gradient)
+        low, high = high, min(high + max(clearance, reach / _LINE_SAMPLES), reach)
+        clearance = _clearance_along(regions, i, position, velocity, high / speed, point, gradient)
     for _ in range(_HALVINGS):
-        middle = 0.5 * (within + beyond)
+        middle = 0.5 * (low + high)
         if _clearance_along(regions, i, position, velocity, middle / speed, point, gradient) > 0.0:
-            within = middle
+            low = middle
         else:
-            beyond = middle
+            high = middle
     for axis in range(3):
-        point[axis] = position[axis] + within / speed * velocity[axis]
-    distance = place_clearance(regions, i, point, face)
+        point[axis] = position[axis] + low / speed * velocity[axis]
+    distance = position_clearance(regions, i, point, face)
     for axis in range(3):
         distance += face[axis] * (position[axis] - point[axis])
     return distance
@@ -69,4 +69,4 @@ def _clearance_along(
     """Return the clearance after a time at a velocity; write `point` and `gradient`, shape (3,) each."""
     for axis in range(3):
         point[axis] = position[axis] + time * velocity[axis]
-    return clearance_of_place(regions, i, point, gradient)
+    return clearance_at_position(regions, i, point, gradient)

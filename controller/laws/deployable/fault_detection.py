@@ -67,7 +67,7 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
     if gains.failure_threshold <= 0.0:
         return -1
     m, ratio, x = thrusters.health.size, fault_state.ratio, estimate.state
-    best, next_best, at = 0.0, 0.0, -1
+    best, next_best, suspect = 0.0, 0.0, -1
     for j in range(m):
         if thrusters.health[j] == 0.0:
             ratio[j] = ratio[m + j] = 0.0
@@ -76,28 +76,28 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
             _add_evidence(fault_state, estimate, thrusters, j, kind * m + j)
         likelihood = max(ratio[j], ratio[m + j])
         if likelihood > best:
-            best, next_best, at = likelihood, best, j
+            best, next_best, suspect = likelihood, best, j
         elif likelihood > next_best:
             next_best = likelihood
     if best > gains.failure_threshold and best > next_best + _LEAD:
-        hypothesis = _likelier(fault_state, at, m)
-        fault_state.tentative[at] += 1 if best < next_best + _CERTAIN else 2
+        hypothesis = _likelier(fault_state, suspect, m)
+        fault_state.tentative[suspect] += 1 if best < next_best + _CERTAIN else 2
         loss = 1.0
-        if hypothesis == at:
-            loss = fault_state.sums[0, at] / fault_state.sums[1, at]
-        remaining = x[EFFECTIVENESS + at] * (1.0 - loss)
+        if hypothesis == suspect:
+            loss = fault_state.sums[0, suspect] / fault_state.sums[1, suspect]
+        remaining = x[EFFECTIVENESS + suspect] * (1.0 - loss)
         for i in range(x.size):
             x[i] += loss * estimate.deviation[hypothesis, i]
         force = np.nan
-        if hypothesis > at:
-            force = estimate.supposed[0, at] * estimate.supposed[1, at]
+        if hypothesis > suspect:
+            force = estimate.supposed[0, suspect] * estimate.supposed[1, suspect]
         elif remaining > _USEFUL:  # kept with the remaining effectiveness
-            fault_state.tentative[at] = 0
-            inflate_effectiveness(estimate, at)
+            fault_state.tentative[suspect] = 0
+            inflate_effectiveness(estimate, suspect)
             _start_all_anew(fault_state, estimate, thrusters)
             return -1
-        _isolate(fault_state, estimate, thrusters, at, force)
-        return at
+        _isolate(fault_state, estimate, thrusters, suspect, force)
+        return suspect
     usual = 0.0  # mean effectiveness
     for j in range(m):
         usual += x[EFFECTIVENESS + j] / m
@@ -116,21 +116,21 @@ def try_again(
 ) -> int:
     """Try one of several isolated thrusters again after a while, and return it, or -1; reported (m,), period [s]."""
     fault_state.waited[0] += period
-    isolated, least = 0, -1
+    isolated, candidate = 0, -1
     for j in range(thrusters.health.size):
         if thrusters.health[j] == 0.0 and reported[j] > 0.0:
             isolated += 1
-            if least < 0 or fault_state.trials[j] < fault_state.trials[least]:
-                least = j
-    if isolated < 2 or not quiet or fault_state.waited[0] < _TRIAL * _RARER ** fault_state.trials[least]:
+            if candidate < 0 or fault_state.trials[j] < fault_state.trials[candidate]:
+                candidate = j
+    if isolated < 2 or not quiet or fault_state.waited[0] < _TRIAL * _RARER ** fault_state.trials[candidate]:
         return -1
     fault_state.waited[0] = 0.0
-    fault_state.trials[least] += 1
-    fault_state.tentative[least] = 0
-    thrusters.health[least], thrusters.stuck[least] = 1.0, np.nan
-    set_effectiveness(estimate, least, 1.0)
+    fault_state.trials[candidate] += 1
+    fault_state.tentative[candidate] = 0
+    thrusters.health[candidate], thrusters.stuck[candidate] = 1.0, np.nan
+    set_effectiveness(estimate, candidate, 1.0)
     _start_all_anew(fault_state, estimate, thrusters)
-    return least
+    return candidate
 
 
 def _likelier(fault_state: FaultState, j: int, m: int) -> int:

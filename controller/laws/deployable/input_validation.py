@@ -81,14 +81,14 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
         memory.attitude.started[0] = 0.0  # the next change of the rates would span several periods
     R, position, velocity = zeros(3, 3), zeros(3), zeros(3)
     write_rotation(memory.quaternion, R)
-    position_noise, velocity_noise, lasting = gains.position_noise, gains.velocity_noise, 0.0
+    position_noise, velocity_noise, max_deviation = gains.position_noise, gains.velocity_noise, 0.0
     for i in range(12):
         memory.deviation[i] = min(max(state.deviation[i], 0.0), _FARTHEST) if state.deviation[i] >= 0.0 else _FARTHEST
     for i in range(3):  # an estimated state drifts, and jumps by a fraction of its deviation
         position_noise = max(position_noise, _JUMP * memory.deviation[i])
         velocity_noise = max(velocity_noise, square(memory.deviation[3 + i]) / _STEADY)
-        lasting = max(lasting, memory.deviation[3 + i])
-    estimate.weight[0] = 1.0 if lasting <= _STEADY else square(_STEADY / lasting)
+        max_deviation = max(max_deviation, memory.deviation[3 + i])
+    estimate.weight[0] = 1.0 if max_deviation <= _STEADY else square(_STEADY / max_deviation)
     for i in range(3):
         for k in range(3):
             velocity[i] += R[i, k] * state.velocity_body[k]

@@ -35,7 +35,7 @@ from controller.laws.deployable.barrier import (
     empty_observation,
     observe_regions,
     predict_shifts,
-    update_promise,
+    update_clearance_bound,
     vehicle_bound,
     write_rows,
 )
@@ -95,7 +95,7 @@ def step(
         _hold_weight(memory, R, gains, forces)
         copy(forces, thrusters.forces)
         memory.report[15], memory.report[16] = estimate.time_since_measurement[0], NO_BOUND
-        memory.promised[:] = memory.expected[:] = np.nan
+        memory.clearance_bound[:] = memory.expected[:] = np.nan
         return
 
     for axis in range(3):
@@ -157,9 +157,9 @@ def step(
 
     # desired wrench
     observe_regions(memory.observation, regions_ahead, ahead.position, ahead.quaternion, ahead.velocity)
-    share = period / (period + gains.smoothing)
+    fraction = period / (period + gains.smoothing)
     for axis in range(3):
-        memory.filtered_acceleration[axis] += share * (
+        memory.filtered_acceleration[axis] += fraction * (
             acceleration[axis] - free[axis] - memory.filtered_acceleration[axis]
         )
     _force_of(dynamics, R_ahead, memory.filtered_acceleration, wrench)
@@ -177,7 +177,7 @@ def step(
             work.nominal[j] += thrusters.allocator[j, k] * wrench[k]
         work.nominal[j] *= min(max(thrusters.effectiveness[j] / _LEAST_EFFECTIVENESS, _LEAST_SHARE), 1.0)
     lower, upper = memory.given_limits[0], memory.given_limits[1]
-    model.write_given_limits(thrusters, memory.given_limits)
+    model.write_force_limits(thrusters, memory.given_limits)
 
     # barriers
     model.write_thruster_acceleration(
@@ -201,7 +201,7 @@ def step(
         yields = memory.report[12] > KEPT  # yielding barriers amplify noise
         rows = write_rows(
             work, memory.observation, regions_ahead, memory.weights[1], motion, lower, upper,
-            share if yields else 1.0, gains,
+            fraction if yields else 1.0, gains,
         )  # fmt: skip
         vehicle = vehicle_bound(regions, estimate.position, motion, gains)
         memory.observation.bound[0] = min(memory.observation.bound[0], vehicle)
@@ -216,8 +216,8 @@ def step(
     write_program_report(memory.report, work.multipliers, work.price, rows, steps)
     beyond = max(spread - 2.0 * _TRUSTED_SPREAD, 0.0)  # spread that the margins do not cover
     slack = memory.report[12]
-    update_promise(memory.promised, memory.observation.bound[0], slack)
-    memory.report[16] = memory.promised[0] - beyond - slack / (gains.barrier_rate * gains.barrier_slope)
+    update_clearance_bound(memory.clearance_bound, memory.observation.bound[0], slack)
+    memory.report[16] = memory.clearance_bound[0] - beyond - slack / (gains.barrier_rate * gains.barrier_slope)
 
 
 def _hold_weight(memory: DeployableMemory, R: Array, gains: DeployableGains, forces: Array) -> None:
@@ -237,15 +237,15 @@ def _limit_speed(estimate: Estimate, spread: float, gains: DeployableGains, desi
     """Limit the desired velocity so that the vehicle can stop before `coast` ends or the position is too uncertain."""
     # `spread` is the uncertainty of the position [m].
     gap = max(estimate.time_since_measurement[0], estimate.longest_gap[0])
-    most = gains.speed
+    max_speed = gains.speed
     if gap > _STALE:
-        most = min(most, gains.acceleration * max(gains.coast - gap, 0.0))
+        max_speed = min(max_speed, gains.acceleration * max(gains.coast - gap, 0.0))
     if spread > _TRUSTED_SPREAD:
-        most = min(most, gains.speed * max(2.0 - spread / _TRUSTED_SPREAD, 0.0))
+        max_speed = min(max_speed, gains.speed * max(2.0 - spread / _TRUSTED_SPREAD, 0.0))
     speed = length3(desired[0], desired[1], desired[2])
-    if speed > most:
+    if speed > max_speed:
         for axis in range(3):
-            desired[axis] *= most / speed
+            desired[axis] *= max_speed / speed
 
 
 def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> None:
@@ -332,7 +332,7 @@ class DeployableLaw(CompiledLaw):
             omega=np.zeros(3),
             deviation=np.zeros(12),
             position_variance=np.zeros(3),
-            promised=np.full(2, np.nan),
+            clearance_bound=np.full(2, np.nan),
             goal_shifts=np.zeros((1, 3)),
             region_shifts=np.zeros((n_regions, 3)),
             samples=np.zeros(2),

@@ -39,7 +39,7 @@ class DeployableMemory(NamedTuple):
     omega: Array  # (3,) rad/s, body rates, measured, or propagated by the model
     deviation: Array  # (12,) standard deviations of the measured state, as in `VehicleState`
     position_variance: Array  # (3,) m2, NED: variance of the estimated position
-    promised: Array  # (2,) m: promised lower bound of the clearances; bound of the last step; NaN without a bound
+    clearance_bound: Array  # (2,) m, of the clearances: guaranteed; of the last step; NaN without one
     goal_shifts: Array  # (1, 3) m, NED: shift of the goal at the time of the predicted state
     region_shifts: Array  # (n, 3) m, NED: those of the regions
     samples: Array  # (2,) number of position and velocity samples: that reached the gate; that it rejected

@@ -211,7 +211,7 @@ def write_thruster_acceleration(
             ahead[i, j] = R_ahead[i, 0] * body[0] + R_ahead[i, 1] * body[1] + R_ahead[i, 2] * body[2]
 
 
-def write_given_limits(thrusters: Thrusters, limits: Array) -> None:
+def write_force_limits(thrusters: Thrusters, limits: Array) -> None:
     """Write the true force [N] of each thruster at its lower and upper limit, shape (2, m)."""
     # Both limits of a stuck thruster are its estimated force.
     for j in range(thrusters.health.size):
@@ -220,10 +220,10 @@ def write_given_limits(thrusters: Thrusters, limits: Array) -> None:
             limits[0, j] = limits[1, j] = thrusters.lower[j]
         else:
             ceiling, spread = thrusters.ceiling[0, j], thrusters.ceiling[1, j]
-            least, _ = limited_force(thrusters.lower[j], thrusters.nominal_lower[j], ceiling, spread)
-            most, _ = limited_force(thrusters.upper[j], thrusters.nominal_upper[j], ceiling, spread)
-            limits[0, j] = least * thrusters.effectiveness[j]
-            limits[1, j] = most * thrusters.effectiveness[j]
+            min_force, _ = limited_force(thrusters.lower[j], thrusters.nominal_lower[j], ceiling, spread)
+            max_force, _ = limited_force(thrusters.upper[j], thrusters.nominal_upper[j], ceiling, spread)
+            limits[0, j] = min_force * thrusters.effectiveness[j]
+            limits[1, j] = max_force * thrusters.effectiveness[j]
 
 
 def command_forces(thrusters: Thrusters, forces: Array) -> None:
@@ -234,17 +234,17 @@ def command_forces(thrusters: Thrusters, forces: Array) -> None:
             forces[j] = 0.0
         elif thrusters.effectiveness[j] > 0.0:
             limit = thrusters.nominal_upper[j] if forces[j] > 0.0 else thrusters.nominal_lower[j]
-            needed = forces[j] / thrusters.effectiveness[j]
-            command = command_for(needed, limit, thrusters.ceiling[0, j], thrusters.ceiling[1, j])
+            desired = forces[j] / thrusters.effectiveness[j]
+            command = command_for(desired, limit, thrusters.ceiling[0, j], thrusters.ceiling[1, j])
             forces[j] = min(max(command, thrusters.lower[j]), thrusters.upper[j])
 
 
 def smallest(values: Array) -> float:
     """Return the smallest of values."""
-    least: float = values[0]
+    result: float = values[0]
     for i in range(values.size):
-        least = min(least, values[i])
-    return least
+        result = min(result, values[i])
+    return result
 
 
 def available_braking(dynamics: Dynamics, thrusters: Thrusters) -> float:

@@ -23,22 +23,26 @@ def _range(limit: float, ceiling: float, spread: float) -> tuple[float, float]:
 def limited_force(command: float, limit: float, ceiling: float, spread: float) -> tuple[float, float]:
     """Return the mean force [N] of a command [N], and its derivative by the ceiling."""
     # `limit` is the vehicle's in that direction, of either sign [N]; `spread` the standard deviation of the ceiling.
-    least, most = _range(limit, ceiling, spread)
-    excess, sign = abs(command) - least, 1.0 if command > 0.0 else -1.0
+    min_limit, max_limit = _range(limit, ceiling, spread)
+    excess, sign = abs(command) - min_limit, 1.0 if command > 0.0 else -1.0
     if excess <= 0.0:
         return command, 0.0
-    if excess >= most - least:
-        return sign * 0.5 * (least + most), sign * abs(limit)
-    return command - sign * square(excess) / (2.0 * (most - least)), sign * abs(limit) * excess / (most - least)
+    if excess >= max_limit - min_limit:
+        return sign * 0.5 * (min_limit + max_limit), sign * abs(limit)
+    return command - sign * square(excess) / (2.0 * (max_limit - min_limit)), sign * abs(limit) * excess / (
+        max_limit - min_limit
+    )
 
 
 def command_for(force: float, limit: float, ceiling: float, spread: float) -> float:
     """Return the least command [N] whose `limited_force` is a force [N], or that gives the most."""
-    least, most = _range(limit, ceiling, spread)
-    excess, sign = abs(force) - least, 1.0 if force > 0.0 else -1.0
+    min_limit, max_limit = _range(limit, ceiling, spread)
+    excess, sign = abs(force) - min_limit, 1.0 if force > 0.0 else -1.0
     if excess <= 0.0:
         return force
-    if 2.0 * excess >= most - least:
-        return sign * most
-    command: float = sign * (most - (most - least) * np.sqrt(1.0 - 2.0 * excess / (most - least)))
+    if 2.0 * excess >= max_limit - min_limit:
+        return sign * max_limit
+    command: float = sign * (
+        max_limit - (max_limit - min_limit) * np.sqrt(1.0 - 2.0 * excess / (max_limit - min_limit))
+    )
     return command

@@ -11,18 +11,18 @@ from pkgutil import iter_modules
 from controller.regions.entry import Entry
 
 
-def _found() -> dict[str, Entry]:
+def _find_entries() -> dict[str, Entry]:
     """Return the entries of all files in this folder, those of position first, each with its kind."""
-    found = {}
+    entries = {}
     for module in iter_modules(__path__):
         entry = getattr(import_module(f"{__name__}.{module.name}"), "ENTRY", None)
         if not isinstance(entry, Entry):
             raise TypeError(f"{__name__}.{module.name} has no ENTRY, expected the Entry of its shape")
-        found[module.name] = entry
-    ordered = dict(sorted(found.items(), key=lambda item: (item[1].of_attitude, item[0])))
+        entries[module.name] = entry
+    ordered = dict(sorted(entries.items(), key=lambda item: (item[1].of_attitude, item[0])))
     for kind, entry in enumerate(ordered.values()):
         entry.shape.kind = kind
     return ordered
 
 
-ENTRIES: dict[str, Entry] = _found()
+ENTRIES: dict[str, Entry] = _find_entries()

@@ -70,15 +70,15 @@ def cone(p: Array, q: Array) -> Evaluation:
     sine, cosine, reach = q[6], q[7], q[8]
 
     from_feature = hypotenuse(along, aside)
-    beyond = from_feature - reach
+    excess = from_feature - reach
     # the nearest point of the flank
     on_flank = clamp(aside * sine + along * cosine, 0.0, reach)
     to_aside, to_along = aside - on_flank * sine, along - on_flank * cosine
     flank = hypotenuse(to_aside, to_along)
     outside = 1.0 if cosine * aside - sine * along >= 0.0 else -1.0
 
-    if beyond > outside * flank:
-        g = beyond
+    if excess > outside * flank:
+        g = excess
         of_aside, of_along = aside / from_feature, along / from_feature
     else:
         g = outside * flank

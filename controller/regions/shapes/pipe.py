@@ -97,7 +97,7 @@ def _rings(shape: Pipe, around: int) -> tuple[Array, list[Array], Array]:
     ends = [(points[0], -ways[0]), (points[-1], ways[-1])]
     origins = np.vstack([np.broadcast_to(at, d.shape) for at, d in rays] + [at for at, _ in ends])
     directions = np.vstack([d for _, d in rays] + [d for _, d in ends])
-    surface = _left(shape, origins, directions)
+    surface = _exit_points(shape, origins, directions)
     return surface[-2], np.split(surface[:-2], len(rays)), surface[-1]
 
 
@@ -133,18 +133,23 @@ def _turned(vector: Array, axis: Array, angle: float) -> Array:
     return math.cos(angle) * vector + math.sin(angle) * np.cross(axis, vector)
 
 
-def _left(shape: Pipe, origins: Array, directions: Array) -> Array:
+def _exit_points(shape: Pipe, origins: Array, directions: Array) -> Array:
     """Return the exits of rays that start inside: a step by the distance to the surface never leaves the pipe."""
     packed = np.array(shape.packed())
-    gone = np.zeros(len(origins))
+    distances = np.zeros(len(origins))
     inside = np.arange(len(origins))
     for _ in range(_MAX_STEPS):
-        left = np.array([-pipe(p, packed)[4] for p in origins[inside] + gone[inside, None] * directions[inside]])
-        inside, left = inside[left > _ROUNDING * shape.radius], left[left > _ROUNDING * shape.radius]
+        remaining = np.array(
+            [-pipe(p, packed)[4] for p in origins[inside] + distances[inside, None] * directions[inside]]
+        )
+        inside, remaining = (
+            inside[remaining > _ROUNDING * shape.radius],
+            remaining[remaining > _ROUNDING * shape.radius],
+        )
         if not inside.size:
             break
-        gone[inside] += left
-    surface: Array = origins + gone[:, None] * directions
+        distances[inside] += remaining
+    surface: Array = origins + distances[:, None] * directions
     return surface
 
 

@@ -199,7 +199,7 @@ def test_promised_clearance_rises_with_the_bound_and_falls_only_with_slack_or_a_
     promised = np.full(2, np.nan)
 
     def promise(bound, slack=0.0):
-        barrier.update_promise(promised, bound, slack)
+        barrier.update_clearance_bound(promised, bound, slack)
         return promised[0]
 
     assert promise(-0.2) == -0.2  # the first: a start within a region

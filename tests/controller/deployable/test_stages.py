@@ -18,7 +18,7 @@ from controller.laws.deployable.model import (
     free_acceleration,
     make_thrusters,
     reallocate,
-    write_given_limits,
+    write_force_limits,
     write_thruster_acceleration,
 )
 from controller.laws.deployable.path_planning.planner import CORNERS, empty_plan
@@ -73,7 +73,7 @@ def test_thruster_influence_matrix_matches_the_inverse_mass():
     assert later == pytest.approx(np.vstack([ahead @ body[:3], body[3:]]), rel=1e-12, abs=1e-15)
     lower, upper = ODIN.thrust_min * thrusters.effectiveness, ODIN.thrust_max * thrusters.effectiveness
     lower[5] = upper[5] = 4.0 * thrusters.effectiveness[5]  # it gives what it is stuck at, whatever is commanded
-    write_given_limits(thrusters, limits)
+    write_force_limits(thrusters, limits)
     assert limits == pytest.approx(np.array([lower, upper]), rel=1e-12)
 
 

@@ -142,8 +142,8 @@ def test_promised_clearance_is_less_by_the_spread_beyond_the_margins_and_by_the_
         own.step(sea.measured()._replace(deviation=deviation), pack([GOAL]), pack(walls), np.ones(2), forces)
     spread = 3.0 * np.sqrt(own.memory.state_estimate.covariance[0, 0] + 0.25**2)
     slack = own.report[12] / (GAINS.barrier_rate * GAINS.barrier_slope)
-    assert spread > 0.65 and slack > 0.01 and abs(own.memory.promised[0]) > 0.01
-    assert own.report[16] == pytest.approx(own.memory.promised[0] - (spread - 0.6) - slack, rel=1e-12)
+    assert spread > 0.65 and slack > 0.01 and abs(own.memory.clearance_bound[0]) > 0.01
+    assert own.report[16] == pytest.approx(own.memory.clearance_bound[0] - (spread - 0.6) - slack, rel=1e-12)
 
 
 def test_unequal_effectiveness_causes_no_opposing_forces_at_a_barrier():

@@ -6,7 +6,7 @@ from scipy.integrate import quad
 
 from controller.laws.deployable.estimate import EFFECTIVENESS
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import command_forces, make_thrusters, write_given_limits
+from controller.laws.deployable.model import command_forces, make_thrusters, write_force_limits
 from controller.laws.deployable.thrust_limit import command_for, limited_force
 from controller.regions import Region, Sphere
 from tests.controller.deployable.scenery import ODIN, Sea, fly, law_for
@@ -57,7 +57,7 @@ def test_allocation_uses_the_learned_limit_and_commands_no_more():
     thrusters, limits, forces = make_thrusters(ODIN), np.empty((2, 8)), np.full(8, 40.0)
     thrusters.ceiling[:] = [[0.6], [0.01]]
     thrusters.health[3] = thrusters.lower[3] = thrusters.upper[3] = 0.0
-    write_given_limits(thrusters, limits)
+    write_force_limits(thrusters, limits)
     assert np.delete(limits, 3, axis=1) == pytest.approx(np.array([[-16.2], [16.2]]) * np.ones(7))
     assert not limits[:, 3].any()
     command_forces(thrusters, forces)

@@ -7,10 +7,10 @@ from controller.regions import Region, pack
 from controller.regions.region_set import (
     attitude_clearance,
     clearance_at,
-    clearance_of_place,
+    clearance_at_position,
     clearance_of_pose,
     clearance_of_sphere,
-    place_clearance,
+    position_clearance,
 )
 from controller.regions.shapes import ENTRIES
 
@@ -35,8 +35,8 @@ def test_all_region_evaluations_agree():
                 assert clearance_at(packed, i, p) == np.inf
                 continue
             assert clearance_at(packed, i, p) == pytest.approx(clearances[i], rel=1e-12)
-            assert clearance_of_place(packed, i, p, room) == pytest.approx(clearances[i], rel=1e-12)
-            assert place_clearance(packed, i, p, slope) == pytest.approx(clearances[i], rel=1e-12)
+            assert clearance_at_position(packed, i, p, room) == pytest.approx(clearances[i], rel=1e-12)
+            assert position_clearance(packed, i, p, slope) == pytest.approx(clearances[i], rel=1e-12)
             size = np.linalg.norm(gradients[i])
             assert slope == pytest.approx(-gradients[i] / size if size > 0.0 else np.zeros(3), rel=1e-12, abs=1e-15)
             if region.name == "sphere":

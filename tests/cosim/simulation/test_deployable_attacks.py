@@ -77,7 +77,7 @@ def assert_sound(law, forces):
             "state_estimate.last_measured",
             "plan.new_cost.clear_until",
             "expected",
-            "promised",
+            "clearance_bound",
             "thrusters.stuck",
         ):
             assert np.isfinite(value).all(), key

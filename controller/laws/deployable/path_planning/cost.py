@@ -16,7 +16,7 @@ from controller.laws.deployable.path_planning.search import PathLimits, uncertai
 from controller.linear_algebra import copy
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
-from controller.regions.region_set import PackedRegions, clearance_of_place, clearance_of_sphere
+from controller.regions.region_set import PackedRegions, clearance_at_position, clearance_of_sphere
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -75,13 +75,14 @@ def begin_cost(cost: PathCost, start: Array, drift: Array, waits: bool) -> None:
     cost.clear_until[:] = 0.0
 
 
-def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, limits: PathLimits, most: float) -> bool:
-    """Continue the evaluation of a path; return True once it is complete, or the cost exceeds `most`; path [m, NED]."""
-    # with most [m]
-    place = zeros(3)
+def add_cost(
+    cost: PathCost, path: Array, count: int, regions: PackedRegions, limits: PathLimits, cost_limit: float
+) -> bool:
+    """Continue to evaluate a path [m, NED]; return True once it is complete, or the cost exceeds `cost_limit` [m]."""
+    point = zeros(3)
     for _ in range(_SAMPLES[0]):
         leg, s = cost.counts[0], cost.travelled[1]
-        if cost.cost[0] > most:
+        if cost.cost[0] > cost_limit:
             return True
         if leg == count:
             cost.cost[0] += _STAY * _stay_cost(path[count - 1], cost.drift, regions, limits)
@@ -103,8 +104,8 @@ def add_cost(cost: PathCost, path: Array, count: int, regions: PackedRegions, li
             continue
         cost.counts[1] += 1
         for axis in range(3):
-            place[axis] = begin[axis] + (path[leg, axis] - begin[axis]) * (s / length)
-        free, soft, reach = _evaluate_place(cost, place, regions, limits)
+            point[axis] = begin[axis] + (path[leg, axis] - begin[axis]) * (s / length)
+        free, soft, reach = _evaluate_point(cost, point, regions, limits)
         spare = max(_TRUST * (free - limits.clearance), 0.5 * (free - limits.margin))  # m, no surface in between
         stride = min(max(spare, _STRIDE[0]), reach)
         _add_stride(cost, min(stride, length - s + 1e-9), soft, _near_cost(free, limits))
@@ -119,37 +120,37 @@ def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> N
     cost.cost[2] += stride * soft
 
 
-def _evaluate_place(
+def _evaluate_point(
     cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits
 ) -> tuple[float, float, float]:
     """Return the least clearance of hard regions [m], the penalty of soft ones per metre, and the stride limit [m]."""
     travelled = cost.travelled[0] + cost.travelled[1]
     later = travelled / limits.speed  # s
-    far = limits.clearance + _STRIDE[1] / _TRUST  # m, clearance beyond which a hard region has no effect
-    free, soft, reach, point, room = far, 0.0, _STRIDE[1], zeros(3), zeros(3)
+    effect_distance = limits.clearance + _STRIDE[1] / _TRUST  # m, clearance beyond which a hard region has no effect
+    free, soft, reach, point, scratch = effect_distance, 0.0, _STRIDE[1], zeros(3), zeros(3)
     for i in range(regions.kinds.size):
         if travelled < cost.clear_until[i] or regions.kinds[i] >= _ATTITUDE:
             continue
         if cost.waits[0] and cost.counts[0] > 0 and is_fast(regions, i, limits):
             continue  # it has passed by then
-        own = 0.0  # m/s, speed of the region, summed over the axes
+        region_speed = 0.0  # m/s, speed of the region, summed over the axes
         for axis in range(3):
             point[axis] = place[axis] - regions.velocities[i, axis] * later
-            own += abs(regions.velocities[i, axis])
+            region_speed += abs(regions.velocities[i, axis])
         if regions.kinds[i] == _SPHERE:
             clearance = clearance_of_sphere(regions, i, point)
         else:
-            clearance = clearance_of_place(regions, i, point, room)
-        beyond = clearance - _STRIDE[1]
+            clearance = clearance_at_position(regions, i, point, scratch)
+        excess = clearance - _STRIDE[1]
         if regions.hard[i]:
             clearance -= uncertainty(regions, i)
-            beyond = clearance - far
+            excess = clearance - effect_distance
             free = min(free, clearance)
         else:
             soft += regions.crossing_costs[i] * _depth_cost(-clearance, 0.0)
             reach = min(reach, max(abs(clearance), _COARSE))
-        if beyond >= 0.0:
-            cost.clear_until[i] = travelled + beyond / (1.0 + own / limits.speed)
+        if excess >= 0.0:
+            cost.clear_until[i] = travelled + excess / (1.0 + region_speed / limits.speed)
     return free, soft, reach
 
 
@@ -183,8 +184,8 @@ def is_fast(regions: PackedRegions, i: int, limits: PathLimits) -> bool:
 
 
 def _add_stay(cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits) -> None:
-    """Add the cost of fast regions that meet a vehicle at rest after the evaluated legs, at a place [m, NED]."""
-    free, point, room = limits.clearance, zeros(3), zeros(3)
+    """Add the cost of fast regions that meet a vehicle at rest after the evaluated legs, at a position [m, NED]."""
+    free, point, scratch = limits.clearance, zeros(3), zeros(3)
     for i in range(regions.kinds.size):
         if not is_fast(regions, i, limits):
             continue
@@ -193,7 +194,7 @@ def _add_stay(cost: PathCost, place: Array, regions: PackedRegions, limits: Path
         while later < _FORESIGHT:
             for axis in range(3):
                 point[axis] = place[axis] - v[axis] * later
-            clearance = clearance_of_place(regions, i, point, room) - uncertainty(regions, i)
+            clearance = clearance_at_position(regions, i, point, scratch) - uncertainty(regions, i)
             free = min(free, clearance)
             later += max((clearance - limits.clearance) / speed, _FORESIGHT / _PREDICTIONS)
     price = _STAY * _near_cost(free, limits)
@@ -206,15 +207,15 @@ def _stay_cost(end: Array, drift: Array, regions: PackedRegions, limits: PathLim
     # An end that drifts [m/s, NED] with the goal is also evaluated at later positions, and against hard regions, which
     # it may meet there. The cost is the mean over these times.
     drifts = _drifts(drift)
-    samples, later, total, place, room = _STAY_SAMPLES if drifts else 1, 0.0, 0.0, zeros(3), zeros(3)
+    samples, later, total, point, scratch = _STAY_SAMPLES if drifts else 1, 0.0, 0.0, zeros(3), zeros(3)
     for _ in range(samples):
         free = limits.clearance
         for i in range(regions.kinds.size):
             if regions.kinds[i] >= _ATTITUDE or (regions.hard[i] and not drifts):
                 continue
             for axis in range(3):
-                place[axis] = end[axis] + (drift[axis] - regions.velocities[i, axis]) * later
-            clearance = clearance_of_place(regions, i, place, room)
+                point[axis] = end[axis] + (drift[axis] - regions.velocities[i, axis]) * later
+            clearance = clearance_at_position(regions, i, point, scratch)
             if regions.hard[i]:
                 free = min(free, clearance - uncertainty(regions, i))
             else:

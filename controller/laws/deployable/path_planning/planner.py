@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from controller.arithmetic import exponential, length3
 from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost, empty_cost, is_fast
 from controller.laws.deployable.path_planning.search import (
-    ROOM,
+    SAMPLING_MARGIN,
     PathLimits,
     Search,
     empty_search,
@@ -26,7 +26,7 @@ from controller.laws.deployable.path_planning.search import (
 )
 from controller.linear_algebra import copy, norm
 from controller.regions.kinds import FIRST_OF_ATTITUDE
-from controller.regions.region_set import PackedRegions, clearance_at, clearance_of_place, evaluate_packed
+from controller.regions.region_set import PackedRegions, clearance_at, clearance_at_position, evaluate_packed
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -144,7 +144,7 @@ def improve_path(
     blocked = is_blocked(plan, start)
     looks_again = _count_blocked(plan, blocked, period)
     if not (blocked or looks_again) and plan.cost[2] <= _BLOCKED * _length(plan.path, plan.counts[0], start):
-        plan.search.room[0], plan.turn[0] = ROOM[0], _HARD
+        plan.search.sampling_margin[0], plan.turn[0] = SAMPLING_MARGIN[0], _HARD
     elif plan.counts[2] == 0:
         end, random_numbers = plan.path[plan.counts[0] - 1], plan.random_numbers
         _choose_closed(plan, blocked or looks_again, start, end, regions, limits.margin)
@@ -177,7 +177,7 @@ def _count_blocked(plan: PathPlan, blocked: bool, period: float) -> bool:
 
 def _restart_trees(search: Search) -> None:
     search.of_goal.size[0] = search.of_vehicle.size[0] = 0
-    search.room[0] = ROOM[0]
+    search.sampling_margin[0] = SAMPLING_MARGIN[0]
 
 
 def go_straight(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
@@ -192,7 +192,7 @@ def _choose_closed(
     """Choose the regions that the trees keep out of; a change of the choice restarts the trees."""
     # While hard regions block the path, only these are closed. Otherwise the costlier soft ones, or all, are closed
     # too, in turns that grow longer. A soft region near or around start or end of the path stays open.
-    turn, room = plan.turn[0], zeros(3)
+    turn, scratch = plan.turn[0], zeros(3)
     if blocked:
         turn = _HARD
     elif turn == _HARD:
@@ -218,7 +218,7 @@ def _choose_closed(
             continue
         plan.closed[i] = turn == _ALL or regions.crossing_costs[i] > mean
         for place in range(2):
-            clearance = clearance_of_place(regions, i, start if place == 0 else end, room)
+            clearance = clearance_at_position(regions, i, start if place == 0 else end, scratch)
             if clearance < margin:
                 plan.closed[i] = False
 
@@ -341,7 +341,12 @@ def _distance(a: Array, b: Array) -> float:
 
 def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
     """Write a mutation of the path into `candidate`."""
-    path, candidate, random, room = plan.path, plan.candidate, plan.random, plan.search.room[0] - _LESS
+    path, candidate, random, sampling_margin = (
+        plan.path,
+        plan.candidate,
+        plan.random,
+        plan.search.sampling_margin[0] - _LESS,
+    )
     _copy_path(path, candidate)
     count = plan.counts[0]
     last = count - 1
@@ -356,28 +361,28 @@ def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, limits: Path
         for axis in range(3):
             candidate[last, axis] += reach * _bell_shaped(random)
         nearest_goal_point(goal, candidate[last], limits.depth, candidate[last])
-    elif choice < 0.3 and count > 1:  # a corner less
+    elif choice < 0.3 and count > 1:  # remove a corner
         drop = int(uniform(random) * last)
         for i in range(drop, last):
             copy(candidate[i + 1], candidate[i])
         count -= 1
-    elif choice < 0.65 and count > 1:  # a corner moved
-        moved = int(uniform(random) * last)
+    elif choice < 0.65 and count > 1:  # move a corner
+        corner = int(uniform(random) * last)
         reach = 0.03 * exponential(_LN_30 * uniform(random))
         for axis in range(3):
-            candidate[moved, axis] += reach * _bell_shaped(random)
-    elif choice < 0.9 and count <= CORNERS:  # a corner more, anywhere about
-        at = int(uniform(random) * count)
-        for i in range(count, at, -1):
+            candidate[corner, axis] += reach * _bell_shaped(random)
+    elif choice < 0.9 and count <= CORNERS:  # add a corner
+        inserted = int(uniform(random) * count)
+        for i in range(count, inserted, -1):
             copy(candidate[i - 1], candidate[i])
         for axis in range(3):
-            low, high = limits_along(axis, start, path[last], room)
-            candidate[at, axis] = low + uniform(random) * (high - low)
+            low, high = limits_along(axis, start, path[last], sampling_margin)
+            candidate[inserted, axis] = low + uniform(random) * (high - low)
         count += 1
     else:  # one corner alone, anywhere about
         copy(path[last], candidate[1])
         for axis in range(3):
-            low, high = limits_along(axis, start, path[last], room)
+            low, high = limits_along(axis, start, path[last], sampling_margin)
             candidate[0, axis] = low + uniform(random) * (high - low)
         count = 2
     plan.counts[1] = count

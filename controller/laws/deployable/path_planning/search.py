@@ -17,7 +17,7 @@ from controller.laws.deployable.gains import SPREADS
 from controller.linear_algebra import copy
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
-from controller.regions.region_set import PackedRegions, clearance_of_place, clearance_of_sphere
+from controller.regions.region_set import PackedRegions, clearance_at_position, clearance_of_sphere
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _NODES = 512  # number of nodes at which a tree restarts
 _CHAIN = 64  # greatest number of points of a path before it is shortened
 _REACH = (1.5, 0.1)  # longest edge: length [m]; fraction of the distance from start to end, if that is longer
-ROOM = (3.0, 32.0)  # m beyond start and end within which random nodes lie: at first; greatest
+SAMPLING_MARGIN = (3.0, 32.0)  # m beyond start and end within which random nodes lie: at first; greatest
 _GROWS = 1.003  # factor by which that distance grows with each call
 _STRIDE = 0.05  # m, least distance between two evaluations along a line
 _LINE_SAMPLES = 32  # greatest number of evaluations along a line
@@ -69,13 +69,15 @@ class Search(NamedTuple):
     of_goal: Tree  # root at the end of the path
     of_vehicle: Tree  # root at the vehicle
     turn: NDArray[np.int64]  # (1,) 0: the tree of the goal grows next, 1: that of the vehicle
-    room: Array  # (1,) m beyond start and end within which random nodes lie
+    sampling_margin: Array  # (1,) m beyond start and end within which random nodes lie
     chain: Array  # (_CHAIN, 3) m, NED: the last path found, before it is shortened
 
 
 def empty_search() -> Search:
     """Return a search whose trees have no nodes."""
-    return Search(_empty_tree(), _empty_tree(), np.zeros(1, dtype=np.int64), np.array([ROOM[0]]), np.zeros((_CHAIN, 3)))
+    return Search(
+        _empty_tree(), _empty_tree(), np.zeros(1, dtype=np.int64), np.array([SAMPLING_MARGIN[0]]), np.zeros((_CHAIN, 3))
+    )
 
 
 def _empty_tree() -> Tree:
@@ -89,35 +91,35 @@ def uncertainty(regions: PackedRegions, i: int) -> float:
     return float(SPREADS * max(deviations[i, 0], deviations[i, 1], deviations[i, 2]))
 
 
-def clearance_of_all(point: Array, regions: PackedRegions, room: Array) -> float:
-    """Return the least clearance [m] of the hard regions of position at a point; `room` has shape (3,)."""
-    least = np.inf
+def clearance_of_all(point: Array, regions: PackedRegions, scratch: Array) -> float:
+    """Return the least clearance [m] of the hard regions of position at a point; `scratch` has shape (3,)."""
+    min_clearance = np.inf
     for i in range(regions.kinds.size):
         if regions.hard[i] and regions.kinds[i] < _ATTITUDE:
             if regions.kinds[i] == _SPHERE:
                 clearance = clearance_of_sphere(regions, i, point)
             else:
-                clearance = clearance_of_place(regions, i, point, room)
-            least = min(least, clearance - uncertainty(regions, i))
-    return least
+                clearance = clearance_at_position(regions, i, point, scratch)
+            min_clearance = min(min_clearance, clearance - uncertainty(regions, i))
+    return min_clearance
 
 
 def free_length(start: Array, end: Array, regions: PackedRegions, margin: float) -> float:
     """Return the length to which a line keeps a clearance of all hard regions at their present positions."""
     # with start, end [m, NED], margin [m], returns [m]
-    point, room = zeros(3), zeros(3)
+    point, scratch = zeros(3), zeros(3)
     length = length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
     s, free = 0.0, -1.0
     for _ in range(_LINE_SAMPLES):
         for axis in range(3):
             point[axis] = start[axis] + (end[axis] - start[axis]) * (s / length if length > 0.0 else 0.0)
-        least = clearance_of_all(point, regions, room)
-        if not least >= margin:
+        clearance = clearance_of_all(point, regions, scratch)
+        if not clearance >= margin:
             return float(free)
         if s >= length:
             return float(length)
-        free = min(length, s + least - margin)
-        s = min(length, s + max(least - margin, _STRIDE))
+        free = min(length, s + clearance - margin)
+        s = min(length, s + max(clearance - margin, _STRIDE))
     return float(min(free, s))
 
 
@@ -126,12 +128,12 @@ def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float
     return free_length(start, end, regions, margin) >= length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
 
 
-def limits_along(axis: int, start: Array, end: Array, room: float) -> tuple[float, float]:
-    """Return the range of random points along an axis [m, NED]: `room` beyond both ends, but below the surface."""
+def limits_along(axis: int, start: Array, end: Array, margin: float) -> tuple[float, float]:
+    """Return the range of random points along an axis [m, NED]: `margin` beyond both ends, but below the surface."""
     low, high = min(start[axis], end[axis]), max(start[axis], end[axis])
     if axis == 2:
-        return max(low - room, min(low, 0.0)), high + room
-    return low - room, high + room
+        return max(low - margin, min(low, 0.0)), high + margin
+    return low - margin, high + margin
 
 
 def look_for_path(
@@ -150,11 +152,11 @@ def look_for_path(
         return 0
     move_root(of_goal, end, regions, margin)
     move_root(of_vehicle, start, regions, margin)
-    search.room[0] = min(_GROWS * search.room[0], ROOM[1])
+    search.sampling_margin[0] = min(_GROWS * search.sampling_margin[0], SAMPLING_MARGIN[1])
     reach = max(_REACH[0], _REACH[1] * length3(start[0] - end[0], start[1] - end[1], start[2] - end[2]))
     if search.turn[0] == 0:
         search.turn[0] = 1
-        _draw_target(of_goal, start, end, start, search.room[0], reach, random_numbers, target)
+        _draw_target(of_goal, start, end, start, search.sampling_margin[0], reach, random_numbers, target)
         grown = extend_tree(of_goal, target, reach, regions, margin)
         if grown < 0:
             return 0
@@ -163,7 +165,7 @@ def look_for_path(
             return 0
         return _write_path(search, grown, met, start, regions, margin, path)
     search.turn[0] = 0
-    _draw_target(of_vehicle, start, end, end, search.room[0], reach, random_numbers, target)
+    _draw_target(of_vehicle, start, end, end, search.sampling_margin[0], reach, random_numbers, target)
     grown = extend_tree(of_vehicle, target, reach, regions, margin)
     if grown < 0:
         return 0
@@ -174,7 +176,14 @@ def look_for_path(
 
 
 def _draw_target(
-    tree: Tree, start: Array, end: Array, other: Array, room: float, reach: float, random_numbers: Array, target: Array
+    tree: Tree,
+    start: Array,
+    end: Array,
+    other: Array,
+    sampling_margin: float,
+    reach: float,
+    random_numbers: Array,
+    target: Array,
 ) -> None:
     """Write the point towards which a tree grows: the other tree's root, a point near a node, or any point."""
     if random_numbers[3] < _TO_OTHER:
@@ -185,27 +194,27 @@ def _draw_target(
             target[axis] = tree.nodes[node, axis] + reach * (2.0 * random_numbers[axis] - 1.0)
     else:
         for axis in range(3):
-            low, high = limits_along(axis, start, end, room)
+            low, high = limits_along(axis, start, end, sampling_margin)
             target[axis] = low + random_numbers[axis] * (high - low)
 
 
-def move_root(tree: Tree, place: Array, regions: PackedRegions, margin: float) -> None:
+def move_root(tree: Tree, point: Array, regions: PackedRegions, margin: float) -> None:
     """Set the root of a tree to a point: add it if its line to the old root is free, else restart the tree."""
     nodes, parents, root = tree.nodes, tree.parents, tree.root[0]
     if tree.size[0] > 0:
-        moved = length3(nodes[root, 0] - place[0], nodes[root, 1] - place[1], nodes[root, 2] - place[2])
-        if tree.size[0] < _NODES and moved <= _MOVED:
+        distance = length3(nodes[root, 0] - point[0], nodes[root, 1] - point[1], nodes[root, 2] - point[2])
+        if tree.size[0] < _NODES and distance <= _MOVED:
             return
-        least = min(_margin_at(tree, root, regions, margin), clearance_of_all(place, regions, zeros(3)) - _SLACK)
-        if tree.size[0] < _NODES and is_line_free(nodes[root], place, regions, least):
+        root_margin = min(_margin_at(tree, root, regions, margin), clearance_of_all(point, regions, zeros(3)) - _SLACK)
+        if tree.size[0] < _NODES and is_line_free(nodes[root], point, regions, root_margin):
             new = tree.size[0]
-            copy(place, nodes[new])
+            copy(point, nodes[new])
             parents[new] = -1
             parents[root] = new
             tree.size[0] += 1
             tree.root[0] = new
             return
-    copy(place, nodes[0])
+    copy(point, nodes[0])
     parents[0] = -1
     tree.size[0] = 1
     tree.root[0] = 0
@@ -260,11 +269,11 @@ def extend_tree(tree: Tree, target: Array, reach: float, regions: PackedRegions,
         if ancestor < 0 or not _sees(tree, ancestor, new, regions, margin):
             break
         parent = ancestor
-    at = tree.size[0]
-    copy(new, nodes[at])
-    parents[at] = parent
+    index = tree.size[0]
+    copy(new, nodes[index])
+    parents[index] = parent
     tree.size[0] += 1
-    return int(at)
+    return int(index)
 
 
 def _write_path(
@@ -291,13 +300,13 @@ def _write_path(
             return 0
         copy(search.of_goal.nodes[node], chain[length])
         length, node = length + 1, search.of_goal.parents[node]
-    least = min(margin, clearance_of_all(start, regions, zeros(3)) - _SLACK)
+    leg_margin = min(margin, clearance_of_all(start, regions, zeros(3)) - _SLACK)
     before, count = start, 0
     for i in range(length):
-        if i + 1 < length and is_line_free(before, chain[i + 1], regions, least):
+        if i + 1 < length and is_line_free(before, chain[i + 1], regions, leg_margin):
             continue
         if count == path.shape[0]:
             return 0
         copy(chain[i], path[count])
-        before, least, count = path[count], margin, count + 1
+        before, leg_margin, count = path[count], margin, count + 1
     return count
