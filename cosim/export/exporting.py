@@ -8,7 +8,7 @@ from pathlib import Path
 from cosim.errors import ExportError, RunError
 from cosim.export.excerpt import excerpt_of
 from cosim.export.formats import FORMATS
-from cosim.results.record import RECORD
+from cosim.results.record import RECORD, STREAM
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, SUMMARY
 from plant_fmu.archive import temporary_folder
 from plant_fmu.installing import install_hint
@@ -18,7 +18,7 @@ _REMOVED = {
     "mat": "MATLAB reads RUN/record.parquet by parquetread",
     "npz": "pandas.read_parquet and pyarrow read RUN/record.parquet",
 }
-_RUN_FILES = frozenset({RECORD, SCENARIO, SUMMARY, COMMANDS_LOG})
+_RUN_FILES = frozenset({RECORD, STREAM, SCENARIO, SUMMARY, COMMANDS_LOG})
 
 
 def export_run(

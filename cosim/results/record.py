@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 from collections import OrderedDict
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -16,6 +17,8 @@ from numpy.typing import NDArray
 from cosim.errors import RunError
 from cosim.io.format_number import require_format
 from cosim.simulation.signals import Array, Column
+
+log = logging.getLogger(__name__)
 
 MAX_ROWS = 100_000_001  # rows of a run with the greatest number of steps that a scenario may have
 RECORD = "record.parquet"
@@ -223,8 +226,8 @@ class _ParquetSource:
 class _StreamSource:
     """Rows of an Arrow stream, by batch, up to the first that is incomplete."""
 
-    def __init__(self, stream: Any) -> None:
-        self.schema, self._batches = stream.schema, list(_complete_batches(stream))
+    def __init__(self, schema: pa.Schema, batches: Iterator[pa.RecordBatch]) -> None:
+        self.schema, self._batches = schema, list(batches)
         self.group_rows = [len(batch) for batch in self._batches]
 
     def read(self, columns: Sequence[Column], groups: Sequence[int]) -> Iterator[Rows]:
@@ -233,20 +236,21 @@ class _StreamSource:
             yield _rows_of(self._batches[group], columns)
 
 
-def _complete_batches(stream: Any) -> Iterator[pa.RecordBatch]:
-    """Yield the batches of a stream up to the first that a kill or a full disk has cut."""
-    with contextlib.suppress(StopIteration, pa.ArrowInvalid, OSError):
-        while True:
-            batch = stream.read_next_batch()
-            batch.validate()
+def _complete_batches(file: Path, stream: Any) -> Iterator[pa.RecordBatch]:
+    """Yield the batches of a stream up to the first that a kill, a full disk or damage has made unreadable."""
+    try:
+        for batch in stream:
+            batch.validate()  # a damaged length would be read beyond the file's end
             yield batch
+    except (pa.ArrowInvalid, OSError) as error:
+        log.warning("%s: its end cannot be read (%s); the rows before it are kept", file, error)
 
 
 @contextlib.contextmanager
 def stream_batches(file: Path) -> Iterator[Iterator[pa.RecordBatch]]:
     """Open an Arrow stream to read its complete batches, whose memory is the file's."""
     with pa.memory_map(str(file)) as memory, pa.ipc.open_stream(memory) as stream:
-        yield _complete_batches(stream)
+        yield _complete_batches(file, stream)
 
 
 def _rows_of(batch: pa.RecordBatch, columns: Sequence[Column]) -> Rows:
@@ -268,7 +272,7 @@ def _opened(file: Path) -> Iterator[_ParquetSource | _StreamSource]:
     try:
         if file.suffix == Path(STREAM).suffix:
             with pa.memory_map(str(file)) as memory, pa.ipc.open_stream(memory) as stream:
-                yield _StreamSource(stream)
+                yield _StreamSource(stream.schema, _complete_batches(file, stream))
         else:
             # with pre_buffer all that was read of a file would stay in memory until it is closed
             with pq.ParquetFile(file, pre_buffer=False) as parquet:

@@ -40,7 +40,7 @@ class Recorder:
         self._filled = 0  # rows of the block
         self._columns: Array = np.empty((len(columns), size))
         self._transposed = 0  # rows of the columns
-        self._message = self._schema.serialize()  # what is to be written next
+        self._message = self._schema.serialize()  # bytes that the next write appends
         (folder / STREAM).touch(exist_ok=False)
         self._end = 0  # bytes of the complete messages in the file
         self._due = time.monotonic() + _PERIOD
@@ -101,12 +101,11 @@ class Recorder:
     def _convert(self) -> None:
         """Write the rows of the stream to a Parquet file."""
         size = max(1, min(max(_BATCH, self.rows // _GROUPS), _GROUP_VALUES // len(self._schema)))
+        # written by name: the writer's destructor would fail on a closed `file`
         with (
             stream_batches(self._folder / STREAM) as batches,
             atomic_file(self._folder / RECORD) as file,
-            pq.ParquetWriter(
-                file.name, self._schema, **_WRITING
-            ) as writer,  # a closed `file` would fail in its destructor
+            pq.ParquetWriter(file.name, self._schema, **_WRITING) as writer,
         ):
             for group in _groups(batches, size):
                 writer.write_table(pa.Table.from_batches(group).combine_chunks())
