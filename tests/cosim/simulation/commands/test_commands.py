@@ -63,6 +63,14 @@ def test_log_replays_every_command_at_its_step(tmp_path_factory, given_commands)
     assert recorded.exhausted
 
 
+def test_log_line_is_readable_json(tmp_path):
+    logged = LoggedCommands(queue := CommandQueue(), tmp_path / "log")
+    queue.submit(cmd.SetTarget((1.0, 2.0, 3.0), 0.5))
+    logged.take(7)
+    target = '{"command":"set_target","position":[1.0,2.0,3.0],"radius":0.5,"velocity":[0.0,0.0,0.0]}'
+    assert (tmp_path / "log").read_text() == f'{{"step":7,"command":{target}}}\n'
+
+
 def test_full_queue_rejects_commands():
     queue = CommandQueue()
     assert all(queue.submit(cmd.Arm(True)) for _ in range(QUEUED))
