@@ -102,6 +102,11 @@ class LogContents:
         """Append a sample of a quantity to its source, like `Source.put`."""
         self.source(quantity, name, len(values)).put(stamp, written, values)
 
+    def put_parameter(self, name: str, value: float) -> None:
+        """Store a parameter of the autopilot; omit one that is not finite."""
+        if math.isfinite(value):
+            self.parameters[name] = value
+
     def best(self, quantity: str) -> Source | None:
         """Return the source to use for a quantity: the preferred one, else the one with most samples, or None."""
         sources = {s.name: s for s in self.sources.values() if s.quantity == quantity and s.count}

@@ -120,7 +120,7 @@ class VehicleMessages:
             self._contents.put("dvl", "VISION_POSITION_DELTA", math.nan, written - 0.5 * seconds, values)
 
     def _store_parameter(self, m: Any, stamp: float, written: float) -> None:
-        self._contents.parameters[_text(m.param_id).rstrip("\0")[:16]] = float(m.param_value)
+        self._contents.put_parameter(_text(m.param_id).rstrip("\0")[:16], float(m.param_value))
 
     def _store_frame(self, m: Any, stamp: float, written: float) -> None:
         text = _text(m.text)

@@ -96,7 +96,7 @@ class _Messages:
             self._add(name, m)
         except KeyError as error:
             raise ImportLogError(f"message {name} has no field {error}, expected it as ArduPilot has it") from error
-        except TypeError as error:
+        except (TypeError, ValueError) as error:
             raise ImportLogError(f"message {name} has a text, expected numbers as ArduPilot has them") from error
 
     def _add(self, name: str, m: Fields) -> None:
@@ -127,7 +127,7 @@ class _Messages:
     # ---- messages that are no plain samples ----
 
     def _store_parameter(self, m: Fields, source: str, time: float) -> None:
-        self._contents.parameters[str(m["Name"])] = float(m["Value"])
+        self._contents.put_parameter(str(m["Name"]), float(m["Value"]))
         if m["Name"] == "FRAME_CONFIG" and 0 <= m["Value"] < len(_FRAMES):
             self._contents.frame = _FRAMES[int(m["Value"])]
 

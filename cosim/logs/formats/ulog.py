@@ -42,7 +42,8 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
         names.add(name.split("[")[0])
         _put_samples(samples, contents, name, outputs)
     contents.autopilot = "px4"
-    contents.parameters |= log.parameters
+    for key, value in log.parameters.items():
+        contents.put_parameter(key, value)
     contents.kind = vehicle_kind(int(contents.parameters.get("MAV_TYPE", 0)))
     contents.unread.update(dict.fromkeys(log.formats - names - set(_TOPICS), 1))
     if log.dropouts:

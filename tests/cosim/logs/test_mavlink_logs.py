@@ -192,6 +192,17 @@ def test_sticks_replace_missing_servo_outputs(tmp_path):
     np.testing.assert_allclose(record["attitude.yaw"][20:-20], math.radians(30.0), rtol=1e-6)
 
 
+def test_progress_is_reported_by_its_former_name_too(tmp_path, six_thrusters):
+    arguments, options = (DATAFLASH, six_thrusters, tmp_path / "run"), {"report": False}
+    fractions, again = [], []
+    cosim.import_log(*arguments, on_progress=fractions.append, **options)
+    with pytest.warns(DeprecationWarning, match="moved is now on_progress"):
+        cosim.import_log(*arguments, moved=again.append, overwrite=True, **options)
+    assert again == fractions == sorted(fractions) and fractions[-1] == 1.0
+    with pytest.raises(ImportLogError, match="moved is the former name of on_progress, expected one of them"):
+        cosim.import_log(*arguments, on_progress=again.append, moved=again.append, overwrite=True, **options)
+
+
 @pytest.mark.medium(fast=2)
 @pytest.mark.parametrize(("path", "cut"), [(TLOG, 0.3), (DATAFLASH, 0.61803), (DATAFLASH, 0.9)])
 def test_truncated_log_is_read_to_its_end(tmp_path, path, cut, six_thrusters):
@@ -260,6 +271,51 @@ def test_dataflash_parser_matches_pymavlink():
             assert same or (math.isnan(value) and math.isnan(other)), (name, field)
     assert log.recv_match(type=list(wanted)) is None
     close(log)
+
+
+USED = {  # message: fields that are read
+    "ATT": "TimeUS Roll Pitch Yaw", "XKF1": "TimeUS PN PE PD VN VE VD", "XKQ": "TimeUS Q1 Q2 Q3 Q4",
+    "BARO": "TimeUS Alt", "IMU": "TimeUS GyrX GyrY GyrZ AccX AccY AccZ", "RATE": "TimeUS R P Y",
+    "VISO": "TimeUS dt PosDX PosDY PosDZ",
+    "PARM": "TimeUS Value", "RCOU": "TimeUS " + " ".join(f"C{i}" for i in range(1, 15)),
+}  # fmt: skip
+FORMATS = {m["Name"]: m for _, m in parse_messages(DATAFLASH, frozenset({"FMT"}), lambda fraction: None) if m}
+
+
+def message_of(name, letters, *values):
+    """Return a dataflash message; letters are the types of its fields."""
+    layout = "<" + "".join(DFReader.FORMAT_TO_STRUCT[letter][0] for letter in letters)
+    return b"\xa3\x95" + bytes([FORMATS[name]["Type"]]) + struct.pack(layout, *values)
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("name", USED)
+def test_dataflash_text_where_a_number_belongs_is_refused(tmp_path, name):
+    """Each field in turn is a text by the log's own format of the message."""
+    columns, refused = FORMATS[name]["Columns"], []
+    for i, column in enumerate(columns.split(",")):
+        letters = FORMATS[name]["Format"][:i] + "n" + FORMATS[name]["Format"][i + 1 :]
+        message = message_of(name, letters, *(b"text" if letter in "nN" else 1 for letter in letters))
+        texts = (text.encode() for text in (name, letters, columns))
+        form = message_of("FMT", FORMATS["FMT"]["Format"], FORMATS[name]["Type"], len(message), *texts)
+        (tmp_path / "it.bin").write_bytes(form + 9 * message)
+        try:
+            cosim.import_log(tmp_path / "it.bin", "bluerov2_heavy", tmp_path / "run", report=False, overwrite=True)
+        except ImportLogError as error:
+            refused += [column] if f"message {name} has a text" in str(error) else []
+    assert sorted(refused) == sorted(USED[name].split())
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+@pytest.mark.parametrize(
+    "name", ["BARO_PRIMARY", "INS_GYRO_FILTER", "SERVO1_FUNCTION", "FRAME_CONFIG", "MOT_1_DIRECTION"]
+)
+def test_parameters_that_are_not_finite_are_omitted(tmp_path, six_thrusters, dataflash, name, value):
+    parameter = message_of("PARM", FORMATS["PARM"]["Format"], 0, name.encode(), value)
+    (tmp_path / "it.bin").write_bytes(DATAFLASH.read_bytes() + parameter)
+    run = cosim.import_log(tmp_path / "it.bin", six_thrusters, tmp_path / "run", report=False)
+    for column in dataflash.record.units:
+        np.testing.assert_array_equal(run.record[column], dataflash.record[column])
 
 
 @pytest.mark.medium
