@@ -35,10 +35,10 @@ class _Udp:
 
     def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
         """Queue a frame for the next datagram to each peer; having no listener is no failure."""
-        if len(self._packets[2]) + len(frame) > _MAX_PACKET:
+        frames = {1: frame_v1 or b"", 2: frame}
+        if any(len(self._packets[version]) + len(frames[version]) > _MAX_PACKET for version in frames):
             self._send_packets()
-        self._packets[2] += frame
-        self._packets[1] += frame_v1 or b""  # about the same length: fewer messages, whose trailing zeros are not cut
+        self._packets = {version: self._packets[version] + frames[version] for version in frames}
         return True
 
     def poll(self, now: float) -> None:

@@ -48,7 +48,7 @@ def until(found):
     return value
 
 
-def open_page(browser, running, condition="subreach.runs[0]?.rows > 0 && !!subreach.scene"):
+def open_page(browser, running, condition="subreach.runs[0]?.rows > 0 && subreach.scene?.drawn.runs.length > 0"):
     until(lambda: running.view._run >= 0)
     browser.get(running.url)
     until(lambda: browser.execute_script(f"return window.subreach?.ready && {condition}"))

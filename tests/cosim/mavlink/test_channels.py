@@ -121,6 +121,23 @@ def test_udp_peers_are_answered_in_their_mavlink_version():
     assert old.recv(1000)[0] == 0xFD
 
 
+@pytest.mark.parametrize("is_server", [False, True])
+def test_datagrams_of_both_versions_hold_at_most_1000_bytes(is_server):
+    """Frames of MAVLink 1 keep the trailing zeros that those of MAVLink 2 lose."""
+    peer = udp_socket()
+    link = link_of(UdpIn(HERE, 0) if is_server else UdpOut(*peer.getsockname()))
+    if not is_server:
+        send_now(link, heartbeat())
+    address = (HERE, link.channel.port) if is_server else peer.recvfrom(1000)[1]
+    peer.sendto(Station().pack(heartbeat(), v1=True), address)
+    assert until(lambda: received(link))
+    for _ in range(10):
+        link.send(mavlink.MAVLink_file_transfer_protocol_message(0, 255, 190, bytes(251)))
+    link.channel.close()
+    sizes = [len(peer.recv(65536)) for _ in range(4)]
+    assert sum(sizes) == 10 * (8 + 254) and max(sizes) <= 1000
+
+
 def test_tcp_client_is_answered_in_its_mavlink_version():
     link = link_of(TcpIn(HERE, 0))
     (side,) = connected(link.channel)
