@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 from cosim.mavlink.wire.dialect import dialect, make_heartbeat
 from cosim.mavlink.wire.options import ORIGIN
 from cosim.simulation.pace import Pace
 from cosim.sitl.hil_messages import RATE, hil_messages
+from cosim.sitl.lockstep_server import POLL, LockstepServer
 from cosim.sitl.motion import Motion, at_rest
 from cosim.sitl.sitl_flight import Flight
-from cosim.sitl.sitl_session import POLL, LockstepServer, SitlSession
 
 LEFT = "ended: the autopilot left"
 SYSTEM_ID, COMPONENT_ID = 254, 25  # identity of the simulator, unlike those of vehicles and ground stations
@@ -32,6 +33,7 @@ class _SilentError(Exception):
     """The autopilot has sent nothing for longer than the timeout."""
 
 
+@dataclass(eq=False)
 class HilServer(LockstepServer):
     """Fly the plant in lockstep with a PX4."""
 
@@ -39,17 +41,7 @@ class HilServer(LockstepServer):
     # begins with the first actuator controls of an armed vehicle, and each one from then on makes one step.
 
     kind = socket.SOCK_STREAM
-
-    def __init__(
-        self,
-        flights: SitlSession,
-        address: tuple[str, int],
-        timeout: float | None = None,
-        report: Callable[[str], None] | None = None,
-        speedup: float | None = None,
-    ) -> None:
-        super().__init__(flights, address, timeout, report)
-        self._mavlink, self._speedup = dialect(), speedup
+    speedup: float | None = None  # simulated seconds per second of the wall clock; None: as fast as possible
 
     def _serve(self) -> str:
         while True:
@@ -59,12 +51,12 @@ class HilServer(LockstepServer):
                 return str(error)
             with connection:
                 connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-                flight = self._flights.begin(RATE)
-                self._report(f"{flight.folder}: {peer[0]}:{peer[1]} flies, {RATE} frames a simulated second")
+                flight = self.flights.begin(RATE)
+                self.report(f"{flight.folder}: {peer[0]}:{peer[1]} flies, {RATE} frames a simulated second")
                 try:
                     self._fly(flight, connection)
                 except _DisconnectedError:
-                    self._flights.end(LEFT)
+                    self.flights.end(LEFT)
                 except _SilentError as error:
                     return str(error)
                 else:
@@ -82,12 +74,12 @@ class HilServer(LockstepServer):
 
     def _fly(self, flight: Flight, connection: socket.socket) -> None:
         """Fly with one connection until the scenario's end."""
-        codec = self._mavlink.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=COMPONENT_ID)
+        codec = dialect().MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=COMPONENT_ID)
         codec.robust_parsing = True
         motion = at_rest(flight.motion())
         frame = 0  # number of frames on PX4's clock, which is never reset
         controls: Iterator[tuple[bool, list[float]]] = iter(())
-        pace = None if self._speedup is None else Pace(1.0 / (RATE * self._speedup))
+        pace = None if self.speedup is None else Pace(1.0 / (RATE * self.speedup))
         while not flight.done:
             if pace is not None:
                 pace.wait()
@@ -102,7 +94,7 @@ class HilServer(LockstepServer):
                 continue
             is_armed, outputs = answer
             if flight.steps or is_armed:
-                self._flights.law.set_outputs(outputs)
+                self.flights.law.set_outputs(outputs)
                 motion = flight.step()
                 self.counts.steps += 1
             else:
@@ -110,7 +102,7 @@ class HilServer(LockstepServer):
                 self.counts.waited += 1
 
     def _send(self, connection: socket.socket, codec: Any, motion: Motion, frame: int) -> None:
-        m = self._mavlink
+        m = dialect()
         time_us = (frame + 1) * 1_000_000 // RATE
         messages = hil_messages(m, motion, time_us, ORIGIN, frame % _GPS_EVERY == 0)
         if frame % _HEARTBEAT_EVERY == 0:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import logging
 import socket
 import time
-from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Literal
 
 from cosim.sitl import json_protocol
-from cosim.sitl.sitl_session import MIN_RATE, RESTARTED, LockstepServer, SitlSession
+from cosim.sitl.lockstep_server import LockstepServer
+from cosim.sitl.sitl_session import MIN_RATE, RESTARTED
 
 log = logging.getLogger(__name__)
 
@@ -41,24 +42,15 @@ class Lockstep:
         return "gap" if self.missed else "next"
 
 
+@dataclass(eq=False)
 class JsonServer(LockstepServer):
     """Fly the plant in lockstep with an ArduPilot."""
 
     kind = socket.SOCK_DGRAM
-
-    def __init__(
-        self,
-        flights: SitlSession,
-        address: tuple[str, int],
-        timeout: float | None = None,
-        report: Callable[[str], None] | None = None,
-    ) -> None:
-        super().__init__(flights, address, timeout, report)
-        self._receive = self._socket.recvfrom
-        self._lockstep = Lockstep()
-        self._sender: Sender | None = None
-        self._answer = b""
-        self._warned: dict[str, float] = {}
+    _lockstep: Lockstep = field(default_factory=Lockstep, init=False)
+    _sender: Sender | None = field(default=None, init=False)
+    _answer: bytes = field(default=b"", init=False)
+    _warned: dict[str, float] = field(default_factory=dict, init=False)  # s, time of the last warning of each kind
 
     def _serve(self) -> str:
         while not (status := self.poll()):
@@ -68,13 +60,13 @@ class JsonServer(LockstepServer):
     def poll(self) -> str:
         """Answer the next frame, or wait for one for at most 0.25 s; return the run's status once it has ended."""
         try:
-            data, sender = self._receive(json_protocol.MAX_SIZE + 1)
+            data, sender = self._socket.recvfrom(json_protocol.MAX_SIZE + 1)
         except OSError:  # timeout; or the report of an earlier answer that was refused
             data, sender = b"", None
         now = time.monotonic()
         if sender is not None and self._accept(data, sender, now):
             self._received = now
-            if self._flights.flight is not None and self._flights.flight.done:
+            if self.flights.flight is not None and self.flights.flight.done:
                 return "completed"
             return ""
         return self._silence()
@@ -119,21 +111,21 @@ class JsonServer(LockstepServer):
         return True
 
     def _begin(self, frame_rate: int) -> None:
-        if self._flights.flight is not None:
-            self._flights.end(RESTARTED)
-        flight = self._flights.begin(frame_rate)
+        if self.flights.flight is not None:
+            self.flights.end(RESTARTED)
+        flight = self.flights.begin(frame_rate)
         sender = f"{self._sender[0]}:{self._sender[1]}" if self._sender else "no sender"
-        self._report(f"{flight.folder}: {sender} flies, {frame_rate} frames a simulated second")
+        self.report(f"{flight.folder}: {sender} flies, {frame_rate} frames a simulated second")
 
     def _count_lost(self, missed: int) -> None:
         self.counts.lost += missed
-        self._flights.law.lost += missed
+        self.flights.law.lost += missed
         self._warn("lost", f"{missed} frames of the autopilot lost: one step is made for all")
 
     def _step(self, packet: json_protocol.ServoPacket) -> None:
-        flight = self._flights.flight
+        flight = self.flights.flight
         assert flight is not None
-        law = self._flights.law
+        law = self.flights.law
         law.set_outputs(packet.pwm)
         if flight.steps or (law.is_driving and flight.can_start):
             motion = flight.step()

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
-import logging
-import socket
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
 
 from cosim.errors import CosimError, RunError
 from cosim.results.run_result import Run
@@ -21,11 +17,8 @@ from cosim.sitl.sitl_flight import Flight
 from plant_fmu import PlantFmuError, Vehicle
 from plant_fmu.build import cached_fmu
 
-log = logging.getLogger(__name__)
-
 SCENARIO = "sitl"  # default scenario
 MIN_RATE, MAX_RATE = 11, 65535  # Hz: an autopilot's frame is shorter than 0.1 s, and a packet holds 16 bits
-POLL = 0.25  # s of the wall clock, timeout of a socket, after which the silence is checked
 RESTARTED = "ended: the autopilot restarted"
 
 _VALIDATION_RATE = 1000  # Hz, frame rate for the validation of a scenario before an autopilot connects
@@ -81,56 +74,6 @@ def scenario_to_fly(
     scenario = load_scenario(name_or_file, [*changes, f"time.step={step!r}"])
     table = scenario.table | {"changed": base.table["changed"]}  # its steps are the autopilot's, which the title names
     return dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, name=autopilot), table=table)
-
-
-class LockstepServer:
-    """A socket on which an autopilot flies the runs of a session."""
-
-    kind: ClassVar[socket.SocketKind]
-
-    def __init__(
-        self,
-        flights: SitlSession,
-        address: tuple[str, int],
-        timeout: float | None = None,
-        report: Callable[[str], None] | None = None,
-    ) -> None:
-        self._flights, self._timeout, self._report = flights, timeout, report or log.info
-        self.counts = FrameCounts()
-        self._socket = socket.socket(socket.AF_INET, self.kind)
-        try:
-            if self.kind == socket.SOCK_STREAM:
-                self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            self._socket.bind(address)
-            if self.kind == socket.SOCK_STREAM:
-                self._socket.listen(1)
-        except OSError as error:
-            self._socket.close()
-            protocol = "TCP" if self.kind == socket.SOCK_STREAM else "UDP"
-            raise RunError(f"{protocol} {address[0]}:{address[1]}: {error.strerror or error}") from error
-        self._socket.settimeout(POLL if timeout is None else min(POLL, timeout))
-        self.address: tuple[str, int] = self._socket.getsockname()
-        self._received = time.monotonic()
-
-    def serve(self) -> Outcome:
-        """Fly until the scenario's end, a timeout, or Ctrl-C, as `SitlSession.fly`."""
-        try:
-            return self._flights.fly(self._serve, self.counts)
-        finally:
-            self.close()
-
-    def _serve(self) -> str:
-        """Serve the autopilot; return the status of the last run."""
-        raise NotImplementedError
-
-    def close(self) -> None:
-        """Close the socket. May be called twice."""
-        self._socket.close()
-
-    def _silence(self) -> str:
-        """Return the status of a session whose autopilot was silent for longer than the timeout; else an empty text."""
-        is_silent = self._timeout is not None and time.monotonic() - self._received > self._timeout
-        return f"ended: silence for {self._timeout:g} s" if is_silent else ""
 
 
 class SitlSession:

@@ -347,11 +347,11 @@ def test_a_plant_that_fails_leaves_its_record(serve):
     with StandIn(served.address) as pilot:
         for _ in range(5):
             pilot.fly(NEUTRAL)
-        served.server._flights.flight._master.plant.close()
+        served.server.flights.flight._master.plant.close()
         pilot.send(frame(5, NEUTRAL))
         with pytest.raises(Exception, match="clos"):
             served.outcome()
-    assert len(load_record(served.server._flights._ended[0][0].folder)["time"]) == 5
+    assert len(load_record(served.server.flights._ended[0][0].folder)["time"]) == 5
 
 
 def test_occupied_port_is_reported():
