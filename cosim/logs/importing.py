@@ -42,14 +42,8 @@ from plant_fmu.archive import temporary_folder
 from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
 
-_SCENARIO_KEYS = (
-    "goal",
-    "regions",
-    "criteria",
-    "arbiter",
-    "intersection",
-    "title",
-)  # keys of a scenario that apply to a log
+# keys of a scenario that apply to a log
+_SCENARIO_KEYS = ("goal", "regions", "criteria", "arbiter", "intersection", "title")
 _MIN_ROWS, _ROWS_PER_SAMPLE = 500_000, 200  # rows that a log may have: some, and for each of its samples
 _MAX_GAPS = 12  # gaps of a topic in a report
 
