@@ -54,12 +54,12 @@ def fly(  # noqa: C901 - one loop, as a whole
     """Fly from start to end."""
     m, n, inputs = setup.thrusters, setup.regions.kinds.size, native.inputs
     state, weights, by_criterion = workspace.state, workspace.weights, workspace.by_criterion
-    clearances, goal_clearance, seen = workspace.clearances, workspace.goal_clearance, workspace.arbiter_clearances
+    clearances, goal_clearance = workspace.clearances, workspace.goal_clearance
     arbiter_state = workspace.arbiter_state
     position, quaternion = native.outputs[:3], native.outputs[3:7]
     first_inside, last_entered, inside = -1, -1, False
-    place, stayed = 0, 0
-    least, least_angle, most = np.inf, np.inf, -np.inf
+    goal_index, stayed = 0, 0
+    min_clearance, min_angle, max_goal_clearance = np.inf, np.inf, -np.inf
     effort, thrust_effort, variation, violation = 0.0, 0.0, 0.0, 0.0
     max_force, max_speed, worst, refused = 0.0, 0.0, 0.0, -1
     failures, known_failures, outages = 0, 0, 0
@@ -93,23 +93,23 @@ def fly(  # noqa: C901 - one loop, as a whole
         # metrics
         if setup.moving or k == 0:
             _move(setup, now)
-        if place > 0:
+        if goal_index > 0:
             for axis in range(3):
-                setup.goal.shifts[0, axis] += setup.goal_places[place - 1, axis]
+                setup.goal.shifts[0, axis] += setup.goal_places[goal_index - 1, axis]
         _clearances(setup.regions, position, quaternion, clearances, workspace.scratch)
         _clearances(setup.goal, position, quaternion, goal_clearance, workspace.scratch)
         for i in range(n):
             if setup.regions.hard[i]:
                 if setup.regions.kinds[i] < _ATTITUDE:
-                    least = _least(clearances[i], least)
+                    min_clearance = _least(clearances[i], min_clearance)
                     if not np.isnan(bound):
                         excess = max(excess, bound - clearances[i])
                 else:
-                    least_angle = _least(clearances[i], least_angle)
+                    min_angle = _least(clearances[i], min_angle)
             if k < setup.steps and not clearances[i] >= 0.0:
                 violation -= setup.priorities[i] * clearances[i] * setup.step
-        if place == setup.goal_places.shape[0]:
-            most = max(most, goal_clearance[0])
+        if goal_index == setup.goal_places.shape[0]:
+            max_goal_clearance = max(max_goal_clearance, goal_clearance[0])
             if goal_clearance[0] >= 0.0 and not inside:
                 last_entered = k
                 if first_inside < 0:
@@ -118,7 +118,7 @@ def fly(  # noqa: C901 - one loop, as a whole
         else:
             stayed = stayed + 1 if goal_clearance[0] >= 0.0 else 0
             if stayed > setup.goal_stay:
-                place, stayed = place + 1, 0
+                goal_index, stayed = goal_index + 1, 0
         u, v, w = native.outputs[7], native.outputs[8], native.outputs[9]
         max_speed = max(max_speed, math.sqrt(u * u + v * v + w * w))
         controls = k % setup.control_every == 0
@@ -138,8 +138,11 @@ def fly(  # noqa: C901 - one loop, as a whole
             arbiter_clearances = clearances
             write_arbiter_state(state, law.expected, arbiter_state)
             if not setup.exact:
-                _clearances(setup.regions, arbiter_state.position, arbiter_state.quaternion, seen, workspace.scratch)
-                arbiter_clearances = seen
+                arbiter_clearances = workspace.arbiter_clearances
+                _clearances(
+                    setup.regions, arbiter_state.position, arbiter_state.quaternion,
+                    arbiter_clearances, workspace.scratch,
+                )  # fmt: skip
             workspace.now[0] = now
             compute_inputs(
                 setup.inputs,
@@ -168,7 +171,7 @@ def fly(  # noqa: C901 - one loop, as a whole
             if timed:
                 worst = max(worst, seconds(setup.clock, workspace.ticks) - started)
             if out.reasons.shape[0]:
-                _give_reasons(out.reasons[k // setup.control_every], out.estimate, place, workspace)
+                _give_reasons(out.reasons[k // setup.control_every], out.estimate, goal_index, workspace)
             if out.trace.shape[0]:
                 _trace(out.trace[k // setup.control_every], now, native, state.position, by_criterion, law.report)
             for j in range(inputs.size):
@@ -195,7 +198,7 @@ def fly(  # noqa: C901 - one loop, as a whole
         max_force = max(max_force, force)
     metrics = out.metrics
     metrics[0], metrics[1], metrics[2] = first_inside, last_entered, inside
-    metrics[3], metrics[4], metrics[5] = least, least_angle, most
+    metrics[3], metrics[4], metrics[5] = min_clearance, min_angle, max_goal_clearance
     metrics[6], metrics[7], metrics[8] = effort, thrust_effort, variation
     metrics[9], metrics[10], metrics[11], metrics[12] = max_force, max_speed, worst, refused
     metrics[13], metrics[14] = excess, violation

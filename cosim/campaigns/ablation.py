@@ -68,26 +68,26 @@ def ablate(
     if not variants or len(set(variants)) < len(variants):
         raise RunError(f"variants are {', '.join(variants) or 'none'}, expected one or more, each once")
     refuse_other_files(out, {NUMBERS, PAGE, WHOLE, *VARIANTS}, "an ablation")
-    flown = {WHOLE: Variant("all of it")} | {name: VARIANTS[name] for name in variants}
+    all_variants = {WHOLE: Variant("all of it")} | {name: VARIANTS[name] for name in variants}
     gains, conditions = gains_from(LAW, settings), conditions or Conditions()
 
     def numbers(campaigns: Mapping[str, Campaign]) -> dict[str, Any]:
-        whole = campaigns[WHOLE]
+        reference = campaigns[WHOLE]
         return {
             "law": LAW,
             "variants": {
-                name: {"description": variant.description, **_compare(whole.results, campaigns[name].results)}
-                for name, variant in flown.items()
+                name: {"description": variant.description, **_compare(reference.results, campaigns[name].results)}
+                for name, variant in all_variants.items()
             },
-            "versions": whole.summary["versions"],
-            "code_sha256": whole.summary["code_sha256"],
+            "versions": reference.summary["versions"],
+            "code_sha256": reference.summary["code_sha256"],
         }
 
     tasks = {
         name: SceneTask(
             LAW, gains._replace(**variant.gains), msgspec.structs.replace(conditions, arbiter=variant.arbiter)
         )
-        for name, variant in flown.items()
+        for name, variant in all_variants.items()
     }
     return fly_each(scenes, out, tasks, NUMBERS, numbers, workers, progress)
 

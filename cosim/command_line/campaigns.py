@@ -172,7 +172,7 @@ def _ablate(options: argparse.Namespace) -> int:
 
     refuse_flags(options, ["arbiter"], "no --ablate with it")
     names = list(VARIANTS) if options.variants is None else [name.strip() for name in options.variants.split(",")]
-    given = options.scenes, options.out, names, _conditions(options), options.set, options.workers
+    arguments = options.scenes, options.out, names, _conditions(options), options.set, options.workers
 
     def lines(done: Any) -> Iterator[str]:
         for name, result in done.numbers["variants"].items():
@@ -181,4 +181,4 @@ def _ablate(options: argparse.Namespace) -> int:
             completed = f"{result['completed']['rows']} of {result['scenes']} scenes completed"
             yield f"{name} ({result['description']}): {completed}{weighted}"
 
-    return fly(options, lambda: ablate(*given, not options.quiet), lines, write_ablation_page)
+    return fly(options, lambda: ablate(*arguments, not options.quiet), lines, write_ablation_page)

@@ -56,6 +56,6 @@ def check(options: argparse.Namespace) -> int:
     from cosim.precheck.precheck import check_scenario
     from cosim.scenario.scenario import load_scenario
 
-    found = check_scenario(load_scenario(options.scenario, options.set))
-    print(check_json(found).rstrip() if options.json else check_text(found))
-    return 0 if found.holds else 1
+    result = check_scenario(load_scenario(options.scenario, options.set))
+    print(check_json(result).rstrip() if options.json else check_text(result))
+    return 0 if result.holds else 1

@@ -49,19 +49,19 @@ def sitl(options: argparse.Namespace) -> int:
 
     _check(options)
     address = _address(options.host, options.port or _PORTS[options.backend], options.allow_remote)
-    chosen = FlightOptions(
+    flight_options = FlightOptions(
         options.scenario, tuple(options.set), options.vehicle, options.out, options.record_rate,
         not options.no_report,
     )  # fmt: skip
     server: JsonServer | HilServer
     link = None
     if options.backend == "px4":
-        flights, speedup = SitlSession(chosen, options.backend, make_control_law), options.speedup or 1.0
+        flights, speedup = SitlSession(flight_options, options.backend, make_control_law), options.speedup or 1.0
         server = HilServer(flights, address, options.timeout, print_status, speedup=speedup)
         print_status("waiting for PX4 on TCP {}:{}".format(*server.address))
     else:
         link = _autopilot_link(options)
-        flights = SitlSession(chosen, options.backend, lambda vehicle: make_pwm_law(vehicle, link))
+        flights = SitlSession(flight_options, options.backend, lambda vehicle: make_pwm_law(vehicle, link))
         server = JsonServer(flights, address, options.timeout, print_status)
         print_status("waiting for ArduPilot on UDP {}:{}".format(*server.address))
     with contextlib.closing(link) if link is not None else contextlib.nullcontext():

@@ -114,29 +114,29 @@ def _draw(entity: SceneEntity, solid: Solid, active: bool) -> None:
     shape, opaque = solid.shape, OPAQUE[active]
     at_rest = (1.0, 0.0, 0.0, 0.0)
     if isinstance(shape, Sphere):
-        drawn = entity.spheres.add()
-        _set_pose(drawn.pose, shape.centre, at_rest)
-        _set_vector(drawn.size, [2.0 * shape.radius] * 3)
+        primitive = entity.spheres.add()
+        _set_pose(primitive.pose, shape.centre, at_rest)
+        _set_vector(primitive.size, [2.0 * shape.radius] * 3)
     elif isinstance(shape, Ellipsoid):
-        drawn = entity.spheres.add()
-        _set_pose(drawn.pose, shape.centre, _unit(shape.quaternion))
-        _set_vector(drawn.size, [2.0 * a for a in shape.semi_axes])
+        primitive = entity.spheres.add()
+        _set_pose(primitive.pose, shape.centre, _unit(shape.quaternion))
+        _set_vector(primitive.size, [2.0 * a for a in shape.semi_axes])
     elif isinstance(shape, Box):
-        drawn = entity.cubes.add()
-        _set_pose(drawn.pose, shape.centre, _unit(shape.quaternion))
-        _set_vector(drawn.size, shape.size)
+        primitive = entity.cubes.add()
+        _set_pose(primitive.pose, shape.centre, _unit(shape.quaternion))
+        _set_vector(primitive.size, shape.size)
     elif isinstance(shape, Cylinder):
-        drawn = entity.cylinders.add(bottom_scale=1.0, top_scale=1.0)
+        primitive = entity.cylinders.add(bottom_scale=1.0, top_scale=1.0)
         start, end = np.array(shape.start), np.array(shape.end)
-        _set_pose(drawn.pose, ((start + end) / 2.0).tolist(), _shortest_turn(_Z, end - start))
-        _set_vector(drawn.size, [2.0 * shape.radius, 2.0 * shape.radius, float(np.linalg.norm(end - start))])
+        _set_pose(primitive.pose, ((start + end) / 2.0).tolist(), _shortest_turn(_Z, end - start))
+        _set_vector(primitive.size, [2.0 * shape.radius, 2.0 * shape.radius, float(np.linalg.norm(end - start))])
     else:
-        drawn = entity.triangles.add()
-        _set_pose(drawn.pose, (0.0, 0.0, 0.0), at_rest)
+        primitive = entity.triangles.add()
+        _set_pose(primitive.pose, (0.0, 0.0, 0.0), at_rest)
         for point in solid.mesh.vertices.tolist():
-            _set_vector(drawn.points.add(), point)
-        drawn.indices.extend(solid.mesh.triangles.ravel().tolist())
-    _set_colour(drawn.color, solid.colour, opaque)
+            _set_vector(primitive.points.add(), point)
+        primitive.indices.extend(solid.mesh.triangles.ravel().tolist())
+    _set_colour(primitive.color, solid.colour, opaque)
 
 
 def _label_place(solid: Solid) -> Array:

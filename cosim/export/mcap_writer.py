@@ -100,21 +100,21 @@ class _Drawing:
         """Return a function that writes the scene of one of the rows, given its index and time [ns]."""
         known = set(np.flatnonzero(np.isfinite(rows.stack(POSITION + QUATERNION)).all(axis=1)).tolist())
         positions, quaternions = rows.stack(POSITION).tolist(), rows.stack(QUATERNION).tolist()
-        moved = {foxglove.frame_of(s): rows.stack(s.shift).tolist() for s in self._scene.solids if s.moves}
+        shifts_by_region = {foxglove.frame_of(s): rows.stack(s.shift).tolist() for s in self._scene.solids if s.moves}
         active = active_at(self._run.scenario, rows).tolist()
 
         def draw(i: int, time: int) -> None:
-            at = foxglove.timestamp(time)
+            timestamp = foxglove.timestamp(time)
             if i in known:  # otherwise the vehicle keeps its last pose
-                shifts = {frame: by_row[i] for frame, by_row in moved.items()}
-                self._send("/tf", time, foxglove.frame_transforms(at, positions[i], quaternions[i], shifts))
-                self._send("/vehicle/pose", time, foxglove.pose(at, positions[i], quaternions[i]))
+                shifts = {frame: by_row[i] for frame, by_row in shifts_by_region.items()}
+                self._send("/tf", time, foxglove.frame_transforms(timestamp, positions[i], quaternions[i], shifts))
+                self._send("/vehicle/pose", time, foxglove.pose(timestamp, positions[i], quaternions[i]))
             if self._changed(time) or active[i] != self._drawn:
                 self._drawn = active[i]
-                self._send("/scene", time, foxglove.regions(self._solids, at, active[i]))
+                self._send("/scene", time, foxglove.regions(self._solids, timestamp, active[i]))
             while self._events and self._events[0].time * 1e9 <= time:
                 event = self._events.popleft()
-                self._send("/log", time, foxglove.log_message(at, event))
+                self._send("/log", time, foxglove.log_message(timestamp, event))
 
         return draw
 

@@ -14,16 +14,16 @@ _ELEMENT = re.compile(r"(.+)\[(\d+)\]")
 
 def valid_names(names: Iterable[str]) -> list[str]:
     """Convert names to unique ones of ASCII letters, digits and underscores that begin with a letter."""
-    made: dict[str, None] = {}
+    unique: dict[str, None] = {}
     for name in names:
         plain = re.sub(r"[^0-9A-Za-z]+", "_", name).strip("_")[:_MAX_LENGTH]
         stem = plain if plain[:1].isalpha() else f"n{plain}"[:_MAX_LENGTH]
         candidate, n = stem, 2
-        while candidate in made:
+        while candidate in unique:
             suffix = f"_{n}"
             candidate, n = f"{stem[: _MAX_LENGTH - len(suffix)]}{suffix}", n + 1
-        made[candidate] = None
-    return list(made)
+        unique[candidate] = None
+    return list(unique)
 
 
 def group_columns(columns: Sequence[Column]) -> dict[str, dict[str, int]]:

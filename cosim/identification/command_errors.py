@@ -116,15 +116,15 @@ def most_likely_errors(
     known: Mapping[str, float],
 ) -> tuple[float, dict[str, float]]:  # fmt: skip
     """Return the factor of all impulses and the noise of each topic that explain residuals best."""
-    parts = {str(name): known.get(str(name), 1.0) for own in topics for name in np.unique(own)}
+    parts = {str(name): known.get(str(name), 1.0) for labels in topics for name in np.unique(labels)}
     residuals, by_impulses = [x.copy() for x in residuals], [x.copy() for x in by_impulses]
     for _ in range(_UPDATES):
         size = most_likely_size(residuals[::_EVERY], by_impulses[::_EVERY])
         whiteners = [whitener(by, size) for by in by_impulses[::_EVERY]]
         for name, part in noise_parts(residuals[::_EVERY], whiteners, topics[::_EVERY]).items():
             new = float(np.clip(parts[name] * part, _MIN_FACTOR, 1.0))
-            for residual, by, own in zip(residuals, by_impulses, topics, strict=True):
-                residual[own == name] *= parts[name] / new
-                by[own == name] *= parts[name] / new
+            for residual, by, labels in zip(residuals, by_impulses, topics, strict=True):
+                residual[labels == name] *= parts[name] / new
+                by[labels == name] *= parts[name] / new
             parts[name] = new
     return most_likely_size(residuals, by_impulses), parts

@@ -154,26 +154,28 @@ def design(
     if not usable:
         raise IdentificationError(f"--box {box[0]:g} {box[1]:g} {box[2]:g}: is too small for any segment")
     order = choose_segments([matrix for _, matrix in usable], parameters, count)
-    whole = excitation_scenario(start, vehicle, depth, BEGIN + count * (SECONDS + RETURN) - RETURN)
+    scenario = excitation_scenario(start, vehicle, depth, BEGIN + count * (SECONDS + RETURN) - RETURN)
     uncertain = [p for p in parameters if _is_uncertain(p)]
     directions = 2.0 * math.pi * np.arange(_VEHICLES) / _VEHICLES
-    fastest = [_variant(whole, uncertain, np.full(len(uncertain), 0.5), current, angle) for angle in directions]
-    segments = keep_inside([usable[i][0] for i in order], whole, box, fastest)
+    fastest = [_variant(scenario, uncertain, np.full(len(uncertain), 0.5), current, angle) for angle in directions]
+    segments = keep_inside([usable[i][0] for i in order], scenario, box, fastest)
     commands = tuple(schedule(segments))
-    rehearsal = rehearse(whole, commands)
+    rehearsal = rehearse(scenario, commands)
     matrix = information(rehearsal.log(), vehicle, parameters)
     if matrix is None:
         raise IdentificationError("the schedule leaves no window that can be predicted")
     covariance = np.linalg.inv(matrix + np.diag([p.deviation**-2.0 for p in parameters]))
     rng = np.random.default_rng([seed, 1])
-    drawn = [
-        _variant(whole, uncertain, rng.uniform(0.5, 1.5, len(uncertain)), current, rng.uniform(0.0, 2.0 * math.pi))
+    variants = [
+        _variant(scenario, uncertain, rng.uniform(0.5, 1.5, len(uncertain)), current, rng.uniform(0.0, 2.0 * math.pi))
         for _ in range(_VEHICLES)
     ]
-    excursions = tuple(float(excursions_of(rehearse(other, commands), whole, box, count).max()) for other in drawn)
+    excursions = tuple(
+        float(excursions_of(rehearse(other, commands), scenario, box, count).max()) for other in variants
+    )
     progress(1.0)
     return Design(
-        start, whole, box, segments, len(candidates), commands, tuple(parameters), np.sqrt(np.diag(covariance)),
+        start, scenario, box, segments, len(candidates), commands, tuple(parameters), np.sqrt(np.diag(covariance)),
         rehearsal, current, excursions,
     )  # fmt: skip
 

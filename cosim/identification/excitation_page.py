@@ -88,17 +88,17 @@ def require_empty(out: Path) -> None:
 
 def _stick_lines(design: Design) -> Iterator[str]:
     yield "time_s,mode," + ",".join(AXES)
-    time, rest = BEGIN, ",".join("0" for _ in AXES)
-    yield f"0,return,{rest}"
+    time, neutral = BEGIN, ",".join("0" for _ in AXES)
+    yield f"0,return,{neutral}"
     for k, segment in enumerate(design.segments):
         if k:
-            yield f"{time:.3f},return,{rest}"
+            yield f"{time:.3f},return,{neutral}"
             time += RETURN
         for i, sticks in enumerate(segment.sticks):
             uneven = time + PERIOD * ((i * _GOLDEN) % 1.0 - 0.5)
             yield f"{uneven:.3f},{segment.mode}," + ",".join(f"{x:.4g}" for x in sticks)
             time += PERIOD
-    yield f"{time:.3f},return,{rest}"
+    yield f"{time:.3f},return,{neutral}"
 
 
 def _prior_ratios(design: Design) -> NDArray[np.float64]:

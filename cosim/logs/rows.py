@@ -71,53 +71,53 @@ class RowMaker:
             rows[:, [self._at[name] for name in names]] = values
 
         put(["time"], time[:, None])
-        at = time + self._start
-        self._put_motion(put, at)
+        log_time = time + self._start
+        self._put_motion(put, log_time)
         for quantity, (names, sensor) in _SENSORS.items():
             if quantity in self._readers:
-                values, when = self._readers[quantity].held(at)
+                values, when = self._readers[quantity].held(log_time)
                 put(names, values)
                 put([f"measured.time.{sensor}"], (when - self._start)[:, None])
                 if quantity == "altitude":
                     put(["altitude"], values)
-        self._put_commands(put, at)
+        self._put_commands(put, log_time)
         if self._region_columns is not None:
             self._region_columns.put(rows)
         return rows
 
-    def _put_motion(self, put: Callable[..., None], at: Array) -> None:
+    def _put_motion(self, put: Callable[..., None], times: Array) -> None:
         readers = self._readers
         if "position" in readers:
-            put(_POSITION, readers["position"].interpolated(at))
+            put(_POSITION, readers["position"].interpolated(times))
         elif "depth" in readers:
-            put(["position.z"], readers["depth"].interpolated(at))
-        quaternions = readers["attitude"].interpolated(at) if "attitude" in readers else None
+            put(["position.z"], readers["depth"].interpolated(times))
+        quaternions = readers["attitude"].interpolated(times) if "attitude" in readers else None
         if quaternions is not None:
             put(_QUATERNION, quaternions)
             put([f"attitude.{name}" for name in ("roll", "pitch", "yaw")], euler_zyx(quaternions))
         if "velocity" in readers:
-            put([f"velocity.{a}" for a in "uvw"], readers["velocity"].interpolated(at))
+            put([f"velocity.{a}" for a in "uvw"], readers["velocity"].interpolated(times))
         elif "velocity_world" in readers and quaternions is not None:
-            over_ground = readers["velocity_world"].interpolated(at)
+            over_ground = readers["velocity_world"].interpolated(times)
             put([f"velocity.{a}" for a in "uvw"], rotate_to_body(quaternions, over_ground))
         rates = readers.get("rates") or readers.get("gyro")
         if rates is not None:
-            put([f"velocity.{a}" for a in "pqr"], rates.interpolated(at))
+            put([f"velocity.{a}" for a in "pqr"], rates.interpolated(times))
 
-    def _put_commands(self, put: Callable[..., None], at: Array) -> None:
+    def _put_commands(self, put: Callable[..., None], times: Array) -> None:
         if self._commands is None:
             return
         quantity = next(name for name in self._readers if name == self._commands.quantity)
-        values, when = self._readers[quantity].held(at)
+        values, when = self._readers[quantity].held(times)
         put([COMMAND_TIME], (when - self._start)[:, None])
-        volts = np.full(len(at), self._voltage)
+        volts = np.full(len(times), self._voltage)
         if "voltage" in self._readers and not np.isfinite(self._voltage):
-            volts = self._readers["voltage"].held(at)[0][:, 0]
+            volts = self._readers["voltage"].held(times)[0][:, 0]
         forces = self._commands.forces(values, volts)
         vehicle = self._scenario.vehicle
         if self._commands.through == "wrench":
             put([f"wrench.{a}" for a in _WRENCH], forces)
-            put([f"thrust[{i + 1}]" for i in range(vehicle.n_thrusters)], np.zeros((len(at), vehicle.n_thrusters)))
+            put([f"thrust[{i + 1}]" for i in range(vehicle.n_thrusters)], np.zeros((len(times), vehicle.n_thrusters)))
             for kind in ("command", "actuation"):
                 put([f"{kind}.{a}" for a in _WRENCH], forces)
             return
@@ -125,7 +125,7 @@ class RowMaker:
         names = [str(i + 1) for i in range(vehicle.n_thrusters)]
         put([f"thrust[{i}]" for i in names], forces)
         put([f"thruster_force[{i}]" for i in names], acting)
-        put([f"wrench.{a}" for a in _WRENCH], np.zeros((len(at), 6)))
+        put([f"wrench.{a}" for a in _WRENCH], np.zeros((len(times), 6)))
         put([f"command.{a}" for a in _WRENCH], forces @ vehicle.thruster_matrix.T)
         put([f"actuation.{a}" for a in _WRENCH], acting @ vehicle.thruster_matrix.T)
         saturated = np.where(np.isnan(forces), np.nan, acting != forces)
@@ -136,19 +136,19 @@ class RowMaker:
 class _RegionColumns:
     """Evaluate the goal and the regions of a scenario at the poses of rows."""
 
-    def __init__(self, scenario: Scenario, at: Mapping[str, int]) -> None:
+    def __init__(self, scenario: Scenario, columns: Mapping[str, int]) -> None:
         names = [*(["goal"] if scenario.has_goal else []), *(s.region.name for s in scenario.regions)]
         self._first = 0 if scenario.has_goal else 1
-        self._values = [at[f"{name}.value"] for name in names]
-        self._clearances = [at[f"{name}.clearance"] for name in names]
-        self._shifts = [at[f"{name}.shift.{a}"] for name in scenario.moving for a in "xyz"]
-        self._position, self._quaternion = [at[n] for n in _POSITION], [at[n] for n in _QUATERNION]
+        self._values = [columns[f"{name}.value"] for name in names]
+        self._clearances = [columns[f"{name}.clearance"] for name in names]
+        self._shifts = [columns[f"{name}.shift.{a}"] for name in scenario.moving for a in "xyz"]
+        self._position, self._quaternion = [columns[n] for n in _POSITION], [columns[n] for n in _QUATERNION]
         n = 1 + len(scenario.regions)
         self._environment = RegionEnvironment(scenario)
         self._evaluation = self._environment.empty_evaluation(np.zeros(n), np.zeros(n))
         self._shift: Array = np.zeros((len(scenario.moving), 3))
         self._health = np.ones(scenario.vehicle.n_thrusters)
-        self._time = at["time"]
+        self._time = columns["time"]
 
     def put(self, rows: Array) -> None:
         """Write values, clearances and shifts into rows; NaN where the pose is unknown."""

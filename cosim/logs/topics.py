@@ -64,31 +64,31 @@ def clean(source: Source, times: Callable[[Array, Array], Array], convert: Conve
     periods, heap, last, first = _Periods(), list[tuple[float, float]](), -np.inf, True
     previous, repeats = np.full(source.size, np.nan), 0
     with topic.path.open("wb") as file:
-        for at, values in spread:
-            highest = np.maximum.accumulate(np.concatenate([[last], at]))[:-1]
-            rising = at > highest
+        for stamps, values in spread:
+            highest = np.maximum.accumulate(np.concatenate([[last], stamps]))[:-1]
+            rising = stamps > highest
             topic.late += int(np.count_nonzero(~rising))
-            at, values = at[rising], values[rising]
-            if not at.size:
+            stamps, values = stamps[rising], values[rising]
+            if not stamps.size:
                 continue
-            last = float(at[-1])
+            last = float(stamps[-1])
             fresh, repeats = _fresh(values, previous, repeats, stretch)
             previous = values[-1]
             topic.held += int(np.count_nonzero(~fresh))
-            at, values = at[fresh], values[fresh]
-            if not at.size:
+            stamps, values = stamps[fresh], values[fresh]
+            if not stamps.size:
                 continue
             values = values if convert is None else convert(values)
             _require_plausible(source, values)
-            steps = np.diff(at, prepend=np.nan if first else topic.end)
+            steps = np.diff(stamps, prepend=np.nan if first else topic.end)
             for i in np.flatnonzero(steps > _MIN_GAP):
                 push = heapq.heappush if len(heap) < 10 * _MAX_LISTED else heapq.heappushpop
-                push(heap, (float(steps[i]), float(at[i])))
+                push(heap, (float(steps[i]), float(stamps[i])))
             periods.add(steps)
-            topic.start = float(at[0]) if first else topic.start
-            first, topic.end, topic.size = False, float(at[-1]), values.shape[1]
-            topic.count += len(at)
-            np.column_stack([at, values]).tofile(file)
+            topic.start = float(stamps[0]) if first else topic.start
+            first, topic.end, topic.size = False, float(stamps[-1]), values.shape[1]
+            topic.count += len(stamps)
+            np.column_stack([stamps, values]).tofile(file)
     topic.period = periods.median()
     topic.gap_count = periods.above(topic.longest)
     topic.gaps = sorted((end - size, end) for size, end in heapq.nlargest(_MAX_LISTED, heap) if size > topic.longest)
@@ -131,18 +131,18 @@ def _survey(source: Source, times: Callable[[Array, Array], Array]) -> tuple[int
     steps_all, run = _Periods(), 1
     previous, last, counted = np.full(source.size, np.nan), np.nan, 0
     spans: list[float] = []
-    for at, values in _timed(source, times):
+    for stamps, values in _timed(source, times):
         same = (values == np.vstack([previous, values[:-1]])).all(axis=1)
         changes = np.flatnonzero(~same)
         lengths = np.diff(np.concatenate([[-run], changes]))
         lengths = lengths[1:] if counted == 0 else lengths
         runs += np.bincount(np.minimum(lengths, _LONGEST_RUN), minlength=len(runs))
         run = len(values) - int(changes[-1]) if changes.size else run + len(values)
-        steps = np.diff(at, prepend=last)
+        steps = np.diff(stamps, prepend=last)
         steps_all.add(steps)
         spans.append(float(steps[(steps > 0.0) & (steps < 2.0)].sum()))
         counted += int(np.count_nonzero(steps < 2.0))
-        previous, last = values[-1], at[-1]
+        previous, last = values[-1], stamps[-1]
     stretch = _hold_length(runs) if QUANTITIES[source.quantity].kind in ("sensor", "state") else 1
     mean = sum(spans) / counted if counted else 0.0
     quick_count = source.count - 1 - steps_all.above(_QUICK * mean) if mean else 0
@@ -187,18 +187,18 @@ def _fresh(values: Array, previous: Array, repeats: int, stretch: int) -> tuple[
 
 def _spread(samples: Iterator[tuple[Array, Array]], period: float, topic: Topic) -> Iterator[tuple[Array, Array]]:
     """Spread the samples of each burst evenly in time before its last one, which alone was not delayed."""
-    at, values = np.empty(0), None
+    buffered, values = np.empty(0), None
     before = np.nan
     for more_at, more_values in samples:
-        at = np.concatenate([at, more_at])
+        buffered = np.concatenate([buffered, more_at])
         values = more_values if values is None else np.vstack([values, more_values])
-        ends = np.flatnonzero(np.diff(at) > 0.5 * period)
+        ends = np.flatnonzero(np.diff(buffered) > 0.5 * period)
         if ends.size:
             done = int(ends[-1]) + 1
-            yield _evenly(at[:done], before, period, topic), values[:done]
-            before, at, values = float(at[done - 1]), at[done:], values[done:]
-    if values is not None and at.size:
-        yield _evenly(at, before, period, topic), values
+            yield _evenly(buffered[:done], before, period, topic), values[:done]
+            before, buffered, values = float(buffered[done - 1]), buffered[done:], values[done:]
+    if values is not None and buffered.size:
+        yield _evenly(buffered, before, period, topic), values
 
 
 def _evenly(at: Array, before: float, period: float, topic: Topic) -> Array:

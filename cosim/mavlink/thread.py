@@ -126,15 +126,15 @@ class LinkThread:
             self._guard("tick", self._vehicle.tick, now)
         self._poll(now)
         sent = time.perf_counter()
-        rest = max(_REST_RECEIVING * (received - start), _REST_SENDING * (sent - received))
-        rest = min(rest, _MAX_REST)
+        pause = max(_REST_RECEIVING * (received - start), _REST_SENDING * (sent - received))
+        pause = min(pause, _MAX_REST)
         if has_more:
-            return rest
+            return pause
         if now - self._received_at < _ACTIVE_TIME:
-            return max(rest, _ACTIVE_PERIOD)
+            return max(pause, _ACTIVE_PERIOD)
         is_fast = self._snapshot_count > _FAST_RUN_RATE * (start - self._last_poll)
         self._snapshot_count, self._last_poll = 0, start
-        return max(rest, _FAST_RUN_PERIOD if is_fast else _IDLE_PERIOD)
+        return max(pause, _FAST_RUN_PERIOD if is_fast else _IDLE_PERIOD)
 
     def _poll(self, now: float) -> None:
         for link in self._links:

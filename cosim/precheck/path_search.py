@@ -55,23 +55,23 @@ def find_path(
     """Search a path from a start into the goal that satisfies regions throughout, at their positions at time 0."""
     # with start [m, NED], duration [s]
     at_rest = [dataclasses.replace(region, hard=True, velocity=(0.0, 0.0, 0.0)) for region in regions]
-    plan, place = empty_plan(len(at_rest), _SEED), np.array(start, dtype=float)
+    plan, position = empty_plan(len(at_rest), _SEED), np.array(start, dtype=float)
     limits = path_limits(gains)
-    left, taken = math.ceil(min(duration, SEARCH_TIME) / PERIOD), 0
+    left, used = math.ceil(min(duration, SEARCH_TIME) / PERIOD), 0
     periods = np.zeros(2, dtype=np.int64)
     goal_at_rest = dataclasses.replace(goal, velocity=(0.0, 0.0, 0.0))
-    search = BoundCall(search_path, (plan, place, pack([goal_at_rest]), pack(at_rest), limits, PERIOD, periods)).call
-    least = -math.inf
+    search = BoundCall(search_path, (plan, position, pack([goal_at_rest]), pack(at_rest), limits, PERIOD, periods)).call
+    clearance = -math.inf
     while left > 0:
         periods[0] = left
         search()
-        left, taken = left - int(periods[1]), taken + int(periods[1])
-        points = np.array([place, *plan.path[: plan.counts[0]]])
-        least = float(common_depth(_samples(points), at_rest).min()) if at_rest else math.inf
-        if least >= 0.0:
+        left, used = left - int(periods[1]), used + int(periods[1])
+        points = np.array([position, *plan.path[: plan.counts[0]]])
+        clearance = float(common_depth(_samples(points), at_rest).min()) if at_rest else math.inf
+        if clearance >= 0.0:
             corners = tuple((float(x), float(y), float(z)) for x, y, z in points)
-            return SearchedPath(corners, least, taken * PERIOD)
-    return SearchedPath((), min(least, 0.0), taken * PERIOD)
+            return SearchedPath(corners, clearance, used * PERIOD)
+    return SearchedPath((), min(clearance, 0.0), used * PERIOD)
 
 
 def _samples(points: Array) -> Array:

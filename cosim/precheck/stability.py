@@ -71,19 +71,19 @@ def vehicle_findings(scenario: Scenario) -> Iterator[Finding]:
 
 
 def _damping(model: Model, velocities: Array) -> Finding:
-    rest = float(model.linear_damping.min())
+    at_rest = float(model.linear_damping.min())
     moving = min(float(damping(model.linear_damping, model.quadratic_damping, nu).min()) for nu in velocities)
-    numbers = {"least_at_rest": rest, "least_moving": moving}
-    if rest > 0.0:
-        text = f"D is positive definite: least eigenvalue {rest:.4g} at rest, and more when moving."
+    numbers = {"least_at_rest": at_rest, "least_moving": moving}
+    if at_rest > 0.0:
+        text = f"D is positive definite: least eigenvalue {at_rest:.4g} at rest, and more when moving."
         return Finding("vehicle", "Property 3", "holds", text, numbers=numbers)
-    if rest == 0.0 and moving > 0.0:
+    if at_rest == 0.0 and moving > 0.0:
         text = (
             "D is positive definite only where every velocity is other than 0: at rest its least eigenvalue is 0 "
             "(no linear drag). What (45) needs then has to come from K_v alone."
         )
         return Finding("vehicle", "Property 3", "note", text, numbers=numbers)
-    text = f"D is not positive definite: least eigenvalue {rest:.4g} at rest, {moving:.4g} when moving."
+    text = f"D is not positive definite: least eigenvalue {at_rest:.4g} at rest, {moving:.4g} when moving."
     advice = "Give the vehicle drag along and about every axis (hydrodynamics.*_damping)."
     return Finding("vehicle", "Property 3", "fails", text, advice, numbers)
 
@@ -151,7 +151,7 @@ def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:
 
 def _potential(start: _Start) -> Finding:
     mass, gains, slope = start.model.mass, start.gains, start.slope
-    least = least_of_potential_test(mass, slope, gains) if slope else math.inf
+    min_eigenvalue = least_of_potential_test(mass, slope, gains) if slope else math.inf
     limit = greatest_gradient(mass, gains)
     first, second = potential_fits(mass, slope, gains)
     where = f"Holds where |df/dp| < {limit:.4g}" + (
@@ -163,11 +163,12 @@ def _potential(start: _Start) -> Finding:
         f" With the scalar lambda_m as printed the condition on attitude fails too ({_pair(second)}); "
         "it takes the mass for an inertia."
     )  # fmt: skip
-    text = f"P - sigma M sigma has the least eigenvalue {least:.4g} at the start ({_pair(first)} in position). "
+    text = f"P - sigma M sigma has the least eigenvalue {min_eigenvalue:.4g} at the start ({_pair(first)} in position)."
     return Finding(
-        "law", "(38) 1, 2", status(least > 0.0), text + where + scalar, "" if least > 0.0 else _lower_sigma(start),
+        "law", "(38) 1, 2", status(min_eigenvalue > 0.0), f"{text} {where}{scalar}",
+        "" if min_eigenvalue > 0.0 else _lower_sigma(start),
         {
-            "least_eigenvalue": least, "position_have": first.have, "position_need": first.need,
+            "least_eigenvalue": min_eigenvalue, "position_have": first.have, "position_need": first.need,
             "attitude_have": second.have, "attitude_need_scalar": second.need, "greatest_gradient": limit,
             "gradient_at_start": slope, "radius": start.radii[0] if start.radii else None,
         },

@@ -69,18 +69,18 @@ def _mend_current(scenario: Scenario) -> str:
     vehicle, phi = true_vehicle(scenario), scenario.true_restoring_parameters
     quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
 
-    def reach(part: float) -> float:
-        hold = held_wrench(vehicle, phi, quaternion, part * current)
+    def reach(fraction: float) -> float:
+        hold = held_wrench(vehicle, phi, quaternion, fraction * current)
         left = least_margin(vehicle, quaternion, hold, np.ones(vehicle.n_thrusters, dtype=bool))
         return left.force - _ROUNDING if left else -1.0
 
     if reach(0.0) <= 0.0:
         return "Trim the vehicle (plant.parameters.buoyancy, weight, r_G, r_B) or choose a level desired attitude."
-    part = brentq(reach, 0.0, 1.0, xtol=0.01)
-    return f"Take a current of at most {part * float(np.linalg.norm(current)):.2g} m/s, or stronger thrusters."
+    fraction = brentq(reach, 0.0, 1.0, xtol=0.01)
+    return f"Take a current of at most {fraction * float(np.linalg.norm(current)):.2g} m/s, or stronger thrusters."
 
 
-def asked_finding(scenario: Scenario, weights: Array) -> Finding:
+def start_force_finding(scenario: Scenario, weights: Array) -> Finding:
     """Compare the first force of the paper's law with the greatest force of the thrusters in that direction."""
     gains, initial, vehicle = scenario.law.gains, scenario.initial, true_vehicle(scenario)
     (f,), (slope,), _ = evaluate_regions([scenario.goal_region], initial.position, initial.quaternion)
@@ -93,24 +93,25 @@ def asked_finding(scenario: Scenario, weights: Array) -> Finding:
     tau, velocity = np.empty(6), np.array(initial.velocity)
     paper_law.apply(tuple(e_p), tuple(e_s), turned[1:], R, velocity, gains, 0.0, np.zeros(4), tau)
     force = tau[:3]
-    asked = float(np.linalg.norm(force))
-    if not asked > 0.0:
+    required = float(np.linalg.norm(force))
+    if not required > 0.0:
         text = "The law asks for no force at the start."
-        return Finding("thrust", "asked at t = 0", "holds", text, numbers={"asked": 0.0})
+        return Finding("thrust", "force at the start", "holds", text, numbers={"asked": 0.0})
     alive = np.ones(vehicle.n_thrusters, dtype=bool)
-    given = greatest_force(vehicle, force / asked, np.zeros(6), alive) or 0.0
+    available = greatest_force(vehicle, force / required, np.zeros(6), alive) or 0.0
     text = (
-        f"The law asks for {format_force(asked)} at the start; "
-        f"the thrusters give at most {format_force(given)} that way."
+        f"The law asks for {format_force(required)} at the start; "
+        f"the thrusters give at most {format_force(available)} that way."
     )
     if scenario.actuation.through == "wrench":
         limit = f"at most {format_force(scenario.limit.force)}" if scenario.limit.force < np.inf else "no limit"
         text += f" In this scenario the wrench acts on the body directly, with {limit}."
     advice = ""
-    if asked > given:
+    if required > available:
         # nearly all of it is attraction to the goal, which is proportional to k_p1
-        k_p1 = gains.k_p1 * given / asked
+        k_p1 = gains.k_p1 * available / required
         advice = f"Lower law.gains.k_p1 to about {k_p1:.2g}, start nearer, or take a law with a bounded attraction."
     return Finding(
-        "thrust", "asked at t = 0", status(asked <= given), text, advice, {"asked": asked, "given": given}
+        "thrust", "force at the start", status(required <= available), text, advice,
+        {"asked": required, "given": available},
     )  # fmt: skip

@@ -44,7 +44,7 @@ def events_of(run: Run, log: Log) -> list[Event]:
     # a killed run has logged commands of rows that it did not save; a reset comes after the last row
     log = [(min(k, rows - 1), command) for k, command in log if k <= rows]
     commands = [Event(time, "command", text) for time, text in command_events(log, step, _MAX_EVENTS)]
-    found = [
+    events = [
         *commands,
         *_goal(run),
         *_violations(run),
@@ -55,7 +55,7 @@ def events_of(run: Run, log: Log) -> list[Event]:
         *_rejections(run),
         *_saturation(run),
     ]
-    return [*sorted(found, key=lambda event: event.time), *_goal_miss(run), _end(run)]
+    return [*sorted(events, key=lambda event: event.time), *_goal_miss(run), _end(run)]
 
 
 def _goal(run: Run) -> Iterator[Event]:
@@ -232,14 +232,14 @@ def _longest_changes(changes: Iterator[tuple[float, int]]) -> list[tuple[float, 
 
 def _changes_with_duration(changes: Iterator[tuple[float, int]]) -> Iterator[tuple[float, float, int]]:
     """Yield negative duration [s], time [s] and region of each change; ignore absences below `_MIN_ABSENCE`."""
-    kept: tuple[float, int] | None = None
+    pending: tuple[float, int] | None = None
     first = True
     for (time, active), (then, back) in pairwise(chain(changes, [(math.inf, -1)])):
-        if kept is not None and (active == kept[1] or (then - time < _MIN_ABSENCE and back == kept[1])):
+        if pending is not None and (active == pending[1] or (then - time < _MIN_ABSENCE and back == pending[1])):
             continue
-        if kept is not None:
-            yield -math.inf if first else kept[0] - time, *kept
+        if pending is not None:
+            yield -math.inf if first else pending[0] - time, *pending
             first = False
-        kept = time, active
-    if kept is not None:
-        yield -math.inf, *kept
+        pending = time, active
+    if pending is not None:
+        yield -math.inf, *pending

@@ -125,7 +125,7 @@ def _vehicle(vehicle: Vehicle) -> dict[str, Any]:
     # that is nearest to the body origin.
     radius = vehicle.hull_radius or (0.75 * vehicle.buoyancy / (_SEA_WATER * np.pi)) ** (1.0 / 3.0)
     thrusters = []
-    for i, (line, least, most) in enumerate(
+    for i, (line, min_force, max_force) in enumerate(
         zip(thruster_lines(vehicle), vehicle.thrust_min, vehicle.thrust_max, strict=True)
     ):
         thrusters.append(
@@ -133,8 +133,8 @@ def _vehicle(vehicle: Vehicle) -> dict[str, Any]:
                 "name": str(i + 1),
                 "position": [float(x) for x in line.nearest],
                 "direction": [float(x) for x in line.force],
-                "min": float(least),
-                "max": float(most),
+                "min": float(min_force),
+                "max": float(max_force),
             }
         )
     return {

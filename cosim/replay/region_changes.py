@@ -96,15 +96,15 @@ class _Changes:
 
     def _by_mission(self, commands: Iterable[Command], now: int | None) -> Iterator[Command]:
         """Yield the commands of the items that start in a step; `now` is the item, None outside a mission."""
-        begun = False
+        restarted = False
         for command in commands:
             if isinstance(command, SetMission):
                 self._items, self._item = command.items, -1
             elif isinstance(command, SetCurrentItem):
-                self._item, begun = command.item - 1, True
+                self._item, restarted = command.item - 1, True
             elif isinstance(command, SetMode) and command.mode == "mission":
-                self._item, begun = max(self._item, 0) - 1, True
-        if now is None or not 0 <= now < len(self._items) or (now == self._item and not begun):
+                self._item, restarted = max(self._item, 0) - 1, True
+        if now is None or not 0 <= now < len(self._items) or (now == self._item and not restarted):
             return
         for item in passed_items(self._items, self._item, now) or [now]:
             yield from self._items[item].commands

@@ -26,15 +26,15 @@ class ViewColumns:
         names = [column.name for column in columns]
         self.picked = [i for i, name in enumerate(names) if _drawn(name)]
         self._criteria, names_of_criteria = scenario.criterion_places, scenario.criterion_names
-        drawn = [names[i] for i in self.picked]
-        self._memberships = [drawn.index(f"membership.{name}") for name in names_of_criteria]
-        self._weights = [drawn.index(f"weight.{name}") for name in names_of_criteria]
-        self._goal, *self._velocity = (drawn.index(name) for name in RESTING_SIGNALS)
-        self._clearances = [drawn.index(f"{secondary.region.name}.clearance") for secondary in scenario.regions]
+        picked = [names[i] for i in self.picked]
+        self._memberships = [picked.index(f"membership.{name}") for name in names_of_criteria]
+        self._weights = [picked.index(f"weight.{name}") for name in names_of_criteria]
+        self._goal, *self._velocity = (picked.index(name) for name in RESTING_SIGNALS)
+        self._clearances = [picked.index(f"{secondary.region.name}.clearance") for secondary in scenario.regions]
         system = scenario.rules.system
         self._inputs = self._memberships  # inputs of the rules
         if scenario.arbiter.file:
-            self._inputs = [drawn.index(f"arbiter.{signal.name}") for signal in scenario.rules.inputs]
+            self._inputs = [picked.index(f"arbiter.{signal.name}") for signal in scenario.rules.inputs]
         self._firing, rules = Firing(system), system.rules
         self._low, self._high = np.array([variable.universe for variable in system.inputs]).T
         self.columns = (

@@ -13,7 +13,7 @@ from cosim.simulation.signals import Array
 
 def extreme_rows(blocks: Iterable[Sequence[Array]], signals: int, edges: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the rows at which each signal is first least and first greatest in each part of a run."""
-    found = _Extremes(len(edges) - 1, signals)
+    extremes = _Extremes(len(edges) - 1, signals)
     first = 0
     for block in blocks:
         end = first + len(block[0])
@@ -22,9 +22,9 @@ def extreme_rows(blocks: Iterable[Sequence[Array]], signals: int, edges: NDArray
             part = int(np.searchsorted(edges, a, "right")) - 1
             if 0 <= part < len(edges) - 1 and a < b:
                 for i, signal in enumerate(block):
-                    found.add((part, i), signal[a - first : b - first], a)
+                    extremes.add((part, i), signal[a - first : b - first], a)
         first = end
-    return np.unique(found.rows[:, found.finite])
+    return np.unique(extremes.rows[:, extremes.finite])
 
 
 class _Extremes:

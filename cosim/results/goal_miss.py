@@ -87,7 +87,7 @@ def _cause(scenario: Scenario, end: _End, summary: dict[str, Any]) -> str:
         return f"The time was too short: the vehicle, {away}, had {summary['simulated_time']:.1f} s."
     if end.closing > _APPROACHING:
         return f"The time was too short: the vehicle, {away}, still came nearer at {end.closing:.2f} m/s."
-    between, is_hard = next(_regions_between(scenario, end, distance), ("", False))
+    blocker, is_hard = next(_regions_between(scenario, end, distance), ("", False))
     if end.at_limits >= _AT_LIMITS:
         isolated = [str(one["thruster"]) for one in summary["isolations"]]
         without = f" after thruster {', '.join(dict.fromkeys(isolated))} was isolated" if isolated else ""
@@ -97,13 +97,13 @@ def _cause(scenario: Scenario, end: _End, summary: dict[str, Any]) -> str:
             f"{end.at_limits:.0%} of the last {end.duration:.0f} s{drift}."
         )
     if end.speed > _MOVING and end.closing >= -_APPROACHING:
-        round_it = f"; {between} lies in between" if between else ""
+        round_it = f"; {blocker} lies in between" if blocker else ""
         return f"The vehicle, {away}, was under way at {end.speed:.2f} m/s, but came no nearer{round_it}."
     if is_hard:
-        return f"The goal was blocked: {away}, the vehicle stopped before {between}."
+        return f"The goal was blocked: {away}, the vehicle stopped before {blocker}."
     if end.closing < -_APPROACHING:
         return f"The vehicle was adrift: {away}, it went away at {-end.closing:.2f} m/s with its thrust within limits."
-    return f"The vehicle stood still {away}, with its thrust within limits and {between or 'nothing'} in between."
+    return f"The vehicle stood still {away}, with its thrust within limits and {blocker or 'nothing'} in between."
 
 
 def _regions_between(scenario: Scenario, end: _End, distance: float) -> Iterator[tuple[str, bool]]:

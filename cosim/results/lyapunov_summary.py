@@ -21,9 +21,9 @@ def summarise_lyapunov(record: Rows) -> dict[str, Any] | None:
 
 
 def _summarise_form(record: Rows, name: str) -> dict[str, Any]:
-    least, size = np.inf, 0.0
+    minimum, size = np.inf, 0.0
     for block in record.blocks([name]):
-        least, size = np.minimum(least, block[name].min()), np.maximum(size, np.abs(block[name]).max())
+        minimum, size = np.minimum(minimum, block[name].min()), np.maximum(size, np.abs(block[name]).max())
     threshold = ROUNDING * float(size)
     before: tuple[Array, Array] = np.empty(0), np.empty(0)  # the row before a block
     rises, first_rise, first_negative = 0, None, None
@@ -36,7 +36,7 @@ def _summarise_form(record: Rows, name: str) -> dict[str, Any]:
     return {
         "start": record.value(name, 0),
         "end": record.value(name, -1),
-        "least": float(least),
+        "least": float(minimum),
         "threshold": threshold,
         "increases": rises,
         "first_rise": first_rise,

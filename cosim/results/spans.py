@@ -30,7 +30,7 @@ class Spans:
 
     def add(self, flags: Flags, time: Array, signal: Array | None = None) -> list[Span]:
         """Add the next rows, and return the spans that end in them; flags (rows,), time (rows,) [s], signal (rows,)."""
-        ended = []
+        completed = []
         edges = np.flatnonzero(np.diff(flags, prepend=self.open is not None)).tolist()
         for first, end in zip([0, *edges], [*edges, len(flags)], strict=True):
             if end == first:
@@ -42,9 +42,9 @@ class Spans:
                     span.least = float(np.fmin(span.least, np.fmin.reduce(signal[first:end])))
             elif self.open is not None:
                 self.open.end = float(time[first])
-                ended.append(self.open)
+                completed.append(self.open)
                 self.open = None
-        return ended
+        return completed
 
 
 def spans(flags: Flags, time: Array) -> list[tuple[float, float]]:

@@ -42,7 +42,7 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
     settled = bool(visits and data.inside.open and simulated - visits[-1].start >= SETTLED_FOR)
     submerged = scenario.has_goal and not scenario.log and is_submerged_model(scenario)
     above = [name for name, _ in heights_above_surface(scenario)] if submerged else []
-    least = {name: data.least[f"{name}.clearance"] for name in names}
+    min_clearance = {name: data.least[f"{name}.clearance"] for name in names}
     summary = {
         "scenario": scenario.name,
         "law": scenario.law.name,
@@ -65,10 +65,12 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "weighted_violation": data.violation.total() * period,
         "intersection": [names[i] for i in scenario.intersection],
         "intersection_windows": [(span.start, span.end) for span in data.windows],
-        "min_clearance": least,
+        "min_clearance": min_clearance,
         "clearance_unit": {r.region.name: "rad" if of_attitude(r.region.shape) else "m" for r in scenario.regions},
         "hard": [r.region.name for r in scenario.regions if r.region.hard],
-        "hard_violated": [r.region.name for r in scenario.regions if r.region.hard and least[r.region.name] < 0.0],
+        "hard_violated": [
+            r.region.name for r in scenario.regions if r.region.hard and min_clearance[r.region.name] < 0.0
+        ],
         "violated_at_start": [name for name in names if first_rows[f"{name}.clearance"][0] < 0.0],
         "max_force": data.greatest.get("force", 0.0),
         "max_force_asked": data.greatest["asked"],

@@ -58,7 +58,7 @@ def verdict(summary: dict[str, Any]) -> str:
         return f"A log of {summary['simulated_time']:.1f} s, without goal and regions.{_commanded_force(summary)}"
     if summary["settled"]:
         entered, settled = summary["reach_time"], summary["settle_time"]
-        stayed = "and stayed" if settled == entered else f"and was in for good from {settled:.2f} s"
+        stayed = "and stayed" if settled == entered else f"and stayed inside from {settled:.2f} s"
         goal = f"The vehicle entered the goal region at {entered:.2f} s {stayed}"
     elif summary["reached"]:
         goal = f"The vehicle entered the goal region at {summary['reach_time']:.2f} s but did not settle there"
@@ -66,28 +66,29 @@ def verdict(summary: dict[str, Any]) -> str:
         near, goals = summary["closest_to_goal"], summary.get("goals")
         how_near = f"it came within {near:.2f} m of it" if math.isfinite(near) else "how near it came is not recorded"
         goal = f"The vehicle never entered the goal region; {how_near}"
-        if goals and goals["reached"] < goals["of"] - 1:  # the last goal, which counts, was not yet where it had to go
+        if goals and goals["reached"] < goals["of"] - 1:  # the last goal, which counts, was not yet active
             goal = f"The vehicle reached {goals['reached']} of {goals['of']} goals in turn"
     violated = [_violation(summary, name) for name, c in summary["min_clearance"].items() if c < 0.0]
-    kept = "; it kept every region."
+    regions = "; it kept every region."
     if violated:
         but = "" if summary["hard_violated"] or not summary["hard"] else "kept every hard region but "
-        kept = f"; it {but}violated {', '.join(violated)}."
+        regions = f"; it {but}violated {', '.join(violated)}."
     if summary["status"] == IMPORTED:
-        return f"{goal}{kept}{_commanded_force(summary)}"
-    wanted, acted = format_force(summary["max_force_asked"]), format_force(summary["max_force"])
-    force = f" The law asked for up to {wanted}" + ("." if wanted == acted else f"; up to {acted} acted.")
+        return f"{goal}{regions}{_commanded_force(summary)}"
+    commanded, acted = format_force(summary["max_force_asked"]), format_force(summary["max_force"])
+    force = f" The law asked for up to {commanded}" + ("." if commanded == acted else f"; up to {acted} acted.")
     if not math.isfinite(summary["max_force"]):
-        force = f" The law asked for up to {wanted}; what acted was not measured."
-    ended = {
+        force = f" The law asked for up to {commanded}; what acted was not measured."
+    ending = {
         "completed": "",
         "interrupted": f" The run was interrupted at {summary['simulated_time']:.3f} s.",
         "reset": f" The run was reset at {summary['simulated_time']:.3f} s.",
         "killed": f" The run was killed; its record ends at {summary['simulated_time']:.3f} s.",
     }.get(summary["status"], f" The run {summary['status']}.")
     commands = summary.get("commands", 0)
-    steered = f" It was given {commands} command{'s' if commands > 1 else ''} on the way." if commands else ""
-    return goal + kept + _above_surface(summary) + force + _law_reports(summary) + steered + ended + _goal_miss(summary)
+    steering = f" It received {commands} command{'s' if commands > 1 else ''} on the way." if commands else ""
+    laws = _above_surface(summary) + force + _law_reports(summary)
+    return goal + regions + laws + steering + ending + _goal_miss(summary)
 
 
 def isolation_text(thruster: int, isolated: bool) -> str:

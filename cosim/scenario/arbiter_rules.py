@@ -212,15 +212,15 @@ def _signals(
         if not isinstance(value, str):
             yield InputSignal(name, "given", course=_course(value, key), what="given")
             continue
-        kind, _, of = value.partition(".")
-        if kind in VEHICLE_SIGNALS and not of:
+        kind, _, subject = value.partition(".")
+        if kind in VEHICLE_SIGNALS and not subject:
             yield InputSignal(name, kind, unit=VEHICLE_SIGNALS[kind], what=value)  # type: ignore[arg-type]
         elif kind == "membership":
-            _require_known(of, of_criteria, key, value, "criterion")
-            yield InputSignal(name, "membership", of_criteria[of], what=value)
+            _require_known(subject, of_criteria, key, value, "criterion")
+            yield InputSignal(name, "membership", of_criteria[subject], what=value)
         elif kind in REGION_SIGNALS:
-            _require_known(of, places, key, value, "region")
-            place, unit = places[of]
+            _require_known(subject, places, key, value, "region")
+            place, unit = places[subject]
             yield InputSignal(name, kind, place, REGION_SIGNALS[kind][unit == "rad"], what=value)  # type: ignore[arg-type]
         else:
             forms = (*VEHICLE_SIGNALS, "membership.CRITERION", *(f"{form}.REGION" for form in REGION_SIGNALS))

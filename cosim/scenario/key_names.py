@@ -63,8 +63,8 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
     head, *rest = key.split(".")
     if head == "regions" and len(rest) > 1:
         regions = table["regions"]
-        at = next((r for r in regions if r["name"] == rest[0]), None) or regions[int(rest[0])]
-        return _region_key_name(at["name"], at, rest[1:])
+        item = next((r for r in regions if r["name"] == rest[0]), None) or regions[int(rest[0])]
+        return _region_key_name(item["name"], item, rest[1:])
     if head == "goal" and rest:
         own = rest[0] in ("velocity", "streamed", "then", "stay")
         return _region_key_name("the goal", table["goal"] | {"shape": table["goal"]}, rest if own else ["shape", *rest])
@@ -72,9 +72,9 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
         return KeyName(f"{rest[1]} of {head[:-1]} {rest[0]}", KEYS[f"{head}[].{rest[1]}"].unit)
     if head == "criteria" and len(rest) > 1:
         criteria = table["criteria"]
-        at = next((c for c in criteria if c["name"] == rest[0]), None) or criteria[int(rest[0])]
+        item = next((c for c in criteria if c["name"] == rest[0]), None) or criteria[int(rest[0])]
         unit = QUANTITIES.get(rest[2], "").partition(",")[0] if rest[1] == "membership" and len(rest) > 2 else ""
-        return KeyName(f"{' '.join(rest[1:]).replace('_', ' ')} of {at['name']}", unit)
+        return KeyName(f"{' '.join(rest[1:]).replace('_', ' ')} of {item['name']}", unit)
     if key not in KEYS and (vector := key.rpartition(".")[0]) in _WORDS:
         place, count = int(rest[-1]), len(table[head][rest[0]])
         linear, _, angular = KEYS[vector].unit.partition(", ")

@@ -45,8 +45,8 @@ def _read(value: str, of_time: bool, where: str) -> Membership:
     try:
         term = reads(text, "json").inputs[0].terms[-1].shape
     except ArbiterError as error:
-        said = re.sub(prefix, where, str(error))
-        raise ScenarioError(said if said.startswith(where) else f"{where}: {said}") from error
+        message = re.sub(prefix, where, str(error))
+        raise ScenarioError(message if message.startswith(where) else f"{where}: {message}") from error
     assert isinstance(term, Membership)
     if isinstance(term, Curve) and term.jumps:
         raise ScenarioError(f"{where}: {term.kind} {list(term.parameters)} jumps, expected a change without jumps")

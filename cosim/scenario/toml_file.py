@@ -173,16 +173,16 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
         _name_law(table, value)
     if key == "arbiter.file":
         _name_rules(table)
-    at: Any = table
+    node: Any = table
     for part in path:
-        if isinstance(at, list):
-            at = at[_index(at, part, key)]
-        elif isinstance(at, dict):
-            at = at.setdefault(part, {})
-    if isinstance(at, list):
-        at[_index(at, last, key)] = value
-    elif isinstance(at, dict):
-        at[last] = value
+        if isinstance(node, list):
+            node = node[_index(node, part, key)]
+        elif isinstance(node, dict):
+            node = node.setdefault(part, {})
+    if isinstance(node, list):
+        node[_index(node, last, key)] = value
+    elif isinstance(node, dict):
+        node[last] = value
     else:
         raise ScenarioError(f"--set {_short(key)}: there is no table at {_short('.'.join(path))!r}")
 
@@ -215,24 +215,24 @@ def flatten(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
     """Return the table or list that holds a key, and the name or index in it."""
     *path, last = key.split(".")
-    at: Any = table
+    container: Any = table
     for depth, part in enumerate([*path, last]):
-        if isinstance(at, list | tuple):
-            names = [item.get("name") for item in at if isinstance(item, dict)]
-            inside = part.isdecimal() and len(part) < 10 and int(part) < len(at)
-            place: Any = names.index(part) if part in names else int(part) if inside else None
-            known = names or list(map(str, range(len(at))))
+        if isinstance(container, list | tuple):
+            names = [item.get("name") for item in container if isinstance(item, dict)]
+            inside = part.isdecimal() and len(part) < 10 and int(part) < len(container)
+            index: Any = names.index(part) if part in names else int(part) if inside else None
+            known = names or list(map(str, range(len(container))))
         else:
-            known = list(at) if isinstance(at, dict) else []
-            place = part if part in known else None
-        if place is None:
+            known = list(container) if isinstance(container, dict) else []
+            index = part if part in known else None
+        if index is None:
             from plant_fmu.toml_tables import hint
 
             where = ".".join(key.split(".")[:depth])
-            said = hint(part, map(str, known)) if known else f"{where} holds no others"
+            expected = hint(part, map(str, known)) if known else f"{where} holds no others"
             what = "is unknown" if part == key else f"is unknown: {part!r}"
-            raise ScenarioError(f"key {key!r} {what}; {said}")
+            raise ScenarioError(f"key {key!r} {what}; {expected}")
         if depth == len(path):
-            return at, place
-        at = at[place]
+            return container, index
+        container = container[index]
     raise AssertionError("unreachable")

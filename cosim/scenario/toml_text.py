@@ -19,7 +19,7 @@ def scenario_text(table: Mapping[str, Any], said: Mapping[str, str]) -> str:
     return "\n".join(_lines(table, said)) + "\n"
 
 
-def _lines(table: Mapping[str, Any], said: Mapping[str, str], head: str = "", path: str = "") -> Iterator[str]:
+def _lines(table: Mapping[str, Any], comments: Mapping[str, str], head: str = "", path: str = "") -> Iterator[str]:
     """Yield the lines of a table: its values, then the tables in it, then its lists of tables."""
     # In the paths of comments, a list of tables has one entry for all of its items.
     values, tables, lists = [], [], []
@@ -31,17 +31,17 @@ def _lines(table: Mapping[str, Any], said: Mapping[str, str], head: str = "", pa
         else:
             values.append((key, value))
     for key, value in values:
-        comment = said.get(f"{path}{key}", "")
-        if said and (units := _units(table, key, value)):
+        comment = comments.get(f"{path}{key}", "")
+        if comments and (units := _units(table, key, value)):
             comment = ", ".join(filter(None, (units, comment)))
         yield _with(f"{_key(key)} = {_value(value)}", comment)
     for key, inner in tables:
         yield ""
-        yield _with(f"[{head}{_key(key)}]", said.get(f"{path}{key}", ""))
-        yield from _lines(inner, said, f"{head}{_key(key)}.", f"{path}{key}.")
+        yield _with(f"[{head}{_key(key)}]", comments.get(f"{path}{key}", ""))
+        yield from _lines(inner, comments, f"{head}{_key(key)}.", f"{path}{key}.")
     for key, several in lists:
         for i, one in enumerate(several):
-            known = {} if i else said  # only the first item gets comments
+            known = {} if i else comments  # only the first item gets comments
             yield ""
             yield _with(f"[[{head}{_key(key)}]]", known.get(f"{path}{key}", ""))
             yield from _lines(one, known, f"{head}{_key(key)}.", f"{path}{key}[].")

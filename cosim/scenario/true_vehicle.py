@@ -25,17 +25,17 @@ def true_vehicle(scenario: Scenario) -> Vehicle:
     changed: dict[str, float | Array] = {}
     effectiveness = np.ones(vehicle.n_thrusters)
     for name, value in over.items():
-        stem, place = _place(name)
+        stem, index = _place(name)
         if stem == "thrust_effectiveness":
-            effectiveness[place] = value
+            effectiveness[index] = value
         elif hasattr(vehicle, stem):
-            if not place:
+            if not index:
                 changed[stem] = float(value)
                 continue
             array = np.array(changed.get(stem, getattr(vehicle, stem)))
-            array[place] = value
+            array[index] = value
             if stem in _SYMMETRIC:
-                array[place[::-1]] = value
+                array[index[::-1]] = value
             changed[stem] = array
     for limit in ("thrust_min", "thrust_max"):
         changed[limit] = np.asarray(changed.get(limit, getattr(vehicle, limit))) * effectiveness

@@ -120,10 +120,10 @@ def compute_inputs(
 def _input(
     packed: PackedInputs, k: int, state: VehicleState, now: float, clearances: Array, signals: ArbiterSignals
 ) -> float:
-    kind, at = packed.kinds[k], packed.places[k]
+    kind, index = packed.kinds[k], packed.places[k]
     x: float = now
     if kind == _MEMBERSHIP:
-        x = signals.memberships[at]
+        x = signals.memberships[index]
     elif kind == _DEPTH:
         x = state.position[2]
     elif kind == _SPEED:
@@ -131,11 +131,11 @@ def _input(
     elif kind == _GIVEN:
         x = _given(packed, k, now)
     elif kind == _CLOSING_SPEED:
-        x = signals.closing_speeds[at]
+        x = signals.closing_speeds[index]
     elif kind != _TIME:
-        x = signals.goal_clearance[0] if at == 0 else clearances[at - 1]
+        x = signals.goal_clearance[0] if index == 0 else clearances[index - 1]
         if kind == _APPROACH_TIME:
-            x = _approach_time(x, signals.closing_speeds[at])
+            x = _approach_time(x, signals.closing_speeds[index])
     return x
 
 
@@ -161,7 +161,7 @@ def _approach_time(clearance: float, speed: float) -> float:
 
 def _closing_speed(regions: PackedRegions, i: int, state: VehicleState, clearance: float) -> float:
     """Return the closing speed of a region [m/s or rad/s]: the rate at which its clearance shrinks."""
-    ahead, turned, room, omega = zeros(3), zeros(4), zeros(3), zeros(3)
+    ahead, turned, scratch, omega = zeros(3), zeros(4), zeros(3), zeros(3)
     u, v, w = state.velocity_body[0], state.velocity_body[1], state.velocity_body[2]
     rows = rotation_rows(state.quaternion)
     ahead[0] = rows[0][0] * u + rows[0][1] * v + rows[0][2] * w
@@ -176,5 +176,5 @@ def _closing_speed(regions: PackedRegions, i: int, state: VehicleState, clearanc
     size = math.sqrt(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2] + turned[3] * turned[3])
     for j in range(4):
         turned[j] /= size
-    speed: float = (clearance - clearance_of_pose(regions, i, ahead, turned, room)) / _AHEAD
+    speed: float = (clearance - clearance_of_pose(regions, i, ahead, turned, scratch)) / _AHEAD
     return speed

@@ -22,18 +22,18 @@ class Sensor:
 
     def measure(self, time: float, anew: bool) -> None:
         """Write the measured state at a time; time [s]."""
-        sensing, true_state, given = self._sensing, self._true_state, self._given
+        sensing, true_state, measured = self._sensing, self._true_state, self._given
         if anew:
             self._noise[:] = self._deviation * self._rng.standard_normal(6)
-        given.quaternion[:] = true_state.quaternion
-        given.velocity_body[3:] = true_state.velocity_body[3:]
+        measured.quaternion[:] = true_state.quaternion
+        measured.velocity_body[3:] = true_state.velocity_body[3:]
         if sensing.dead_from <= time < sensing.dead_from + sensing.dead_for:
             if not sensing.frozen:
-                given.position[:] = np.nan
-                given.velocity_body[:3] = np.nan
+                measured.position[:] = np.nan
+                measured.velocity_body[:3] = np.nan
             elif time == 0.0:  # nothing was measured before
-                given.position[:] = true_state.position
-                given.velocity_body[:3] = true_state.velocity_body[:3]
+                measured.position[:] = true_state.position
+                measured.velocity_body[:3] = true_state.velocity_body[:3]
             return
-        given.position[:] = true_state.position + self._noise[:3]
-        given.velocity_body[:3] = true_state.velocity_body[:3] + self._noise[3:]
+        measured.position[:] = true_state.position + self._noise[:3]
+        measured.velocity_body[:3] = true_state.velocity_body[:3] + self._noise[3:]

@@ -83,7 +83,7 @@ class Loop:
         """Functions that a step calls, with their arguments, by name in C."""
         goal, regions = self.setup.goal, self.setup.regions
         forces = self.wrench if self.law.output == "wrench" else self.thrusts
-        found: dict[str, tuple[Any, tuple[Any, ...]]] = {
+        calls: dict[str, tuple[Any, tuple[Any, ...]]] = {
             "decide": (decide, (
                 RegionPlaces(goal, regions), self.state, self.expected, self.arbiter_state, self.evaluation,
                 self.setup.inputs, self.now, self.signals,
@@ -95,9 +95,9 @@ class Loop:
         if self.setup.through_sensors:
             sensors = self.setup.sensors
             given = (self.measurements, self.now, sensors, self.navigation, self.state)
-            found["navigate"] = navigate, given
+            calls["navigate"] = navigate, given
         if self.allocates:
-            found["allocate"] = allocate_wrench, (self.allocator, self.stage, self.wrench, self.thrusts)
+            calls["allocate"] = allocate_wrench, (self.allocator, self.stage, self.wrench, self.thrusts)
         if self.setup.goal_places.size:
-            found["find_goal"] = find_goal, (goal, self.true_position, self.true_quaternion, self.goal_clearance)
-        return found
+            calls["find_goal"] = find_goal, (goal, self.true_position, self.true_quaternion, self.goal_clearance)
+        return calls

@@ -32,16 +32,16 @@ class Memory:
 
     def keep(self, array: np.ndarray) -> int:
         """Give an array a place in the member for its type; return the index of its first item there."""
-        whole = array
-        while isinstance(whole.base, np.ndarray):
-            whole = whole.base
-        if id(whole) not in self._places:
-            member = self._member(whole)
-            self._places[id(whole)] = self._sizes[member]
-            self._sizes[member] += whole.size
-            self._pools[member].append(whole)
-        between = array.ctypes.data - whole.ctypes.data if array.size else 0
-        return self._places[id(whole)] + between // array.itemsize
+        base = array
+        while isinstance(base.base, np.ndarray):
+            base = base.base
+        if id(base) not in self._places:
+            member = self._member(base)
+            self._places[id(base)] = self._sizes[member]
+            self._sizes[member] += base.size
+            self._pools[member].append(base)
+        between = array.ctypes.data - base.ctypes.data if array.size else 0
+        return self._places[id(base)] + between // array.itemsize
 
     def fix(self, *values: Any) -> None:
         """Define all arrays of arguments as constants, except those that have a place already."""

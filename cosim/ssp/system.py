@@ -118,7 +118,7 @@ def _require(scenario: Scenario) -> None:
     """Raise a RunError for features that the FMUs of a system do not support."""
     streamed = next((r.region.name for r in scenario.regions if r.streamed), "")
     require_builtin_law(scenario)
-    for good, key, received, expected in (
+    for ok, key, received, expected in (
         (
             scenario.arbiter.engine in _EXACT,
             "arbiter.engine",
@@ -129,7 +129,7 @@ def _require(scenario: Scenario) -> None:
         (not scenario.goal_streamed, "goal.streamed", "true", "false"),
         (not streamed, f"regions.{streamed}.streamed", "true", "false"),
     ):
-        if not good:
+        if not ok:
             raise RunError(f"{key} is {received}, expected {expected} in a system of FMUs")
     try:
         to_c(scenario.rules.system)

@@ -26,9 +26,9 @@ def worst_table(results: Results, folder: Path, count: int = LISTED) -> list[dic
     violated = results.fact(violated_column(results)) | np.isfinite(stopped)
     clearance, time = results.number("min_clearance"), results.number("reach_time")
     depth = np.where(np.isfinite(clearance), np.maximum(-clearance, 0.0), 0.0)
-    far = results.number("closest_to_goal", 0.0) if "closest_to_goal" in names else np.zeros(len(keys))
+    shortfall = results.number("closest_to_goal", 0.0) if "closest_to_goal" in names else np.zeros(len(keys))
     group = np.where(violated, 0, np.where(reached, 2, 1))
-    badness = np.select([group == 0, group == 1], [depth, far], np.nan_to_num(time))
+    badness = np.select([group == 0, group == 1], [depth, shortfall], np.nan_to_num(time))
     flown = np.flatnonzero(results.is_null("refused"))
     order = flown[np.lexsort((keys[flown], -badness[flown], group[flown]))][: max(count, 0)]
     worst = []
@@ -38,7 +38,7 @@ def worst_table(results: Results, folder: Path, count: int = LISTED) -> list[dic
         elif violated[i]:
             why = f"violated, {depth[i]:.3f} m deep" if depth[i] > 0.0 else "violated"
         elif not reached[i]:
-            why = f"not reached, {far[i]:.2f} m short" if far[i] > 0.0 else "not reached"
+            why = f"not reached, {shortfall[i]:.2f} m short" if shortfall[i] > 0.0 else "not reached"
         else:
             why = f"reached at {time[i]:.2f} s"
         worst.append({"row": int(keys[i]), "why": why, "command": rerun_command(folder, int(keys[i]))})

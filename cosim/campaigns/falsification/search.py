@@ -29,11 +29,11 @@ def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None
     drawn = rng.random((math.ceil(_FIRST * budget), dimension))
     costs = evaluate(drawn)
     starts = iter(drawn[np.argsort(costs, kind="stable")])
-    place, least = drawn[np.argmin(costs)], float(costs.min())
+    best_point, best_cost = drawn[np.argmin(costs)], float(costs.min())
     left, wide, small = budget - len(drawn), True, 4 + int(3.0 * math.log(dimension))
     population = small
     while left > 0:
-        start = next(starts, rng.random(dimension)) if wide else place
+        start = next(starts, rng.random(dimension)) if wide else best_point
         size = population if wide else small
         options = {
             "bounds": [0.0, 1.0], "CMA_diagonal": True, "popsize": size, "seed": np.nan,
@@ -41,7 +41,7 @@ def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None
             "signals_filename": "", "verbose": -9, "verb_log": 0, "verb_disp": 0,
         }  # fmt: skip
         strategy = cma.CMAEvolutionStrategy(start, _WIDE if wide else _NARROW, options)
-        own, stale = math.inf, 0
+        search_cost, stale = math.inf, 0
         while left > 0 and stale < _PATIENCE and not strategy.stop():
             points = np.array(strategy.ask())[:left]
             costs = evaluate(points)
@@ -49,10 +49,10 @@ def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None
             if len(points) == size:
                 strategy.tell(list(points), costs.tolist())
             best = int(np.argmin(costs))
-            stale = 0 if costs[best] < own else stale + 1
-            own = min(own, float(costs[best]))
-            if own < least:
-                place, least = points[best], own
+            stale = 0 if costs[best] < search_cost else stale + 1
+            search_cost = min(search_cost, float(costs[best]))
+            if search_cost < best_cost:
+                best_point, best_cost = points[best], search_cost
         population, wide = (2 * population, False) if wide else (population, True)
 
 

@@ -32,16 +32,16 @@ def side_by_side(one: str, results: Results, other: str, others: Results, column
                 upright = {"rotation": 90, "ha": "right"} if line == axes.axvline else {}
                 axes.annotate("never", at, (-2, 2), textcoords="offset points", fontsize=8, **upright)
         x, y = (np.where(np.isfinite(values), values, never) for values in (x, y))
-        for what, of, colour, mark in (
+        for what, mask, colour, mark in (
             ("both complete", mine & theirs, GREEN, "o"),
             (f"only {one}", mine & ~theirs, BLUE, "<"),
             (f"only {other}", theirs & ~mine, ORANGE, "^"),
             ("neither", ~mine & ~theirs, RED, "x"),
         ):
-            if not of.any():
+            if not mask.any():
                 continue
-            at = some[of[some]]
-            axes.plot(x[at], y[at], mark, color=colour, markersize=3.5, alpha=0.7, label=f"{what} ({of.sum()})")
+            at = some[mask[some]]
+            axes.plot(x[at], y[at], mark, color=colour, markersize=3.5, alpha=0.7, label=f"{what} ({mask.sum()})")
         axes.plot([low, high], [low, high], color=BLACK, linewidth=0.8)
         axes.set(xlabel=f"{label}, {one}", ylabel=f"{label}, {other}")
     legend_above(figure, panels[0])

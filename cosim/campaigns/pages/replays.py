@@ -65,10 +65,10 @@ def write_page_with_replays(
 
 def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Replay:
     """Fly a row of one or several campaigns again, unless done before, and write a page with the flights."""
-    place = out / WORST / str(key)
-    if not (place / _REMARKS).exists():
-        place.parent.mkdir(exist_ok=True)
-        with temporary_folder(f".{key}-", place.parent) as scratch:
+    target = out / WORST / str(key)
+    if not (target / _REMARKS).exists():
+        target.parent.mkdir(exist_ok=True)
+        with temporary_folder(f".{key}-", target.parent) as scratch:
             traces, remarks = [], []
             for folder in folders:
                 name = f"{folder.name}: " if len(folders) > 1 else ""
@@ -79,12 +79,12 @@ def replay_of(out: Path, key: int, folders: Sequence[Path], title: str) -> Repla
                 write_page(scratch / REPLAY, traces, title)
             write_atomic(scratch / _REMARKS, json_text({"remarks": remarks}))
             scratch.chmod(0o755)
-            shutil.rmtree(place, ignore_errors=True)
-            scratch.replace(place)
-    stored = read_json(place / _REMARKS).get("remarks")
+            shutil.rmtree(target, ignore_errors=True)
+            scratch.replace(target)
+    stored = read_json(target / _REMARKS).get("remarks")
     if not (isinstance(stored, list) and all(isinstance(remark, str) for remark in stored)):
-        raise RunError(f"{place / _REMARKS}: cannot be read: remarks are missing")
-    return Replay(f"{WORST}/{key}/{REPLAY}" if (place / REPLAY).exists() else None, tuple(stored))
+        raise RunError(f"{target / _REMARKS}: cannot be read: remarks are missing")
+    return Replay(f"{WORST}/{key}/{REPLAY}" if (target / REPLAY).exists() else None, tuple(stored))
 
 
 def _flown(repeat: Repeat, folder: Path) -> tuple[dict[str, Any] | None, str]:

@@ -74,28 +74,28 @@ def _drawings(results: Results, s: dict[str, Any]) -> Iterator[NamedFigure]:
     from cosim.campaigns.pages.figures import Key, Rated, binned_rates, distributions, forest, scatter
     from cosim.report.figures.style import NamedFigure
 
-    flown = results.is_null("refused")
+    is_flown = results.is_null("refused")
     lines = [Rated(fact, "", s["flown"], s[fact]) for fact in FACTS]
     caption = "How many rows reached the goal, settled there, and violated a hard region."
     yield NamedFigure("rates", caption, forest(lines))
 
-    columns = {name: {"": results.number(name)[flown]} for name in s["quantiles"]}
+    columns = {name: {"": results.number(name)[is_flown]} for name in s["quantiles"]}
     yield from distributions(columns, "Rows without a value leave a curve below 100 %.")
 
     keys = [
         Key(s["words"][name], column, bool(s["vary"][name].get("log")))
         for name in _by_weight(s)
-        if np.ptp(column := results.number(name)[flown]) > 0.0
+        if np.ptp(column := results.number(name)[is_flown]) > 0.0
     ][:_SHOWN]
     if keys:
-        reached, violated = results.fact("reached")[flown], results.fact("violated")[flown]
+        reached, violated = results.fact("reached")[is_flown], results.fact("violated")[is_flown]
         caption = (
             "Outcomes by what varies, in parts of the range with about as many rows each, what matters most first."
         )
         if any(0 < fact.sum() < len(fact) for fact in (reached, violated)):
             yield NamedFigure("depends", caption, binned_rates(keys, {"reached": reached, "violated": violated}))
         for name in ("min_clearance", "reach_time"):
-            column = results.number(name)[flown]
+            column = results.number(name)[is_flown]
             if np.isfinite(column).any():
                 caption = f"{LABELS[name].partition(' [')[0].capitalize()} of each row by what varies."
                 drawn = scatter(keys, column, LABELS[name], reached, violated)

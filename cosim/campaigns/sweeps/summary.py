@@ -23,21 +23,21 @@ SPREADS = ("reach_time", "settle_time", "min_clearance", "effort", "max_force", 
 
 def summarize_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str, Any]:
     """Summarize a sweep."""
-    flown, base = results.is_null("refused"), work.variation.base
+    is_flown, base = results.is_null("refused"), work.variation.base
     return {
         "name": work.name,
         "title": base.title,
         "words": {key: key_name(key, base.table, base.vehicle).label for key in work.variation.keys},
         "rows": len(results),
-        "flown": int(flown.sum()),
-        "refused": int((~flown).sum()),
+        "flown": int(is_flown.sum()),
+        "refused": int((~is_flown).sum()),
         "reasons": refusal_reasons(results),
         "stopped": int(np.isfinite(results.number("stopped_at")).sum()),
-        **{name: rate(results.fact(name)[flown]) for name in FACTS},
+        **{name: rate(results.fact(name)[is_flown]) for name in FACTS},
         "quantiles": {name: quantiles(results.number(name)) for name in SPREADS},
         "worst": worst_table(results, folder),
-        "effects": _of_keys(work, results, flown, effect),
-        "rank_correlations": _of_keys(work, results, flown, _rank_correlation),
+        "effects": _of_keys(work, results, is_flown, effect),
+        "rank_correlations": _of_keys(work, results, is_flown, _rank_correlation),
         **{key: value for key, value in work.plan.items() if key != "name"},
     }
 

@@ -116,7 +116,7 @@ def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Snapshot]:
     # a table needs no more rows than these, and all rows of a long run would not fit into memory
     rows = np.arange(steps - 1, -1, -max(1, steps // _ROWS))[::-1] if not once else np.array([steps - 1])
     picked = record.take(rows, [record.columns[i].name for i in view_columns.picked]).to_array()
-    times, ended = picked[:, 0], (str(run.summary["status"]), verdict(run.summary))
+    times, ending = picked[:, 0], (str(run.summary["status"]), verdict(run.summary))
     header = header_of(run.scenario, view_columns.columns)
 
     def at(k: int, note: str, end: tuple[str, str] | None = None) -> Snapshot:
@@ -131,7 +131,7 @@ def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Snapshot]:
         else:
             time.sleep(_FRAME)
             k = int(np.searchsorted(times, times[0] + rate * (time.monotonic() - began), side="right")) - 1
-    yield at(len(times) - 1, "replay", ended)
+    yield at(len(times) - 1, "replay", ending)
 
 
 def _is_being_recorded(path: Path) -> bool:

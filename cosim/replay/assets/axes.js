@@ -12,11 +12,11 @@ class TimeAxis {
   constructor([from, to], rest, left, right) {
     this.broken = rest !== null && rest > from && to - rest > LONG_TAIL * (to - from);
     this.rest = this.broken ? rest : to;
-    const at = this.broken ? right - SHORT_TAIL * (right - left) : right;
-    const across = (at - left) / Math.max(this.rest - from, 1e-9);
-    const behind = (right - at) / Math.max(to - this.rest, 1e-9);
-    this.x = (t) => (this.broken && t > rest ? at + (t - rest) * behind : left + (t - from) * across);
-    this.time = (x) => (this.broken && x > at ? rest + (x - at) / behind : from + (x - left) / across);
+    const breakX = this.broken ? right - SHORT_TAIL * (right - left) : right;
+    const across = (breakX - left) / Math.max(this.rest - from, 1e-9);
+    const behind = (right - breakX) / Math.max(to - this.rest, 1e-9);
+    this.x = (t) => (this.broken && t > rest ? breakX + (t - rest) * behind : left + (t - from) * across);
+    this.time = (x) => (this.broken && x > breakX ? rest + (x - breakX) / behind : from + (x - left) / across);
   }
 }
 

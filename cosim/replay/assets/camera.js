@@ -100,9 +100,9 @@ class Camera {
   refit() {
     if (!this.fitted) return;
     const { target, distance } = this;
-    const shown = this._showsAll();
+    const complete = this._showsAll();
     this._fit();
-    if (shown && this.distance > NEARER * distance) Object.assign(this, { target, distance });
+    if (complete && this.distance > NEARER * distance) Object.assign(this, { target, distance });
     this._changed();
     this.fitted = true;
   }
@@ -150,12 +150,12 @@ class Camera {
    * `side`. Both bounds are linear in the distance, so the solution is closed.
    */
   _bounded(side, below, above) {
-    const places = this.content.map((p) => [Vec.dot(p, side), Vec.dot(Vec.sub(p, this.target), this.forward)]);
-    const most = Math.max(...places.map(([across, ahead]) => across - above * ahead));
-    const least = Math.min(...places.map(([across, ahead]) => across + below * ahead));
+    const points = this.content.map((p) => [Vec.dot(p, side), Vec.dot(Vec.sub(p, this.target), this.forward)]);
+    const upper = Math.max(...points.map(([across, ahead]) => across - above * ahead));
+    const lower = Math.min(...points.map(([across, ahead]) => across + below * ahead));
     return {
-      least: (most - least) / (above + below),
-      middle: (distance) => 0.5 * (most - above * distance + least + below * distance),
+      least: (upper - lower) / (above + below),
+      middle: (distance) => 0.5 * (upper - above * distance + lower + below * distance),
     };
   }
 

@@ -169,12 +169,12 @@ function handlePlot(chart) {
         if (event.pointerType !== "touch") on.hover(chart.frame.time(x(event)), chart, y);
         return;
       }
-      const moved = x(event) - press.x;
-      if (press.mode === "perhaps" && Math.abs(moved) > 8) press.mode = "seek";
+      const dx = x(event) - press.x;
+      if (press.mode === "perhaps" && Math.abs(dx) > 8) press.mode = "seek";
       if (press.mode === "seek") seek(event);
       if (press.mode !== "window") return;
       brush.hidden = false;
-      Object.assign(brush.style, { left: `${Math.min(x(event), press.x)}px`, width: `${Math.abs(moved)}px` });
+      Object.assign(brush.style, { left: `${Math.min(x(event), press.x)}px`, width: `${Math.abs(dx)}px` });
     },
     pointerup(event) {
       if (press?.mode === "perhaps") seek(event);

@@ -56,19 +56,19 @@ class CommandPanel extends FieldPanel {
       button.onclick = () => this.link.command(command);
     }
     const reset = group.querySelector(".reset"); // must be pressed twice
-    let sure = 0;
-    const rest = () => {
-      clearTimeout(sure);
-      sure = 0;
+    let timer = 0;
+    const cancelReset = () => {
+      clearTimeout(timer);
+      timer = 0;
       setText(reset, "Reset");
     };
     reset.onclick = () => {
-      if (sure) {
+      if (timer) {
         this.link.command({ command: "reset" });
-        rest();
+        cancelReset();
       } else {
         setText(reset, "Really reset?");
-        sure = setTimeout(rest, SURE);
+        timer = setTimeout(cancelReset, SURE);
       }
     };
     return group;
@@ -89,11 +89,11 @@ class CommandPanel extends FieldPanel {
 
   /** Write the position of a region into its fields, unless one of them has the focus. */
   _place({ index, set, fields }) {
-    const place = placeOf(this.run, index, this.run.end);
-    set.hidden = !place;
-    if (!place || set.contains(document.activeElement)) return;
+    const position = placeOf(this.run, index, this.run.end);
+    set.hidden = !position;
+    if (!position || set.contains(document.activeElement)) return;
     fields.forEach((field, axis) => {
-      field.value = field.disabled ? "" : shortNumber(Number(place[axis].toFixed(2)));
+      field.value = field.disabled ? "" : shortNumber(Number(position[axis].toFixed(2)));
     });
   }
 
@@ -114,13 +114,13 @@ class CommandPanel extends FieldPanel {
     const { vehicle, changes } = run.header;
     const radius = Number(Math.max(0.3, vehicle.radius).toFixed(2));
     const [north, east] = Vec.turned(Vec.matrix(quaternion), [1, 0, 0]);
-    const place = Vec.along(position, Vec.unit([north, east, 0]), 4 * radius + vehicle.radius);
+    const obstacle = Vec.along(position, Vec.unit([north, east, 0]), 4 * radius + vehicle.radius);
     const number = Math.max(NEW_OBSTACLES - 1, ...changes.map((change) => change.number ?? 0)) + 1;
-    this.link.command({ command: "add_obstacle", number, position: place, radius });
+    this.link.command({ command: "add_obstacle", number, position: obstacle, radius });
   }
 
   _forget(index) {
-    const came = this.run.header.changes.findLast((change) => change.region === index && change.number !== undefined);
-    if (came) this.link.command({ command: "remove_obstacle", number: came.number });
+    const addition = this.run.header.changes.findLast((change) => change.region === index && change.number !== undefined);
+    if (addition) this.link.command({ command: "remove_obstacle", number: addition.number });
   }
 }

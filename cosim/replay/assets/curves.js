@@ -44,23 +44,23 @@ const clearanceOf = ({ name, comes }) => (run) => {
 
 /** Return the clearance signals of regions with one unit: the nearest named, the others thin and grey. */
 function clearances(runs, unit) {
-  const found = new Map();
+  const byName = new Map();
   for (const run of runs) {
     for (const region of run.header.regions.filter((one) => one.unit === unit)) {
       const values = clearanceOf(region)(run);
       if (!values || (region.comes && !values.some(Number.isFinite))) continue; // no value so far: not added yet
-      const before = found.get(region.name)?.least ?? Infinity;
-      found.set(region.name, { region, least: values.reduce((a, b) => (b < a ? b : a), before) });
+      const before = byName.get(region.name)?.least ?? Infinity;
+      byName.set(region.name, { region, least: values.reduce((a, b) => (b < a ? b : a), before) });
     }
   }
   const all = [...found.values()];
   const near = all.filter(({ region }) => region.criterion).sort((a, b) => a.least - b.least).slice(0, NAMED);
-  let drawn = 0;
+  let dashIndex = 0;
   return all.map((one) => {
     const { name, criterion, colour } = one.region;
     const faint = Boolean(criterion) && !near.includes(one);
     return signal(`${name}.clearance`, name, faint ? "grey" : hueOf(colour), {
-      dash: faint ? [] : DASHES[drawn++ % DASHES.length], faint, values: clearanceOf(one.region),
+      dash: faint ? [] : DASHES[dashIndex++ % DASHES.length], faint, values: clearanceOf(one.region),
     });
   });
 }

@@ -133,8 +133,8 @@ class Run {
     while (row > 0 && limits.every(([column, limit]) => Math.abs(column[row - 1] - column[last]) <= limit)) row -= 1;
     const events = (this.header.events ?? []).filter(({ kind }) => kind !== "end");
     const times = events.flatMap(({ time, until }) => [time, until ?? time]);
-    const rest = Math.max(this.rows ? this.time[row] : 0, ...times);
-    return rest + 0.05 * (rest - this.start);
+    const restStart = Math.max(this.rows ? this.time[row] : 0, ...times);
+    return restStart + 0.05 * (restStart - this.start);
   }
 
   /** Append one row of a live run, in the order of the header's signals. */

@@ -44,19 +44,19 @@ class Dragging {
   _under(x, y) {
     const { link } = this;
     const scene = link.page.scene();
-    const found = link.acceptsCommands && scene?.pick(x, y);
-    if (!found || !link.canMove(found.region, found.place) || isFlat(link.run, found.region)) return null;
+    const hit = link.acceptsCommands && scene?.pick(x, y);
+    if (!hit || !link.canMove(hit.region, hit.place) || isFlat(link.run, hit.region)) return null;
     // a keep-inside region surrounds the scene, so that its label is the only handle
-    const { keep } = link.run.header.regions[found.region];
+    const { keep } = link.run.header.regions[hit.region];
     const named = scene.labels.nameAt(x, y) !== null; // labels are picked before what is behind them
-    return found.region === 0 || keep === "out" || named ? found : null;
+    return hit.region === 0 || keep === "out" || named ? hit : null;
   }
 
   _take(event) {
     if (event.button !== 0 || !event.isPrimary || event.altKey || event.ctrlKey) return;
     const { offsetX: x, offsetY: y } = event;
-    const found = this._under(x, y);
-    if (!found) return;
+    const hit = this._under(x, y);
+    if (!hit) return;
     const { run, page, refusal, time } = this.link;
     if (refusal) {
       page.say(refusal, "info");
@@ -65,7 +65,7 @@ class Dragging {
     event.preventDefault();
     this.canvas.focus();
     this.canvas.setPointerCapture(event.pointerId);
-    const { region, place } = found;
+    const { region, place } = hit;
     const from = placeOf(run, region, time, place);
     this.held = { run, region, place, time, from, to: from, start: [x, y], last: [x, y], moved: false };
   }

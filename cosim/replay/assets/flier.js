@@ -13,18 +13,18 @@ function put(Type, address, numbers) {
 const copied = (address, count) => new Float64Array(flight.memory.buffer, address, count).slice();
 
 /** Return the last message of the plant. */
-function said() {
+function lastMessage() {
   const bytes = new Uint8Array(flight.memory.buffer, flight.message(), 512);
   return new TextDecoder().decode(bytes.slice(0, bytes.indexOf(0)));
 }
 
 /** Throw the last message of the plant if it has refused. */
 function check(ok) {
-  if (!ok) throw new Error(said());
+  if (!ok) throw new Error(lastMessage());
 }
 
 /** Simulate one flight and return its results. */
-function flown({ numbers, integers, gains, starts, noise, sizes, metrics: [first, count] }) {
+function simulate({ numbers, integers, gains, starts, noise, sizes, metrics: [first, count] }) {
   check(flight.begin());
   put(Float64Array, flight.numbers(), numbers);
   put(BigInt64Array, flight.integers(), integers.map(([place, value]) => [place, BigInt(value)]));
@@ -33,7 +33,7 @@ function flown({ numbers, integers, gains, starts, noise, sizes, metrics: [first
   const began = performance.now();
   check(flight.fly(...noise));
   const took = performance.now() - began;
-  const result = { took, said: said(), metrics: copied(flight.numbers() + 8 * first, count) };
+  const result = { took, message: lastMessage(), metrics: copied(flight.numbers() + 8 * first, count) };
   for (const [name, size] of Object.entries(sizes)) result[name] = copied(flight[ARRAYS[name]](), size);
   return result;
 }
@@ -45,7 +45,7 @@ self.onmessage = async ({ data }) => {
       flight._initialize();
       self.postMessage({ ready: true });
     } else {
-      const result = flown(data);
+      const result = simulate(data);
       self.postMessage(result, Object.keys(ARRAYS).map((name) => result[name].buffer));
     }
   } catch (error) {

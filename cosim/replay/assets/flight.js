@@ -102,17 +102,17 @@ function runOfFlight(data, result, header, times = []) {
   const refused = result.metrics[12];
   const rows = refused >= 0 ? Math.max(1, Math.ceil(refused / data.every)) : data.rows;
   const stride = Math.ceil(rows / MOST_ROWS);
-  const number = (array, place) => (row) => result[array][row * data.widths[array] + place];
+  const number = (array, index) => (row) => result[array][row * data.widths[array] + index];
   const time = number("trace", 0);
-  const asked = Array.from(times, (t) => Math.round(t / (data.step * data.every)));
-  const kept = new Set(asked.filter((row, i) => row < rows && time(row) === times[i])).add(rows - 1);
-  for (let row = 0; row < rows; row += stride) kept.add(row);
+  const requestedRows = Array.from(times, (t) => Math.round(t / (data.step * data.every)));
+  const rowSet = new Set(requestedRows.filter((row, i) => row < rows && time(row) === times[i])).add(rows - 1);
+  for (let row = 0; row < rows; row += stride) rowSet.add(row);
   const order = [...kept].sort((a, b) => a - b);
   const signals = header.signals.filter(({ name }) => name in data.signals);
   const columns = signals.map(({ name }) => {
     const [kind, ...rest] = data.signals[name];
-    const of = SIGNALS[kind]?.(data, rest, number, result.value) ?? number(kind, rest[0]);
-    return Float64Array.from(order, (row) => of(row));
+    const valueAt = SIGNALS[kind]?.(data, rest, number, result.value) ?? number(kind, rest[0]);
+    return Float64Array.from(order, (row) => valueAt(row));
   });
   const run = new Run({ ...header, signals }, columns);
   run.column("active")?.set(activeRegions(run, data.criteria));
@@ -127,9 +127,9 @@ const SIGNALS = {
   },
 
   shift(data, [region, axis], number, value) {
-    const [time, place] = [number("trace", 0), number("reasons", data.place)];
-    const places = goalPlaces(data, value);
-    return (row) => data.velocities[region][axis] * time(row) + (region === 0 ? places[place(row)][axis] : 0);
+    const [time, goalIndex] = [number("trace", 0), number("reasons", data.place)];
+    const shifts = goalPlaces(data, value);
+    return (row) => data.velocities[region][axis] * time(row) + (region === 0 ? shifts[goalIndex(row)][axis] : 0);
   },
 
   water({ water: { surface, shear, period, variation } }, [axis], number, value) {

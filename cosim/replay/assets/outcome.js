@@ -6,36 +6,36 @@ function outcomeOf(data, result, run, failure) {
   const refused = result.metrics[12];
   const end = refused >= 0 ? refused : (run.end - run.start) / data.step;
   const settled = inside > 0 && (end - lastEntered) * data.step >= data.settled_for;
-  const least = run.header.regions.slice(1).map(({ name }) => {
+  const clearances = run.header.regions.slice(1).map(({ name }) => {
     return [name, run.column(`${name}.clearance`).reduce((a, b) => (b < a ? b : a), Infinity)];
   });
   const summary = {
     reach_time: firstInside >= 0 ? firstInside * data.step : null,
     settle_time: settled ? lastEntered * data.step : null,
-    min_clearance: Object.fromEntries(least),
+    min_clearance: Object.fromEntries(clearances),
   };
   const [verdict, events] = [verdictOf(result, run, summary), eventsOf(run, summary, failure)];
   return { summary, verdict, events, status: "completed" };
 }
 
-function verdictOf({ metrics, said }, run, { reach_time: reach, settle_time: settled, min_clearance: least }) {
+function verdictOf({ metrics, message }, run, { reach_time: reach, settle_time: settled, min_clearance: clearances }) {
   const [goal, ...regions] = run.header.regions;
-  const [goals, at, closest] = [goal.places?.length ?? 1, run.goalPlace(run.end), -metrics[5]];
+  const [goals, goalIndex, closest] = [goal.places?.length ?? 1, run.goalPlace(run.end), -metrics[5]];
   const unknown = "how near it came is not recorded";
   const near = Number.isFinite(closest) ? `it came within ${decimals(closest, 2)} m of it` : unknown;
   const entered = `The vehicle entered the goal region at ${decimals(reach, 2)} s`;
   let words = `The vehicle never entered the goal region; ${near}`;
   if (settled !== null && settled === reach) words = `${entered} and stayed`;
-  else if (settled !== null) words = `${entered} and was in for good from ${decimals(settled, 2)} s`;
+  else if (settled !== null) words = `${entered} and stayed inside from ${decimals(settled, 2)} s`;
   else if (reach !== null) words = `${entered} but did not settle there`;
-  else if (at < goals - 1) words = `The vehicle reached ${at} of ${goals} goals in turn`;
-  const broken = regions.filter(({ name }) => least[name] < 0).map(({ name, unit, hard }) => {
-    const depth = unit === "rad" ? `${decimals(-least[name] * DEGREES, 1)}°` : `${decimals(-least[name], 3)} m`;
+  else if (goalIndex < goals - 1) words = `The vehicle reached ${goalIndex} of ${goals} goals in turn`;
+  const broken = regions.filter(({ name }) => clearances[name] < 0).map(({ name, unit, hard }) => {
+    const depth = unit === "rad" ? `${decimals(-clearances[name] * DEGREES, 1)}°` : `${decimals(-clearances[name], 3)} m`;
     return `${name} by ${depth}${hard ? "" : " (soft)"}`;
   });
-  const kept = broken.length ? `violated ${broken.join(", ")}` : "kept every region";
-  const stopped = ` The flight ended before its time: ${said || "the plant refused a step"}.`;
-  return `${words}; it ${kept}.${metrics[12] >= 0 ? stopped : ""}`;
+  const regionText = broken.length ? `violated ${broken.join(", ")}` : "kept every region";
+  const stopped = ` The flight ended before its time: ${message || "the plant refused a step"}.`;
+  return `${words}; it ${regionText}.${metrics[12] >= 0 ? stopped : ""}`;
 }
 
 function eventsOf(run, { reach_time: reach }, failure) {

@@ -5,8 +5,8 @@ const textColour = (colour) => (hueOf(colour) === colour ? legible(colour) : col
 
 /** Set the shape and color of a mark to those of a region's criterion; without a region clear them. */
 function setMark(mark, run, region) {
-  const place = run.header.criteria.findIndex((one) => one.name === region?.criterion);
-  mark.className = `mark ${region ? (place < 0 ? "goal" : `of-${place % 4}`) : "unknown"}`;
+  const index = run.header.criteria.findIndex((one) => one.name === region?.criterion);
+  mark.className = `mark ${region ? (index < 0 ? "goal" : `of-${index % 4}`) : "unknown"}`;
   mark.style.background = region ? textColour(region.colour) : "";
 }
 

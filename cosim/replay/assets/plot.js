@@ -71,8 +71,8 @@ function paintAxes(context, { left, right, top, bottom, range, window, width, ax
   beginLines(context, ...heights.map(level), ...times.map(upright));
   Object.assign(context, { lineWidth: 1, strokeStyle: COLOURS.grid, fillStyle: COLOURS.muted });
   context.stroke();
-  const beside = { textAlign: "right", textBaseline: "middle" };
-  tickTexts(heights).forEach((text, i) => writeText(context, text, left - 6, rowOf(heights[i]), beside));
+  const style = { textAlign: "right", textBaseline: "middle" };
+  tickTexts(heights).forEach((text, i) => writeText(context, text, left - 6, rowOf(heights[i]), style));
   const texts = tickTexts(times);
   if (axis.broken) {
     times.push(window[1]);
@@ -81,16 +81,16 @@ function paintAxes(context, { left, right, top, bottom, range, window, width, ax
   texts.push(`${texts.pop()} s`);
   times.forEach((t, i) => {
     const half = context.measureText(texts[i]).width / 2;
-    const place = Math.min(x(t), width - half - 1);
-    writeText(context, texts[i], place, bottom + 5, { textAlign: "center", textBaseline: "top" });
+    const textX = Math.min(x(t), width - half - 1);
+    writeText(context, texts[i], textX, bottom + 5, { textAlign: "center", textBaseline: "top" });
   });
   context.strokeStyle = COLOURS.muted;
   if (axis.broken) {
-    const at = x(axis.rest); // nothing moves after it
+    const breakX = x(axis.rest); // nothing moves after it
     Object.assign(context, { fillStyle: COLOURS.grid, globalAlpha: 0.45, lineWidth: 1.5 });
-    context.fillRect(at, top, right - at, bottom - top);
+    context.fillRect(breakX, top, right - breakX, bottom - top);
     context.globalAlpha = 1;
-    beginLines(context, ...[at - 2, at + 2].map((cut) => [[cut - 2.5, bottom + 4], [cut + 2.5, bottom - 4]]));
+    beginLines(context, ...[breakX - 2, breakX + 2].map((cut) => [[cut - 2.5, bottom + 4], [cut + 2.5, bottom - 4]]));
     context.stroke();
     context.lineWidth = 1;
   }
@@ -102,13 +102,13 @@ function paintAxes(context, { left, right, top, bottom, range, window, width, ax
 
 /** Write "at rest" after the break of the time axis: at the top, in the middle or at the bottom, where no curve is. */
 function nameRest(context, { axis, x, y, top, bottom, right }, curves) {
-  const at = x(axis.rest);
+  const breakX = x(axis.rest);
   const lines = curves.map(({ values }) => y(values.at(-1)));
   const rows = [top + 8, (top + bottom) / 2, bottom - 24];
   const free = rows.find((row) => !lines.some((line) => Math.abs(line - row) < 10));
-  if (free === undefined || right - at <= 40) return;
+  if (free === undefined || right - breakX <= 40) return;
   const style = { textAlign: "center", textBaseline: "middle", fillStyle: COLOURS.muted };
-  writeOutlined(context, "at rest", (at + right) / 2, free, style);
+  writeOutlined(context, "at rest", (breakX + right) / 2, free, style);
 }
 
 /** Write the true values that lie beyond the range of the curves, a line of text each, with an arrow. */

@@ -82,9 +82,9 @@ function anchorOf({ solid, sheet, sight, shift, middle }, camera) {
 function rightmostSeen(corners, camera) {
   const between = (a, b) => [0, 0.2, 0.4, 0.6, 0.8].map((part) => Vec.along(a, Vec.sub(b, a), part));
   const points = corners.flatMap((a, i) => between(a, corners[(i + 1) % corners.length]));
-  const seen = points.map((point) => ({ point, pixel: camera.project(point) }));
-  const inside = seen.filter(({ pixel }) => camera.isInPicture(pixel));
-  return (inside.length ? inside : seen).reduce((a, b) => (b.pixel[0] > a.pixel[0] ? b : a)).point;
+  const projected = points.map((point) => ({ point, pixel: camera.project(point) }));
+  const inside = projected.filter(({ pixel }) => camera.isInPicture(pixel));
+  return (inside.length ? inside : projected).reduce((a, b) => (b.pixel[0] > a.pixel[0] ? b : a)).point;
 }
 
 /** Return the entries of keep-out regions, sorted by clearance, the nearest first. */
@@ -113,19 +113,19 @@ function nameRegions(labels, camera, entries, runs, t) {
   for (const entry of entries) {
     const { of, region, next, active } = entry;
     const key = `${of.run}:${of.region}:${next}`;
-    const seen = camera.project(anchorOf(entry, camera));
-    if (named.has(key) || !camera.isInPicture(seen)) continue;
+    const pixel = camera.project(anchorOf(entry, camera));
+    if (named.has(key) || !camera.isInPicture(pixel)) continue;
     named.add(key);
-    const place = Math.max(0, near.indexOf(entry));
-    if (place >= NAMED_IN_SCENE && !active) continue;
+    const rank = Math.max(0, near.indexOf(entry));
+    if (rank >= NAMED_IN_SCENE && !active) continue;
     const isTwice = entries.some((other) => other.of.run !== of.run && other.region.name === region.name);
     const name = regionName(region, of.place, next ? "next" : "present");
     const isGoal = of.region === 0;
     labels.add({
-      key, x: seen[0], y: seen[1], gap: 6, of, size: camera.width < 480 && !active ? 10 : 12,
+      key, x: pixel[0], y: pixel[1], gap: 6, of, size: camera.width < 480 && !active ? 10 : 12,
       text: (active ? "▶ " : "") + name + (entry.solid && isTwice ? `, ${names[of.run]}` : ""),
       colour: active ? COLOURS.ink : COLOURS.soft, edge: entry.colour, bold: active, chip: COLOURS.chip,
-      rank: active ? 0 : isGoal ? 1 + Number(next) : 10 + place, far: active || isGoal,
+      rank: active ? 0 : isGoal ? 1 + Number(next) : 10 + rank, far: active || isGoal,
       sides: ["above", "right", "left", "below"],
     });
   }

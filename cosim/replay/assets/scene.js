@@ -180,8 +180,8 @@ class Scene {
 
   _follow(pose) {
     if (pose) {
-      const moved = Vec.sub(pose.position, this._followed ?? this.camera.target);
-      if (Vec.norm(moved) > 0) this._quiet(() => this.camera.aim(Vec.add(this.camera.target, moved)));
+      const shift = Vec.sub(pose.position, this._followed ?? this.camera.target);
+      if (Vec.norm(shift) > 0) this._quiet(() => this.camera.aim(Vec.add(this.camera.target, shift)));
     }
     this._followed = pose?.position;
   }

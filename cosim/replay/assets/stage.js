@@ -29,12 +29,12 @@ class Stage {
    * @param {boolean} same true for runs of the scenario that is shown: the view stays, as far as it shows them
    */
   setRuns(runs, shown, same = runs === this.runs) {
-    const kept = same && this.scene;
+    const keepsScene = same && this.scene;
     Object.assign(this, { runs, shown });
     const names = runNames(runs);
-    const seen = [...runs.keys()].filter((index) => shown[index] && drawable(runs[index]));
-    const apart = this.side && seen.length > 1;
-    const groups = apart ? seen.map((index) => [index]) : [seen];
+    const visible = [...runs.keys()].filter((index) => shown[index] && drawable(runs[index]));
+    const apart = this.side && visible.length > 1;
+    const groups = apart ? visible.map((index) => [index]) : [visible];
     while (this.views.length > groups.length) this.views.pop().element.remove();
     while (this.views.length < groups.length) this.views.push(this._view(this._another()));
     groups.forEach((indices, i) => {
@@ -55,7 +55,7 @@ class Stage {
     const { camera } = this.scene; // all scenes share it, and it frames the content of all
     camera.content = this.scenes.flatMap((scene) => scene.content);
     for (const scene of this.scenes) scene.camera = camera;
-    if (kept) camera.refit();
+    if (keepsScene) camera.refit();
     else camera.look("iso");
     this.changed();
   }
@@ -103,15 +103,15 @@ class Stage {
 
   /** Return the run, the region and the goal's place at a pixel of a view; null if there is none. */
   under(view, x, y) {
-    const found = view.blank ? null : view.scene.pick(x, y);
-    return found && { ...found, run: this.runs[view.indices[found.run]] };
+    const hit = view.blank ? null : view.scene.pick(x, y);
+    return hit && { ...hit, run: this.runs[view.indices[hit.run]] };
   }
 
   _another() {
     const canvas = h("canvas", { tabIndex: 0, role: "img", ariaLabel: "Another run in three dimensions" });
-    const made = h("div.view", {}, canvas, h("p.caption"));
-    this.holder.append(made);
-    return made;
+    const element = h("div.view", {}, canvas, h("p.caption"));
+    this.holder.append(element);
+    return element;
   }
 
   _view(element) {
@@ -127,10 +127,10 @@ function showPointed(stage, view) {
   const tip = byId("pointed");
   let next = 0;
   const show = (x, y) => {
-    const found = stage.under(view, x, y);
-    tip.hidden = !found;
-    if (!found) return;
-    const { run, region, place } = found;
+    const hit = stage.under(view, x, y);
+    tip.hidden = !hit;
+    if (!hit) return;
+    const { run, region, place } = hit;
     const name = regionName(run.header.regions[region], place, place > run.goalPlace(stage.time) ? "next" : "present");
     setText(tip, `${name}: ${regionWords(run, region, stage.time)}`);
     const inner = view.canvas.getBoundingClientRect();

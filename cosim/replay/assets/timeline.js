@@ -69,8 +69,8 @@ class Timeline {
       for (const [from, until] of below(this.run, `${name}.clearance`)) bar(from, until, height - 4, 2);
     }
     if (!this.axis.broken) return;
-    const at = x(this.axis.rest); // after these cuts, time is compressed
-    beginLines(context, ...[at - 3, at + 3].map((cut) => [[cut - 3, height], [cut + 3, 0]]));
+    const breakX = x(this.axis.rest); // after these cuts, time is compressed
+    beginLines(context, ...[breakX - 3, breakX + 3].map((cut) => [[cut - 3, height], [cut + 3, 0]]));
     context.stroke();
   }
 }

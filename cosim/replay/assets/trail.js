@@ -71,17 +71,17 @@ class Trail {
   marks(spacing) {
     const { run } = this;
     if (this._marks?.spacing === spacing && this._marks.rows === run.rows) return this._marks.list;
-    const least = 0.5 * run.header.vehicle.radius;
+    const minStep = 0.5 * run.header.vehicle.radius;
     const list = [];
     let length = 0;
     let from = this._point(0);
     for (let row = 1; row < run.rows; row++) {
       const middle = this._point(row);
-      const moved = Vec.distance(middle, from);
-      if (moved < least) continue;
+      const step = Vec.distance(middle, from);
+      if (step < minStep) continue;
       from = middle;
       const before = Math.floor(length / spacing);
-      length += Number.isFinite(moved) ? moved : 0;
+      length += Number.isFinite(step) ? step : 0;
       if (Math.floor(length / spacing) === before) continue;
       let k = row; // far enough back for a direction
       while (k > 0 && Vec.distance(middle, this._point(k)) < 0.05 * spacing) k--;

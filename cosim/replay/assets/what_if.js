@@ -42,8 +42,8 @@ class WhatIf {
       // move both ends of a cylinder by exactly the same step, so that its length stays
       const along = this.flight.slots.get(keys[0])?.places[0][0] === "middle" && values[0] !== values[1];
       const step = Math.round(1024 * by[axis]) / 1024;
-      const moved = (value) => (along ? value + step : Number((value + by[axis]).toFixed(4)));
-      keys.forEach((key, i) => this._put(key, moved(values[i])));
+      const shifted = (value) => (along ? value + step : Number((value + by[axis]).toFixed(4)));
+      keys.forEach((key, i) => this._put(key, shifted(values[i])));
     });
     this.later(0);
   }
@@ -147,8 +147,8 @@ class WhatIf {
   _refine(run) {
     const { recorded } = this;
     const { step, every } = this.flight.data; // the simulation has a row for each decision, the record for each step
-    const whole = recorded.end - run.end <= step * every;
-    if (this.repeats !== 0 || !whole || run.rows <= recorded.rows) return;
+    const isComplete = recorded.end - run.end <= step * every;
+    if (this.repeats !== 0 || !isComplete || run.rows <= recorded.rows) return;
     // signals that the simulation lacks are held from row to row of the record, as it is drawn
     const { signals } = recorded.header;
     const columns = signals.map(({ name }) => run.column(name) ?? run.time.map((t) => recorded.held(name, t)));
@@ -168,21 +168,21 @@ class WhatIf {
     if (goal.places) regions[0] = { ...goal, places: goalPlaces(this.flight.data, (key) => this.value(key)) };
     const change = this._change(restoring.key);
     const truth = { ...header.truth, estimate: restoring.truth.map((phi, i) => phi + change * restoring.slopes[i]) };
-    const asked = this.changed ? `With ${this.words().join(", ")}.` : header.asked;
-    return { ...header, name: "what if", asked, regions, truth, changes: [], gaps: {} };
+    const task = this.changed ? `With ${this.words().join(", ")}.` : header.asked;
+    return { ...header, name: "what if", asked: task, regions, truth, changes: [], gaps: {} };
   }
 
   /** Return the changes as texts. */
   words() {
     const movable = this.movable();
-    const moved = movable.filter(({ axes }) => axes.flat().some((key) => this.values.has(key)));
+    const draggedRegions = movable.filter(({ axes }) => axes.flat().some((key) => this.values.has(key)));
     const placed = new Set(movable.flatMap(({ axes }) => axes.flat()));
     const numbers = [...this.values].filter(([key]) => !placed.has(key)).map(([key, value]) => {
       const { words, unit } = this.flight.slots.get(key);
       return `${words} ${shortNumber(value)} ${unit}`.trim();
     });
     const failed = this.failure ? [`thruster ${this.failure.thruster} failing at ${this.failure.time} s`] : [];
-    return [...moved.map(({ name }) => `${name} moved`), ...numbers, ...failed];
+    return [...draggedRegions.map(({ name }) => `${name} moved`), ...numbers, ...failed];
   }
 }
 
@@ -197,9 +197,9 @@ function movedShape(shape, by) {
     drawing: (drawing) => movedShape(drawing, by),
     planes: (planes) => planes.map((plane) => movedShape(plane, by)),
   };
-  const given = Object.entries(shape).filter(([, value]) => value !== null);
-  const moved = given.map(([key, value]) => [key, moves[key]?.(value) ?? value]);
-  return Object.fromEntries(moved);
+  const entries = Object.entries(shape).filter(([, value]) => value !== null);
+  const shifted = entries.map(([key, value]) => [key, moves[key]?.(value) ?? value]);
+  return Object.fromEntries(shifted);
 }
 
 /** Start the what-if simulation if the page has one and the browser can run it; else return null. */

@@ -105,14 +105,14 @@ function activeWords(run, t) {
   const index = run.active(t);
   const region = regions[index];
   const clearance = run.held(`${region.name}.clearance`, t);
-  const asked = clearanceWords(clearance, region);
-  let sentence = `No region asks: the goal region alone steers, ${asked}.`;
+  const distance = clearanceWords(clearance, region);
+  let sentence = `No region asks: the goal region alone steers, ${distance}.`;
   if (region.criterion) {
     const weight = run.held(`weight.${region.criterion}`, t);
     const share = Number.isFinite(weight) ? ` with weight ${figure(weight, 2)}` : "";
-    sentence = `The criterion ${region.criterion} leads${share}; ${region.name} is most critical: ${asked}.`;
+    sentence = `The criterion ${region.criterion} leads${share}; ${region.name} is most critical: ${distance}.`;
   } else if (clearance >= 0) {
-    sentence = `${slow(run, t) ? "At rest" : "On the move"} in the goal region, ${asked}.`;
+    sentence = `${slow(run, t) ? "At rest" : "On the move"} in the goal region, ${distance}.`;
   }
   return { index, name: region.name, region, sentence };
 }
@@ -135,17 +135,17 @@ function sizes(run, name) {
 
 /** Return the values of the vehicle at a time [s]: [name, text]; an empty text is left out. */
 function numbersAt(run, t) {
-  const of = (name, unit) => quantity(run.held(name, t), unit);
+  const value = (name, unit) => quantity(run.held(name, t), unit);
   const size = (name, axes, unit) => quantity(Math.hypot(...run.vectorHeld(name, t, axes)), unit);
   const current = run.current(t);
   const limited = run.held("wrench_saturated", t) > 0 || run.held("allocation_saturated", t) > 0;
   return [
-    ["North, east", `${of("position.x", "m")}, ${of("position.y", "m")}`],
-    ["Depth", of("position.z", "m")],
+    ["North, east", `${value("position.x", "m")}, ${value("position.y", "m")}`],
+    ["Depth", value("position.z", "m")],
     ["Speed over ground", size("velocity", "uvw", "m/s")],
     ["Current", current ? currentWords(current) : ""],
-    ["Heading", of("attitude.yaw", "rad")],
-    ["Roll, pitch", `${of("attitude.roll", "rad")}, ${of("attitude.pitch", "rad")}`],
+    ["Heading", value("attitude.yaw", "rad")],
+    ["Roll, pitch", `${value("attitude.roll", "rad")}, ${value("attitude.pitch", "rad")}`],
     ["Force asked", size("command", "XYZ", "N")],
     ["Force that acts", size("actuation", "XYZ", "N")],
     ["Limits", limited ? "cut what is asked" : "not reached"],

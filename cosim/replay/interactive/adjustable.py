@@ -1,6 +1,6 @@
-"""The numbers of a scenario that a page may change, and their places in the WebAssembly of its flight."""
+"""The numbers of a scenario that a page may change, and where the WebAssembly of its flight keeps them."""
 
-# Each key is tried: if its new number appears unchanged in the flight's arrays, its places are known. A key whose
+# Each key is tried: the arrays in which its new number appears unchanged are those that hold it. A key whose
 # number is only used to compute others is not offered: the page writes numbers, and computes none from them.
 
 from __future__ import annotations
@@ -58,21 +58,23 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[tuple[t
     shapes = [("goal", table["goal"]), *((f"regions.{i}.shape", r["shape"]) for i, r in enumerate(table["regions"]))]
     moving = [_moving_keys(path, shape) for path, shape in shapes]
     moving_keys = [key for axes in moving for keys in axes for key in keys]
-    places = dict(_search(flight, memory, [*numbers, *moving_keys]))
+    slots_of_keys = dict(_search(flight, memory, [*numbers, *moving_keys]))
     for path, shape in shapes:
         if {"start", "end"} <= shape.keys():
-            places |= _ends_by_middle(flight, memory, path)
+            slots_of_keys |= _ends_by_middle(flight, memory, path)
     then = [f"goal.then.{i}.{axis}" for i in range(len(scenario.goal_then)) for axis in range(3)]
     first = memory.keep(flight.setup.goal_places)
-    places |= {key: (("shift", first + i),) for i, key in enumerate(then)}
-    moves = [axes if any(axes) and all(key in places for keys in axes for key in keys) else None for axes in moving]
+    slots_of_keys |= {key: (("shift", first + i),) for i, key in enumerate(then)}
+    moves = [
+        axes if any(axes) and all(key in slots_of_keys for keys in axes for key in keys) else None for axes in moving
+    ]
     if then and shape_entry(scenario.goal).center is None:
         moves[0] = None  # the page does not know where its center would be
     offered = {key for axes in moves if axes for keys in axes for key in keys}.union(numbers, then)
     slots = []
-    for key in (key for key in places if key in offered):
+    for key in (key for key in slots_of_keys if key in offered):
         name = key_name(key, table, scenario.vehicle)
-        slots.append(Slot(key, name.words, name.unit, _value(scenario, key), places[key]))
+        slots.append(Slot(key, name.words, name.unit, _value(scenario, key), slots_of_keys[key]))
     return slots, moves
 
 
@@ -111,10 +113,10 @@ def _ends_by_middle(flight: Flight, memory: Memory, path: str) -> dict[str, tupl
     except ScenarioError:
         return {}
     middles = {(changes[start] + changes[end]) / 2.0: start for start, end in ends}
-    found = _places(flight, memory, other, middles) or {}
-    if len(found) < len(ends):
+    middle_slots = _places(flight, memory, other, middles) or {}
+    if len(middle_slots) < len(ends):
         return {}
-    return {key: tuple(("middle", place) for _, place in found[pair[0]]) for pair in ends for key in pair}
+    return {key: tuple(("middle", place) for _, place in middle_slots[pair[0]]) for pair in ends for key in pair}
 
 
 def _search(flight: Flight, memory: Memory, keys: Sequence[str]) -> Iterator[tuple[str, tuple[tuple[str, int], ...]]]:
@@ -144,11 +146,11 @@ def _places(
 ) -> dict[str, list[tuple[str, int]]] | None:
     """Return the places of numbers in the flight, by comparison with one that has the numbers of `keys` there."""
     # None if anything else differs: then a changed number also enters a computation.
-    found: dict[str, list[tuple[str, int]]] = {}
+    slots: dict[str, list[tuple[str, int]]] = {}
 
-    def put(value: float, kind: str, place: int) -> bool:
+    def put(value: float, kind: str, index: int) -> bool:
         if value in keys:
-            found.setdefault(keys[value], []).append((kind, place))
+            slots.setdefault(keys[value], []).append((kind, index))
         return value in keys
 
     for array, changed in zip(flight.arrays(), other.arrays(), strict=True):
@@ -167,13 +169,13 @@ def _places(
             return None
     references = {v.name: (i, v.type) for i, v in enumerate(variables(flight.scenario.vehicle))}
     for name, new in other.start.items():
-        place, kind = references[name]
-        if flight.start.get(name) != new and not (kind == "real" and put(new, "start", place)):
+        index, kind = references[name]
+        if flight.start.get(name) != new and not (kind == "real" and put(new, "start", index)):
             return None
     for value, key in keys.items():
         if key in NOISE:
             put(value, "noise", NOISE.index(key))
-    return found if list(_numbers(flight.fly)) == list(_numbers(other.fly)) else None
+    return slots if list(_numbers(flight.fly)) == list(_numbers(other.fly)) else None
 
 
 def _numbers(value: Any) -> Iterator[Any]:

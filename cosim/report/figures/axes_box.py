@@ -63,10 +63,10 @@ class Box:
         ticks: Array = values[(values >= self._low[axis]) & (values <= self._high[axis])]
         return ticks
 
-    def _face(self, ax: Axes, across: int, at: float) -> None:
+    def _face(self, ax: Axes, across: int, offset: float) -> None:
         u, v = (axis for axis in range(3) if axis != across)
         corners = np.empty((4, 3))
-        corners[:, across] = at
+        corners[:, across] = offset
         corners[:, u] = self._low[u], self._high[u], self._high[u], self._low[u]
         corners[:, v] = self._low[v], self._low[v], self._high[v], self._high[v]
         ax.add_patch(Polygon(corners @ self.view.T, facecolor=_FACE, edgecolor=_GRID, linewidth=0.8))
@@ -74,7 +74,7 @@ class Box:
         for along, other in ((u, v), (v, u)):
             for tick in self._ticks(along):
                 line = np.empty((2, 3))
-                line[:, across], line[:, along], line[:, other] = at, tick, (self._low[other], self._high[other])
+                line[:, across], line[:, along], line[:, other] = offset, tick, (self._low[other], self._high[other])
                 lines += [line @ self.view.T, np.full((1, 2), np.nan)]
         if lines:
             ax.plot(*np.vstack(lines).T, color=_GRID, linewidth=0.5)

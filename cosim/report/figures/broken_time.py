@@ -39,23 +39,25 @@ def rests_from(record: Rows) -> float | None:
     return rest if start < rest < start + _LATEST * (end - start) else None
 
 
-def break_time(axes: Sequence[Axes], rest: float, end: float) -> None:
+def break_time(axes: Sequence[Axes], rest_start: float, end: float) -> None:
     """Shorten the time from `rest` to `end` [s], on grey, in axes of a whole run that share their time."""
-    slope = _TAIL / (1.0 - _TAIL) * rest / (end - rest)
+    slope = _TAIL / (1.0 - _TAIL) * rest_start / (end - rest_start)
 
     def forward(t: Array) -> Array:
-        return np.where(t > rest, rest + slope * (t - rest), t)
+        return np.where(t > rest_start, rest_start + slope * (t - rest_start), t)
 
     def inverse(x: Array) -> Array:
-        return np.where(x > rest, rest + (x - rest) / slope, x)
+        return np.where(x > rest_start, rest_start + (x - rest_start) / slope, x)
 
-    ticks = [t for t in MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(0.0, rest) if 0.0 <= t <= 0.97 * rest]
+    ticks = [
+        t for t in MaxNLocator(6, steps=[1, 2, 5, 10]).tick_values(0.0, rest_start) if 0.0 <= t <= 0.97 * rest_start
+    ]
     for ax in axes:
         ax.set_xscale("function", functions=(forward, inverse))
         ax.set_xlim(0.0, end)
         ax.xaxis.set_major_locator(FixedLocator([*ticks, end]))
-        ax.axvspan(rest, end, color=BLACK, alpha=0.06, linewidth=0)
-    middle = inverse(np.array(rest + 0.5 * slope * (end - rest)))
+        ax.axvspan(rest_start, end, color=BLACK, alpha=0.06, linewidth=0)
+    middle = inverse(np.array(rest_start + 0.5 * slope * (end - rest_start)))
     axes[0].text(
         float(middle), 0.98, "at rest", transform=axes[0].get_xaxis_transform(), ha="center", va="top", fontsize=7
     )

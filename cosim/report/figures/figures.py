@@ -27,14 +27,14 @@ def drawings(data: FigureData) -> Iterator[NamedFigure]:
 
 def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData], Figure]]]:
     """Yield name, caption, and drawing function of each figure."""
-    moved = ""
+    moving_note = ""
     if data.scenario.moving:
-        moved = (
+        moving_note = (
             " What moved is faint where it began and ended; regions are full where they were when the vehicle had "
             "least clearance to them."
         )
     if targets_of(data):
-        moved += " Diamonds: the targets before the last one, numbered as they were commanded."
+        moving_note += " Diamonds: the targets before the last one, numbered as they were commanded."
     way = (
         "" if data.scenario.log else "; the path is in a criterion's colour while the arbiter gives way to its regions"
     )
@@ -50,7 +50,7 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
         )
         yield (
             "path-plane",
-            f"Path from the side and from above{after['5b']}{outlines}{way}.{moved}",
+            f"Path from the side and from above{after['5b']}{outlines}{way}.{moving_note}",
             in_space.path_plane,
         )
     judged, imported = data.scenario.has_goal, bool(data.scenario.log)

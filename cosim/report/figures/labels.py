@@ -32,21 +32,21 @@ class Labels:
     def place(self, path: Array) -> None:
         """Place the labels that fit, those of small outlines first, clear of a path of shape (n, 2)."""
         floor, ceiling, frame = self._frame.min(axis=0), self._frame.max(axis=0), Path(self._frame)
-        taken: list[tuple[Array, Array]] = []
+        placed: list[tuple[Array, Array]] = []
         for name, low, high, outline in sorted(self._requested, key=lambda label: float(np.prod(label[2] - label[1]))):
             size = np.array([_LETTER * len(name), _HIGH]) / self._scale
             low, high = np.maximum(low, floor), np.minimum(high, ceiling)
             wide = bool((high - low > _MAX_SHARE * (ceiling - floor)).all())
             for middle in _candidates(low, high, size, wide):
-                least, most = middle - size / 2.0, middle + size / 2.0
+                label_low, label_high = middle - size / 2.0, middle + size / 2.0
                 corners = middle + size / 2.0 * _CORNERS
                 if not frame.contains_points(corners).all() or (wide and not outline.contains_points(corners).all()):
                     continue
-                if any((least < b).all() and (most > a).all() for a, b in taken):
+                if any((label_low < b).all() and (label_high > a).all() for a, b in placed):
                     continue
-                if ((path > least) & (path < most)).all(axis=1).any():
+                if ((path > label_low) & (path < label_high)).all(axis=1).any():
                     continue
-                taken.append((least, most))
+                placed.append((label_low, label_high))
                 self._ax.text(middle[0], middle[1], name, fontsize=_SIZE, color=_COLOUR, ha="center", va="center")
                 break
 

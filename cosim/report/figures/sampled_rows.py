@@ -66,9 +66,9 @@ def _signals_with_extremes(scenario: Scenario, rows: Rows) -> list[Array]:
 
 def _along(record: Rows) -> NDArray[np.intp]:
     """Return rows that are evenly spaced along the path of the vehicle."""
-    found, total = [], 0.0
+    chunks, total = [], 0.0
     for wanted in (0, POINTS):  # the length first
-        marks, first, length, passed = np.linspace(0.0, total, wanted), 0, 0.0, -1.0
+        marks, first, length, last_length = np.linspace(0.0, total, wanted), 0, 0.0, -1.0
         before: Array | None = None
         for block in record.blocks(POSITION):
             path = block.stack(POSITION)
@@ -76,13 +76,13 @@ def _along(record: Rows) -> NDArray[np.intp]:
             if known.size:
                 steps = np.diff(path[known], axis=0, prepend=path[known[:1]] if before is None else before)
                 reached = length + np.cumsum(np.linalg.norm(steps, axis=1))
-                due = marks[(marks > passed) & (marks <= reached[-1])]
-                found.append(first + known[np.searchsorted(reached, due)])
-                length = passed = float(reached[-1])
+                due = marks[(marks > last_length) & (marks <= reached[-1])]
+                chunks.append(first + known[np.searchsorted(reached, due)])
+                length = last_length = float(reached[-1])
                 before = path[known[-1:]]
             first += len(block)
         total = length
-    return np.concatenate([np.empty(0, np.intp), *found])
+    return np.concatenate([np.empty(0, np.intp), *chunks])
 
 
 def _commanded(record: Rows) -> NDArray[np.intp]:

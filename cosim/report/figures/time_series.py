@@ -209,8 +209,8 @@ def clearance(data: FigureData) -> Figure:
     named = _named(data, [region.name for region, _ in regions])
     others = len(regions) - len(named)
     labels = [region.name for region, _ in (*of_places, *of_angles) if region.name in named]
-    rest = [f"{others} others"] if others else []
-    figure, axes = _zoomed(data, [2.5, 1.5] if of_angles else [2.5], [*labels, *rest])
+    other_labels = [f"{others} others"] if others else []
+    figure, axes = _zoomed(data, [2.5, 1.5] if of_angles else [2.5], [*labels, *other_labels])
     entries: dict[str, Artist] = {}
     command = [region.name for region, _ in regions if region.name in named]
     for row, group, unit in zip(axes, (of_places, of_angles), ("m", "°"), strict=False):
@@ -224,7 +224,7 @@ def clearance(data: FigureData) -> Figure:
                 dashes, width = DASHES[i % len(DASHES)], 1.3 if i < len(DASHES) else 0.8
                 entries[region.name] = curve(row, data, signal, color=colour, linestyle=dashes, linewidth=width)
             else:
-                entries[rest[0]] = curve(row, data, signal, color=colour, alpha=0.3, linewidth=0.6)
+                entries[other_labels[0]] = curve(row, data, signal, color=colour, alpha=0.3, linewidth=0.6)
         low, high = limits_of(signals)
         low = min(low, -0.08 * (high - min(low, 0.0)))  # always shows some of the range below 0
         row[0].set_ylim(low, max(high, -0.2 * low))
@@ -232,7 +232,7 @@ def clearance(data: FigureData) -> Figure:
             ax.axhspan(low, 0.0, color=RED, alpha=0.06, linewidth=0)
             _zero_line(ax)
         row[0].set_ylabel(f"clearance [{unit}]")
-    legend(figure, {label: entries[label] for label in (*labels, *rest)})
+    legend(figure, {label: entries[label] for label in (*labels, *other_labels)})
     return figure
 
 
@@ -270,7 +270,7 @@ def lyapunov(data: FigureData) -> Figure:
     lines = [curve(axes[0], data, V, color=colour, linestyle=style) for V, colour, style in styles]
     rate = data.record["lyapunov.rate"]
     curve(axes[1], data, rate, color=BLUE)
-    for row, signal, bad in ((axes[0], forms["normalized"], -1.0), (axes[1], rate, 1.0)):
+    for row, signal, bad_sign in ((axes[0], forms["normalized"], -1.0), (axes[1], rate, 1.0)):
         size = np.abs(signal[np.isfinite(signal)])
         largest, typical = (float(size.max()), float(np.percentile(size, 50))) if size.size else (0.0, 0.0)
         if largest > 20.0 * max(typical, 1.0):  # on a linear axis the beginning would hide the rest
@@ -279,7 +279,7 @@ def lyapunov(data: FigureData) -> Figure:
             row[0].set_ylim(*limits_of([signal, np.zeros(1)]))
         limits = row[0].get_ylim()
         for ax in row:
-            ax.axhspan(0.0, limits[0] if bad < 0.0 else limits[1], color=RED, alpha=0.06, linewidth=0)
+            ax.axhspan(0.0, limits[0] if bad_sign < 0.0 else limits[1], color=RED, alpha=0.06, linewidth=0)
             _zero_line(ax)
         row[0].set_ylim(limits)
     axes[0, 0].set_ylabel("V [N m]")

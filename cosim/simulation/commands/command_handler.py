@@ -10,7 +10,6 @@ import numpy as np
 
 from controller import VehicleState
 from cosim.errors import CommandError
-from cosim.scenario.region_tables import Vector3
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.actuators import Actuators
 from cosim.simulation.commands.commands import (
@@ -170,9 +169,9 @@ class CommandHandler:
             self._actuators.limit(settings.of_plant[key], settings[key])
 
     def _set_mode(self, mode: Mode, time: float) -> None:
-        here: Vector3 = (float(self._state.position[0]), float(self._state.position[1]), float(self._state.position[2]))
+        north, east, down = (float(x) for x in self._state.position)
         radius = self.settings["commands.hold_radius"]
-        if mode in ("hold", "surface") and not all(map(math.isfinite, here)):
+        if mode in ("hold", "surface") and not all(map(math.isfinite, (north, east, down))):
             raise CommandError(f"mode {mode} needs a position, and none is known")
         if mode == "mission" and not self._mission.items:
             raise CommandError("mode mission: there is no mission")
@@ -180,10 +179,9 @@ class CommandHandler:
         self._release()
         match mode:
             case "hold":
-                self._environment.set_target(here, radius)
+                self._environment.set_target((north, east, down), radius)
             case "surface":
-                up = (here[0], here[1], self.settings["commands.surface_depth"])
-                self._environment.set_target(up, radius)
+                self._environment.set_target((north, east, self.settings["commands.surface_depth"]), radius)
             case "reach":
                 self._environment.restore_target()
             case "mission":

@@ -57,15 +57,15 @@ class MissionExecutor:
 def passed_items(items: Sequence[MissionItem], before: int, now: int) -> list[int] | None:
     """Return the items that a mission passed through from one item to the present one."""
     # Only items without a position are passed through at once.
-    ways, seen = [[before + 1]], set[int]()
+    ways, visited = [[before + 1]], set[int]()
     while ways:
         path = ways.pop(0)
         item = path[-1]
         if item == now:
             return path
-        if item in seen or not 0 <= item < len(items) or items[item].position is not None:
+        if item in visited or not 0 <= item < len(items) or items[item].position is not None:
             continue
-        seen.add(item)
+        visited.add(item)
         jump = items[item].jump
         ways += [[*path, following] for following in (item + 1, jump) if following is not None]
     return None

@@ -58,8 +58,8 @@ class StickStabilizer:
         return result
 
     def _moment(self, sticks: Array, gain: float) -> Array:
-        rate, turn, asked = np.zeros(3), float(sticks[5]), self.attitude
-        if asked is None:
+        rate, turn, target = np.zeros(3), float(sticks[5]), self.attitude
+        if target is None:
             if abs(turn) > _CENTERED:
                 rate[2] = gain * turn * YAW_RATE
                 ahead = math.remainder(self._heading + rate[2] * self._period - self._yaw(), math.tau)
@@ -68,10 +68,10 @@ class StickStabilizer:
                 from_axis_angle(_EAST, float(sticks[4]) * GREATEST_TILT),
                 from_axis_angle(_NORTH, float(sticks[3]) * GREATEST_TILT),
             )
-            asked = multiply(from_axis_angle(_DOWN, self._heading), tilt)
+            target = multiply(from_axis_angle(_DOWN, self._heading), tilt)
         else:
             self._heading = self._yaw()  # kept once the attitude is free again
-        angle = 2.0 * error(asked, self._state.quaternion)[1:]
+        angle = 2.0 * error(target, self._state.quaternion)[1:]
         moment: Array = -self._inertia * _ATTITUDE * (_ATTITUDE * angle + 2.0 * (self._state.velocity_body[3:] - rate))
         return moment
 
