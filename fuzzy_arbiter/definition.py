@@ -85,7 +85,7 @@ class Variable:
             given = tuple(Term(term, shape) for term, shape in given.items())
         terms = all_of(Term, given, f"{what}: terms", "a mapping from names to shapes, or a sequence of Term")
         if not terms and isinstance(self, Output):
-            raise DefinitionError(f"{what}: no terms came, expected at least one")
+            raise DefinitionError(f"{what}: no terms, expected at least one")
         for term in terms:
             require_name(term.name, f"{what}: term")
         twice = _repeated(term.name for term in terms)
@@ -201,12 +201,12 @@ class Output(Variable):
             raise DefinitionError(
                 f"{what} is a value, expected a membership function, or one of the defuzzifiers {', '.join(WEIGHTED)}"
             )
-        made = self._within(term)
-        shape = made.membership
+        bounded = self._within(term)
+        shape = bounded.membership
         point = shape.parameters[0] if isinstance(shape, Curve) and shape.kind == "singleton" else math.nan
         if not self.universe[0] <= point <= self.universe[1] and not shape.area(self.universe) > 0.0:
             raise DefinitionError(f"{what} has no area in [{_span(self)}]")
-        return made
+        return bounded
 
     @property
     def weighted(self) -> bool:
@@ -331,11 +331,11 @@ class System:
     def __repr__(self) -> str:
         """Return Python text that builds an equal system; rules are texts, and default settings are left out."""
         rules = tuple(str(rule) if rule.operators is None else rule for rule in self.rules)
-        said = [
+        parts = [
             f"{key.name}={getattr(self, key.name)!r}" for key in fields(self) if getattr(self, key.name) != key.default
         ]
-        said[2] = f"rules={rules!r}"
-        return f"System({', '.join(said)})"
+        parts[2] = f"rules={rules!r}"
+        return f"System({', '.join(parts)})"
 
 
 CHOICES = {

@@ -177,7 +177,7 @@ class HysteresisArbiter:
         now: float,
     ) -> tuple[list[bool], list[float], list[float]]:
         """Return the latches after one sample, the times at which they closed, and the inputs of the arbiter."""
-        closed, since, places = list(before), list(since_before), list(values)
+        closed, since, adjusted = list(before), list(since_before), list(values)
         for i, degree in enumerate(degrees):
             if degree >= self._enter[i]:
                 if not closed[i]:
@@ -185,10 +185,10 @@ class HysteresisArbiter:
             elif closed[i] and degree <= self._release[i] and (not self._dwell[i] or now - since[i] >= self._dwell[i]):
                 closed[i] = False
             if closed[i]:
-                places[i] = self._on_places[i]
+                adjusted[i] = self._on_places[i]
             elif not self._graded:
-                places[i] = self._off_places[i]
-        return closed, since, places
+                adjusted[i] = self._off_places[i]
+        return closed, since, adjusted
 
     def __repr__(self) -> str:
         settings = {"enter": self._enter, "release": self._release, "dwell": self._dwell}

@@ -59,7 +59,7 @@ def require_values(system: System) -> None:
                 used |= whole.names | (set(inputs) if isinstance(term.shape, Linear) else set())
     for variable in system.inputs:
         if not variable.terms and variable.name not in used:
-            raise DefinitionError(f"variable {variable.name!r}: no terms came, expected at least one")
+            raise DefinitionError(f"variable {variable.name!r}: no terms, expected at least one")
 
 
 def _require_known(statement: Is, known: _Terms, kind: str) -> None:

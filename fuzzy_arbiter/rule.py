@@ -80,10 +80,10 @@ class Rule:
     def __post_init__(self) -> None:
         if not isinstance(self.condition, Proposition):
             raise DefinitionError(f"rule: condition is {shown(self.condition)}, expected such as variable['term']")
-        found = (self.conclusions,) if isinstance(self.conclusions, Is) else self.conclusions
-        conclusions = all_of(Is, found, self.condition, "as conclusions output['term'] or a sequence of such")
+        listed = (self.conclusions,) if isinstance(self.conclusions, Is) else self.conclusions
+        conclusions = all_of(Is, listed, self.condition, "as conclusions output['term'] or a sequence of such")
         if not conclusions:
-            raise DefinitionError(f"{self.condition}: no conclusions came, expected output['term']")
+            raise DefinitionError(f"{self.condition}: no conclusions, expected output['term']")
         weight = finite(self.weight)
         if weight is None or not 0.0 < weight <= 1.0:
             rule = str(Rule(self.condition, conclusions))

@@ -47,23 +47,23 @@ def draw(
     if kind == "rules":
         output = _names(kind, "--output", outputs, output_names, 1)[0]
         return _figure(pictures.rules(arbiter, sample(at, system), output))
-    places: Any = sample(at, system) if at else {}
-    if not isinstance(places, dict):
+    values: Any = sample(at, system) if at else {}
+    if not isinstance(values, dict):
         raise InputError(f"--at {at[0]}: expected name=value")
     if kind == "terms":
         names = [*inputs, *outputs] or [*input_names, *output_names]
-        for name in places:
+        for name in values:
             if name not in names:
                 raise InputError(f"--at {name}: its terms are not drawn, expected one of {', '.join(names)}")
-        return _terms(arbiter, names, places)
+        return _terms(arbiter, names, values)
     if kind == "profile":
-        return _figure(pictures.profile(arbiter, _names(kind, "--input", inputs, input_names, 1)[0], places))
+        return _figure(pictures.profile(arbiter, _names(kind, "--input", inputs, input_names, 1)[0], values))
     first, second = _names(kind, "--input", inputs, input_names, 2)
     if kind == "decisions":
-        return _figure(pictures.decisions(arbiter, (first, second), places))
+        return _figure(pictures.decisions(arbiter, (first, second), values))
     output = _names(kind, "--output", outputs, output_names, 1)[0]
     ax = new_axes(6.4, 5.2, projection="3d") if relief else None
-    return _figure(pictures.surface(arbiter, output, (first, second), places, ax=ax))
+    return _figure(pictures.surface(arbiter, output, (first, second), values, ax=ax))
 
 
 def middles(at: Sequence[str], system: System) -> list[str]:

@@ -98,17 +98,17 @@ def _scaled_centroids(cuts: Array, shape: Outline) -> Array:
         # each against those before it
         others = [(start_at[t], end_at[t], start_at[:t], end_at[:t]) for t in range(1, terms)]
         breaks = [np.zeros((1, n)), np.ones((1, n)), *(_crossings(*pair, n) for pair in others)]
-        places = np.sort(np.concatenate(breaks), axis=0)
-        middles = (places[:-1] + places[1:]) / 2
+        breakpoints = np.sort(np.concatenate(breaks), axis=0)
+        middles = (breakpoints[:-1] + breakpoints[1:]) / 2
         heights, starts, ends = np.zeros((3, *middles.shape))
         for t in range(terms):
             cut, rise = cuts[t], b[t] - a[t]
-            degrees, lines = (a[t] + rise * middles) * cut, (a[t] + rise * places) * cut
+            degrees, lines = (a[t] + rise * middles) * cut, (a[t] + rise * breakpoints) * cut
             greatest = degrees > heights
             np.copyto(starts, lines[:-1], where=greatest)
             np.copyto(ends, lines[1:], where=greatest)
             np.maximum(heights, degrees, out=heights)
-        x, w = start + places * width, np.diff(places, axis=0) * width
+        x, w = start + breakpoints * width, np.diff(breakpoints, axis=0) * width
         for i, (width_i, y0, y1) in enumerate(zip(w, starts, ends, strict=True)):
             # one after another, as for one sample, to the same bits
             area += width_i * (y0 + y1) / 2

@@ -22,19 +22,19 @@ _DENSE = np.linspace(-1.0 + 1e-12, 1.0 - 1e-12, 33)  # these points in a panel, 
 _LIKELY = 0.95  # least height at the points around a maximum, as a fraction of the greatest at any point
 
 
-def of_points(of: Quadrature, cuts: Array) -> float:
+def of_points(quad: Quadrature, cuts: Array) -> float:
     """Return the mean of the singletons, weighted by their heights: what very narrow terms of one width tend to."""
     joined = [
         (shape.parameters[0], float(implication(cut, np.array([shape.height]))[0]))
-        for cut, implication, t in zip(cuts, of._implications, of._term, strict=True)
-        if isinstance(shape := of._shapes[t], Curve) and shape.kind == "singleton"
+        for cut, implication, t in zip(cuts, quad._implications, quad._term, strict=True)
+        if isinstance(shape := quad._shapes[t], Curve) and shape.kind == "singleton"
     ]
     weight = sum(height for _, height in joined)
-    return sum(place * height for place, height in joined) / weight if weight > 0.0 else math.nan
+    return sum(position * height for position, height in joined) / weight if weight > 0.0 else math.nan
 
 
 def bisectors(samples: Samples, panels: Panels, totals: Array) -> Array:
-    """Return for each sample the place that halves the area; of several the middle one."""
+    """Return for each sample the position that halves the area; of several the middle one."""
     order = np.lexsort((panels.starts, panels.rows))
     rows, starts, ends, areas = (column[order] for column in (panels.rows, panels.starts, panels.ends, panels.areas))
     counts = np.bincount(rows, minlength=samples.n)
@@ -47,81 +47,88 @@ def bisectors(samples: Samples, panels: Panels, totals: Array) -> Array:
     index = (sums < (half * (1.0 - 1e-14))[:, None]).sum(axis=1)
     index = np.minimum(index, counts - 1)
     every = np.arange(samples.n)
-    chosen = first + index
-    missing = half - (sums[every, index] - areas[chosen])
-    result: Array = ends[chosen].copy()
-    at_end = np.abs(missing - areas[chosen]) <= 1e-14 * half  # perhaps of a gap, whose end is the next start
+    panel = first + index
+    missing = half - (sums[every, index] - areas[panel])
+    result: Array = ends[panel].copy()
+    at_end = np.abs(missing - areas[panel]) <= 1e-14 * half  # perhaps of a gap, whose end is the next start
     for row in np.flatnonzero(at_end).tolist():
         after = np.flatnonzero(table[row, index[row] + 1 : counts[row]] > 0.0)
         if len(after):
-            result[row] = (result[row] + starts[chosen[row] + 1 + after[0]]) / 2
+            result[row] = (result[row] + starts[panel[row] + 1 + after[0]]) / 2
     inside = np.flatnonzero(~at_end & (totals > 0.0))
 
     def lacking(x: Array, which: Indices) -> Array:
         row = inside[which]
-        start = starts[chosen[row]]
+        start = starts[panel[row]]
         heights = samples.heights(points_of(start, x, NODES), row).height
         return np.asarray((heights * WEIGHTS).sum(axis=-1) * (x - start) / 2 - missing[row])
 
-    at, found = roots(lacking, starts[chosen[inside]], ends[chosen[inside]], samples.of.precision)
-    result[inside[found]] = at[found]
+    middles, has_root = roots(lacking, starts[panel[inside]], ends[panel[inside]], samples.quad.precision)
+    result[inside[has_root]] = middles[has_root]
     return result
 
 
 def of_maximum(samples: Samples, panels: Panels, kind: str) -> Array:
-    """Return for each sample the mean, the smallest or the largest of the places where the height is greatest."""
-    of, n = samples.of, samples.n
+    """Return for each sample the mean, smallest or largest position of the greatest height."""
+    quad, n = samples.quad, samples.n
     tops = panels.heights.max(axis=1)
-    greatest = np.zeros(n)
-    np.maximum.at(greatest, panels.rows, tops)
-    found = [(np.repeat(np.arange(n), len(of.edges)), np.tile(of.edges, n))]
-    high = np.flatnonzero(~panels.flat & (tops >= _LIKELY * greatest[panels.rows]))
+    max_heights = np.zeros(n)
+    np.maximum.at(max_heights, panels.rows, tops)
+    candidates = [(np.repeat(np.arange(n), len(quad.edges)), np.tile(quad.edges, n))]
+    high = np.flatnonzero(~panels.flat & (tops >= _LIKELY * max_heights[panels.rows]))
     if len(high):
-        some = panels.chosen(high)
-        best = points_of(some.starts, some.ends, NODES)[np.arange(len(high)), some.heights[:, INNER].argmax(axis=1)]
-        # a height that jumps at an end is greatest beside it
-        beside = np.minimum(4.0 * of.precision, (some.ends - some.starts) * 1e-3)
-        ends = (some.starts, some.ends, some.starts + beside, some.ends - beside)
-        found += [*((some.rows, x) for x in (*ends, best)), _turning(samples, some)]
-    rows, places = (np.concatenate(column) for column in zip(*found, strict=True))
-    heights = samples.heights(places, rows).height
-    greatest = np.zeros(n)
-    np.maximum.at(greatest, rows, heights)
-    np.maximum.at(greatest, panels.rows[panels.flat], tops[panels.flat])
-    top = (heights >= greatest[rows] * _EQUAL) & (heights > 0.0)
-    rows, places = rows[top], places[top]
-    level = panels.flat & (tops >= greatest[panels.rows] * _EQUAL) & (tops > 0.0)
+        tall = panels.chosen(high)
+        best = points_of(tall.starts, tall.ends, NODES)[np.arange(len(high)), tall.heights[:, INNER].argmax(axis=1)]
+        # a height that jumps at an end reaches its maximum just inside
+        inset = np.minimum(4.0 * quad.precision, (tall.ends - tall.starts) * 1e-3)
+        ends = (tall.starts, tall.ends, tall.starts + inset, tall.ends - inset)
+        candidates += [*((tall.rows, x) for x in (*ends, best)), _turning(samples, tall)]
+    rows, positions = (np.concatenate(column) for column in zip(*candidates, strict=True))
+    heights = samples.heights(positions, rows).height
+    max_heights = np.zeros(n)
+    np.maximum.at(max_heights, rows, heights)
+    np.maximum.at(max_heights, panels.rows[panels.flat], tops[panels.flat])
+    top = (heights >= max_heights[rows] * _EQUAL) & (heights > 0.0)
+    rows, positions = rows[top], positions[top]
+    level = panels.flat & (tops >= max_heights[panels.rows] * _EQUAL) & (tops > 0.0)
     flat, left, right = panels.rows[level], panels.starts[level], panels.ends[level]
     result = np.full(n, math.nan)
     if kind == "mom":
-        order = np.lexsort((places, rows))
-        rows, places = rows[order], places[order]
-        one = np.ones(len(rows), dtype=bool)
-        one[1:] = (rows[1:] != rows[:-1]) | (np.diff(places) > _APART * of.width)
-        count = np.bincount(rows[one], minlength=n)
+        order = np.lexsort((positions, rows))
+        rows, positions = rows[order], positions[order]
+        is_distinct = np.ones(len(rows), dtype=bool)
+        is_distinct[1:] = (rows[1:] != rows[:-1]) | (np.diff(positions) > _APART * quad.width)
+        count = np.bincount(rows[is_distinct], minlength=n)
         some_points = count > 0
-        result[some_points] = np.bincount(rows[one], places[one] - of.low, n)[some_points] / count[some_points] + of.low
+        result[some_points] = (
+            np.bincount(rows[is_distinct], positions[is_distinct] - quad.low, n)[some_points] / count[some_points]
+            + quad.low
+        )
         length = np.bincount(flat, right - left, n)
-        wide = length > _APART * of.width
-        moment = np.bincount(flat, (right - left) * ((left + right) / 2 - of.low), n)
-        result[wide] = of.low + moment[wide] / length[wide]
+        wide = length > _APART * quad.width
+        moment = np.bincount(flat, (right - left) * ((left + right) / 2 - quad.low), n)
+        result[wide] = quad.low + moment[wide] / length[wide]
         return result
     pick, ends = (np.fmin, left) if kind == "som" else (np.fmax, right)
-    pick.at(result, rows, places)
+    pick.at(result, rows, positions)
     pick.at(result, flat, ends)
     return result
 
 
 def _turning(samples: Samples, panels: Panels) -> tuple[Indices, Array]:
-    """Return samples and places where the height within a panel turns from rising to falling."""
+    """Return samples and positions where the height within a panel turns from rising to falling."""
     rows, starts, ends = panels.rows, panels.starts, panels.ends
     for _ in range(_CLOSER):
-        places = points_of(starts, ends, _DENSE)
-        heights = samples.heights(places, rows).height
+        positions = points_of(starts, ends, _DENSE)
+        heights = samples.heights(positions, rows).height
         around = np.pad(heights, ((0, 0), (1, 1)))
-        items, at = np.nonzero((heights >= around[:, :-2]) & (heights > around[:, 2:]))
-        rows, starts, ends = rows[items], places[items, np.maximum(at - 1, 0)], places[items, np.minimum(at + 1, 32)]
-        best, height = places[items, at], heights[items, at]
+        items, index = np.nonzero((heights >= around[:, :-2]) & (heights > around[:, 2:]))
+        rows, starts, ends = (
+            rows[items],
+            positions[items, np.maximum(index - 1, 0)],
+            positions[items, np.minimum(index + 1, 32)],
+        )
+        best, height = positions[items, index], heights[items, index]
     slope = legendre.legder(
         np.einsum("pj,kj->kp", samples.heights(points_of(starts, ends, NODES), rows).height, ANALYSIS)
     )
@@ -131,5 +138,5 @@ def _turning(samples: Samples, panels: Panels) -> tuple[Indices, Array]:
         with np.errstate(divide="ignore", invalid="ignore"):
             step = legendre.legval(x, slope, tensor=False) / legendre.legval(x, bend, tensor=False)
         x = np.clip(np.where(np.isfinite(step), x - step, x), -1.0, 1.0)
-    places = points_of(starts, ends, x[:, None])[:, 0]
-    return rows, np.where(samples.heights(places, rows).height >= height * _EQUAL, places, best)
+    positions = points_of(starts, ends, x[:, None])[:, 0]
+    return rows, np.where(samples.heights(positions, rows).height >= height * _EQUAL, positions, best)

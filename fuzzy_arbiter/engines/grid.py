@@ -68,13 +68,13 @@ def sampled(output: Output, points: int) -> tuple[Array, Array]:
     """Return the places at which an output is sampled, shape (points,), and its terms there, (terms, points)."""
     if points * len(output.terms) > 2**25:
         raise EngineError(f"output {output.name!r}: {points} points are too many to sample, expected fewer")
-    places = np.linspace(*output.universe, points)
-    if not (np.diff(places) > 0.0).all():
+    positions = np.linspace(*output.universe, points)
+    if not (np.diff(positions) > 0.0).all():
         raise EngineError(f"output {output.name!r}: {points} points do not fit in {output.universe}")
-    samples = np.array([term.membership.of_many(places) for term in output.terms])
+    samples = np.array([term.membership.of_many(positions) for term in output.terms])
     for term, degrees in zip(output.terms, samples, strict=True):
         if not degrees.any():
             raise EngineError(
                 f"output {output.name!r}: term {term.name!r} is 0 at all {points} points; expected more points"
             )
-    return places, samples
+    return positions, samples

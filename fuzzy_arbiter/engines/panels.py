@@ -82,10 +82,10 @@ def smooth_panels(universe: tuple[float, float], shapes: Sequence[Membership]) -
     starts, ends = edges[:-1], edges[1:]
     areas = np.zeros(len(shapes))
     for _ in range(_MAX_HALVINGS):
-        places = points_of(starts, ends)
+        positions = points_of(starts, ends)
         rough = np.zeros(len(starts), dtype=bool)
         for k, shape in enumerate(shapes):
-            values = shape.of_many(places.ravel()).reshape(places.shape)
+            values = shape.of_many(positions.ravel()).reshape(positions.shape)
             widths = ends - starts
             areas[k] = max(areas[k], float(((values[:, INNER] * WEIGHTS).sum(axis=-1) * widths).sum()) / 2)
             rough |= mean_errors(values) * widths > _STATIC * areas[k]
@@ -106,17 +106,17 @@ def constant_panels(shape: Membership, middles: Array, degrees: Array) -> Mask:
     return np.asarray(np.ptp(degrees, axis=1) == 0.0)
 
 
-def dividing(items: Indices, places: Array, starts: Array, ends: Array) -> tuple[Indices, Array, Array]:
-    """Divide some panels at places within them; return the panel of each part, its start and its end."""
-    whole = np.unique(items)
-    items, places = np.concatenate([whole, items]), np.concatenate([starts[whole], places])
-    order = np.lexsort((places, items))
-    items, places = items[order], places[order]
-    until = np.append(places[1:], 0.0)
+def dividing(items: Indices, positions: Array, starts: Array, ends: Array) -> tuple[Indices, Array, Array]:
+    """Divide some panels at positions within them; return the panel of each part, its start and its end."""
+    divided = np.unique(items)
+    items, positions = np.concatenate([divided, items]), np.concatenate([starts[divided], positions])
+    order = np.lexsort((positions, items))
+    items, positions = items[order], positions[order]
+    until = np.append(positions[1:], 0.0)
     last = np.append(items[1:] != items[:-1], True)
     until[last] = ends[items[last]]
-    wide = until > places
-    return items[wide], places[wide], until[wide]
+    wide = until > positions
+    return items[wide], positions[wide], until[wide]
 
 
 def lowest_between(values: Array) -> tuple[Mask, Array]:
@@ -128,40 +128,40 @@ def lowest_between(values: Array) -> tuple[Mask, Array]:
     bend = ((v2 - v1) / (x2 - x1) - slope) / (x2 - x0)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         turn = (x0 + x1) / 2 - slope / (2 * bend)
-        least = v0 + slope * (turn - x0) + bend * (turn - x0) * (turn - x1)
-        rise = np.maximum(v0, v2) - least
-        near = (bend > 0.0) & (x0 < turn) & (turn < x2) & (least < rise / 2) & (rise > 1e-12)
-    least = np.where(near, least, np.inf)
-    best = least.argmin(axis=1)
+        minimum = v0 + slope * (turn - x0) + bend * (turn - x0) * (turn - x1)
+        rise = np.maximum(v0, v2) - minimum
+        near = (bend > 0.0) & (x0 < turn) & (turn < x2) & (minimum < rise / 2) & (rise > 1e-12)
+    minimum = np.where(near, minimum, np.inf)
+    best = minimum.argmin(axis=1)
     return near.any(axis=1), np.take_along_axis(turn, best[:, None], axis=1)[:, 0]
 
 
 def roots(
     function: Callable[[Array, Indices], Array], starts: Array, ends: Array, tolerance: float
 ) -> tuple[Array, Mask]:
-    """Find a root of each of many functions between two places, by Chandrupatla's method."""
-    which = np.arange(len(starts))
-    f1, f2 = function(starts, which), function(ends, which)
-    found = (f1 >= 0.0) != (f2 >= 0.0)
-    result = np.where(found, starts, np.nan)
-    which = which[found]
-    x1, x2, f1, f2 = starts[found], ends[found], f1[found], f2[found]
-    share = f1 / (f1 - f2)
-    while len(which):
-        x = x1 + share * (x2 - x1)
-        f = function(x, which)
+    """Find a root of each of many functions between two positions, by Chandrupatla's method."""
+    active = np.arange(len(starts))
+    f1, f2 = function(starts, active), function(ends, active)
+    has_root = (f1 >= 0.0) != (f2 >= 0.0)
+    result = np.where(has_root, starts, np.nan)
+    active = active[has_root]
+    x1, x2, f1, f2 = starts[has_root], ends[has_root], f1[has_root], f2[has_root]
+    fraction = f1 / (f1 - f2)
+    while len(active):
+        x = x1 + fraction * (x2 - x1)
+        f = function(x, active)
         same = (f >= 0.0) == (f1 >= 0.0)
         x3, f3 = np.where(same, x1, x2), np.where(same, f1, f2)
         x2, f2 = np.where(same, x2, x1), np.where(same, f2, f1)
         x1, f1 = x, f
-        result[which] = np.where(np.abs(f1) < np.abs(f2), x1, x2)
+        result[active] = np.where(np.abs(f1) < np.abs(f2), x1, x2)
         with np.errstate(all="ignore"):
-            least = tolerance / np.abs(x2 - x1)
+            min_fraction = tolerance / np.abs(x2 - x1)
             place, value = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
             quadratic = (1.0 - np.sqrt(1.0 - place) < value) & (value < np.sqrt(place))
-            share = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
-        share = np.clip(np.where(quadratic, share, 0.5), least, 1.0 - least)
-        go = (least < 0.5) & (f1 != 0.0)
-        which, share = which[go], share[go]
+            fraction = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
+        fraction = np.clip(np.where(quadratic, fraction, 0.5), min_fraction, 1.0 - min_fraction)
+        go = (min_fraction < 0.5) & (f1 != 0.0)
+        active, fraction = active[go], fraction[go]
         x1, x2, f1, f2 = x1[go], x2[go], f1[go], f2[go]
-    return result, found
+    return result, has_root

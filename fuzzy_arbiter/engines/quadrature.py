@@ -1,7 +1,7 @@
 """Outputs of any terms, norms and defuzzifiers, for many samples at once."""
 
-# The joined terms of a sample bend where a term does, where one meets its cut, and where two change places. Between
-# these places they are smooth, and Gauss-Legendre quadrature of one order integrates them. The ends of the panels that
+# The joined terms of a sample bend where a term does, where one meets its cut, and where two cross. Between these
+# points they are smooth, and Gauss-Legendre quadrature of one order integrates them. The ends of the panels that
 # suit the terms are known before; a panel in which the joined terms of a sample bend is divided there, and one that is
 # too rough in its middle, until the error of all panels is within the tolerance.
 
@@ -49,7 +49,7 @@ _LEVEL, _PAIR, _FULL, _PASSED = range(4)  # a slot meets a level, another slot; 
 
 
 class Events(NamedTuple):
-    """Places to be found, each between two points, where the joined terms bend."""
+    """Points where the joined terms bend, each between two quadrature points, before they are located."""
 
     items: Indices  # panel of each
     first: Indices  # the point before it
@@ -59,7 +59,7 @@ class Events(NamedTuple):
 
 
 class Joined(NamedTuple):
-    """Heights at some places of the slots, and of their join."""
+    """Heights of the slots at some positions, and of their join."""
 
     degrees: list[Array]  # of each term
     implied: list[Array]  # of each slot
@@ -82,19 +82,19 @@ class Quadrature:
         self.low, self.width = output.universe[0], output.universe[1] - output.universe[0]
         self.precision = 4e-16 * max(abs(self.low), abs(output.universe[1]))
         self.edges = smooth_panels(output.universe, self._shapes)
-        places = points_of(self.edges[:-1], self.edges[1:])
-        if places.size * len(self._shapes) > _MAX_TABLE:
+        positions = points_of(self.edges[:-1], self.edges[1:])
+        if positions.size * len(self._shapes) > _MAX_TABLE:
             raise EngineError(
-                f"output {output.name!r}: its {len(self._shapes)} terms need {len(places)} panels, expected terms and "
-                f"panels of a product of at most {_MAX_TABLE // len(POINTS)}"
+                f"output {output.name!r}: its {len(self._shapes)} terms need {len(positions)} panels, "
+                f"expected terms and panels of a product of at most {_MAX_TABLE // len(POINTS)}"
             )
         middles = (self.edges[:-1] + self.edges[1:]) / 2
         self._constant = [
-            constant_panels(shape, middles, shape.of_many(places.ravel()).reshape(places.shape))
+            constant_panels(shape, middles, shape.of_many(positions.ravel()).reshape(positions.shape))
             for shape in self._shapes
         ]
         self._drastic = output.aggregation == "drastic_sum" or any(s.implication == "drastic_product" for s in slots)
-        self._table = [self._degrees(t, places.ravel()).reshape(places.shape) for t in range(len(self._shapes))]
+        self._table = [self._degrees(t, positions.ravel()).reshape(positions.shape) for t in range(len(self._shapes))]
         # slot and True for its cut, False for 1 less its cut: levels of its term's degree at which its height bends
         words = [slot.implication for slot in slots]
         self._levels = [
@@ -112,16 +112,20 @@ class Quadrature:
         if any(isinstance(shape, Formula) for shape in self._shapes):
             return "adaptive quadrature, without a bound, as nothing is known of a formula between its points"
         if defuzzifier == "bisector":
-            return f"adaptive quadrature, halves of the area within {BOUND:g} of it, and to the rounding of the place"
+            return (
+                f"adaptive quadrature, halves of the area within {BOUND:g} of it, and to the rounding of the position"
+            )
         if defuzzifier != "centroid":
-            return "search for the greatest height, without a bound: a small error of the height may move its place far"
+            return (
+                "search for the greatest height, without a bound: a small error of the height may move its position far"
+            )
         if (
             all(shape.polynomial for shape in self._shapes)
             and set(words) <= {"min", "prod"}
             and self.output.aggregation in ("max", "probor", "sum", "bounded_sum")
         ):
             return "integrals of polynomials, to rounding"
-        bound = max(BOUND, 4 * self.precision / self.width)  # places far from 0 are rounded more
+        bound = max(BOUND, 4 * self.precision / self.width)  # positions far from 0 are rounded more
         return f"adaptive quadrature, within {bound:g} of the universe's width"
 
     def value(self, cuts: Sequence[float], inputs: Sequence[float] = ()) -> float:
@@ -145,19 +149,19 @@ class Quadrature:
             height = np.asarray(self._join(height, one))
         return Joined(degrees, implied, before, height)
 
-    def heights(self, places: Array, cuts: Array) -> Joined:
-        """Return heights at places of any shape, for cuts that fit it."""
+    def heights(self, positions: Array, cuts: Array) -> Joined:
+        """Return heights at positions, an array of any shape, for cuts of the same shape."""
         return self.joined(
-            [self._degrees(t, places.ravel()).reshape(places.shape) for t in range(len(self._shapes))], cuts
+            [self._degrees(t, positions.ravel()).reshape(positions.shape) for t in range(len(self._shapes))], cuts
         )
 
-    def _degrees(self, t: int, places: Array) -> Array:
+    def _degrees(self, t: int, positions: Array) -> Array:
         """Return degrees of a term; where operators jump at 0 and 1, those that only round to these are within them."""
-        degrees = self._shapes[t].of_many(places)
+        degrees = self._shapes[t].of_many(positions)
         if not self._drastic:
             return degrees
-        panels = np.clip(np.searchsorted(self.edges, places) - 1, 0, len(self.edges) - 2)
-        within = ~self._constant[t][panels] & (self.edges[panels + 1] != places) & (places != self.low)
+        panels = np.clip(np.searchsorted(self.edges, positions) - 1, 0, len(self.edges) - 2)
+        within = ~self._constant[t][panels] & (self.edges[panels + 1] != positions) & (positions != self.low)
         return np.where(within, np.clip(degrees, 1e-300, 1.0 - 2.0**-53), degrees)
 
     def tabled(self, rows: Indices, panels: Indices, cuts: Array) -> Joined:
@@ -169,43 +173,43 @@ class Quadrature:
         i, is_cut = self._levels[event]
         return np.asarray(cuts[i] if is_cut else 1.0 - cuts[i])
 
-    def margins(self, of: Joined, cuts: Array, kinds: Indices, one: Indices, other: Indices) -> Array:
-        """Return for each place a value whose sign changes at its event, for heights of the shape (places,)."""
-        result, places = np.empty(len(kinds)), np.arange(len(kinds))
-        implied = np.array(of.implied)
+    def margins(self, joined: Joined, cuts: Array, kinds: Indices, one: Indices, other: Indices) -> Array:
+        """Return for each position a value whose sign changes at its event, for heights of the shape (positions,)."""
+        result, indices = np.empty(len(kinds)), np.arange(len(kinds))
+        implied = np.array(joined.implied)
         for event in range(len(self._levels)):
             mine = (kinds == _LEVEL) & (one == event)
-            result[mine] = (of.degrees[self._term[self._levels[event][0]]] - self.level(event, cuts))[mine]
+            result[mine] = (joined.degrees[self._term[self._levels[event][0]]] - self.level(event, cuts))[mine]
         pairs, slots = kinds == _PAIR, np.where(kinds == _LEVEL, 0, one)
-        result[pairs] = (implied[slots, places] - implied[other, places])[pairs]
+        result[pairs] = (implied[slots, indices] - implied[other, indices])[pairs]
         if self._sums:
-            first, second = np.array(of.before)[slots, places], implied[slots, places]
+            first, second = np.array(joined.before)[slots, indices], implied[slots, indices]
             result[kinds == _FULL] = (first + second - 1.0)[kinds == _FULL]
             result[kinds == _PASSED] = (second - first)[kinds == _PASSED]
         return result
 
-    def flat(self, of: Joined, cuts: Array, panels: Indices, greatest: Indices) -> Mask:
-        """Return True for panels of constant height; `greatest` is the slot of the greatest height in the middle."""
+    def flat(self, joined: Joined, cuts: Array, panels: Indices, top_slots: Indices) -> Mask:
+        """Return True for panels of constant height; `top_slots` are the highest in their middles."""
         if not self._max:
-            return np.asarray(np.ptp(of.height, axis=1) <= 4e-16 * of.height.max(axis=1))
+            return np.asarray(np.ptp(joined.height, axis=1) <= 4e-16 * joined.height.max(axis=1))
         result = np.zeros(len(panels), dtype=bool)
         for i, t in enumerate(self._term):
             constant = self._constant[t][panels]
             if i in self._clip:
-                constant = constant | (of.degrees[t][:, 4] > self.level(self._clip[i], cuts)[:, 0])
-            result |= constant & (greatest == i)
+                constant = constant | (joined.degrees[t][:, 4] > self.level(self._clip[i], cuts)[:, 0])
+            result |= constant & (top_slots == i)
         return result
 
 
 class Samples:
     """The joined terms of n samples, for strengths of an output's slots of the shape (slots, n)."""
 
-    def __init__(self, of: Quadrature, cuts: Array) -> None:
-        self.of, self.cuts, self.n = of, cuts, cuts.shape[1]
+    def __init__(self, quad: Quadrature, cuts: Array) -> None:
+        self.quad, self.cuts, self.n = quad, cuts, cuts.shape[1]
 
     def values(self) -> Array:
         """Return the value of each sample, shape (n,)."""
-        panels, kind, low = self.panels(), self.of.output.defuzzifier, self.of.low
+        panels, kind, low = self.panels(), self.quad.output.defuzzifier, self.quad.low
         if kind in ("mom", "som", "lom"):
             return defuzzification.of_maximum(self, panels, kind)
         areas = np.bincount(panels.rows, panels.areas, self.n).astype(np.float64)
@@ -215,146 +219,150 @@ class Samples:
         else:
             moments = np.bincount(panels.rows, panels.moments, self.n)
             result = np.clip(
-                low + np.divide(moments, areas, out=np.zeros(self.n), where=some), *self.of.output.universe
+                low + np.divide(moments, areas, out=np.zeros(self.n), where=some), *self.quad.output.universe
             )
         for row in np.flatnonzero(~some).tolist():
-            result[row] = defuzzification.of_points(self.of, self.cuts[:, row])
+            result[row] = defuzzification.of_points(self.quad, self.cuts[:, row])
         return result
 
-    def heights(self, places: Array, rows: Indices) -> Joined:
-        """Return heights at places of some samples, shape (rows,) or (rows, points)."""
+    def heights(self, positions: Array, rows: Indices) -> Joined:
+        """Return heights at positions of some samples, shape (rows,) or (rows, points)."""
         cuts = self.cuts[:, rows]
-        return self.of.heights(places, cuts if places.ndim == 1 else cuts[..., None])
+        return self.quad.heights(positions, cuts if positions.ndim == 1 else cuts[..., None])
 
     def panels(self) -> Panels:
         """Return panels in which the joined terms are smooth."""
-        of, done, total = self.of, [], np.zeros(self.n)
-        rows, own = np.divmod(np.arange(self.n * (len(of.edges) - 1)), len(of.edges) - 1)
-        starts, ends = of.edges[own], of.edges[own + 1]
-        narrowest = NARROWEST * max(abs(of.low), abs(of.low + of.width), of.width)
+        quad, done, total = self.quad, [], np.zeros(self.n)
+        rows, base = np.divmod(np.arange(self.n * (len(quad.edges) - 1)), len(quad.edges) - 1)
+        starts, ends = quad.edges[base], quad.edges[base + 1]
+        narrowest = NARROWEST * max(abs(quad.low), abs(quad.low + quad.width), quad.width)
         for turn in range(_ROUNDS + 1):
-            places = points_of(starts, ends)
-            joined = self.heights(places, rows) if turn else of.tabled(rows, own, self.cuts)
+            positions = points_of(starts, ends)
+            joined = self.heights(positions, rows) if turn else quad.tabled(rows, base, self.cuts)
             inner, half = np.ascontiguousarray(joined.height[:, INNER]), (ends - starts) / 2
             areas = (inner * WEIGHTS).sum(axis=-1) * half
-            moments = (inner * WEIGHTS * (places[:, INNER] - of.low)).sum(axis=-1) * half
-            whole = total + np.bincount(rows, areas, self.n)
-            items, at, greatest = self._bends(joined, rows, starts, ends, places)
+            moments = (inner * WEIGHTS * (positions[:, INNER] - quad.low)).sum(axis=-1) * half
+            estimate = total + np.bincount(rows, areas, self.n)
+            items, breaks, top_slots = self._bends(joined, rows, starts, ends, positions)
             errors = mean_errors(joined.height)
-            good = errors * 2 * half <= _TOLERANCE * whole[rows]
-            good |= (errors <= _NOISE * inner.max(axis=1)) | (errors <= of.noise) | (ends - starts <= narrowest)
-            good |= errors * half <= np.ptp(inner, axis=1) * of.precision  # rounding of places
-            good[items] = True
-            rough = np.flatnonzero(~good)
-            items, at = np.concatenate([items, rough]), np.concatenate([at, (starts[rough] + ends[rough]) / 2])
+            accurate = errors * 2 * half <= _TOLERANCE * estimate[rows]
+            accurate |= (errors <= _NOISE * inner.max(axis=1)) | (errors <= quad.noise) | (ends - starts <= narrowest)
+            accurate |= errors * half <= np.ptp(inner, axis=1) * quad.precision  # rounding of positions
+            accurate[items] = True
+            rough = np.flatnonzero(~accurate)
+            items, breaks = np.concatenate([items, rough]), np.concatenate([breaks, (starts[rough] + ends[rough]) / 2])
             if turn == _ROUNDS:
-                items, at = items[:0], at[:0]
-            kept = np.ones(len(rows), dtype=bool)
-            kept[items] = False
-            flat = of.flat(joined, self.cuts[:, rows][..., None], own, greatest)
-            done.append(Panels(rows, starts, ends, joined.height, flat, areas, moments).chosen(kept))
-            total = total + np.bincount(rows[kept], areas[kept], self.n)
+                items, breaks = items[:0], breaks[:0]
+            finished = np.ones(len(rows), dtype=bool)
+            finished[items] = False
+            flat = quad.flat(joined, self.cuts[:, rows][..., None], base, top_slots)
+            done.append(Panels(rows, starts, ends, joined.height, flat, areas, moments).chosen(finished))
+            total = total + np.bincount(rows[finished], areas[finished], self.n)
             if len(items) == 0:
                 break
             if len(items) > _MAX_PANELS * self.n:
                 raise EngineError(
-                    f"output {of.output.name!r}: its joined terms are too rough to be integrated to {BOUND:g} of "
+                    f"output {quad.output.name!r}: its joined terms are too rough to be integrated to {BOUND:g} of "
                     "its universe; expected smoother terms"
                 )
-            parents, starts, ends = dividing(items, at, starts, ends)
-            rows, own = rows[parents], own[parents]
+            parents, starts, ends = dividing(items, breaks, starts, ends)
+            rows, base = rows[parents], base[parents]
         return Panels(*map(np.concatenate, zip(*done, strict=True)))
 
     def _bends(
-        self, joined: Joined, rows: Indices, starts: Array, ends: Array, places: Array
+        self, joined: Joined, rows: Indices, starts: Array, ends: Array, positions: Array
     ) -> tuple[Indices, Array, Indices]:
-        """Return panels and the places in them where the joined terms bend, and the greatest slot of each panel."""
-        of, cuts = self.of, self.cuts[:, rows][..., None]
-        wide = ends - starts > NARROWEST * 10 * of.width
-        found: list[Events] = []
-        near: list[tuple[Indices, Array]] = []
-        who = np.zeros(joined.height.shape, dtype=np.intp)
-        if of._max:
+        """Return panels, where in them the joined terms bend, and the highest slot in each panel's middle."""
+        quad, cuts = self.quad, self.cuts[:, rows][..., None]
+        wide = ends - starts > NARROWEST * 10 * quad.width
+        events: list[Events] = []
+        minima: list[tuple[Indices, Array]] = []
+        top_slots = np.zeros(joined.height.shape, dtype=np.intp)
+        if quad._max:
             top = np.zeros(joined.height.shape)
             for i, height in enumerate(joined.implied):
-                np.copyto(who, i, where=height > top)
+                np.copyto(top_slots, i, where=height > top)
                 np.maximum(top, height, out=top)
-            self._passes(joined, who, wide, found)
-        for event, (i, clips) in enumerate(of._levels):
-            margin = joined.degrees[of._term[i]] - of.level(event, cuts)
+            self._passes(joined, top_slots, wide, events)
+        for event, (i, clips) in enumerate(quad._levels):
+            margin = joined.degrees[quad._term[i]] - quad.level(event, cuts)
             above = margin > 0.0  # not where it rounds to its cut, as a curve at its top does
             change = (above[:, 1:] != above[:, :-1]) & (wide & (cuts[i, :, 0] > 0.0))[:, None]
-            if of._max:
-                mine = who == i
+            if quad._max:
+                mine = top_slots == i
                 # below a level other than its cut a slot is 0, so that none is the greatest
-                change &= mine[:, 1:] & mine[:, :-1] if clips and not of._jumps else mine[:, 1:] | mine[:, :-1]
-            self._add(found, change, _LEVEL, event)
-            if of._turning[event]:
-                near.append(self._nearing(np.abs(margin), wide & ~change.any(axis=1), 1.0))
+                change &= mine[:, 1:] & mine[:, :-1] if clips and not quad._jumps else mine[:, 1:] | mine[:, :-1]
+            self._add(events, change, _LEVEL, event)
+            if quad._turning[event]:
+                minima.append(self._nearing(np.abs(margin), wide & ~change.any(axis=1), 1.0))
         for i in range(1, len(joined.before)):
             before, one = joined.before[i], joined.implied[i]
             for kind, margin in ((_FULL, before + one - 1.0), (_PASSED, one - before)):
-                if kind == _FULL or of.output.aggregation == "nilpotent_maximum":
+                if kind == _FULL or quad.output.aggregation == "nilpotent_maximum":
                     above = margin >= 0.0
                     change = (above[:, 1:] != above[:, :-1]) & (wide & (cuts[i, :, 0] > 0.0))[:, None]
-                    self._add(found, change, kind, i)
-                    near.append(self._nearing(np.abs(margin), wide & ~change.any(axis=1), 1.0))
-        if of._max and len(joined.implied) > 1:
+                    self._add(events, change, kind, i)
+                    minima.append(self._nearing(np.abs(margin), wide & ~change.any(axis=1), 1.0))
+        if quad._max and len(joined.implied) > 1:
             scale = joined.height.max(axis=1)
             for i, height in enumerate(joined.implied):
                 below = joined.height - height
-                apart = wide & (who != i).all(axis=1) & (below.min(axis=1) < _CLOSE * scale) & (cuts[i, :, 0] > 0.0)
-                near.append(self._nearing(below, apart, scale))
-        items, at = self._located(found, rows, places)
-        inside = (at > starts[items]) & (at < ends[items])
-        items, at = items[inside], at[inside]
-        for panels, share in near:
+                apart = (
+                    wide & (top_slots != i).all(axis=1) & (below.min(axis=1) < _CLOSE * scale) & (cuts[i, :, 0] > 0.0)
+                )
+                minima.append(self._nearing(below, apart, scale))
+        items, breaks = self._located(events, rows, positions)
+        inside = (breaks > starts[items]) & (breaks < ends[items])
+        items, breaks = items[inside], breaks[inside]
+        for panels, offset in minima:
             items = np.concatenate([items, panels])
-            at = np.concatenate([at, (starts[panels] + ends[panels]) / 2 + share * (ends[panels] - starts[panels]) / 2])
-        return items, at, who[:, 4]
+            breaks = np.concatenate(
+                [breaks, (starts[panels] + ends[panels]) / 2 + offset * (ends[panels] - starts[panels]) / 2]
+            )
+        return items, breaks, top_slots[:, 4]
 
-    def _passes(self, joined: Joined, who: Indices, wide: Mask, found: list[Events]) -> None:
+    def _passes(self, joined: Joined, top_slots: Indices, wide: Mask, events: list[Events]) -> None:
         """Find the points after which another slot is the greatest."""
-        items, first = np.nonzero((who[:, 1:] != who[:, :-1]) & wide[:, None])
+        items, first = np.nonzero((top_slots[:, 1:] != top_slots[:, :-1]) & wide[:, None])
         if len(items) == 0:
             return
-        a, b = who[items, first], who[items, first + 1]
+        a, b = top_slots[items, first], top_slots[items, first + 1]
         implied = np.array([height[items] for height in joined.implied])
         order = np.arange(len(items))
         p = implied[a, order, first], implied[b, order, first]
         q = implied[a, order, first + 1], implied[b, order, first + 1]
         apart = (p[1] < p[0] * (1.0 - _TIED)) & (q[0] < q[1] * (1.0 - _TIED))
         items, first, a, b = items[apart], first[apart], a[apart], b[apart]
-        found.append(Events(items, first, np.full(len(items), _PAIR), a, b))
+        events.append(Events(items, first, np.full(len(items), _PAIR), a, b))
 
     @staticmethod
-    def _add(found: list[Events], change: Mask, kind: int, one: int) -> None:
+    def _add(events: list[Events], change: Mask, kind: int, one: int) -> None:
         items, first = np.nonzero(change)
         if len(items):
-            found.append(Events(items, first, *(np.full(len(items), x) for x in (kind, one, 0))))
+            events.append(Events(items, first, *(np.full(len(items), x) for x in (kind, one, 0))))
 
     @staticmethod
     def _nearing(values: Array, chosen: Mask, scale: Array | float) -> tuple[Indices, Array]:
-        """Return the panels, of some, where values may come to 0 between two points, and the places from -1 to 1."""
+        """Return the panels, of some, where values may come to 0 between two points, and where, from -1 to 1."""
         chosen = chosen & (values.min(axis=1) < _CLOSE * scale)
         items = np.flatnonzero(chosen)
         if len(items) == 0:
             return items, np.zeros(0)
         with np.errstate(divide="ignore", invalid="ignore"):
-            near, share = lowest_between(values[items] / np.broadcast_to(scale, len(values))[items][:, None])
-        return items[near], share[near]
+            near, offset = lowest_between(values[items] / np.broadcast_to(scale, len(values))[items][:, None])
+        return items[near], offset[near]
 
-    def _located(self, found: Sequence[Events], rows: Indices, places: Array) -> tuple[Indices, Array]:
-        """Return the panels of events, and their places."""
+    def _located(self, found: Sequence[Events], rows: Indices, positions: Array) -> tuple[Indices, Array]:
+        """Locate events by their roots; return their panels and positions."""
         if not found:
             return np.zeros(0, dtype=np.intp), np.zeros(0)
         events = Events(*map(np.concatenate, zip(*found, strict=True)))
 
         def margin(x: Array, which: Indices) -> Array:
             cuts = self.cuts[:, rows[events.items[which]]]
-            joined = self.of.heights(x, cuts)
-            return self.of.margins(joined, cuts, events.kinds[which], events.one[which], events.other[which])
+            joined = self.quad.heights(x, cuts)
+            return self.quad.margins(joined, cuts, events.kinds[which], events.one[which], events.other[which])
 
-        x0, x1 = places[events.items, events.first], places[events.items, events.first + 1]
-        at, ok = roots(margin, x0, x1, self.of.precision)
-        return events.items[ok], at[ok]
+        x0, x1 = positions[events.items, events.first], positions[events.items, events.first + 1]
+        positions, ok = roots(margin, x0, x1, self.quad.precision)
+        return events.items[ok], positions[ok]

@@ -226,20 +226,20 @@ def _degree(x: str, shape: Membership, universe: tuple[float, float]) -> list[tu
     if shape == DEGREE and universe == (0.0, 1.0):
         return [("", x)]
     knots: list[tuple[float, float, float]] = []  # place, degree left and right of it
-    for place, degree in shape.points:
-        if knots and knots[-1][0] == place:
-            knots[-1] = (place, knots[-1][1], degree)
+    for x0, degree in shape.points:
+        if knots and knots[-1][0] == x0:
+            knots[-1] = (x0, knots[-1][1], degree)
         else:
-            knots.append((place, degree, degree))
-    place, left, right = knots[0]
+            knots.append((x0, degree, degree))
+    x0, left, right = knots[0]
     if len(knots) == 1 and left == right:
         return [("", repr(left))]
-    values = [(f"{x} < {place!r}", repr(left)), (f"{x} == {place!r}", repr(max(left, right)))]
+    values = [(f"{x} < {x0!r}", repr(left)), (f"{x} == {x0!r}", repr(max(left, right)))]
     if left >= right:
-        values = [(f"{x} <= {place!r}", repr(left))]
-    for (a, _, start), (place, left, right) in zip(knots, knots[1:], strict=False):
-        values.append((f"{x} < {place!r}", _line(x, a, start, place - a, left - start)))
-        values.append((f"{x} == {place!r}", repr(max(left, right))))
+        values = [(f"{x} <= {x0!r}", repr(left))]
+    for (a, _, start), (x0, left, right) in zip(knots, knots[1:], strict=False):
+        values.append((f"{x} < {x0!r}", _line(x, a, start, x0 - a, left - start)))
+        values.append((f"{x} == {x0!r}", repr(max(left, right))))
     if values[-1][1] == repr(right):
         del values[-1]
     return [*values, ("", repr(right))]

@@ -192,16 +192,16 @@ class _Reader(Cursor):
 
     def defuzzify(self) -> None:
         draft = self.draft(self.outputs, "DEFUZZIFY")
-        seen: set[str] = set()
+        keywords: set[str] = set()
         while not self.accept("END_DEFUZZIFY"):
             key = self.take("TERM", "METHOD", "DEFAULT", "RANGE", "ACCU", "LOCK", "ENABLED", "END_DEFUZZIFY")
             word = key.text.upper()
             if word == "TERM":
                 self.term(draft, len(self.inputs))
                 continue
-            if word in seen:
+            if word in keywords:
                 refuse(key.line, f"{word} came twice")
-            seen.add(word)
+            keywords.add(word)
             if word == "RANGE":
                 self.only_range(draft)
             elif word == "DEFAULT":

@@ -79,17 +79,17 @@ def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
     comments: list[tuple[int, str]] = []
     line, spaced = 1, False
     for match in _TOKEN.finditer(text):
-        kind, found = str(match.lastgroup), match.group()
+        kind, word = str(match.lastgroup), match.group()
         if kind == "comment":
-            comments.append((line, found[2:] if found.startswith("//") else found[2:-2]))
+            comments.append((line, word[2:] if word.startswith("//") else word[2:-2]))
         elif kind == "open":
-            refuse(line, f"the comment that begins here with {found!r} has no end")
+            refuse(line, f"the comment that begins here with {word!r} has no end")
         elif kind == "other":
-            refuse(line, f"{found!r} is no sign of FCL")
+            refuse(line, f"{word!r} is no sign of FCL")
         elif kind != "space":
-            tokens.append(Token(kind, found, line, spaced))
+            tokens.append(Token(kind, word, line, spaced))
         spaced = kind in ("space", "comment")
-        line += found.count("\n")
+        line += word.count("\n")
     tokens.append(Token("end", "the end of the file", line))
     return tokens, comments
 

@@ -90,30 +90,30 @@ def _function(term: Term, v: Variable) -> str:
     def above(x: float) -> float:
         return x + width if x + width > x else math.nextafter(x, math.inf)
 
-    places = [x for x, _ in term.shape.points]
+    points = [x for x, _ in term.shape.points]
     if isinstance(v, Output) and v.weighted:  # a ramp of Tsukamoto's method, for which fuzzylite alone has a word
         if max(degree for _, degree in term.shape.points) != 1.0:
             raise UnsupportedError(_no_function(term, v))
-        foot, top = places if term.shape.points[0][1] == 0.0 else reversed(places)
+        foot, top = points if term.shape.points[0][1] == 0.0 else reversed(points)
         return f"'rampmf',[{format_number(foot)} {format_number(top)}]"
     match [degree for _, degree in term.shape.points]:
         case [0.0, 1.0, 0.0] | [0.0, 1.0, 1.0, 0.0]:
             pass
         case [0.0, 1.0]:
-            a, b = places
-            places = [a, b, above(b)] if b >= high else [a, b, high, above(high)]
+            a, b = points
+            points = [a, b, above(b)] if b >= high else [a, b, high, above(high)]
         case [1.0, 0.0]:
-            a, b = places
-            places = [below(a), a, b] if a <= low else [below(low), low, a, b]
+            a, b = points
+            points = [below(a), a, b] if a <= low else [below(low), low, a, b]
         case [1.0]:
-            places = [below(low), low, high, above(high)]
+            points = [below(low), low, high, above(high)]
         case [0.0]:
-            places = [high, above(high), above(above(high))]
+            points = [high, above(high), above(above(high))]
         case _:
             raise UnsupportedError(_no_function(term, v))
-    if not all(map(math.isfinite, places)):
+    if not all(map(math.isfinite, points)):
         raise UnsupportedError(_no_function(term, v))
-    return f"'{'trimf' if len(places) == 3 else 'trapmf'}',[{format_numbers(places)}]"
+    return f"'{'trimf' if len(points) == 3 else 'trapmf'}',[{format_numbers(points)}]"
 
 
 def _named(term: Term, v: Variable) -> str:

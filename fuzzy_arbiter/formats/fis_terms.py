@@ -53,15 +53,15 @@ def complement(shape: Membership) -> Membership:
 
 def with_unique_names(terms: Sequence[Term]) -> tuple[Term, ...]:
     """Append a number to each repeated name, so that all terms have different names."""
-    found: list[Term] = []
+    renamed: list[Term] = []
     for term in terms:
-        name, names = term.name, {other.name for other in found}
+        name, names = term.name, {other.name for other in renamed}
         for k in range(2, len(terms) + 2):
             if name not in names:
                 break
             name = f"{term.name}_{k}"
-        found.append(Term(name, term.shape))
-    return tuple(found)
+        renamed.append(Term(name, term.shape))
+    return tuple(renamed)
 
 
 def numbers_of(text: str, line: int, what: str) -> list[float]:

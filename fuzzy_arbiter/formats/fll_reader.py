@@ -63,8 +63,8 @@ def read(text: str) -> System:
     inputs = [b for b in blocks if b.kind == "InputVariable"]
     outputs = [b for b in blocks if b.kind == "OutputVariable"]
     variables = [Variable(*_variable(b)) for b in inputs]
-    made = [_output(b, len(inputs)) for b in outputs]
-    results = [output for output, _ in made]
+    parsed = [_output(b, len(inputs)) for b in outputs]
+    results = [output for output, _ in parsed]
     clips = _alike(inputs, [b.word("lock-range", {"true": "clip", "false": "refuse"}, "false") for b in inputs])
     settings = read_settings(comments, settings_of(results))
     values = {output.name for output in results if output.weighted}
@@ -72,7 +72,7 @@ def read(text: str) -> System:
     name = engines[0].name or "arbiter"
     options = {
         "outside": clips or "refuse",
-        "points": max((points for _, points in made), default=0) or RESOLUTION,
+        "points": max((points for _, points in parsed), default=0) or RESOLUTION,
         **norms,
         **settings,
     }

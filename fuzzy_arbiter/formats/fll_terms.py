@@ -41,16 +41,16 @@ def format_shape(shape: Membership | Value) -> str:
         return f"Function {shape.text}"
     if not isinstance(shape, Shape):
         raise UnsupportedError(f"fll cannot say {shape!r}")
-    places = [x for x, _ in shape.points]
+    positions = [x for x, _ in shape.points]
     match [degree for _, degree in shape.points]:
         case [0.0, 1.0, 0.0]:
-            return f"Triangle {format_numbers(places)}"
+            return f"Triangle {format_numbers(positions)}"
         case [0.0, 1.0, 1.0, 0.0]:
-            return f"Trapezoid {format_numbers(places)}"
+            return f"Trapezoid {format_numbers(positions)}"
         case [0.0, 1.0] if not shape.jumps:
-            return f"Ramp {format_numbers(places)}"
+            return f"Ramp {format_numbers(positions)}"
         case [1.0, 0.0] if not shape.jumps:
-            return f"Ramp {format_numbers(reversed(places))}"
+            return f"Ramp {format_numbers(reversed(positions))}"
     return f"Discrete {format_numbers(x for point in shape.points for x in point)}"
 
 

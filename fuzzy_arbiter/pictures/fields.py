@@ -55,7 +55,7 @@ def surface(
     'obstacle'
     """
     k = output_index(arbiter.system, output)
-    x, y, weights, where = _field(arbiter, over, at, points)
+    x, y, weights, note = _field(arbiter, over, at, points)
     z = np.ma.masked_invalid(weights[..., k])
     relief = ax is not None and ax.name == "3d"
     ax = new_axes(5.6, 4.4) if ax is None else ax
@@ -76,7 +76,7 @@ def surface(
         bar.outline.set_visible(False)
     if not relief:
         ax.set(xlabel=over[0], ylabel=over[1])
-    ax.set_title(wrapped(f"{output}{where}", room(ax)), fontsize=10, loc="left")
+    ax.set_title(wrapped(f"{output}{note}", room(ax)), fontsize=10, loc="left")
     return ax
 
 
@@ -120,21 +120,21 @@ def decisions(
         raise DefinitionError(
             f"decisions: the only output is {outputs[0].name!r}, expected two or more to decide between"
         )
-    x, y, weights, where = _field(arbiter, over, at, points)
+    x, y, weights, note = _field(arbiter, over, at, points)
     ax = new_axes(5.8, 4.4) if ax is None else ax
     undefined = np.asarray(np.isnan(weights).any(axis=-1))
-    known = np.where(undefined[..., None], 0.0, weights)
-    ranked = np.sort(known, axis=-1)
-    most = max(float((ranked[..., -1] - ranked[..., -2]).max()), _TIE)
-    levels = np.linspace(0.0, most, _SHADES + 1)
-    levels[0] = most * 1e-4  # equal, to what can be drawn
+    ranked_weights = np.where(undefined[..., None], 0.0, weights)
+    ranked = np.sort(ranked_weights, axis=-1)
+    max_margin = max(float((ranked[..., -1] - ranked[..., -2]).max()), _TIE)
+    levels = np.linspace(0.0, max_margin, _SHADES + 1)
+    levels[0] = max_margin * 1e-4  # equal, to what can be drawn
     levels[-1] *= 1.0 + 1e-9
     if undefined.any():
         ax.contourf(x, y, undefined.astype(float), levels=[0.5, 1.5], colors=[_UNDEFINED])
     keys: list[Patch] = []
     for k, name in enumerate(arbiter.system.result_names):
-        others = np.delete(known, k, axis=-1).max(axis=-1)
-        ahead = np.ma.masked_where(undefined, known[..., k] - others)
+        others = np.delete(ranked_weights, k, axis=-1).max(axis=-1)
+        ahead = np.ma.masked_where(undefined, ranked_weights[..., k] - others)
         if ahead.count() == 0 or not ahead.max() > levels[0]:
             continue
         shades = [_mixed(to_rgb(colour(k)), share) for share in np.linspace(0.2, 0.85, _SHADES)]
@@ -152,11 +152,11 @@ def decisions(
         keys.append(Patch(label="undefined", facecolor=_UNDEFINED))
     ax.legend(
         handles=keys, loc="upper left", bbox_to_anchor=(1.01, 1.0), frameon=False, fontsize=9, borderaxespad=0.0,
-        title=f"greatest, darkest\nwhere {most:.3g} ahead", title_fontsize=9, alignment="left", handleheight=1.6,
+        title=f"greatest, darkest\nwhere {max_margin:.3g} ahead", title_fontsize=9, alignment="left", handleheight=1.6,
         labelspacing=0.8,
     )  # fmt: skip
     ax.set(xlim=(x[0], x[-1]), ylim=(y[0], y[-1]), xlabel=over[0], ylabel=over[1])
-    ax.set_title(wrapped(f"what decides{where}", room(ax)), fontsize=10, loc="left")
+    ax.set_title(wrapped(f"what decides{note}", room(ax)), fontsize=10, loc="left")
     return ax
 
 

@@ -67,23 +67,23 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     """
     system = arbiter.system
     k = 0 if output is None else output_index(system, output)
-    drawn = system.outputs[k]
+    variable = system.outputs[k]
     values = arbiter.samples.one(inputs)
     firing = Firing(system)
     implications = {slot.implication for slot in firing.slots[k]}
-    if drawn.weighted or drawn.aggregation != "max" or not implications < {"min", "prod"}:
+    if variable.weighted or variable.aggregation != "max" or not implications < {"min", "prod"}:
         raise UnsupportedError(
-            f"rules of {drawn.name!r}: its values, or terms under {', '.join(sorted(implications))} joined by "
-            f"{drawn.aggregation}, are not drawn; expected terms under min or prod, joined by max"
+            f"rules of {variable.name!r}: its values, or terms under {', '.join(sorted(implications))} joined by "
+            f"{variable.aggregation}, are not drawn; expected terms under min or prod, joined by max"
         )
     strengths = firing.strengths(values)
     cuts = firing.cuts(strengths)[k]
 
     concluding = [
-        _Row(f"R{i + 1}", rule, strength, drawn.term_names.index(conclusion.term))
+        _Row(f"R{i + 1}", rule, strength, variable.term_names.index(conclusion.term))
         for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
         for conclusion in rule.conclusions
-        if conclusion.variable == drawn.name
+        if conclusion.variable == variable.name
     ]
     rows = concluding
     if len(rows) > MOST_ROWS:
@@ -93,25 +93,25 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     lines = sum(label.count("\n") for label in labels)
     ax = new_axes(7.2, 1.3 + 0.58 * len(rows) + 0.1 * lines + 0.95) if ax is None else ax
 
-    x = points_along(drawn, 801)
+    x = points_along(variable, 801)
     scaled = implications == {"prod"}
-    clipped = [_cut(term.membership.of_many(x), cut, scaled) for term, cut in zip(drawn.terms, cuts, strict=True)]
-    for place, row in enumerate(rows):  # rows are counted downwards
-        shape = drawn.terms[row.term].membership
-        _draw_row(ax, drawn, place, row, (x, _cut(shape.of_many(x), row.strength, scaled)), cuts[row.term])
+    clipped = [_cut(term.membership.of_many(x), cut, scaled) for term, cut in zip(variable.terms, cuts, strict=True)]
+    for line, row in enumerate(rows):  # rows are counted downwards
+        shape = variable.terms[row.term].membership
+        _draw_row(ax, variable, line, row, (x, _cut(shape.of_many(x), row.strength, scaled)), cuts[row.term])
     foot = len(rows) + _TALL - 0.6
     tall = _TALL * _HEIGHT
     joined = np.max(clipped, axis=0)
-    ax.plot(drawn.universe, [foot, foot], color=INK, linewidth=1.0)
+    ax.plot(variable.universe, [foot, foot], color=INK, linewidth=1.0)
     ax.fill_between(x, foot, foot - tall * joined, facecolor="#d9d9d9", linewidth=0)
     ax.plot(x, foot - tall * joined, color=INK, linewidth=1.8)
     text = _centroid(ax, arbiter, values, k, (foot, tall), any(cuts))
 
     hidden = len(concluding) - len(rows)
     joined_label = "joined" + (f"\n({hidden} rules not drawn)" if hidden else "")
-    ax.set_yticks([*(place - 0.12 for place in range(len(rows))), foot - tall / 2.6], [*labels, joined_label])
+    ax.set_yticks([*(line - 0.12 for line in range(len(rows))), foot - tall / 2.6], [*labels, joined_label])
     ax.tick_params(axis="y", length=0, pad=8, labelsize=9)
-    ax.set(xlim=drawn.universe, ylim=(foot + 0.02, -1.0 + 0.15), xlabel=drawn.name)
+    ax.set(xlim=variable.universe, ylim=(foot + 0.02, -1.0 + 0.15), xlabel=variable.name)
     ax.spines[["top", "right", "left"]].set_visible(False)
     heading = f"{format_values(dict(zip(variable_names(system.inputs), values, strict=True)))}  →  {text}"
     ax.set_title(wrapped(heading, 64), fontsize=10, loc="right", pad=8)
@@ -134,23 +134,23 @@ class _Row:
         return "\n".join(lines if len(lines) <= 4 else [*lines[:2], f"{lines[2]} …", lines[-1]])
 
 
-def _draw_row(ax: Axes, drawn: Output, place: int, row: _Row, outline: tuple[Array, Array], cut: float) -> None:
+def _draw_row(ax: Axes, variable: Output, baseline: int, row: _Row, outline: tuple[Array, Array], cut: float) -> None:
     """Draw the term of a rule, its part below the rule's strength, and that strength."""
-    term = drawn.terms[row.term]
+    term = variable.terms[row.term]
     x, degrees = outline
     fires = row.strength > 0.0
     decides = fires and row.strength == cut
-    ax.plot(drawn.universe, [place, place], color=FAINT, linewidth=0.7)
-    ends, whole = corners(term, drawn.universe)
-    ax.plot(ends, place - _HEIGHT * np.array(whole), color=FAINT, linewidth=1.0)
+    ax.plot(variable.universe, [baseline, baseline], color=FAINT, linewidth=0.7)
+    ends, whole = corners(term, variable.universe)
+    ax.plot(ends, baseline - _HEIGHT * np.array(whole), color=FAINT, linewidth=1.0)
     if fires:
-        top, ink = place - _HEIGHT * degrees, colour(row.term)
-        ax.fill_between(x, place, top, facecolor=ink, alpha=0.45, linewidth=0)
-        ax.fill_between(x, place, top, facecolor="none", edgecolor=ink, hatch=hatch(row.term), linewidth=0)
+        top, ink = baseline - _HEIGHT * degrees, colour(row.term)
+        ax.fill_between(x, baseline, top, facecolor=ink, alpha=0.45, linewidth=0)
+        ax.fill_between(x, baseline, top, facecolor="none", edgecolor=ink, hatch=hatch(row.term), linewidth=0)
         ax.plot(x, top, color=ink, linewidth=1.6)
     ax.annotate(
         f"{row.strength:.3f} {term.name}" + (" •" if decides else ""),
-        (1.0, place), xycoords=("axes fraction", "data"), xytext=(8, 4), textcoords="offset points",
+        (1.0, baseline), xycoords=("axes fraction", "data"), xytext=(8, 4), textcoords="offset points",
         color=INK if fires else FAINT, fontweight="bold" if decides else "normal",
         annotation_clip=False, fontsize=9.5,
     )  # fmt: skip
@@ -165,16 +165,16 @@ def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[f
     output = arbiter.system.outputs[k]
     foot, tall = place
     if fires:
-        centre, what = _alone(arbiter, output)(values)[0], "centroid"
+        centre, meaning = _alone(arbiter, output)(values)[0], "centroid"
     elif output.default is not None:
-        centre, what = output.default, "default"
+        centre, meaning = output.default, "default"
     else:
         return f"{output.name}: no rule fires"
     ax.plot([centre, centre], [foot, foot - tall], color=INK, linewidth=1.4, linestyle=(0, (4, 2)))
     ax.plot(centre, foot, "^", color=INK, markersize=8, clip_on=False, zorder=5)
     side = -1 if centre > sum(output.universe) / 2.0 else 1  # on the wider side
     ax.annotate(
-        f"{what} {centre:.4g}", (centre, foot - tall), xytext=(6 * side, -3), textcoords="offset points",
+        f"{meaning} {centre:.4g}", (centre, foot - tall), xytext=(6 * side, -3), textcoords="offset points",
         ha="right" if side < 0 else "left", va="top", fontsize=9.5, color=INK,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
     )  # fmt: skip

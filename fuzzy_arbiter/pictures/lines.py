@@ -73,14 +73,14 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     'degree'
     """
     variables = (*arbiter.system.inputs, *arbiter.system.outputs)
-    drawn = variables[index_of(variables, variable, "variable")]
-    low, high = drawn.universe
+    shown = variables[index_of(variables, variable, "variable")]
+    low, high = shown.universe
     if at is not None and not low <= at <= high:
         raise InputError(f"{variable}: place is {at!r}, expected a number in [{low:g}, {high:g}]")
-    if not drawn.terms or (isinstance(drawn, Output) and drawn.weighted):
+    if not shown.terms or (isinstance(shown, Output) and shown.weighted):
         raise UnsupportedError(f"terms of {variable!r}: it has values or none, which are not drawn; expected sets")
     ax = new_axes(6.0, 2.7) if ax is None else ax
-    for i, term in enumerate(drawn.terms):
+    for i, term in enumerate(shown.terms):
         x, y = corners(term, (low, high))
         ax.plot(x, y, label=term.name, clip_on=False, **line_style(i))
         if at is not None:
@@ -89,7 +89,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
         ax.axvline(at, color=FAINT, linewidth=1.0, zorder=1)
     ax.set(xlim=(low, high), ylim=(0.0, 1.0), xlabel=variable, ylabel="degree")
     tidy(ax)
-    legend_above(ax, drawn.term_names)
+    legend_above(ax, shown.term_names)
     return ax
 
 

@@ -70,18 +70,18 @@ def crisp(variable: Variable, levels: Sequence[Fraction]) -> Domain:
 def graded(variable: Variable, levels: Sequence[Fraction]) -> Domain:
     """Return the domain of an input that may be any real number in its universe."""
     degrees = _exact(variable)
-    places = list(map(Fraction, variable.knots))
+    knots = list(map(Fraction, variable.knots))
     crossings = {
         a + (level - left) * (b - a) / (right - left)
-        for a, b in zip(places, places[1:], strict=False)
+        for a, b in zip(knots, knots[1:], strict=False)
         for left, right in zip(_between(degrees, a, b, False), _between(degrees, a, b, True), strict=True)
         for level in levels
         if (left - level) * (right - level) < 0
     }
-    places = sorted({*places, *crossings})
-    middles = [(a + b) / 2 for a, b in zip(places, places[1:], strict=False)]
+    knots = sorted({*knots, *crossings})
+    middles = [(a + b) / 2 for a, b in zip(knots, knots[1:], strict=False)]
     patterns: dict[tuple[int, ...], float] = {}
-    for place in sorted([*places, *middles]):
+    for place in sorted([*knots, *middles]):
         pattern = tuple(rank(max(of(place, False), of(place, True)), levels) for of in degrees)
         patterns.setdefault(pattern, float(place))
     return Domain(

@@ -158,9 +158,9 @@ class _Checks:
             answers = ask.ask([Goal(tuple(map(ask.above_half, terms)), 2, ANY) for terms in sets.values()])
             verdicts, hows = set(), set()
             for (output, terms), answer in zip(sets.items(), answers, strict=True):
-                verdict, how, place = self._both_above_half(ask, terms, answer)
+                verdict, method, place = self._both_above_half(ask, terms, answer)
                 verdicts.add(verdict)
-                hows.add(how)
+                hows.add(method)
                 if place is not None:
                     inputs = [float(place.get(v.name, v.universe[0])) for v in self.system.inputs]
                     causes = reasons(self.system, Firing(self.system).strengths(inputs), terms, 0.5)
@@ -168,10 +168,10 @@ class _Checks:
                         "warning", name, f"{text.format(output)} where {_format_place(place)}: {causes}", place
                     )
             holds = False if False in verdicts else None if None in verdicts else True
-            how = "by an example" if holds is False else "; ".join(sorted(hows))
-            self.checks.append(Check(name, holds, how))
+            method = "by an example" if holds is False else "; ".join(sorted(hows))
+            self.checks.append(Check(name, holds, method))
             if holds is None:
-                self._add_finding("warning", name, f"{name.replace('_', ' ')}: not decided, {how}")
+                self._add_finding("warning", name, f"{name.replace('_', ' ')}: not decided, {method}")
 
     def _both_above_half(
         self, ask: Questions, terms: Sequence[Is], answer: Answer

@@ -84,24 +84,24 @@ class Search:
 
     def run(self, limit: int, max_boxes: int = 1) -> tuple[list[Answer], int]:
         """Search for boxes that meet the goals."""
-        found: list[list[Box]] = [[] for _ in self._goals]
+        boxes_by_goal: list[list[Box]] = [[] for _ in self._goals]
         open_goals = list(range(len(self._goals)))
         stack = [np.zeros((1, 0), dtype=np.int32)]
-        seen = 0
-        while stack and open_goals and seen * self._cost < limit:
+        searched = 0
+        while stack and open_goals and searched * self._cost < limit:
             # few at a time in the beginning, so that an easy goal ends early
-            size = min(CHUNK, max(16, seen // 8), max(1, limit // self._cost))
+            size = min(CHUNK, max(16, searched // 8), max(1, limit // self._cost))
             boxes = stack.pop()
             if len(boxes) > size:
                 stack.append(boxes[size:])
                 boxes = boxes[:size]
-            seen += len(boxes)
+            searched += len(boxes)
             sure, possible = self._judge(boxes)
             keep = np.zeros(len(boxes), dtype=np.bool_)
             for g in open_goals:
-                for row in np.flatnonzero(sure[g])[: max_boxes - len(found[g])]:
-                    found[g].append(self._box(boxes[row]))
-            open_goals = [g for g in open_goals if len(found[g]) < max_boxes]
+                for row in np.flatnonzero(sure[g])[: max_boxes - len(boxes_by_goal[g])]:
+                    boxes_by_goal[g].append(self._box(boxes[row]))
+            open_goals = [g for g in open_goals if len(boxes_by_goal[g]) < max_boxes]
             for g in open_goals:
                 keep |= possible[g] & ~sure[g]
             boxes = boxes[keep]
@@ -110,8 +110,8 @@ class Search:
                 grown = np.repeat(boxes, len(patterns), axis=0)
                 stack.append(np.column_stack((grown, np.tile(patterns, len(boxes)))))
         done = not stack  # for a goal that has max_boxes, others were left out
-        answers = [Answer(tuple(boxes), done and len(boxes) < max_boxes, self.combinations) for boxes in found]
-        return answers, seen * self._cost
+        answers = [Answer(tuple(boxes), done and len(boxes) < max_boxes, self.combinations) for boxes in boxes_by_goal]
+        return answers, searched * self._cost
 
     def _box(self, row: NDArray[np.int32]) -> Box:
         return {self._order[i]: int(self._patterns[i][p]) for i, p in enumerate(row)}

@@ -59,7 +59,7 @@ def nested(depth):
         (lambda: Rule("wind is calm", sail["full"]), "rule: condition is 'wind is calm', expected such as"),
         (lambda: Rule(CALM, "sail is full"), r"wind is calm: 'sail is full' came, expected as conclusions output\["),
         (lambda: Rule(CALM, ~sail["full"]), r"wind is calm: Not\(.*\) came, expected as conclusions"),
-        (lambda: Rule(CALM, ()), "wind is calm: no conclusions came, expected output"),
+        (lambda: Rule(CALM, ()), "wind is calm: no conclusions, expected output"),
         *(
             (
                 lambda weight=weight: Rule(CALM, sail["full"], weight),

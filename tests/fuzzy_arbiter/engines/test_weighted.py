@@ -142,7 +142,7 @@ def test_input_without_terms_is_allowed_only_in_formulas():
     made = output(Linear((0.0, 0.0, 1.0)))
     whole = System((X, Z, bare), (made,), ("if x is any then y is t0",), normalization="none")
     assert Arbiter(system=whole)([0.0, 0.0, 0.5]) == (0.5,)
-    with pytest.raises(DefinitionError, match="variable 'w': no terms came, expected at least one"):
+    with pytest.raises(DefinitionError, match="variable 'w': no terms, expected at least one"):
         System((X, Z, bare), (output(Constant(1.0)),), ("if x is any then y is t0",), normalization="none")
 
 
