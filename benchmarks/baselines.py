@@ -30,7 +30,7 @@ KINDS = ("plain", "hard")  # kinds of scenes, flown alternately
 FIRST_SEED = 10_000
 SCENES = 600  # number of scenes, plain and hard ones together
 DURATION = 60.0  # s, duration of a scene in the search; good gains reach the goal much earlier
-# for each heat: scenes flown by its end beside those in which the best fails, greatest ratio of median reach times
+# for each heat: scenes flown by its end beside those in which the best fails, maximum ratio of median reach times
 HEATS = ((4, 1.3), (10, 1.15), (40, 1.08), (120, 1.03), (SCENES // 2, 1.0), (SCENES, 1.0))
 FIRST_HEAT = 40  # number of scenes that the first batch flies, before there is a best
 BATCH = 10  # number of draws that race the same best

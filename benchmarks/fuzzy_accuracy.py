@@ -19,14 +19,14 @@ from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 
 SYSTEMS = 1000
 DEFUZZIFIERS = ("centroid", "bisector", "mom", "som", "lom")
-BOUND = 1e-9  # greatest error: of the universe's width, of the area, and of the greatest height
+BOUND = 1e-9  # maximum error: of the universe's width, of the area, and of the maximum height
 _CELLS = 20_000  # number of equal cells of the reference, before their division
 _HALVINGS = 50
 _MAX_CELLS = 100_000
 # Lobatto's rule has the ends of a cell among its points, so that it sees a bend near one
 _NODES = np.array([-1.0, -np.sqrt(3 / 7), 0.0, np.sqrt(3 / 7), 1.0])
 _WEIGHTS = np.array([9.0, 49.0, 64.0, 49.0, 9.0]) / 90.0
-_TOP = 1e-13  # fraction of the greatest height within which the reference counts a place as one of the greatest
+_TOP = 1e-13  # fraction of the maximum height within which the reference counts a place as one of the greatest
 
 
 @dataclass(frozen=True)
@@ -194,7 +194,7 @@ class Reference:
         return places, self.height(places)
 
     def _off_mean(self, value: float, places: Array, heights: Array) -> float:
-        """Return the error of a mean of the places of the greatest height."""
+        """Return the error of a mean of the places of the maximum height."""
         top = np.flatnonzero(heights >= heights.max() * (1.0 - _TOP))
         first = np.flatnonzero(np.diff(top, prepend=-2) > 1)
         last = np.append(first[1:] - 1, len(top) - 1)

@@ -132,7 +132,7 @@ def dive(duration: float) -> list[tuple[int, Command]]:
 
 
 def fly(scenario: Scenario, commands: Any, nuisance: str, noise: float, rng: np.random.Generator) -> tuple[Log, float]:
-    """Simulate a run; return its log, and the greatest distance from the center of the box along an axis [m]."""
+    """Simulate a run; return its log, and the maximum distance from the center of the box along an axis [m]."""
     n, steps = scenario.vehicle.n_thrusters, scenario.steps + 1
     force = random_force(steps, rng) if nuisance == "force" else np.zeros((1, 6))
     forward = rng.uniform(0.9, 1.1, n) if nuisance in ("thrusters", "asymmetric") else np.ones(n)

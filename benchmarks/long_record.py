@@ -22,7 +22,7 @@ from cosim.scenario.scenario import load_scenario
 ROWS = (1_000_000, 10_000_000)
 SCENARIO = "paper"
 
-_REPEATED = 20_000  # greatest number of rows of the short run
+_REPEATED = 20_000  # maximum number of rows of the short run
 _EXPORTS = ("csv", "mcap", "rrd", "tlog")
 WORK = {
     "record": ("write",),

@@ -31,7 +31,7 @@ from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, position_clearance
 
 PERIOD = 0.1  # s, time between plans
-ITERATIONS = 15  # greatest number of the solver's iterations
+ITERATIONS = 15  # maximum number of the solver's iterations
 # numbers of constraints of a plan among spheres: the nearest spheres, and the two planes of a depth band
 SPHERES = {"obstacles": 8, "hard": 2, "soft": 0}
 SHAPES = {"obstacles": 0, "hard": 2, "soft": 3}  # numbers of constraints of a plan among regions of other shapes

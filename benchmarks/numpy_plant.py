@@ -11,7 +11,7 @@ STATES = [
     *(f"quaternion.e{i}" for i in range(4)),
     *(f"velocity.{a}" for a in "uvwpqr"),
 ]
-SUBSTEP = 0.005  # s, greatest integration step, that of the FMU
+SUBSTEP = 0.005  # s, maximum integration step, that of the FMU
 
 
 class NumpyPlant(Fmi2Slave):

@@ -14,7 +14,7 @@ from benchmarks.timing import Timing
 
 PAGE = Path(__file__).parents[1] / "docs" / "performance.md"
 PARTS = ("all", "scaling")
-_WIDTH = 120  # greatest number of characters in a line
+_WIDTH = 120  # maximum number of characters in a line
 _PART = "<!-- figures: {} -->\n{}<!-- end of figures -->"
 
 

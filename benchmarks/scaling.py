@@ -25,7 +25,7 @@ HORIZONS = (10.0, 30.0, 100.0, 300.0)  # s, durations of runs
 VEHICLES = (1, 8, 64, 512)  # numbers of vehicles in a batch
 ROWS = 1_000  # number of rows of a sweep
 LAWS = ("ismail_dunnigan", "deployable")
-_SWEEPS = 3  # greatest number of repeats of a sweep
+_SWEEPS = 3  # maximum number of repeats of a sweep
 
 
 @dataclass(frozen=True)

@@ -44,7 +44,7 @@ class Row:
 
     @property
     def range(self) -> tuple[float, float] | None:
-        """The least and the greatest ratio of one repeat."""
+        """The minimum and the maximum ratio of one repeat."""
         if not self.duel or isinstance(self.timing, str) or isinstance(self.base_timing, str):
             return None
         ratios = [b / a for a, b in zip(self.timing.samples, self.base_timing.samples, strict=True)]

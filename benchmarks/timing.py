@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-_MOST = 10**9  # greatest number of items of a repeat
+_MOST = 10**9  # maximum number of items of a repeat
 
 
 class NotMeasuredError(Exception):
@@ -146,7 +146,7 @@ def growth(sizes: Sequence[float], costs: Sequence[float]) -> float:
 
 
 def straight(sizes: Sequence[float], costs: Sequence[float]) -> tuple[float, float, float]:
-    """Fit cost = a + b size, a, b >= 0, by least squares of relative errors; return a, b and the greatest error."""
+    """Fit cost = a + b size, a, b >= 0, by least squares of relative errors; return a, b and the maximum error."""
     import numpy as np
     from scipy.optimize import nnls
 

@@ -11,11 +11,11 @@ from controller.errors import LawError
 
 Array = NDArray[np.float64]
 
-_ROUNDING = 1e-12  # force that counts as 0, as a fraction of the greatest force
+_ROUNDING = 1e-12  # force that counts as 0, as a fraction of the maximum force
 
 
 def _greatest(forces: Array) -> float:
-    """Return the greatest magnitude [N]; NaN if a force is NaN."""
+    """Return the maximum magnitude [N]; NaN if a force is NaN."""
     greatest = 0.0
     for i in range(forces.size):
         if not abs(forces[i]) <= greatest:

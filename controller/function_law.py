@@ -15,7 +15,7 @@ from controller.law import Array, Diagnostic, Output, VehicleState
 from controller.regions.region_set import PackedRegions
 
 _REAL = "biufO"  # kinds of NumPy's types of real numbers; O holds whole numbers too long for the others
-_LONGEST = 200  # greatest number of characters of a value in a message
+_LONGEST = 200  # maximum number of characters of a value in a message
 
 
 class RegionsSeen(NamedTuple):

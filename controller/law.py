@@ -66,7 +66,7 @@ class VehicleModel(NamedTuple):
     quadratic_damping: Array  # (6,) N s2/m2, N m s2/rad2
     thruster_matrix: Array  # (6, m) body wrench of one newton of each thruster
     thrust_min: Array  # (m,) N, least force of each thruster, 0 or negative
-    thrust_max: Array  # (m,) N, greatest force of each thruster
+    thrust_max: Array  # (m,) N, maximum force of each thruster
     thrust_time_constant: Array  # (m,) s, time constant of each thruster's lag
 
 

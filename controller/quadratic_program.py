@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 
 _TOLERANCE = 1e-11  # violation below which a row counts as kept, as a fraction of the greatest one at the start
 _DEPENDENT = 1e-12  # remainder of a row beside the other rows, as a fraction of G_ii, below which it depends on them
-_STEPS_A_ROW = 3  # greatest number of steps for each row
+_STEPS_A_ROW = 3  # maximum number of steps for each row
 _HALF = 2.0**27 + 1.0  # splits the 53 bits of a number into two exact halves
 _FREE, _PASSIVE, _ASIDE, _NOTHING = 0, 1, 2, 3  # state of a row: may be added, is passive, is set aside, moves no force
 

@@ -11,7 +11,7 @@ from fuzzy_arbiter.errors import DefinitionError
 
 _T = TypeVar("_T")
 
-MAX_NAME = 200  # greatest number of characters of a name
+MAX_NAME = 200  # maximum number of characters of a name
 
 
 def finite(value: object) -> float | None:

@@ -30,7 +30,7 @@ Normalization = Literal["none", "range", "sum", "max"]
 Outside = Literal["refuse", "clip"]
 
 MAX_POINTS = 1_000_000_000
-# least and greatest width of an output's universe; moments are products of widths, which must not over- or underflow
+# minimum and maximum width of an output's universe; moments are products of widths, which must not over- or underflow
 WIDTHS = (1e-100, 1e100)
 
 

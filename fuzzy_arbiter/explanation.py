@@ -61,12 +61,12 @@ class Explanation:
     inputs: tuple[InputDegrees, ...]  # inputs in the system's order
     rules: tuple[FiredRule, ...]  # all rules, also those that did not fire
     outputs: tuple[OutputDecision, ...]  # outputs in the system's order
-    # the output with the greatest weight, by its name in results; None if that is shared, or all weights are 0. An
+    # the output with the maximum weight, by its name in results; None if that is shared, or all weights are 0. An
     # output that is NaN takes no part
     winner: str | None
     runner_up: str | None  # the output with the next weight; None without a winner, or if there is no other output
-    margin: float  # greatest weight less the next, or the weight of the only output
-    tied: tuple[str, ...]  # the outputs that share the greatest weight, if it is not 0; none if there is a winner
+    margin: float  # maximum weight less the next, or the weight of the only output
+    tied: tuple[str, ...]  # the outputs that share the maximum weight, if it is not 0; none if there is a winner
 
     @property
     def weights(self) -> Result[float]:

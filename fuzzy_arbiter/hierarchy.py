@@ -17,7 +17,7 @@ from fuzzy_arbiter.terms.term import Term
 
 Form = Literal["hierarchical", "minimal", "conjunctive", "complete"]
 FORMS: tuple[str, ...] = get_args(Form)
-MAX_COMPLETE = 16  # greatest number of criteria in the complete form, which then has a million rules
+MAX_COMPLETE = 16  # maximum number of criteria in the complete form, which then has a million rules
 
 DEGREE = rising(0.0, 1.0)
 # the pair of section VI: low is the triangle (0, 0, 1), high the triangle (0, 1, 1)

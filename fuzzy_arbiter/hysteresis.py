@@ -23,7 +23,7 @@ from fuzzy_arbiter.verification.questions import Effort, Questions, greatest_ter
 from fuzzy_arbiter.verification.search import Goal
 
 Setting = float | Mapping[str, float]
-EFFORT = 100_000_000  # greatest number of statements of the search for the row at rest, less than a second
+EFFORT = 100_000_000  # maximum number of statements of the search for the row at rest, less than a second
 
 
 class HysteresisArbiter:

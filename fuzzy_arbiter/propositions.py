@@ -11,7 +11,7 @@ from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.norms import HEDGES
 
-MAX_NESTING = 100  # greatest number of nested parentheses and negations
+MAX_NESTING = 100  # maximum number of nested parentheses and negations
 KEYWORDS = ("if", "then", "and", "or", "not", "is", "with", "any")
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 

@@ -11,7 +11,7 @@ from plant_fmu import load_vehicle
 
 GOAL_RADIUS = 0.5  # m
 VEHICLE = "bluerov2_heavy"
-_FREE = 0.6  # m, least distance of an obstacle from the start, from the dive below it, and from the goal
+_FREE = 0.6  # m, minimum distance of an obstacle from the start, from the dive below it, and from the goal
 _DIVE = 0.6  # m, depth of the dive below the start
 _MOST_DRAWS = 1000  # draws of an obstacle, after which it is left out
 

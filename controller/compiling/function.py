@@ -22,7 +22,7 @@ from controller.translator.types import Type, type_of
 INTERPRETED = "SUBREACH_INTERPRETED"  # environment variable: if set, Python runs all functions, without a compiler
 Described = dict[int, tuple[Any, Type, list[int]]]  # arguments with their types and words, by their ids
 
-_MAX_CACHED = 8  # greatest number of sets of arguments in the cache
+_MAX_CACHED = 8  # maximum number of sets of arguments in the cache
 _NONE = (None,) * 7
 _CALLBACK = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
 

@@ -19,7 +19,7 @@ class Number(NamedTuple):
     above: str = ""  # name of the number that it must exceed
 
 
-Range = tuple[str, float, float]  # unit, least and greatest
+Range = tuple[str, float, float]  # unit, minimum and maximum
 
 LENGTH: Range = ("m", -1e6, 1e6)
 SIZE: Range = ("m", 1e-9, 1e6)

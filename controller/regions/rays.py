@@ -14,7 +14,7 @@ from controller.regions.shapes.prism import Prism
 from controller.stack_array import zeros
 
 TOUCHING = 1e-4  # m, clearance at which a ray has met a surface
-MAX_STEPS = 64  # greatest number of steps along a ray, for each region
+MAX_STEPS = 64  # maximum number of steps along a ray, for each region
 _PARALLEL = 1e-100  # component of a direction that counts as 0: squared, or as a divisor, it may leave float64's range
 
 _ELLIPSOID = Ellipsoid.kind

@@ -27,7 +27,7 @@ Evaluation = tuple[float, float, float, float, float]
 EvaluationOfAttitude = tuple[float, float, float, float, float, float, float]
 
 UP_TO_ROUNDING = 1e-12  # length below which a vector has no direction
-GREATEST = 1e6  # m, greatest coordinate and length; squares and their sums stay far from overflow
+GREATEST = 1e6  # m, maximum coordinate and length; squares and their sums stay far from overflow
 
 
 class Shape(Protocol):

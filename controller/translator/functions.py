@@ -22,7 +22,7 @@ _RESERVED = {
     "while", "bool", "true", "false", "NAN", "INFINITY", "gamma", "div", "free", "index", "j0", "j1", "jn",
     "y0", "y1", "yn", "time", "remove", "signal",
 }  # fmt: skip
-_MAX_PASSES = 6  # greatest number of passes until the types of variables are fixed
+_MAX_PASSES = 6  # maximum number of passes until the types of variables are fixed
 
 
 class Functions(Protocol):
@@ -58,7 +58,7 @@ class Function(Statements):
         self.result: Type = Nothing()
 
     def fail(self, node: ast.AST, what: str) -> NoReturn:
-        """Refuse a construct, with its place."""
+        """Refuse a construct, with its file and line."""
         line = self._first + getattr(node, "lineno", 1) - 1
         raise TranslationError(f"{self._file}:{line}: {what}, which is not translated to C")
 

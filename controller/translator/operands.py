@@ -47,7 +47,7 @@ class Operands:
     lines: list[str]
 
     def fail(self, node: ast.AST, what: str) -> NoReturn:
-        """Refuse a construct, with its place."""
+        """Refuse a construct, with its file and line."""
         raise NotImplementedError
 
     def temporary(self, kind: Type, code: str) -> Value:

@@ -139,7 +139,7 @@ class FlightMetrics(NamedTuple):
     max_speed: float  # m/s, over ground
     worst_step: float  # s of the wall clock, longest time of law and allocation in a step
     failed_step: float  # step in which the FMU failed
-    bound_excess: float  # m, greatest excess of the law's bound over a clearance; -inf: no bound
+    bound_excess: float  # m, maximum excess of the law's bound over a clearance; -inf: no bound
     weighted_violation: float  # m s, rad s: sum over regions of priority times the integral of the violation depth
 
 

@@ -26,7 +26,7 @@ from cosim.run.progress import ProgressBar
 
 log = logging.getLogger(__name__)
 
-_MAX_WARNINGS = 3  # greatest number of refused rows that are logged one by one
+_MAX_WARNINGS = 3  # maximum number of refused rows that are logged one by one
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from typing import Any
 
 from cosim.errors import RunError
 
-_SHOWN = 40  # greatest number of characters of a refused text in the message
+_SHOWN = 40  # maximum number of characters of a refused text in the message
 
 # of a flag that takes several values and may be repeated
 LIST: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}

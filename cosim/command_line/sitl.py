@@ -32,7 +32,7 @@ def add_verbs(verbs: Any) -> None:
     flag(verb, "--allow-remote", "let the address be seen from other machines")
     flag(verb, "--timeout S", "end after so many seconds without a frame (default: never)", number(1e-3, 1e6))
     flag(verb, "--speedup N", "with px4: most simulated seconds per second (default: 1)", number(0.01, 100.0))
-    flag(verb, "--record-rate HZ", "greatest number of recorded rows per simulated second", number(1e-3, 1e6), 100.0)
+    flag(verb, "--record-rate HZ", "maximum number of recorded rows per simulated second", number(1e-3, 1e6), 100.0)
     flag(verb, "--autopilot ENDPOINT", "with ardupilot: its port, such as tcp:127.0.0.1:5762; records its estimate")
     flag(verb, "--dvl HZ", "rate of VISION_POSITION_DELTA to the autopilot, in simulated time", number(0.1, 100.0))
     flag(verb, "--dvl-latency S", "their latency", number(0.0, 10.0), 0.1)

@@ -24,7 +24,7 @@ HULL_COLOUR, TRAIL_COLOUR, THRUST_COLOUR = (240, 228, 66), (140, 140, 140), (204
 OPAQUE = {False: 0.25, True: 0.75}  # opacity by activity of the region
 _MARGIN = 1.0  # m, around path and bounded regions
 _SIGHT = 5.0  # hull radii, length of the drawing of an attitude region
-_TRAIL = 2000  # greatest number of points of the path
+_TRAIL = 2000  # maximum number of points of the path
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +51,7 @@ class Thruster:
 
     position: Array  # (3,) m
     direction: Array  # (3,) unit vector of positive force
-    max_force: float  # N, greatest magnitude of the force
+    max_force: float  # N, maximum magnitude of the force
 
 
 class Scene:

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 _SPAN = 0.3  # s, time between the two samples of a change of velocity
 _GRID = np.arange(-0.1, 0.601, 0.02)  # s, candidate delays
 _LAGS = (0.0, 0.1, 0.2)  # s, candidate lags of the thrusters; the most likely one is used
-_MIN_CHANGES = 50  # least number of changes for an estimate
+_MIN_CHANGES = 50  # minimum number of changes for an estimate
 _DECIDED = 20.0  # twice the gain of log-likelihood above which a topic gets a delay of its own
 _SLOW = ("depth", "position")  # topics whose second differences are noise: they get the least delay of the others
 

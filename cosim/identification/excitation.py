@@ -57,7 +57,7 @@ _SETTLE = 1.0  # s, time before a candidate segment; windows begin with the segm
 _STICK_ROWS = round(PERIOD / ROW)  # rows of the record per stick value
 _BOX_FRACTION = 0.7  # fraction of the box that a segment may use, with the start values of the parameters
 _MAX_RATE = 2.0  # rad/s, greatest angular velocity about a body axis in a segment
-_MAX_TILT = math.sin(math.radians(55.0))  # sine of the greatest tilt in a segment
+_MAX_TILT = math.sin(math.radians(55.0))  # sine of the maximum tilt in a segment
 _REDUCTION = 0.7  # factor on the sticks each time a segment leaves the limits
 _MAX_TRIALS = 7  # simulations of a segment or schedule, each with sticks reduced by that factor
 _VEHICLES = 8  # number of other vehicles for which forces are reduced, and of random ones that check the result
@@ -112,7 +112,7 @@ class Design:
     deviations: Array  # (p,) expected standard deviations of the parameters, in their units
     rehearsal: Rehearsal
     current: float  # m/s, speed of the current in which the other vehicles move
-    excursions: tuple[float, ...]  # greatest distance of each other vehicle from the center, in halves of the box
+    excursions: tuple[float, ...]  # maximum distance of each other vehicle from the center, in halves of the box
 
     @property
     def center(self) -> Array:
@@ -227,7 +227,7 @@ def _sticks(values: Array, group: tuple[int, ...], mode: StickMode) -> Array:
 
 
 def _multisine(low: float, high: float, count: int, rng: np.random.Generator) -> Array:
-    """Return zero-mean sums of sines, whole periods of each, with a greatest value of 1; shape (n, count)."""
+    """Return zero-mean sums of sines, whole periods of each, with a maximum value of 1; shape (n, count)."""
     n = round(SECONDS / PERIOD)
     turns = np.unique(np.round(np.geomspace(low, high, _MAX_SINES) * SECONDS).clip(1))
     phases = rng.uniform(0.0, 2.0 * np.pi, (len(turns), count))
@@ -357,7 +357,7 @@ def keep_inside(
 
 
 def excursions_of(rehearsal: Rehearsal, scenario: Scenario, box: Box, count: int) -> Array:
-    """Return the greatest distance from the center in each segment and the return after it, in halves of the box."""
+    """Return the maximum distance from the center in each segment and the return after it, in halves of the box."""
     distance = np.abs(rehearsal.states[:, :3] - np.array(scenario.initial.position)) / (0.5 * np.array(box))
     segment = ((rehearsal.times - BEGIN) / (SECONDS + RETURN)).clip(0, count - 1).astype(int)
     return np.array([distance[segment == k].max() for k in range(count)])

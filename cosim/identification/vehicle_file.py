@@ -22,7 +22,7 @@ from plant_fmu.vehicle import Vehicle, shipped_vehicles
 
 DRAWS = 256  # number of drawn vehicles
 _MAX_TRIALS = 100  # draws per vehicle, until its mass matrix is positive definite
-_WIDTH = 118  # greatest length of a comment
+_WIDTH = 118  # maximum length of a comment
 _ATTRIBUTES = {
     "rigid_body.center_of_gravity": "r_G", "hydrostatics.center_of_buoyancy": "r_B",
     "thrusters.matrix": "thruster_matrix", "thrusters.time_constant": "thrust_time_constant",

@@ -23,7 +23,7 @@ from cosim.simulation.signals import Array, Column
 log = logging.getLogger(__name__)
 
 PERIOD = 1.0 / 30.0  # s of the wall clock, between rows that are copied
-_QUEUE_LENGTH = 256  # greatest number of rows in the queue to the thread; beyond it the oldest are dropped
+_QUEUE_LENGTH = 256  # maximum number of rows in the queue to the thread; beyond it the oldest are dropped
 _CLOSE_TIMEOUT = 3.0  # s, for which closing or a new run waits for the thread
 
 

@@ -28,8 +28,8 @@ _LIMITS = {  # as SQLite advises for files from others, sqlite.org/security.html
 _PRAGMAS = ("trusted_schema = OFF", "query_only = ON", "cell_size_check = ON", "mmap_size = 0")
 _PLAIN = re.compile(r"CREATE\s+(TABLE|(UNIQUE\s+)?INDEX)\b", re.IGNORECASE)
 _STEPS = 10_000  # instructions between two calls of the handler
-_STEPS_PER_BYTE = 10  # greatest number of instructions for each byte of the file, beyond a million
-_ROW_SIZE = 8  # bytes, least size of a row in a file
+_STEPS_PER_BYTE = 10  # maximum number of instructions for each byte of the file, beyond a million
+_ROW_SIZE = 8  # bytes, minimum size of a row in a file
 
 
 class BagDatabase:

@@ -18,7 +18,7 @@ from cosim.logs.bag_database import open_database
 from cosim.logs.chunked_file import OnProgress
 from cosim.logs.decompression import MAX_PART, Decompressor
 
-MAX_DECODED = 1 << 20  # bytes, greatest size of a message that is decoded: its objects take up to a hundred times that
+MAX_DECODED = 1 << 20  # bytes, maximum size of a message that is decoded: its objects take up to a hundred times that
 _MAX_TOPICS = 20_000
 _RECORD_HEAD = struct.Struct("<BQ")  # opcode and length of an MCAP record
 _MESSAGE_HEAD, _DATA = struct.Struct("<H4xQ"), 22  # channel and time of an MCAP message; bytes before its data

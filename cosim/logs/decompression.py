@@ -8,7 +8,7 @@ from typing import Any
 
 from cosim.errors import ImportLogError
 
-MAX_PART = 1 << 27  # bytes, greatest size of a chunk or message
+MAX_PART = 1 << 27  # bytes, maximum size of a chunk or message
 _MIN_TOTAL = 1 << 24  # bytes that the parts of any bag may have in total
 _MAX_RATIO = 100  # greatest total size of the parts beyond that, in sizes of the file
 

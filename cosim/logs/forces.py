@@ -19,7 +19,7 @@ from plant_fmu.autopilot import Autopilot, effort_of_pulse
 from plant_fmu.t200 import VOLTAGES, force_of_pulse
 
 CURVES = ("linear", "quadratic", "t200")
-PILOT_GAIN = 0.5  # fraction of the greatest wrench that full sticks command, ArduSub's default
+PILOT_GAIN = 0.5  # fraction of the maximum wrench that full sticks command, ArduSub's default
 _MOTORS = 33  # SERVOn_FUNCTION of the first motor
 _MAX_MOTORS = 8
 _NEUTRAL = 1500.0  # us, pulse at which a T200 rests
@@ -66,7 +66,7 @@ def command_forces(
 
 
 def _scale_efforts(efforts: Array, vehicle: Vehicle) -> Array:
-    """Return forces [N] of fractions of each thruster's greatest force, -1 to 1, NaN for NaN."""
+    """Return forces [N] of fractions of each thruster's maximum force, -1 to 1, NaN for NaN."""
     forces: Array = np.where(efforts < 0.0, -efforts * vehicle.thrust_min, efforts * vehicle.thrust_max)
     return forces
 

@@ -11,10 +11,10 @@ from cosim.errors import ImportLogError
 from cosim.logs.bag_storage import DAMAGE
 
 _MAX_TEXT = 1 << 17  # characters of a definition with its nested types
-_SIGNS = {"ros2msg": ("\n,", 5000), "ros2idl": ("=[<,", 1000)}  # signs that take long to parse, greatest number of them
+_SIGNS = {"ros2msg": ("\n,", 5000), "ros2idl": ("=[<,", 1000)}  # signs that take long to parse, maximum number of them
 _MAX_FIELDS = 1000  # fields and constants of a type with its nested types
-_MAX_DEPTH = 16  # greatest depth of nested types
-_MAX_LENGTH = 1 << 20  # greatest length of an array
+_MAX_DEPTH = 16  # maximum depth of nested types
+_MAX_LENGTH = 1 << 20  # maximum length of an array
 _MAX_COPIES = 1000  # elements of all arrays of texts and nested types, for each of which rosbags writes code
 _TYPE_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)+", re.ASCII)
 _FIELD_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*", re.ASCII)
@@ -64,7 +64,7 @@ class _Walk:
 
     def __init__(self, types: Types, empty_size: int) -> None:
         self._types, self._empty_size = types, empty_size
-        self._sizes: dict[str, int] = {}  # least size of each type [bytes]
+        self._sizes: dict[str, int] = {}  # minimum size of each type [bytes]
         self._count = self._copies = 0
         self.reachable: dict[str, Any] = {}
 
@@ -93,7 +93,7 @@ class _Walk:
         return self
 
     def _size(self, kind: Any, parents: tuple[str, ...]) -> int:
-        """Return the least size of a field [bytes]; visit its type."""
+        """Return the minimum size of a field [bytes]; visit its type."""
         if kind[0] == _BASE:
             return 1
         if kind[0] == _NAMED:

@@ -18,7 +18,7 @@ from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array, Column
 
 BLOCK = 4096  # rows that are made at once
-_SPAN = 60.0  # s, greatest duration of these rows: at a low rate, the samples between rows are in memory too
+_SPAN = 60.0  # s, maximum duration of these rows: at a low rate, the samples between rows are in memory too
 _POSITION, _QUATERNION = [f"position.{a}" for a in "xyz"], [f"quaternion.e{i}" for i in range(4)]
 _WRENCH = "XYZKMN"
 _SENSORS = {  # quantity: columns, and name of the sensor's time column

@@ -20,10 +20,10 @@ Convert = Callable[[Array], Array]
 _EDGES = np.logspace(-6, 5, 4401)  # s, edges of the histogram of periods; neighbors differ by 0.6 %
 _AROUND = 8  # number of bins on either side of the median whose mean is the period
 _GAP_PERIODS, _MIN_GAP = 3.0, 0.3  # periods, s: a pause longer than both is a gap
-_MAX_LISTED = 100  # greatest number of listed gaps
+_MAX_LISTED = 100  # maximum number of listed gaps
 _RUNS, _REGULAR = 10, 0.6  # held values have at least so many runs of equal ones, and this fraction of similar lengths
 _LONGEST_RUN = 1000  # samples, length from which on runs count as equally long
-_QUICK, _BURSTING = 0.2, 0.3  # bursts: greatest distance of samples in mean periods; least fraction of such samples
+_QUICK, _BURSTING = 0.2, 0.3  # bursts: maximum distance of samples in mean periods; least fraction of such samples
 
 
 @dataclass

@@ -20,9 +20,9 @@ _MAGIC = b"ULog\x01\x12\x35"
 _SYNC = bytes.fromhex("2f731320250cbb12")  # body of a synchronization message
 _HEAD = struct.Struct("<HB")  # size and type of a message
 _FILE_HEAD = 16  # bytes, size of the file's header
-_BLOCK = 1 << 16  # bytes, least size of a yielded block of samples before the end
-_MAX_MESSAGE = 10_000  # bytes, greatest size of a message; a longer one counts as damage
-_MAX_LENGTH, _MAX_DEPTH = 4096, 8  # greatest length of an array in a message; greatest depth of nested types
+_BLOCK = 1 << 16  # bytes, minimum size of a yielded block of samples before the end
+_MAX_MESSAGE = 10_000  # bytes, maximum size of a message; a longer one counts as damage
+_MAX_LENGTH, _MAX_DEPTH = 4096, 8  # maximum length of an array in a message; maximum depth of nested types
 _KNOWN = frozenset(b"BFIMPQARDLCSO")  # types of messages
 _TYPES = {
     "int8_t": "i1", "uint8_t": "u1", "int16_t": "<i2", "uint16_t": "<u2", "int32_t": "<i4", "uint32_t": "<u4",

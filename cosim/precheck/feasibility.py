@@ -22,7 +22,7 @@ from cosim.scenario.scenario import Scenario
 Array = NDArray[np.float64]
 
 _MARGIN = 3.0  # m, margin around start and regions of the box that is searched
-_MAX_MARGIN = 1e5  # m, greatest margin that is tried
+_MAX_MARGIN = 1e5  # m, maximum margin that is tried
 
 
 def region_findings(scenario: Scenario) -> Iterator[Finding]:

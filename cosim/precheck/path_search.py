@@ -19,7 +19,7 @@ from cosim.precheck.region_intersection import Vector3, common_depth
 
 Array = NDArray[np.float64]
 
-SEARCH_TIME = 120.0  # s of flight time, greatest duration of the search
+SEARCH_TIME = 120.0  # s of flight time, maximum duration of the search
 PERIOD = 0.02  # s, control period of the law, in which the search takes a step
 _SEED = 1  # seed of the search
 _SAMPLE = 0.02  # m, between the points of a path at which its clearance is evaluated
@@ -30,7 +30,7 @@ class SearchedPath:
     """Result of a search: a path, or none."""
 
     corners: tuple[Vector3, ...]  # m, NED: start, corners, and an end in the goal; empty if no path was found
-    clearance: float  # m, least clearance of all regions along the path; 0 or negative if none was found
+    clearance: float  # m, minimum clearance of all regions along the path; 0 or negative if none was found
     searched: float  # s of flight time that the search took
 
     @property

@@ -20,15 +20,15 @@ Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 
 TOLERANCE = 0.01  # m, accuracy of the common depth
-_MAX_BOXES = 400_000  # greatest number of boxes in one round of halving
+_MAX_BOXES = 400_000  # maximum number of boxes in one round of halving
 
 
 @dataclass(frozen=True)
 class Overlap:
     """Result of a search for a common point of regions."""
 
-    point: Vector3  # m, NED: the point of greatest depth that was found
-    depth: float  # m, least clearance there over the regions; negative if one is violated
+    point: Vector3  # m, NED: the point of maximum depth that was found
+    depth: float  # m, minimum clearance there over the regions; negative if one is violated
     at_most: float  # m, certified upper bound of the depth in the searched box
 
     @property
@@ -43,13 +43,13 @@ class Overlap:
 
 
 def common_depth(points: Array, regions: Sequence[Region]) -> Array:
-    """Return the least clearance over regions, shape (m,) [m]: above 0 where all are satisfied; points [m, NED]."""
+    """Return the minimum clearance over regions, shape (m,) [m]: above 0 where all are satisfied; points [m, NED]."""
     depths: Array = np.min([clearances_at(points, region) for region in regions], axis=0)
     return depths
 
 
 def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float = TOLERANCE) -> Overlap:
-    """Find the point of a box with the greatest common depth of regions; low, high (3,) [m, NED], tolerance [m]."""
+    """Find the point of a box with the maximum common depth of regions; low, high (3,) [m, NED], tolerance [m]."""
     half = 0.5 * (np.asarray(high, dtype=float) - low)
     centres = (np.asarray(low, dtype=float) + half)[None, :]
     best_point, best = centres[0], -math.inf
@@ -75,7 +75,7 @@ def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float 
 
 
 def _refine(regions: Sequence[Region], point: Array, depth: float, low: Array, high: Array) -> tuple[Array, float]:
-    """Improve a point by Nelder-Mead, since the least clearance is not smooth; return point and depth."""
+    """Improve a point by Nelder-Mead, since the minimum clearance is not smooth; return point and depth."""
     done = minimize(
         lambda p: -float(common_depth(p[None, :], regions)[0]), point, method="Nelder-Mead",
         bounds=list(zip(low, high, strict=True)), options={"xatol": 1e-5, "fatol": 1e-6, "maxiter": 300},

@@ -65,7 +65,7 @@ def _force(margin: Margin | None) -> float | None:
 
 
 def _mend_current(scenario: Scenario) -> str:
-    """Return advice on the greatest current in which the vehicle can be kept still."""
+    """Return advice on the maximum current in which the vehicle can be kept still."""
     vehicle, phi = true_vehicle(scenario), scenario.true_restoring_parameters
     quaternion, current = np.array(scenario.law.desired_quaternion), np.array(scenario.plant.current)
 
@@ -81,7 +81,7 @@ def _mend_current(scenario: Scenario) -> str:
 
 
 def start_force_finding(scenario: Scenario, weights: Array) -> Finding:
-    """Compare the first force of the paper's law with the greatest force of the thrusters in that direction."""
+    """Compare the first force of the paper's law with the maximum force of the thrusters in that direction."""
     gains, initial, vehicle = scenario.law.gains, scenario.initial, true_vehicle(scenario)
     (f,), (slope,), _ = evaluate_regions([scenario.goal_region], initial.position, initial.quaternion)
     regions = [secondary.region for secondary in scenario.regions]

@@ -48,7 +48,7 @@ class ThrustMargin:
 
 
 def greatest_force(vehicle: Vehicle, direction_body: Array, hold: Array, alive: Array) -> float | None:
-    """Return the greatest force in a direction beside a constant wrench, by a linear program; hold [N, N m]."""
+    """Return the maximum force in a direction beside a constant wrench, by a linear program; hold [N, N m]."""
     # with returns [N]
     matrix = np.column_stack([vehicle.thruster_matrix, -np.r_[direction_body, 0.0, 0.0, 0.0]])
     bounds = [*zip(vehicle.thrust_min * alive, vehicle.thrust_max * alive, strict=True), (0.0, None)]
@@ -82,7 +82,7 @@ def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Arra
 
 
 def least_margin(vehicle: Vehicle, quaternion: Array, hold: Array, alive: Array) -> Margin | None:
-    """Return the direction and force of the least margin, None if `hold` is not feasible."""
+    """Return the direction and force of the minimum margin, None if `hold` is not feasible."""
     to_body = rotation_matrix(quaternion).T
     worst: Margin | None = None
     for name, direction in DIRECTIONS.items():

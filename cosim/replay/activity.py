@@ -28,7 +28,7 @@ def active_regions(
     criteria: Sequence[int], memberships: Array, weights: Array, clearances: Array, resting: NDArray[np.bool_]
 ) -> NDArray[np.float64]:
     """Return the active region of each row; clearances [m or rad]."""
-    # It is the most critical region, that of the least clearance, of the criterion with the greatest weight. It is the
+    # It is the most critical region, that of the minimum clearance, of the criterion with the maximum weight. It is the
     # goal if the membership of that criterion is 0, or its weight below 0.005; also if the vehicle rests in the goal
     # region, the criterion weighs less than 0.5, and its region is satisfied.
     rows = np.arange(len(weights))

@@ -21,7 +21,7 @@ from cosim.results.wording import IMPORTED, isolation_text
 from cosim.scenario.sensor_suite import SENSOR_NAMES
 from cosim.simulation.signals import Array
 
-_MAX_EVENTS = 12  # greatest number of events of a kind; of more, the closest ones are joined
+_MAX_EVENTS = 12  # maximum number of events of a kind; of more, the closest ones are joined
 
 _REJECTIONS_APART = 1.0  # s; rejected samples closer than that are one event, which takes at least as long
 

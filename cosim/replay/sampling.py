@@ -16,7 +16,7 @@ _BYTES = 400_000  # for the first minute
 _BYTES_A_MINUTE = 150_000  # for each further minute
 MAX_BYTES = 6_000_000
 MAX_BYTES_INTERACTIVE = 650_000  # less, since the flight that the page itself simulates has more rows
-_PARTS = 100  # greatest number of parts of the run, from each of which the extremes are kept
+_PARTS = 100  # maximum number of parts of the run, from each of which the extremes are kept
 _EXTREME_ROWS = 0.5  # greatest part of the rows that are extremes
 
 

@@ -19,7 +19,7 @@ from cosim.results.wording import describe_task, format_isolations, format_numbe
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-_MAX_SPANS = 6  # greatest number of spans that a table lists for a criterion
+_MAX_SPANS = 6  # maximum number of spans that a table lists for a criterion
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def _regions(run: Run) -> Table | None:
 
 
 class _Violation:
-    """Finds the time of a region's least clearance and the duration of its violations, block by block."""
+    """Finds the time of a region's minimum clearance and the duration of its violations, block by block."""
 
     def __init__(self) -> None:
         self._least, self.worst_at = math.inf, math.nan  # m or rad, s

@@ -9,7 +9,7 @@ from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
 from cosim.results.run_result import Run
 from cosim.results.wording import format_number
 
-_NAMED = 12  # greatest number of unused kinds of messages, and of gaps, that a table lists
+_NAMED = 12  # maximum number of unused kinds of messages, and of gaps, that a table lists
 
 
 @dataclass(frozen=True)

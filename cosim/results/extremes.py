@@ -28,7 +28,7 @@ def extreme_rows(blocks: Iterable[Sequence[Array]], signals: int, edges: NDArray
 
 
 class _Extremes:
-    """The least and the greatest of each signal in each part."""
+    """The minimum and the maximum of each signal in each part."""
 
     def __init__(self, parts: int, signals: int) -> None:
         self._bounds = np.full((2, parts, signals), np.inf)  # minima, and negated maxima

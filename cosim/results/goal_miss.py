@@ -14,7 +14,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
 _WINDOW = 10.0  # s, time before the end that is examined
-_SAMPLES = 500  # greatest number of rows of that time that are read
+_SAMPLES = 500  # maximum number of rows of that time that are read
 _APPROACHING = 0.03  # m/s, least mean rate at which the distance to the goal falls or grows
 _SWIMS = 1.0  # m/s, speed of a vehicle for which a time would not be too short
 _MOVING = 0.1  # m/s, least mean speed of a vehicle that is under way

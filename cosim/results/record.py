@@ -20,11 +20,11 @@ from cosim.simulation.signals import Array, Column
 
 log = logging.getLogger(__name__)
 
-MAX_ROWS = 100_000_001  # rows of a run with the greatest number of steps that a scenario may have
+MAX_ROWS = 100_000_001  # rows of a run with the maximum number of steps that a scenario may have
 RECORD = "record.parquet"
 STREAM = "record.arrows"  # Arrow stream of the rows of a run that is under way or was killed
 PARTS = "record.parts"  # folder in which earlier versions left the rows of a killed run, as Parquet files
-_DIGITS = 9  # greatest number of digits of a format number
+_DIGITS = 9  # maximum number of digits of a format number
 _BLOCK = 10_000  # rows that are read at once
 _SMALL = 2**22  # numbers; a record of at most so many is read as a whole
 _KEPT = 24  # signals of a larger record that are kept in memory

@@ -14,7 +14,7 @@ log = logging.getLogger(__name__)
 
 _OPTIONAL = ("law.", "sensed.", "water_velocity.")  # prefixes of columns that are only exported
 REGION_COLUMNS = (".clearance", ".shift.x", ".shift.y", ".shift.z")  # suffixes of the needed columns of a region
-_NAMED = 3  # greatest number of columns named in a message
+_NAMED = 3  # maximum number of columns named in a message
 
 
 def require_columns(scenario: Scenario, record: Record) -> None:

@@ -19,7 +19,7 @@ class Span:
 
     start: float  # s, first instant at which it holds
     end: float  # s, first instant at which it no longer holds; while it holds, the last instant so far
-    least: float = np.nan  # least value of a signal in the span
+    least: float = np.nan  # minimum value of a signal in the span
 
 
 class Spans:

@@ -10,7 +10,7 @@ from controller.regions.shape import Shape
 from cosim.scenario.scenario import Scenario
 
 IMPORTED = "imported"  # status of a run that was imported from a log
-_MAX_LISTED = 6  # greatest number of isolations that a sentence lists
+_MAX_LISTED = 6  # maximum number of isolations that a sentence lists
 _FEW_REJECTED = 0.005  # fraction of rejected samples below which a sentence leaves them out
 
 

@@ -19,8 +19,8 @@ from fuzzy_arbiter import Arbiter, ArbiterError, Rule, Shape, System, Term, Vari
 from fuzzy_arbiter.formats import FORMATS, reads
 from plant_fmu.toml_tables import hint
 
-MAX_TEXT = 200_000  # greatest number of characters of a file of rules
-MAX_INPUTS = 32  # greatest number of inputs of a file of rules
+MAX_TEXT = 200_000  # maximum number of characters of a file of rules
+MAX_INPUTS = 32  # maximum number of inputs of a file of rules
 
 _ON = Shape(((0.5 - 1e-9, 0.0), (0.5 + 1e-9, 1.0)))  # crisp, but continuous
 _OFF = Shape(((0.5 - 1e-9, 1.0), (0.5 + 1e-9, 0.0)))

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from cosim.scenario.scenario import Scenario
 
 GOAL_COLOUR = "#009E73"  # Okabe and Ito's
-_WIDEST = 50.0 / 360.0  # turns, greatest difference of hue between a criterion's colour and its regions'
+_WIDEST = 50.0 / 360.0  # turns, maximum difference of hue between a criterion's colour and its regions'
 # for the regions of a criterion in turn: fraction of the greatest hue difference, added lightness, saturation factor
 _SHADES = (
     (0.0, 0.0, 1.0),

@@ -30,7 +30,7 @@ class CriterionEntry(Table, frozen=True):
             expected="a letter, then at most 23 letters, digits and _, no word of rules",
         ),
     ]
-    order: Annotated[int | None, key("priority: the least comes first", default="its place in the list")] = None
+    order: Annotated[int | None, key("priority: the lowest comes first", default="its position in the list")] = None
     colour: Annotated[
         str,
         key(
@@ -41,7 +41,7 @@ class CriterionEntry(Table, frozen=True):
     membership: Annotated[
         dict[str, Any],
         key(
-            "memberships by `ramp`, `clearance`, `angle`, `approach_time`; the greatest counts",
+            "memberships by `ramp`, `clearance`, `angle`, `approach_time`; the maximum counts",
             default="`arbiter.ramp`",
         ),
     ] = msgspec.field(default_factory=dict)
@@ -119,12 +119,16 @@ class RegionEntry(Table, frozen=True):
     velocity: Annotated[Vector3, key("velocity, north east down; the law receives it", "m/s")] = (0.0, 0.0, 0.0)
     streamed: Annotated[bool, key("moved from outside during the run", more=", below")] = False
     hard: Annotated[
-        bool, key("must not be violated", more="; the paper's law and laws of plain potentials do not use it")
+        bool,
+        key(
+            "a hard region is kept, a soft one only pushes",
+            more="; the paper's law and laws of plain potentials do not use it",
+        ),
     ] = True
     deviation: Annotated[
         float | tuple[float, float, float],  # a range beside a tuple makes msgspec read memory that is not its own
         key(
-            "standard deviation of its place, or three: north, east, down", "m",
+            "standard deviation of its position, or three: north, east, down", "m",
             ": margins of the deployable law grow",
         ),
     ] = 0.0  # fmt: skip

@@ -14,9 +14,9 @@ from cosim.scenario.region_tables import PAPER_CRITERIA, CriterionEntry, RegionE
 from plant_fmu.toml_tables import Finite, NonNegative, Positive, Table, Unlimited, hint, key, require
 
 RuleVariant = Literal["ordered", "reversed", "crisp", "none"]
-MAX_TEXT = 200  # greatest number of characters of a text
-MAX_POINTS = 100_001  # greatest number of samples of the arbiter's output universe
-MAX_OBSTACLES = 100  # greatest number of obstacle slots
+MAX_TEXT = 200  # maximum number of characters of a text
+MAX_POINTS = 100_001  # maximum number of samples of the arbiter's output universe
+MAX_OBSTACLES = 100  # maximum number of obstacle slots
 
 
 def require_text(name: str, text: str) -> None:
@@ -38,7 +38,7 @@ class PlantSetup(Table, frozen=True):
 
     fmi: Annotated[Literal[2, 3], key("FMI version of the plant, 2 or 3")] = 3
     current: Annotated[Vector3, key("velocity of the water, north east down", "m/s")] = (0.0, 0.0, 0.0)
-    substep: Annotated[Positive, key("greatest integration step", "s")] = 0.005
+    substep: Annotated[Positive, key("maximum integration step", "s")] = 0.005
     parameters: Annotated[
         dict[str, bool | Finite],
         key("parameters of the FMU over those of the vehicle, such as `mass` or `r_G.z`", more="; not for the law"),
@@ -185,7 +185,7 @@ class Commands(Table, frozen=True):
     ] = False
     await_arm: Annotated[bool, key("nothing moves before it is armed", more="; `--await-arm` sets it")] = False
     obstacles: Annotated[
-        int, key("greatest number of obstacles that commands add during the run, up to 100", ge=0, le=MAX_OBSTACLES)
+        int, key("maximum number of obstacles that commands add during the run, up to 100", ge=0, le=MAX_OBSTACLES)
     ] = 8
     obstacle_radius: Annotated[Positive, key("radius of an obstacle whose size is not given", "m")] = 0.5
     obstacle_gain: Annotated[NonNegative, key("gain of each obstacle, per unit of g", "N")] = 100.0
@@ -194,7 +194,7 @@ class Commands(Table, frozen=True):
         float, key("depth of that sphere's centre in mode surface", "m", ge=0.0, le=1e3)
     ] = 0.5  # fmt: skip
     pilot_gain: Annotated[
-        float, key("part of the greatest wrench along an axis that a full stick commands", ge=0.0, le=1.0)
+        float, key("fraction of the maximum wrench along an axis that a full stick commands", ge=0.0, le=1.0)
     ] = 0.5
 
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from cosim.errors import ScenarioError
 from plant_fmu.errors import TableError, printable
 
-_SHOWN = 80  # greatest number of characters quoted in a message
+_SHOWN = 80  # maximum number of characters quoted in a message
 
 # a key: parts with dots between them, and TOML's quotes around those that have blanks; and a key with a value
 _QUOTED = r'"(?:[^"\\]|\\.)*"|\'[^\']*\''

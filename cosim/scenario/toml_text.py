@@ -9,7 +9,7 @@ import tomli_w
 
 from cosim.scenario.keys import unit_of_shape
 
-_WIDE = 100  # greatest number of characters of a value in one line
+_WIDE = 100  # maximum number of characters of a value in one line
 _INLINE = ("shape", "membership")  # tables that are written in one line if they fit
 _COMMENT_AT = 40  # column at which comments begin, after a shorter line
 

@@ -21,7 +21,7 @@ from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
 
 ROUNDING = 1e-6  # tolerance of a multiple of the step, as a fraction of the step
-MAX_STEPS = 100_000_000  # greatest number of plant steps of a run
+MAX_STEPS = 100_000_000  # maximum number of plant steps of a run
 
 # parameters of the FMU for which a scenario has other keys
 _OWN_KEYS = {

@@ -25,7 +25,7 @@ from fuzzy_arbiter.errors import EngineError
 Numbers = Sequence[Any]  # all floats, or all fractions
 TINY = 1e-120  # if no cut is greater, all are scaled up alike: the centroid stays, and nothing underflows
 LARGER = 2.0**266  # factor of that scaling
-MAX_LINES = 200_000  # greatest number of lines of an outline
+MAX_LINES = 200_000  # maximum number of lines of an outline
 
 
 class Outline(NamedTuple):

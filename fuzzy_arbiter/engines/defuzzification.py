@@ -1,4 +1,4 @@
-"""From the panels of joined terms to one value: the bisector, the places of the greatest height, and singletons."""
+"""From the panels of joined terms to one value: the bisector, the places of the maximum height, and singletons."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def bisectors(samples: Samples, panels: Panels, totals: Array) -> Array:
 
 
 def of_maximum(samples: Samples, panels: Panels, kind: str) -> Array:
-    """Return for each sample the mean, smallest or largest position of the greatest height."""
+    """Return for each sample the mean, smallest or largest position of the maximum height."""
     quad, n = samples.quad, samples.n
     tops = panels.heights.max(axis=1)
     max_heights = np.zeros(n)

@@ -22,7 +22,7 @@ POINTS = np.array([-1.0 + _BESIDE, *NODES, 1.0 - _BESIDE])
 INNER = slice(1, -1)  # the nodes among the points
 # coefficients of the Legendre series through the values at the nodes, a row for each degree
 ANALYSIS = (np.arange(ORDER)[:, None] + 0.5) * legendre.legvander(NODES, ORDER - 1).T * WEIGHTS
-NARROWEST = 1e-14  # least width of a panel that is divided, as a fraction of the universe's greatest number
+NARROWEST = 1e-14  # least width of a panel that is divided, as a fraction of the universe's maximum number
 _STATIC = 1e-13  # tolerance of a panel of one term, as a fraction of the term's area
 _AT_ENDS = legendre.legvander(np.array([-1.0, 1.0]), ORDER - 1).T  # the series' polynomials at a panel's ends
 _REST = 8.0  # greatest rest of a smooth function's series at an end, as a multiple of its last terms

@@ -38,13 +38,13 @@ from fuzzy_arbiter.terms.values import Formula
 
 BOUND = 1e-9  # bound of a centroid's error, as a fraction of the universe's width
 _TOLERANCE = 1e-12  # tolerance of each panel, as a fraction of the area
-_ROUNDS = 60  # greatest number of divisions of a panel
-_MAX_PANELS = 4000  # greatest number of panels of a sample that are divided at a time
-_MAX_TABLE = 2**25  # greatest number of degrees at the points of the terms' panels
+_ROUNDS = 60  # maximum number of divisions of a panel
+_MAX_PANELS = 4000  # maximum number of panels of a sample that are divided at a time
+_MAX_TABLE = 2**25  # maximum number of degrees at the points of the terms' panels
 _BLOCK = 2**17  # number of degrees that are computed at a time
 _TIED = 1e-12  # heights count as equal if their quotient differs from 1 by less
 _NOISE = 4e-16  # error of a height by rounding, as a fraction of it, or of 1 where it is a difference from 1
-_CLOSE = 0.2  # distance below the greatest height at which a slot may pass it between two points
+_CLOSE = 0.2  # distance below the maximum height at which a slot may pass it between two points
 _LEVEL, _PAIR, _FULL, _PASSED = range(4)  # a slot meets a level, another slot; it and those before sum to 1, are equal
 
 

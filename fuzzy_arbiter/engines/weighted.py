@@ -59,5 +59,5 @@ def _array(shape: object, inputs: Sequence[str], outputs: Sequence[str]) -> Call
     if isinstance(shape, Value):
         of = shape.array(inputs, outputs)
         return lambda cut, samples: of(samples)
-    # a strength of 0 has no weight, so that its place does not matter
+    # a strength of 0 has no weight, so that its position does not matter
     return lambda cut, samples: np.array([place_of(shape, w) if w > 0.0 else 0.0 for w in cut.tolist()])  # type: ignore[arg-type]

@@ -29,9 +29,9 @@ from fuzzy_arbiter.terms.values import Formula, Value
 
 _JOINS = {name: f"{norm.name}({{}}, {{}})" for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
 _JOINS |= {"prod": "({} * {})", "sum": "({} + {})"}
-_DEEPEST = 20  # greatest number of nested parentheses; parsers accept some hundred
+_DEEPEST = 20  # maximum number of nested parentheses; parsers accept some hundred
 TABLES = tuple(map(str.upper, Outline._fields))  # names of an outline's tables in code
-_LONGEST = 16  # greatest number of branches of one choice; parsers accept some hundred
+_LONGEST = 16  # maximum number of branches of one choice; parsers accept some hundred
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,7 @@ __all__ = ["FORMATS", "FormatName", "fold_normalization", "load", "reads", "save
 
 FormatName = Literal["json", "toml", "fcl", "fis", "fll"]
 FORMATS: tuple[str, ...] = get_args(FormatName)
-MAX_FILE = 4_000_000  # greatest number of bytes of a file
+MAX_FILE = 4_000_000  # maximum number of bytes of a file
 
 _READ: dict[str, Callable[[str], System]] = {
     "json": json_toml.read_json,

@@ -1,4 +1,4 @@
-"""Pictures over two inputs: one output as a surface, and the output with the greatest weight."""
+"""Pictures over two inputs: one output as a surface, and the output with the maximum weight."""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 MOST_ROWS = 10
-_LETTERS = 50  # greatest number of letters in a line of a rule
+_LETTERS = 50  # maximum number of letters in a line of a rule
 _HEIGHT = 0.72  # height of a term of degree 1, in rows
 _TALL = 1.6  # factor of the height of the outline at the foot
 

@@ -11,9 +11,9 @@ from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.terms.functions import FUNCTIONS, SAME, WORDS
 
-MAX_LENGTH = 2000  # greatest number of characters of an expression
-MAX_NESTING = 50  # greatest number of nested parentheses and signs
-MAX_DEPTH = 200  # greatest number of nested operators; a sum of n terms has n - 1
+MAX_LENGTH = 2000  # maximum number of characters of an expression
+MAX_NESTING = 50  # maximum number of nested parentheses and signs
+MAX_DEPTH = 200  # maximum number of nested operators; a sum of n terms has n - 1
 
 _TOKEN = re.compile(r"\s*(?:(\d+\.?\d*(?:[eE][+-]?\d+)?|\.\d+(?:[eE][+-]?\d+)?)|([A-Za-z_]\w*)|(\S))", re.ASCII)
 

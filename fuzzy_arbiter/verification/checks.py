@@ -31,9 +31,9 @@ from fuzzy_arbiter.verification.report import Check, Finding, Row, Severity, Ver
 from fuzzy_arbiter.verification.rules import labels, redundant, unused
 from fuzzy_arbiter.verification.search import Answer, Goal
 
-EFFORT = 4_000_000_000  # greatest number of statements, some seconds; forty prioritised criteria need 1/500 of it
+EFFORT = 4_000_000_000  # maximum number of statements, some seconds; forty prioritised criteria need 1/500 of it
 MAX_ROWS = 256
-MAX_TERMS = 200  # greatest number of terms of a variable, as the time grows with its square
+MAX_TERMS = 200  # maximum number of terms of a variable, as the time grows with its square
 NAMED_ROWS = 8
 _ALL = "for all real inputs"
 _WORST_FIRST = {"fault": 0, "warning": 1, "note": 2}

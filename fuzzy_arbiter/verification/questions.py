@@ -22,7 +22,7 @@ HALF = Fraction(1, 2)
 SUPPORT = (Fraction(0), Fraction(1))
 FIRES, FULLY = rank(Fraction(0), SUPPORT), rank(Fraction(1), SUPPORT) - 1  # ranks to exceed
 ANY = 2**30  # number of groups that is never reached, for no upper limit
-SAMPLES = 4096  # greatest number of sampled combinations
+SAMPLES = 4096  # maximum number of sampled combinations
 
 
 class Effort:

@@ -9,7 +9,7 @@ from fuzzy_arbiter.table import aligned
 from fuzzy_arbiter.verification.cells import Stretch
 
 Severity = Literal["fault", "warning", "note"]
-SHOWN_ROWS = 32  # greatest number of crisp rows in the text
+SHOWN_ROWS = 32  # maximum number of crisp rows in the text
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.verification.report import Finding
 
-MAX_COMPARED = 100  # greatest number of rules with one conclusion that are compared with each other
+MAX_COMPARED = 100  # maximum number of rules with one conclusion that are compared with each other
 
 
 def unused(system: System) -> Iterator[Finding]:

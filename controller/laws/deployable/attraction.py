@@ -18,7 +18,7 @@ _SLOWEST_CORNER = 0.25  # speed at corners of 120 degrees and more, as a fractio
 
 
 def approach_speed(distance: float, deceleration: float, slope: float) -> float:
-    """Return the greatest speed [m/s] from which the vehicle can stop within a distance [m]."""
+    """Return the maximum speed [m/s] from which the vehicle can stop within a distance [m]."""
     # It is sqrt(2 a d), smoothed near 0, where it grows with `slope` [1/s]; the deceleration along it is below a.
     if distance <= 0.0:
         return slope * distance

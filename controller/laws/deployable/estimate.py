@@ -54,8 +54,8 @@ class Estimate(NamedTuple):
     last_measured: Array  # (6,) last measured position [m, NED] and velocity [m/s, body axes]
     mass_scale: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
     lags: Array  # (3,) s: estimated lag less a standard deviation, at least 0; the lag itself; the lag plus one
-    bracket: Array  # (2, m) N, forces at the end of the period, for the least and the greatest of `lags`
-    by_lag: Array  # (m,) N/s, secant of the acting forces between the least and the greatest of `lags`
+    bracket: Array  # (2, m) N, forces at the end of the period, for the minimum and the maximum of `lags`
+    by_lag: Array  # (m,) N/s, secant of the acting forces between the minimum and the maximum of `lags`
     curvature: Array  # (m,) N, difference of the acting forces from that secant
     # (3, m) N, by the ceiling: derivative of the acting forces; of those at the end of the period; (-) the ceilings
     # of these forces

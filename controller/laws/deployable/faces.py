@@ -17,7 +17,7 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-FACES = 2  # greatest number of faces besides the nearest that have barriers
+FACES = 2  # maximum number of faces besides the nearest that have barriers
 _LINE_SAMPLES = 16  # a stride along a line, which ends with an evaluation, is at least the line's length over this
 _HALVINGS = 6  # bisections of the interval in which the line leaves the region
 

@@ -26,7 +26,7 @@ from controller.regions.shape import (
     unit,
 )
 
-_STEPS = 200  # greatest number of steps, more than the root below ever needs
+_STEPS = 200  # maximum number of steps, more than the root below ever needs
 
 
 @dataclass(frozen=True)

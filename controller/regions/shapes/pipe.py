@@ -15,7 +15,7 @@ from controller.regions.mesh import AROUND, Mesh, lathe, weld
 from controller.regions.numbers import LENGTH, SIZE, Number, vector
 from controller.regions.shape import Array, Bounds, Evaluation, Vector3, ball_bounds, join, require, require_finite
 
-_MAX_STEPS = 20_000  # greatest number of steps of a ray; many where it runs just inside a straight surface
+_MAX_STEPS = 20_000  # maximum number of steps of a ray; many where it runs just inside a straight surface
 _ROUNDING = 1e-12  # distance to the surface that counts as 0, as a fraction of the radius
 _BEND = math.radians(15.0)  # rad, angle between rings about a corner
 _STRAIGHT = 1e-9  # rad, turn below which a line counts as straight

@@ -19,8 +19,8 @@ Facts = NDArray[np.bool_]
 CONFIDENCE = 0.95  # confidence level of all intervals
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 CHANCE = 0.01  # significance level of effects and rank correlations
-_BINS = 6  # greatest number of bins; fewer distinct values have one bin each
-_MIN_ROWS = 16  # least number of rows for an effect: two bins of eight
+_BINS = 6  # maximum number of bins; fewer distinct values have one bin each
+_MIN_ROWS = 16  # minimum number of rows for an effect: two bins of eight
 _RESAMPLES = 2000  # number of resamples of a bootstrap
 _ROUNDING = 1e-14  # relative range within which an outcome counts as constant
 

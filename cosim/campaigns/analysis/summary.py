@@ -16,7 +16,7 @@ from cosim.simulation.signals import Array
 
 SPREADS = ("reach_time", "min_clearance", "effort", "thrust_variation")  # columns with quantiles
 OF_ALL = ("min_clearance",)  # columns with quantiles over all scenes; the others over those that were reached
-_REASONS = 5  # greatest number of listed reasons for refusing rows
+_REASONS = 5  # maximum number of listed reasons for refusing rows
 MEDIANS = ("reach_time", "effort", "thrust_variation", "min_clearance", "worst_step_time")  # columns with medians
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.campaigns.store.results import Results
 
-LISTED = 10  # greatest number of rows that summaries and pages list
+LISTED = 10  # maximum number of rows that summaries and pages list
 
 
 def violated_column(results: Results) -> str:

@@ -21,8 +21,8 @@ from cosim.campaigns.store.results import Results
 RANDOM = "random"  # folder of the campaign with as many random rows
 _COLUMNS = {"clearance": "min_clearance", "violation": "weighted_violation", "arrival": "reach_time"}
 _REFUSED = 1e9  # cost of a row that was not flown, which the search avoids
-_STOPPED = -1e-6  # m, greatest clearance of a flight that the plant stopped, which counts as a violation
-_APART = 0.1  # least distance between listed rows: root mean square over the coordinates
+_STOPPED = -1e-6  # m, maximum clearance of a flight that the plant stopped, which counts as a violation
+_APART = 0.1  # minimum distance between listed rows: root mean square over the coordinates
 
 Search = SceneSearch | ScenarioSearch
 

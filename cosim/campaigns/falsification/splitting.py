@@ -20,7 +20,7 @@ _ACCEPTED = 0.3  # desired acceptance rate of the moves, to which the step is ad
 _GAIN = 2.0  # gain of that adaptation
 _SHORTEST = 0.02  # least step of a move [standard deviations]
 _TAIL = 0.025  # probability outside the interval on each side
-MIN_BUDGET = 100  # least number of points
+MIN_BUDGET = 100  # minimum number of points
 
 
 @dataclass(frozen=True)

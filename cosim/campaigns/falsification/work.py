@@ -30,7 +30,7 @@ from plant_fmu.toml_tables import hint
 Objective = Literal["clearance", "violation", "arrival"]
 OBJECTIVES: tuple[Objective, ...] = get_args(Objective)
 _LIMIT = 3.0  # standard deviations of a normal number within which a search stays
-_MAX_BUDGET = 1_000_000  # greatest number of rows
+_MAX_BUDGET = 1_000_000  # maximum number of rows
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,8 @@ from cosim.campaigns.pages.figures import WIDTH, legend_above
 from cosim.campaigns.store.results import Results
 from cosim.report.figures.style import BLACK, BLUE, GREEN, ORANGE, RED
 
-_MAX_SCENES = 1500  # greatest number of scenes that are drawn
-_NEVER = 1.12  # distance of missing numbers from the least number, as a multiple of the range of the numbers
+_MAX_SCENES = 1500  # maximum number of scenes that are drawn
+_NEVER = 1.12  # distance of missing numbers from the minimum number, as a multiple of the range of the numbers
 
 
 def side_by_side(one: str, results: Results, other: str, others: Results, columns: Sequence[tuple[str, str]]) -> Figure:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
 
 PAGE = "falsification.html"
-_LABELS = {"clearance": "least clearance [m]", "violation": "weighted violation [m s]", "arrival": "arrival [s]"}
+_LABELS = {"clearance": "minimum clearance [m]", "violation": "weighted violation [m s]", "arrival": "arrival [s]"}
 _UNITS = {objective: label[label.index("[") + 1 : -1] for objective, label in _LABELS.items()}
 
 

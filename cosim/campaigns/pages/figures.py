@@ -17,11 +17,11 @@ from cosim.simulation.signals import Array
 
 WIDTH = 5.6  # in, width of a figure, which is readable on a phone too
 _ACROSS = 2  # number of panels per row
-_MAX_KEYS = 8  # greatest number of keys that are drawn
-_POINTS = 700  # greatest number of points in a panel
-_TICKS = 5  # greatest number of intervals across a panel, so that labels of five digits fit
+_MAX_KEYS = 8  # maximum number of keys that are drawn
+_POINTS = 700  # maximum number of points in a panel
+_TICKS = 5  # maximum number of intervals across a panel, so that labels of five digits fit
 _WIDE = 30.0  # ratio of a logarithmic range from which on only powers of ten have ticks
-_STEPS = 400  # greatest number of steps of a drawn distribution
+_STEPS = 400  # maximum number of steps of a drawn distribution
 _DASHES = ("-", "--", "-.", ":")
 
 FACT_COLOURS = {"completed": BLUE, "reached": GREEN, "settled": BLUE, "violation": RED, "violated": RED}

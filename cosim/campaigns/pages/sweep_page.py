@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 PAGE = "sweep.html"
 _MIN_SHARE, _MIN_RHO = 0.01, 0.1  # least effects and rank correlations in the table
-_SHOWN, _VALUES = 8, 12  # greatest numbers of keys in figures and table, and of values listed for a key
+_SHOWN, _VALUES = 8, 12  # maximum numbers of keys in figures and table, and of values listed for a key
 
 
 def write_sweep_page(folder: Path, replays: int) -> Path:

@@ -151,7 +151,7 @@ def _scene_outcome(run: Run, conditions: Conditions) -> Outcome:
 
 
 def _least_clearance(run: Run) -> float:
-    """Return the least clearance of hard regions of position [m], inf where there is none."""
+    """Return the minimum clearance of hard regions of position [m], inf where there is none."""
     hard = [r.region.name for r in run.scenario.regions if r.region.hard and not of_attitude(r.region.shape)]
     return min((run.summary["min_clearance"][name] for name in hard), default=math.inf)
 

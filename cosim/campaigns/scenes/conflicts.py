@@ -28,9 +28,9 @@ Kinds = dict[str, Callable[[Generator], tuple[Table, list[Table]]]]
 # s, lag of each vehicle's thrusters; None: that of its file
 _LAGS = {"odin": 0.0, "bluerov2_heavy": 0.15, "rexrov": None}
 _PRIORITY = 4.0  # ratio of priorities of successive criteria
-_MAX_NET_WEIGHT = 50.0  # N, greatest magnitude of the net weight of a light vehicle
-_WEIGHT_FRACTION = 0.025  # greatest magnitude as a fraction of the weight, where that is more: of a heavy vehicle
-_CURRENT = 0.4  # m/s, greatest speed of the current
+_MAX_NET_WEIGHT = 50.0  # N, maximum magnitude of the net weight of a light vehicle
+_WEIGHT_FRACTION = 0.025  # maximum magnitude as a fraction of the weight, where that is more: of a heavy vehicle
+_CURRENT = 0.4  # m/s, maximum speed of the current
 _CRITERIA = ("obstacle", "shape", "depth", "visibility")
 
 
@@ -149,7 +149,7 @@ def _sides(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _squeeze(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make a least and a greatest depth, both soft, that exclude each other."""
+    """Make a least and a maximum depth, both soft, that exclude each other."""
     one, other = _two(rng)
     middle, overlap = rng.uniform(3.7, 4.3), rng.uniform(0.2, 1.0)
     return sphere_table((rng.uniform(8.0, 11.0), rng.uniform(-2.0, 2.0), middle), rng.uniform(0.8, 1.4)), [
@@ -159,7 +159,7 @@ def _squeeze(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _view(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make a moving feature to be kept in view, with an obstacle, clutter, and a greatest depth on the path."""
+    """Make a moving feature to be kept in view, with an obstacle, clutter, and a maximum depth on the path."""
     speed, drop = rng.uniform(0.1, 0.2), rng.uniform(0.0, 0.25)
     velocity = (speed, 0.0, drop * speed)
     end = 2.0 + 60.0 * speed
@@ -190,7 +190,7 @@ def _sides_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _depths_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make goals near a least and a greatest depth in turn, both soft, which exclude each other."""
+    """Make goals near a least and a maximum depth in turn, both soft, which exclude each other."""
     goal, regions = _squeeze(rng)
     x, y, z = goal["centre"]
     deep, shallow = z + rng.uniform(0.2, 0.8), z - rng.uniform(0.2, 0.8)
@@ -225,7 +225,7 @@ class _Family(NamedTuple):
 
 
 _KINDS: Kinds = {
-    "ceiling": partial(_closing, axis=2, middle=4.0),  # a ceiling and a greatest depth
+    "ceiling": partial(_closing, axis=2, middle=4.0),  # a ceiling and a maximum depth
     "dock": partial(_closing, axis=1, middle=0.0),  # the walls of a dock
     "door": _door,
     "sides": _sides,

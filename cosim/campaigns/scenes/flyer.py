@@ -34,7 +34,7 @@ class Score(NamedTuple):
     thrust_variation: float  # N, sum over thrusters of the absolute changes of the commanded force, from 0 on
     worst_step: float  # s, wall-clock time: longest time of law and allocation in a step
     failed_step: int  # plant step in which the FMU failed, -1 for none
-    bound_excess: float = -math.inf  # m, greatest excess of the law's bound over a clearance; -inf: it has no bound
+    bound_excess: float = -math.inf  # m, maximum excess of the law's bound over a clearance; -inf: it has no bound
     weighted_violation: float = 0.0  # m s, sum over regions of priority times the integral of the violation depth
 
 

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.scenes.trials import make_trial
 
-MAX_OBSTACLES = {"plain": 6, "hard": 14}  # greatest number of obstacles of each kind of scene
+MAX_OBSTACLES = {"plain": 6, "hard": 14}  # maximum number of obstacles of each kind of scene
 _GOAL_RADIUS = 0.5  # m
-_FREE = 0.6  # m, least distance of an obstacle from the start and from the goal region
+_FREE = 0.6  # m, minimum distance of an obstacle from the start and from the goal region
 
 
 def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[str]:

@@ -13,7 +13,7 @@ from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu import PlantFmuError
 from plant_fmu.toml_tables import Table
 
-_MAX_LENGTH = 60  # greatest number of characters of a kind
+_MAX_LENGTH = 60  # maximum number of characters of a kind
 
 
 class ScenarioScene(Table, frozen=True):

@@ -68,7 +68,7 @@ class Scene(Table, frozen=True):
     start: Vector3  # m, NED
     goal: SphereSpec
     obstacles: tuple[Obstacle, ...]
-    depth_band: tuple[Moderate, Moderate]  # m, least and greatest depth
+    depth_band: tuple[Moderate, Moderate]  # m, minimum and maximum depth
     current: Vector3  # m/s, NED
     weight_minus_buoyancy: float  # N
     righting_moment: float  # N m: z_G W - z_B B

@@ -14,7 +14,7 @@ from cosim.errors import ScenarioError
 from plant_fmu import PlantFmuError
 from plant_fmu.toml_tables import decode
 
-_MAX_BYTES = 1_000_000  # greatest number of bytes of a line, since a pipe may send an endless one
+_MAX_BYTES = 1_000_000  # maximum number of bytes of a line, since a pipe may send an endless one
 
 
 def decode_scene(line: bytes) -> AnyScene:

@@ -22,7 +22,7 @@ from plant_fmu.vehicle import Vehicle, load_vehicle
 VEHICLES = ("odin", "bluerov2_heavy", "rexrov")
 _START, _GOAL = np.array([0.0, 0.0, 4.0]), np.array([10.0, 0.0, 4.0])
 _GOAL_RADIUS = 0.5  # m
-_FREE = 0.8  # m, least distance of an obstacle from the start and from the goal region
+_FREE = 0.8  # m, minimum distance of an obstacle from the start and from the goal region
 
 
 def make_trial(seed: int) -> Table:

@@ -18,7 +18,7 @@ import plant_fmu
 _SOURCES = (".py", ".c", ".h", ".toml")  # suffixes of files that count as sources
 _LIBRARIES = ("subreach", "numpy", "pyarrow", "scipy")  # packages whose versions are part of a plan
 SCENES, SWEEP = "scenes", "sweep"  # kinds of campaigns
-_NAMED = 3  # greatest number of differences in a message
+_NAMED = 3  # maximum number of differences in a message
 
 
 def versions() -> dict[str, str]:

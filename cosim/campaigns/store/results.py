@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from cosim.errors import RunError
 from cosim.simulation.signals import Array
 
-_MAX_NUMBER = 1e100  # greatest size of a number, whose powers are still finite
+_MAX_NUMBER = 1e100  # maximum size of a number, whose powers are still finite
 _CHUNK = 1000  # number of rows that are read at once
 
 

@@ -20,8 +20,8 @@ from cosim.scenario.toml_file import plain_key, split_change
 
 Kind = Literal["grid", "random", "sobol", "lhs", "paired"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-MAX_ROWS = 10_000_000  # greatest number of rows
-_MAX_SOBOL_KEYS = 21201  # greatest number of keys of a Sobol' sequence
+MAX_ROWS = 10_000_000  # maximum number of rows
+_MAX_SOBOL_KEYS = 21201  # maximum number of keys of a Sobol' sequence
 _SEEDS = 2**31  # number of FMI integers from 0
 
 

@@ -12,8 +12,8 @@ from cosim.campaigns.workers.work import Rows
 FIRST = 1  # number of rows of the first batch, before the time of a row is known
 TARGET = 1.0  # s, desired time of a batch; one process submits and writes all batches, for any number of workers
 MIN_TIME = 0.05  # s, least time of a batch; the last ones are small, so that all workers end together
-GROWTH = 4  # greatest ratio of a batch's size to the one before: the time of first batches includes compiling
-MAX_ROWS = 65536  # greatest number of rows of a batch
+GROWTH = 4  # maximum ratio of a batch's size to the one before: the time of first batches includes compiling
+MAX_ROWS = 65536  # maximum number of rows of a batch
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 KILLED = "the process that flew it crashed each time (killed, or out of memory)"
 _CHECK_PERIOD = 5.0  # s between checks of the pool while no batch finishes
-_MAX_CRASHES = 30  # greatest number of crashes without a finished batch in between: with more, the cause is not a row
+_MAX_CRASHES = 30  # maximum number of crashes without a finished batch in between: with more, the cause is not a row
 
 
 def fly_all(work: Work, batches: Batches, pool: WorkerPool) -> Generator[Any, None, None]:

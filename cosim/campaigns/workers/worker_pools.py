@@ -32,7 +32,7 @@ class WorkerCrash:
 class WorkerPool:
     """Flies batches in this process; the other pools derive from it."""
 
-    width: int = 1  # greatest number of batches under way
+    width: int = 1  # maximum number of batches under way
 
     def submit(self, task: Task, batch: Any) -> Flight:
         """Fly a batch, or submit it to a worker."""

@@ -31,10 +31,10 @@ from cosim.simulation.signals import Array
 
 _FRAME = 0.1  # s of the wall clock, between snapshots
 _FAST = 200  # number of snapshots of a run that is played back at full speed
-_ROWS = 10_000  # greatest number of rows of a finished run
+_ROWS = 10_000  # maximum number of rows of a finished run
 _FRESH = 5.0  # s; a run whose newest rows are older is not being recorded
 _ANSWER = 5.0  # s, timeout of a connection to a live view
-_GREATEST = 1 << 26  # bytes, greatest size of a message
+_GREATEST = 1 << 26  # bytes, maximum size of a message
 
 
 class _Signal(msgspec.Struct):

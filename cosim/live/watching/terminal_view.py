@@ -11,7 +11,7 @@ from rich.text import Text
 from cosim.live.watching.run_views import Snapshot
 from cosim.simulation.commands.commands import MODES
 
-_NAME = 16  # greatest number of characters of a name
+_NAME = 16  # maximum number of characters of a name
 _FIRED = 0.005  # least strength of a rule that is shown
 
 

@@ -55,7 +55,7 @@ function tickTexts(values) {
 /** Return the rows that cover a time window, one beyond on each side: [first, past the last]. */
 const rowsIn = (run, [from, to]) => (run.rows ? [run.row(from), Math.min(run.rows, run.row(to) + 2)] : [0, 0]);
 
-/** Return the least and the greatest finite value of some curves in a time window. */
+/** Return the minimum and the maximum finite value of some curves in a time window. */
 function extentIn(curves, window) {
   let [low, high] = [Infinity, -Infinity];
   for (const { run, values } of curves) {
@@ -94,7 +94,7 @@ function rangeOf(curves, window, zero) {
 /**
  * Add a curve to the path of a context.
  *
- * Where rows are denser than pixels, only the first, least, greatest and last value of each pixel column are drawn.
+ * Where rows are denser than pixels, only the first, minimum, maximum and last value of each pixel column are drawn.
  * Numbers that are not finite leave a gap.
  */
 function traceCurve(context, { run, values }, window, toX, toY) {

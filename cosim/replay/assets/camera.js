@@ -144,7 +144,7 @@ class Camera {
   }
 
   /**
-   * Return the least distance from eye to target that frames all content along one axis of the picture.
+   * Return the minimum distance from eye to target that frames all content along one axis of the picture.
    *
    * `below` and `above` are tangents of the half angles. `middle` maps a distance to the middle of the content along
    * `side`. Both bounds are linear in the distance, so the solution is closed.

@@ -6,7 +6,7 @@ class Forces {
     this.run = run;
     this._rows = 0; // that are evaluated
     this._thrusters = false; // true once any thruster had a force
-    this._most = 0; // N, the greatest force on the body
+    this._most = 0; // N, the maximum force on the body
   }
 
   /**

@@ -31,7 +31,7 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
     if data.scenario.moving:
         moving_note = (
             " What moved is faint where it began and ended; regions are full where they were when the vehicle had "
-            "least clearance to them."
+            "minimum clearance to them."
         )
     if targets_of(data):
         moving_note += " Diamonds: the targets before the last one, numbered as they were commanded."

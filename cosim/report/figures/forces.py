@@ -13,7 +13,7 @@ from cosim.results.record import Rows
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-_FLOOR = 1e-2  # N, least value on a logarithmic axis
+_FLOOR = 1e-2  # N, minimum value on a logarithmic axis
 _ESTIMATES = ("W − B", "x_G W − x_B B", "y_G W − y_B B", "z_G W − z_B B")
 
 
@@ -52,7 +52,7 @@ def forces(data: FigureData) -> Figure:
 def thruster_caption(scenario: Scenario) -> str:
     """Return the caption of the figure of thrusters."""
     if scenario.actuation.through == "thrusters":
-        return "Force of each thruster, and the least and greatest of any of them (dashed black)."
+        return "Force of each thruster, and the minimum and maximum of all (dashed black)."
     return (
         "What the acting body wrench would ask of each thruster (pseudo-inverse), and what a thruster gives (dashed "
         "black): in this scenario the wrench acts on the body directly, not through the thrusters."

@@ -39,10 +39,10 @@ from cosim.simulation.signals import Array
 
 SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # view of north and depth, looking west
 ABOVE = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # view of north and east
-_TALLEST = 7.6  # inches, greatest height of both planes together
+_TALLEST = 7.6  # inches, maximum height of both planes together
 _FAINT = 0.35  # opacity of a region where it began or ended
 _GAP = 0.34  # inches between the planes
-_NAMED = 8  # greatest number of regions that are labelled in space
+_NAMED = 8  # maximum number of regions that are labelled in space
 
 
 def path_3d(data: FigureData) -> Figure:

@@ -18,10 +18,10 @@ from cosim.results.run_result import Run
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-_WHOLE = 200_000  # greatest number of rows of a record that is used as a whole
-_MOST = 80_000  # greatest number of rows with extremes
+_WHOLE = 200_000  # maximum number of rows of a record that is used as a whole
+_MOST = 80_000  # maximum number of rows with extremes
 _EVEN = 2_000  # number of evenly spaced rows
-_CHANGES = 100  # greatest number of changes by commands in a block of rows; in all a hundred times as many
+_CHANGES = 100  # maximum number of changes by commands in a block of rows; in all a hundred times as many
 _DRAWN = (
     "time", "position.", "quaternion.", "velocity.", "attitude.", "membership.", "weight.", "estimate.", "command.",
     "actuation.", "thruster_force[", "commands.", "target.", "lyapunov.",

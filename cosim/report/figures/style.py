@@ -73,7 +73,7 @@ class NamedFigure:
 
 
 def thin(time: Array, signal: Array) -> tuple[Array, Array]:
-    """Thin a signal for drawing to the least and the greatest value in each part of the time; time [s], returns [s]."""
+    """Thin a signal to the minimum and the maximum value in each part of the time; time [s], returns [s]."""
     n = len(time)
     if n <= 2 * POINTS:
         return time, signal
@@ -105,7 +105,7 @@ class Place:
 
 
 def places_of(data: FigureData) -> Iterator[Place]:
-    """Yield the goal at the end of the run, and each region at the time of its least clearance."""
+    """Yield the goal at the end of the run, and each region at the time of its minimum clearance."""
     # A moving region is preceded by itself at the start and at the end, marked as faint. Regions of attitude have no
     # position and are skipped.
     dynamic = {secondary.region.name for secondary in data.scenario.regions if secondary.is_dynamic}
@@ -132,7 +132,7 @@ def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
 
 
 def shifts_of(record: Rows, name: str) -> Array:
-    """Return the shift of a region from its place in the scenario at each step, shape (steps, 3) [m, NED]."""
+    """Return the shift of a region from its position in the scenario at each step, shape (steps, 3) [m, NED]."""
     if f"{name}.shift.x" not in record.units:
         return np.zeros((len(record), 3))
     return record.stack([f"{name}.shift.{axis}" for axis in "xyz"])

@@ -37,10 +37,10 @@ from cosim.simulation.commands.commands import MODES
 from cosim.simulation.signals import Array
 
 _AWAY = 1e4  # m; regions further away are free obstacle slots
-_NAMED = 8  # greatest number of regions that a legend names one by one
+_NAMED = 8  # maximum number of regions that a legend names one by one
 _NEAREST = 5  # regions named beside the goal if there are more
 DASHES = ("-", "--", "-.", ":")
-_WINDOWS = 3  # greatest number of windows that are shown
+_WINDOWS = 3  # maximum number of windows that are shown
 _WIDER = 1.6  # end of the enlarged span, relative to the end of the first overlap
 _TIME = "time [s]"
 

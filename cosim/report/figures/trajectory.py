@@ -11,7 +11,7 @@ from cosim.replay.activity import active_at, activity_signals
 from cosim.report.figures.style import POINTS, FigureData
 from cosim.simulation.signals import Array
 
-_TARGETS = 12  # greatest number of targets that are drawn
+_TARGETS = 12  # maximum number of targets that are drawn
 POSITION = ("position.x", "position.y", "position.z")
 
 

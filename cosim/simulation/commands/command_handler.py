@@ -61,7 +61,7 @@ class CommandHandler:
         self.control_regained = self.turned = self.changed = self.reset = False
         self._environment, self._actuators, self._state, self._out = environment, actuators, state, out
         vehicle = scenario.vehicle
-        # greatest wrench along and about each axis, which a full stick commands
+        # maximum wrench along and about each axis, which a full stick commands
         self._greatest_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._manual: Array = np.zeros(6)
         self._by_gain = True  # True if the pilot's gain scales the sticks
@@ -222,7 +222,7 @@ class CommandHandler:
 
 
 def greatest_wrench(matrix: Array, lower: Array, upper: Array) -> Array:
-    """Return the greatest wrench along and about each single axis, in both directions, by least-norm allocation."""
+    """Return the maximum wrench along and about each single axis, in both directions, by least-norm allocation."""
     # with matrix [-, m], lower, upper [N], returns [N, N m]
     inverse = np.linalg.pinv(matrix)
     limit = np.minimum(-lower, upper)

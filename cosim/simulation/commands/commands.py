@@ -18,10 +18,10 @@ STICK_MODES: tuple[Mode, ...] = ("manual", "stabilize", "depth_hold")  # manual 
 
 NOT_A_COMMAND = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # raised by msgspec for an invalid text
 
-_FAR = 1e5  # m, greatest coordinate, displacement and radius of a command
-_FAST = 1e2  # m/s, greatest velocity of a command
+_FAR = 1e5  # m, maximum coordinate, displacement and radius of a command
+_FAST = 1e2  # m/s, maximum velocity of a command
 _LONG = 1e9  # s, longest stay of a mission item
-_UNIT = 1e-2  # greatest deviation of a quaternion's length from 1
+_UNIT = 1e-2  # maximum deviation of a quaternion's length from 1
 
 
 def _tag(name: str) -> str:
@@ -66,7 +66,7 @@ class SetHeading(_Command, frozen=True):
 
 
 class ManualControl(_Command, frozen=True):
-    """Control manually: a fraction, from -1 to 1, of the greatest wrench along and about each body axis."""
+    """Control manually: a fraction, from -1 to 1, of the maximum wrench along and about each body axis."""
 
     wrench: Vector6  # fractions, [-]
     by_gain: bool = True  # True: the pilot's gain scales the fractions
@@ -78,7 +78,7 @@ class SetAttitude(_Command, frozen=True):
     # Another mode, another target, or an attitude of None ends it.
 
     quaternion: tuple[float, float, float, float] | None  # unit quaternion from body to world, scalar first
-    force: Vector3 | None = None  # fractions [-] of the greatest force along each body axis; None: the sticks'
+    force: Vector3 | None = None  # fractions [-] of the maximum force along each body axis; None: the sticks'
     rate_down: float | None = None  # m/s, of the depth, in place of a vertical force
 
 

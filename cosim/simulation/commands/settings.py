@@ -14,9 +14,9 @@ from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
 from plant_fmu.variables import variables
 
-_GREATEST_RAMP = 1e3  # m, greatest value of ``arbiter.ramp``
+_GREATEST_RAMP = 1e3  # m, maximum value of ``arbiter.ramp``
 _LEAST_RADIUS = 1e-2  # m, least radius of obstacles and of the target while holding
-_COMMAND_SETTINGS = {  # unit, least, greatest
+_COMMAND_SETTINGS = {  # unit, minimum, maximum
     "obstacle_radius": ("m", _LEAST_RADIUS, 1e3),
     "hold_radius": ("m", _LEAST_RADIUS, 1e3),
     "surface_depth": ("m", 0.0, 1e3),

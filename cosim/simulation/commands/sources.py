@@ -15,9 +15,9 @@ from cosim.errors import CommandError, RunError
 from cosim.scenario.validation import MAX_STEPS
 from cosim.simulation.commands.commands import NOT_A_COMMAND, Command, Reset, validate_command
 
-QUEUED = 256  # greatest number of commands between two steps; further ones are rejected
-RUNS = 100  # greatest number of runs of a session: further resets are rejected
-LOG_BYTES = 64_000_000  # greatest size of a run's commands in its log: some hours of sticks; further ones are rejected
+QUEUED = 256  # maximum number of commands between two steps; further ones are rejected
+RUNS = 100  # maximum number of runs of a session: further resets are rejected
+LOG_BYTES = 64_000_000  # maximum size of a run's commands in its log: some hours of sticks; further ones are rejected
 
 
 class CommandSource(Protocol):

@@ -207,7 +207,7 @@ def test_sweep_page_lists_varied_keys_and_outcomes(tmp_path, fakes):
         told["violated a hard region"][0] == f"{100 * share['share']:.0f}\N{NO-BREAK SPACE}%, ρ\N{NO-BREAK SPACE}+0.87"
     )
     assert told["violated a hard region"][-1] == f"{100 * share['floor']:.0f}\N{NO-BREAK SPACE}%"
-    assert told["least clearance [m]"][0].endswith("ρ\N{NO-BREAK SPACE}+1.00") and told["effort [N s]"][0] == "", (
+    assert told["minimum clearance [m]"][0].endswith("ρ\N{NO-BREAK SPACE}+1.00") and told["effort [N s]"][0] == "", (
         "it is all of the gain"
     )
     assert sum("expected less" in row[-1] for row in checker.rows) == 5

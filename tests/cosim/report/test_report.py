@@ -208,7 +208,7 @@ def test_summary_numbers_are_labeled_with_units(shipped_run):
     checker = Checker()
     checker.feed(page_of(run))
     words = " ".join(" ".join(checker.words).split())
-    assert "greatest force that acted, norm [N]" in words
+    assert "maximum force that acted, norm [N]" in words
     assert f"{run.summary['max_force']:,.0f}".replace(",", " ") in words
     assert "max_force" not in words and "reach_time" not in words
     assert "cosim run scenario.toml --out again" in words

@@ -21,9 +21,9 @@ from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
 
-# greatest number of evaluations of the regions along a path: in one call; in total, after which the rest is blocked
+# maximum number of evaluations of the regions along a path: in one call; in total, after which the rest is blocked
 _SAMPLES = (64, 512)
-_STRIDE = (0.08, 3.0)  # m, least and greatest distance between two evaluations
+_STRIDE = (0.08, 3.0)  # m, minimum and maximum distance between two evaluations
 _TRUST = 0.7  # ratio of a stride to the clearance beyond the desired one
 _INSIDE = 200.0  # penalty per metre of path closer to a hard region than the margin; added once more per metre closer
 _EDGE = 0.1  # m closer than the margin at which it is full; proportional before, so that no stride's end decides
@@ -36,10 +36,10 @@ _FIRST_LATER = 1.0  # s from now, time of the second evaluation
 _LATER_RATIO = 3.0  # ratio of the time of each further evaluation to the one before
 _FAST = 0.25  # fraction of the vehicle's speed above which a hard region may run into a vehicle at rest
 _FORESIGHT = 8.0  # s from now, to which such regions are predicted there
-_PREDICTIONS = 16  # greatest number of predictions of one of them
+_PREDICTIONS = 16  # maximum number of predictions of one of them
 _WAIT = 0.5  # m, cost of a wait
 _AWAY = 0.05  # m, distance from a soft region within which a stay counts as inside: keeps the end off its surface
-_COARSE = 0.25  # m, least distance between two evaluations near the surface of a soft region
+_COARSE = 0.25  # m, minimum distance between two evaluations near the surface of a soft region
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 
@@ -123,7 +123,7 @@ def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> N
 def _evaluate_point(
     cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits
 ) -> tuple[float, float, float]:
-    """Return the least clearance of hard regions [m], the penalty of soft ones per metre, and the stride limit [m]."""
+    """Return the minimum clearance of hard regions [m], the penalty of soft ones per meter, the stride limit [m]."""
     travelled = cost.travelled[0] + cost.travelled[1]
     later = travelled / limits.speed  # s
     effect_distance = limits.clearance + _STRIDE[1] / _TRUST  # m, clearance beyond which a hard region has no effect

@@ -32,17 +32,17 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 _LN_30 = 3.4011973816621555
-CORNERS = 8  # greatest number of corners of a path
+CORNERS = 8  # maximum number of corners of a path
 _BETTER = 0.03  # m, constant part of the cost that a candidate must save to replace the path
 _BETTER_PART = 0.01  # proportional part of that, as a fraction of the path's cost
 _BLOCKED = 0.3  # cost by regions, as a fraction of the path's length, above which the trees search for another path
 _HARD, _ALL, _COSTLY = 0, 1, 2  # regions closed to the search: hard ones; all; hard ones and the costlier soft ones
-_SEARCH_CALLS = (100, 800)  # calls of the search with one choice of closed regions: at first; greatest number
+_SEARCH_CALLS = (100, 800)  # calls of the search with one choice of closed regions: at first; maximum number
 _BLOCKED_LONG = 1.0  # s, time for which the path has been blocked, after which the trees grow by more nodes a period
 _MORE_CALLS = 8  # calls of the search a period from then on: the vehicle goes astray meanwhile
 _SECOND_LOOK = 2.0  # s, time for which new trees then look for other paths, since the first one found may be a detour
 _PASSED = 0.25  # m, distance from a corner within which it counts as passed
-_CLIMBS = 12  # greatest number of steps from a point into the goal region
+_CLIMBS = 12  # maximum number of steps from a point into the goal region
 _PAYS = 0.05  # least gain in depth per metre of such a step; it gains 1 where the gradient does not turn
 _DEEP_ENOUGH = 1e-3  # m, tolerance of the depth of an end
 _BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: no evaluation under way; the path is evaluated; the candidate is

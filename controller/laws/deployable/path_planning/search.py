@@ -25,12 +25,12 @@ Array = NDArray[np.float64]
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _NODES = 512  # number of nodes at which a tree restarts
-_CHAIN = 64  # greatest number of points of a path before it is shortened
+_CHAIN = 64  # maximum number of points of a path before it is shortened
 _REACH = (1.5, 0.1)  # longest edge: length [m]; fraction of the distance from start to end, if that is longer
 SAMPLING_MARGIN = (3.0, 32.0)  # m beyond start and end within which random nodes lie: at first; greatest
 _GROWS = 1.003  # factor by which that distance grows with each call
-_STRIDE = 0.05  # m, least distance between two evaluations along a line
-_LINE_SAMPLES = 32  # greatest number of evaluations along a line
+_STRIDE = 0.05  # m, minimum distance between two evaluations along a line
+_LINE_SAMPLES = 32  # maximum number of evaluations along a line
 _ANCESTORS = 2  # number of ancestors tested as parents of a new node, besides the nearest node
 _SLACK = 0.005  # m by which edges from a root may be closer to hard regions than the root
 _MOVED = 0.3  # m, motion of start or end above which its tree gets a new root; also the shortest edge before a wall
@@ -44,7 +44,7 @@ class PathLimits(NamedTuple):
     """Requirements of a path."""
 
     clearance: float  # m, desired clearance of hard regions
-    margin: float  # m, least clearance of hard regions
+    margin: float  # m, minimum clearance of hard regions
     speed: float  # m/s, speed of the vehicle
     depth: float  # m, depth in the goal region at which the path ends
 
@@ -92,7 +92,7 @@ def uncertainty(regions: PackedRegions, i: int) -> float:
 
 
 def clearance_of_all(point: Array, regions: PackedRegions, scratch: Array) -> float:
-    """Return the least clearance [m] of the hard regions of position at a point; `scratch` has shape (3,)."""
+    """Return the minimum clearance [m] of the hard regions of position at a point; `scratch` has shape (3,)."""
     min_clearance = np.inf
     for i in range(regions.kinds.size):
         if regions.hard[i] and regions.kinds[i] < _ATTITUDE:
