@@ -34,7 +34,7 @@ _FAST = 200  # number of snapshots of a run that is played back at full speed
 _ROWS = 10_000  # maximum number of rows of a finished run
 _FRESH = 5.0  # s; a run whose newest rows are older is not being recorded
 _ANSWER = 5.0  # s, timeout of a connection to a live view
-_GREATEST = 1 << 26  # bytes, maximum size of a message
+_MAX_SIZE = 1 << 26  # bytes of a message
 
 
 class _Signal(msgspec.Struct):
@@ -103,7 +103,8 @@ def snapshots(what: str, rate: float | None = 1.0, once: bool = False) -> Iterat
         return _finished(path, rate, once)
     if not once:
         return running
-    return itertools.islice((one for one in running if one.row is not None or one.ended or one.silent), 1)
+    settled = (snapshot for snapshot in running if snapshot.row is not None or snapshot.ended or snapshot.silent)
+    return itertools.islice(settled, 1)
 
 
 # ---- folders -------------------------------------------------------------------------------------------------------
@@ -119,19 +120,19 @@ def _finished(path: Path, rate: float | None, once: bool) -> Iterator[Snapshot]:
     times, ending = picked[:, 0], (str(run.summary["status"]), verdict(run.summary))
     header = header_of(run.scenario, view_columns.columns)
 
-    def at(k: int, note: str, end: tuple[str, str] | None = None) -> Snapshot:
+    def snapshot(k: int, note: str, end: tuple[str, str] | None = None) -> Snapshot:
         return Snapshot(header, view_columns.compute_rows(picked[k : k + 1])[0], note, end)
 
     began, k = time.monotonic(), 0
     note = "replay" if rate is None else f"replay, {rate:g} times real time"
     while k < len(times) - 1:
-        yield at(k, note)
+        yield snapshot(k, note)
         if rate is None:
             k += max(1, len(times) // _FAST)
         else:
             time.sleep(_FRAME)
             k = int(np.searchsorted(times, times[0] + rate * (time.monotonic() - began), side="right")) - 1
-    yield at(len(times) - 1, "replay", ending)
+    yield snapshot(len(times) - 1, "replay", ending)
 
 
 def _is_being_recorded(path: Path) -> bool:
@@ -151,14 +152,15 @@ def _recording(path: Path) -> Iterator[Snapshot]:
     known, since = 0, time.monotonic()
     while not (path / SUMMARY).exists():
         record = None
-        with contextlib.suppress(RunError):  # before the first rows, and while the run completes its record
-            record = load_record(path)
-        if record is not None and len(record) > known:
+        with contextlib.suppress(FileNotFoundError, RunError):  # no rows yet, or the run completes its record
+            if (size := (path / STREAM).stat().st_size) > known:  # a stream is read from its start
+                known, record = size, load_record(path)
+        if record is not None and len(record):
             require_columns(scenario, record)
             view_columns = ViewColumns(scenario, record.columns)
             header = header_of(scenario, view_columns.columns)
             last = record.take([len(record) - 1]).to_array()
-            known, since = len(record), time.monotonic()
+            since = time.monotonic()
             row = view_columns.compute_rows(last[:, view_columns.picked])[0]
         silent = time.monotonic() - since
         wait = f"no new rows for {silent:.0f} s: waiting, writing its report, or killed"
@@ -192,7 +194,7 @@ def _live(endpoint: tuple[str, int]) -> Iterator[Snapshot]:
     try:
         # connecting by our own socket bypasses proxies
         reached = socket.create_connection(endpoint, timeout=_ANSWER)
-        with connect(url, sock=reached, open_timeout=_ANSWER, max_size=_GREATEST, compression=None) as connection:
+        with connect(url, sock=reached, open_timeout=_ANSWER, max_size=_MAX_SIZE, compression=None) as connection:
             row: Array | None = None
             shown = -math.inf
             for message in connection:

@@ -13,6 +13,7 @@ import subprocess
 import sys
 import termios
 import threading
+from unittest import mock
 
 import numpy as np
 import pytest
@@ -139,6 +140,8 @@ def test_a_run_that_is_being_written_is_followed_to_its_end(paper, tmp_path):
         recorder.observe(k, rows[k])
     frame = next(frames)
     assert (frame["time"], frame.note) == (1.999, "being recorded")
+    with mock.patch("cosim.live.watching.run_views.load_record") as read:
+        assert [next(frames)["time"] for _ in range(3)] == [1.999] * 3 and not read.called
     assert [look["time"] for look in snapshots(str(folder), once=True)] == [1.999]
     for k in range(2001, len(rows)):
         recorder.observe(k, rows[k])
