@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -177,15 +177,9 @@ def _potential(start: _Start) -> Finding:
 
 def _lower_sigma(start: _Start) -> str:
     """Return advice on sigma_p, or on sigma_a where the condition fails in attitude."""
-
-    def greatest(gains: Gains, name: str) -> float | None:
-        return _greatest_sigma(
-            lambda sigma: least_of_potential_test(start.model.mass, start.slope, gains._replace(**{name: sigma}))
-        )
-
-    if sigma := greatest(start.gains, "sigma_p"):
+    if sigma := _max_sigma(start, start.gains, "sigma_p"):
         return f"Lower law.gains.sigma_p to {_below(sigma)}" + start.or_start_within(0)
-    if sigma := greatest(start.gains._replace(sigma_p=0.0), "sigma_a"):
+    if sigma := _max_sigma(start, start.gains._replace(sigma_p=0.0), "sigma_a"):
         return f"Lower law.gains.sigma_a to {_below(sigma)}: the condition fails in attitude, everywhere."
     return "Raise law.gains.k_p1 and k_p2 above 0."
 
@@ -254,14 +248,18 @@ def _error(goal: Region, position: Array) -> Array:
     return primary_error(*_value_and_gradient(goal, position))
 
 
-def _greatest_sigma(test: Callable[[float], float]) -> float | None:
-    """Return the sigma at which a test changes from above 0 to below, None if it fails at 0 already."""
-    if test(0.0) <= 0.0:
+def _max_sigma(start: _Start, gains: Gains, name: str) -> float | None:
+    """Return the value of a sigma up to which (38) 1, 2 holds, None if it fails at 0 already."""
+
+    def margin(sigma: float) -> float:
+        return least_of_potential_test(start.model.mass, start.slope, gains._replace(**{name: sigma}))
+
+    if margin(0.0) <= 0.0:
         return None
     upper = 1e-6
-    while test(upper) > 0.0:
+    while margin(upper) > 0.0:
         upper *= 10.0
-    return float(brentq(test, 0.0, upper))
+    return float(brentq(margin, 0.0, upper))
 
 
 def _below(bound: float) -> str:

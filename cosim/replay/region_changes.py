@@ -17,8 +17,7 @@ from cosim.replay.header import limits_of, shape_of
 from cosim.results.as_flown import radii_of
 from cosim.results.record import Rows
 from cosim.results.run_result import COMMANDS_LOG, Run
-from cosim.scenario.region_tables import PARKED_POSITION
-from cosim.scenario.tables import SecondaryRegion
+from cosim.scenario.region_tables import PARKED_POSITION, SecondaryRegion
 from cosim.simulation.commands.commands import (
     MODES,
     ChangeSetting,

@@ -60,7 +60,7 @@ def contents_of(run: Run) -> Contents:
         isolated=format_isolations(run.summary) or "none",
         limited=math.isfinite(s.limit.force) or s.limit.time_constant > 0.0,
         log=log_contents(run),
-        repeatable=not s.log and not s.law.own and s.law.name in LAWS,
+        repeatable=not s.log and not s.law.is_custom and s.law.name in LAWS,
     )
 
 

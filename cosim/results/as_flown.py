@@ -9,9 +9,8 @@ import numpy as np
 
 from controller.regions import Sphere
 from cosim.results.record import Rows
-from cosim.scenario.region_tables import PARKED_POSITION
+from cosim.scenario.region_tables import PARKED_POSITION, SecondaryRegion
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import SecondaryRegion
 from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array
 

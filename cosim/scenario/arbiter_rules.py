@@ -14,7 +14,8 @@ import msgspec
 from controller.regions.region_set import of_attitude
 from cosim.errors import ScenarioError
 from cosim.scenario.criteria import PAPER, CriterionSetup
-from cosim.scenario.tables import ArbiterSetup, RuleVariant, SecondaryRegion
+from cosim.scenario.region_tables import SecondaryRegion
+from cosim.scenario.tables import ArbiterSetup, RuleVariant
 from fuzzy_arbiter import Arbiter, ArbiterError, Rule, Shape, System, Term, Variable, prioritised
 from fuzzy_arbiter.formats import FORMATS, reads
 from plant_fmu.toml_tables import hint

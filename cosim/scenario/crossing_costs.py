@@ -15,7 +15,7 @@ from dataclasses import replace
 
 from controller.regions.region_set import of_attitude
 from cosim.scenario.arbiter_rules import ArbiterRules, InputSignal
-from cosim.scenario.tables import SecondaryRegion
+from cosim.scenario.region_tables import SecondaryRegion
 from fuzzy_arbiter import Arbiter, System
 
 _EQUAL = 2.0  # m, cost at share 1/2

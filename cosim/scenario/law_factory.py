@@ -28,7 +28,7 @@ def law_of(scenario: Scenario) -> CompiledLaw:
 
 def require_builtin_law(scenario: Scenario) -> None:
     """Raise `RunError` if a scenario's law is a custom one, whose code is not in its file."""
-    if scenario.law.own:
+    if scenario.law.is_custom:
         raise RunError(
             f"law.name is {scenario.law.name!r}, a law of one's own, which no file holds: expected a run from Python, "
             f"by run_scenario(..., law=...), or another law.name, one of {', '.join(sorted(LAWS))}"

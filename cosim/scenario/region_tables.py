@@ -1,13 +1,15 @@
-"""The tables of a scenario's goal, regions, shapes and criteria."""
+"""The tables of a scenario's goal, regions, shapes and criteria; and a secondary region with its criterion."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Union, get_type_hints
 
 import msgspec
 
 from controller.errors import RegionError
+from controller.regions import Region
 from controller.regions.region_set import deviations_of
 from controller.regions.shape import Shape
 from controller.regions.shapes import ENTRIES
@@ -140,3 +142,19 @@ class RegionEntry(Table, frozen=True):
     def __post_init__(self) -> None:
         ok = all(0.0 <= deviation < math.inf for deviation in deviations_of(self.deviation))
         require(ok, "deviation", self.deviation, "finite, 0 m or above, one number or three")
+
+
+@dataclass(frozen=True)
+class SecondaryRegion:
+    """A region and its criterion."""
+
+    region: Region
+    criterion: str  # name of a criterion of the scenario
+    streamed: bool = False  # True: moved from outside during the run
+    is_dynamic: bool = False  # slot for an obstacle that commands may add during the run
+    priority: float = 1.0  # factor of its violation in the score
+
+    @property
+    def moves(self) -> bool:
+        """True if it may move away from its position in the scenario."""
+        return self.streamed or any(self.region.velocity)

@@ -23,7 +23,7 @@ from cosim.scenario.changes import changed_keys, differing_keys, join_keys, show
 from cosim.scenario.criteria import PAPER, CriterionSetup, check_criteria, check_criteria_of_regions, fill_criteria
 from cosim.scenario.crossing_costs import with_crossing_costs
 from cosim.scenario.keys import comments
-from cosim.scenario.region_tables import PAPER_CRITERIA, Vector3
+from cosim.scenario.region_tables import PAPER_CRITERIA, SecondaryRegion, Vector3
 from cosim.scenario.tables import (
     Actuation,
     ArbiterSetup,
@@ -37,7 +37,6 @@ from cosim.scenario.tables import (
     Outage,
     PlantSetup,
     RecordSetup,
-    SecondaryRegion,
     Sensing,
     Time,
 )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The tables of a scenario's file: each key with its type, range, unit and meaning; and checked values."""
+"""The tables of a scenario's file: each key with its type, range, unit and meaning."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from typing import Annotated, Any, Literal, NamedTuple
 import msgspec
 
 from controller import LAWS
-from controller.regions import Region
 from cosim.scenario.region_tables import PAPER_CRITERIA, CriterionEntry, RegionEntry, Vector3, Vector4, Vector6
 from plant_fmu.toml_tables import Finite, NonNegative, Positive, Table, Unlimited, hint, key, require
 
@@ -28,9 +27,6 @@ def require_text(name: str, text: str) -> None:
 def _require_unit(name: str, quaternion: Vector4) -> None:
     ok = abs(math.hypot(*quaternion) - 1.0) < 1e-6
     require(ok, name, quaternion, "four numbers of length 1")
-
-
-# ---- tables of the file --------------------------------------------------------------------------------------------
 
 
 class PlantSetup(Table, frozen=True):
@@ -235,6 +231,24 @@ class Time(Table, frozen=True):
             msgspec.structs.force_setattr(self, name, getattr(self, name) or self.step)
 
 
+class NoGains(NamedTuple):
+    """Gains of a custom law in a scenario: none."""
+
+
+@dataclass(frozen=True)
+class LawSetup:
+    """Name, desired attitude and gains of the law."""
+
+    name: str  # one of controller.LAWS; with a colon: source of a custom law, such as mine.py:steer
+    desired_quaternion: Vector4  # attitude to be kept, body to world, scalar first
+    gains: Any  # gains of that law's gains_type; `NoGains` for a custom law
+
+    @property
+    def is_custom(self) -> bool:
+        """True if it is a custom law, whose code is not in the file."""
+        return isinstance(self.gains, NoGains)
+
+
 class LawEntry(Table, frozen=True):
     """Name and gains of the law; gains that are not given are the law's own."""
 
@@ -349,40 +363,3 @@ class File(Table, frozen=True):
             require_text(name, getattr(self, name))
         for changed in self.changed:
             require_text("changed", changed)
-
-
-# ---- checked values ------------------------------------------------------------------------------------------------
-
-
-class NoGains(NamedTuple):
-    """Gains of a custom law in a scenario: none."""
-
-
-@dataclass(frozen=True)
-class LawSetup:
-    """Name, desired attitude and gains of the law."""
-
-    name: str  # one of controller.LAWS; with a colon: source of a custom law, such as mine.py:steer
-    desired_quaternion: Vector4  # attitude to be kept, from body to world, scalar first
-    gains: Any  # gains of that law's gains_type; `NoGains` for a custom law
-
-    @property
-    def own(self) -> bool:
-        """True if it is a custom law, whose code is not in the file."""
-        return isinstance(self.gains, NoGains)
-
-
-@dataclass(frozen=True)
-class SecondaryRegion:
-    """A region and its criterion."""
-
-    region: Region
-    criterion: str  # name of a criterion of the scenario
-    streamed: bool = False  # True: moved from outside during the run
-    is_dynamic: bool = False  # slot for an obstacle that commands may add during the run
-    priority: float = 1.0  # factor of its violation in the score
-
-    @property
-    def moves(self) -> bool:
-        """True if it may move away from its position in the scenario."""
-        return self.streamed or any(self.region.velocity)

@@ -13,8 +13,8 @@ from controller.regions import Region, Sphere
 from controller.regions.region_set import of_attitude
 from controller.regions.shape import Shape
 from cosim.errors import ScenarioError
-from cosim.scenario.region_tables import PARKED_POSITION, AnyShape, GoalMotion, RegionEntry
-from cosim.scenario.tables import Commands, File, LawEntry, LawSetup, Limit, SecondaryRegion
+from cosim.scenario.region_tables import PARKED_POSITION, AnyShape, GoalMotion, RegionEntry, SecondaryRegion
+from cosim.scenario.tables import Commands, File, LawEntry, LawSetup, Limit
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.toml_tables import decode, hint
 from plant_fmu.variables import variables

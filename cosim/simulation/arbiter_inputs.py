@@ -16,7 +16,7 @@ from controller.regions.region_set import PackedRegions, clearance_of_pose
 from controller.stack_array import zeros
 from cosim.scenario.arbiter_rules import ArbiterRules
 from cosim.scenario.criteria import CriterionSetup
-from cosim.scenario.tables import SecondaryRegion
+from cosim.scenario.region_tables import SecondaryRegion
 from cosim.simulation.memberships import PackedMemberships, compute_memberships, pack_memberships
 from cosim.simulation.signals import Array
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.scenario.criteria import CriterionSetup
-from cosim.scenario.tables import SecondaryRegion
+from cosim.scenario.region_tables import SecondaryRegion
 from cosim.simulation.curves import PackedCurves, curve_degree, pack_curves
 from cosim.simulation.signals import Array
 from fuzzy_arbiter import Shape, ramp

@@ -12,9 +12,8 @@ from controller.regions.rays import ray_distances
 from controller.regions.region_set import of_attitude
 from controller.regions.shape import Shape
 from cosim.mavlink.vehicle.view import View
-from cosim.scenario.region_tables import PARKED_POSITION, Vector3
+from cosim.scenario.region_tables import PARKED_POSITION, SecondaryRegion, Vector3
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.tables import SecondaryRegion
 from cosim.simulation.commands.settings import LiveSettings
 
 SECTORS = 72  # number of sectors of a scan

@@ -73,7 +73,7 @@ def test_killed_run_names_its_custom_law(scenario, named, tmp_path):
 def test_scenario_file_with_custom_law_is_loadable_but_not_runnable(scenario, named, tmp_path):
     run = run_scenario(scenario, tmp_path / "run", report=False, law=named)
     again = load_scenario(run.folder / "scenario.toml")
-    assert again.law.name == NAME and again.law.own
+    assert again.law.name == NAME and again.law.is_custom
     assert check_scenario(again).law == NAME
     for attempt in (lambda: run_scenario(again, tmp_path / "again"), lambda: Master(again)):
         with pytest.raises(RunError, match=f"law.name is '{NAME}', a law of one's own"):

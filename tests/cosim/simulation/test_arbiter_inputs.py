@@ -10,7 +10,7 @@ from controller import VehicleState
 from controller.regions import Box, Cone, DepthBand, Orientation, Region, Sphere, Visibility, pack
 from cosim.scenario.arbiter_rules import ArbiterRules, InputSignal
 from cosim.scenario.criteria import PAPER
-from cosim.scenario.tables import SecondaryRegion
+from cosim.scenario.region_tables import SecondaryRegion
 from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, empty_state, pack_inputs, write_arbiter_state
 from fuzzy_arbiter import Criterion, prioritised, rising
 

@@ -10,8 +10,7 @@ from controller.compiling.function import CompiledFunction
 from controller.regions import Orientation, Region, Sphere
 from cosim.errors import ScenarioError
 from cosim.scenario.criteria import PAPER, check_criteria
-from cosim.scenario.region_tables import CriterionEntry
-from cosim.scenario.tables import SecondaryRegion
+from cosim.scenario.region_tables import CriterionEntry, SecondaryRegion
 from cosim.simulation.curves import _power, _quotient
 from cosim.simulation.memberships import compute_memberships, pack_memberships
 from fuzzy_arbiter import Shape
