@@ -239,6 +239,7 @@ def _range(metas: list[msgspec.Meta], unit: str, is_finite: bool) -> str:
 def _plain(text: str) -> str:
     """Replace the decoder's names of types by words."""
     for quoted in re.findall(r"`[^`]*`", text):
-        words = [_TYPES.get(name, name) for name in quoted.strip("`").split(" | ") if name != "null"]
+        names = quoted.strip("`").removesuffix(" | null").split(" | ")
+        words = [_TYPES.get(name, name) for name in names]
         text = text.replace(quoted, " or ".join(words))
     return text[:1].lower() + text[1:]

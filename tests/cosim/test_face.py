@@ -55,6 +55,7 @@ def test_replace_equals_command_line_overrides():
     [
         ({"limit.forse": 1.0}, "paper: .*limit.forse"),
         ({"limit.force": -1.0}, "paper: limit.force is -1"),
+        ({"limit.force": None}, "paper: limit.force: expected a number, got nothing"),
         ({"regions.SR9.gain": 1.0}, "paper: .*SR9"),
         ({"time.duration": "long"}, "paper: .*time.duration"),
         ({"title": object()}, "paper: .*title"),
