@@ -31,7 +31,7 @@ NonNegative = Annotated[float, msgspec.Meta(ge=0.0, le=_FINITE)]
 Positive = Annotated[float, msgspec.Meta(gt=0.0, le=_FINITE)]
 Unlimited = Annotated[float, msgspec.Meta(ge=0.0)]  # 0 to infinity
 
-_STEP = re.compile(r"\.(\w+)|\[(\d+|\.\.\.)\]")  # a part of the decoder's path, such as $.regions[0].shape
+_STEP = re.compile(r"\.(\w+)|\[(\d+|\.\.\.)\]")  # a part of the decoder's path, such as $[0].regions[0].shape
 _TYPES = {
     "object": "a table", "array": "a list", "float": "a number", "int": "a whole number", "str": "a text",
     "bool": "true or false", "null": "nothing",
@@ -85,7 +85,7 @@ def require_bounded(table: dict[str, Any]) -> None:
 def decode(table: Any, kind: Any, where: str = "") -> Any:
     """Turn a table into a `Table`, or one of several by their tags, checking every key, type and range."""
     try:
-        return msgspec.convert(table, kind)
+        return msgspec.convert((table,), types.GenericAlias(tuple, (kind,)))[0]  # so that every error ends in a path
     except UnicodeEncodeError as error:  # from a command line: files are read as UTF-8
         raise TableError(f"{where or 'a text'}: {error.object!r} is no UTF-8, expected such a text") from error
     except msgspec.ValidationError as error:
@@ -138,10 +138,10 @@ def table_in(annotation: Any) -> tuple[type[Table] | None, bool]:
 
 
 def _describe(error: msgspec.ValidationError, table: Any, kind: Any, where: str) -> str:
-    """Format an error of the decoder, which ends in a path such as ``$.a.b[0]``, with the name of the item."""
+    """Format an error of the decoder, which ends in a path such as ``$[0].a.b[0]``, with the name of the item."""
     text, _, location = str(error).rpartition(" - at ")
-    text, value, annotation, unit, item = text or location, table, kind, "", ""
-    for name, index in _STEP.findall(location) if location.startswith("`$") else ():
+    value, annotation, unit, item = table, kind, "", ""
+    for name, index in _STEP.findall(location)[1:]:
         choices = list(types_in(annotation))
         unit = next((meta.extra["unit"] for _, metas in choices for meta in metas if meta.extra), unit)
         annotation, step = _enter(choices, value, name or index)
@@ -162,7 +162,7 @@ def _sentence(text: str, value: Any, choices: list[tuple[Any, Any]], where: str,
     if is_own:
         return f"{dot}{text}"
     if "unknown field" in text or "missing required field" in text:
-        name = text.split("`")[1]
+        name = text[text.index("`") + 1 : text.rindex("`")]
         if "missing" in text:
             tags = [tag for tag, field in _tags(choices) if field == name]
             return f"{dot}{name} is missing" + (f", expected one of {', '.join(tags)}" if tags else "")

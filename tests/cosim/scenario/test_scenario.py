@@ -316,6 +316,19 @@ def test_missing_keys_are_named(tmp_path, missing):
         load_scenario(saved(tmp_path, text))
 
 
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('title = "\\n - at `$[0].time.zz`"', r"title is '\n - at `$[0].time.zz`', expected one line"),
+        ('"x` - at `$.zz[3]" = 1', "x` - at `$.zz[3]: unknown key"),
+        ('arbiter = { "x` - at `$[0].time" = 1 }', "arbiter.x` - at `$[0].time: unknown key"),
+    ],
+)
+def test_text_like_a_path_in_an_error_is_not_taken_for_one(tmp_path, line, words):
+    with pytest.raises(ScenarioError, match=re.escape(f"mine.toml: {words}")):
+        load_scenario(saved(tmp_path, f"{line}\n{MINIMAL}"))
+
+
 def test_unknown_scenario_suggests_the_nearest():
     with pytest.raises(ScenarioError, match=r"'papr' is unknown; did you mean 'paper'"):
         load_scenario("papr")
