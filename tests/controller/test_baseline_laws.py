@@ -83,7 +83,8 @@ def textbook(name, p, e, e_d, nu, theta, gains):
     return tau + Z @ theta, -Z.T @ (nu + np.repeat([gains.sigma_p, gains.sigma_a], 3) * s) / gains.gamma
 
 
-@pytest.mark.parametrize("name", [n if n == "pd" else pytest.param(n, marks=pytest.mark.slow) for n in NAMES])
+@pytest.mark.medium(fast=1)
+@pytest.mark.parametrize("name", NAMES)
 def test_wrench_and_adaptation_are_the_equations(name):
     rng, regions, pushed, bounded = np.random.default_rng(5), pack([ROCK, BAND]), 0, 0
     chosen = {"k_p1": 100.0, "repulsion": 300.0}

@@ -11,6 +11,7 @@ from controller.laws.deployable.path_planning.planner import (
     CORNERS,
     empty_plan,
     improve_path,
+    is_blocked,
     nearest_goal_point,
     uniform,
 )
@@ -145,6 +146,16 @@ def test_path_cost_matches_dense_evaluation():
         dear, long = dear + (penalty > 0.2 * length), long + (penalty > 50.0 * length)
         soft += through > 0.1
     assert dear > 20 and long > 1 and soft > 3 and min(calls) == 1 and max(calls) > 1
+
+
+def test_approaching_region_is_evaluated_before_the_path_meets_it():
+    """Head-on, at half the vehicle's speed, from 23 m."""
+    packed, start, way = pack(REGIONS), np.array([-20.0, 0.2, 2.4]), np.zeros((CORNERS + 1, 3))
+    packed.velocities[:], way[0] = 0.0, (2.0, 0.2, 2.4)
+    packed.velocities[0, 0] = -0.5 * GAINS.speed
+    expected = expected_cost([start, way[0]], packed)
+    assert expected[1] > 10.0
+    assert cost_of(way, 1, packed, start)[0] == pytest.approx(expected, rel=1e-9)
 
 
 def test_evaluation_of_a_too_costly_path_stops_early():
@@ -536,13 +547,19 @@ def test_found_path_is_the_next_candidate():
     assert not np.array_equal(plan.candidate[:2], plan.found[:2])
 
 
-def test_first_corner_of_a_full_path_is_dropped():
-    plan = empty_plan(0, 1)
-    plan.counts[0], plan.path[:, 0], plan.path[:, 1:] = CORNERS + 1, np.linspace(0.0, 8.0, CORNERS + 1), (0.5, 2.5)
+def test_passed_corners_of_a_full_path_are_dropped_and_its_length_is_measured():
+    """By the cost of hard regions from which it counts as blocked."""
+    plan, start = empty_plan(0, 1), np.array([0.45, 0.4, 2.5])
+    plan.counts[0], plan.path[:, 0], plan.path[:, 1:] = CORNERS + 1, np.linspace(0.4, 8.4, CORNERS + 1), (0.5, 2.5)
+    plan.path[1, 0] = 0.5
     before = plan.path.copy()
-    improve_path(plan, np.array([0.0, 0.4, 2.5]), pack([GOAL]), pack([]), GAINS, 0.02)
-    assert plan.counts[0] == CORNERS
-    assert np.array_equal(plan.path[:CORNERS], before[1:])
+    improve_path(plan, start, pack([GOAL]), pack([]), GAINS, 0.02)
+    assert plan.counts[0] == CORNERS - 1
+    assert np.array_equal(plan.path[: CORNERS - 1], before[2:])
+    length = np.hypot(1.95, 0.1) + 6.0
+    for part in (0.2999, 0.3001):
+        plan.cost[1] = part * length
+        assert is_blocked(plan, start) == (part > 0.3)
 
 
 def test_distant_regions_are_not_reevaluated(monkeypatch):
