@@ -99,11 +99,11 @@ def check_rules(
             first = next(iter(setup.inputs))
             raise ScenarioError(f"arbiter.inputs.{first} is given, expected none without arbiter.file")
         system = rules_by_order(setup.rules, criteria, setup.points)
-        places = {criterion.name: i for i, criterion in enumerate(criteria)}
+        indices = {criterion.name: i for i, criterion in enumerate(criteria)}
         if setup.rules == "none":
             inputs = (InputSignal(v.name, "given", course=((0.0, 1.0),), what="given") for v in system.inputs)
         else:
-            inputs = (InputSignal(v.name, "membership", places[v.name]) for v in system.inputs)
+            inputs = (InputSignal(v.name, "membership", indices[v.name]) for v in system.inputs)
         return ArbiterRules(system, tuple(inputs))
     if setup.rules != "ordered":
         raise ScenarioError(f"arbiter.rules is {setup.rules!r}, expected none beside arbiter.file, which has its own")
@@ -198,7 +198,7 @@ def _always_fires(arbiter: Arbiter) -> bool:
 def _signals(
     setup: ArbiterSetup, names: Sequence[str], criteria: Sequence[CriterionSetup], regions: Sequence[SecondaryRegion]
 ) -> Iterator[InputSignal]:
-    places = {"goal": (0, "m")} | {
+    of_regions = {"goal": (0, "m")} | {
         region.region.name: (i, "rad" if of_attitude(region.region.shape) else "m")
         for i, region in enumerate(regions, 1)
     }
@@ -220,9 +220,9 @@ def _signals(
             _require_known(subject, of_criteria, key, value, "criterion")
             yield InputSignal(name, "membership", of_criteria[subject], what=value)
         elif kind in REGION_SIGNALS:
-            _require_known(subject, places, key, value, "region")
-            place, unit = places[subject]
-            yield InputSignal(name, kind, place, REGION_SIGNALS[kind][unit == "rad"], what=value)  # type: ignore[arg-type]
+            _require_known(subject, of_regions, key, value, "region")
+            index, unit = of_regions[subject]
+            yield InputSignal(name, kind, index, REGION_SIGNALS[kind][unit == "rad"], what=value)  # type: ignore[arg-type]
         else:
             forms = (*VEHICLE_SIGNALS, "membership.CRITERION", *(f"{form}.REGION" for form in REGION_SIGNALS))
             raise ScenarioError(f"{key} is {value!r}, expected one of {', '.join(forms)}, or a number")
@@ -236,8 +236,8 @@ def _require_known(name: str, known: dict[str, Any], key: str, value: str, what:
 def _course(value: Any, key: str) -> tuple[tuple[float, float], ...]:
     """Parse the course of a given signal: a constant, or points of time [s] and value."""
     points = value if isinstance(value, list | tuple) else [[0.0, value]]
-    good = bool(points) and all(isinstance(point, list | tuple) and len(point) == 2 for point in points)
-    if not (good and all(_is_finite(x) for point in points for x in point)):
+    ok = bool(points) and all(isinstance(point, list | tuple) and len(point) == 2 for point in points)
+    if not (ok and all(_is_finite(x) for point in points for x in point)):
         raise ScenarioError(f"{key} is {value!r}, expected a signal, a finite number, or a list of [time, value]")
     times = [float(time) for time, _ in points]
     if any(after <= before for before, after in zip(times, times[1:], strict=False)):

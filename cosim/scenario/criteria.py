@@ -68,7 +68,7 @@ class CriterionSetup:
 
 def fill_criteria(entries: tuple[CriterionEntry, ...]) -> tuple[CriterionEntry, ...]:
     """Fill in the defaults of order and colour."""
-    return tuple(_filled(entry, i, entries) for i, entry in enumerate(entries))
+    return tuple(_fill(entry, i, entries) for i, entry in enumerate(entries))
 
 
 def check_criteria(entries: tuple[CriterionEntry, ...]) -> tuple[CriterionSetup, ...]:
@@ -89,12 +89,12 @@ def check_criteria(entries: tuple[CriterionEntry, ...]) -> tuple[CriterionSetup,
     return tuple(setups[order] for order in sorted(setups))
 
 
-def _filled(entry: CriterionEntry, place: int, entries: Sequence[CriterionEntry]) -> CriterionEntry:
-    taken = {other.colour.upper() for other in entries}
-    free = [colour for colour in _COLOURS if colour not in taken] or list(_COLOURS)
-    of_paper = {c.name: c.colour for c in PAPER_CRITERIA if c.colour not in taken}
-    without = sum(not other.colour and other.name not in of_paper for other in entries[:place])
-    order = place + 1 if entry.order is None else entry.order
+def _fill(entry: CriterionEntry, index: int, entries: Sequence[CriterionEntry]) -> CriterionEntry:
+    used = {other.colour.upper() for other in entries}
+    free = [colour for colour in _COLOURS if colour not in used] or list(_COLOURS)
+    of_paper = {c.name: c.colour for c in PAPER_CRITERIA if c.colour not in used}
+    without = sum(not other.colour and other.name not in of_paper for other in entries[:index])
+    order = index + 1 if entry.order is None else entry.order
     colour = entry.colour or of_paper.get(entry.name) or free[without % len(free)]
     return msgspec.structs.replace(entry, order=order, colour=colour)
 
@@ -128,9 +128,9 @@ def check_criteria_of_regions(regions: Sequence[SecondaryRegion], criteria: Sequ
             raise ScenarioError(f"{key} is {name!r}, which is none of criteria; {hint(name, known)}")
         if not any(reason.is_of(region) for reason in known[name].reasons):
             angle = of_attitude(region.region.shape)
-            wanted, unit = ("angle", "rad: it is of attitude") if angle else ("clearance", "m: it is in space")
+            quantity, unit = ("angle", "rad: it is of attitude") if angle else ("clearance", "m: it is in space")
             raise ScenarioError(
-                f"criteria.{name}.membership has no {wanted}, expected one, or ramp or approach_time, "
+                f"criteria.{name}.membership has no {quantity}, expected one, or ramp or approach_time, "
                 f"for region {region.region.name!r}, whose clearance is in {unit}"
             )
 

@@ -30,9 +30,9 @@ def with_crossing_costs(
     if not soft:
         return regions
     of_regions = tuple(region.criterion for region in regions)
-    asked = tuple(name in soft for name in criteria)
+    is_soft = tuple(name in soft for name in criteria)
     costs = dict(
-        zip(criteria, _costs(rules.system, rules.inputs, tuple(criteria), asked, of_regions, depth), strict=True)
+        zip(criteria, _costs(rules.system, rules.inputs, tuple(criteria), is_soft, of_regions, depth), strict=True)
     )
     return tuple(replace(r, region=replace(r.region, crossing_cost=costs[r.criterion])) for r in regions)
 
@@ -42,23 +42,23 @@ def _costs(
     system: System,
     inputs: tuple[InputSignal, ...],
     criteria: tuple[str, ...],
-    asked: tuple[bool, ...],
+    is_soft: tuple[bool, ...],
     of_regions: tuple[str, ...],
     depth: float,
 ) -> tuple[float, ...]:
     """Return the cost of each criterion [m]."""
-    arbiter, places = Arbiter(system=system), [i for i, ask in enumerate(asked) if ask]
+    arbiter, indices = Arbiter(system=system), [i for i, soft in enumerate(is_soft) if soft]
     costs = []
     for i in range(len(criteria)):
         shares = []
-        for j in places:
-            if i in places and i != j:
-                asking = {criteria[i], criteria[j]}
-                asks = [
-                    _input(signal, upper.universe[1], asking, criteria, of_regions, depth)
+        for j in indices:
+            if i in indices and i != j:
+                pressing = {criteria[i], criteria[j]}
+                values = [
+                    _input(signal, upper.universe[1], pressing, criteria, of_regions, depth)
                     for signal, upper in zip(inputs, system.inputs, strict=False)
                 ]
-                weights = arbiter(asks)
+                weights = arbiter(values)
                 total = weights[i] + weights[j]
                 shares.append(weights[i] / total if total > 0.0 else 0.5)
         share = math.fsum(shares) / len(shares) if shares else 0.5
@@ -67,13 +67,18 @@ def _costs(
 
 
 def _input(
-    signal: InputSignal, far: float, asking: set[str], criteria: Sequence[str], of_regions: Sequence[str], depth: float
+    signal: InputSignal,
+    far: float,
+    pressing: set[str],
+    criteria: Sequence[str],
+    of_regions: Sequence[str],
+    depth: float,
 ) -> float:
-    """Return the value of an input while the criteria `asking` have membership 1; `far` is its upper bound."""
+    """Return the value of an input while the criteria `pressing` have membership 1; `far` is its upper bound."""
     if signal.kind == "membership":
-        return float(criteria[signal.of] in asking)
+        return float(criteria[signal.of] in pressing)
     if signal.kind in ("clearance", "approach_time"):  # 0: on the surface
-        return 0.0 if signal.of and of_regions[signal.of - 1] in asking else far
+        return 0.0 if signal.of and of_regions[signal.of - 1] in pressing else far
     if signal.kind == "given":
         return signal.course[0][1]
     return depth if signal.kind == "depth" else 0.0

@@ -73,9 +73,9 @@ def unit_of_shape(kind: str, key: str) -> str:
 
 def comments(law: str, vehicle: Vehicle) -> dict[str, str]:
     """Return the comment for each key of a file: its unit and its meaning, as plain text."""
-    said = {path: _comment(key.unit, _LINK.sub(r"\1", key.meaning).replace("`", "")) for path, key in KEYS.items()}
-    said |= {f"law.gains.{gain}": text for gain, text in _gain_comments(law).items()}
-    return said | {f"plant.parameters.{v.name}": _comment(v.quantity.unit, v.description) for v in variables(vehicle)}
+    texts = {path: _comment(key.unit, _LINK.sub(r"\1", key.meaning).replace("`", "")) for path, key in KEYS.items()}
+    texts |= {f"law.gains.{gain}": text for gain, text in _gain_comments(law).items()}
+    return texts | {f"plant.parameters.{v.name}": _comment(v.quantity.unit, v.description) for v in variables(vehicle)}
 
 
 @functools.cache
