@@ -547,6 +547,22 @@ def test_found_path_is_the_next_candidate():
     assert not np.array_equal(plan.candidate[:2], plan.found[:2])
 
 
+@pytest.mark.parametrize(("count", "waits"), [(2, False), (2, True), (CORNERS, False), (CORNERS + 1, False)])
+def test_wait_is_put_before_the_path_or_moved_and_stays_below_the_surface(count, waits):
+    plan, rng, corners = empty_plan(0, 1), np.random.default_rng(1), []
+    plan.path[:], plan.counts[0], plan.waits[0] = rng.normal(size=(CORNERS + 1, 3)), count, waits
+    first, added = (plan.path[0], 0) if waits else (START, int(count <= CORNERS))
+    for _ in range(300):
+        way_round._choose_wait(plan, START)
+        assert plan.waits[1] and plan.counts[1] == count + added
+        assert np.array_equal(plan.candidate[1 : count + added], plan.path[1 - added : count])
+        corners.append(plan.candidate[0].copy())
+    off = np.array(corners) - first
+    assert (
+        np.abs(np.median(off, axis=0)[:2]).max() < 0.2 < np.abs(off[:, :2]).max() and np.min(corners, axis=0)[2] == 0.0
+    )
+
+
 def test_passed_corners_of_a_full_path_are_dropped_and_its_length_is_measured():
     """By the cost of hard regions from which it counts as blocked."""
     plan, start = empty_plan(0, 1), np.array([0.45, 0.4, 2.5])

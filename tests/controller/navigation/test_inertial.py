@@ -89,6 +89,17 @@ def test_strapdown_integration_matches_scipy():
     assert (rotation(quaternion) * rotation(truth(2.01)[6:]).inv()).magnitude() < 2e-4
 
 
+def test_past_motion_is_interpolated_between_its_two_samples():
+    """With forces that change at random from sample to sample."""
+    memory, rng, motions = begun(np.random.default_rng(5)), np.random.default_rng(5), np.zeros((6, 10))
+    for _ in range(6):
+        propagate(memory, rng.normal(size=3) * 20.0, rng.normal(size=3), SENSORS, 0.01)
+    for motion, time in zip(motions, (0.02, 0.023, 0.03, 0.05, 0.053, 0.06), strict=True):
+        assert estimate_at(memory, time, motion[:3], motion[3:6], motion[6:])
+    for before, between, after in (motions[:3, :6], motions[3:, :6]):
+        assert between == pytest.approx(0.7 * before + 0.3 * after, rel=1e-9, abs=1e-12)
+
+
 def test_the_covariance_is_propagated_as_by_plain_matrices():
     rng, sensors = np.random.default_rng(2), SENSORS._replace(acceleration_bias=3.0, angular_velocity_bias=2.0)
     for _ in range(10):
