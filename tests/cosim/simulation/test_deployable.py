@@ -118,6 +118,7 @@ def test_goal_is_reached_and_obstacles_are_avoided(name):
         assert flight.report("time_since_measurement").max() < 0.05
     if name == "an outlier":
         assert np.abs(flight.position - fly(regions).position).max() < 0.1
+        assert flight.report("rejected")[-1] == 0.5 / (len(flight.time) - 1)  # of two a period, from the second on
 
 
 @pytest.mark.medium
