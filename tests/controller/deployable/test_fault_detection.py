@@ -104,7 +104,7 @@ def test_isolated_thrusters_are_retried_in_turn_at_growing_intervals():
     estimate, thrusters, state = started()
     reported, tried, period = np.ones(8), [], 0.1
     reported[7] = 0.0
-    thrusters.health[[1, 4, 7]], thrusters.stuck[4] = 0.0, -3.0
+    thrusters.health[[2, 4, 7]], thrusters.stuck[4] = 0.0, -3.0
 
     def wait(seconds, quiet=True):
         for _ in range(round(seconds / period)):
@@ -121,16 +121,16 @@ def test_isolated_thrusters_are_retried_in_turn_at_growing_intervals():
     wait(0.4, quiet=False)
     assert tried == []
     wait(0.1)
-    assert tried == [1]
+    assert tried == [2]
     wait(5.2)
-    assert tried == [1, 4]
+    assert tried == [2, 4]
     wait(39.0)
-    assert tried == [1, 4]
+    assert tried == [2, 4]
     wait(1.5)
-    assert tried == [1, 4, 1]
-    thrusters.health[1] = 1.0  # one alone is not tried, nor what is reported
+    assert tried == [2, 4, 2]
+    thrusters.health[2] = 1.0  # one alone is not tried, nor what is reported
     wait(1000.0)
-    assert tried == [1, 4, 1]
+    assert tried == [2, 4, 2]
 
 
 @pytest.mark.medium

@@ -35,7 +35,7 @@ _STAY_SAMPLES = 4  # number of evaluations of a stay that moves with the goal, t
 _FIRST_LATER = 1.0  # s from now, time of the second evaluation
 _LATER_RATIO = 3.0  # ratio of the time of each further evaluation to the one before
 _FAST = 0.25  # fraction of the vehicle's speed above which a hard region may run into a vehicle at rest
-_FORESIGHT = 8.0  # s from now, to which such regions are predicted there
+_HORIZON = 8.0  # s from now, to which such regions are predicted there
 _PREDICTIONS = 16  # maximum number of predictions of one of them
 _WAIT = 0.5  # m, cost of a wait
 _AWAY = 0.05  # m, distance from a soft region within which a stay counts as inside: keeps the end off its surface
@@ -87,7 +87,7 @@ def add_cost(
         if leg == count:
             cost.cost[0] += _STAY * _stay_cost(path[count - 1], cost.drift, regions, limits)
             if not (cost.waits[0] or _drifts(cost.drift)):
-                _add_stay(cost, path[count - 1], regions, limits)
+                _add_rest_cost(cost, path[count - 1], regions, limits)
             return True
         begin = cost.start if leg == 0 else path[leg - 1]
         length = length3(path[leg, 0] - begin[0], path[leg, 1] - begin[1], path[leg, 2] - begin[2])
@@ -97,7 +97,7 @@ def add_cost(
             cost.travelled[1] = 0.0
             if leg == 0 and cost.waits[0]:
                 cost.cost[0] += _WAIT
-                _add_stay(cost, path[0], regions, limits)
+                _add_rest_cost(cost, path[0], regions, limits)
             continue
         if cost.counts[1] == _SAMPLES[1]:
             _add_stride(cost, length - s, 0.0, _INSIDE)
@@ -177,13 +177,13 @@ def _drifts(drift: Array) -> bool:
 
 
 def is_fast(regions: PackedRegions, i: int, limits: PathLimits) -> bool:
-    """Return True if region `i` is a hard one of position that barriers alone may not escape from."""
+    """Return True if region `i` is hard, has a position, and moves so fast that barriers alone may not avoid it."""
     v = regions.velocities
     speed = length3(v[i, 0], v[i, 1], v[i, 2])
     return bool(regions.hard[i] and regions.kinds[i] < _ATTITUDE and speed > _FAST * limits.speed)
 
 
-def _add_stay(cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits) -> None:
+def _add_rest_cost(cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits) -> None:
     """Add the cost of fast regions that meet a vehicle at rest after the evaluated legs, at a position [m, NED]."""
     free, point, scratch = limits.clearance, zeros(3), zeros(3)
     for i in range(regions.kinds.size):
@@ -191,12 +191,12 @@ def _add_stay(cost: PathCost, place: Array, regions: PackedRegions, limits: Path
             continue
         v, later = regions.velocities[i], cost.travelled[0] / limits.speed
         speed = length3(v[0], v[1], v[2])
-        while later < _FORESIGHT:
+        while later < _HORIZON:
             for axis in range(3):
                 point[axis] = place[axis] - v[axis] * later
             clearance = clearance_at_position(regions, i, point, scratch) - uncertainty(regions, i)
             free = min(free, clearance)
-            later += max((clearance - limits.clearance) / speed, _FORESIGHT / _PREDICTIONS)
+            later += max((clearance - limits.clearance) / speed, _HORIZON / _PREDICTIONS)
     price = _STAY * _near_cost(free, limits)
     cost.cost[0] += price
     cost.cost[3] += price

@@ -46,8 +46,8 @@ _CLIMBS = 12  # maximum number of steps from a point into the goal region
 _PAYS = 0.05  # least gain in depth per metre of such a step; it gains 1 where the gradient does not turn
 _DEEP_ENOUGH = 1e-3  # m, tolerance of the depth of an end
 _BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: no evaluation under way; the path is evaluated; the candidate is
-_MET = 1.0  # m, cost by hard regions from which the path may wait for them to pass
-_WAITING = 0.4  # fraction of the candidates that then wait
+_WAIT_THRESHOLD = 1.0  # m, cost by hard regions above which candidates may wait until fast ones have passed
+_WAIT_FRACTION = 0.4  # fraction of the candidates that then wait
 _USED = -1  # value of `counts[2]` while the found path is the candidate
 _LESS = 0.5  # m by which random corners stay closer to start and end than random nodes of the trees
 
@@ -300,11 +300,11 @@ def _choose_candidate(
         plan.counts[2] = _USED
         return
     plan.counts[2] = 0
-    met = False
-    if plan.cost[1] + plan.cost[3] > _MET:
+    has_fast = False
+    if plan.cost[1] + plan.cost[3] > _WAIT_THRESHOLD:
         for i in range(regions.kinds.size):
-            met = met or is_fast(regions, i, limits)
-    if (plan.waits[0] or met) and uniform(plan.random) < _WAITING:
+            has_fast = has_fast or is_fast(regions, i, limits)
+    if (plan.waits[0] or has_fast) and uniform(plan.random) < _WAIT_FRACTION:
         _choose_wait(plan, start)
     else:
         _mutate_path(plan, start, goal, limits)
@@ -315,10 +315,10 @@ def _choose_wait(plan: PathPlan, start: Array) -> None:
     added = 0 if plan.waits[0] or plan.counts[0] > CORNERS else 1
     for i in range(CORNERS, added - 1, -1):
         copy(plan.path[i - added], plan.candidate[i])
-    about = plan.path[0] if plan.waits[0] else start
+    center = plan.path[0] if plan.waits[0] else start
     reach = 0.2 * exponential(_LN_30 * uniform(plan.random))
     for axis in range(3):
-        plan.candidate[0, axis] = about[axis] + reach * _bell_shaped(plan.random)
+        plan.candidate[0, axis] = center[axis] + reach * _bell_shaped(plan.random)
     plan.candidate[0, 2] = max(plan.candidate[0, 2], min(start[2], 0.0))
     plan.counts[1], plan.waits[1] = plan.counts[0] + added, True
 
