@@ -244,7 +244,7 @@ def _evaluate(arbiter: Arbiter, options: argparse.Namespace) -> None:
     if options.csv is None:
         text = evaluated(arbiter, sample(options.values, arbiter.system), options.json)
     elif options.values:
-        raise InputError(f"{options.values[0]!r} came with --csv, expected one of the two")
+        raise InputError(f"got {options.values[0]!r} with --csv, expected one of the two")
     else:
         table, where = read_text(options.csv, sys.stdin)
         text = evaluated_table(arbiter, table, where, options.json)

@@ -66,12 +66,12 @@ class Arbiter:
         engine: str = "auto",
     ) -> None:
         if isinstance(criteria, System):
-            raise DefinitionError("criteria: a System came, expected Arbiter(system=...)")
+            raise DefinitionError("criteria: got a System, expected Arbiter(system=...)")
         if system is None:
             system = prioritised(criteria, form, weight, normalization, outside, points)
         elif (criteria, form, weight, normalization, outside, points) != (*_DEFAULTS,):
             raise DefinitionError(
-                "system: came with criteria, form, weight, normalization, outside or points, which it has"
+                "system: pass either a system, or criteria with form, weight, normalization, outside and points"
             )
         self._system = system
         self._engine, self._why = choose(system, engine)
@@ -253,7 +253,7 @@ def _one_of(inputs: Any, named: Mapping[str, Any]) -> Any:
     if not named:
         return inputs
     if inputs is not None:
-        raise InputError(f"inputs came by position and {', '.join(named)} by keyword, expected one of the two")
+        raise InputError(f"got inputs by position and {', '.join(named)} by keyword, expected one of the two")
     return named
 
 

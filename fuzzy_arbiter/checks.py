@@ -26,11 +26,11 @@ def finite(value: object) -> float | None:
 def all_of(kind: type[_T] | tuple[type[_T], ...], values: object, where: object, expected: str) -> tuple[_T, ...]:
     """Return the members of an iterable as a tuple, and check the type of each."""
     if isinstance(values, str) or not isinstance(values, Iterable):
-        raise DefinitionError(f"{where}: {shown(values)} came, expected {expected}")
+        raise DefinitionError(f"{where}: got {shown(values)}, expected {expected}")
     members = tuple(values)
     for member in members:
         if not isinstance(member, kind):
-            raise DefinitionError(f"{where}: {shown(member)} came among them, expected {expected}")
+            raise DefinitionError(f"{where}: got {shown(member)} among them, expected {expected}")
     return members
 
 

@@ -295,7 +295,7 @@ class System:
         self._require_names_of_weights()
         for key in ("inputs", "outputs", "rules"):
             if not getattr(self, key):
-                raise DefinitionError(f"{key}: none came, expected at least one")
+                raise DefinitionError(f"{key}: got none, expected at least one")
         twice = _repeated(v.name for v in (*self.inputs, *self.outputs))
         if twice is not None:
             raise DefinitionError(f"variables: two are named {twice!r}, expected each name once")

@@ -129,13 +129,13 @@ def prioritised(
     """
     criteria = all_of(Criterion, criteria, "criteria", "a sequence of Criterion")
     if not criteria:
-        raise DefinitionError("criteria: none came, expected at least one")
+        raise DefinitionError("criteria: got none, expected at least one")
     if not isinstance(form, str) or form not in FORMS:
         raise DefinitionError(f"form is {form!r}, expected one of {', '.join(FORMS)}")
     if not isinstance(weight, Output):
         raise DefinitionError(f"weight is {shown(weight)}, expected an Output")
     if len(weight.terms) != 2:
-        raise DefinitionError(f"weight {weight.name!r}: {len(weight.terms)} terms came, expected two, low and high")
+        raise DefinitionError(f"weight {weight.name!r}: got {len(weight.terms)} terms, expected two, low and high")
     outputs = tuple(replace(weight, name=f"{weight.name}_{k + 1}") for k in range(len(criteria)))
     on = tuple(Is(c.name, c.on) for c in criteria)
     off = tuple(Is(c.name, c.off) for c in criteria)

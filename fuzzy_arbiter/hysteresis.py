@@ -104,7 +104,7 @@ class HysteresisArbiter:
         self._dwell = _settings("dwell", dwell, self._names, "seconds, at least 0", lambda x: 0.0 <= x < math.inf)
         for name, upper, lower in zip(self._names, self._enter, self._release, strict=True):
             if not lower < upper:
-                raise DefinitionError(f"release: {lower:g} came for {name!r}, expected less than enter, {upper:g}")
+                raise DefinitionError(f"release: got {lower:g} for {name!r}, expected less than enter, {upper:g}")
         self._graded = graded
         self._on = terms = _on_terms(arbiter.system, on)
         self._shapes = [_shape(v, term) for v, term in zip(variables, terms, strict=True)]
@@ -209,7 +209,7 @@ def _settings(
     for name, x in zip(names, each, strict=True):
         if not isinstance(x, Real) or isinstance(x, bool) or not fits(float(x)):
             where = f" for {name!r}" if isinstance(received, Mapping) else ""
-            raise DefinitionError(f"{key}: {x!r} came{where}, expected {expected}")
+            raise DefinitionError(f"{key}: got {x!r}{where}, expected {expected}")
     return [float(x) for x in each]
 
 
@@ -219,7 +219,7 @@ def _require_names(key: str, received: Mapping[str, object], names: Sequence[str
             raise DefinitionError(f"{key}: {name!r} is no input, expected {', '.join(names)}")
     for name in names:
         if name not in received:
-            raise DefinitionError(f"{key}: nothing came for {name!r}, expected {', '.join(names)}")
+            raise DefinitionError(f"{key}: got nothing for {name!r}, expected {', '.join(names)}")
 
 
 def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
@@ -238,7 +238,7 @@ def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
         for v in system.inputs:
             if on[v.name] not in v.term_names:
                 expected = " or ".join(v.term_names)
-                raise DefinitionError(f"on: {on[v.name]!r} came for {v.name!r}, expected {expected}")
+                raise DefinitionError(f"on: got {on[v.name]!r} for {v.name!r}, expected {expected}")
         return [on[v.name] for v in system.inputs]
     # at rest no output is in its greatest term; if there is one such row, the criteria are on in the other terms
     ask = Questions.of_rows(system, Effort(EFFORT, 1))

@@ -125,7 +125,7 @@ class Not(Proposition):
 
     def __post_init__(self) -> None:
         if not isinstance(self.part, Proposition):
-            raise DefinitionError(f"not: {shown(self.part)} came, expected such as variable['term']")
+            raise DefinitionError(f"not: got {shown(self.part)}, expected such as variable['term']")
         _set_nesting(self, self.part.nesting + (1 if isinstance(self.part, Is) else 2))
 
     def terms(self) -> Iterator[Is]:
@@ -169,7 +169,7 @@ class Hedged(Proposition):
         if not isinstance(self.hedge, str) or self.hedge not in HEDGES:
             raise DefinitionError(f"hedge is {shown(self.hedge)}, expected one of {', '.join(HEDGES)}")
         if not isinstance(self.part, Proposition):
-            raise DefinitionError(f"{self.hedge}: {shown(self.part)} came, expected such as variable['term']")
+            raise DefinitionError(f"{self.hedge}: got {shown(self.part)}, expected such as variable['term']")
         _set_nesting(self, self.part.nesting + (1 if _on_one(self.part) else 2))
 
     def terms(self) -> Iterator[Is]:

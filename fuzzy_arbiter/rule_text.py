@@ -41,7 +41,7 @@ class _Parser:
 
     def __init__(self, text: str) -> None:
         if not isinstance(text, str):
-            raise DefinitionError(f"rule: {shown(text)} came, expected text")
+            raise DefinitionError(f"rule: got {shown(text)}, expected text")
         self.text = text
         self.tokens: list[tuple[str, str]] = []  # kind (keyword or sign itself, "name", "number", "end") and text
         for match in _TOKEN.finditer(text):
@@ -74,7 +74,7 @@ class _Parser:
         found, token = self.tokens[self.at]
         if found != kind:
             before = f" after {self.tokens[self.at - 1][1]!r}" if self.at else ""
-            raise self.fault(f"{token if found == 'end' else repr(token)} came{before}, expected {what}")
+            raise self.fault(f"got {token if found == 'end' else repr(token)}{before}, expected {what}")
         self.at += 1
         return token
 

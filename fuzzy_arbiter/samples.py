@@ -76,9 +76,9 @@ class Samples:
         try:
             received = np.asarray(inputs)
             if received.dtype.kind not in "biufO":  # NumPy would read numbers from texts, too
-                raise TypeError(f"values of the type {received.dtype.name} came")
+                raise TypeError(f"got values of the type {received.dtype.name}")
             if received.dtype.kind == "O" and any(isinstance(x, str | bytes) for x in received.flat):
-                raise TypeError("a text came among the values")
+                raise TypeError("got a text among the values")
             masked = self._masked(inputs)
             if masked is not None and masked.shape == received.shape == (len(received), len(self._names)):
                 masked = np.asarray(masked.any(axis=1))
@@ -167,7 +167,7 @@ class Samples:
         except TypeError:
             return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
         if len(values) != len(self._names):
-            return InputError(f"inputs: {len(values)} came, expected {len(self._names)}: {', '.join(self._names)}")
+            return InputError(f"inputs: got {len(values)}, expected {len(self._names)}: {', '.join(self._names)}")
         for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
             if not isinstance(x, _NUMBER) or x != x or (not self._clips and not low <= x <= high):
                 came = "masked" if masked and x is None else shown(x)

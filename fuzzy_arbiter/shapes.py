@@ -88,7 +88,7 @@ class Shape(Membership):
     def __post_init__(self) -> None:
         points = list(self._pairs())
         if not points:
-            raise DefinitionError("shape: no points came, expected at least one")
+            raise DefinitionError("shape: got no points, expected at least one")
         for (a, _), (b, _) in zip(points, points[1:], strict=False):
             if b < a:
                 raise DefinitionError(f"shape: place {b} comes after {a}, expected places that never decrease")

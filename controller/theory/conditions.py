@@ -100,16 +100,16 @@ def damping_fit(
     # (43) come on top unless they happen to cancel it, so this condition is necessary for the full one in general. (The
     # term with D's linear part is no multiple of |nu|^2 at all; (43) holds for it only together with the errors.)
     drag = np.array(linear_damping, dtype=float)
-    least = drag[:3].min() + gains.k_v1 if translation_alone else drag.min() + min(gains.k_v1, gains.k_v2)
+    bound = drag[:3].min() + gains.k_v1 if translation_alone else drag.min() + min(gains.k_v1, gains.k_v2)
     translation = float(np.linalg.eigvalsh(mass[:3, :3])[-1])
-    return Fit(float(least), gains.sigma_p * translation * jacobian_bound)
+    return Fit(float(bound), gains.sigma_p * translation * jacobian_bound)
 
 
 def gain_fits(gains: Gains) -> tuple[Fit, Fit]:
     """Return (45), second and third condition, of `gains`, with J_v read as blkdiag(R, I)."""
     # That leaves diag(k_p1 I, k_p2 I).
-    least = min(gains.k_p1, gains.k_p2)
-    return Fit(least, 0.0), Fit(gains.k_q, least)
+    min_gain = min(gains.k_p1, gains.k_p2)
+    return Fit(min_gain, 0.0), Fit(gains.k_q, min_gain)
 
 
 def sphere_radii(mass: Array, linear_damping: Array, radius: float, gains: Gains) -> tuple[float, float, float]:

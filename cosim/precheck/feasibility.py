@@ -195,8 +195,8 @@ def _in_words(overlap: Overlap, what: str) -> str:
         text = f"There is certainly no common point of {what}"
     else:
         text = f"No common point of {what} was found, nor is one excluded"
-    least = max(0.0, -overlap.at_most)
-    best = f"the best, {_point(overlap.point)}, violates one by {-overlap.depth:.3f} m, none less than {least:.3f} m"
+    bound = max(0.0, -overlap.at_most)
+    best = f"the best, {_point(overlap.point)}, violates one by {-overlap.depth:.3f} m, none less than {bound:.3f} m"
     return f"{text}: {best}."
 
 

@@ -9,7 +9,7 @@ from cosim.precheck.angles import angle_findings
 from cosim.precheck.feasibility import region_findings
 from cosim.precheck.finding import Finding
 from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
-from cosim.precheck.thrust import start_force_finding, thrust_findings
+from cosim.precheck.thrust import initial_force_finding, thrust_findings
 from cosim.scenario.scenario import Scenario, to_scenario
 
 
@@ -75,7 +75,7 @@ def check_scenario(scenario: Scenario | str | Path) -> Check:
     findings += thrust_findings(scenario)
     if scenario.law.name == "ismail_dunnigan":
         weights = start_weights(scenario)
-        findings += [*gain_findings(scenario, weights), start_force_finding(scenario, weights)]
+        findings += [*gain_findings(scenario, weights), initial_force_finding(scenario, weights)]
     else:
         text = f"(31)-(45) hold for the paper's law alone: not checked for {scenario.law.name}."
         findings.append(Finding("law", "(38), (45)", "note", text))

@@ -48,11 +48,11 @@ def vehicle_findings(scenario: Scenario) -> Iterator[Finding]:
     velocities, quaternions = rng.normal(size=(_SAMPLES, 6)), rng.normal(size=(_SAMPLES, 4))
     quaternions /= np.linalg.norm(quaternions, axis=1)[:, None]
 
-    least, lopsided = least_inertia(model.mass), asymmetry(model.mass)
+    min_eigenvalue, lopsided = least_inertia(model.mass), asymmetry(model.mass)
     yield Finding(
-        "vehicle", "Property 1", status(least > 0.0 and lopsided < _ROUNDING),
-        f"M is symmetric and positive definite: least eigenvalue {least:.4g}, asymmetry {lopsided:.1g}.",
-        numbers={"least_eigenvalue": least, "asymmetry": lopsided},
+        "vehicle", "Property 1", status(min_eigenvalue > 0.0 and lopsided < _ROUNDING),
+        f"M is symmetric and positive definite: least eigenvalue {min_eigenvalue:.4g}, asymmetry {lopsided:.1g}.",
+        numbers={"least_eigenvalue": min_eigenvalue, "asymmetry": lopsided},
     )  # fmt: skip
     defect = max(skew_defect(model.mass, nu) for nu in velocities)
     yield Finding(

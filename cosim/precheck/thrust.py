@@ -80,7 +80,7 @@ def _mend_current(scenario: Scenario) -> str:
     return f"Take a current of at most {fraction * float(np.linalg.norm(current)):.2g} m/s, or stronger thrusters."
 
 
-def start_force_finding(scenario: Scenario, weights: Array) -> Finding:
+def initial_force_finding(scenario: Scenario, weights: Array) -> Finding:
     """Compare the first force of the paper's law with the maximum force of the thrusters in that direction."""
     gains, initial, vehicle = scenario.law.gains, scenario.initial, true_vehicle(scenario)
     (f,), (slope,), _ = evaluate_regions([scenario.goal_region], initial.position, initial.quaternion)
@@ -96,7 +96,7 @@ def start_force_finding(scenario: Scenario, weights: Array) -> Finding:
     required = float(np.linalg.norm(force))
     if not required > 0.0:
         text = "The law asks for no force at the start."
-        return Finding("thrust", "force at the start", "holds", text, numbers={"asked": 0.0})
+        return Finding("thrust", "initial force", "holds", text, numbers={"asked": 0.0})
     alive = np.ones(vehicle.n_thrusters, dtype=bool)
     available = greatest_force(vehicle, force / required, np.zeros(6), alive) or 0.0
     text = (
@@ -112,6 +112,6 @@ def start_force_finding(scenario: Scenario, weights: Array) -> Finding:
         k_p1 = gains.k_p1 * available / required
         advice = f"Lower law.gains.k_p1 to about {k_p1:.2g}, start nearer, or take a law with a bounded attraction."
     return Finding(
-        "thrust", "force at the start", status(required <= available), text, advice,
+        "thrust", "initial force", status(required <= available), text, advice,
         {"asked": required, "given": available},
     )  # fmt: skip

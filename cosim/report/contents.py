@@ -98,10 +98,10 @@ def _regions(run: Run) -> Table | None:
     rows = []
     for secondary in run.scenario.regions:
         region = secondary.region
-        violation, least = violations[region.name], run.summary["min_clearance"][region.name]
-        when = f"{violation.worst_at:.2f}" if math.isfinite(least) else "–"
+        violation, clearance = violations[region.name], run.summary["min_clearance"][region.name]
+        when = f"{violation.worst_at:.2f}" if math.isfinite(clearance) else "–"
         degrees = run.summary["clearance_unit"][region.name] == "rad"
-        shown = f"{format_number(math.degrees(least), 4)}°" if degrees else f"{format_number(least, 4)} m"
+        shown = f"{format_number(math.degrees(clearance), 4)}°" if degrees else f"{format_number(clearance, 4)} m"
         violated_for = violation.duration()
         rows.append(
             (

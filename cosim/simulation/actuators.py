@@ -98,8 +98,8 @@ def saturate(wrench: Array) -> bool:
     # with wrench [N, N m]
     changed = False
     for part in (wrench[:3], wrench[3:]):
-        greatest = float(np.max(np.abs(part)))
-        if not greatest <= MAX_WRENCH:
-            part[:] = part * (MAX_WRENCH / greatest) if greatest < np.inf else 0.0
+        maximum = float(np.max(np.abs(part)))
+        if not maximum <= MAX_WRENCH:
+            part[:] = part * (MAX_WRENCH / maximum) if maximum < np.inf else 0.0
             changed = True
     return changed

@@ -161,9 +161,9 @@ def _parameters(scenario: Scenario, indices: Mapping[str, int]) -> Iterator[Vari
     for i, (name, start) in enumerate(law.gains._asdict().items()):
         unit = unit_of_gain(law.name, name).replace(" ", ".")
         unit = _UNITS_BY_GOAL.get(unit, {}).get(scenario.goal.unit, unit)
-        least = 0.0 if _accepts(law, name, 0.0) else _LEAST
-        most = next((most for most in (_MOST, 1.0) if _accepts(law, name, most)), max(float(start), least))
-        quantity = Quantity(unit if unit in UNITS else "", least, most, is_gain=True)
+        minimum = 0.0 if _accepts(law, name, 0.0) else _LEAST
+        maximum = next((x for x in (_MOST, 1.0) if _accepts(law, name, x)), max(float(start), minimum))
+        quantity = Quantity(unit if unit in UNITS else "", minimum, maximum, is_gain=True)
         description = _without_unit(said.get(f"law.gains.{name}", "")) or f"Gain {name} of the law"
         yield _parameter(f"law.gains.{name}", f"parameters.gains[{i}]", quantity, description, start)
     for i, start in enumerate(scenario.law.desired_quaternion):

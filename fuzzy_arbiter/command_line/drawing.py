@@ -41,7 +41,7 @@ def draw(
     received = {"--input": inputs, "--output": outputs, "--at": at, "--relief": relief}
     for option, value in received.items():
         if value and option not in PICTURES[kind]:
-            raise InputError(f"{kind}: {option} came, expected none but {', '.join(PICTURES[kind])}")
+            raise InputError(f"{kind}: got {option}, expected none but {', '.join(PICTURES[kind])}")
     system = arbiter.system
     input_names, output_names = variable_names(system.inputs), variable_names(system.outputs)
     if kind == "rules":

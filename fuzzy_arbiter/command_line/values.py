@@ -17,17 +17,17 @@ from fuzzy_arbiter.errors import ArbiterError, InputError
 def sample(words: Sequence[str], system: System) -> list[float] | dict[str, float]:
     """Parse words of the command line as a sample."""
     if not words:
-        raise InputError(f"no values came, expected {', '.join(variable_names(system.inputs))}")
+        raise InputError(f"got no values, expected {', '.join(variable_names(system.inputs))}")
     named = ["=" in word for word in words]
     if any(named) and not all(named):
-        raise InputError("some values came with a name and some without, expected either")
+        raise InputError("got some values with a name and some without, expected all or none")
     if not any(named):
         return [number(word, word) for word in words]
     result: dict[str, float] = {}
     for word in words:
         name, _, value = word.rpartition("=")
         if name in result:
-            raise InputError(f"{name}: came twice, expected once")
+            raise InputError(f"{name} appears twice, expected once")
         result[name] = number(value, word)
     return result
 

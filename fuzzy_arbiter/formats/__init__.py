@@ -71,7 +71,7 @@ def reads(text: str, format: str, block: str | None = None) -> System:
     """
     _require_format(format, f"format is {format!r}")
     if not isinstance(text, str):
-        raise FormatError(f"{shown(text)} came, expected text")
+        raise FormatError(f"got {shown(text)}, expected text")
     lines = text.removeprefix("\ufeff").replace("\r\n", "\n").replace("\r", "\n")
     if format == "fcl":
         return fcl.read(lines, block)
@@ -112,7 +112,7 @@ def writes(system: System, format: str) -> str:
     """
     _require_format(format, f"format is {format!r}")
     if not isinstance(system, System):
-        raise UnsupportedError(f"{shown(system)} came, expected a System")
+        raise UnsupportedError(f"got {shown(system)}, expected a System")
     return _WRITE[format](system)
 
 

@@ -34,7 +34,7 @@ class Cursor:
         """Refuse the next token."""
         before = f" after {self.tokens[self.index - 1].text!r}" if self.index else ""
         found = self.here.text if self.here.kind == "end" else repr(self.here.text)
-        refuse(self.here.line, f"{found} came{before}, expected {expected}")
+        refuse(self.here.line, f"got {found}{before}, expected {expected}")
 
     def accept(self, *words: str) -> Token | None:
         """Take the next token if it is one of these words or signs."""

@@ -169,7 +169,7 @@ class _Reader(Cursor):
             )
         draft = known[token.text]
         if draft.terms is not None:
-            refuse(token.line, f"{section} {token.text!r} came twice")
+            refuse(token.line, f"{section} {token.text!r} appears twice")
         draft.line, draft.terms = token.line, []
         return draft
 
@@ -187,7 +187,7 @@ class _Reader(Cursor):
 
     def only_range(self, draft: _Draft) -> None:
         if draft.universe is not None:
-            refuse(self.here.line, "RANGE came twice")
+            refuse(self.here.line, "RANGE appears twice")
         draft.universe = self.range()
 
     def defuzzify(self) -> None:
@@ -200,7 +200,7 @@ class _Reader(Cursor):
                 self.term(draft, len(self.inputs))
                 continue
             if word in keywords:
-                refuse(key.line, f"{word} came twice")
+                refuse(key.line, f"{word} appears twice")
             keywords.add(word)
             if word == "RANGE":
                 self.only_range(draft)
@@ -249,7 +249,7 @@ class _Reader(Cursor):
             elif word == "ENABLED":
                 self.choice({"TRUE": True})
             elif word in block.norms:
-                refuse(key.line, f"{word} came twice")
+                refuse(key.line, f"{word} appears twice")
             else:
                 block.norms[word] = self.choice(choices[word])
 

@@ -117,4 +117,4 @@ def chosen_block(tokens: list[Token], name: str | None) -> list[Token]:
     listed = ", ".join(names) or "none: there is no FUNCTION_BLOCK"
     if name is not None:
         refuse(tokens[0].line, f"block is {name!r}, expected {'one of ' * bool(names)}{listed}, each once")
-    return refuse(tokens[starts[1]].line, f"another FUNCTION_BLOCK came, expected block=, one of {listed}")
+    return refuse(tokens[starts[1]].line, f"got another FUNCTION_BLOCK, expected block=, one of {listed}")

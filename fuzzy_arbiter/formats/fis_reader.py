@@ -109,7 +109,7 @@ def _sections(text: str) -> tuple[dict[str, _Section], list[tuple[int, str]]]:
             if (head[1] in ("Input", "Output")) != bool(head[2]):
                 refuse(line, f"section {content!r}, expected [System], [Input1], [Output1], [Rules] and so on")
             if name in sections:
-                refuse(line, f"section {content!r} came twice")
+                refuse(line, f"section {content!r} appears twice")
             section = sections[name] = _Section(name, line)
         elif section is None or content.startswith("["):
             refuse(line, f"{content!r}, expected a section such as [System], [Input1], [Output1] or [Rules]")
@@ -120,7 +120,7 @@ def _sections(text: str) -> tuple[dict[str, _Section], list[tuple[int, str]]]:
             if not entry:
                 refuse(line, f"{content!r}, expected a key, = and its value")
             if entry[1] in section.entries:
-                refuse(line, f"{entry[1]} came twice in [{section.name}]")
+                refuse(line, f"{entry[1]} appears twice in [{section.name}]")
             section.entries[entry[1]] = line, entry[2]
     return sections, comments
 
@@ -172,7 +172,7 @@ def _variables(sections: dict[str, _Section], kind: str, inputs: int | None) -> 
     for k in range(1, len(found) + 1):
         section = sections.get(f"{kind}{k}")
         if section is None:
-            refuse(found[-1].line, f"[{found[-1].name}] came, and no [{kind}{k}]; expected them numbered from 1")
+            refuse(found[-1].line, f"got [{found[-1].name}] without [{kind}{k}]; expected them numbered from 1")
         variables.append(_variable(section, inputs))
     return variables
 
@@ -213,7 +213,7 @@ def _variable(section: _Section, inputs: int | None) -> _Parts:
     terms: list[Term] = []
     for j, (key, (line, value)) in enumerate(functions.items(), 1):
         if key != f"MF{j}":
-            refuse(line, f"{key} came in [{section.name}], expected MF{j}")
+            refuse(line, f"got {key} in [{section.name}], expected MF{j}")
         match = _FUNCTION.fullmatch(value)
         if not match:
             refuse(line, f"{value}, expected a membership function such as 'low':'trimf',[-1 0 1]")

@@ -59,7 +59,7 @@ def read(text: str) -> System:
     blocks, comments = _blocks(text)
     engines = [b for b in blocks if b.kind == "Engine"]
     if len(engines) != 1:
-        raise FormatError(f"expected one Engine in a FLL file, {len(engines) or 'none'} came")
+        raise FormatError(f"expected one Engine in a FLL file, got {len(engines) or 'none'}")
     inputs = [b for b in blocks if b.kind == "InputVariable"]
     outputs = [b for b in blocks if b.kind == "OutputVariable"]
     variables = [Variable(*_variable(b)) for b in inputs]
@@ -95,7 +95,7 @@ def _blocks(text: str) -> tuple[list[_Block], list[tuple[int, str]]]:
             blocks.append(_Block(key, value, line))
             continue
         if not blocks:
-            refuse(line, f"{key!r} came, expected Engine first")
+            refuse(line, f"got {key!r}, expected Engine first")
         block = blocks[-1]
         key = OLD.get(key, key)
         if key not in KEYS[block.kind]:
@@ -103,7 +103,7 @@ def _blocks(text: str) -> tuple[list[_Block], list[tuple[int, str]]]:
         if key in MANY:
             block.many.append((line, value))
         elif key in block.entries:
-            refuse(line, f"{key} came twice in {block.kind} {block.name!r}")
+            refuse(line, f"{key} appears twice in {block.kind} {block.name!r}")
         else:
             block.entries[key] = line, value
     return blocks, comments

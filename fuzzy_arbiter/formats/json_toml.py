@@ -45,7 +45,7 @@ def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     result: dict[str, Any] = {}
     for key, value in pairs:
         if key in result:
-            raise FormatError(f"{key!r} came twice in one object, expected each key once")
+            raise FormatError(f"{key!r} appears twice in one object, expected each key once")
         result[key] = value
     return result
 

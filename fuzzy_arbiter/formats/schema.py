@@ -172,4 +172,4 @@ def _number(value: object, where: str) -> float:
 
 def _refuse(where: str, value: object, expected: str) -> NoReturn:
     text = shown(value) if not isinstance(value, dict | list) else f"a {'table' if isinstance(value, dict) else 'list'}"
-    raise FormatError(f"{where}: {text} came, expected {expected}")
+    raise FormatError(f"{where}: got {text}, expected {expected}")

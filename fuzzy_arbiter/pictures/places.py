@@ -38,7 +38,7 @@ def fixed_inputs(arbiter: Arbiter, over: Sequence[str], at: Mapping[str, float] 
         if name in at:
             raise DefinitionError(f"{name!r} is at {at[name]!r}, and the picture goes over it; expected one of the two")
     if len(set(over)) < len(over):
-        raise DefinitionError(f"{over[0]!r} came twice, expected two inputs")
+        raise DefinitionError(f"{over[0]!r} appears twice, expected two inputs")
     middle = {v.name: (v.universe[0] + v.universe[1]) / 2.0 for v in inputs}
     values = dict(zip(middle, arbiter.samples.one(middle | at), strict=True))
     return {name: value for name, value in values.items() if name not in over}

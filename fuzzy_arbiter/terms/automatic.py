@@ -58,9 +58,9 @@ def auto_terms(terms: int | Sequence[str]) -> AutomaticTerms:
     """
     if isinstance(terms, int) and not isinstance(terms, bool):
         if terms not in _NAMES:
-            raise DefinitionError(f"auto_terms: {shown(terms)} came, expected 3, 5 or 7, or the terms' names")
+            raise DefinitionError(f"auto_terms: got {shown(terms)}, expected 3, 5 or 7, or the terms' names")
         return AutomaticTerms(_NAMES[terms])
     names = all_of(str, terms, "auto_terms", "3, 5 or 7, or the terms' names")
     if len(names) < 2:
-        raise DefinitionError(f"auto_terms: {len(names)} names came, expected two or more")
+        raise DefinitionError(f"auto_terms: got {len(names)} names, expected two or more")
     return AutomaticTerms(names)

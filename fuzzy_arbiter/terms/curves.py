@@ -62,13 +62,13 @@ class Curve(Membership):
         numbers = tuple(x for x in map(finite, given) if x is not None)
         if len(numbers) != len(given) or len(numbers) != len(kind.parameters):
             raise DefinitionError(
-                f"{words}: {shown(self.parameters)} came, expected {len(kind.parameters)} finite numbers"
+                f"{words}: got {shown(self.parameters)}, expected {len(kind.parameters)} finite numbers"
             )
         height = finite(self.height)
         if height is None or not 0.0 < height <= 1.0:
             raise DefinitionError(f"{words}: height is {shown(self.height)}, expected above 0 and at most 1")
         if not kind.is_valid(*numbers):
-            raise DefinitionError(f"{words}: {shown(numbers)} came, expected {kind.expected}")
+            raise DefinitionError(f"{words}: got {shown(numbers)}, expected {kind.expected}")
         named = dict(zip(kind.parameters, numbers, strict=True))
         pieces = [(end, _tree(text, named, height)) for end, text in kind.pieces(*numbers)]
         object.__setattr__(self, "parameters", numbers)

@@ -30,10 +30,10 @@ class _Parser:
 
     def __init__(self, text: str) -> None:
         if not isinstance(text, str):
-            raise DefinitionError(f"expression: {shown(text)} came, expected text")
+            raise DefinitionError(f"expression: got {shown(text)}, expected text")
         self.text = text
         if len(text) > MAX_LENGTH:
-            raise self.fault(f"{len(text)} characters came, expected at most {MAX_LENGTH}")
+            raise self.fault(f"got {len(text)} characters, expected at most {MAX_LENGTH}")
         self.tokens = [match.groups(default="") for match in _TOKEN.finditer(text)]
         self.at = self.depth = 0
 
@@ -45,7 +45,7 @@ class _Parser:
         return "".join(self.tokens[self.at]) if self.at < len(self.tokens) else ""
 
     def unexpected(self, expected: str) -> DefinitionError:
-        return self.fault(f"{repr(self.here) if self.here else 'the end'} came, expected {expected}")
+        return self.fault(f"got {repr(self.here) if self.here else 'the end'}, expected {expected}")
 
     def accept(self, *signs: str) -> str:
         sign = self.here
@@ -104,7 +104,7 @@ class _Parser:
         if number:
             self.at += 1
             if not math.isfinite(float(number)):
-                raise self.fault(f"{number} came, expected a finite number")
+                raise self.fault(f"got {number}, expected a finite number")
             return float(number)
         if name:
             self.at += 1

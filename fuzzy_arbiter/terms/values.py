@@ -101,7 +101,7 @@ class Linear(Value):
         given = all_of(object, self.coefficients, "linear", "a sequence of numbers")
         numbers = tuple(map(finite, (*given, self.constant)))
         if None in numbers:
-            raise DefinitionError(f"linear: {shown((*given, self.constant))} came, expected finite numbers")
+            raise DefinitionError(f"linear: got {shown((*given, self.constant))}, expected finite numbers")
         object.__setattr__(self, "coefficients", numbers[:-1])
         object.__setattr__(self, "constant", numbers[-1])
 

@@ -45,7 +45,7 @@ def test_data_frame_row_is_a_sample(tipping, frame):
         (lambda a: a.batch(pd.DataFrame({"service": [3, 99], "food": [4, 5]})), "row 1: service is 99.0, expected a n"),
         (
             lambda a: a.batch(pd.DataFrame({"service": ["3"], "food": [4]})),
-            "a text came among the values; expected rows of num",
+            "got a text among the values; expected rows of num",
         ),
         (lambda a: a(pd.DataFrame({"service": [3], "food": [4]})), "service: input is .*; for columns there is batch"),
         (lambda a: a(pd.Series([3.0, 4.0])), "service: input is missing"),

@@ -35,20 +35,20 @@ def nested(depth):
     ("make", "fault"),
     [
         (lambda: CALM and wind["strong"], "wind is calm: a proposition is not true or false; combine with &"),
-        (lambda: CALM & "wind is strong", "And: 'wind is strong' came among them, expected such as variable"),
+        (lambda: CALM & "wind is strong", "And: got 'wind is strong' among them, expected such as variable"),
         (lambda: Or(CALM for _ in range(1)), "Or of 1 propositions, expected two or more"),
-        (lambda: Not("x"), "not: 'x' came, expected such as"),
+        (lambda: Not("x"), "not: got 'x', expected such as"),
         (lambda: Is("wind", 3), "'wind' is 3: expected the names of both"),
         (lambda: nested(200), "nested deeper than 100 parentheses and negations"),
         (lambda: parse_rule("if " + "not " * 99 + "a is b then c is d"), "rule 'if not .*: nested deeper than 100"),
-        (lambda: parse_rule(None), "rule: None came, expected text"),
+        (lambda: parse_rule(None), "rule: got None, expected text"),
         (lambda: wind[0], "'wind' has no term 0, expected one of calm, strong"),
         (lambda: Variable("v", None, TERMS), "variable 'v': universe is None, expected two finite numbers"),
         (lambda: Variable("v", (False, True), TERMS), r"universe is \(False, True\), expected two"),
         (lambda: Variable("v", (0, HUGE), TERMS), "universe is a tuple that is too long to show, expected two"),
         (lambda: Variable("v", (-1.7e308, 1.7e308), TERMS), "expected a finite width"),
         (lambda: Variable("v", (0, 1), {"calm": (2, 6)}), r"term 'calm': shape is \(2, 6\), expected such as"),
-        (lambda: Variable("v", (0, 1), TERMS[0]), r"terms: Term\(.*\) came, expected a mapping from names"),
+        (lambda: Variable("v", (0, 1), TERMS[0]), r"terms: got Term\(.*\), expected a mapping from names"),
         (lambda: Term("low", [(0, 1), (1, 0)]), r"term 'low': shape is \[.*\], expected such as triangle\(0, 1, 2\)"),
         (lambda: Shape((("0", "1"),)), r"shape: point \('0', '1'\), expected a finite place and a degree in \[0, 1\]"),
         (lambda: Shape(((HUGE, 1),)), "shape: point .* that is too long to show, 1"),
@@ -57,8 +57,8 @@ def nested(depth):
         (lambda: Output("o", (0, 1), sail.terms, 1.5), "default is 1.5, expected a number in .*, its universe"),
         (lambda: Output("o", (0, 1), sail.terms, HUGE), "default is a int that is too long .*, expected a number in"),
         (lambda: Rule("wind is calm", sail["full"]), "rule: condition is 'wind is calm', expected such as"),
-        (lambda: Rule(CALM, "sail is full"), r"wind is calm: 'sail is full' came, expected as conclusions output\["),
-        (lambda: Rule(CALM, ~sail["full"]), r"wind is calm: Not\(.*\) came, expected as conclusions"),
+        (lambda: Rule(CALM, "sail is full"), r"wind is calm: got 'sail is full', expected as conclusions output\["),
+        (lambda: Rule(CALM, ~sail["full"]), r"wind is calm: got Not\(.*\), expected as conclusions"),
         (lambda: Rule(CALM, ()), "wind is calm: no conclusions, expected output"),
         *(
             (
@@ -67,13 +67,13 @@ def nested(depth):
             )
             for weight in (True, "0.5", None, float("nan"), 0, 1.5, np.array([0.5]), Fraction(1, 10**400))
         ),
-        (lambda: system(rules="if wind is calm then sail is full"), "rules: 'if wind .*' came, expected a sequence"),
-        (lambda: system(None), "rules: None came among them, expected a sequence of Rule or text"),
-        (lambda: system(inputs=wind), r"inputs: Variable\(.* came, expected a sequence of Variable"),
-        (lambda: system(outputs=(wind,)), r"outputs: Variable\(.* came among them, expected a sequence of Output"),
+        (lambda: system(rules="if wind is calm then sail is full"), "rules: got 'if wind .*', expected a sequence"),
+        (lambda: system(None), "rules: got None among them, expected a sequence of Rule or text"),
+        (lambda: system(inputs=wind), r"inputs: got Variable\(.*, expected a sequence of Variable"),
+        (lambda: system(outputs=(wind,)), r"outputs: got Variable\(.* among them, expected a sequence of Output"),
         (lambda: system(normalization=np.array(["sum", "max"])), "normalization is array.*, expected one of none"),
         (lambda: system(points=HUGE), "points is a int that is too long to show, expected a whole number, 3 or more"),
-        (lambda: prioritised(["a", "b"]), "criteria: 'a' came among them, expected a sequence of Criterion"),
+        (lambda: prioritised(["a", "b"]), "criteria: got 'a' among them, expected a sequence of Criterion"),
         (lambda: prioritised(weight="w"), "weight is 'w', expected an Output"),
         (lambda: prioritised(form=["minimal"]), r"form is \['minimal'\], expected one of hierarchical"),
         (lambda: Criterion("a", membership=[(0, 0), (1, 1)]), "criterion 'a': membership is .*, expected such as"),
@@ -109,9 +109,9 @@ def test_definition_copies_lists_and_generators():
 
 
 def test_writers_require_systems_and_readers_require_text():
-    with pytest.raises(UnsupportedError, match="'x' came, expected a System"):
+    with pytest.raises(UnsupportedError, match="got 'x', expected a System"):
         writes("x", "json")
-    with pytest.raises(FormatError, match=r"b'{}' came, expected text"):
+    with pytest.raises(FormatError, match=r"got b'{}', expected text"):
         reads(b"{}", "json")
 
 

@@ -165,7 +165,7 @@ def test_batch_is_rejected():
     ("inputs", "time", "match"),
     [
         ([math.nan, 0, 0], 2, "obstacle: input is nan"),
-        ([0, 0], 2, "inputs: 2 came, expected 3"),
+        ([0, 0], 2, "inputs: got 2, expected 3"),
         ({"obstacle": 0}, 2, "shape: input is missing"),
         ([0, 0, 0], 0.5, "time is 0.5 after 1"),
         ([0, 0, 0], math.nan, "time is nan"),
@@ -211,18 +211,18 @@ def test_an_output_without_a_firing_rule_is_nan():
 @pytest.mark.parametrize(
     ("settings", "match"),
     [
-        ({"enter": 0.0}, r"enter: 0.0 came, expected a number in \(0, 1\]"),
-        ({"enter": math.nan}, "enter: nan came"),
-        ({"release": -0.1}, r"release: -0.1 came, expected a number in \[0, 1\)"),
-        ({"release": 0.8}, "release: 0.8 came for 'obstacle', expected less than enter, 0.8"),
-        ({"enter": {"obstacle": 0.9, "shape": 0.9, "depth": 0.1}}, "release: 0.2 came for 'depth'"),
-        ({"dwell": -1}, "dwell: -1 came, expected seconds, at least 0"),
-        ({"enter": {"obstacle": 0.9}}, "enter: nothing came for 'shape', expected obstacle, shape, depth"),
+        ({"enter": 0.0}, r"enter: got 0.0, expected a number in \(0, 1\]"),
+        ({"enter": math.nan}, "enter: got nan"),
+        ({"release": -0.1}, r"release: got -0.1, expected a number in \[0, 1\)"),
+        ({"release": 0.8}, "release: got 0.8 for 'obstacle', expected less than enter, 0.8"),
+        ({"enter": {"obstacle": 0.9, "shape": 0.9, "depth": 0.1}}, "release: got 0.2 for 'depth'"),
+        ({"dwell": -1}, "dwell: got -1, expected seconds, at least 0"),
+        ({"enter": {"obstacle": 0.9}}, "enter: got nothing for 'shape', expected obstacle, shape, depth"),
         ({"dwell": {"wind": 1}}, "dwell: 'wind' is no input"),
-        ({"dwell": {"obstacle": 1, "shape": 1, "depth": "long"}}, "dwell: 'long' came for 'depth'"),
+        ({"dwell": {"obstacle": 1, "shape": 1, "depth": "long"}}, "dwell: got 'long' for 'depth'"),
         ({"graded": 1}, "graded is 1, expected True or False"),
         ({"on": "exist"}, "on is 'exist', expected a term for each of obstacle, shape, depth"),
-        ({"on": {"obstacle": "exist", "shape": "round", "depth": "maintain"}}, "on: 'round' came for 'shape'"),
+        ({"on": {"obstacle": "exist", "shape": "round", "depth": "maintain"}}, "on: got 'round' for 'shape'"),
     ],
 )  # fmt: skip
 def test_invalid_settings_are_rejected(settings, match):

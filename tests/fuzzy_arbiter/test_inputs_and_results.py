@@ -147,7 +147,7 @@ def test_keyword_columns_broadcast_scalars(tipping):
 @pytest.mark.parametrize(
     ("ask", "fault"),
     [
-        (lambda a: a([1, 2], service=3), "inputs came by position and service by keyword"),
+        (lambda a: a([1, 2], service=3), "got inputs by position and service by keyword"),
         (lambda a: a(service=3), "food: input is missing, expected service, food"),
         (lambda a: a(service=3, food=4, fod=4), "fod: unknown input, expected service, food"),
         (lambda a: a(service=[3, 4], food=[4, 5]), r"service: input is \[3, 4\], .*; for columns there is batch"),

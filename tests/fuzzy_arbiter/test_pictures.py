@@ -143,7 +143,7 @@ def test_unknown_output_error_lists_known_outputs(arbiter, draw):
 
 
 def test_invalid_axis_inputs_are_rejected(arbiter):
-    with pytest.raises(DefinitionError, match="came twice"):
+    with pytest.raises(DefinitionError, match="appears twice"):
         pictures.decisions(arbiter, ("obstacle", "obstacle"))
     with pytest.raises(DefinitionError, match="the picture goes over it"):
         pictures.surface(arbiter, "alpha_1", ("obstacle", "shape"), {"shape": 0.2})

@@ -79,10 +79,10 @@ def thin(time: Array, signal: Array) -> tuple[Array, Array]:
         return time, signal
     part = -(-n // (POINTS // 2))
     whole = n // part * part
-    least = np.where(np.isnan(signal), np.inf, signal)[:whole].reshape(-1, part).argmin(axis=1)
-    most = np.where(np.isnan(signal), -np.inf, signal)[:whole].reshape(-1, part).argmax(axis=1)
+    lowest = np.where(np.isnan(signal), np.inf, signal)[:whole].reshape(-1, part).argmin(axis=1)
+    highest = np.where(np.isnan(signal), -np.inf, signal)[:whole].reshape(-1, part).argmax(axis=1)
     starts = np.arange(0, whole, part)
-    index = np.unique(np.concatenate([[0], starts + least, starts + most, np.arange(whole, n)]))
+    index = np.unique(np.concatenate([[0], starts + lowest, starts + highest, np.arange(whole, n)]))
     return time[index], signal[index]
 
 

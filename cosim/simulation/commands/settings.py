@@ -15,7 +15,7 @@ from cosim.scenario.scenario import Scenario
 from plant_fmu.variables import variables
 
 _GREATEST_RAMP = 1e3  # m, maximum value of ``arbiter.ramp``
-_LEAST_RADIUS = 1e-2  # m, least radius of obstacles and of the target while holding
+_LEAST_RADIUS = 1e-2  # m, minimum radius of obstacles and of the target while holding
 _COMMAND_SETTINGS = {  # unit, minimum, maximum
     "obstacle_radius": ("m", _LEAST_RADIUS, 1e3),
     "hold_radius": ("m", _LEAST_RADIUS, 1e3),
@@ -50,12 +50,12 @@ class LiveSettings:
         self._add("arbiter.ramp", "m", scenario.arbiter.ramp, 0.0, _GREATEST_RAMP)
         self._add_limits(scenario)
         if scenario.commands.enabled:
-            for name, (unit, least, greatest) in _COMMAND_SETTINGS.items():
-                self._add(f"commands.{name}", unit, getattr(scenario.commands, name), least, greatest)
+            for name, (unit, minimum, maximum) in _COMMAND_SETTINGS.items():
+                self._add(f"commands.{name}", unit, getattr(scenario.commands, name), minimum, maximum)
 
-    def _add(self, key: str, unit: str, value: float, least: float, greatest: float) -> None:
-        self._numbers[key] = min(max(value, least), greatest)
-        self._units[key], self._ranges[key] = unit, (least, greatest)
+    def _add(self, key: str, unit: str, value: float, minimum: float, maximum: float) -> None:
+        self._numbers[key] = min(max(value, minimum), maximum)
+        self._units[key], self._ranges[key] = unit, (minimum, maximum)
 
     def _add_limits(self, scenario: Scenario) -> None:
         """Add the limits of the actuation: of the direct wrench, or of each thruster."""
@@ -69,11 +69,11 @@ class LiveSettings:
         for key, name in keys.items():
             variable = table[name]
             value = float(scenario.plant.parameters.get(name, wrench.get(name, variable.start)))
-            least, greatest = variable.quantity.minimum, variable.quantity.maximum
+            minimum, maximum = variable.quantity.minimum, variable.quantity.maximum
             # 0 stays between a thruster's limits
-            least = 0.0 if name.startswith("thrust_max") else least
-            greatest = 0.0 if name.startswith("thrust_min") else greatest
-            self._add(key, variable.quantity.unit, value, least, greatest)
+            minimum = 0.0 if name.startswith("thrust_max") else minimum
+            maximum = 0.0 if name.startswith("thrust_min") else maximum
+            self._add(key, variable.quantity.unit, value, minimum, maximum)
         self.of_plant = keys  # parameter of the FMU for each key
 
     def __iter__(self) -> Iterator[Setting]:
@@ -114,9 +114,9 @@ class LiveSettings:
 
     def _change_number(self, key: str, value: float) -> None:
         if key in self._ranges:
-            least, greatest = self._ranges[key]
-            if not least <= value <= greatest:
-                raise CommandError(f"{key} is {value:g}, expected {least:g} to {greatest:g}")
+            minimum, maximum = self._ranges[key]
+            if not minimum <= value <= maximum:
+                raise CommandError(f"{key} is {value:g}, expected {minimum:g} to {maximum:g}")
         else:  # regions.NAME.gain, which the region itself checks
             name = key.removeprefix("regions.").removesuffix(".gain")
             self._regions[name] = dataclasses.replace(self._regions[name], gain=value)

@@ -83,9 +83,9 @@ class StickStabilizer:
             self._depth = depth + min(max(ahead, -_FARTHEST[1]), _FARTHEST[1])
         error_down = self._depth - depth
         force = self._mass * _DEPTH * _DEPTH * error_down
-        most = float(self._reach[2])
+        max_heave = float(self._reach[2])
         if math.isfinite(force):
-            self._integral = min(max(self._integral + _INTEGRAL * force * self._period, -most), most)
+            self._integral = min(max(self._integral + _INTEGRAL * force * self._period, -max_heave), max_heave)
         speed = float(R[2] @ self._state.velocity_body[:3])
         return force + self._mass * _DEPTH * 2.0 * (rate - speed) + self._integral
 

@@ -14,7 +14,7 @@ from cosim.precheck.feasibility import region_findings
 from cosim.precheck.output import check_text
 from cosim.precheck.precheck import check_scenario
 from cosim.precheck.stability import gain_findings, start_weights, vehicle_findings
-from cosim.precheck.thrust import start_force_finding, thrust_findings
+from cosim.precheck.thrust import initial_force_finding, thrust_findings
 from cosim.results.water_surface import heights_above_surface
 from cosim.scenario.keys import unit_of_gain
 from cosim.scenario.scenario import load_scenario
@@ -31,7 +31,7 @@ def named(found):
 def of_law(*overrides):
     scenario = load_scenario("paper", [CLOSED, *overrides])
     weights = start_weights(scenario)
-    found = [*vehicle_findings(scenario), *gain_findings(scenario, weights), start_force_finding(scenario, weights)]
+    found = [*vehicle_findings(scenario), *gain_findings(scenario, weights), initial_force_finding(scenario, weights)]
     return named(found)
 
 
@@ -95,7 +95,7 @@ def test_gain_conditions_38_and_45_are_evaluated_for_the_paper(paper):
 
 
 def test_commanded_force_at_the_papers_start(paper):
-    finding = paper["force at the start"]
+    finding = paper["initial force"]
     assert finding.status == "fails"
     assert finding.numbers["asked"] == pytest.approx(26.82e3, rel=1e-3)
     # along (2, 0, 1) / sqrt(5): the horizontal thrusters, 76.4 N to the north, end first
@@ -103,7 +103,7 @@ def test_commanded_force_at_the_papers_start(paper):
 
 
 @pytest.mark.parametrize(
-    ("finding", "key"), [("(38) 1, 2", "sigma_p"), ("(45) 1", "sigma_p"), ("force at the start", "k_p1")]
+    ("finding", "key"), [("(38) 1, 2", "sigma_p"), ("(45) 1", "sigma_p"), ("initial force", "k_p1")]
 )
 def test_following_the_advice_satisfies_the_conditions(paper, finding, key):
     value = float(re.search(rf"law\.gains\.{key} to (?:about )?([0-9.e-]+[0-9])", paper[finding].advice)[1])

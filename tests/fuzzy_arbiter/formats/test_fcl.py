@@ -126,38 +126,38 @@ def test_numbers_are_those_of_the_standard():
     ("old", "new", "fault"),
     [
         ("METHOD : COG", "METHOD : COGS", r"line 19: output 'tip': term 'cheap' is no value"),
-        ("METHOD : COG", "METHOD : COM", r"line 23: 'COM' came after ':', expected COG or COA"),
+        ("METHOD : COG", "METHOD : COM", r"line 23: got 'COM' after ':', expected COG or COA"),
         ("METHOD : COG;", "", None),
-        ("ACCU : MAX", "ACCU : DIFF", r"line 29: 'DIFF' came after ':', expected MAX or ASUM"),
+        ("ACCU : MAX", "ACCU : DIFF", r"line 29: got 'DIFF' after ':', expected MAX or ASUM"),
         ("ACCU : MAX;", "", None),
-        ("AND : MIN;", "ENABLED : FALSE;", r"line 27: 'FALSE' came after ':', expected TRUE"),
-        ("AND : MIN;", "AND : MIN; AND : MIN;", r"line 27: AND came twice"),
+        ("AND : MIN;", "ENABLED : FALSE;", r"line 27: got 'FALSE' after ':', expected TRUE"),
+        ("AND : MIN;", "AND : MIN; AND : MIN;", r"line 27: AND appears twice"),
         ("TERM poor := (0, 1) (4, 0)", "TERM poor := GAUS 0 2", r"line 11: 'GAUS' is no membership function, exp"),
-        ("TERM poor := (0, 1) (4, 0)", "TERM poor := GAUSS 0", r"line 11: ';' came after '0', expected a number"),
-        ("TERM poor := (0, 1) (4, 0)", "TERM poor := GAUSS 0 0", r"line 11: .*\(0.0, 0.0\) came, expected a dev"),
+        ("TERM poor := (0, 1) (4, 0)", "TERM poor := GAUSS 0", r"line 11: got ';' after '0', expected a number"),
+        ("TERM poor := (0, 1) (4, 0)", "TERM poor := GAUSS 0 0", r"line 11: .*got \(0.0, 0.0\), expected a dev"),
         ("TERM poor := (0, 1) (4, 0)", "TERM poor := Constant 4", r"line 11: an input's term is Constant, which"),
         ("TRIAN 0 5 10", "FUNCTION 2 * service", r"line 19: output 'tip': term 'cheap' is a value, expected a"),
-        ("(0, 1) (4, 0)", "(0, 1) (low, 0)", r"line 11: 'low' came after '\(', expected a number, a place"),
+        ("(0, 1) (4, 0)", "(0, 1) (low, 0)", r"line 11: got 'low' after '\(', expected a number, a place"),
         ("(0, 1) (4, 0)", "(0, 1) (-4, 0)", r"line 11: term 'poor': shape: place -4.0 comes after 0.0"),
         ("(0, 1) (4, 0)", "(0, 1) (4e999, 0)", r"line 11: a place is '4e999', expected a finite number"),
         ("TERM good", "TERM poor", r"line 10: variable 'service': two terms are named 'poor'"),
         ("FUZZIFY food", "FUZZIFY fod", r"line 15: FUZZIFY 'fod', expected one of service, food"),
         ("food : real;", "food, wine : REAL;", r"line 7: 'wine' has no FUZZIFY"),
-        ("food : real;", "food : INT;", r"line 7: 'INT' came after ':', expected REAL"),
-        ("VAR_OUTPUT", "VAR x : REAL; VAR_OUTPUT", r"line 9: 'VAR' came after 'END_VAR', expected VAR_IN"),
+        ("food : real;", "food : INT;", r"line 7: got 'INT' after ':', expected REAL"),
+        ("VAR_OUTPUT", "VAR x : REAL; VAR_OUTPUT", r"line 9: got 'VAR' after 'END_VAR', expected VAR_IN"),
         ("IF service IS good", "IF service IS god", r"line 31: R2 .*'service' has no term 'god', expected one of exc"),
-        ("IF service IS good", "IF service good", r"line 31: rule .*'good' came after 'service', expected 'is'"),
-        ("tip IS average", "tip", r"line 31: rule 'IF service IS good THEN tip WITH 0.5': 'WITH' came after 'tip'"),
+        ("IF service IS good", "IF service good", r"line 31: rule .*: got 'good' after 'service', expected 'is'"),
+        ("tip IS average", "tip", r"line 31: rule 'IF service IS good THEN tip WITH 0.5': got 'WITH' after 'tip'"),
         ("WITH 0.5", "WITH 1.5", r"line 31: 'if service .*': weight is 1.5"),
         ("average WITH 0.5;", "average WITH 0.5", None),
         ("average WITH 0.5;", "average WITH 0.5 ACCU : MAX;", r"line 31: rule .*':' cannot stand in a rule"),
-        ("DEFAULT := 0;", "DEFAULT := none;", r"line 24: 'none' came after ':=', expected a number, the default"),
-        ("DEFAULT := 0;", "DEFAULT := 0 | 1;", r"line 24: '1' came after '\|', expected NC"),
+        ("DEFAULT := 0;", "DEFAULT := none;", r"line 24: got 'none' after ':=', expected a number, the default"),
+        ("DEFAULT := 0;", "DEFAULT := 0 | 1;", r"line 24: got '1' after '\|', expected NC"),
         ("(* Center", "(* Center (*", None),
         ("Gravity *)", "Gravity", r"line 23: the comment that begins here with '\(\*' has no end"),
         ("ACT : MIN;", "ACT = MIN;", r"line 28: '=' is no sign of FCL"),
-        ("END_FUNCTION_BLOCK\n", "", r"line 34: the end of the file came after 'END_RULEBLOCK', expected VAR_INPUT"),
-        ("END_FUNCTION_BLOCK\n", "END_FUNCTION_BLOCK FUNCTION_BLOCK", r"line 34: another FUNCTION_BLOCK came"),
+        ("END_FUNCTION_BLOCK\n", "", r"line 34: got the end of the file after 'END_RULEBLOCK', expected VAR_INPUT"),
+        ("END_FUNCTION_BLOCK\n", "END_FUNCTION_BLOCK FUNCTION_BLOCK", r"line 34: got another FUNCTION_BLOCK"),
         ("TRIAN 0 5 10;", "TRIAN 40 45 50; RANGE := (0 .. 30);", r"line 19: .*term 'cheap' has no area"),
     ],
 )  # fmt: skip
@@ -228,7 +228,7 @@ def test_one_of_several_blocks_is_chosen_by_name(tmp_path):
     assert reads(text, "fcl", "first") == reads(BLOCKS, "fcl")
     assert reads(text, "fcl", "second of two").name == "second of two"
     with pytest.raises(
-        FormatError, match="line 12: another FUNCTION_BLOCK came, expected block=, one of first, second of"
+        FormatError, match="line 12: got another FUNCTION_BLOCK, expected block=, one of first, second of"
     ):
         reads(text, "fcl")
     with pytest.raises(FormatError, match="line 1: block is 'third', expected one of first, second of two, each once"):

@@ -101,9 +101,9 @@ def test_terms_are_triangles_trapezoids_and_ramps_where_they_can_be():
         ("  range: 0.000 10.000\n", "", "line 4: range of 'service' is missing, expected two numbers"),
         ("Triangle -inf 0.000 5.000", "Gauss 0 1", "line 8: term type 'Gauss' is not known here, expected"),
         ("Triangle -inf 0.000 5.000", "Gaussian 0", "line 8: Gaussian has 1 numbers, expected 2, and perhaps a height"),
-        ("Triangle -inf 0.000 5.000", "Gaussian 0 0", r"line 8: .*\(0.0, 0.0\) came, expected a deviation"),
+        ("Triangle -inf 0.000 5.000", "Gaussian 0 0", r"line 8: .*got \(0.0, 0.0\), expected a deviation"),
         ("Triangle -inf 0.000 5.000", "Constant 1", "line 8: an input's term is Constant, which is a value, expected"),
-        ("Triangle -inf 0.000 5.000", "Function x * (", "line 8: term 'poor': expression 'x . .': the end came"),
+        ("Triangle -inf 0.000 5.000", "Function x * (", "line 8: term 'poor': expression 'x . .': got the end"),
         ("Triangle -inf 0.000 5.000", "Function x", "line 4: variable 'service': term 'poor': expression 'x' gives"),
         ("Triangle -inf 0.000 5.000", "Triangle 0 1", "line 8: Triangle has the numbers '0 1', expected 3"),
         ("Triangle -inf 0.000 5.000", "Triangle 0 1 2 2", "line 8: Triangle has the height 2.0, expected 0 to 1"),
@@ -126,9 +126,9 @@ def test_terms_are_triangles_trapezoids_and_ramps_where_they_can_be():
         ("service is good", "service is god", "line 34: R2 .*'service' has no term 'god'"),
         ("with 0.500", "with 2", "line 29: .*weight is 2.0"),
         ("description", "descripton", "line 3: 'descripton' is not known in Engine, expected one of description"),
-        ("  activation: General\n", "  activation: General\n  activation: General\n", "line 29: activation came twice"),
+        ("  activation: General\n", "  activation: General\n  activation: General\n", "line 29: activation appears"),
         ("RuleBlock: more", "Engine: more", "line 31: 'conjunction' is not known in Engine"),
-        ("Engine: tip for two\n", "", "line 2: 'description' came, expected Engine first"),
+        ("Engine: tip for two\n", "", "line 2: got 'description', expected Engine first"),
         ("  enabled: true", "  enabled", "line 5: 'enabled', expected a key, a colon and its value"),
     ],
 )  # fmt: skip
@@ -156,7 +156,7 @@ def test_rules_keep_the_operators_of_their_block():
 
 def test_file_with_two_engines_is_rejected():
     text = writes(prioritised(), "fll")
-    with pytest.raises(FormatError, match="expected one Engine in a FLL file, 2 came"):
+    with pytest.raises(FormatError, match="expected one Engine in a FLL file, got 2"):
         reads(f"{text}Engine: twin\n", "fll")
 
 

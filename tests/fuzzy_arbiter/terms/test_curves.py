@@ -90,7 +90,7 @@ def test_inverse_returns_a_position_of_the_degree(kind, parameters, share):
     ("kind", "parameters", "fault"),
     [
         ("gauss", (0, 1), "curve is 'gauss', expected one of gaussian, gaussian2"),
-        ("gaussian", (0,), r"gaussian of mean, deviation: \(0,\) came, expected 2 finite numbers"),
+        ("gaussian", (0,), r"gaussian of mean, deviation: got \(0,\), expected 2 finite numbers"),
         ("gaussian", (0, math.inf), "expected 2 finite numbers"),
         ("gaussian", ("0", 1), "expected 2 finite numbers"),
         ("gaussian", (0, 0), "expected a deviation other than 0"),
