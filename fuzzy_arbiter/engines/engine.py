@@ -56,18 +56,16 @@ class Engine:
 
     def centroids_of_many(self, inputs: Array) -> Array:
         """Return the raw value of each output for many samples; inputs (n, inputs), returns (n, outputs)."""
-        outputs = self.system.outputs
-        result = np.empty((len(inputs), len(outputs)))
-        sequential = any(output.weighted for output in outputs)  # values may depend on the outputs before them
-        size = max(1, len(inputs)) if sequential else _BLOCK
-        for start in range(0, len(inputs), size):
-            known, block = inputs[start : start + size], result[start : start + size]
+        result = np.empty((len(inputs), len(self.system.outputs)))
+        uses_outputs = any(output.weighted for output in self.system.outputs)  # values may depend on earlier outputs
+        for start in range(0, len(inputs), _BLOCK):
+            block = slice(start, start + _BLOCK)
+            known = inputs[block]
             for k, cuts in enumerate(self.firing.cuts_of_many(self.firing.strengths_of_many(known))):
-                self._fill_fired(k, cuts, np.column_stack([known, block[:, :k]]) if sequential else known, block[:, k])
-                if sequential:
-                    self._fill_defaults(k, block[:, k])
-        for k in range(0 if sequential else len(outputs)):
-            self._fill_defaults(k, result[:, k])
+                self._fill_fired(
+                    k, cuts, np.column_stack([known, result[block, :k]]) if uses_outputs else known, result[block, k]
+                )
+                self._fill_defaults(k, result[max(0, start - 1) : start + _BLOCK, k])  # the last value before is kept
         return result
 
     def _fill_fired(self, k: int, cuts: Array, known: Array, values: Array) -> None:

@@ -54,7 +54,8 @@ class _Sampler:
             heights = self._join(heights, implication(cut[:, None], degrees))
         if self._defuzzifier == "bisector":
             sums = np.cumsum(heights, axis=1)
-            return np.asarray(x[np.minimum((sums < sums[:, -1:] / 2).sum(axis=1), len(x) - 1)])
+            whole = sums[:, -1:]
+            return np.where(whole[:, 0] > 0.0, x[np.argmax(sums >= whole / 2, axis=1)], np.nan)
         if self._defuzzifier != "centroid":
             heights = (heights >= heights.max(axis=1, keepdims=True) * _EQUAL) & (heights > 0.0)
         if self._defuzzifier in ("som", "lom"):

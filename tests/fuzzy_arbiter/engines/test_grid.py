@@ -7,12 +7,12 @@ from fuzzy_arbiter import Arbiter, Output, System, Variable, curve, rising, tria
 from fuzzy_arbiter.errors import EngineError
 
 
-def arbiter(points=11, defuzzifier="centroid", **terms):
+def arbiter(points=11, defuzzifier="centroid", implication="min", **terms):
     """A rule for each term, whose strength is an input of its own."""
     inputs = [Variable(name, (0, 1), {"on": rising(0, 1)}) for name in terms]
     rules = [f"if {name} is on then y is {name}" for name in terms]
     output = Output("y", (0, 10), terms, defuzzifier=defuzzifier)
-    return Arbiter(system=System(inputs, [output], rules, points=points), engine="grid")
+    return Arbiter(system=System(inputs, [output], rules, points=points, implication=implication), engine="grid")
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,12 @@ def test_maxima_of_a_plateau():
         made = arbiter(defuzzifier=defuzzifier, a=triangle(2, 5, 8), b=triangle(0, 1, 2))
         assert made(a=0.5, b=0.25) == (value,)
         assert np.isnan(made(a=0.0, b=0.0)).all()
+
+
+@pytest.mark.parametrize("defuzzifier", ["centroid", "bisector", "mom", "som", "lom"])
+def test_no_height_is_no_value(defuzzifier):
+    made = arbiter(defuzzifier=defuzzifier, implication="bounded_difference", a=curve("gaussian", 12, 2))
+    assert np.isnan(made.batch([[0.25], [1.0]])).tolist() == [[True], [False]]
 
 
 def test_batches_equal_single_samples_however_long():

@@ -93,6 +93,7 @@ def test_locked_output_is_clipped_or_holds_its_previous_value():
     rows = [[0.0, 0.0], [4.0, 0.0], [0.0, 1.0], [6.0, 0.0], [0.0, 0.0]]
     assert arbiter.batch(rows)[:, 0].tolist() == [-1.0, 4.0, 4.0, 6.0, 6.0]
     assert arbiter([0.0, 0.0]) == (-1.0,)  # a sample alone has none before it
+    assert (arbiter.batch([*rows[:2], *rows[:1] * 10_000])[1:, 0] == 4.0).all()  # more rows than a block
     free = Arbiter(system=system(replace(kept, default=None), "if x is high and z is near then y is t0"))
     assert np.isnan(free.batch(rows)[:, 0]).tolist() == [True, False, False, False, False]
 
