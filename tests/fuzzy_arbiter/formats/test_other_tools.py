@@ -41,6 +41,30 @@ def test_committed_files_round_trip(format):
         assert reads(foreign, format) == TIPPING
 
 
+@pytest.mark.parametrize(
+    ("format", "edits"),
+    [
+        ("fll", [("  ", "\t"), ("Engine: tipping", "#by fuzzylite\n\nEngine: tipping\n  description: a: how much?"),
+                 ("RuleBlock: rules", "RuleBlock:"), ("Ramp 5 10", "Ramp  5.000\t10.000   # shoulder")]),
+        ("fcl", [("  ", "\t"), ("FUNCTION_BLOCK tipping", "/* a *tip* // in /\n*/\nfunction_block tipping // one"),
+                 ("METHOD : COG;", "METHOD:COG ; // 'Center'"), ("(0 .. 25)", "(0.0..2.5E1)"),
+                 ("IS medium;", "is medium with 1.0; (* the *) (* usual *)"), ("(0, 1) (5, 0)", "(0,1), (5,0)"),
+                 ("quality IS poor OR", "(quality is poor) or")]),
+        ("toml", [('"if quality is poor or service is poor', '"""IF quality IS poor or\n  service is poor'),
+                  ('tip is low"', 'tip is low"""'), ("rules = [", "rules = [ # three\n"), ("25.0]", "2_5,\n]"),
+                  ("[inputs.terms]\n", ""), ("\npoor", "\nterms.poor"), ("\naverage", "\nterms.average"),
+                  ("\ngood", "\nterms.good")]),
+        ("json", [("\n", ""), ("  ", ""), (": ", ":")]),
+    ],
+)  # fmt: skip
+def test_layouts_by_hand_and_of_other_tools_read_alike(format, edits):
+    text = (DATA / f"tipping.{format}").read_text()
+    for old, new in edits:
+        assert old in text
+        text = text.replace(old, new)
+    assert reads(text, format) == TIPPING
+
+
 @pytest.mark.parametrize("tool", TOOLS)
 def test_recorded_centroids_of_other_tools(tool):
     ours = centroids(TIPPING, GOLDEN["samples"])[:, 0]
