@@ -12,6 +12,7 @@ Examples
 """
 
 import importlib
+import warnings
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -100,6 +101,9 @@ _EXPORTS = {
 
 
 def __getattr__(name: str) -> object:
+    if name == "Sweep":
+        warnings.warn("cosim.Sweep is now cosim.Campaign", DeprecationWarning, stacklevel=2)
+        name = "Campaign"
     for module, names in _EXPORTS.items():
         if name in names:
             return getattr(importlib.import_module(f"{__name__}.{module}"), name)

@@ -177,7 +177,7 @@ def _sentence(text: str, value: Any, choices: list[tuple[Any, Any]], where: str,
         return f"{where} is {value!r}, unknown; {hint(str(value), choices[0][0])}"
     phrase = next((extra["expected"] for extra in extras if extra["expected"] and isinstance(value, str)), "")
     if isinstance(value, int | float) and not isinstance(value, bool) and ("<" in text or ">" in text):
-        phrase = _range(metas, unit, abs(value) <= _FINITE)
+        phrase = _range(metas, unit, abs(value) <= _FINITE, any(choice is float for choice, _ in choices))
     if phrase:
         return f"{where} is {value!r}, expected {phrase}"
     return f"{shown}{_plain(text)}" + ("" if isinstance(value, dict) else f" (got {value!r})")
@@ -220,8 +220,8 @@ def _is_valid(value: Any, kind: Any) -> bool:
     return True
 
 
-def _range(metas: list[msgspec.Meta], unit: str, is_finite: bool) -> str:
-    """Format the range of a number, which is finite or not."""
+def _range(metas: list[msgspec.Meta], unit: str, is_finite: bool, is_float: bool) -> str:
+    """Format the range of a number, which is finite or not, and a float or a whole number."""
     low, above = next(((m.gt, "above ") for m in metas if m.gt is not None), (None, ""))
     low = next((m.ge for m in metas if m.ge is not None), low)
     high = next((m.le for m in metas if m.le is not None), None)
@@ -229,9 +229,9 @@ def _range(metas: list[msgspec.Meta], unit: str, is_finite: bool) -> str:
     if low is None or low == -_FINITE:
         return "a finite number" if high in (None, _FINITE) else f"at most {high:.12g}{unit}"
     if high is not None and high < _FINITE:
-        return f"{above}{low:.12g} to {high:.12g}{unit}"
+        return f"{above}{low:.12g} to {high:.12g}{unit}" if is_float else f"{low} to {high}{unit}"
     bound = f"above {low:.12g}{unit}" if above else f"{low:.12g}{unit} or above"
-    if high is None:
+    if high is None and is_float:
         return f"{bound}, or inf"
     return bound if is_finite else f"a finite number, {bound}"
 

@@ -122,7 +122,7 @@ def carry_out(
             rows = work.rows_of(keys)
             if (rows < 0).any():
                 key = keys[np.argmin(rows)]
-                raise RunError(f"{out}: a part holds the {work.unit} {key}, which is not of this campaign")
+                raise RunError(f"{out}: holds the {work.unit} {key}, which is not of this campaign")
             left[rows] = False
             for _ in flights.fly(np.flatnonzero(left)):
                 pass

@@ -16,6 +16,7 @@ def run_sweep(
     scenario: Scenario | str | Path,
     design: Design,
     out: str | Path,
+    *,
     workers: int = 1,
     executor: Executor | None = None,
     progress: bool = False,

@@ -1,4 +1,4 @@
-"""The engine that samples outputs, as MATLAB, Octave and fuzzylite do."""
+"""The engine that sums over samples of outputs, as MATLAB and simpful do."""
 
 from __future__ import annotations
 

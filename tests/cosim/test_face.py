@@ -86,6 +86,10 @@ def test_paths_may_be_texts_and_scenarios_names(tmp_path, monkeypatch):
     assert cosim.check_scenario("paper").title == cosim.load_scenario("paper").title
     design = cosim.Design(cosim.vary_from(["initial.position.1=-1,1"]), "grid")
     assert cosim.run_sweep("short.toml", design, "sweep").folder == Path("sweep")
+    with pytest.raises(TypeError, match="takes 3 positional arguments"):  # the fourth was the engine
+        cosim.run_sweep("short.toml", design, "sweep", "fused", 2)
+    with pytest.warns(DeprecationWarning, match=r"cosim\.Sweep is now cosim\.Campaign"):
+        assert cosim.Sweep is cosim.Campaign
     assert len(list(cosim.read_scenes("scenes.jsonl"))) == 1
     assert cosim.run_campaign("scenes.jsonl", "pd", "campaign").folder == Path("campaign")
     assert cosim.compare("scenes.jsonl", ["pd", "sun_cheah"], "comparison").folder == Path("comparison")

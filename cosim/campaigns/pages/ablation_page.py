@@ -31,12 +31,12 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
     results = {name: complete_results(folder / name, SCHEMA) for name in variants}
     changed = _changed(results)[: max(LISTED, replays)]
     with understood(folder / NUMBERS):
-        worse = [name for name, of in variants.items() if name != WHOLE and _helps(of)]
+        worse = [name for name, effect in variants.items() if name != WHOLE and _helps(effect)]
     same = [name for name in variants if name not in (WHOLE, *worse)]
     return write_page_with_replays(
         folder / PAGE, folder / NUMBERS, _drawings(numbers),
         {"s": numbers, "changed": changed, "worse": worse, "same": same},
-        [of["seed"] for of in changed[:replays]], [folder / name for name in results],
+        [change["seed"] for change in changed[:replays]], [folder / name for name in results],
         lambda key: f"Scene {key} by {', '.join(results)}",
     )  # fmt: skip
 
@@ -45,16 +45,16 @@ def _changed(results: Mapping[str, Results]) -> list[dict[str, Any]]:
     """Return each scene with the variant that changes its weighted violation most, the greatest change first."""
     whole = results[WHOLE].number("weighted_violation")
     seeds, kinds = results[WHOLE]["seed"].tolist(), scene_kinds(results[WHOLE]).kinds.tolist()
-    found = [
+    changes = [
         {"seed": seeds[i], "kind": kinds[i], "variant": name, "violation": float(other[i]), "whole": float(whole[i])}
         for name, other in ((name, rows.number("weighted_violation")) for name, rows in results.items())
         for i in np.flatnonzero(np.isfinite(other - whole) & (other != whole))
     ]
-    found.sort(key=lambda of: (-abs(of["violation"] - of["whole"]), of["seed"], of["variant"]))
-    first: dict[int, dict[str, Any]] = {}
-    for of in found:
-        first.setdefault(of["seed"], of)
-    return list(first.values())
+    changes.sort(key=lambda c: (-abs(c["violation"] - c["whole"]), c["seed"], c["variant"]))
+    greatest: dict[int, dict[str, Any]] = {}
+    for change in changes:
+        greatest.setdefault(change["seed"], change)
+    return list(greatest.values())
 
 
 def _drawings(numbers: dict[str, Any]) -> Iterator[NamedFigure]:
@@ -62,12 +62,12 @@ def _drawings(numbers: dict[str, Any]) -> Iterator[NamedFigure]:
     from cosim.report.figures.style import NamedFigure
 
     variants = numbers["variants"].items()
-    lines = [Rated(fact, name, of["scenes"], of[fact]) for fact in ("completed", "violation") for name, of in variants]
+    lines = [Rated(fact, name, n["scenes"], n[fact]) for fact in ("completed", "violation") for name, n in variants]
     yield NamedFigure("rates", "How many scenes each variant completed, and violated a region in.", forest(lines))
 
 
-def _helps(of: dict[str, Any]) -> bool:
+def _helps(effect: dict[str, Any]) -> bool:
     """Return True if a part significantly improves completed scenes or weighted violation."""
-    pairs, ratio = of["paired"], of["weighted_violation"]
+    pairs, ratio = effect["paired"], effect["weighted_violation"]
     more = pairs["p"] is not None and pairs["p"] < 0.05 and pairs["only_one"] > pairs["only_other"]
     return more or (ratio["high"] is not None and ratio["high"] < 1.0)

@@ -62,19 +62,19 @@ def campaign_lines(summary: dict[str, Any]) -> Iterator[str]:
 
 def spreads_of(results: Results, groups: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
     """Return the values whose distributions are drawn, by column and group; groups (scenes,)."""
-    reached, found = results["reached"], {}
+    reached, spreads = results["reached"], {}
     for name in SPREADS:
         counts = np.ones(len(results), dtype=bool) if name in (*OF_ALL, "reach_time") else reached
-        found[name] = {group: results.number(name)[of & counts] for group, of in groups.items()}
-    return found
+        spreads[name] = {group: results.number(name)[rows & counts] for group, rows in groups.items()}
+    return spreads
 
 
 def _drawings(results: Results, kinds: SceneKinds, groups: Mapping[str, Any]) -> Iterator[NamedFigure]:
     from cosim.campaigns.pages.figures import Key, Rated, binned_rates, distributions, forest, scatter
     from cosim.report.figures.style import NamedFigure
 
-    named = {name if len(groups) > 1 else "": of for name, of in groups.items()}
-    lines = [Rated(fact, name, of["scenes"], of["rates"][fact]) for fact in FACTS for name, of in named.items()]
+    labeled = {name if len(groups) > 1 else "": numbers for name, numbers in groups.items()}
+    lines = [Rated(fact, label, n["scenes"], n["rates"][fact]) for fact in FACTS for label, n in labeled.items()]
     yield NamedFigure("rates", "How many scenes were completed, reached, and violated a region.", forest(lines))
 
     which = dict(kinds.groups()) or {"all": np.ones(len(results), dtype=bool)}

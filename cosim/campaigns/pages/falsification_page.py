@@ -50,9 +50,9 @@ def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:
     if s["estimate"]:
         yield f"{s['title']}: {_estimated(s['estimate'])}, from {s['flown']} flights"
     else:
-        for name, found in (("search", s), ("random", s["random"])):
-            worst = f", worst {_value(s, found['worst'][0], True)}" if found["worst"] else ""
-            yield f"{name + ':':7} {found['flown']} flights, {found['violations']} with a violation{worst}"
+        for name, numbers in (("search", s), ("random", s["random"])):
+            worst = f", worst {_value(s, numbers['worst'][0], True)}" if numbers["worst"] else ""
+            yield f"{name + ':':7} {numbers['flown']} flights, {numbers['violations']} with a violation{worst}"
     for worst in s["worst"][:1]:
         yield f"worst: {worst['command']}"
 
@@ -72,8 +72,8 @@ def _drawings(s: dict[str, Any]) -> Iterator[NamedFigure]:
         axes.set(xlabel=label, ylabel="probability of less")
         yield NamedFigure("levels", "How likely a flight comes as near or nearer, level by level.", figure)
         return
-    for name, found, color in (("search", s, BLUE), ("random", s["random"], ORANGE)):
-        flights, costs = zip(*[*found["best"], [found["flown"], found["best"][-1][1]]], strict=True)
+    for name, numbers, color in (("search", s, BLUE), ("random", s["random"], ORANGE)):
+        flights, costs = zip(*[*numbers["best"], [numbers["flown"], numbers["best"][-1][1]]], strict=True)
         axes.step(flights, [_of_cost(s, cost) for cost in costs], where="post", color=color, label=name)
     axes.set(xlabel="flights", ylabel=f"worst so far: {label}")
     axes.legend()

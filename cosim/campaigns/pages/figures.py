@@ -86,11 +86,11 @@ def _interval(axes: Axes, line: Rated, y: float) -> None:
 
 def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> Iterator[NamedFigure]:
     """Yield the figure of empirical distributions, a panel for each column, with a dot at the median; columns (n,)."""
-    there = {name: of for name, of in columns.items() if any(np.isfinite(values).any() for values in of.values())}
-    if not there:
+    drawn = {name: groups for name, groups in columns.items() if any(np.isfinite(x).any() for x in groups.values())}
+    if not drawn:
         return
-    figure, panels = _panels(len(there), 2.3)
-    for axes, (column, groups) in zip(panels, there.items(), strict=True):
+    figure, panels = _panels(len(drawn), 2.3)
+    for axes, (column, groups) in zip(panels, drawn.items(), strict=True):
         for i, (name, values) in enumerate(groups.items()):
             x, shares = _thinned(*shares_up_to(values))
             colour, dash = CYCLE[i % len(CYCLE)], _DASHES[i % len(_DASHES)]

@@ -35,9 +35,9 @@ _QUANTILE_NAMES = ["median" if q == 0.5 else f"{100 * q:g} %" for q in QUANTILES
 def quantile_rows(groups: Mapping[str, Mapping[str, Any]]) -> Iterator[tuple[str, str, Iterable[float | None]]]:
     """Yield label, group and quantiles of each column that has numbers; only the first group has the label."""
     for name in next(iter(groups.values()))["quantiles"]:
-        found = {group: of["quantiles"][name] for group, of in groups.items()}
-        if any(values["0.5"] is not None for values in found.values()):
-            for i, (group, values) in enumerate(found.items()):
+        quantiles = {group: numbers["quantiles"][name] for group, numbers in groups.items()}
+        if any(values["0.5"] is not None for values in quantiles.values()):
+            for i, (group, values) in enumerate(quantiles.items()):
                 yield "" if i else LABELS[name], group, values.values()
 
 

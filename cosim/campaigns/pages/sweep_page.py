@@ -63,9 +63,9 @@ def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
     yield f"{s['name']}: {s['flown']} of {s['rows']} rows flown, {s['refused']} refused, {s['stopped']} stopped early"
     for fact in FACTS:
         yield f"{fact:15} {s[fact]['rows']}: {interval(s[fact])}"
-    for name, found in s["quantiles"].items():
-        if found["0.5"] is not None:
-            yield f"{name:15} {found['0.5']:.4g} {FIELDS[name][1]} ({found['0.05']:.4g} to {found['0.95']:.4g})"
+    for name, numbers in s["quantiles"].items():
+        if numbers["0.5"] is not None:
+            yield f"{name:15} {numbers['0.5']:.4g} {FIELDS[name][1]} ({numbers['0.05']:.4g} to {numbers['0.95']:.4g})"
     for worst in s["worst"][:1]:
         yield f"worst: {worst['command']}"
 
@@ -107,7 +107,7 @@ def _by_weight(s: dict[str, Any]) -> list[str]:
     outcomes = ("reached", "violated", "min_clearance", "reach_time")
 
     def weight(key: str) -> float:
-        return max(of["share"] if (of := s["effects"][key][name]) else 0.0 for name in outcomes)
+        return max(effect["share"] if (effect := s["effects"][key][name]) else 0.0 for name in outcomes)
 
     return sorted(s["vary"], key=lambda key: -weight(key))
 
@@ -116,9 +116,9 @@ def _effects(s: dict[str, Any], ranked: list[str]) -> Iterator[list[str]]:
     """Yield cells of a table: an outcome, its effect and rank correlation of each key, and what chance reaches."""
     for name in FIELDS:
         effects = [s["effects"][key][name] for key in ranked]
-        cells = [_effect(of, s["rank_correlations"][key][name]) for key, of in zip(ranked, effects, strict=True)]
+        cells = [_effect(one, s["rank_correlations"][key][name]) for key, one in zip(ranked, effects, strict=True)]
         if any(cells):
-            floors = [of["floor"] for of in effects if of]
+            floors = [one["floor"] for one in effects if one]
             yield [LABELS[name], *cells, _percent(max(floors)) if floors else "–"]
 
 

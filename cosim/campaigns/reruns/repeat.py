@@ -132,7 +132,7 @@ def _row_outcome(run: Run) -> Outcome:
     same = ("reached", "reach_time", "settled", "closest_to_goal", "effort", "max_force", "max_speed")
     return {name: run.summary[name] for name in same} | {
         "violated": bool(run.summary["hard_violated"]),
-        "min_clearance": _least_clearance(run),
+        "min_clearance": _min_clearance(run),
     }
 
 
@@ -141,7 +141,7 @@ def _scene_outcome(run: Run, conditions: Conditions) -> Outcome:
     time, inside = run.record["time"], run.record["goal.clearance"] >= 0.0
     entered = spans(inside, time)[-1][0] if inside[-1] else math.inf
     reached = bool(time[-1] - entered >= conditions.settled - 0.5 * conditions.plant_step)
-    clearance = _least_clearance(run)
+    clearance = _min_clearance(run)
     return {
         "reached": reached,
         "violation": clearance < 0.0,
@@ -150,7 +150,7 @@ def _scene_outcome(run: Run, conditions: Conditions) -> Outcome:
     }
 
 
-def _least_clearance(run: Run) -> float:
+def _min_clearance(run: Run) -> float:
     """Return the minimum clearance of hard regions of position [m], inf where there is none."""
     hard = [r.region.name for r in run.scenario.regions if r.region.hard and not of_attitude(r.region.shape)]
     return min((run.summary["min_clearance"][name] for name in hard), default=math.inf)

@@ -9,7 +9,7 @@ from typing import Any
 import pyarrow as pa
 
 from cosim.campaigns.scenes.flyer import Score
-from cosim.campaigns.store.results import make_schema
+from cosim.campaigns.store.results import make_schema, make_table
 
 Row = dict[str, Any]  # values by column; a missing one is null
 _INTEGER, _FLOAT, _BOOL, _TEXT = pa.int64(), pa.float64(), pa.bool_(), pa.string()
@@ -58,4 +58,4 @@ def refused_row(seed: int, reason: str, scene: str = "") -> Row:
 
 def table_of(rows: Sequence[Row]) -> Any:
     """Convert rows to a table of `SCHEMA`."""
-    return pa.Table.from_pylist(list(rows), SCHEMA)
+    return make_table(SCHEMA, ([row.get(name) for row in rows] for name in SCHEMA.names))

@@ -11,7 +11,7 @@ from msgspec import Meta
 from controller.regions import DepthBand, Region, Sphere
 from controller.regions.shape import GREATEST
 from cosim.errors import ScenarioError
-from plant_fmu.toml_tables import Table
+from plant_fmu.toml_tables import NonNegative, Table
 from plant_fmu.vehicle import Vehicle
 
 Seed = Annotated[int, Meta(ge=0, le=2**63 - 1)]
@@ -48,7 +48,7 @@ class Failure(Table, frozen=True):
     """A thruster that gives no force from some time on."""
 
     index: Annotated[int, Meta(ge=1)]  # number of the thruster, from 1
-    time: Annotated[float, Meta(ge=0.0)]  # s, time of the failure
+    time: NonNegative  # s, time of the failure
 
 
 class Scene(Table, frozen=True):

@@ -54,12 +54,12 @@ class SceneStore:
 
     def lines(self, seeds: Iterable[int]) -> list[bytes]:
         """Return the lines of the scenes with given seeds, in this order."""
-        found = []
+        lines = []
         for seed in seeds:
             offset, length = self._places[seed]
             self._file.seek(offset)
-            found.append(self._file.read(length))
-        return found
+            lines.append(self._file.read(length))
+        return lines
 
     def __len__(self) -> int:
         return len(self.seeds)

@@ -44,9 +44,9 @@ def difference(one: dict[str, Any], other: dict[str, Any]) -> str:
     """Describe the differences of two plans."""
     alone = next((key for key in ("kind", "law") if one.get(key) != other.get(key)), None)
     keys = [alone] if alone else sorted(one.keys() | other.keys())
-    found = list(_differences(one, other, keys))
-    more = f"; and {len(found) - _NAMED} more" if len(found) > _NAMED else ""
-    return "; ".join(found[:_NAMED]) + more
+    differences = list(_differences(one, other, keys))
+    more = f"; and {len(differences) - _NAMED} more" if len(differences) > _NAMED else ""
+    return "; ".join(differences[:_NAMED]) + more
 
 
 def _differences(one: dict[Any, Any], other: dict[Any, Any], keys: Sequence[Any], prefix: str = "") -> Iterator[str]:

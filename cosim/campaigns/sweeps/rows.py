@@ -17,7 +17,7 @@ from cosim.batch.fused import FusedFlyer
 from cosim.batch.outcome import FIELDS, BatchResult, empty_outcomes
 from cosim.batch.variation import Variation
 from cosim.campaigns.store.plan import SWEEP, code_digest, versions
-from cosim.campaigns.store.results import make_schema
+from cosim.campaigns.store.results import make_schema, make_table
 from cosim.campaigns.sweeps.design import Design
 from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
@@ -52,15 +52,13 @@ def schema_of(keys: tuple[str, ...]) -> Any:
 
 def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: BatchResult) -> Any:
     """Convert flights to a table."""
-    refused = np.zeros(len(batch.rows), dtype=bool)
-    refused[list(flown.refused)] = True
-    outcomes = []
-    for name, (kind, _, _) in FIELDS.items():
-        column = flown.outcomes[name].copy()
-        outcomes.append(pa.array(column, mask=refused | (np.isnan(column) if kind is np.float64 else False)))
-    reasons = pa.array([flown.refused.get(i) for i in range(len(batch.rows))], pa.string())
-    columns = [batch.rows, *batch.values.T, batch.seeds, *outcomes, reasons]
-    return pa.Table.from_arrays([pa.array(column) for column in columns], schema=schema_of(keys))
+    reasons = [flown.refused.get(i) for i in range(len(batch.rows))]
+    outcomes = [
+        flown.outcomes[name].astype(object if kind is np.bool_ else kind) for name, (kind, _, _) in FIELDS.items()
+    ]
+    for column in outcomes:
+        column[list(flown.refused)] = None  # NaN among floats
+    return make_table(schema_of(keys), [batch.rows, *batch.values.T, batch.seeds, *outcomes, reasons])
 
 
 @dataclass(frozen=True)

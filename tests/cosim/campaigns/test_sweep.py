@@ -17,7 +17,9 @@ from scipy.stats import norm
 
 from cosim.batch.outcome import FIELDS
 from cosim.campaigns import run_sweep
+from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.folder import PARTS, RESULTS
+from cosim.campaigns.store.results import make_table
 from cosim.campaigns.sweeps.design import design_of
 from cosim.campaigns.sweeps.rows import schema_of
 from cosim.command_line.cli import main
@@ -293,6 +295,42 @@ def test_command_prints_the_sweep_result(tmp_path, fakes, capsys):
     (tmp_path / "other" / "precious").write_text("")
     assert main([*words, "--out", str(tmp_path / "other")]) == 2
     assert "holds no campaign" in capsys.readouterr().err
+
+
+# ---- tables ----
+
+_WITHOUT_PANDAS = """
+import sys
+import numpy as np
+from cosim.campaigns.scenes.rows import refused_row, table_of
+from cosim.campaigns.sweeps import rows
+from tests.cosim.campaigns.fake import Fake, design, paper
+rows.FusedFlyer = Fake
+work = rows.SweepWork(paper(), design())
+tables = work.task.flyer().fly(work.batch(np.arange(9))), table_of([refused_row(1, "why", "scene")])
+sys.exit(f"{list(map(len, tables))} {'pandas' in sys.modules}")
+"""
+
+
+@pytest.mark.medium
+def test_tables_are_made_without_pandas():
+    words = [sys.executable, "-c", _WITHOUT_PANDAS]
+    done = subprocess.run(words, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
+    assert done.stderr == "[9, 1] False\n"
+
+
+@pytest.mark.parametrize("n", [0, 1, 8, 37])
+def test_tables_equal_those_of_pyarrow(n):
+    rng = np.random.default_rng(n)
+    some = {"int64": [3, -(2**62)], "double": [0.0, -0.0, np.inf, 1e300], "bool": [True, False], "string": ["", "ä\n"]}
+    columns = [
+        [None if field.nullable and rng.random() < 0.3 else rng.choice(some[str(field.type)]).item() for _ in range(n)]
+        for field in SCHEMA
+    ]
+    table = make_table(SCHEMA, columns)
+    table.validate(full=True)
+    arrays = [pa.array(column, field.type) for column, field in zip(columns, SCHEMA, strict=True)]
+    assert table.equals(pa.Table.from_arrays(arrays, schema=SCHEMA))
 
 
 # ---- memory ----
