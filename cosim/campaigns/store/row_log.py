@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import logging
 import shutil
 from collections.abc import Iterator
@@ -36,14 +37,16 @@ class RowLog:
         """Append a table, and pass it to the system, so that it survives a kill."""
         if self._file is None:
             number = max((int(file.stem) for file in self._files()), default=-1) + 1
-            self._file = (self._folder / f"{number:06}.arrows").open("wb", buffering=0)
+            self._file = (self._folder / f"{number:06}.arrows").open("wb")
             self._stream = pa.ipc.new_stream(self._file, self._schema)
         self._stream.write_table(table)
+        self._file.flush()  # of a buffered file: PyArrow does not look whether a raw one has written all
 
     def close(self) -> None:
         """Close the file of this session. May be called twice."""
         if self._file is not None:
-            self._file.close()
+            with contextlib.suppress(OSError):  # `add` has raised it
+                self._file.close()
             self._file = None
 
     def keys(self) -> Rows:

@@ -1,5 +1,6 @@
 """Rows on disk during a campaign: none lost, none duplicated, whenever the process is killed."""
 
+import sys
 import tempfile
 from pathlib import Path
 
@@ -23,6 +24,7 @@ def table(rows):
 
 
 def append(folder, *batches):
+    folder.mkdir(exist_ok=True)
     log = RowLog(folder / "parts", SCHEMA)
     for batch in batches:
         log.add(table(batch))
@@ -66,6 +68,25 @@ def test_every_table_before_the_kill_is_kept(tmp_path, caplog):
     file.write_bytes(file.read_bytes()[: size - 9])
     assert append(tmp_path, {4, 5}, {2}).keys().tolist() == [0, 1, 2, 4, 5]
     assert "its end cannot be read" in caplog.text and joined(tmp_path).equals(table([0, 1, 2, 4, 5]))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files")
+def test_full_disk_is_an_error_at_any_byte(tmp_path):
+    import resource
+
+    append(tmp_path / "whole", {0}, range(1, 9))
+    size = (tmp_path / "whole" / "parts" / "000000.arrows").stat().st_size
+    unlimited = resource.getrlimit(resource.RLIMIT_FSIZE)
+    for lacking in range(1, 20):
+        log = RowLog(tmp_path / str(lacking), SCHEMA)
+        log.add(table({0}))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (size - lacking, unlimited[1]))
+        try:
+            with pytest.raises(OSError, match="too large"):
+                log.add(table(range(1, 9)))
+        finally:
+            resource.setrlimit(resource.RLIMIT_FSIZE, unlimited)
+            log.close()
 
 
 def test_copied_file_is_refused_and_foreign_files_are_ignored(tmp_path):
