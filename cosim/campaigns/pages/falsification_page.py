@@ -73,8 +73,11 @@ def _drawings(s: dict[str, Any]) -> Iterator[NamedFigure]:
         yield NamedFigure("levels", "How likely a flight comes as near or nearer, level by level.", figure)
         return
     for name, numbers, color in (("search", s, BLUE), ("random", s["random"], ORANGE)):
-        flights, costs = zip(*[*numbers["best"], [numbers["flown"], numbers["best"][-1][1]]], strict=True)
-        axes.step(flights, [_of_cost(s, cost) for cost in costs], where="post", color=color, label=name)
+        if best := numbers["best"]:  # empty if every flight was refused
+            flights, costs = zip(*[*best, [numbers["flown"], best[-1][1]]], strict=True)
+            axes.step(flights, [_of_cost(s, cost) for cost in costs], where="post", color=color, label=name)
+    if not axes.lines:
+        return
     axes.set(xlabel="flights", ylabel=f"worst so far: {label}")
     axes.legend()
     yield NamedFigure("convergence", "The worst of the search and of random flights, after so many flights.", figure)

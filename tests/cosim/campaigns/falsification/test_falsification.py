@@ -23,8 +23,11 @@ from cosim.campaigns.store.folder import PARTS
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
+from tests.cosim.campaigns.fake import Choosy, fakes
 from tests.cosim.campaigns.scene_data import BRIEF, interrupt_after, rows
 from tests.cosim.campaigns.test_pages import check, runs_of
+
+__all__ = ["fakes"]
 
 pytest.importorskip("cma")
 NEARING = Conditions(duration=12.0)  # long enough to come near to obstacles
@@ -73,6 +76,16 @@ def test_page_shows_search_random_and_worst_replays(found):
     assert [path.name for path in (found.folder / "figures").iterdir()] == ["convergence.svg"]
     (run,) = runs_of(found.folder / page.asked[0])
     assert run["status"] == "completed"
+
+
+@pytest.mark.medium
+def test_page_says_when_every_flight_was_refused(tmp_path, fakes, monkeypatch):
+    monkeypatch.setattr(Choosy, "refused_above", -9.0)
+    fakes(Choosy)
+    found = run_falsification(varied(), tmp_path / "out")
+    assert found.summary["refused"] == len(found.results) and found.summary["worst"] == []
+    page = write_falsification_page(tmp_path / "out", 1)
+    assert check(page).asked == [] and "30 could not be flown" in page.read_text()
 
 
 @pytest.mark.medium
