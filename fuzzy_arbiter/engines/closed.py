@@ -41,7 +41,7 @@ class NoClosedFormError(EngineError):
         self.reason = reason
 
 
-class _OfCut:
+class _ClosedForm:
     """C(h) of one output, whose cuts are 1 - h and h."""
 
     method = "closed form"
@@ -71,7 +71,7 @@ class ClosedEngine(Engine):
         self.ladder = ladder(system, clauses)
         self.raw, scaled = _pieces(system.outputs)
         self.scaled = self.raw if system.normalization == "none" else scaled
-        super().__init__(system, [_OfCut(forms) for forms in self.raw])
+        super().__init__(system, [_ClosedForm(forms) for forms in self.raw])
         self._index = {v.name: i for i, v in enumerate(system.inputs)}
         self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
         self._cubic = _one_cubic(self.scaled)

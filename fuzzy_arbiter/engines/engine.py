@@ -21,7 +21,7 @@ _EACH_BY_ITSELF = ("range", "none")  # normalizations that use one output at a t
 
 
 class Defuzzifier(Protocol):
-    """One value of an output, from the cuts of its slots; inputs and earlier outputs matter to values alone."""
+    """Value of one output from the cuts of its slots; inputs and earlier outputs matter to weighted outputs alone."""
 
     method: str  # how the value is computed, with its error bound
 
@@ -122,12 +122,12 @@ class Engine:
             )
         slots, unknown = self.firing.slots[k], [math.nan] * (len(self.system.inputs) + k)
         terms = sorted({slot.term for slot in slots})
-        alone = [self.defuzzifiers[k].value([float(slot.term == j) for slot in slots], unknown) for j in terms]
-        if not alone:
+        centroids = [self.defuzzifiers[k].value([float(slot.term == j) for slot in slots], unknown) for j in terms]
+        if not centroids:
             raise EngineError(
                 f"output {output.name!r}: no rule concludes on it, which leaves no range to normalize; expected one"
             )
-        low, high = min(alone), max(alone)
+        low, high = min(centroids), max(centroids)
         if not low < high:
             raise EngineError(
                 f"output {output.name!r}: its terms have one centroid, {low:g}, which leaves no range to normalize; "

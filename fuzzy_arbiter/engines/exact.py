@@ -29,9 +29,9 @@ class ExactEngine(Engine):
         output = system.outputs[k]
         if output.weighted:
             return Weighted(output, variable_names(system.inputs), variable_names(system.outputs[:k]))
-        return self._of_areas(system, output)
+        return self._area_defuzzifier(system, output)
 
-    def _of_areas(self, system: System, output: Output) -> Defuzzifier:
+    def _area_defuzzifier(self, system: System, output: Output) -> Defuzzifier:
         slots = slots_of(system, output)
         implications = {slot.implication for slot in slots}
         if (

@@ -23,7 +23,7 @@ class GridEngine(ExactEngine):
 
     name: ClassVar[str] = "grid"
 
-    def _of_areas(self, system: System, output: Output) -> Defuzzifier:
+    def _area_defuzzifier(self, system: System, output: Output) -> Defuzzifier:
         return _Sampler(output, system)
 
 

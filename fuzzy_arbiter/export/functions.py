@@ -42,10 +42,8 @@ _CALL = re.compile(r"\b([a-z_][a-z_0-9]*)\(")
 def called(texts: Iterable[str]) -> list[str]:
     """Return the functions that some expressions call."""
     names = {name for text in texts for name in _CALL.findall(text) if name not in ("or", "and", "not")}
-    names |= {inner for name in names if name in _OPERATORS for inner in _CALL.findall(_body_in_c(name))} - {
-        "sqrt",
-        "pow",
-    }
+    inner = {name for operator in names & _OPERATORS.keys() for name in _CALL.findall(_body_in_c(operator))}
+    names |= inner - {"sqrt", "pow"}
     for name in names:
         if name not in (*_OPERATORS, *_PYTHON, *_COMPARED, *_C_MATH):
             raise UnsupportedError(f"export: the function {name!r} of a formula is not exported")
@@ -80,13 +78,6 @@ def _body_in_c(name: str) -> str:
 
 def _expression_in_c(node: ast.expr) -> str:
     if isinstance(node, ast.IfExp):
-        return " ".join(
-            (
-                ast.unparse(node.test).replace(" and ", " && "),
-                "?",
-                ast.unparse(node.body),
-                ":",
-                _expression_in_c(node.orelse),
-            )
-        )
+        test = ast.unparse(node.test).replace(" and ", " && ")
+        return f"{test} ? {ast.unparse(node.body)} : {_expression_in_c(node.orelse)}"
     return ast.unparse(node)

@@ -34,7 +34,11 @@ def formula(number: Callable[..., float]) -> ast.expr:
 
 @cache
 def _on_arrays(number: Callable[..., float]) -> Callable[[dict[str, Any]], Any]:
-    return _vectorized(formula(number))
+    try:
+        return _vectorized(formula(number))
+    except OSError:  # without sources, as in a frozen program: slower
+        each = np.vectorize(number, otypes=[np.float64])
+        return lambda values: each(*values.values())
 
 
 def _vectorized(node: ast.expr) -> Callable[[dict[str, Any]], Any]:
