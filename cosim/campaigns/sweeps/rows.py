@@ -53,7 +53,7 @@ def schema_of(keys: tuple[str, ...]) -> Any:
 def table_of(keys: tuple[str, ...], batch: SweepBatch, flown: BatchResult) -> Any:
     """Convert flights to a table."""
     reasons = [flown.refused.get(i) for i in range(len(batch.rows))]
-    outcomes = [
+    outcomes: list[NDArray[Any]] = [
         flown.outcomes[name].astype(object if kind is np.bool_ else kind) for name, (kind, _, _) in FIELDS.items()
     ]
     for column in outcomes:
