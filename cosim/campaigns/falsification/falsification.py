@@ -16,7 +16,7 @@ from cosim.campaigns.falsification.search import minimize
 from cosim.campaigns.falsification.splitting import estimate_probability
 from cosim.campaigns.falsification.work import Objective, ScenarioSearch, SceneSearch
 from cosim.campaigns.runner import Campaign, open_flights
-from cosim.campaigns.store.results import Results
+from cosim.campaigns.store.results import Results, to_array, to_column
 
 RANDOM = "random"  # folder of the campaign with as many random rows
 _COLUMNS = {"clearance": "min_clearance", "violation": "weighted_violation", "arrival": "reach_time"}
@@ -33,13 +33,13 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
     points: list[NDArray[np.float64]] = []  # those of all rows
     with open_flights(work, out, workers, progress=progress) as (folder, flights):
         stored = folder.rows()
-        keys = stored.column(0).to_numpy()
+        keys = to_array(stored.column(0))
 
         def evaluate(requested: NDArray[np.float64]) -> NDArray[np.float64]:
             """Return the costs of points, shape (n,); fly those that are not in the folder."""
             points.append(requested)
             rows = work.add(requested)
-            known = stored.filter(pa.array(np.isin(keys, rows)))
+            known = stored.filter(to_column(pa.bool_(), np.isin(keys, rows)))
             flown = pa.concat_tables([known, *flights.fly(rows[~np.isin(rows, keys)])])
             return costs_of(flown.sort_by(flown.schema.names[0]), settings.objective, work.horizon)
 
@@ -57,13 +57,13 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
 
 def costs_of(rows: Any, objective: Objective, horizon: float) -> NDArray[np.float64]:
     """Return the costs that a search minimizes; horizon [s], returns (rows,) [m]."""
-    values = rows[_COLUMNS[objective]].to_numpy().astype(float)
+    values = to_array(rows[_COLUMNS[objective]]).astype(float)
     if objective == "clearance":
-        values = np.where(pc.is_null(rows["stopped_at"]).to_numpy(), values, np.fmin(values, _STOPPED))
+        values = np.where(to_array(pc.is_null(rows["stopped_at"])), values, np.fmin(values, _STOPPED))
         costs = np.nan_to_num(values, nan=_REFUSED, posinf=_REFUSED)
     else:
         costs = -np.nan_to_num(values, nan=horizon if objective == "arrival" else 0.0)
-    return np.where(pc.is_null(rows["refused"]).to_numpy(), costs, _REFUSED)
+    return np.where(to_array(pc.is_null(rows["refused"])), costs, _REFUSED)
 
 
 def _summarize(

@@ -33,11 +33,12 @@ class SceneTask:
 
     def plan(self, scenes: int) -> dict[str, Any]:
         """Return all inputs that determine the rows of a number of scenes, but the scenes themselves."""
+        conditions = msgspec.to_builtins(self.conditions)
         return {
             "kind": SCENES,
             "law": self.law,
             "gains": self.gains._asdict(),
-            "conditions": msgspec.to_builtins(self.conditions),
+            "conditions": conditions | {"outages": list(conditions["outages"])},  # as JSON is read
             "scenes": scenes,
             "code_sha256": code_digest(),
             "versions": versions(),

@@ -37,7 +37,7 @@ class Results:
 
     def __getitem__(self, name: str) -> Any:
         """Return a column, shape (rows,), with NaN or None for null; raise a RunError for numbers beyond statistics."""
-        column = self._read([name])[name].to_numpy()
+        column = to_array(self._read([name])[name])
         if column.dtype == np.float64 and (beyond := np.isfinite(column) & (np.abs(column) > _MAX_NUMBER)).any():
             i = int(np.argmax(beyond))
             raise RunError(
@@ -57,8 +57,7 @@ class Results:
 
     def is_null(self, name: str) -> NDArray[np.bool_]:
         """Return a mask of the nulls of a column, shape (rows,)."""
-        mask: NDArray[np.bool_] = pc.is_null(self._read([name])[name]).to_numpy()
-        return mask
+        return to_array(pc.is_null(self._read([name])[name]))
 
     def values(self, name: str) -> Iterator[Any]:
         """Yield the values of a column in order; raise a RunError if it does not exist."""
@@ -101,11 +100,26 @@ def make_schema(columns: Any) -> Any:
 
 def make_table(schema: Any, columns: Iterable[Sequence[Any] | NDArray[Any]]) -> Any:
     """Make a table of columns, shape (n,); None and NaN are null."""
-    arrays = [_column(field.type, values) for field, values in zip(schema, columns, strict=True)]
+    arrays = [to_column(field.type, values) for field, values in zip(schema, columns, strict=True)]
     return pa.Table.from_arrays(arrays, schema=schema)
 
 
-def _column(kind: Any, values: Sequence[Any] | NDArray[Any]) -> Any:
+def to_array(column: Any) -> NDArray[Any]:
+    """Return the values of a column, shape (n,), with NaN or None for null; not `to_numpy`, which imports pandas."""
+    array = column.combine_chunks() if isinstance(column, pa.ChunkedArray) else column
+    if array.type == pa.string() or (array.type == pa.bool_() and array.null_count):
+        return np.array(array.to_pylist(), dtype=object)
+    if array.type == pa.bool_():
+        return to_array(pc.cast(array, pa.uint8())).view(np.bool_)
+    if not array.null_count:
+        return np.from_dlpack(array)
+    without_nulls = [None, array.buffers()[1]]
+    values = np.from_dlpack(pa.Array.from_buffers(array.type, len(array), without_nulls, 0, array.offset))
+    return np.where(to_array(pc.is_null(array)), np.nan, values)
+
+
+def to_column(kind: Any, values: Sequence[Any] | NDArray[Any]) -> Any:
+    """Make a column of values, shape (n,); None and NaN are null."""
     # not pa.array: it imports pandas where that is installed, which takes each worker a third of a second
     if kind == pa.string():
         texts = [(text or "").encode() for text in values]

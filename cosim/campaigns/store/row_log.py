@@ -14,6 +14,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 import pyarrow.parquet as pq
 
+from cosim.campaigns.store.results import to_array, to_column
 from cosim.campaigns.workers.work import Rows
 from cosim.errors import RunError
 from plant_fmu.archive import atomic_file
@@ -51,7 +52,9 @@ class RowLog:
 
     def keys(self) -> Rows:
         """Return the keys of all complete rows, shape (n,), in rising order."""
-        keys = np.sort(np.concatenate([np.empty(0, np.int64), *(batch[0].to_numpy() for batch in self._batches())]))
+        keys = np.sort(
+            np.concatenate([np.empty(0, np.int64), *(np.from_dlpack(batch[0]) for batch in self._batches())])
+        )
         if (np.diff(keys) == 0).any():
             raise RunError(f"{self._folder}: holds row {keys[np.argmin(np.diff(keys))]} twice, expected each row once")
         return keys
@@ -69,9 +72,10 @@ class RowLog:
                 low, high = keys[i], keys[i : i + _GROUP][-1]
                 near = [batch for span, batch in batches if span["min"] <= high and span["max"] >= low]
                 table = pa.Table.from_batches(near, self._schema)
-                near_keys = table[key].to_numpy()
+                near_keys = to_array(table[key])
                 order = np.argsort(near_keys)
-                writer.write_table(table.take(order[np.isin(near_keys[order], keys[i : i + _GROUP])]))
+                rows = order[np.isin(near_keys[order], keys[i : i + _GROUP])]
+                writer.write_table(table.take(to_column(pa.int64(), rows)))
 
     def remove(self) -> None:
         """Remove the folder."""

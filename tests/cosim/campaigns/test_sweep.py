@@ -19,7 +19,7 @@ from cosim.batch.outcome import FIELDS
 from cosim.campaigns import run_sweep
 from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.folder import PARTS, RESULTS
-from cosim.campaigns.store.results import make_table
+from cosim.campaigns.store.results import make_table, to_array
 from cosim.campaigns.sweeps.design import design_of
 from cosim.campaigns.sweeps.rows import schema_of
 from cosim.command_line.cli import main
@@ -301,22 +301,22 @@ def test_command_prints_the_sweep_result(tmp_path, fakes, capsys):
 
 _WITHOUT_PANDAS = """
 import sys
-import numpy as np
+from pathlib import Path
+from cosim.campaigns import run_sweep
 from cosim.campaigns.scenes.rows import refused_row, table_of
 from cosim.campaigns.sweeps import rows
 from tests.cosim.campaigns.fake import Fake, design, paper
 rows.FusedFlyer = Fake
-work = rows.SweepWork(paper(), design())
-tables = work.task.flyer().fly(work.batch(np.arange(9))), table_of([refused_row(1, "why", "scene")])
-sys.exit(f"{list(map(len, tables))} {'pandas' in sys.modules}")
+done = run_sweep(paper(), design(), Path(sys.argv[1]))
+sys.exit(f"{done.flown} {len(table_of([refused_row(1, 'why', 'scene')]))} {'pandas' in sys.modules}")
 """
 
 
 @pytest.mark.medium
-def test_tables_are_made_without_pandas():
-    words = [sys.executable, "-c", _WITHOUT_PANDAS]
+def test_sweep_and_scenes_do_without_pandas(tmp_path):
+    words = [sys.executable, "-c", _WITHOUT_PANDAS, str(tmp_path / "out")]
     done = subprocess.run(words, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True, text=True)
-    assert done.stderr == "[9, 1] False\n"
+    assert done.stderr == "50 1 False\n"
 
 
 @pytest.mark.parametrize("n", [0, 1, 8, 37])
@@ -331,6 +331,8 @@ def test_tables_equal_those_of_pyarrow(n):
     table.validate(full=True)
     arrays = [pa.array(column, field.type) for column, field in zip(columns, SCHEMA, strict=True)]
     assert table.equals(pa.Table.from_arrays(arrays, schema=SCHEMA))
+    for column in (*table.slice(n // 3).itercolumns(), pa.chunked_array([], pa.float64())):
+        np.testing.assert_array_equal(to_array(column), column.to_numpy())
 
 
 # ---- memory ----

@@ -51,7 +51,7 @@ def test_killed_campaign_resumes_with_the_same_command(tmp_path, command, whole)
 @pytest.mark.slow
 @pytest.mark.parametrize(("workers", "sent"), [(1, signal.SIGINT), (2, signal.SIGHUP)])
 def test_ctrl_c_or_closed_terminal_keeps_completed_rows(tmp_path, command, workers, sent):
-    scenes = write(tmp_path / "s.jsonl", many(2 * N))
+    scenes = write(tmp_path / "s.jsonl", many(20 * N))  # more than are flown before the signal comes
     interrupted = command("campaign", scenes, "--law", "ismail_dunnigan", "--workers", workers)
     interrupted.wait_for_rows(2)
     os.killpg(interrupted.process.pid, sent)  # as a terminal does
