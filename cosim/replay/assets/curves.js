@@ -53,7 +53,7 @@ function clearances(runs, unit) {
       byName.set(region.name, { region, least: values.reduce((a, b) => (b < a ? b : a), before) });
     }
   }
-  const all = [...found.values()];
+  const all = [...byName.values()];
   const near = all.filter(({ region }) => region.criterion).sort((a, b) => a.least - b.least).slice(0, NAMED);
   let dashIndex = 0;
   return all.map((one) => {

@@ -107,7 +107,7 @@ function runOfFlight(data, result, header, times = []) {
   const requestedRows = Array.from(times, (t) => Math.round(t / (data.step * data.every)));
   const rowSet = new Set(requestedRows.filter((row, i) => row < rows && time(row) === times[i])).add(rows - 1);
   for (let row = 0; row < rows; row += stride) rowSet.add(row);
-  const order = [...kept].sort((a, b) => a - b);
+  const order = [...rowSet].sort((a, b) => a - b);
   const signals = header.signals.filter(({ name }) => name in data.signals);
   const columns = signals.map(({ name }) => {
     const [kind, ...rest] = data.signals[name];

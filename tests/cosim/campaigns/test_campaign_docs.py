@@ -100,8 +100,6 @@ def test_the_snippet_runs(tmp_path, monkeypatch):
     write(tmp_path / "scenes.jsonl", PLAIN[:1])
     monkeypatch.chdir(tmp_path)
     names = {}
-    sweep, scene = re.findall(r"```python\n(.*?)```", PAGE, re.S)
+    (scene,) = re.findall(r"```python\n(.*?)```", PAGE, re.S)
     exec(scene, names)
     assert names["trace"].shape == (6000, 28) and names["score"].effort > 0.0
-    exec(sweep, names)
-    assert len(names["sweep"].results) == 8

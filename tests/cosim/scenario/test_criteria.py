@@ -117,7 +117,7 @@ def test_keys_of_the_default_can_be_set():
         ("criteria.visibility.membership={clearance={falling=[1,0]}}", "criteria[3].membership.clearance: shape"),
         ("criteria.visibility.membership={clearance=[[0,1],[0,0]]}", "expected a change without jumps"),
         ("criteria.visibility.membership={clearance=[[0,nan],[1,0]]}", "criteria[3].membership.clearance: NaN"),
-        ("criteria.visibility.membership={clearance=3}", "criteria[3].membership.clearance: 3 came"),
+        ("criteria.visibility.membership={clearance=3}", "criteria[3].membership.clearance: got 3"),
         ("criteria.visibility.membership={ramp=-0.1}", "criteria[3].membership.ramp is -0.1, expected a width"),
         ("criteria.visibility.membership={ramp=true}", "criteria[3].membership.ramp is True, expected a width"),
         (
