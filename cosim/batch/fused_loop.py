@@ -108,6 +108,7 @@ def fly(  # noqa: C901 - one loop, as a whole
                     min_angle = _least(clearances[i], min_angle)
             if k < setup.steps and not clearances[i] >= 0.0:
                 violation -= setup.priorities[i] * clearances[i] * setup.step
+        shown_index = goal_index  # a goal that is reached moves from the next step on
         if goal_index == setup.goal_places.shape[0]:
             max_goal_clearance = max(max_goal_clearance, goal_clearance[0])
             if goal_clearance[0] >= 0.0 and not inside:
@@ -171,7 +172,7 @@ def fly(  # noqa: C901 - one loop, as a whole
             if timed:
                 worst = max(worst, seconds(setup.clock, workspace.ticks) - started)
             if out.reasons.shape[0]:
-                _give_reasons(out.reasons[k // setup.control_every], out.estimate, goal_index, workspace)
+                _give_reasons(out.reasons[k // setup.control_every], out.estimate, shown_index, workspace)
             if out.trace.shape[0]:
                 _trace(out.trace[k // setup.control_every], now, native, state.position, by_criterion, law.report)
             for j in range(inputs.size):
