@@ -1,5 +1,5 @@
 /* The functions that FMI 2.0 and FMI 3.0 have in common, over instance.h. fmi2.c and fmi3.c include it after they have
- * defined FMI(x) as the version's name of x; names are those of FMI 3.0. */
+ * defined FMI(x) as the version's name of x; names are those of FMI 3.0, which messages about NULL quote. */
 #ifndef COMMON_FUNCTIONS_H
 #define COMMON_FUNCTIONS_H
 
@@ -104,29 +104,17 @@ FMI(Status) FMI(SetTime)(FMI(Instance) instance, double time)
     return (FMI(Status))instance_set_time(instance, time);
 }
 
-FMI(Status) FMI(SetContinuousStates)(FMI(Instance) instance, const double continuousStates[], size_t n)
-{
-    REFUSE_NULL(n, continuousStates);
-    return (FMI(Status))instance_set_states(instance, continuousStates, n);
-}
+#define VALUES_OF_STATES(function, type, values, action)                       \
+    FMI(Status) FMI(function)(FMI(Instance) instance, type values[], size_t n) \
+    {                                                                          \
+        REFUSE_NULL(n, values);                                                \
+        return (FMI(Status))action(instance, values, n);                       \
+    }
 
-FMI(Status) FMI(GetContinuousStates)(FMI(Instance) instance, double continuousStates[], size_t n)
-{
-    REFUSE_NULL(n, continuousStates);
-    return (FMI(Status))instance_get_states(instance, continuousStates, n);
-}
-
-FMI(Status) FMI(GetContinuousStateDerivatives)(FMI(Instance) instance, double derivatives[], size_t n)
-{
-    REFUSE_NULL(n, derivatives);
-    return (FMI(Status))instance_get_derivatives(instance, derivatives, n);
-}
-
-FMI(Status) FMI(GetNominalsOfContinuousStates)(FMI(Instance) instance, double nominals[], size_t n)
-{
-    REFUSE_NULL(n, nominals);
-    return (FMI(Status))instance_get_nominals(instance, nominals, n);
-}
+VALUES_OF_STATES(SetContinuousStates, const double, continuousStates, instance_set_states)
+VALUES_OF_STATES(GetContinuousStates, double, continuousStates, instance_get_states)
+VALUES_OF_STATES(GetContinuousStateDerivatives, double, derivatives, instance_get_derivatives)
+VALUES_OF_STATES(GetNominalsOfContinuousStates, double, nominals, instance_get_nominals)
 
 FMI(Status) FMI(GetEventIndicators)(FMI(Instance) instance, double eventIndicators[], size_t n)
 {

@@ -85,23 +85,23 @@ fmi2Status fmi2SetReal(fmi2Component instance, const fmi2ValueReference vr[], si
     return (fmi2Status)instance_set_reals(instance, vr, nvr, value);
 }
 
-#define INTEGERS(type, Type)                                                                                       \
+#define INTEGERS(type, Type)                                                                                              \
     fmi2Status fmi2Get##type(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, fmi2##type value[])       \
-    {                                                                                                              \
-        REFUSE_NULL(nvr, vr, value);                                                                               \
-        for (size_t i = 0; i < nvr; i++)                                                                           \
+    {                                                                                                                     \
+        REFUSE_NULL(nvr, vr, value);                                                                                      \
+        for (size_t i = 0; i < nvr; i++)                                                                                  \
             if (instance_get_integer(instance, Type, vr[i], &value[i]) != STATUS_OK)                                      \
-                return fmi2Error;                                                                                  \
-        return fmi2OK;                                                                                             \
-    }                                                                                                              \
-                                                                                                                   \
+                return fmi2Error;                                                                                         \
+        return fmi2OK;                                                                                                    \
+    }                                                                                                                     \
+                                                                                                                          \
     fmi2Status fmi2Set##type(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, const fmi2##type value[]) \
-    {                                                                                                              \
-        REFUSE_NULL(nvr, vr, value);                                                                               \
-        for (size_t i = 0; i < nvr; i++)                                                                           \
+    {                                                                                                                     \
+        REFUSE_NULL(nvr, vr, value);                                                                                      \
+        for (size_t i = 0; i < nvr; i++)                                                                                  \
             if (instance_set_integer(instance, Type, vr[i], value[i]) != STATUS_OK)                                       \
-                return fmi2Error;                                                                                  \
-        return fmi2OK;                                                                                             \
+                return fmi2Error;                                                                                         \
+        return fmi2OK;                                                                                                    \
     }
 
 INTEGERS(Integer, TYPE_INTEGER)
@@ -168,27 +168,27 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component instance, fmi2EventInfo *fmi2even
 
 /* ---- what this FMU does not offer: logged, and an error ----------------------------------------------------- */
 
-#define UNSUPPORTED(function, parameters, ...)                     \
-    fmi2Status function parameters                                 \
-    {                                                              \
-        __VA_ARGS__;                                               \
-        return (fmi2Status)instance_unsupported(instance, #function);     \
+#define UNSUPPORTED(function, parameters, ...)                        \
+    fmi2Status function parameters                                    \
+    {                                                                 \
+        __VA_ARGS__;                                                  \
+        return (fmi2Status)instance_unsupported(instance, #function); \
     }
 
 /* an empty list of variables is allowed */
-#define UNSUPPORTED_VALUES(function, type)                                                            \
-    fmi2Status function(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, type value[])     \
-    {                                                                                                 \
-        (void)vr, (void)value;                                                                        \
-        return instance && nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(instance, #function);               \
+#define UNSUPPORTED_VALUES(function, type)                                                               \
+    fmi2Status function(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, type value[]) \
+    {                                                                                                    \
+        (void)vr, (void)value;                                                                           \
+        return instance && nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(instance, #function);    \
     }
 
-#define UNSUPPORTED_DERIVATIVES(function, type)                                                             \
+#define UNSUPPORTED_DERIVATIVES(function, type)                                                                       \
     fmi2Status function(fmi2Component instance, const fmi2ValueReference vr[], size_t nvr, const fmi2Integer order[], \
-                        type value[])                                                                       \
-    {                                                                                                       \
-        (void)vr, (void)order, (void)value;                                                                 \
-        return instance && nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(instance, #function);                     \
+                        type value[])                                                                                 \
+    {                                                                                                                 \
+        (void)vr, (void)order, (void)value;                                                                           \
+        return instance && nvr == 0 ? fmi2OK : (fmi2Status)instance_unsupported(instance, #function);                 \
     }
 
 UNSUPPORTED_VALUES(fmi2GetString, fmi2String)
