@@ -5,15 +5,13 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 
-import numpy as np
-
 from controller.law import NOTHING_EXPECTED
 from controller.translator.operands import number
 from controller.translator.program import Program
-from controller.translator.static_data import array_data
 from controller.translator.types import type_of
 from cosim.batch.fused_loop import fly
 from cosim.replay.interactive.flight import Flight
+from cosim.replay.interactive.normal_numbers import normal_numbers
 from cosim.simulation.sensor import STREAM
 from cosim.ssp.c_sources import c_files
 from cosim.ssp.memory import Memory, Named
@@ -143,8 +141,7 @@ def _scene(flight: Flight, token: str) -> Iterator[str]:
         references = [str(at) for at, _ in given] or ["0"]
         yield f"static const fmi3ValueReference {prefix}_REFERENCES[] = {_braced(references)};"
         yield f"static const {c} {prefix}_VALUES[] = {_braced(values or ['0'])};"
-    drawn = np.random.default_rng([scenario.sensing.seed, STREAM]).standard_normal(6 * len(flight.noise) + 1)
-    yield array_data(drawn, "NORMAL", "static const")  # of standard deviation 1
+    yield from normal_numbers((scenario.sensing.seed, STREAM), 6 * len(flight.noise))
 
 
 def _braced(values: Sequence[str]) -> str:

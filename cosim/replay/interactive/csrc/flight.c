@@ -12,6 +12,9 @@
 
 static fmi3Instance PLANT;
 
+__extension__ typedef unsigned __int128 Wide;
+#define WIDE(high, low) ((Wide)UINT64_C(high) << 64 | UINT64_C(low))
+
 #include "loop.h" /* generated: the translated functions, their arrays in a Model, and the scene */
 
 static Model MODEL;
@@ -53,13 +56,37 @@ EXPORT(set_start) int set_start(unsigned reference, double value)
     return fmi3SetFloat64(PLANT, &reference, 1, &value, 1) <= fmi3Warning;
 }
 
+/* Draws the noise with the bits of NumPy: PCG64 (XSL-RR 128/64), and the layers of its ziggurat. */
+static void draw_noise(double position, double velocity)
+{
+    Wide state = RANDOM_STATE;
+
+    for (int i = 0, word = 0, skipped = 0, tail = 0; i < 6 * N_NOISE;) {
+        double number = TAIL[tail];
+        if (i == TAIL_INDICES[tail]) {
+            tail++;
+        } else {
+            state = state * WIDE(2549297995355413924, 4865540595714422341) + RANDOM_INCREMENT;
+            if (word++ == SKIPPED[skipped]) {
+                skipped++;
+                continue;
+            }
+            const uint64_t mixed = (uint64_t)(state >> 64) ^ (uint64_t)state;
+            const unsigned turn = (unsigned)(state >> 122);
+            const uint64_t bits = mixed >> turn | mixed << (-turn & 63u);
+            number = (bits & 0x100 ? -1.0 : 1.0) * (double)(bits >> 9 & UINT64_C(0xfffffffffffff)) * WIDTHS[bits & 0xff];
+        }
+        NOISE[i] = (i % 6 < 3 ? position : velocity) * number;
+        i++;
+    }
+}
+
 /* Flies from start to end, with noise of these standard deviations [m, m/s] if the state is measured. Returns 0 if the plant
  * refused its start; a refusal on the way is in the metrics. */
 EXPORT(fly) int fly(double position_noise, double velocity_noise)
 {
     MODEL.exact = position_noise == 0.0 && velocity_noise == 0.0;
-    for (int i = 0; i < 6 * N_NOISE; i++)
-        NOISE[i] = (i % 6 < 3 ? position_noise : velocity_noise) * NORMAL[i];
+    draw_noise(position_noise, velocity_noise);
     memset(TRACE, 0, sizeof TRACE);
     memset(REASONS, 0, sizeof REASONS);
     if (fmi3EnterInitializationMode(PLANT, false, 0.0, 0.0, false, 0.0) > fmi3Warning ||
