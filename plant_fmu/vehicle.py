@@ -233,7 +233,8 @@ def _make_vehicle(file: _File, where: str) -> Vehicle:
     def square(value: Matrix, n: int, key: str) -> NDArray[np.float64]:
         widths = {len(row) or -1 if isinstance(row, tuple) else 0 for row in value}  # 0: a number, no row
         ok = len(value) == n and widths in ({0}, {n})
-        received = f"{len(value)} rows of {sorted(max(width, 0) for width in widths)} numbers"
+        rows = f"rows of {sorted(max(width, 0) for width in widths)} " if widths != {0} else ""
+        received = f"{len(value)} {rows}numbers"
         require(ok, key, received, f"a diagonal of {n}, or {n} by {n}")
         return np.diag(np.array(value)) if widths == {0} else np.array(value, dtype=float)
 

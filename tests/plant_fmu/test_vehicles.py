@@ -174,6 +174,7 @@ def test_invalid_vehicle_names_are_rejected(tmp_path, name):
         (("[0.508, -0.508,", "[nan, -0.508,"), "thrusters.matrix is not finite"),
         (("[8.0, 8.0, 8.0]", "[[8, 1, 0], [0, 8, 0], [0, 0, 8]]"), "rigid_body.inertia is not symmetric"),
         (("[8.0, 8.0, 8.0]", "[8.0, [1.0, 2.0, 3.0], 8.0]"), r"rigid_body.inertia is 3 rows of \[0, 3\] numbers"),
+        (("[8.0, 8.0, 8.0]", "[8.0, 8.0]"), r"rigid_body.inertia is 2 numbers, expected a diagonal of 3, or 3 by 3"),
         (("[8.0, 8.0, 8.0]", "[[], [], []]"), r"rigid_body.inertia is 3 rows of \[0\] numbers"),
         (("matrix = [", "matrix = []\nmatrix_was = ["), "matrix_was: unknown key"),
         (("Rest no", "\\u0007 Rest no"), r"source is text with '\\x07', expected printable"),
