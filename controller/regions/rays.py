@@ -23,7 +23,7 @@ _PRISM = Prism.kind
 
 
 def ray_distances(regions: PackedRegions, origin: Array, directions: Array, farthest: float, distances: Array) -> None:
-    """Find the distances along rays at which a region, at its present place, is violated; origin [m, NED]."""
+    """Find the distances along rays at which a region, at its present position, is violated; origin [m, NED]."""
     # with farthest [m], distances [m]
     # A ray advances by the clearance, which changes by at most one metre a metre (sphere tracing). The clearance of a
     # convex shape that is kept out of is convex along the ray, so that its tangent allows longer steps and shows when a

@@ -1,4 +1,4 @@
-"""The walk of every campaign: fly the rows that are left, join them in a folder, and write their summary."""
+"""Run a campaign: fly the missing rows, join them in a folder, and write their summary."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def carry_out(
     executor: Executor | None = None,
     progress: bool = False,
 ) -> Campaign:
-    """Fly the rows of a campaign that are left, join them all to one file, and write their summary."""
+    """Fly the missing rows of a campaign, join all to one file, and write their summary."""
     with open_flights(work, out, workers, executor, progress) as (folder, flights):
         if not folder.complete:
             left, keys = np.ones(len(work), dtype=bool), folder.log.keys()

@@ -107,7 +107,7 @@ def fly(
     lines: Callable[[Any], Iterable[str]],
     write_page: Callable[[Path, int], Path],
 ) -> int:
-    """Fly what is left of a campaign, print its outcome and its page; after Ctrl-C or a kill, print what is kept."""
+    """Fly the missing rows of a campaign, and print its outcome and page; after Ctrl-C, print what is kept."""
 
     def run() -> None:
         done = work()

@@ -1,4 +1,4 @@
-"""What sampled commands leave open: impulses between samples, as process noise that residuals are weighed by."""
+"""Uncertainty of sampled commands: impulses between samples, as process noise that weights the residuals."""
 
 # A log that samples servo outputs does not say when within a period a thrust changed. The error of the impulse is of
 # mean zero, independent between periods, and as large as the change times the period by the square root of 12, where a

@@ -141,7 +141,7 @@ class Residuals:
         self.weights, self.whiteners, self._noise_parts = other.weights, other.whiteners, other._noise_parts
 
     def update_command_errors(self, values: Array) -> None:
-        """Weigh the residuals from now on by what sampled commands leave open, of the size that explains them best."""
+        """Weight the residuals by the uncertainty of sampled commands, at its most likely size."""
         # Where commands are not known, the noise of a topic is not known from its samples' differences, which contain
         # the motion: that is its upper bound. The likelihood gives both, the noise of each topic and the size of the
         # errors.

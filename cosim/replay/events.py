@@ -163,7 +163,7 @@ def _saturation(run: Run) -> Iterator[Event]:
     for block in run.record.blocks(["time", *flags]):
         saturated.add(np.logical_or.reduce([block[name] > 0.0 for name in flags]), block["time"])
     for span in saturated.found():
-        text = f"More force is asked for than there is, {saturated.lasting(span)}"
+        text = f"The commanded force exceeds the limits, {saturated.lasting(span)}"
         yield Event(span.start, "saturation", text, span.end)
 
 

@@ -97,7 +97,7 @@ class Cursor:
         return " ".join(token.text for token in self.tokens[start : self.index])
 
     def shape(self, inputs: int | None) -> tuple[Membership | Value, list[float]]:
-        """Take a term's shape, and the minimum and maximum place in it."""
+        """Parse a term's shape, and its lowest and highest point."""
         if self.here.kind == "number":
             value = self.number("a value")
             return Constant(value) if inputs is not None else Curve("singleton", (value,)), [value]

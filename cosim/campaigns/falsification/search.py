@@ -20,7 +20,7 @@ _PATIENCE = 10  # generations without a lesser cost, after which a search ends
 
 
 def minimize(evaluate: Evaluate, dimension: int, budget: int, seed: int) -> None:
-    """Evaluate a function at `budget` points, concentrated where it is least; evaluate (n, dimension)."""
+    """Evaluate a function at `budget` points, most of them near its minimum; evaluate (n, dimension)."""
     # A tenth of them is drawn uniformly. From the best of these starts a CMA-ES with a diagonal covariance (Ros and
     # Hansen 2008), which adapts to some eighty coordinates within a hundred generations. After ten generations without
     # improvement a narrow search starts from the least cost of all, and after it a wide one from the next best drawn

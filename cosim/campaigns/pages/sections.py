@@ -1,4 +1,4 @@
-"""What several pages of campaigns show: names of columns, and rows of tables."""
+"""Column names and table rows that several campaign pages share."""
 
 from __future__ import annotations
 

@@ -149,7 +149,7 @@ def _sides(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _squeeze(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make a least and a maximum depth, both soft, that exclude each other."""
+    """Make a minimum and a maximum depth, both soft, that exclude each other."""
     one, other = _two(rng)
     middle, overlap = rng.uniform(3.7, 4.3), rng.uniform(0.2, 1.0)
     return sphere_table((rng.uniform(8.0, 11.0), rng.uniform(-2.0, 2.0), middle), rng.uniform(0.8, 1.4)), [
@@ -190,7 +190,7 @@ def _sides_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _depths_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make goals near a least and a maximum depth in turn, both soft, which exclude each other."""
+    """Make goals near a minimum and a maximum depth in turn, both soft, which exclude each other."""
     goal, regions = _squeeze(rng)
     x, y, z = goal["centre"]
     deep, shallow = z + rng.uniform(0.2, 0.8), z - rng.uniform(0.2, 0.8)

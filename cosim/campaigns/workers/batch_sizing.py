@@ -30,7 +30,7 @@ class Batch:
 
 
 class Batches:
-    """The batches of a campaign, cut as they are taken."""
+    """The batches of a campaign, made on demand."""
 
     def __init__(self) -> None:
         self._rows: Rows = np.empty(0, np.int64)  # rows that no batch has had yet
