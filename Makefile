@@ -41,8 +41,6 @@ lint: $(VENV)/extras
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/mypy
-	mkdir -p build/page && cat cosim/replay/assets/*.js > build/page/script.js  # as pages have them: one scope
-	$(BIN)/oxlint --no-ignore build/page
 
 coverage: $(VENV)/extras
 	$(BIN)/python -m tests.architecture.coverage
