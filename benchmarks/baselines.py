@@ -160,8 +160,8 @@ def draw_gains(
     changes = {}
     for name, (low, high) in ranges.items():
         if best is not None:
-            centre = getattr(best, name)
-            low, high = max(low, centre / near), min(high, centre * near)
+            center = getattr(best, name)
+            low, high = max(low, center / near), min(high, center * near)
         changes[name] = float(f"{np.exp(rng.uniform(np.log(low), np.log(high))):.4g}")
     return gains_type(**changes)
 

@@ -49,7 +49,7 @@ class _FmuInstance:
         values: list[float] = (self.fmu.getReal if self.fmi == 2 else self.fmu.getFloat64)(references)
         return values
 
-    def initialise(self, start: dict[str, float]) -> None:
+    def initialize(self, start: dict[str, float]) -> None:
         set_values = self.fmu.setReal if self.fmi == 2 else self.fmu.setFloat64
         if self.fmi == 2:
             self.fmu.setupExperiment(startTime=0.0)
@@ -101,7 +101,7 @@ def c_loop(
     """
     with tempfile.TemporaryDirectory(prefix="benchmark-") as scratch, _instance(path) as instance:
         loop = _compile(Path(scratch))
-        instance.initialise(start)
+        instance.initialize(start)
         two, groups = instance.fmi == 2, instance.groups
         functions = ("SetReal", "DoStep", "GetReal", "GetBoolean") if two else (
             "SetFloat64", "DoStep", "GetFloat64", "GetBoolean"

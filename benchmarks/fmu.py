@@ -62,7 +62,7 @@ def _in_c(path: Path, steps: int, repeats: int, substep: float | None = None) ->
 def _plant(path: Path, steps: int, repeats: int) -> Timing:
     with Plant(path) as plant:
         plant.set(INPUTS)
-        plant.initialise()
+        plant.initialize()
         return time_calls(lambda: plant.step(STEP), steps, repeats)
 
 

@@ -31,9 +31,9 @@ def _scenery(obstacles: int) -> tuple[PackedRegions, PackedRegions]:
     rng = np.random.default_rng(obstacles)
     balls = []
     while len(balls) < obstacles:
-        centre, radius = rng.normal([5.0, 0.0, 3.0], [1.5, 1.5, 1.0]), rng.uniform(0.3, 0.9)
-        if min(np.linalg.norm(centre - [0.0, 0.0, 3.0]), np.linalg.norm(centre - [10.0, 0.0, 3.0])) > radius + 1.2:
-            balls.append(Region(f"obstacle {len(balls) + 1}", Sphere(tuple(centre.tolist()), float(radius)), "out"))
+        center, radius = rng.normal([5.0, 0.0, 3.0], [1.5, 1.5, 1.0]), rng.uniform(0.3, 0.9)
+        if min(np.linalg.norm(center - [0.0, 0.0, 3.0]), np.linalg.norm(center - [10.0, 0.0, 3.0])) > radius + 1.2:
+            balls.append(Region(f"obstacle {len(balls) + 1}", Sphere(tuple(center.tolist()), float(radius)), "out"))
     band = Region("depth band", DepthBand(3.65, 3.35), "in")
     return pack([Region("goal", Sphere((10.0, 0.0, 3.0), 0.5), "in")]), pack([*balls, band])
 

@@ -138,7 +138,7 @@ def constraints(regions: PackedRegions, path: Array, interval: float) -> dict[st
     Returns
     -------
     dict
-        ``spheres``, each with centre [m, NED], radius [m] and velocity [m/s, NED]; planes of ``hard`` and ``soft``
+        ``spheres``, each with center [m, NED], radius [m] and velocity [m/s, NED]; planes of ``hard`` and ``soft``
         regions, each with a row for each stage: a unit normal [NED], and the least coordinate along it [m].
     """
     spheres: list[list[float]] = []

@@ -176,8 +176,8 @@ def _with_obstacles(n: int) -> tuple[str, ...]:
     """Return the changes that replace all regions by n spheres of the criterion "obstacle" beside the path."""
     balls = []
     for i in range(n):
-        centre = [8.0 * (i + 1) / (n + 1), 3.0 if i % 2 else -3.0, 3.0]
-        shape = f'{{type = "sphere", centre = {centre}, radius = 0.5}}'
+        center = [8.0 * (i + 1) / (n + 1), 3.0 if i % 2 else -3.0, 3.0]
+        shape = f'{{type = "sphere", center = {center}, radius = 0.5}}'
         balls.append(f'{{name = "O{i}", criterion = "obstacle", keep = "out", gain = 100.0, shape = {shape}}}')
     return (f"regions=[{', '.join(balls)}]", "intersection=[]")
 

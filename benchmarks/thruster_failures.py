@@ -51,10 +51,10 @@ def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: flo
     band = {"type": "depth_band", "depth": start[2], "tolerance": 2.2}
     shapes = [("band", "depth", "in", band)]
     for i in range(int(rng.integers(2, 6))):
-        centre = start + (goal - start) * rng.uniform(0.2, 0.85) + rng.uniform(-1.0, 1.0, 3) * [1.5, 1.5, 0.6]
+        center = start + (goal - start) * rng.uniform(0.2, 0.85) + rng.uniform(-1.0, 1.0, 3) * [1.5, 1.5, 0.6]
         radius = rng.uniform(0.3, 0.7)
-        if min(np.linalg.norm(centre - start), np.linalg.norm(centre - goal)) > radius + 1.5:
-            ball = {"type": "sphere", "centre": centre.tolist(), "radius": radius}
+        if min(np.linalg.norm(center - start), np.linalg.norm(center - goal)) > radius + 1.5:
+            ball = {"type": "sphere", "center": center.tolist(), "radius": radius}
             shapes.append((f"rock{i}", "obstacle", "out", ball))
     first = rng.uniform(1.0, 8.0)
     times = [first, first + rng.uniform(2.0, 8.0)][: _FAILURES.get(case, 0)]
@@ -64,7 +64,7 @@ def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: flo
         "vehicle": "",
         "time": {"duration": 60.0, "step": 0.01, "control": 0.02, "arbiter": 0.02},
         "initial": {"position": start.tolist(), "quaternion": quaternion.tolist()},
-        "goal": {"type": "sphere", "centre": goal.tolist(), "radius": 0.5},
+        "goal": {"type": "sphere", "center": goal.tolist(), "radius": 0.5},
         "law": {"name": "deployable"},
         "actuation": {"through": "thrusters"},
         "arbiter": {"engine": "closed"},

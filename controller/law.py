@@ -51,7 +51,7 @@ class VehicleState(NamedTuple):
 
 
 class VehicleModel(NamedTuple):
-    """The numbers of a vehicle that a law may use: no weight, buoyancy, nor their centres, nor the current.
+    """The numbers of a vehicle that a law may use: no weight, buoyancy, nor their centers, nor the current.
 
     Examples
     --------
@@ -60,7 +60,7 @@ class VehicleModel(NamedTuple):
     ('thrust_min', 'thrust_max', 'thrust_time_constant')
     """
 
-    rigid_mass: Array  # (6, 6) kg, kg m2, with the centre of gravity taken to be the origin
+    rigid_mass: Array  # (6, 6) kg, kg m2, with the center of gravity taken to be the origin
     added_mass: Array  # (6, 6) kg, kg m, kg m2
     linear_damping: Array  # (6,) N s/m, N m s/rad
     quadratic_damping: Array  # (6,) N s2/m2, N m s2/rad2

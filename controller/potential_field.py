@@ -131,7 +131,7 @@ def add_along(gradient: Array, length: float, total: Array) -> None:
 def set_point_error(field: Field, inset: float, most: float) -> None:
     """Write the vector from the set point to the vehicle [m, NED] into `field.error`, shortened to a length."""
     # with inset [m], most [m]
-    # The set point is the nearest point whose clearance within the goal region is `inset`: the centre of a sphere of
+    # The set point is the nearest point whose clearance within the goal region is `inset`: the center of a sphere of
     # that radius. No region's deepest point is needed, so that every shape can be a goal.
     field.error[:] = 0.0
     add_along(field.goal_gradient[0], positive_part(inset - field.goal_clearance[0]), field.error)

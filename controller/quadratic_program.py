@@ -1,12 +1,12 @@
 """The quadratic program of barriers: the thruster forces nearest to the nominal ones that keep every barrier."""
 
-#     minimise    1/2 (u - u0)^T H (u - u0) + 1/2 sum rho_i s_i^2
+#     minimize    1/2 (u - u0)^T H (u - u0) + 1/2 sum rho_i s_i^2
 #     subject to  a_i^T u + s_i >= b_i,   lower <= u <= upper
 #
 # Slack s_i of a barrier costs rho_i, so there is always exactly one solution. Its dual has a multiplier for each
 # barrier and each limit, and only the constraint y >= 0,
 #
-#     minimise    1/2 y^T G y - d^T y,   y >= 0,   G = A H^-1 A^T + diag(1 / rho),   d = b - A u0,
+#     minimize    1/2 y^T G y - d^T y,   y >= 0,   G = A H^-1 A^T + diag(1 / rho),   d = b - A u0,
 #
 # which the active-set method of Lawson and Hanson (Solving Least Squares Problems, 1974, ch. 23) solves. It adds the
 # row that is violated most, measured by sqrt(G_ii), and moves to the minimum over the passive rows, dropping those
@@ -49,7 +49,7 @@ class Workspace(NamedTuple):
     size: Array  # (r + 2 m,) sqrt(G_ii)
     residual: Array  # (r + 2 m,) d
     multipliers: Array  # (r + 2 m,) y
-    trial: Array  # (r + 2 m,) multipliers that minimise over the passive rows, in their order
+    trial: Array  # (r + 2 m,) multipliers that minimize over the passive rows, in their order
     row_state: NDArray[np.int64]  # (r + 2 m,) state of each row
     passive: NDArray[np.int64]  # (r + 2 m,) rows whose multiplier is free, in order of addition
     factor: Array  # (r + 2 m, r + 2 m) Cholesky factor of G over the passive rows
@@ -305,7 +305,7 @@ def _append_factor_row(work: Workspace, barriers: int, a: int) -> bool:
 
 
 def _solve_passive(work: Workspace, count: int) -> None:
-    """Write the multipliers that minimise over the passive rows into `trial`."""
+    """Write the multipliers that minimize over the passive rows into `trial`."""
     L = work.factor
     for a in range(count):
         total = work.residual[work.passive[a]]

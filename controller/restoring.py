@@ -30,7 +30,7 @@ def regressor(e: Array) -> Array:
 
 
 def parameters(weight: float, buoyancy: float, r_G: Array, r_B: Array) -> Array:
-    """Return phi (12), shape (4,) [N, N m], from `weight` and `buoyancy` [N], their centres `r_G` and `r_B` [m]."""
+    """Return phi (12), shape (4,) [N, N m], from `weight` and `buoyancy` [N], their centers `r_G` and `r_B` [m]."""
     phi = np.empty(4)
     phi[0] = weight - buoyancy
     for i in range(3):

@@ -21,7 +21,7 @@ Decide = Callable[[Array, Array], Array]
 STEP, NOISE, SEED = 0.001, 0.01, 1  # s, m in each direction, seed of the noise
 START, STATION = np.array([0.5, 1.8]), np.array([1.5, 1.8])  # x and depth, m
 TIMES, PLACES = [0.0, 1.0, 4.0, 5.0], [0.0, 1.0, 1.0, 0.0]  # s, share of the way from the start to the station
-OBSTACLE, SHAPE, RADIUS = np.array([2.0, 1.8]), np.array([2.0, 2.2]), 0.5  # centres and radius of the spheres, m
+OBSTACLE, SHAPE, RADIUS = np.array([2.0, 1.8]), np.array([2.0, 2.2]), 0.5  # centers and radius of the spheres, m
 BAND, HALF_BAND = 2.5, 1.8  # middle of the band of depths and half of its width, m
 
 
@@ -30,7 +30,7 @@ def measured(noise: float = NOISE) -> tuple[Array, Array]:
     times = np.arange(0.0, TIMES[-1], STEP)
     path = START + np.interp(times, TIMES, PLACES)[:, None] * (STATION - START)
     path = path + noise * np.random.default_rng(SEED).standard_normal(path.shape)
-    spheres = [np.linalg.norm(path - centre, axis=1) - RADIUS for centre in (OBSTACLE, SHAPE)]
+    spheres = [np.linalg.norm(path - center, axis=1) - RADIUS for center in (OBSTACLE, SHAPE)]
     return times, np.column_stack([*spheres, np.abs(path[:, 1] - BAND) - HALF_BAND])
 
 

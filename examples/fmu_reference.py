@@ -23,7 +23,7 @@ PANELS = {
     "velocity, m/s": ["velocity.u", "velocity.v", "velocity.w"],
     "angular velocity, rad/s": ["velocity.p", "velocity.q", "velocity.r"],
 }
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#8a5fbf")
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#8a5fbf")
 
 
 def main() -> None:
@@ -49,9 +49,9 @@ def main() -> None:
 
     figure, axes = plt.subplots(2, 2, figsize=(9.0, 5.4), sharex=True, layout="constrained")
     for panel, (title, names) in zip(axes.flat, PANELS.items(), strict=True):
-        for name, colour in zip(names, COLOURS, strict=False):
-            panel.plot(result["time"], result[name], color=colour, linewidth=1.4, label=name.partition(".")[2])
-            panel.plot(expected["time"][::4], expected[name][::4], "o", color=colour, markersize=3.6, fillstyle="none")
+        for name, color in zip(names, COLORS, strict=False):
+            panel.plot(result["time"], result[name], color=color, linewidth=1.4, label=name.partition(".")[2])
+            panel.plot(expected["time"][::4], expected[name][::4], "o", color=color, markersize=3.6, fillstyle="none")
         panel.set_ylabel(title)
         panel.grid(alpha=0.3)
         panel.legend(

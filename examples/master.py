@@ -19,7 +19,7 @@ law = IsmailDunniganLaw(Gains(k_p1=40.0), np.array([1.0, 0.0, 0.0, 0.0]), STEP, 
 if __name__ == "__main__":
     with Plant("odin") as plant:
         plant.set({"position.z": 1.0, "wrench_force_limit": 60.0})
-        plant.initialise()
+        plant.initialize()
         wrench = plant.inputs.values[-6:]  # after the thrusters
         for _ in range(round(DURATION / STEP)):
             out = plant.outputs.values

@@ -14,7 +14,7 @@ from controller import FunctionLaw, RegionsSeen, VehicleState
 from controller.quaternion import rotation_matrix
 from cosim import load_scenario, run_scenario
 
-PULL, PUSH, REACH = 60.0, 180.0, 0.8  # N a metre from the goal, N on a region's surface, m from which it pushes
+PULL, PUSH, REACH = 60.0, 180.0, 0.8  # N a meter from the goal, N on a region's surface, m from which it pushes
 BRAKE, UPRIGHT, CALM = 70.0, 40.0, 20.0  # N s/m, N m, N m s/rad
 SETTINGS = ["time.step=0.01", "time.control=0.01", "time.arbiter=0.01", "arbiter.ramp=0.8", "arbiter.engine=closed"]
 
@@ -26,7 +26,7 @@ def direction(vector: np.ndarray) -> np.ndarray:
 
 def steer(state: VehicleState, goal: RegionsSeen, regions: RegionsSeen, weights: np.ndarray) -> np.ndarray:
     """Return the wrench [N, N m], body frame."""
-    away = goal.gradients[0] / 2.0  # of a sphere: position less centre
+    away = goal.gradients[0] / 2.0  # of a sphere: position less center
     force = -PULL * direction(away) * min(float(np.linalg.norm(away)), 1.0)
     for i in np.flatnonzero(regions.hard):
         nearness = np.clip(1.0 - regions.clearances[i] / REACH, 0.0, 1.0)

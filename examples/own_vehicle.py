@@ -56,7 +56,7 @@ position = [0.0, 0.0, 1.0]             # m: north, east, down
 
 [goal]
 type = "sphere"
-centre = [3.0, 1.0, 2.0]
+center = [3.0, 1.0, 2.0]
 radius = 0.3                           # m
 
 [law]
@@ -75,7 +75,7 @@ if __name__ == "__main__":
 
     with Plant(fmu) as plant:
         plant.set({"position.z": 2.0})
-        plant.initialise()
+        plant.initialize()
         plant.step(5.0)
         print(f"left alone it comes up from 2.00 m to {plant['position.z']:.2f} m in 5 s")
 

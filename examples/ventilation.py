@@ -105,7 +105,7 @@ if __name__ == "__main__":
 figure = Figure(figsize=(11.0, 4.2), layout="constrained")
 left, right = figure.subplots(1, 2)
 for k, (name, line) in enumerate((("smoke", "-"), ("air", "--"), ("room", ":"))):
-    left.plot(hour, day_weights[:, k], line, color=pictures.COLOURS[k], label=name)
+    left.plot(hour, day_weights[:, k], line, color=pictures.COLORS[k], label=name)
 left.set(xlim=(6.0, 20.0), ylim=(0.0, 1.0), xlabel="hour of the day", ylabel="weight")
 left.legend(loc="upper right", frameon=False)
 pictures.decisions(arbiter, ("co2", "temperature"), {"smoke": 0.5}, ax=right)

@@ -24,7 +24,7 @@ position = [0.0, 0.0, 2.0]
 
 [goal]
 type = "sphere"
-centre = [4.0, 0.0, 2.0]
+center = [4.0, 0.0, 2.0]
 radius = 0.5
 
 [law]
@@ -35,7 +35,7 @@ name = "rock"
 criterion = "obstacle"
 keep = "out"
 gain = 100.0
-shape = { type = "sphere", centre = [2.0, 0.2, 2.0], radius = 0.5 }
+shape = { type = "sphere", center = [2.0, 0.2, 2.0], radius = 0.5 }
 """
 
 FLY = """
@@ -85,7 +85,7 @@ position = [0.0, 0.0, 2.0]
 
 [goal]
 type = "sphere"
-centre = [4.0, 0.0, 2.0]
+center = [4.0, 0.0, 2.0]
 radius = 0.5
 
 [law]
@@ -96,7 +96,7 @@ name = "ring"
 criterion = "obstacle"
 keep = "out"
 gain = 10.0
-shape = { type = "torus", centre = [0.0, 1.0, 2.0], axis = [0.0, 0.0, 1.0], radius = 1.05, tube = 0.2 }
+shape = { type = "torus", center = [0.0, 1.0, 2.0], axis = [0.0, 0.0, 1.0], radius = 1.05, tube = 0.2 }
 """
 
 
@@ -107,7 +107,7 @@ def copy(tmp_path_factory):
     for example, package in (("laws/sliding_mode.py", "laws"), ("shapes/torus.py", "regions/shapes")):
         shutil.copy(ROOT / "examples" / example, folder / "controller" / package)
     (folder / "past.toml").write_text(SCENARIO)
-    ring = 'type = "torus", centre = [2.0, 0.3, 2.0], axis = [1.0, 0.0, 0.0], radius = 1.0, tube = 0.2'
+    ring = 'type = "torus", center = [2.0, 0.3, 2.0], axis = [1.0, 0.0, 0.0], radius = 1.0, tube = 0.2'
     table = SCENARIO.replace("60.0", "30.0").replace('"sliding_mode"', '"pd"').replace('"rock"', '"ring"')
     (folder / "ring.toml").write_text(re.sub('type = "sphere", .*radius = 0.5', ring, table))
     (folder / "struck.toml").write_text(STRUCK)

@@ -16,15 +16,15 @@ def test_random_scenes_leave_start_dive_and_goal_free_and_are_repeatable():
     counts = set()
     for seed in range(20):
         scene = random_scene(seed)
-        start, goal = np.array(scene.initial.position), np.array(scene.goal.centre)
+        start, goal = np.array(scene.initial.position), np.array(scene.goal.center)
         rocks = [s.region.shape for s in scene.regions if s.region.name.startswith("rock")]
         counts.add(len(rocks))
         for rock in rocks:
             assert (
-                min(np.linalg.norm(start + np.array([0.0, 0.0, d]) - rock.centre) for d in (0.0, 0.6))
+                min(np.linalg.norm(start + np.array([0.0, 0.0, d]) - rock.center) for d in (0.0, 0.6))
                 > rock.radius + 0.6
             )
-            assert np.linalg.norm(goal - rock.centre) > rock.radius + 1.1
+            assert np.linalg.norm(goal - rock.center) > rock.radius + 1.1
         assert 8.0 <= goal[0] - start[0] <= 12.0 and np.hypot(*scene.plant.current[:2]) <= 0.4
         assert random_scene(seed).toml() == scene.toml()
     assert min(counts) >= 6 and max(counts) <= 30 and len(counts) > 5
@@ -51,7 +51,7 @@ def test_parameters_of_the_autopilot_are_numbers():
 
 def test_regions_move_from_the_begin_of_steering_on():
     scenario = load_scenario("pipe-inspection")
-    assert scenario.goal.radius == 0.4 and scenario.goal.centre == (0.2, 1.9, 4.0)
+    assert scenario.goal.radius == 0.4 and scenario.goal.center == (0.2, 1.9, 4.0)
     time = np.array([-5.0, 0.0, 2.0, 10.0])
     record = {f"position.{axis}": np.full(4, value) for axis, value in zip("xyz", (0.5, 1.9, 4.0), strict=True)}
     record |= {f"quaternion.e{i}": np.full(4, float(i == 0)) for i in range(4)}

@@ -209,7 +209,7 @@ def test_numpy_and_numba_bodies_match_the_plant():
         plant.set({f"thrust[{i + 1}]": x for i, x in enumerate(setup["thrust"])})
         plant.set({f"wrench.{axis}": x for axis, x in zip("XYZKMN", setup["wrench"], strict=True)})
         plant.set({"substep": STEP})
-        plant.initialise()
+        plant.initialize()
         for _ in range(50):
             plant.step(STEP)
         ours = [plant[name] for name in STATES]

@@ -45,7 +45,7 @@ def test_the_shipped_numbers_are_those_of_the_fit():
     shipped = load_scenario("paper-calibrated").limit
     assert fit.force == pytest.approx(shipped.force, rel=2e-3)
     assert fit.time_constant == pytest.approx(shipped.time_constant, abs=1e-3)
-    # no better fit in the neighbourhood
+    # no better fit in the neighborhood
     for force in (0.97, 1.03):
         entered, left = window(PAPER, force * fit.force, fit.time_constant)
         assert ((entered - 2.65) ** 2 + (left - 2.95) ** 2) / 2 > fit.cost

@@ -11,7 +11,7 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 
 TEXT = " ".join((Path(__file__).parents[1] / "docs" / "reproduction.md").read_text().split())
-CENTRE, RADIUS = np.array([8.0, 0.0, 5.0]), 0.5
+CENTER, RADIUS = np.array([8.0, 0.0, 5.0]), 0.5
 PRINTED = ("paper", "paper-limited", "paper-calibrated")
 
 
@@ -51,7 +51,7 @@ def test_documented_attitude_errors_match_the_runs(records):
 
 @pytest.mark.slow
 def test_documented_root_mean_square_errors_match_the_runs(records):
-    errors = [np.linalg.norm(position(record) - CENTRE, axis=1) / np.sqrt(3.0) for record in records.values()]
+    errors = [np.linalg.norm(position(record) - CENTER, axis=1) / np.sqrt(3.0) for record in records.values()]
     ends = "; ".join(f"{error[-1]:.3f}" for error in errors)
     assert row("The root-mean-square error") == f"from {errors[0][0]:.3f} m to {ends} m at the end"
     assert f"tolerance r_v/√3 = {RADIUS / np.sqrt(3.0):.3f} m" in TEXT
@@ -62,14 +62,14 @@ def test_documented_goal_region_times_match_the_runs(records):
     said = row("The vehicle converges")
     switches = {}
     for name, record in records.items():
-        inside = np.linalg.norm(position(record) - CENTRE, axis=1) <= RADIUS
+        inside = np.linalg.norm(position(record) - CENTER, axis=1) <= RADIUS
         switches[name] = record["time"][1:][np.diff(inside.astype(int)) != 0]
     first, out, last = switches["paper"]
     assert f"in at {first:.2f} s, out again at {out:.2f} s, in for good from {last:.2f} s; never in 120 s" in said
     assert not switches["paper-limited"].size
     assert switches["paper-calibrated"].size == 8 and "in and out four times" in said
     away = position(records["paper-calibrated"])[records["paper-calibrated"]["time"] >= switches["paper-calibrated"][0]]
-    assert f"up to {np.linalg.norm(away - CENTRE, axis=1).max():.1f} m from the center" in said
+    assert f"up to {np.linalg.norm(away - CENTER, axis=1).max():.1f} m from the center" in said
 
 
 @pytest.mark.slow

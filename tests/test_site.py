@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
 PAGES = sorted(path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md"))
 PACKAGES = ("fuzzy_arbiter", "plant_fmu", "controller", "cosim")
-# packages whose names are for their neighbours alone, or stand under another one
+# packages whose names are for their neighbors alone, or stand under another one
 THEORY = (DOCS / "theory.md").read_text()
 
 

@@ -46,7 +46,7 @@ def random_scene(seed: int) -> Scenario:
             center = start + rng.uniform(0.1, 0.9) * (goal - start) + rng.normal(0.0, [0.5, 1.5, 1.0])
             away = min(*(np.linalg.norm(center - p) for p in places), np.linalg.norm(center - goal) - GOAL_RADIUS)
             if away - radius > _FREE:
-                shape = {"type": "sphere", "centre": center.tolist(), "radius": float(radius)}
+                shape = {"type": "sphere", "center": center.tolist(), "radius": float(radius)}
                 regions.append(
                     {"name": f"rock {i + 1}", "criterion": "obstacle", "keep": "out", "gain": 100.0, "shape": shape}
                 )
@@ -63,7 +63,7 @@ def random_scene(seed: int) -> Scenario:
             },
         },
         "initial": {"position": start.tolist()},
-        "goal": {"type": "sphere", "centre": goal.tolist(), "radius": GOAL_RADIUS},
+        "goal": {"type": "sphere", "center": goal.tolist(), "radius": GOAL_RADIUS},
         "law": {"name": "deployable"},
         "regions": regions,
     }

@@ -63,7 +63,7 @@ def _plant(fmi: int) -> Entry:
     def entry(stack: ExitStack) -> Contestant:
         plant = stack.enter_context(Plant(load_vehicle(VEHICLE), fmi))
         plant.set(START)
-        plant.initialise()
+        plant.initialize()
 
         def step() -> None:
             plant.step(STEP)

@@ -1,6 +1,6 @@
 """Nonlinear model predictive control by CasADi and its solver fatrop, over a horizon of N stages.
 
-    minimise    sum_k  w_p (sqrt(|p_k - p_d|^2 + 1) - 1) + w_u |u_k|^2 + w_m |B_r u_k - m_k|^2 + the slack's price
+    minimize    sum_k  w_p (sqrt(|p_k - p_d|^2 + 1) - 1) + w_u |u_k|^2 + w_m |B_r u_k - m_k|^2 + the slack's price
                 + w_s sum_j depth(d_jk + margin - n_jk . p_k) of soft regions, and w_v |v_N|^2 at the end
     subject to  x_{k+1} = f(x_k, u_k),   u_min <= u_k <= u_max,   s_k >= 0,   of each obstacle and each plane
                 |p_k - c_i(t_k)| >= r_i + margin - s_k,   n_jk . p_k >= d_jk + margin - s_k
@@ -54,7 +54,7 @@ def controller(setup: dict[str, Any]) -> Callable[[dict[str, Any]], dict[str, An
     callable
         Function of a dict with ``position`` and ``velocity`` [m, m/s, NED]; ``R`` from body to world; ``disturbance``
         [m/s2, NED]; the attitude loop's moments now, ``moment``, and later, ``hold`` [N m]; ``goal`` and
-        ``goal_velocity`` [m, m/s, NED]; ``spheres`` (n, 7: centre, radius, velocity); planes of ``hard`` and ``soft``
+        ``goal_velocity`` [m, m/s, NED]; ``spheres`` (n, 7: center, radius, velocity); planes of ``hard`` and ``soft``
         regions, each (stages, 4: normal, least coordinate along it); ``weights``; ``again``, True at the start of a
         flight, and then ``vehicle``. It returns ``forces`` [N]; ``success``, True if the solver converged; ``path``
         (stages, 3), expected positions at the stages of the next plan [m, NED]; ``seconds``, computation time. A

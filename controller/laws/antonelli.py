@@ -39,7 +39,7 @@ class AntonelliGains(NamedTuple):
     bound: float = 19.2  # N, bound of each component of the force
     bound_moment: float = 65.0  # N m, bound of each component of the moments: above ODIN-like righting moments
     limit: float = 184.2  # N, greatest pull to the set point
-    inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
+    inset: float = 0.5  # m, clearance of the set point within the goal region: the center of the scenes' goals
     repulsion: float = 222.3  # N/m, slope of the push of a region of gain 1
     reach: float = 1.499  # m, clearance at which regions begin to push
 

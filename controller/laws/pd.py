@@ -26,7 +26,7 @@ class PdGains(NamedTuple):
     k_v1: float = 142.7  # N s/m, damping of translation
     k_v2: float = 40.0  # N m s/rad, damping of rotation, section VII
     limit: float = 164.1  # N, greatest pull to the set point
-    inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
+    inset: float = 0.5  # m, clearance of the set point within the goal region: the center of the scenes' goals
     repulsion: float = 223.8  # N/m, slope of the push of a region of gain 1
     reach: float = 1.354  # m, clearance at which regions begin to push
 

@@ -6,7 +6,7 @@
 #     tau = -J^T K_p s(e) - K_v nu + Z(eta) phi-hat,    d(phi-hat)/dt = -L Z^T (nu + sigma J^T s(e))
 #
 # with s() saturated and only the four numbers of the restoring forces (12) adapted: the law that the paper's one
-# (25)-(29) generalises to regions. The article was not at hand; this is its form as the paper's law shows it, with
+# (25)-(29) generalizes to regions. The article was not at hand; this is its form as the paper's law shows it, with
 # attitude errors as quaternions, where J is blkdiag(R, I). Ours are the bounds of the estimate and the push of the
 # regions, which is not part of the adaptation.
 
@@ -34,7 +34,7 @@ class SunCheahGains(NamedTuple):
     bound: float = 30.5  # N, bound of the estimate of W - B
     bound_moment: float = 65.0  # N m, bound of the other estimates: above the righting moments of ODIN-like vehicles
     limit: float = 184.2  # N, greatest pull to the set point
-    inset: float = 0.5  # m, clearance of the set point within the goal region: the centre of the scenes' goals
+    inset: float = 0.5  # m, clearance of the set point within the goal region: the center of the scenes' goals
     repulsion: float = 222.3  # N/m, slope of the push of a region of gain 1
     reach: float = 1.499  # m, clearance at which regions begin to push
 

@@ -45,7 +45,7 @@ class Entry:
     # exports draw it. A shape of attitude has a cone instead
     surface: Callable[[Any, Bounds], Mesh] | None = None
     cone: Callable[[Any], ViewCone] | None = None
-    # function of an ellipsoid that returns its centre [m, NED], shape (3,), and its half axes as rows [m], shape (3,
+    # function of an ellipsoid that returns its center [m, NED], shape (3,), and its half axes as rows [m], shape (3,
     # 3). Pictures then draw the exact ellipse of its outline, not its mesh
     half_axes: Callable[[Any], tuple[Array, Array]] | None = None
     # function of an unbounded shape that returns a point [m, NED] and the outward unit normal of each bounding plane.

@@ -18,7 +18,7 @@ def clamp(x: float, low: float, high: float) -> float:
 
 
 def to_local(p: Array, q: Array, at: int) -> tuple[float, float, float]:
-    """Return R^T (p - c) for a centre packed at `at`, followed by a rotation matrix, row by row."""
+    """Return R^T (p - c) for a center packed at `at`, followed by a rotation matrix, row by row."""
     d0, d1, d2 = p[0] - q[at], p[1] - q[at + 1], p[2] - q[at + 2]
     R = at + 3
     return (

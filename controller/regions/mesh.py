@@ -104,8 +104,8 @@ def patches(planes: Sequence[tuple[Array, Array]], limits: Bounds) -> Mesh:
     corners, triangles = [], []
     for i, (point, normal) in enumerate(planes):
         along, u, v = frame(normal)
-        centre = middle - ((middle - point) @ along) * along
-        corners += [centre + half * (a * u + b * v) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
+        center = middle - ((middle - point) @ along) * along
+        corners += [center + half * (a * u + b * v) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
         triangles += [(4 * i, 4 * i + 1, 4 * i + 2), (4 * i, 4 * i + 2, 4 * i + 3)]
     return Mesh(np.array(corners), np.array(triangles))
 
@@ -151,8 +151,8 @@ def lathe(rings: Sequence[Array], first: Array, last: Array) -> Mesh:
     return Mesh(vertices, np.vstack(parts))
 
 
-def place_points(points: Array, centre: Sequence[float], quaternion: Sequence[float]) -> Array:
-    """Rotate points of a body [m] by a quaternion of any length, and move them to a centre [m, NED]."""
+def place_points(points: Array, center: Sequence[float], quaternion: Sequence[float]) -> Array:
+    """Rotate points of a body [m] by a quaternion of any length, and move them to a center [m, NED]."""
     e = np.array(quaternion, dtype=float)
-    world: Array = np.array(centre) + points @ rotation_matrix(e / np.linalg.norm(e)).T
+    world: Array = np.array(center) + points @ rotation_matrix(e / np.linalg.norm(e)).T
     return world

@@ -32,8 +32,8 @@ def vector(name: str, of: Range) -> tuple[Number, ...]:
     return tuple(Number(f"{name}.{axis}", *of) for axis in "xyz")
 
 
-TURNED = (  # a centre, and a rotation matrix row by row
-    *vector("centre", LENGTH),
+TURNED = (  # a center, and a rotation matrix row by row
+    *vector("center", LENGTH),
     *(Number(f"rotation[{i},{j}]", *PART) for i in (1, 2, 3) for j in (1, 2, 3)),
 )
 

@@ -25,7 +25,7 @@ _PRISM = Prism.kind
 def ray_distances(regions: PackedRegions, origin: Array, directions: Array, farthest: float, distances: Array) -> None:
     """Find the distances along rays at which a region, at its present position, is violated; origin [m, NED]."""
     # with farthest [m], distances [m]
-    # A ray advances by the clearance, which changes by at most one metre a metre (sphere tracing). The clearance of a
+    # A ray advances by the clearance, which changes by at most one meter a meter (sphere tracing). The clearance of a
     # convex shape that is kept out of is convex along the ray, so that its tangent allows longer steps and shows when a
     # ray passes by (Newton's method, from the side that never oversteps). Pipes are split into capsules.
     distances[:] = math.inf
@@ -105,7 +105,7 @@ def _stride(kind: int, convex: bool, outward: float, here: Evaluation, dx: float
 
 
 def _circle_about(prism: Array) -> tuple[float, float, float]:
-    """Return centre and radius of a circle about all corners of a packed prism [m]."""
+    """Return center and radius of a circle about all corners of a packed prism [m]."""
     x, y, radius, n = 0.0, 0.0, 0.0, (prism.size - 2) // 2
     for i in range(2, prism.size, 2):
         x += prism[i] / n

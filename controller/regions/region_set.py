@@ -55,7 +55,7 @@ class Region:
     gain: float = 1.0  # alpha_i of section VII, in N per unit of g
     hard: bool = True
     deviation: float | Vector3 = 0.0  # m, standard deviation of its position: in any direction, or north, east and down
-    crossing_cost: float = 2.0  # m, added to a path's length per metre through a soft region, half a metre deep
+    crossing_cost: float = 2.0  # m, added to a path's length per meter through a soft region, half a meter deep
 
     @property
     def deviations(self) -> Vector3:
@@ -125,7 +125,7 @@ class PackedRegions(NamedTuple):
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,) True for a hard region
     deviations: Array  # (n, 3) m, standard deviations of each place, NED
-    crossing_costs: Array  # (n,) m, added to a path's length per metre through each, half a metre deep
+    crossing_costs: Array  # (n,) m, added to a path's length per meter through each, half a meter deep
 
     def evaluate(
         self,

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import math
+import warnings
 from collections.abc import Sequence
-from typing import ClassVar, Protocol
+from operator import attrgetter
+from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +22,8 @@ Vector4 = tuple[float, float, float, float]
 
 # lowest and highest corner of an upright box [m, NED]
 Bounds = tuple[Vector3, Vector3]
+
+S = TypeVar("S")
 
 # value of g, its gradient (3 numbers), signed distance [m]
 Evaluation = tuple[float, float, float, float, float]
@@ -54,6 +59,23 @@ class Shape(Protocol):
         ...
 
 
+def with_former_spelling(shape: type[S]) -> type[S]:
+    """Accept `centre`, the former name of a shape's center, as an argument and as an attribute."""
+    initialize = shape.__init__
+
+    @functools.wraps(initialize)
+    def __init__(self: S, *args: Any, **values: Any) -> None:  # noqa: N807
+        if "centre" in values:
+            require("center" not in values, shape.__name__.lower(), "centre", "given beside center", "one of the two")
+            warnings.warn("centre is now center", DeprecationWarning, stacklevel=2)
+            values["center"] = values.pop("centre")
+        initialize(self, *args, **values)
+
+    shape.__init__ = __init__  # type: ignore[assignment,method-assign]
+    shape.centre = property(attrgetter("center"))  # type: ignore[attr-defined]
+    return shape
+
+
 def require(good: bool, shape: str, key: str, received: object, expected: str) -> None:
     """Raise an error that names the key, unless the condition holds."""
     if not good:
@@ -78,15 +100,15 @@ def unit(shape: str, key: str, vector: tuple[float, ...]) -> tuple[float, ...]:
     return tuple(x / length for x in vector)
 
 
-def centered_bounds(centre: Vector3, reach: Sequence[float]) -> Bounds:
-    """Return the bounds about a centre with a reach along each axis; centre [m, NED], reach [m]."""
-    (x, y, z), (dx, dy, dz) = centre, reach
+def centered_bounds(center: Vector3, reach: Sequence[float]) -> Bounds:
+    """Return the bounds about a center with a reach along each axis; center [m, NED], reach [m]."""
+    (x, y, z), (dx, dy, dz) = center, reach
     return (x - dx, y - dy, z - dz), (x + dx, y + dy, z + dz)
 
 
-def ball_bounds(centre: Vector3, radius: float) -> Bounds:
-    """Return the bounds of a ball; centre [m, NED], radius [m]."""
-    return centered_bounds(centre, (radius, radius, radius))
+def ball_bounds(center: Vector3, radius: float) -> Bounds:
+    """Return the bounds of a ball; center [m, NED], radius [m]."""
+    return centered_bounds(center, (radius, radius, radius))
 
 
 def join(parts: Sequence[Bounds]) -> Bounds:

@@ -113,7 +113,7 @@ def gain_fits(gains: Gains) -> tuple[Fit, Fit]:
 
 
 def sphere_radii(mass: Array, linear_damping: Array, radius: float, gains: Gains) -> tuple[float, float, float]:
-    """Return the distances from the centre of a spherical goal region within which conditions hold [m]."""
+    """Return the distances from the center of a spherical goal region within which conditions hold [m]."""
     # with linear_damping [N s/m, N m s/rad]
     potential = 0.5 * greatest_gradient(mass, gains)
     within = []

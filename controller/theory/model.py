@@ -64,7 +64,7 @@ def skew_defect(mass: Array, velocity_body: Array) -> float:
 
 
 def restoring_defect(weight: float, buoyancy: float, r_G: Array, r_B: Array, quaternion: Array) -> float:
-    """Return the difference of Z phi of (12) from weight and buoyancy at their centres [N, N m]."""
+    """Return the difference of Z phi of (12) from weight and buoyancy at their centers [N, N m]."""
     # with weight, buoyancy [N], r_G, r_B [m], returns [N or N m]
     k = down_in_body(quaternion)
     pull, push = weight * k, -buoyancy * k

@@ -109,7 +109,7 @@ def fly_scenario(
     n, through = scenario.vehicle.n_thrusters, scenario.actuation.through == "thrusters"
     plant.reset()
     plant.set(start_values(scenario))
-    plant.initialise()
+    plant.initialize()
     native = plant.native(*exchanged_variables(scenario))
     names = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
     effectiveness = plant.native(names, ())

@@ -33,7 +33,7 @@ def add_verbs(verbs: Any) -> None:
     flag(verb, "--vehicle START", "a shipped vehicle or TOML file: where the search starts", required=True)
     flag(
         verb, "--free KEY", "keys of the vehicle's file, such as hydrodynamics.added_mass or "
-        "hydrodynamics.added_mass.2.6 (default: added mass, damping, buoyancy and its centre, the thrusters' time "
+        "hydrodynamics.added_mass.2.6 (default: added mass, damping, buoyancy and its center, the thrusters' time "
         "constant)", nargs="+",
     )  # fmt: skip
     flag(

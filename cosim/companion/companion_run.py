@@ -234,7 +234,7 @@ class Companion:
     def _steer(self, master: Master, observers: Sequence[Observer], on_state: Callable[[State, str], None]) -> str:
         session = self.session
         clearances = master.signals.view("goal.clearance", len(self.scenario.regions) + 1)
-        master.plant.initialise()
+        master.plant.initialize()
         try:
             for k in range(self.scenario.steps + 1):
                 master.step(k, session)

@@ -74,7 +74,7 @@ class RemoteVehicle:
     def set(self, values: Mapping[str, float]) -> None:
         """Change nothing: parameters and start values are the real vehicle's own."""
 
-    def initialise(self) -> None:
+    def initialize(self) -> None:
         """Write the reported state to the outputs."""
         self._read()
 

@@ -47,6 +47,6 @@ def warm_up(scenario: Scenario, options: CompanionOptions) -> None:
     commands = CommandQueue()
     commands.submit(Arm(True))  # starts the law
     with Master(scenario, plant=RemoteVehicle(scenario, session)) as master:
-        master.plant.initialise()
+        master.plant.initialize()
         for k in range(_STEPS):
             master.step(k, commands)

@@ -17,7 +17,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from controller.regions import Box, Cylinder, Ellipsoid, Sphere
 from controller.regions.region_set import of_attitude
-from cosim.export.scene import BODY, HULL_COLOUR, NED, OPAQUE, PLACE, THRUST_COLOUR, TRAIL_COLOUR, Scene, Solid
+from cosim.export.scene import BODY, HULL_COLOR, NED, OPAQUE, PLACE, THRUST_COLOR, TRAIL_COLOR, Scene, Solid
 from cosim.replay.events import Event
 from cosim.simulation.signals import Array
 
@@ -75,7 +75,7 @@ def regions(solids: Sequence[Solid], time: Timestamp, active: int) -> SceneUpdat
         text = entity.texts.add(billboard=True, font_size=_LETTERS, scale_invariant=True)
         text.text = f"{solid.label} (active)" if i == active else solid.label
         _set_pose(text.pose, _label_place(solid).tolist(), (1.0, 0.0, 0.0, 0.0))
-        _set_colour(text.color, solid.colour, 1.0)
+        _set_color(text.color, solid.color, 1.0)
     return message
 
 
@@ -86,7 +86,7 @@ def vehicle(scene: Scene) -> SceneUpdate:
     ball = entity.spheres.add()
     _set_pose(ball.pose, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     _set_vector(ball.size, [2.0 * scene.hull_radius] * 3)
-    _set_colour(ball.color, HULL_COLOUR, 0.6)
+    _set_color(ball.color, HULL_COLOR, 0.6)
     greatest = max((thruster.max_force for thruster in scene.thrusters), default=1.0) or 1.0
     for thruster in scene.thrusters:
         length = _ARROW * scene.hull_radius * thruster.max_force / greatest
@@ -94,11 +94,11 @@ def vehicle(scene: Scene) -> SceneUpdate:
             arrow = entity.arrows.add(shaft_length=0.7 * length, head_length=0.3 * length)
             arrow.shaft_diameter, arrow.head_diameter = 0.05 * length, 0.15 * length
             _set_pose(arrow.pose, thruster.position.tolist(), _shortest_turn(_X, thruster.direction))
-            _set_colour(arrow.color, THRUST_COLOUR, 1.0)
+            _set_color(arrow.color, THRUST_COLOR, 1.0)
     trail = message.entities.add(frame_id=NED, id="way", frame_locked=True)
     line = trail.lines.add(type=LinePrimitive.LINE_STRIP, thickness=_LINE, scale_invariant=True)
     _set_pose(line.pose, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
-    _set_colour(line.color, TRAIL_COLOUR, 0.8)
+    _set_color(line.color, TRAIL_COLOR, 0.8)
     for point in scene.trail().tolist():
         _set_vector(line.points.add(), point)
     return message
@@ -115,15 +115,15 @@ def _draw(entity: SceneEntity, solid: Solid, active: bool) -> None:
     at_rest = (1.0, 0.0, 0.0, 0.0)
     if isinstance(shape, Sphere):
         primitive = entity.spheres.add()
-        _set_pose(primitive.pose, shape.centre, at_rest)
+        _set_pose(primitive.pose, shape.center, at_rest)
         _set_vector(primitive.size, [2.0 * shape.radius] * 3)
     elif isinstance(shape, Ellipsoid):
         primitive = entity.spheres.add()
-        _set_pose(primitive.pose, shape.centre, _unit(shape.quaternion))
+        _set_pose(primitive.pose, shape.center, _unit(shape.quaternion))
         _set_vector(primitive.size, [2.0 * a for a in shape.semi_axes])
     elif isinstance(shape, Box):
         primitive = entity.cubes.add()
-        _set_pose(primitive.pose, shape.centre, _unit(shape.quaternion))
+        _set_pose(primitive.pose, shape.center, _unit(shape.quaternion))
         _set_vector(primitive.size, shape.size)
     elif isinstance(shape, Cylinder):
         primitive = entity.cylinders.add(bottom_scale=1.0, top_scale=1.0)
@@ -136,7 +136,7 @@ def _draw(entity: SceneEntity, solid: Solid, active: bool) -> None:
         for point in solid.mesh.vertices.tolist():
             _set_vector(primitive.points.add(), point)
         primitive.indices.extend(solid.mesh.triangles.ravel().tolist())
-    _set_colour(primitive.color, solid.colour, opaque)
+    _set_color(primitive.color, solid.color, opaque)
 
 
 def _label_place(solid: Solid) -> Array:
@@ -170,8 +170,8 @@ def _set_quaternion(message: Any, e: Sequence[float]) -> None:
     message.w, message.x, message.y, message.z = e
 
 
-def _set_colour(message: Any, colour: tuple[int, int, int], opaque: float) -> None:
-    message.r, message.g, message.b = (part / 255.0 for part in colour)
+def _set_color(message: Any, color: tuple[int, int, int], opaque: float) -> None:
+    message.r, message.g, message.b = (part / 255.0 for part in color)
     message.a = opaque
 
 

@@ -13,7 +13,7 @@ _FIXED_64 = 1  # wire type of a double
 
 
 def numbers_schema(package: str, message: str, fields: Sequence[str]) -> bytes:
-    """Make the schema of a message of doubles, a serialised ``FileDescriptorSet``."""
+    """Make the schema of a message of doubles, a serialized ``FileDescriptorSet``."""
     file = FileDescriptorProto(name=f"{package}/{message}.proto", package=package, syntax="proto3")
     described = file.message_type.add(name=message)
     for i, name in enumerate(fields):

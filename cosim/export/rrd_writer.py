@@ -18,14 +18,14 @@ from cosim.export.excerpt import Excerpt
 from cosim.export.names import group_columns
 from cosim.export.scene import (
     BODY,
-    HULL_COLOUR,
+    HULL_COLOR,
     NED,
     OPAQUE,
     PLACE,
     POSITION,
     QUATERNION,
-    THRUST_COLOUR,
-    TRAIL_COLOUR,
+    THRUST_COLOR,
+    TRAIL_COLOR,
     Scene,
     Solid,
 )
@@ -111,12 +111,12 @@ class _Sender:
         """Send the hull and the path of the run."""
         scene = self._scene
         self._stay(WORLD, rr.ViewCoordinates.FRD)  # north, east, down
-        hull = rr.Ellipsoids3D(half_sizes=[[scene.hull_radius] * 3], colors=[HULL_COLOUR])
+        hull = rr.Ellipsoids3D(half_sizes=[[scene.hull_radius] * 3], colors=[HULL_COLOR])
         self._stay(f"{_FRAMES[BODY]}/hull", hull)
-        self._stay(f"{WORLD}/way", rr.LineStrips3D([scene.trail()], colors=[TRAIL_COLOUR], radii=[-_THIN]))
+        self._stay(f"{WORLD}/way", rr.LineStrips3D([scene.trail()], colors=[TRAIL_COLOR], radii=[-_THIN]))
         if self._forces:
             places = [thruster.position for thruster in scene.thrusters]
-            self._stay(f"{_FRAMES[BODY]}/thrusts", rr.Arrows3D.from_fields(origins=places, colors=[THRUST_COLOUR]))
+            self._stay(f"{_FRAMES[BODY]}/thrusts", rr.Arrows3D.from_fields(origins=places, colors=[THRUST_COLOR]))
 
     def send_regions(self) -> None:
         """Send regions as lines."""
@@ -169,7 +169,7 @@ class _Sender:
             now = active == i
             changes = np.flatnonzero(np.diff(now, prepend=not now[0] if before is None else before == i))
             for path, kind in kinds.items():
-                self._send(time[changes], path, kind.columns(**_activity_attributes(kind, solid.colour, now[changes])))
+                self._send(time[changes], path, kind.columns(**_activity_attributes(kind, solid.color, now[changes])))
 
     def _send_shapes(self, place: str, shapes: list[tuple[float, Solid]]) -> dict[str, Any]:
         """Send the shapes of a region over time; return the types of its drawings by path."""
@@ -206,26 +206,26 @@ def _archetype(solid: Solid) -> Any:
     """Return the Rerun archetype of a region; attributes that depend on activity are sent over time."""
     shape, label = solid.shape, {"labels": [solid.label]}
     if isinstance(shape, Sphere):
-        return rr.Ellipsoids3D.from_fields(half_sizes=[[shape.radius] * 3], centers=[shape.centre], **label)
+        return rr.Ellipsoids3D.from_fields(half_sizes=[[shape.radius] * 3], centers=[shape.center], **label)
     if isinstance(shape, Ellipsoid):
         return rr.Ellipsoids3D.from_fields(
-            half_sizes=[shape.semi_axes], centers=[shape.centre], quaternions=[_turn(shape.quaternion)], **label
+            half_sizes=[shape.semi_axes], centers=[shape.center], quaternions=[_turn(shape.quaternion)], **label
         )
     if isinstance(shape, Box):
         half = [[size / 2.0 for size in shape.size]]
         return rr.Boxes3D.from_fields(
-            half_sizes=half, centers=[shape.centre], quaternions=[_turn(shape.quaternion)], **label
+            half_sizes=half, centers=[shape.center], quaternions=[_turn(shape.quaternion)], **label
         )
     return rr.Mesh3D(vertex_positions=solid.mesh.vertices, triangle_indices=solid.mesh.triangles)
 
 
-def _activity_attributes(kind: Any, colour: tuple[int, int, int], active: NDArray[np.bool_]) -> dict[str, Any]:
+def _activity_attributes(kind: Any, color: tuple[int, int, int], active: NDArray[np.bool_]) -> dict[str, Any]:
     """Return the attributes that show whether a region is active, for each change of activity."""
     if kind is rr.Mesh3D:
-        return {"albedo_factor": [(*colour, round(255 * OPAQUE[bool(now)])) for now in active]}
+        return {"albedo_factor": [(*color, round(255 * OPAQUE[bool(now)])) for now in active]}
     width = "line_radii" if kind is rr.Ellipsoids3D else "radii"
     return {
-        "colors": [(*colour, _BRIGHT if now else _FAINT) for now in active],
+        "colors": [(*color, _BRIGHT if now else _FAINT) for now in active],
         width: [-(_THICK if now else _THIN) for now in active],
     }
 

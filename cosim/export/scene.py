@@ -1,4 +1,4 @@
-"""Scene of a run for three-dimensional viewers: regions in their colours, the vehicle, and its path."""
+"""Scene of a run for three-dimensional viewers: regions in their colors, the vehicle, and its path."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from controller.regions.shape import Bounds, Shape
 from cosim.export.excerpt import Excerpt
 from cosim.replay.header import header_of
 from cosim.replay.region_changes import changes_of, log_of
-from cosim.scenario.colours import colours_of_regions
+from cosim.scenario.colors import colors_of_regions
 from cosim.simulation.signals import Array
 
 NED, PLACE, BODY = "ned", "place", "body"  # frames: world; at the vehicle, parallel to the world; body
 _FRAMES = {"vehicle": PLACE, "body": BODY}  # of the cones that stand for shapes of attitude
 POSITION = ("position.x", "position.y", "position.z")
 QUATERNION = ("quaternion.e0", "quaternion.e1", "quaternion.e2", "quaternion.e3")
-HULL_COLOUR, TRAIL_COLOUR, THRUST_COLOUR = (240, 228, 66), (140, 140, 140), (204, 121, 167)
+HULL_COLOR, TRAIL_COLOR, THRUST_COLOR = (240, 228, 66), (140, 140, 140), (204, 121, 167)
 OPAQUE = {False: 0.25, True: 0.75}  # opacity by activity of the region
 _MARGIN = 1.0  # m, around path and bounded regions
 _SIGHT = 5.0  # hull radii, length of the drawing of an attitude region
@@ -33,7 +33,7 @@ class Solid:
 
     name: str
     label: str  # name and side to keep
-    colour: tuple[int, int, int]
+    color: tuple[int, int, int]
     shape: Shape
     mesh: Mesh
     frame: str  # frame of the coordinates: `NED`, `PLACE` or `BODY`
@@ -91,7 +91,7 @@ class Scene:
         return Solid(
             region.name,
             f"{region.name}: keep {region.keep}",
-            _rgb(colours_of_regions(scenario)[index]),
+            _rgb(colors_of_regions(scenario)[index]),
             shape,
             self._mesh(shape, limits),
             _FRAMES[cone(shape).frame] if (cone := shape_entry(shape).cone) else NED,
@@ -115,8 +115,8 @@ class Scene:
         return sector(drawn.apex, drawn.axis, drawn.half_angle, _SIGHT * self.hull_radius)
 
 
-def _rgb(colour: str) -> tuple[int, int, int]:
-    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
+def _rgb(color: str) -> tuple[int, int, int]:
+    red, green, blue = bytes.fromhex(color.removeprefix("#"))
     return red, green, blue
 
 

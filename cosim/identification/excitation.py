@@ -259,7 +259,7 @@ def excitation_table(vehicle: str, title: str, depth: float, duration: float) ->
     return {
         "title": f"Excitation of {title}", "vehicle": vehicle, "time": {"duration": duration, "step": ROW},
         "initial": {"position": [0.0, 0.0, depth]},
-        "goal": {"type": "sphere", "centre": [0.0, 0.0, depth], "radius": 0.3}, "law": {"name": "deployable"},
+        "goal": {"type": "sphere", "center": [0.0, 0.0, depth], "radius": 0.3}, "law": {"name": "deployable"},
         "actuation": {"through": "thrusters"}, "commands": {"enabled": True, "pilot_gain": 1.0},
     }  # fmt: skip
 

@@ -1,7 +1,7 @@
 """Intersection of regions: a common point, or the certificate that there is none."""
 
 # Signed distances are Lipschitz with constant 1, and so is their maximum. A box holds no common point if the distance
-# at its centre exceeds its half diagonal. Boxes are halved until a common point is found, or no box is left.
+# at its center exceeds its half diagonal. Boxes are halved until a common point is found, or no box is left.
 
 from __future__ import annotations
 
@@ -51,24 +51,24 @@ def common_depth(points: Array, regions: Sequence[Region]) -> Array:
 def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float = TOLERANCE) -> Overlap:
     """Find the point of a box with the maximum common depth of regions; low, high (3,) [m, NED], tolerance [m]."""
     half = 0.5 * (np.asarray(high, dtype=float) - low)
-    centres = (np.asarray(low, dtype=float) + half)[None, :]
-    best_point, best = centres[0], -math.inf
+    centers = (np.asarray(low, dtype=float) + half)[None, :]
+    best_point, best = centers[0], -math.inf
     bound = math.inf
     while True:
-        depths = common_depth(centres, regions)
+        depths = common_depth(centers, regions)
         at = int(np.argmax(depths))
         if depths[at] > best:
-            best_point, best = _refine(regions, centres[at], float(depths[at]), low, high)
+            best_point, best = _refine(regions, centers[at], float(depths[at]), low, high)
         reach = depths + float(np.linalg.norm(half))
         bound = max(best, min(bound, float(reach.max())))
         if bound - best <= tolerance:
             break
-        open_boxes = centres[reach > best + tolerance]
+        open_boxes = centers[reach > best + tolerance]
         if 8 * len(open_boxes) > _MAX_BOXES:
             break
         half = 0.5 * half
         offsets = np.array(np.meshgrid(*([-1.0, 1.0],) * 3)).reshape(3, -1).T * half
-        centres = (open_boxes[:, None, :] + offsets[None, :, :]).reshape(-1, 3)
+        centers = (open_boxes[:, None, :] + offsets[None, :, :]).reshape(-1, 3)
     best_point, best = _refine(regions, best_point, best, low, high)
     x, y, z = (float(c) for c in best_point)
     return Overlap((x, y, z), best, bound)

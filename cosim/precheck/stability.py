@@ -125,7 +125,7 @@ class _Start:
     def distance(self) -> str:
         """Text that says how far from the center of a sphere the start is."""
         assert isinstance(self.scenario.goal, Sphere)
-        return f"the start is {math.dist(self.scenario.initial.position, self.scenario.goal.centre):.2f} m away."
+        return f"the start is {math.dist(self.scenario.initial.position, self.scenario.goal.center):.2f} m away."
 
 
 def gain_findings(scenario: Scenario, weights: Array) -> Iterator[Finding]:

@@ -11,7 +11,7 @@ import numpy as np
 from controller.regions.region_set import name_of, of_attitude, shape_entry, surface_of
 from controller.regions.shape import Bounds, Shape
 from cosim.results.wording import describe_task
-from cosim.scenario.colours import colours_of_regions
+from cosim.scenario.colors import colors_of_regions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Column
@@ -27,7 +27,7 @@ _SEA_WATER = 1026.0 * 9.81  # N/m3; for the size of a hull without a radius in t
 
 def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = False) -> dict[str, Any]:
     """Return the header of a run, which a view needs before its first row."""
-    limits, colours = limits_of(scenario), colours_of_regions(scenario)
+    limits, colors = limits_of(scenario), colors_of_regions(scenario)
     return {
         "version": VERSION,
         "name": scenario.name,
@@ -41,8 +41,8 @@ def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = Fa
         "commands": commands,
         "through": scenario.actuation.through,
         "vehicle": _vehicle(scenario.vehicle),
-        "criteria": [{"name": criterion.name, "colour": criterion.colour} for criterion in scenario.criteria],
-        "regions": [_region(scenario, i, limits) | {"colour": colour} for i, colour in enumerate(colours)],
+        "criteria": [{"name": criterion.name, "color": criterion.color} for criterion in scenario.criteria],
+        "regions": [_region(scenario, i, limits) | {"color": color} for i, color in enumerate(colors)],
         "rules": rules_of(scenario.rules.system),
         "truth": {"estimate": [float(phi) for phi in scenario.true_restoring_parameters]},
         "signals": [dataclasses.asdict(column) for column in columns],
@@ -58,7 +58,7 @@ def rules_of(system: System) -> list[dict[str, str]]:
 
 def shape_of(shape: Shape, limits: Bounds) -> dict[str, Any]:
     """Return a shape with its ``kind``, its own parameters [m, rad, NED], and its ``drawing``; limits [m, NED]."""
-    # The drawing of a shape of position is its `centre` and `half_axes`, or its `planes`, each with `point` and
+    # The drawing of a shape of position is its `center` and `half_axes`, or its `planes`, each with `point` and
     # `normal`, or the `points` and `faces` of its mesh. A shape of attitude has a `sight`, its cone, instead.
     kind = name_of(shape)
     known = {"kind": kind, **dataclasses.asdict(shape)}  # type: ignore[call-overload]
@@ -81,7 +81,7 @@ def _drawing(shape: Shape, limits: Bounds) -> dict[str, Any]:
     entry = shape_entry(shape)
     if entry.half_axes is not None:
         center, axes = entry.half_axes(shape)
-        return {"centre": center.tolist(), "half_axes": axes.tolist()}
+        return {"center": center.tolist(), "half_axes": axes.tolist()}
     if entry.planes is not None:
         return {"planes": [{"point": p.tolist(), "normal": n.tolist()} for p, n in entry.planes(shape)]}
     mesh = surface_of(shape, limits)

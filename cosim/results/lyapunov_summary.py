@@ -13,14 +13,14 @@ from cosim.simulation.signals import Array
 ROUNDING = 1e-12  # part of the greatest |V| of a run: a smaller rise between two steps is not counted
 
 
-def summarise_lyapunov(record: Rows) -> dict[str, Any] | None:
-    """Summarise V over a run; returns [N m]."""
+def summarize_lyapunov(record: Rows) -> dict[str, Any] | None:
+    """Summarize V over a run; returns [N m]."""
     if "lyapunov.rate" not in record.units:
         return None
-    return {form: _summarise_form(record, f"lyapunov.{form}") for form in FORMS}
+    return {form: _summarize_form(record, f"lyapunov.{form}") for form in FORMS}
 
 
-def _summarise_form(record: Rows, name: str) -> dict[str, Any]:
+def _summarize_form(record: Rows, name: str) -> dict[str, Any]:
     minimum, size = np.inf, 0.0
     for block in record.blocks([name]):
         minimum, size = np.minimum(minimum, block[name].min()), np.maximum(size, np.abs(block[name]).max())

@@ -24,7 +24,7 @@ def require_columns(scenario: Scenario, record: Record) -> None:
     needed = [name for name in missing if not _is_optional(name)]
     if needed:
         raise RunError(f"{record.file}: has no {_list_names(needed)}, which its scenario calls for")
-    # code that reads neighbouring columns, or the first one, relies on the order
+    # code that reads neighboring columns, or the first one, relies on the order
     here = [found[0], *(name for name in found if name in expected)]
     there = [expected[0], *(name for name in expected if name in record.units)]
     odd = next((name for name, other in zip(here, there, strict=True) if name != other), None)

@@ -18,7 +18,7 @@ from cosim.results.log_facts import IMPORT
 from cosim.results.record import RECORD, Record, load_record
 from cosim.results.required_columns import require_columns
 from cosim.results.signal_plot import plot_signals
-from cosim.results.summary import summarise
+from cosim.results.summary import summarize
 from cosim.scenario.scenario import Scenario, load_scenario
 from plant_fmu.errors import printable
 from plant_fmu.installing import install_hint
@@ -216,7 +216,7 @@ def open_run(path: Path, scenario: Scenario, status: str, wall_time: float | Non
             raise RunError(f"{path}: the times of the record do not rise from row to row")
         last = time[-1]
     as_flown = scenario_as_flown(scenario, record)
-    summary = summarise(as_flown, record, status, wall_time)
+    summary = summarize(as_flown, record, status, wall_time)
     if scenario.commands.enabled:
         log = path / COMMANDS_LOG
         # the command of a line that was cut was not applied

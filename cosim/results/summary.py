@@ -11,7 +11,7 @@ import numpy as np
 from controller.regions.region_set import of_attitude
 from cosim.results.goal_miss import explain_miss
 from cosim.results.law_reports import ISOLATED, REJECTED, Isolations
-from cosim.results.lyapunov_summary import summarise_lyapunov
+from cosim.results.lyapunov_summary import summarize_lyapunov
 from cosim.results.record import Rows
 from cosim.results.spans import SETTLED_FOR, Span, Spans
 from cosim.results.water_surface import heights_above_surface, hull_radius, is_submerged_model
@@ -27,8 +27,8 @@ _POSITION = [f"position.{axis}" for axis in "xyz"]
 _ESTIMATE = [f"estimate.phi{i}" for i in range(1, 5)]
 
 
-def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | None) -> dict[str, Any]:
-    """Summarise a run; wall_time [s], returns [rad]."""
+def summarize(scenario: Scenario, record: Rows, status: str, wall_time: float | None) -> dict[str, Any]:
+    """Summarize a run; wall_time [s], returns [rad]."""
     names = [secondary.region.name for secondary in scenario.regions]
     first_rows = record.take(range(min(2, len(record))), ["time", *(f"{name}.clearance" for name in names)])
     # period of the record's rows, which may be fewer than the run's steps
@@ -87,7 +87,7 @@ def summarise(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "estimate_true": scenario.true_restoring_parameters.tolist(),
         "estimate_lowest": [data.least[name] for name in _ESTIMATE],
         "estimate_highest": [data.greatest[name] for name in _ESTIMATE],
-        "lyapunov": summarise_lyapunov(record),
+        "lyapunov": summarize_lyapunov(record),
         "steps": round(simulated / scenario.time.step),
         "wall_time": wall_time,
         "real_time_factor": simulated / wall_time if wall_time else None,

@@ -31,8 +31,8 @@ def describe_task(scenario: Scenario) -> str:
     ]
     respecting = f", keeping {', '.join(regions)}" if regions else ""
     kind = shape_name(scenario.goal)
-    centre = [sum(pair) / 2.0 for pair in zip(*scenario.goal.bounds(), strict=True)]
-    at = f" about ({', '.join(f'{x:g}' for x in centre)}) m" if all(map(math.isfinite, centre)) else ""
+    center = [sum(pair) / 2.0 for pair in zip(*scenario.goal.bounds(), strict=True)]
+    at = f" about ({', '.join(f'{x:g}' for x in center)}) m" if all(map(math.isfinite, center)) else ""
     then = f", then to {len(scenario.goal_then)} more places in turn" if scenario.goal_then else ""
     by = f"{scenario.law.name} law" if not scenario.log else f"imported from {scenario.log}"
     return f"From ({start}) m into the goal region, a {kind}{at}{then}{respecting}; {by}."

@@ -1,4 +1,4 @@
-"""A run from scenario to folder: set up, step, record, summarise, report."""
+"""A run from scenario to folder: set up, step, record, summarize, report."""
 
 from __future__ import annotations
 

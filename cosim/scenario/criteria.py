@@ -1,4 +1,4 @@
-"""The criteria of a scenario in the order of their priority: names, colours and membership functions."""
+"""The criteria of a scenario in the order of their priority: names, colors and membership functions."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ QUANTITIES: dict[str, str] = {  # argument of a membership function, and its uni
     "approach_time": "s",
 }
 MAX_CRITERIA = 16
-# for criteria without a colour: Okabe and Ito's purple, then muted ones of Tol's
-_COLOURS = ("#CC79A7", "#882255", "#44AA99", "#999933", "#332288", "#88CCEE", "#AA4499", "#117733")
+# for criteria without a color: Okabe and Ito's purple, then muted ones of Tol's
+_COLORS = ("#CC79A7", "#882255", "#44AA99", "#999933", "#332288", "#88CCEE", "#AA4499", "#117733")
 _PAPER = {criterion.name: criterion for criterion in SECTION_VI}
 
 
@@ -57,7 +57,7 @@ class CriterionSetup:
     """A checked criterion."""
 
     name: str
-    colour: str  # #RRGGBB
+    color: str  # #RRGGBB
     reasons: tuple[Reason, ...]  # membership functions, the greatest of which counts
 
     @property
@@ -67,7 +67,7 @@ class CriterionSetup:
 
 
 def fill_criteria(entries: tuple[CriterionEntry, ...]) -> tuple[CriterionEntry, ...]:
-    """Fill in the defaults of order and colour."""
+    """Fill in the defaults of order and color."""
     return tuple(_fill(entry, i, entries) for i, entry in enumerate(entries))
 
 
@@ -85,18 +85,18 @@ def check_criteria(entries: tuple[CriterionEntry, ...]) -> tuple[CriterionSetup,
         if order in setups:
             raise ScenarioError(f"{key}.order is {order}, as that of {setups[order].name}: expected one of its own")
         reasons = tuple(_reasons(entry.membership, f"{key}.membership"))
-        setups[order] = CriterionSetup(entry.name, entry.colour, reasons)
+        setups[order] = CriterionSetup(entry.name, entry.color, reasons)
     return tuple(setups[order] for order in sorted(setups))
 
 
 def _fill(entry: CriterionEntry, index: int, entries: Sequence[CriterionEntry]) -> CriterionEntry:
-    used = {other.colour.upper() for other in entries}
-    free = [colour for colour in _COLOURS if colour not in used] or list(_COLOURS)
-    of_paper = {c.name: c.colour for c in PAPER_CRITERIA if c.colour not in used}
-    without = sum(not other.colour and other.name not in of_paper for other in entries[:index])
+    used = {other.color.upper() for other in entries}
+    free = [color for color in _COLORS if color not in used] or list(_COLORS)
+    of_paper = {c.name: c.color for c in PAPER_CRITERIA if c.color not in used}
+    without = sum(not other.color and other.name not in of_paper for other in entries[:index])
     order = index + 1 if entry.order is None else entry.order
-    colour = entry.colour or of_paper.get(entry.name) or free[without % len(free)]
-    return msgspec.structs.replace(entry, order=order, colour=colour)
+    color = entry.color or of_paper.get(entry.name) or free[without % len(free)]
+    return msgspec.structs.replace(entry, order=order, color=color)
 
 
 def _reasons(membership: dict[str, Any], key: str) -> Iterator[Reason]:

@@ -2,8 +2,8 @@
 
 # A planner chooses between regions that are far from each other and from the vehicle, for which the present weights do
 # not hold. So the arbiter is evaluated beforehand for each pair of criteria with soft regions: both have membership 1,
-# all others 0. The share of a criterion is the mean over its pairs of its part of the two weights. A metre of path
-# through a region, half a metre deep, costs `_EQUAL` m at share 1/2, the share of all criteria without preference. At
+# all others 0. The share of a criterion is the mean over its pairs of its part of the two weights. A meter of path
+# through a region, half a meter deep, costs `_EQUAL` m at share 1/2, the share of all criteria without preference. At
 # share 1 it costs `_PREFERRED` times as much, at share 0 as much less.
 
 from __future__ import annotations

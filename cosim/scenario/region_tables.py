@@ -33,10 +33,10 @@ class CriterionEntry(Table, frozen=True):
         ),
     ]
     order: Annotated[int | None, key("priority: the lowest comes first", default="its position in the list")] = None
-    colour: Annotated[
+    color: Annotated[
         str,
         key(
-            "colour in figures and pages, `#RRGGBB`", default="one that no other has",
+            "color in figures and pages, `#RRGGBB`", default="one that no other has",
             pattern=r"\A(#[0-9A-Fa-f]{6})?\Z", expected="#RRGGBB",
         ),
     ] = ""  # fmt: skip
@@ -49,7 +49,7 @@ class CriterionEntry(Table, frozen=True):
     ] = msgspec.field(default_factory=dict)
 
 
-# section VI of the paper; the colours are Okabe and Ito's, which are safe for colour blindness
+# section VI of the paper; the colors are Okabe and Ito's, which are safe for color blindness
 PAPER_CRITERIA = (
     CriterionEntry("obstacle", 1, "#D55E00"),
     CriterionEntry("shape", 2, "#E69F00"),
@@ -98,7 +98,7 @@ class GoalMotion(Table, frozen=True):
     ] = (0.0, 0.0, 0.0)  # fmt: skip
     streamed: Annotated[bool, key("moved from outside during the run", more="; as `regions[].streamed`")] = False
     then: Annotated[
-        tuple[Vector3, ...], key("next centres of the goal in turn, north east down", "m", ", below")
+        tuple[Vector3, ...], key("next centers of the goal in turn, north east down", "m", ", below")
     ] = ()  # fmt: skip
     stay: Annotated[NonNegative, key("time within the goal before the goal moves to its next place", "s")] = 5.0
 

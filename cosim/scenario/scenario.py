@@ -40,7 +40,7 @@ from cosim.scenario.tables import (
     Sensing,
     Time,
 )  # fmt: skip
-from cosim.scenario.toml_file import flatten, list_scenarios, override, read_table, set_key
+from cosim.scenario.toml_file import flatten, list_scenarios, override, read_table, rename_former_keys, set_key
 from cosim.scenario.toml_text import scenario_text
 from cosim.scenario.validation import (
     check_goal,
@@ -97,7 +97,7 @@ class Scenario:
     goal: Shape  # primary region, kept within, at its position at time 0
     goal_velocity: Vector3  # m/s, NED
     goal_streamed: bool  # True: the goal is moved from outside during the run
-    goal_then: tuple[Vector3, ...]  # m, NED: next positions of the goal's centre, in turn
+    goal_then: tuple[Vector3, ...]  # m, NED: next positions of the goal's center, in turn
     goal_stay: float  # s, time within the goal before it moves to the next position
     regions: tuple[SecondaryRegion, ...]
     intersection: tuple[int, ...]  # indices of the regions whose overlap the summary reports
@@ -289,6 +289,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
 
 def read_tables(table: dict[str, Any], name: str) -> File:
     """Check each table of a scenario's file, and fill in the defaults."""
+    rename_former_keys(table)
     plant = table.get("plant")
     if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
         table = table | {"plant": plant | {"parameters": flatten(plant["parameters"])}}

@@ -9,7 +9,7 @@ from cosim.scenario.sensor_suite import scenario_sensors
 
 
 def start_values(scenario: Scenario) -> dict[str, float]:
-    """Return the parameters and start values that the FMU gets before initialisation."""
+    """Return the parameters and start values that the FMU gets before initialization."""
     initial, plant, limit = scenario.initial, scenario.plant, scenario.limit
     values = {"substep": plant.substep, "wrench_time_constant": limit.time_constant}
     if limit.force < np.inf:

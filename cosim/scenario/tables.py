@@ -187,7 +187,7 @@ class Commands(Table, frozen=True):
     obstacle_gain: Annotated[NonNegative, key("gain of each obstacle, per unit of g", "N")] = 100.0
     hold_radius: Annotated[Positive, key("radius of the target sphere in modes hold and surface", "m")] = 0.3
     surface_depth: Annotated[
-        float, key("depth of that sphere's centre in mode surface", "m", ge=0.0, le=1e3)
+        float, key("depth of that sphere's center in mode surface", "m", ge=0.0, le=1e3)
     ] = 0.5  # fmt: skip
     pilot_gain: Annotated[
         float, key("fraction of the maximum wrench along an axis that a full stick commands", ge=0.0, le=1.0)

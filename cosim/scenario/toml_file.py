@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+import logging
 import re
 import tomllib
 from importlib import resources
@@ -12,6 +13,8 @@ from typing import Any, NamedTuple
 from cosim.errors import ScenarioError
 from plant_fmu.errors import TableError, printable
 
+_LOG = logging.getLogger(__name__)
+_RENAMED = {"centre": "center", "colour": "color"}  # former names of keys
 _SHOWN = 80  # maximum number of characters quoted in a message
 
 # a key: parts with dots between them, and TOML's quotes around those that have blanks; and a key with a value
@@ -72,6 +75,7 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
             table, name, folder = read_toml(shipped), name_or_file, Path()
     else:
         raise ScenarioError(f"base {name_or_file!r} is unknown; {hint(name_or_file, list_scenarios())}")
+    rename_former_keys(table)
     if name_or_file in seen:
         raise ScenarioError(f"{name}: is its own base")
     if "base" in table:
@@ -178,11 +182,11 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
         if isinstance(node, list):
             node = node[_index(node, part, key)]
         elif isinstance(node, dict):
-            node = node.setdefault(part, {})
+            node = node.setdefault(current_name(node, part), {})
     if isinstance(node, list):
         node[_index(node, last, key)] = value
     elif isinstance(node, dict):
-        node[last] = value
+        node[current_name(node, last)] = value
     else:
         raise ScenarioError(f"--set {_short(key)}: there is no table at {_short('.'.join(path))!r}")
 
@@ -224,7 +228,8 @@ def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
             known = names or list(map(str, range(len(container))))
         else:
             known = list(container) if isinstance(container, dict) else []
-            index = part if part in known else None
+            name = current_name(container, part) if known else part
+            index = name if name in known else None
         if index is None:
             from plant_fmu.toml_tables import hint
 
@@ -236,3 +241,41 @@ def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
             return container, index
         container = container[index]
     raise AssertionError("unreachable")
+
+
+def current_name(table: dict[str, Any], name: str) -> str:
+    """Return the name of a key that a table has by its new name alone."""
+    new = _RENAMED.get(name, name)
+    return new if new in table and name not in table else name
+
+
+def rename_former_keys(table: dict[str, Any]) -> None:
+    """Rename former keys of a scenario's goal, shapes and criteria in place."""
+    regions, criteria = (
+        [item for item in _list(table.get(key)) if isinstance(item, dict)] for key in ("regions", "criteria")
+    )
+    for shape in (table.get("goal"), *(region.get("shape") for region in regions)):
+        if isinstance(shape, dict) and "centre" in shape and not _has_own_centre(shape.get("type")):
+            _rename(shape, "centre")
+    for criterion in criteria:
+        _rename(criterion, "colour")
+
+
+def _list(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else []
+
+
+def _has_own_centre(kind: object) -> bool:
+    """Return True for a user's own shape that calls a key by the former name."""
+    from controller.regions.shapes import ENTRIES  # imports NumPy
+
+    return isinstance(kind, str) and kind in ENTRIES and "centre" in ENTRIES[kind].units
+
+
+def _rename(table: dict[str, Any], old: str) -> None:
+    if old in table:
+        new = _RENAMED[old]
+        if new in table:
+            raise ScenarioError(f"pass either {new} or {old}, its former name")
+        table[new] = table.pop(old)
+        _LOG.warning("key %s is now %s", old, new)

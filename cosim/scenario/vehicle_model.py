@@ -9,7 +9,7 @@ from plant_fmu.vehicle import Vehicle
 
 
 def vehicle_model(vehicle: Vehicle) -> VehicleModel:
-    """Return a vehicle's nominal model for a law, without weight, buoyancy and their centres."""
+    """Return a vehicle's nominal model for a law, without weight, buoyancy and their centers."""
     rigid_mass = np.zeros((6, 6))
     rigid_mass[:3, :3] = vehicle.mass * np.eye(3)
     rigid_mass[3:, 3:] = vehicle.inertia

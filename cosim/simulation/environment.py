@@ -28,7 +28,7 @@ class _Target:
     """A target region."""
 
     packed: PackedRegions  # this region alone
-    middle: Array  # (3,) m, NED: centre of its shape as packed
+    middle: Array  # (3,) m, NED: center of its shape as packed
     origin: Array  # (3,) m, NED: its shift from there, extrapolated to time 0 at its present velocity
     radius: float  # m, radius of a sphere; 0 for the shape of the scenario's goal
 
@@ -165,7 +165,7 @@ class RegionEnvironment:
 
     @property
     def target(self) -> Array:
-        """Centre of the target region, shape (3,) [m, NED]."""
+        """Center of the target region, shape (3,) [m, NED]."""
         middle: Array = self._target.middle + self.goal.shifts[0]
         return middle
 
@@ -197,7 +197,7 @@ class RegionEnvironment:
         self._places = self._places._replace(goal=target.packed)
 
     def _new_target(self, radius: float | None, position: Vector3) -> _Target:
-        """Return a target at rest with its centre at a position, a sphere or with the shape of the scenario's goal."""
+        """Return a target at rest with its center at a position, a sphere or with the shape of the scenario's goal."""
         if radius is None:
             origin = np.subtract(position, self._middle)
             return _Target(pack([self._goal_region]), np.array(self._middle), origin, 0.0)
@@ -239,7 +239,7 @@ def stay_steps(scenario: Scenario) -> int:
 
 
 def shape_center(shape: Shape) -> Vector3:
-    """Return the centre of a shape, the point by which targets are placed; returns [m, NED]."""
+    """Return the center of a shape, the point by which targets are placed; returns [m, NED]."""
     center = shape_entry(shape).center
     if center is not None:
         return center(shape)

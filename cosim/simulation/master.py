@@ -105,7 +105,7 @@ class Master:
         self.plant: SteppedPlant = Plant(scenario.vehicle, scenario.plant.fmi) if plant is None else plant
         try:
             self.plant.set(start_values(scenario))
-            self.plant.initialise()
+            self.plant.initialize()
             self.signals = Signals(columns_of(scenario, self.plant, self.law))
             self._bind()
         except BaseException:

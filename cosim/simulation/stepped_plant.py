@@ -22,8 +22,8 @@ class SteppedPlant(Protocol):
         """Set parameters and start values by name."""
         ...
 
-    def initialise(self) -> None:
-        """Initialise the plant before the first step."""
+    def initialize(self) -> None:
+        """Initialize the plant before the first step."""
         ...
 
     def step(self, step: float) -> None:

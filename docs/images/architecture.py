@@ -97,10 +97,10 @@ def _row(names: list[str], height: float, level: int, down: float) -> dict[str, 
     }
 
 
-def _box(name: str, text: str, x: float, y: float, width: float, colour: str) -> str:
+def _box(name: str, text: str, x: float, y: float, width: float, color: str) -> str:
     middle = x + width / 2
     return (
-        f'<rect x="{x:g}" y="{y:g}" width="{width:g}" height="{_BOX}" rx="5" fill="{colour}" stroke="#37474f"/>'
+        f'<rect x="{x:g}" y="{y:g}" width="{width:g}" height="{_BOX}" rx="5" fill="{color}" stroke="#37474f"/>'
         f'<text x="{middle:g}" y="{y + 20:g}" font-size="14" font-weight="bold" text-anchor="middle">{name}</text>'
         f'<text x="{middle:g}" y="{y + 38:g}" font-size="10" text-anchor="middle">{escape(text)}</text>'
     )

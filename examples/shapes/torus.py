@@ -17,32 +17,32 @@ from controller.regions.shape import Array, Bounds, Evaluation, Vector3, centere
 
 @dataclass(frozen=True)
 class Torus:
-    """All points within `tube` [m] of the circle of `radius` [m] about `centre` [m, NED], square to `axis`."""
+    """All points within `tube` [m] of the circle of `radius` [m] about `center` [m, NED], square to `axis`."""
 
     kind: ClassVar[int]
     unit: ClassVar[str] = "m"
-    centre: Vector3
+    center: Vector3
     axis: Vector3
     radius: float
     tube: float
 
     def __post_init__(self) -> None:
-        require_finite("torus", centre=self.centre, radius=self.radius, tube=self.tube)
+        require_finite("torus", center=self.center, radius=self.radius, tube=self.tube)
         unit("torus", "axis", self.axis)
         require(0.0 < self.tube < self.radius, "torus", "tube", self.tube, "above 0 m and below radius")
 
     def packed(self) -> tuple[float, ...]:
         """Return center, unit axis, radius and tube."""
-        return (*self.centre, *unit("torus", "axis", self.axis), self.radius, self.tube)
+        return (*self.center, *unit("torus", "axis", self.axis), self.radius, self.tube)
 
     def numbers(self) -> tuple[Number, ...]:
         """Return what `packed` gives, by name and unit."""
-        return (*vector("centre", LENGTH), *vector("axis", PART), Number("radius", *SIZE), Number("tube", *SIZE))
+        return (*vector("center", LENGTH), *vector("axis", PART), Number("radius", *SIZE), Number("tube", *SIZE))
 
     def bounds(self) -> Bounds:
         """Return the corners of the upright box about it."""
         axis = unit("torus", "axis", self.axis)
-        return centered_bounds(self.centre, [self.radius * math.sqrt(max(0.0, 1.0 - x * x)) + self.tube for x in axis])
+        return centered_bounds(self.center, [self.radius * math.sqrt(max(0.0, 1.0 - x * x)) + self.tube for x in axis])
 
 
 def torus(p: Array, q: Array) -> Evaluation:
@@ -68,11 +68,11 @@ def surface(shape: Torus, limits: Bounds) -> Mesh:
     turn, around = np.meshgrid(2.0 * np.pi * np.arange(32) / 32, 2.0 * np.pi * np.arange(12) / 12, indexing="ij")
     out = np.cos(turn)[..., None] * u + np.sin(turn)[..., None] * np.cross(axis, u)
     away = shape.radius + shape.tube * np.cos(around)[..., None]
-    return closed_grid(np.array(shape.centre) + away * out + shape.tube * np.sin(around)[..., None] * axis)
+    return closed_grid(np.array(shape.center) + away * out + shape.tube * np.sin(around)[..., None] * axis)
 
 
 EXAMPLE = Torus((1.0, 0.0, 2.0), (1.0, 0.0, 0.0), 1.5, 0.2)
 ENTRY = Entry(
-    Torus, torus, EXAMPLE, {"centre": "m", "axis": "", "radius": "m", "tube": "m"},
-    flat_faces=False, kinks="everywhere", convex=False, center=attrgetter("centre"), surface=surface,
+    Torus, torus, EXAMPLE, {"center": "m", "axis": "", "radius": "m", "tube": "m"},
+    flat_faces=False, kinks="everywhere", convex=False, center=attrgetter("center"), surface=surface,
 )  # fmt: skip

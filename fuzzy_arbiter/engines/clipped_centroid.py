@@ -1,6 +1,6 @@
 """The exact centroid of one output, piece by piece of its straight terms, clipped or scaled."""
 
-# Between two neighbouring knots, or places where two terms' lines meet, the lines l_1, l_2, .. have one order, the
+# Between two neighboring knots, or places where two terms' lines meet, the lines l_1, l_2, .. have one order, the
 # highest first. Clipped at their cuts c_1, c_2, .. and joined by the maximum they are a sum of single clipped lines:
 # with C_t the greatest of the first t cuts,
 #

@@ -9,10 +9,10 @@ Imports: terms, engines.
 from fuzzy_arbiter.pictures.fields import decisions, surface
 from fuzzy_arbiter.pictures.firing import rules
 from fuzzy_arbiter.pictures.lines import normalizations, profile, terms
-from fuzzy_arbiter.pictures.style import COLOURS
+from fuzzy_arbiter.pictures.style import COLORS
 
 __all__ = [
-    "COLOURS",
+    "COLORS",
     "decisions",
     "normalizations",
     "profile",

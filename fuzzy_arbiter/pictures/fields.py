@@ -11,7 +11,7 @@ from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.pictures.places import fixed_inputs, format_values, index_of, output_index, weights_at
-from fuzzy_arbiter.pictures.style import INK, colour, hatch, new_axes, require_matplotlib, room, wrapped
+from fuzzy_arbiter.pictures.style import INK, color, hatch, new_axes, require_matplotlib, room, wrapped
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -97,7 +97,7 @@ def decisions(
     Returns
     -------
     Axes
-        Axes of the picture, white where the greatest is shared, grey where an output is undefined.
+        Axes of the picture, white where the greatest is shared, gray where an output is undefined.
 
     Raises
     ------
@@ -137,11 +137,11 @@ def decisions(
         ahead = np.ma.masked_where(undefined, ranked_weights[..., k] - others)
         if ahead.count() == 0 or not ahead.max() > levels[0]:
             continue
-        shades = [_mixed(to_rgb(colour(k)), share) for share in np.linspace(0.2, 0.85, _SHADES)]
+        shades = [_mixed(to_rgb(color(k)), share) for share in np.linspace(0.2, 0.85, _SHADES)]
         ax.contourf(x, y, ahead, levels=levels, colors=shades)
         hatching = ax.contourf(x, y, ahead, levels=levels[[0, -1]], colors="none", hatches=[hatch(k)])
         hatching.set(edgecolor=(1.0, 1.0, 1.0, 0.55), linewidth=0.0)
-        # two neighbours are ahead of each other by opposite amounts, so that their borders fall on one line
+        # two neighbors are ahead of each other by opposite amounts, so that their borders fall on one line
         if ahead.min() < levels[0]:
             ax.contour(x, y, ahead, levels=levels[:1], colors=INK, linewidths=1.1)
         keys.append(Patch(label=wrapped(name, 24), facecolor=shades[-1], edgecolor="white", hatch=hatch(k)))
@@ -161,7 +161,7 @@ def decisions(
 
 
 def _mixed(whole: tuple[float, float, float], share: float) -> str:
-    """Return a colour mixed with white."""
+    """Return a color mixed with white."""
     from matplotlib.colors import to_hex
 
     red, green, blue = (1.0 - share * (1.0 - part) for part in whole)

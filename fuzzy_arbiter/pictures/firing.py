@@ -13,7 +13,7 @@ from fuzzy_arbiter.engines.firing import Array, Firing
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.pictures.lines import corners
 from fuzzy_arbiter.pictures.places import format_values, output_index, points_along
-from fuzzy_arbiter.pictures.style import FAINT, INK, colour, hatch, new_axes, wrapped
+from fuzzy_arbiter.pictures.style import FAINT, INK, color, hatch, new_axes, wrapped
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.samples import Sample
 
@@ -144,7 +144,7 @@ def _draw_row(ax: Axes, variable: Output, baseline: int, row: _Row, outline: tup
     ends, whole = corners(term, variable.universe)
     ax.plot(ends, baseline - _HEIGHT * np.array(whole), color=FAINT, linewidth=1.0)
     if fires:
-        top, ink = baseline - _HEIGHT * degrees, colour(row.term)
+        top, ink = baseline - _HEIGHT * degrees, color(row.term)
         ax.fill_between(x, baseline, top, facecolor=ink, alpha=0.45, linewidth=0)
         ax.fill_between(x, baseline, top, facecolor="none", edgecolor=ink, hatch=hatch(row.term), linewidth=0)
         ax.plot(x, top, color=ink, linewidth=1.6)
@@ -165,16 +165,16 @@ def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[f
     output = arbiter.system.outputs[k]
     foot, tall = place
     if fires:
-        centre, meaning = _alone(arbiter, output)(values)[0], "centroid"
+        center, meaning = _alone(arbiter, output)(values)[0], "centroid"
     elif output.default is not None:
-        centre, meaning = output.default, "default"
+        center, meaning = output.default, "default"
     else:
         return f"{output.name}: no rule fires"
-    ax.plot([centre, centre], [foot, foot - tall], color=INK, linewidth=1.4, linestyle=(0, (4, 2)))
-    ax.plot(centre, foot, "^", color=INK, markersize=8, clip_on=False, zorder=5)
-    side = -1 if centre > sum(output.universe) / 2.0 else 1  # on the wider side
+    ax.plot([center, center], [foot, foot - tall], color=INK, linewidth=1.4, linestyle=(0, (4, 2)))
+    ax.plot(center, foot, "^", color=INK, markersize=8, clip_on=False, zorder=5)
+    side = -1 if center > sum(output.universe) / 2.0 else 1  # on the wider side
     ax.annotate(
-        f"{meaning} {centre:.4g}", (centre, foot - tall), xytext=(6 * side, -3), textcoords="offset points",
+        f"{meaning} {center:.4g}", (center, foot - tall), xytext=(6 * side, -3), textcoords="offset points",
         ha="right" if side < 0 else "left", va="top", fontsize=9.5, color=INK,
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
     )  # fmt: skip

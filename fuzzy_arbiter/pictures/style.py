@@ -1,4 +1,4 @@
-"""The style of the pictures: new axes, colours and lines that can be distinguished, texts that fit."""
+"""The style of the pictures: new axes, colors and lines that can be distinguished, texts that fit."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from fuzzy_arbiter.errors import PictureError
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Okabe and Ito's colours, which colour-blind people can distinguish, from dark to light
-COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
+# Okabe and Ito's colors, which color-blind people can distinguish, from dark to light
+COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
 DASHES = ("-", (0, (6, 2)), (0, (2, 1.5)), (0, (7, 2, 1.5, 2)), (0, (7, 2, 1.5, 2, 1.5, 2)), (0, (1, 2)))
 HATCHES = ("////", "....", "\\\\\\\\", "xx", "----", "||||")
 INK, FAINT = "#333333", "#999999"
@@ -35,20 +35,20 @@ def new_axes(width: float, height: float, **keywords: Any) -> Axes:
     return ax
 
 
-def colour(i: int) -> str:
-    """Return the colour of the i-th line or area."""
-    return COLOURS[i % len(COLOURS)]
+def color(i: int) -> str:
+    """Return the color of the i-th line or area."""
+    return COLORS[i % len(COLORS)]
 
 
 def hatch(i: int) -> str:
     """Return the hatching of the i-th area."""
-    return HATCHES[(i + i // len(COLOURS)) % len(HATCHES)]
+    return HATCHES[(i + i // len(COLORS)) % len(HATCHES)]
 
 
 def line_style(i: int) -> dict[str, Any]:
-    """Return the style of the i-th line, which differs in colour and dashes, and is narrower than the line below."""
-    dashes = DASHES[(i + i // len(COLOURS)) % len(DASHES)]
-    return {"color": colour(i), "linestyle": dashes, "linewidth": max(1.8, 2.8 - 0.25 * i)}
+    """Return the style of the i-th line, which differs in color and dashes, and is narrower than the line below."""
+    dashes = DASHES[(i + i // len(COLORS)) % len(DASHES)]
+    return {"color": color(i), "linestyle": dashes, "linewidth": max(1.8, 2.8 - 0.25 * i)}
 
 
 def tidy(ax: Axes) -> None:

@@ -247,8 +247,8 @@ def _rows(system: System) -> Iterator[Row]:
     rows = list(itertools.product(*(v.term_names[::-1] for v in system.inputs)))
     columns = dict(zip(names, np.array(rows, dtype=object).T, strict=True))
     logic = array_logic(Operators())
-    labelled = {Is(v.name, t): (columns[v.name] == t).astype(np.float64) for v in system.inputs for t in v.term_names}
-    fires = [logic.degree(rule.condition, labelled.__getitem__) > 0.0 for rule in system.rules]
+    labeled = {Is(v.name, t): (columns[v.name] == t).astype(np.float64) for v in system.inputs for t in v.term_names}
+    fires = [logic.degree(rule.condition, labeled.__getitem__) > 0.0 for rule in system.rules]
     for i, terms in enumerate(rows):
         fired = [r for r in range(len(fires)) if fires[r][i]]
         concluded = {statement for r in fired for statement in system.rules[r].conclusions}

@@ -82,7 +82,7 @@ def simulate_in_plant(fmu: FmuFile, task: Task, folder: Path) -> Answer:
     """Step a co-simulation FMU in `Plant`."""
     with Plant(fmu.path) as plant:
         plant.set(task.start)
-        plant.initialise()
+        plant.initialize()
         for _ in range(task.steps):
             plant.step(task.step)
         return dict(zip(plant.outputs.names, plant.outputs.values.tolist(), strict=True)), ""

@@ -37,13 +37,13 @@ class CoSimulationInstance:
         self._output_index = {name: i for i, name in enumerate(self.outputs.names)}
         self._calls = (*bound.set_inputs, *bound.do_step, *bound.get_outputs)
         self._now, self._ended = bound.now, bound.ended
-        self._set_clock(_AT_ZERO, initialised=False)
+        self._set_clock(_AT_ZERO, initialized=False)
 
-    def _set_clock(self, clock: Clock, *, initialised: bool) -> None:
+    def _set_clock(self, clock: Clock, *, initialized: bool) -> None:
         """Set the clock. The next step calls `_change_step`, whatever its length, since NaN equals no number."""
         self._start, self._count, self._last_step = clock.start, clock.count, clock.step
         self._step = math.nan
-        self.time, self.initialised = clock.time, initialised
+        self.time, self.initialized = clock.time, initialized
 
     # ---- properties ----
 
@@ -74,7 +74,7 @@ class CoSimulationInstance:
         batches: dict[str, tuple[list[Any], list[Value]]] = {}
         for name, value in values.items():
             variable = self._variable(name)
-            require_settable(variable, self.initialised)
+            require_settable(variable, self.initialized)
             variables, numbers = batches.setdefault(variable.type, ([], []))
             variables.append(variable)
             numbers.append(convert_value(variable, value))
@@ -84,7 +84,7 @@ class CoSimulationInstance:
             for variable, number in zip(variables, numbers, strict=True):
                 if variable.name in self._input_index:
                     self.inputs.values[self._input_index[variable.name]] = number
-        if self.initialised:
+        if self.initialized:
             self._read()
 
     def __setitem__(self, name: str, value: Value) -> None:
@@ -99,8 +99,8 @@ class CoSimulationInstance:
         if name in self._input_index:
             return float(self.inputs.values[self._input_index[name]])
         variable = self._variable(name)
-        if not self.initialised:
-            raise PlantError(f"{name} has no value before initialise()")
+        if not self.initialized:
+            raise PlantError(f"{name} has no value before initialize()")
         if name in self._output_index:
             return float(self.outputs.values[self._output_index[name]])
         if variable.dimensions or variable.type in ("Binary", "Clock"):
@@ -123,17 +123,17 @@ class CoSimulationInstance:
         if self._instance.closed:
             raise PlantError(f"plant {self.name} is closed")
 
-    def _require_initialised(self, action: str) -> None:
+    def _require_initialized(self, action: str) -> None:
         self._require_open()
-        if not self.initialised:
-            raise PlantError(f"plant {self.name} {action} before initialise()")
+        if not self.initialized:
+            raise PlantError(f"plant {self.name} {action} before initialize()")
 
     # ---- life cycle ----
 
-    def initialise(self, time: float = 0.0) -> None:
-        """Initialise the FMU, and read the outputs; time [s]."""
+    def initialize(self, time: float = 0.0) -> None:
+        """Initialize the FMU, and read the outputs; time [s]."""
         self._require_open()
-        if self.initialised:
+        if self.initialized:
             raise PlantError(f"plant {self.name} is initialized already; reset() it first")
         if not isinstance(time, (int, float, np.integer, np.floating)):
             raise PlantError(f"start time is {time!r}, expected seconds")
@@ -149,16 +149,16 @@ class CoSimulationInstance:
             instance.do(fmu.exitInitializationMode)
         except PlantError as error:
             raise PlantError(f"{error}; reset(), then set valid values") from error
-        self._set_clock(Clock(time, 0, math.nan), initialised=True)
+        self._set_clock(Clock(time, 0, math.nan), initialized=True)
         self._read()
 
     def reset(self) -> None:
-        """Return to the state after loading: start values of the FMU, not initialised, time 0."""
+        """Return to the state after loading: start values of the FMU, not initialized, time 0."""
         self._require_open()
         self._instance.do(self._instance.fmu.reset)
         self._instance.messages.take_failures()  # so that a later error does not quote earlier messages
         self.inputs.values[:] = self._bound.starts
-        self._set_clock(_AT_ZERO, initialised=False)
+        self._set_clock(_AT_ZERO, initialized=False)
 
     def step(self, step: float) -> None:
         """Send the inputs, advance by `step`, and read the outputs; step [s]."""
@@ -177,7 +177,7 @@ class CoSimulationInstance:
 
     def _change_step(self, step: float) -> None:
         """Prepare steps of another length than before."""
-        self._require_initialised("cannot step")
+        self._require_initialized("cannot step")
         number = isinstance(step, (int, float, np.integer, np.floating)) and not isinstance(step, bool)
         if not (number and 0.0 < step < _MAX_STEP):
             raise PlantError(f"step is {step!r}, expected seconds above 0")
@@ -200,8 +200,8 @@ class CoSimulationInstance:
 
     def read_flags(self) -> NDArray[np.bool_]:
         """Read the Boolean outputs after the last step; returns (n,)."""
-        if not self.initialised:
-            self._require_initialised("has no flags")
+        if not self.initialized:
+            self._require_initialized("has no flags")
         get_flags, flag_arguments = self._bound.get_flags
         if get_flags(*flag_arguments) > WARNING:
             raise PlantError(f"the flags cannot be read: {self._failure_message()}")
@@ -210,10 +210,10 @@ class CoSimulationInstance:
     def close(self) -> None:
         """Free the instance, unload the library and remove the extracted files. May be called twice."""
         self._instance.close()
-        self._set_clock(Clock(self.time, 0, math.nan), initialised=False)
+        self._set_clock(Clock(self.time, 0, math.nan), initialized=False)
 
     def __reduce_ex__(self, protocol: Any) -> Any:
-        raise PlantError("a plant cannot be copied or pickled, expected save() and serialise() for its state")
+        raise PlantError("a plant cannot be copied or pickled, expected save() and serialize() for its state")
 
     def __enter__(self) -> Self:
         return self

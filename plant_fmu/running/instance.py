@@ -32,7 +32,7 @@ _LOADING = threading.Lock()  # FMPy changes the working folder of the whole proc
 # capability: attribute of CoSimulation in FMI 2.0 and in FMI 3.0; FMPy does not read all of them
 _CAPABILITIES = {
     "state": ("canGetAndSetFMUstate", "canGetAndSetFMUState"),
-    "serialise": ("canSerializeFMUstate", "canSerializeFMUState"),
+    "serialize": ("canSerializeFMUstate", "canSerializeFMUState"),
     "derivatives": ("providesDirectionalDerivative", "providesDirectionalDerivatives"),
 }
 

@@ -37,7 +37,7 @@ class Plant(CoSimulationInstance):
         Boolean outputs; `read_flags` updates ``flags.values``.
     time : float
         Present time [s].
-    initialised : bool
+    initialized : bool
         True if the plant can step.
 
     Raises
@@ -57,7 +57,7 @@ class Plant(CoSimulationInstance):
     >>> from plant_fmu import Plant
     >>> plant = Plant("odin")
     >>> plant.set({"position.z": 2.0})
-    >>> plant.initialise()
+    >>> plant.initialize()
     >>> plant.step(0.1)
     >>> 0.0 < plant["position.z"] < 4.0
     True
@@ -85,7 +85,7 @@ class Plant(CoSimulationInstance):
         self._instance.sweep()
         handle = self._instance.do(self._instance.fmu.getFMUState)
         clock = Clock(self._start, self._count, self._last_step)
-        return State(self._instance, handle, clock, self.initialised, self.inputs.values.copy())
+        return State(self._instance, handle, clock, self.initialized, self.inputs.values.copy())
 
     def restore(self, state: State) -> None:
         """Restore a saved state of this plant, from which the simulation is the same to the last bit.
@@ -93,7 +93,7 @@ class Plant(CoSimulationInstance):
         Parameters
         ----------
         state : State
-            State from `save` or `deserialise`.
+            State from `save` or `deserialize`.
 
         Raises
         ------
@@ -104,8 +104,8 @@ class Plant(CoSimulationInstance):
         self._instance.sweep()
         self._instance.do(self._instance.fmu.setFMUState, state.handle(self._instance))
         self.inputs.values[:] = state.inputs
-        self._set_clock(state.clock, initialised=state.initialised)
-        if self.initialised:
+        self._set_clock(state.clock, initialized=state.initialized)
+        if self.initialized:
             self._read()
 
     def free(self, state: State) -> None:
@@ -113,7 +113,7 @@ class Plant(CoSimulationInstance):
         if not self._instance.closed:
             state.free(self._instance)
 
-    def serialise(self, state: State) -> bytes:
+    def serialize(self, state: State) -> bytes:
         """Return a saved state as bytes, for another plant of the same FMU, another process or a file.
 
         Raises
@@ -121,18 +121,18 @@ class Plant(CoSimulationInstance):
         PlantError
             If the FMU does not support it, or the state is of another plant.
         """
-        self._require("serialise", "cannot serialise its state")
+        self._require("serialize", "cannot serialize its state")
         return to_bytes(state, self._instance)
 
-    def deserialise(self, data: bytes) -> State:
-        """Return the state that `serialise` converted to the bytes `data`.
+    def deserialize(self, data: bytes) -> State:
+        """Return the state that `serialize` converted to the bytes `data`.
 
         Raises
         ------
         PlantError
             If the bytes are no state, of another FMU, or damaged.
         """
-        self._require("serialise", "cannot serialise its state")
+        self._require("serialize", "cannot serialize its state")
         return from_bytes(data, self._instance)
 
     def jacobian(self, unknowns: Sequence[str], knowns: Sequence[str]) -> NDArray[np.float64]:
@@ -156,7 +156,7 @@ class Plant(CoSimulationInstance):
             If a name is unknown, or the FMU has no such derivative.
         """
         self._require("derivatives", "provides no directional derivatives")
-        self._require_initialised("has no derivatives")
+        self._require_initialized("has no derivatives")
         rows, columns = ([self._real(name) for name in names] for names in (unknowns, knowns))
         self._send()
         jacobian = np.zeros((len(rows), len(columns)))
@@ -168,7 +168,7 @@ class Plant(CoSimulationInstance):
         return jacobian
 
     def native(self, inputs: Sequence[str], outputs: Sequence[str]) -> Native:
-        """Return the C functions of an initialised FMI 3.0 plant for a compiled loop.
+        """Return the C functions of an initialized FMI 3.0 plant for a compiled loop.
 
         Such a loop steps the FMU without this object: `time` and the channels do not change, so `reset` the
         plant, or close it, afterwards.
@@ -186,9 +186,9 @@ class Plant(CoSimulationInstance):
         Raises
         ------
         PlantError
-            If the plant is not initialised or of another version, or a variable is no real scalar.
+            If the plant is not initialized or of another version, or a variable is no real scalar.
         """
-        self._require_initialised("cannot be stepped")
+        self._require_initialized("cannot be stepped")
         return native_calls(self._instance, tuple(inputs), tuple(outputs))
 
     def _real(self, name: str) -> int:

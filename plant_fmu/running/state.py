@@ -16,7 +16,7 @@ from plant_fmu.errors import PlantError
 from plant_fmu.running.instance import Instance
 
 _HEAD = struct.Struct("<8s8sI")  # magic, FMU, checksum of the body
-_BODY = struct.Struct("<?dqdI")  # initialised, clock, number of inputs; inputs and the FMU's own bytes follow
+_BODY = struct.Struct("<?dqdI")  # initialized, clock, number of inputs; inputs and the FMU's own bytes follow
 _MAGIC = b"PLANTST1"
 
 
@@ -38,10 +38,10 @@ class State:
     """A state from `Plant.save`. `Plant.free` frees it, else its last reference does."""
 
     def __init__(
-        self, instance: Instance, handle: Any, clock: Clock, initialised: bool, inputs: NDArray[np.float64]
+        self, instance: Instance, handle: Any, clock: Clock, initialized: bool, inputs: NDArray[np.float64]
     ) -> None:
         self._instance, self._handle = instance, instance.keep(handle)
-        self.clock, self.initialised, self.inputs = clock, initialised, inputs
+        self.clock, self.initialized, self.inputs = clock, initialized, inputs
         self._end = weakref.finalize(self, instance.drop, handle.value)
         self._end.atexit = False
 
@@ -51,12 +51,12 @@ class State:
         return self.clock.time
 
     def __reduce_ex__(self, protocol: Any) -> Any:
-        raise PlantError("a state cannot be copied or pickled, expected plant.serialise(state)")
+        raise PlantError("a state cannot be copied or pickled, expected plant.serialize(state)")
 
     def handle(self, instance: Instance) -> Any:
         """Return the FMU's handle, for its own `instance`."""
         if self._instance is not instance:
-            raise PlantError("the state is of another plant; serialise it there, and deserialise it here")
+            raise PlantError("the state is of another plant; serialize it there, and deserialize it here")
         if not self._end.alive:
             raise PlantError("the state was freed")
         return self._handle
@@ -70,10 +70,10 @@ class State:
 
 
 def to_bytes(state: State, instance: Instance) -> bytes:
-    """Serialise a state to bytes that any plant with the same FMU can read, on the same kind of machine."""
+    """Serialize a state to bytes that any plant with the same FMU can read, on the same kind of machine."""
     fmu_state: bytes = instance.do(instance.fmu.serializeFMUState, state.handle(instance))
     clock, inputs = state.clock, state.inputs.astype("<f8")
-    header = _BODY.pack(state.initialised, clock.start, clock.count, clock.step, len(inputs))
+    header = _BODY.pack(state.initialized, clock.start, clock.count, clock.step, len(inputs))
     body = header + inputs.tobytes() + fmu_state
     return _HEAD.pack(_MAGIC, _fmu_digest(instance), zlib.crc32(body)) + body
 
@@ -81,17 +81,17 @@ def to_bytes(state: State, instance: Instance) -> bytes:
 def from_bytes(data: bytes, instance: Instance) -> State:
     """Return the state that `to_bytes` wrote."""
     if len(data) < _HEAD.size + _BODY.size or not data.startswith(_MAGIC):
-        raise PlantError(f"got {len(data)} bytes, expected a serialised state of a plant")
+        raise PlantError(f"got {len(data)} bytes, expected a serialized state of a plant")
     _, fmu_digest, checksum = _HEAD.unpack_from(data)
     if fmu_digest != _fmu_digest(instance):
-        raise PlantError(f"the serialised state is of another FMU than {instance.path}")
+        raise PlantError(f"the serialized state is of another FMU than {instance.path}")
     body = data[_HEAD.size :]
     if zlib.crc32(body) != checksum:
-        raise PlantError("the serialised state is damaged: its checksum is wrong")
-    initialised, start, count, step, n = _BODY.unpack_from(body)
+        raise PlantError("the serialized state is damaged: its checksum is wrong")
+    initialized, start, count, step, n = _BODY.unpack_from(body)
     inputs = np.frombuffer(body, "<f8", n, _BODY.size).astype(np.float64)
     handle = instance.do(instance.fmu.deserializeFMUState, body[_BODY.size + 8 * n :])
-    return State(instance, handle, Clock(start, count, step), initialised, inputs)
+    return State(instance, handle, Clock(start, count, step), initialized, inputs)
 
 
 def _fmu_digest(instance: Instance) -> bytes:

@@ -41,15 +41,15 @@ def convert_value(variable: Any, value: object) -> Value:
     raise PlantError(f"{variable.name} is of type {kind}, which cannot be set")
 
 
-def require_settable(variable: Any, initialised: bool) -> None:
+def require_settable(variable: Any, initialized: bool) -> None:
     """Require that FMI allows to set a variable now."""
     if variable.causality == "input":
         return
     calculated = variable.initial == "calculated" or variable.causality in ("calculatedParameter", "independent")
     if calculated or variable.variability == "constant" or variable.causality == "structuralParameter":
         raise PlantError(f"{variable.name} cannot be set, expected a parameter, an input or a start value")
-    if initialised and variable.variability != "tunable":
-        raise PlantError(f"{variable.name} cannot be set any more: initialise() fixed it, until reset()")
+    if initialized and variable.variability != "tunable":
+        raise PlantError(f"{variable.name} cannot be set any more: initialize() fixed it, until reset()")
 
 
 def _real(variable: Any, value: object) -> float:

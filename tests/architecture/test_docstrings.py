@@ -24,7 +24,7 @@ _ONE = r"(?:1/s|[kmµn]?s|[km]?m|k?N|kg|m?rad|deg|degE7|Hz|Pa|m?G|bar|%)[234]?"
 UNIT = re.compile(
     rf"\[(?:-|{_ONE}(?:[ /]{_ONE})*)[],;: ]"  # [m/s], [m, NED], [-]
     rf"|(?:^|(?<=[\s(,])){_ONE}(?:[ /]{_ONE})*(?=[\s,.;:)]|$)"  # m/s, rad
-    r"|\bSI\b|\b(?:metre|second|newton|radian|degree)s?\b|dimensionless|units? of|as a part of"
+    r"|\bSI\b|\b(?:meter|second|newton|radian|degree)s?\b|dimensionless|units? of|as a part of"
 )
 # what a function may raise without a word: that it is abstract, a fault of our own, Ctrl-C, or argparse's own errors
 UNSAID = {"NotImplementedError", "AssertionError", "KeyboardInterrupt", "ArgumentTypeError"}

@@ -102,7 +102,7 @@ def test_k_q_has_no_effect():
 
 
 def test_the_law_evaluates_its_regions_and_weighs_them():
-    """At a quarter of a metre from the centre of a sphere of one metre to be kept out of: 0.5 * 100 * (1 - 1/16) N."""
+    """At a quarter of a meter from the center of a sphere of one meter to be kept out of: 0.5 * 100 * (1 - 1/16) N."""
     law, tau = IsmailDunniganLaw(GAINS, IDENTITY, 0.001, 1), np.empty(6)
     goal, rock = (
         pack([Region("goal", Sphere((0.0, 0.0, 0.0), 1.0), "in")]),
@@ -119,8 +119,8 @@ def test_a_region_without_gradient_contributes_nothing():
 
 
 def test_a_repulsive_sphere_pushes_at_most_gain_times_radius_squared():
-    """Inside SR1, at its centre, 100 * 0.25 = 25 N: against 26.8 kN there is no avoidance."""
-    depth = 1e-9  # from the centre
+    """Inside SR1, at its center, 100 * 0.25 = 25 N: against 26.8 kN there is no avoidance."""
+    depth = 1e-9  # from the center
     sphere = ([0.25 - depth**2], [[-2.0 * depth, 0.0, 0.0]])
     tau, _ = evaluate_law(IDENTITY, np.zeros(6), (-1.0, np.zeros(3)), sphere, np.array([100.0]))
     assert tau[:3] == pytest.approx([25.0, 0.0, 0.0])

@@ -45,7 +45,7 @@ def test_step_is_its_equations(ball):
     memory, gains = law.memory, law.gains
     turned = np.array([0.9, 0.2, -0.3, 0.1]) / np.linalg.norm([0.9, 0.2, -0.3, 0.1])
     memory.started[0], memory.position[:], memory.velocity[:] = 1.0, (3.1, 0.0, 2.4), rng.normal(size=6) * 0.2
-    memory.velocity[:3] += np.array(ball.shape.centre) - memory.position
+    memory.velocity[:3] += np.array(ball.shape.center) - memory.position
     memory.disturbance[:], memory.thrusters.forces[:] = rng.normal(size=6) * 0.05, rng.normal(size=8) * 5.0
     R = rotation_matrix(turned)
     measured = np.r_[R.T @ memory.velocity[:3], memory.velocity[3:]] + rng.normal(size=6) * 0.05
@@ -67,7 +67,7 @@ def test_step_is_its_equations(ball):
     assert d == pytest.approx(before.disturbance + (1.0 - z) ** 2 / PERIOD * off, rel=1e-9)
     model.free_acceleration(memory.dynamics, R, v[:3], v[3:], memory.still, free)
     # nominal forces
-    error, away = p - GOAL.shape.centre, p - ball.shape.centre
+    error, away = p - GOAL.shape.center, p - ball.shape.center
     error *= min(1.0, gains.limit / gains.k_p1 / np.linalg.norm(error))
     n, h = away / np.linalg.norm(away), np.linalg.norm(away) - ball.shape.radius
     force = -gains.k_p1 * error - gains.k_v1 * v[:3] - np.trace(M[:3, :3]) / 3.0 * d[:3]
@@ -89,7 +89,7 @@ def test_step_is_its_equations(ball):
 def test_net_weight_and_current_leave_no_steady_error(net_weight):
     law, sea = law_of(), Sea(current=(0.1, -0.2, 0.0), restoring=net_weight)
     positions, _ = fly(law, sea, 60.0)
-    assert positions[-1] == pytest.approx(GOAL.shape.centre, abs=5e-3)
+    assert positions[-1] == pytest.approx(GOAL.shape.center, abs=5e-3)
     assert law.estimate[0] == pytest.approx(net_weight, abs=0.1)
 
 
@@ -125,8 +125,8 @@ def test_without_barrier_the_same_obstacle_is_hit():
 def test_obstacles_are_avoided_under_noise_and_goal_is_reached():
     regions = (BALL, Region("drifting", Sphere((5.8, -0.9, 2.2), 0.5), "out", (-0.03, 0.05, 0.0)), BAND)
     positions, forces = fly(law_of(regions), Sea(noise=(0.02, 0.01), seed=3), 60.0, regions)
-    assert np.linalg.norm(positions - BALL.shape.centre, axis=1).min() > 0.7
-    assert np.linalg.norm(positions[-200:] - GOAL.shape.centre, axis=1).max() < 0.5
+    assert np.linalg.norm(positions - BALL.shape.center, axis=1).min() > 0.7
+    assert np.linalg.norm(positions[-200:] - GOAL.shape.center, axis=1).max() < 0.5
     assert np.abs(forces).max() <= 27.0
 
 

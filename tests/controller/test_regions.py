@@ -75,20 +75,20 @@ def contains(shape, p, e=LEVEL):
             sight = np.array(feature) - (p + attitude.apply(camera_position))
             cosine = sight @ attitude.apply(camera_axis) / np.linalg.norm(sight) / np.linalg.norm(camera_axis)
             return math.acos(np.clip(cosine, -1, 1)) <= half_angle
-        case Sphere(centre, radius):
-            return np.linalg.norm(p - centre) <= radius
+        case Sphere(center, radius):
+            return np.linalg.norm(p - center) <= radius
         case DepthBand(depth, tolerance):
             return depth - tolerance <= p[2] <= depth + tolerance
         case HalfSpace(point, normal):
             return (p - point) @ normal <= 0.0
-        case Box(centre, size):
-            return bool(np.all(np.abs(R.T @ (p - centre)) <= np.array(size) / 2))
+        case Box(center, size):
+            return bool(np.all(np.abs(R.T @ (p - center)) <= np.array(size) / 2))
         case Cylinder(start, end, radius):
             axis = np.subtract(end, start)
             along = (p - start) @ axis / (axis @ axis)
             return 0.0 <= along <= 1.0 and np.linalg.norm(p - start - along * axis) <= radius
-        case Ellipsoid(centre, semi_axes):
-            return np.linalg.norm(R.T @ (p - centre) / semi_axes) <= 1.0
+        case Ellipsoid(center, semi_axes):
+            return np.linalg.norm(R.T @ (p - center) / semi_axes) <= 1.0
         case Prism(corners, top, bottom):
             return top <= p[2] <= bottom and winding(corners, p[:2]) != 0
         case Pipe(nodes, radius):
@@ -158,7 +158,7 @@ def test_distance_changes_no_faster_than_one_moves(shape, p, q):
 @pytest.mark.slow
 @each_shape_in_space
 def test_distance_is_that_of_the_nearest_point_of_the_surface(shape):
-    """Outside by minimising |x - p| over the set, inside by growing a ball until it leaves the set."""
+    """Outside by minimizing |x - p| over the set, inside by growing a ball until it leaves the set."""
     rng = np.random.default_rng(5)
     directions = rng.normal(size=(3000, 3))
     directions /= np.linalg.norm(directions, axis=1)[:, None]
@@ -201,7 +201,7 @@ EDGES = [
 def test_values_are_finite_at_centers_axes_and_corners(shape):
     """At corners of the surface and between each two of them, where axes and ridges lie."""
     corners = surface_of(shape, ((-4.0,) * 3, (5.0,) * 3)).vertices[:24]
-    centers = [np.array(getattr(shape, name)) for name in ("centre", "feature", "start") if hasattr(shape, name)]
+    centers = [np.array(getattr(shape, name)) for name in ("center", "feature", "start") if hasattr(shape, name)]
     for p in [*(a + b for a in 0.5 * corners for b in 0.5 * corners), *centers]:
         g, gradient, clearance = at(shape, p)
         assert np.isfinite([g, *gradient, clearance]).all()
@@ -236,7 +236,7 @@ def test_paper_regions_have_the_paper_values():
     ("make", "words"),
     [
         (lambda: Sphere((0.0, 0.0, 0.0), 0.0), "radius"),
-        (lambda: Sphere((0.0, math.nan, 0.0), 1.0), "centre"),
+        (lambda: Sphere((0.0, math.nan, 0.0), 1.0), "center"),
         (lambda: DepthBand(2.0, -1.0), "tolerance"),
         (lambda: HalfSpace((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), "normal"),
         (lambda: Box((0.0, 0.0, 0.0), (1.0, 0.0, 1.0)), "size"),

@@ -193,7 +193,7 @@ def test_values_are_compared_to_their_shown_digits(shown, value, same):
 def test_only_literals_in_comments_are_results():
     assert shown_result("array([1.0, 2.0])") == "array([1.0, 2.0])"
     assert shown_result("inside: (1, 2)") == "(1, 2)"
-    assert shown_result("metres") is None
+    assert shown_result("meters") is None
     assert shown_result("f(2)") is None
     assert shown_result("[deg C]") is None
 

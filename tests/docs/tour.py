@@ -55,7 +55,7 @@ INTERRUPTED = 130  # docs/reference/command-line.md
 # what the page says ends with another status than 0
 STATUS = (
     ("cosim check paper", "1"),  # "Verdict: 3 of 15 fail"
-    ("cosim check mine.toml --set goal.centre=[3.0,0.2,3.0]", "1"),  # "It ends with 1 then, and says so"
+    ("cosim check mine.toml --set goal.center=[3.0,0.2,3.0]", "1"),  # "It ends with 1 then, and says so"
 )
 
 LIMIT = 3600.0  # s, for anything: what takes longer hangs

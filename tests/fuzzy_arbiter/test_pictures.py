@@ -22,7 +22,7 @@ from fuzzy_arbiter import (
     triangle,
 )
 from fuzzy_arbiter.errors import DefinitionError, InputError, UnsupportedError
-from fuzzy_arbiter.pictures.style import colour, hatch, line_style, wrapped
+from fuzzy_arbiter.pictures.style import color, hatch, line_style, wrapped
 from tests.fuzzy_arbiter.formats.systems import RICHER
 
 MEASURED = (
@@ -169,7 +169,7 @@ def test_terms_are_drawn_corner_by_corner(sail):
 def test_many_terms_have_distinct_styles():
     lines = {(style["color"], str(style["linestyle"])) for style in map(line_style, range(36))}
     assert len(lines) == 36
-    assert len({(colour(i), hatch(i)) for i in range(36)}) == 36
+    assert len({(color(i), hatch(i)) for i in range(36)}) == 36
 
 
 def test_a_legend_is_no_wider_than_its_axes(arbiter):

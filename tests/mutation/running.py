@@ -182,7 +182,7 @@ def _mark(path: str) -> str:
 
 
 def _compiler(folder: Path) -> Path:
-    """Return a folder with a ``cc`` that does not take the time to optimise."""
+    """Return a folder with a ``cc`` that does not take the time to optimize."""
     place = folder / "bin"
     real = shutil.which("cc")
     if real and not place.exists():

@@ -131,10 +131,10 @@ class CoSimulationInstance:
     def free(self, state):
         (self.fmu.freeFMUState if self.fmi == 3 else self.fmu.freeFMUstate)(state)
 
-    def serialise(self, state):
+    def serialize(self, state):
         return bytes(self.fmu.serializeFMUState(state) if self.fmi == 3 else self.fmu.serializeFMUstate(state))
 
-    def deserialise(self, data):
+    def deserialize(self, data):
         return self.fmu.deserializeFMUState(data) if self.fmi == 3 else self.fmu.deSerializeFMUstate(data)
 
     # ---- model exchange ----
@@ -223,7 +223,7 @@ def make_plant():
         plants.append(Plant(source, fmi))
         plants[-1].set(values)
         if start:
-            plants[-1].initialise()
+            plants[-1].initialize()
         return plants[-1]
 
     yield make

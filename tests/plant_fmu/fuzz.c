@@ -99,7 +99,7 @@ static Unit create(int me, int quiet)
 #define JACOBIAN(c, u, nu, k, nk, s, r) fmi2GetDirectionalDerivative(c, u, nu, k, nk, s, r)
 #define ADJOINT(c, u, nu, k, nk, s, r) fmi2Error
 
-static int initialise(Unit c)
+static int initialize(Unit c)
 {
     if (draw(4))
         fmi2SetupExperiment(c, 0, 0.0, draw(9) ? 0.0 : value_of(1), draw(3) == 0, value_of(1));
@@ -157,7 +157,7 @@ static Unit create(int me, int quiet)
 #define JACOBIAN(c, u, nu, k, nk, s, r) fmi3GetDirectionalDerivative(c, u, nu, k, nk, s, nk, r, nu)
 #define ADJOINT(c, u, nu, k, nk, s, r) fmi3GetAdjointDerivative(c, u, nu, k, nk, s, nu, r, nk)
 
-static int initialise(Unit c)
+static int initialize(Unit c)
 {
     return (int)fmi3EnterInitializationMode(c, 0, 0.0, draw(9) ? 0.0 : value_of(1), draw(3) == 0, value_of(1));
 }
@@ -189,7 +189,7 @@ static int integers(Unit c, unsigned reference, int value)
 
 #endif
 
-static void serialise(Unit c, Kept from, Kept *to)
+static void serialize(Unit c, Kept from, Kept *to)
 {
     size_t size = 0;
 
@@ -238,7 +238,7 @@ static void call(Unit c, Kept kept[KEPT], double *t)
     case 0: case 1: case 2: status = (int)SET_REALS(c, vr, n > 3 ? 1 : n, v); break;
     case 3: case 4: status = (int)GET_REALS(c, vr, n, v); check(status, v, n, "get"); break;
     case 5: case 6: status = integers(c, draw(9) ? N_VARIABLES - 1 - (unsigned)draw(14) : vr[0], (int)draw(5) - 1); break;
-    case 7: status = initialise(c); break;
+    case 7: status = initialize(c); break;
     case 8: status = (int)CALL(ExitInitializationMode)(c); break;
     case 9: status = draw(30) ? 2 : (int)CALL(Terminate)(c); break;
     case 10: status = 2; if (draw(30) == 0) { status = (int)CALL(Reset)(c); *t = 0.0; } break;
@@ -250,7 +250,7 @@ static void call(Unit c, Kept kept[KEPT], double *t)
     case 14: status = (int)SAVE(c, &kept[draw(KEPT)]); break;
     case 15: status = (int)RESTORE(c, kept[draw(KEPT)]); break;
     case 16: status = (int)FREE(c, &kept[draw(KEPT)]); break;
-    case 17: serialise(c, kept[draw(KEPT)], &kept[draw(KEPT)]); break;
+    case 17: serialize(c, kept[draw(KEPT)], &kept[draw(KEPT)]); break;
     case 18: status = (int)(draw(2) ? CALL(EnterEventMode)(c) : CALL(EnterContinuousTimeMode)(c)); break;
     case 19: status = update(c); break;
     case 20: *t += draw(10) ? 0.01 : value_of(0); status = (int)CALL(SetTime)(c, *t); break;
@@ -286,7 +286,7 @@ int main(int argc, char **argv)
             const unsigned state = FIRST_STATE + (unsigned)draw(N_STATES);
             const double start = 0.5;
             SET_REALS(c, &state, 1, &start);
-            initialise(c);
+            initialize(c);
             CALL(ExitInitializationMode)(c);
             if (me && draw(2)) {
                 update(c);

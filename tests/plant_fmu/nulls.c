@@ -38,7 +38,7 @@ static fmi3LogMessageCallback log_callback;
 
 #define CALL(name) fmi@FMI@##name
 
-static const char *const MODES[] = {"instantiated", "initialising", "stepping", "silent", "events", "continuous"};
+static const char *const MODES[] = {"instantiated", "initializing", "stepping", "silent", "events", "continuous"};
 enum { N_MODES = STATES > 0 ? 6 : 4 };
 
 static Unit c;

@@ -24,7 +24,7 @@ def fly(fmu, parameters=None, steps=20, **inputs):
     """Return the motion after steps of 10 ms; inputs by their names with underscores for points."""
     with Plant(fmu) as plant:
         plant.set({"position.z": 2.0, "velocity.u": 0.4, "velocity.q": 0.3, **(parameters or {})})
-        plant.initialise()
+        plant.initialize()
         for name, value in inputs.items():
             plant[name] = value
         for _ in range(steps):
@@ -78,7 +78,7 @@ def test_current_rate_acts_within_a_step(coupled):
     def drift(step, with_rate):
         with Plant(coupled) as plant:
             plant.set({"position.z": 2.0, "substep": 0.001})
-            plant.initialise()
+            plant.initialize()
             for k in range(round(1.0 / step)):
                 plant["current_input.x"] = 0.5 * k * step
                 plant["current_input_rate.x"] = 0.5 if with_rate else 0.0
@@ -104,10 +104,10 @@ def test_a_wrench_in_the_body_frame_is_that_of_the_wrench_input(coupled):
 
 
 @pytest.mark.medium
-def test_a_force_in_the_world_frame_at_the_centre_of_buoyancy_is_buoyancy(coupled):
+def test_a_force_in_the_world_frame_at_the_center_of_buoyancy_is_buoyancy(coupled):
     """However the vehicle turns meanwhile."""
     with Plant("odin") as plant:
-        plant.initialise()
+        plant.initialize()
         names = [f"r_B.{axis}" for axis in "xyz"]
         r_B, buoyancy = [plant[name] for name in names], plant["buoyancy"]
     inputs = {"external.world.force.z": -7.0} | {
@@ -119,7 +119,7 @@ def test_a_force_in_the_world_frame_at_the_centre_of_buoyancy_is_buoyancy(couple
 @pytest.mark.medium
 def test_commands_of_thrusters_in_other_units(coupled):
     with Plant("odin") as plant:
-        plant.initialise()
+        plant.initialize()
         least, most = plant["thrust_min[1]"], plant["thrust_max[1]"]
     for share, force in ((0.25, 0.25 * most), (-0.5, 0.5 * least)):
         got = fly(coupled, **{"thrust_normalized[1]": share})
@@ -148,7 +148,7 @@ def test_derivatives_by_these_inputs_are_those_of_differences(coupled):
     with Plant(coupled) as plant:
         plant.set({"position.z": 2.0, "velocity.u": 0.4, "quaternion.e1": 0.3, "quaternion.e2": -0.4})
         plant.set({"supply_voltage": 13.3})  # between two published ones
-        plant.initialise()
+        plant.initialize()
         names = [
             n for n in plant.inputs.names if n.startswith(("current_input", "external", "thrust_nor", "thrust_fail"))
         ]

@@ -115,7 +115,7 @@ def test_docs_page_is_up_to_date():
     assert (ROOT / "docs" / "fmu-variables.md").read_text() == documentation(load_vehicle("odin"))
 
 
-def test_odin_is_labelled_as_unsourced():
+def test_odin_is_labeled_as_unsourced():
     assert "unsourced" in load_vehicle("odin").title
     assert "unsourced" in model_description(make_vehicle_component(load_vehicle("odin")), 3, "")
 

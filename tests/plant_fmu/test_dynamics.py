@@ -144,11 +144,11 @@ def test_vehicle_drifts_with_the_current(make_slave):
     assert slave.get("position.x", "position.y", "position.z") == pytest.approx([4.0, -3.0, 2.0], abs=1e-12)
 
 
-@pytest.mark.parametrize("initialised", [True, False])
-def test_euler_angles_are_those_of_the_quaternion(make_slave, initialised):
+@pytest.mark.parametrize("initialized", [True, False])
+def test_euler_angles_are_those_of_the_quaternion(make_slave, initialized):
     """Also while the quaternion is not normalized yet."""
     slave = make_slave()
-    if initialised:
+    if initialized:
         slave.start(**START)
     else:
         slave.set_values({name: 0.5 * value for name, value in START.items()})

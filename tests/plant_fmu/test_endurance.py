@@ -84,7 +84,7 @@ def test_repeated_loading_leaks_little_memory():
 
     def once():
         with Plant(path) as plant:
-            plant.initialise()
+            plant.initialize()
             plant.step(0.01)
 
     def grown(times):
@@ -116,7 +116,7 @@ def run(barrier=None):
     """All outputs after each of 2,000 steps of a lively plant."""
     with Plant("odin") as plant:
         plant.set(LIVELY)
-        plant.initialise()
+        plant.initialize()
         rows = np.zeros((2000, len(plant.outputs)))
         if barrier:
             barrier.wait()

@@ -84,11 +84,11 @@ def test_values_are_sent_by_their_type(make_plant, fmi):
     plant = make_plant("odin", fmi, start=False)
     plant.set({"seed": 7, "free_surface": True, "hull_radius": 0.3, "mass": 130})
     plant.set({"position.z": np.float32(2.5), "thrust[1]": np.int64(3)})
-    plant.initialise()
+    plant.initialize()
     assert [plant[n] for n in ("seed", "free_surface", "mass", "position.z", "thrust[1]")] == [7, True, 130, 2.5, 3]
     plant.reset()
     plant.set({"seed": 8.0, "free_surface": 0.0})
-    plant.initialise()
+    plant.initialize()
     assert (plant["seed"], plant["free_surface"]) == (8, False)
 
 
@@ -122,14 +122,14 @@ def test_wrong_values_are_named(make_plant, how, name, value, words):
     with pytest.raises(PlantError, match=words) as caught:
         act[how]()
     assert "\n" not in str(caught.value)
-    plant.initialise()
+    plant.initialize()
     assert plant["mass"] == 125.0 and plant["buoyancy"] == 1228.25  # nothing was set
 
 
-def test_initialise_fixes_start_values_and_leaves_parameters_tunable(make_plant, fmi):
+def test_initialize_fixes_start_values_and_leaves_parameters_tunable(make_plant, fmi):
     plant = make_plant("odin", fmi)
     for name in ("position.x", "quaternion.e0"):
-        with pytest.raises(PlantError, match=f"{name} cannot be set any more: initialise"):
+        with pytest.raises(PlantError, match=f"{name} cannot be set any more: initialize"):
             plant[name] = 1.0
     plant["buoyancy"] = 1300.0
     plant.step(0.1)
@@ -140,7 +140,7 @@ def test_inputs_act_from_the_start_and_hold(make_plant, fmi):
     plant = make_plant("odin", fmi, start=False)
     plant.set({"wrench.X": 20.0})
     plant.inputs.values[plant.inputs.names.index("wrench.Y")] = 5.0
-    plant.initialise()
+    plant.initialize()
     assert (plant["actuation.X"], plant["actuation.Y"]) == (20.0, 5.0)
     plant.step(0.1)
     plant.step(0.1)
@@ -163,16 +163,16 @@ def test_nan_input_rejects_the_step_and_the_plant_continues(make_plant, fmi):
 # ---- the order of things ----
 
 
-def test_only_setting_is_allowed_before_initialise(make_plant, fmi):
+def test_only_setting_is_allowed_before_initialize(make_plant, fmi):
     plant = make_plant("odin", fmi, start=False)
     calls = [lambda: plant.step(0.1), plant.read_flags, lambda: plant.jacobian(["actuation.X"], ["wrench.X"])]
     for act in [*calls, lambda: plant["mass"], lambda: plant["position.x"]]:
-        with pytest.raises(PlantError, match=r"before initialise\(\)"):
+        with pytest.raises(PlantError, match=r"before initialize\(\)"):
             act()
     assert plant["thrust[1]"] == 0.0
-    plant.initialise()
+    plant.initialize()
     with pytest.raises(PlantError, match=r"initialized already; reset\(\) it first"):
-        plant.initialise()
+        plant.initialize()
 
 
 def test_closed_plant_rejects_every_call(make_plant):
@@ -180,8 +180,8 @@ def test_closed_plant_rejects_every_call(make_plant):
     state = plant.save()
     plant.close()
     plant.close()
-    calls = [plant.read_flags, plant.initialise, plant.reset, plant.save]
-    calls += [lambda: plant.step(0.1), lambda: plant.restore(state), lambda: plant.serialise(state)]
+    calls = [plant.read_flags, plant.initialize, plant.reset, plant.save]
+    calls += [lambda: plant.step(0.1), lambda: plant.restore(state), lambda: plant.serialize(state)]
     calls += [lambda: plant.set({"mass": 1.0}), lambda: plant["thrust[1]"], lambda: plant.jacobian([], [])]
     for act in calls:
         with pytest.raises(PlantError, match="plant odin is closed"):
@@ -202,7 +202,7 @@ def test_invalid_steps_are_rejected(make_plant, step):
 
 def test_time_accumulates_no_rounding_error(make_plant):
     plant = make_plant(start=False)
-    plant.initialise(time=100.0)
+    plant.initialize(time=100.0)
     plant.step(0.5)
     assert plant.time == 100.5
     plant = make_plant()
@@ -220,8 +220,8 @@ def test_reset_restores_the_initial_state(make_plant, fmi):
     drive(plant)
     plant["mass"] = 140.0
     plant.reset()
-    assert plant.time == 0.0 and not plant.initialised and not plant.inputs.values.any()
-    plant.initialise()
+    assert plant.time == 0.0 and not plant.initialized and not plant.inputs.values.any()
+    plant.initialize()
     assert plant["mass"] == 125.0
     assert np.array_equal(drive(plant), drive(fresh))
 
@@ -247,7 +247,7 @@ def test_failed_initialization_error_names_the_remedy():
     with Plant("odin") as plant:
         plant.set({"dvl.velocity_noise": 0.1})
         with pytest.raises(PlantError, match=r"needs the sensor's rate .*; reset\(\), then set valid values"):
-            plant.initialise()
+            plant.initialize()
         plant.reset()
         plant.set({"dvl.velocity_noise": 0.1, "dvl.rate": 5.0})
-        plant.initialise()
+        plant.initialize()

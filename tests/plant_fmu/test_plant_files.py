@@ -47,7 +47,7 @@ def test_threads_have_a_plant_each(scratch, fmi):
 
     def work(i):
         with Plant("odin", fmi) as plant:
-            plant.initialise()
+            plant.initialize()
             state = plant.save()
             drive(plant)
             plant.restore(state)
@@ -88,7 +88,7 @@ def test_reordered_fmu_without_optional_capabilities_works(make_plant, tmp_path)
     assert plant.read_flags().shape == (0,)
     for act, words in (
         (plant.save, "cannot save its state"),
-        (lambda: plant.deserialise(b""), "cannot serialise its state"),
+        (lambda: plant.deserialize(b""), "cannot serialize its state"),
         (lambda: plant.jacobian(["position.x"], ["mass"]), "provides no directional derivatives"),
     ):
         with pytest.raises(PlantError, match=words):

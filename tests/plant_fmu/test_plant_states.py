@@ -30,44 +30,44 @@ def test_restored_run_continues_bit_for_bit(make_plant, fmi):
     assert plant.outputs.values[0] != runs[0][0][-1][0]
 
 
-def test_state_saved_before_initialise_can_be_restored(make_plant, fmi):
+def test_state_saved_before_initialize_can_be_restored(make_plant, fmi):
     plant = make_plant("odin", fmi, start=False)
     plant["mass"] = 130.0
     state = plant.save()
-    plant.initialise()
+    plant.initialize()
     first = drive(plant)
     plant.restore(state)
-    assert not plant.initialised
-    plant.initialise()
+    assert not plant.initialized
+    plant.initialize()
     assert plant["mass"] == 130.0 and np.array_equal(drive(plant), first)
 
 
 def test_state_round_trips_as_bytes(make_plant, fmi):
     plant, other = make_plant("odin", fmi), make_plant("odin", fmi, start=False)
     drive(plant)
-    data = plant.serialise(plant.save())
+    data = plant.serialize(plant.save())
     assert isinstance(data, bytes)
-    other.restore(other.deserialise(data))
+    other.restore(other.deserialize(data))
     assert other.time == plant.time and np.array_equal(other.inputs.values, plant.inputs.values)
     assert np.array_equal(drive(other), drive(plant))
 
 
 def test_invalid_state_bytes_are_rejected(make_plant):
     plant = make_plant()
-    data = plant.serialise(plant.save())
+    data = plant.serialize(plant.save())
     flipped = bytearray(data)
     flipped[-9] ^= 1
     for wrong, words in (
-        (b"", "got 0 bytes, expected a serialised state"),
-        (b"x" * 1000, "got 1000 bytes, expected a serialised state"),
+        (b"", "got 0 bytes, expected a serialized state"),
+        (b"x" * 1000, "got 1000 bytes, expected a serialized state"),
         (data[:-1], "damaged"),
         (bytes(flipped), "damaged"),
     ):
         with pytest.raises(PlantError, match=words):
-            plant.deserialise(wrong)
+            plant.deserialize(wrong)
     for foreign in (make_plant("odin", 2), make_plant("bluerov2_heavy")):
         with pytest.raises(PlantError, match="of another FMU"):
-            plant.deserialise(foreign.serialise(foreign.save()))
+            plant.deserialize(foreign.serialize(foreign.save()))
 
 
 def test_states_are_freed_once_and_never_used_again(make_plant, fmi):

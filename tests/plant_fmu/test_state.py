@@ -37,9 +37,9 @@ def test_state_continues_bit_for_bit_here_and_in_another_instance(make_slave, fm
     slave, other = make_slave(fmi=fmi).start(**LIVELY), make_slave(fmi=fmi)
     drive(slave, 0, 50)
     state = slave.save()
-    data = slave.serialise(state)
+    data = slave.serialize(state)
     assert data[:8] == bytes(8)  # some importers hand the block, not its address, to the function that frees it
-    arrived = other.deserialise(data)
+    arrived = other.deserialize(data)
     other.restore(arrived)
     first = drive(slave, 50, 120)
     slave.restore(state)
@@ -64,18 +64,18 @@ def test_get_state_overwrites_an_existing_state(make_slave, fmi):
 def refused(slave, data, words):
     slave.said.clear()
     with pytest.raises(FMICallException):
-        slave.deserialise(data)
+        slave.deserialize(data)
     assert words in slave.said[-1][1]
 
 
 def test_invalid_state_bytes_are_rejected(make_slave, fmi):
     slave, foreign = make_slave(fmi=fmi).start(), make_slave("bluerov2_heavy", fmi).start()
     state, strange = slave.save(), foreign.save()
-    data = slave.serialise(state)
+    data = slave.serialize(state)
     refused(slave, data[:-8], "bytes, expected")
     refused(slave, b"", "bytes, expected")
     refused(slave, bytes(len(data)), "of another FMU, or damaged")
-    refused(slave, foreign.serialise(strange), "of another FMU, or damaged")
+    refused(slave, foreign.serialize(strange), "of another FMU, or damaged")
     for at in np.linspace(40, len(data) - 1, 30).astype(int):
         refused(slave, data[:at] + bytes([data[at] ^ 0x55]) + data[at + 1 :], "checksum")
     slave.free(state)
@@ -93,7 +93,7 @@ def test_forged_state_with_invalid_values_is_rejected(make_slave, fmi):
     """With a checksum that fits, and a NaN in it."""
     slave = make_slave(fmi=fmi).start(**{"position.x": 123.456})
     state = slave.save()
-    data = slave.serialise(state)
+    data = slave.serialize(state)
     of_start = 48  # behind head, interface, mode and flags
     assert data[of_start : of_start + 8] == bytes(8)
     for at, words in (
@@ -111,7 +111,7 @@ def test_forged_state_with_invalid_values_is_rejected(make_slave, fmi):
 def test_state_of_the_other_interface_is_rejected(make_slave, fmi):
     slave, model = make_slave(fmi=fmi).start(), make_slave(fmi=fmi, interface="me").start()
     state = slave.save()
-    arrived = model.deserialise(slave.serialise(state))
+    arrived = model.deserialize(slave.serialize(state))
     with pytest.raises(FMICallException):
         model.restore(arrived)
     assert "other interface" in model.said[-1][1]

@@ -38,7 +38,7 @@ class Attitude(NamedTuple):
     preferred: Array  # (4,) from body to world: attitude where no region requires another
     desired: Array  # (4,) from body to world: setpoint of the loop
     last_omega: Array  # (3,) rad/s, body rates of the last step
-    by_current: Array  # (3, 2) N s, derivative of the modelled moment by the current, north and east
+    by_current: Array  # (3, 2) N s, derivative of the modeled moment by the current, north and east
     measured_moment: Array  # (3,) N m, body axes: moment of thrusters and weight over the last period
     started: Array  # (1,) 1 if `last_omega` was measured in the last step, else 0
 

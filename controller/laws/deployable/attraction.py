@@ -30,7 +30,7 @@ def desired_velocity(plan: PathPlan, position: Array, goal_velocity: Array, gain
     """Write the velocity [m/s], NED, shape (3,), that follows the path from a position [m, NED], shape (3,)."""
     waits, path = plan.waits[0], plan.path
     count = 1 if waits else plan.counts[0]
-    speed, remaining, travelled, heading = gains.speed, 0.0, 0.0, zeros(3)
+    speed, remaining, traveled, heading = gains.speed, 0.0, 0.0, zeros(3)
     to_go, before = _AHEAD, zeros(3)
     for leg in range(count):
         length, direction = 0.0, zeros(3)
@@ -44,14 +44,14 @@ def desired_velocity(plan: PathPlan, position: Array, goal_velocity: Array, gain
         if leg > 0:  # slower round a corner
             turn = before[0] * direction[0] + before[1] * direction[1] + before[2] * direction[2]
             at_corner = gains.speed * max(_SLOWEST_CORNER, 0.5 * (1.0 + turn))
-            speed = min(speed, np.sqrt(square(at_corner) + 2.0 * gains.acceleration * travelled))
+            speed = min(speed, np.sqrt(square(at_corner) + 2.0 * gains.acceleration * traveled))
         part = min(to_go, length)
         for axis in range(3):
             heading[axis] += part * direction[axis]
         to_go -= part
-        travelled += length
+        traveled += length
         copy(direction, before)
-    remaining = travelled
+    remaining = traveled
     speed = min(speed, approach_speed(remaining, gains.acceleration, gains.position_bandwidth))
     size = length3(heading[0], heading[1], heading[2])
     for axis in range(3):

@@ -1,4 +1,4 @@
-"""Gains of the deployable law, with defaults for a vehicle of about a metre."""
+"""Gains of the deployable law, with defaults for a vehicle of about a meter."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class DeployableGains(NamedTuple):
     # barriers
     margin: float = 0.03  # m, kept of hard regions in addition to the estimate's error
     braking_share: float = 0.8  # of the deceleration that is left with any one thruster lost, relied on for stopping
-    barrier_slope: float = 1.5  # 1/s, maximum rate at which a barrier may be approached per metre
+    barrier_slope: float = 1.5  # 1/s, maximum rate at which a barrier may be approached per meter
     barrier_rate: float = 4.0  # 1/s, at which a barrier's speed limit is enforced
     # path planner
     clearance: float = 0.25  # m, of the path from hard regions, where there is room

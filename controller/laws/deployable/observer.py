@@ -35,7 +35,7 @@ from controller.stack_array import zeros
 Array = NDArray[np.float64]
 
 
-_UNMODELLED = 0.03  # m/s2/sqrt(Hz), acceleration noise of the model
+_UNMODELED = 0.03  # m/s2/sqrt(Hz), acceleration noise of the model
 _SLOWEST = 0.15  # m/s against the water, least speed at which drag is linearized
 _GATE = 6.0  # number of standard deviations beyond which a measurement is rejected
 _ANGULAR = 0.019  # rad/s2/sqrt(Hz), angular acceleration noise of the model
@@ -94,7 +94,7 @@ def predict(
         x[VELOCITY + axis] += T * acceleration
     _propagate_covariance(estimate, T)
     for axis in range(3):
-        P[VELOCITY + axis, VELOCITY + axis] += square(_UNMODELLED) * T + _CURVED / T * square(curvature[axis])
+        P[VELOCITY + axis, VELOCITY + axis] += square(_UNMODELED) * T + _CURVED / T * square(curvature[axis])
         # the moments adapt at the rate `adaptation`
         P[MOMENTS + axis, MOMENTS + axis] += square(gains.adaptation * _ANGULAR * dynamics.mass[3 + axis, 3 + axis]) * T
     for axis in range(2):
@@ -187,7 +187,7 @@ def correct_by_moment(
     period: float,
 ) -> None:
     """Correct by the moment [N m] of thrusters and weight, measured by the rates over a period [s], shape (3,)."""
-    # `by_current`, shape (3, 2), is the derivative of the modelled moment by the current [N s]; `rate_deviation`, shape
+    # `by_current`, shape (3, 2), is the derivative of the modeled moment by the current [N s]; `rate_deviation`, shape
     # (3,), the standard deviation [rad/s] of the rates.
     row, x = estimate.row, estimate.state
     k, middle, body = zeros(3), zeros(3), zeros(3)

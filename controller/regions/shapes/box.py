@@ -23,37 +23,39 @@ from controller.regions.shape import (
     require,
     require_finite,
     unit,
+    with_former_spelling,
 )
 
 
+@with_former_spelling
 @dataclass(frozen=True)
 class Box:
-    """All points of a cuboid of full `size` [m] about `centre` [m, NED]; g is the signed distance [m].
+    """All points of a cuboid of full `size` [m] about `center` [m, NED]; g is the signed distance [m].
 
     `quaternion` (scalar first) turns the box's axes into the world.
 
     Examples
     --------
     >>> from controller.regions import Box
-    >>> Box(centre=(0.0, 0.0, 5.0), size=(4.0, 2.0, 1.0)).bounds()
+    >>> Box(center=(0.0, 0.0, 5.0), size=(4.0, 2.0, 1.0)).bounds()
     ((-2.0, -1.0, 4.5), (2.0, 1.0, 5.5))
     """
 
     kind: ClassVar[int]
     unit: ClassVar[str] = "m"
-    centre: Vector3
+    center: Vector3
     size: Vector3
     quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        require_finite("box", centre=self.centre, size=self.size)
+        require_finite("box", center=self.center, size=self.size)
         require(min(self.size) > 0.0, "box", "size", self.size, "three numbers above 0 m")
         unit("box", "quaternion", self.quaternion)
 
     def packed(self) -> tuple[float, ...]:
-        """Return centre, rotation matrix and half sizes."""
+        """Return center, rotation matrix and half sizes."""
         R = rotation_matrix(np.array(unit("box", "quaternion", self.quaternion)))
-        return (*self.centre, *R.ravel().tolist(), *(s / 2.0 for s in self.size))
+        return (*self.center, *R.ravel().tolist(), *(s / 2.0 for s in self.size))
 
     def numbers(self) -> tuple[Number, ...]:
         """Return name and unit of each number of `packed`."""
@@ -63,7 +65,7 @@ class Box:
         """Return the corners of the upright box about it."""
         R = rotation_matrix(np.array(unit("box", "quaternion", self.quaternion)))
         reach = np.abs(R) @ np.array(self.size) / 2.0
-        return centered_bounds(self.centre, reach.tolist())
+        return centered_bounds(self.center, reach.tolist())
 
 
 def box(p: Array, q: Array) -> Evaluation:
@@ -83,11 +85,11 @@ def surface(shape: Box, limits: Bounds) -> Mesh:
     corners = np.array([(x, y, z) for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
     faces = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
     triangles = np.array([t for a, b, c, d in faces for t in ((a, b, c), (a, c, d))])
-    return Mesh(place_points(corners * np.array(shape.size), shape.centre, shape.quaternion), triangles)
+    return Mesh(place_points(corners * np.array(shape.size), shape.center, shape.quaternion), triangles)
 
 
-_UNITS = {"centre": "m", "size": "m", "quaternion": ""}
+_UNITS = {"center": "m", "size": "m", "quaternion": ""}
 ENTRY = Entry(
     Box, box, Box((1.0, 1.0, 1.0), (2.0, 3.0, 1.0), (0.9, 0.1, -0.3, 0.2)), _UNITS,
-    flat_faces=True, kinks="everywhere", convex=True, center=attrgetter("centre"), surface=surface,
+    flat_faces=True, kinks="everywhere", convex=True, center=attrgetter("center"), surface=surface,
 )  # fmt: skip

@@ -24,39 +24,41 @@ from controller.regions.shape import (
     require,
     require_finite,
     unit,
+    with_former_spelling,
 )
 
 _STEPS = 200  # maximum number of steps, more than the root below ever needs
 
 
+@with_former_spelling
 @dataclass(frozen=True)
 class Ellipsoid:
-    """All points of an ellipsoid about `centre` [m, NED]; g = sum (x_i / a_i)^2 - 1 [-].
+    """All points of an ellipsoid about `center` [m, NED]; g = sum (x_i / a_i)^2 - 1 [-].
 
     `quaternion` (scalar first) turns the axes, of half lengths `semi_axes` [m], into the world.
 
     Examples
     --------
     >>> from controller.regions import Ellipsoid
-    >>> Ellipsoid(centre=(0.0, 0.0, 5.0), semi_axes=(2.0, 1.0, 1.0)).bounds()
+    >>> Ellipsoid(center=(0.0, 0.0, 5.0), semi_axes=(2.0, 1.0, 1.0)).bounds()
     ((-2.0, -1.0, 4.0), (2.0, 1.0, 6.0))
     """
 
     kind: ClassVar[int]
     unit: ClassVar[str] = ""
-    centre: Vector3
+    center: Vector3
     semi_axes: Vector3
     quaternion: Vector4 = (1.0, 0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
-        require_finite("ellipsoid", centre=self.centre, semi_axes=self.semi_axes)
+        require_finite("ellipsoid", center=self.center, semi_axes=self.semi_axes)
         require(min(self.semi_axes) > 0.0, "ellipsoid", "semi_axes", self.semi_axes, "three numbers above 0 m")
         unit("ellipsoid", "quaternion", self.quaternion)
 
     def packed(self) -> tuple[float, ...]:
-        """Return centre, rotation matrix and half axes."""
+        """Return center, rotation matrix and half axes."""
         R = rotation_matrix(np.array(unit("ellipsoid", "quaternion", self.quaternion)))
-        return (*self.centre, *R.ravel().tolist(), *self.semi_axes)
+        return (*self.center, *R.ravel().tolist(), *self.semi_axes)
 
     def numbers(self) -> tuple[Number, ...]:
         """Return name and unit of each number of `packed`."""
@@ -66,7 +68,7 @@ class Ellipsoid:
         """Return the corners of the upright box about it."""
         R = rotation_matrix(np.array(unit("ellipsoid", "quaternion", self.quaternion)))
         reach = np.linalg.norm(R * np.array(self.semi_axes), axis=1)
-        return centered_bounds(self.centre, reach.tolist())
+        return centered_bounds(self.center, reach.tolist())
 
 
 def ellipsoid(p: Array, q: Array) -> Evaluation:
@@ -82,7 +84,7 @@ def ellipsoid(p: Array, q: Array) -> Evaluation:
 def _surface_distance(x: float, y: float, z: float, a: float, b: float, c: float) -> float:
     """Return the distance from a point of the first octant to the surface."""
     # The nearest point is x_i a_i^2 / (t + a_i^2), with t the root of sum (a_i x_i / (t + a_i^2))^2 = 1 above -min
-    # a_i^2 (Eberly). With s = t + min a_i^2 as unknown, nothing cancels near the centre. The sum falls and is convex:
+    # a_i^2 (Eberly). With s = t + min a_i^2 as unknown, nothing cancels near the center. The sum falls and is convex:
     # Newton's method from a point left of the root only grows towards it.
     least = square(min(a, b, c))
     da, db, dc = a * a - least, b * b - least, c * c - least
@@ -105,17 +107,17 @@ def surface(shape: Ellipsoid, limits: Bounds) -> Mesh:
     """Return a ball, scaled along the axes."""
     unit_ball = ball()
     scaled = unit_ball.vertices * np.array(shape.semi_axes)
-    return Mesh(place_points(scaled, shape.centre, shape.quaternion), unit_ball.triangles)
+    return Mesh(place_points(scaled, shape.center, shape.quaternion), unit_ball.triangles)
 
 
 def half_axes(shape: Ellipsoid) -> tuple[Array, Array]:
-    """Return its centre and its half axes."""
-    centre = np.array(shape.centre)
-    return centre, place_points(np.diag(shape.semi_axes), shape.centre, shape.quaternion) - centre
+    """Return its center and its half axes."""
+    center = np.array(shape.center)
+    return center, place_points(np.diag(shape.semi_axes), shape.center, shape.quaternion) - center
 
 
-_UNITS = {"centre": "m", "semi_axes": "m", "quaternion": ""}
+_UNITS = {"center": "m", "semi_axes": "m", "quaternion": ""}
 ENTRY = Entry(
     Ellipsoid, ellipsoid, Ellipsoid((1.0, 0.0, 1.0), (2.0, 1.0, 0.5), (0.9, 0.1, -0.3, 0.2)), _UNITS,
-    flat_faces=False, kinks="inside", convex=True, center=attrgetter("centre"), surface=surface, half_axes=half_axes,
+    flat_faces=False, kinks="inside", convex=True, center=attrgetter("center"), surface=surface, half_axes=half_axes,
 )  # fmt: skip

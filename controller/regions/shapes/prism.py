@@ -74,7 +74,7 @@ def _signed_area(corners: tuple[Vector2, ...]) -> float:
 
 
 def _touches_itself(corners: tuple[Vector2, ...]) -> bool:
-    """Return True if edges that are no neighbours share a point, or neighbours more than their corner."""
+    """Return True if edges that are no neighbors share a point, or neighbors more than their corner."""
 
     def side(a: Vector2, b: Vector2, c: Vector2) -> float:
         return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])

@@ -20,7 +20,7 @@ class Visibility:
 
     `camera_axis` and `camera_position` [m] are in the body frame. g is the angle between axis and line of sight, less
     the half angle [rad]. The camera's range is a region of its own, such as a sphere or a `Cone` about the feature.
-    By position, g changes with one over the distance: a feature closer than some tenths of a metre makes g change too
+    By position, g changes with one over the distance: a feature closer than some tenths of a meter makes g change too
     fast to follow. A feature in the camera itself counts as behind it.
 
     Examples

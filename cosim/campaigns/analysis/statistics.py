@@ -44,7 +44,7 @@ def quantiles(values: Array) -> dict[str, float | None]:
 
 
 class Bin(NamedTuple):
-    """Rows with neighbouring values of a key."""
+    """Rows with neighboring values of a key."""
 
     median: float  # of the values
     rows: Facts  # (n,) mask of the rows in the bin

@@ -24,14 +24,14 @@ _WIDE = 30.0  # ratio of a logarithmic range from which on only powers of ten ha
 _STEPS = 400  # maximum number of steps of a drawn distribution
 _DASHES = ("-", "--", "-.", ":")
 
-FACT_COLOURS = {"completed": BLUE, "reached": GREEN, "settled": BLUE, "violation": RED, "violated": RED}
+FACT_COLORS = {"completed": BLUE, "reached": GREEN, "settled": BLUE, "violation": RED, "violated": RED}
 _MARKS = {"completed": "D", "reached": "o", "settled": "D", "violation": "s", "violated": "s"}
 
 
 class Rated(NamedTuple):
     """A line of a forest plot."""
 
-    fact: str  # name of the outcome, one of `FACT_COLOURS`
+    fact: str  # name of the outcome, one of `FACT_COLORS`
     group: str  # name of the group of rows; "" if there is only one
     rows: int  # number of rows in the group
     rate: dict[str, Any]  # result of `cosim.campaigns.analysis.statistics.rate`
@@ -73,9 +73,9 @@ def _interval(axes: Axes, line: Rated, y: float) -> None:
     share = line.rate["share"]
     if share is None:
         return
-    colour = FACT_COLOURS[line.fact]
-    axes.hlines(y, line.rate["low"], line.rate["high"], color=colour, linewidth=2.2)
-    axes.plot(share, y, _MARKS[line.fact], color=colour, markersize=6, clip_on=False)
+    color = FACT_COLORS[line.fact]
+    axes.hlines(y, line.rate["low"], line.rate["high"], color=color, linewidth=2.2)
+    axes.plot(share, y, _MARKS[line.fact], color=color, markersize=6, clip_on=False)
     text = f"{100 * share:.1f} %"
     right = line.rate["high"] < 0.86
     axes.annotate(
@@ -93,11 +93,11 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> 
     for axes, (column, groups) in zip(panels, drawn.items(), strict=True):
         for i, (name, values) in enumerate(groups.items()):
             x, shares = _thinned(*shares_up_to(values))
-            colour, dash = CYCLE[i % len(CYCLE)], _DASHES[i % len(_DASHES)]
-            axes.step(x, shares, where="post", color=colour, linestyle=dash, label=name)
+            color, dash = CYCLE[i % len(CYCLE)], _DASHES[i % len(_DASHES)]
+            axes.step(x, shares, where="post", color=color, linestyle=dash, label=name)
             median = quantiles(values)["0.5"]
             if median is not None:  # at half of the share of existing numbers
-                axes.plot(median, shares[-1] / 2.0, "o", color=colour, markersize=5)
+                axes.plot(median, shares[-1] / 2.0, "o", color=color, markersize=5)
         if column == "min_clearance":
             axes.axvline(0.0, color=BLACK, linewidth=0.8)
         axes.set(xlabel=LABELS[column], ylim=(0.0, 1.02))
@@ -127,7 +127,7 @@ def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
             shares, low, high = (np.array([r[name] for r in rates]) for name in ("share", "low", "high"))
             axes.errorbar(
                 [part.median for part in parts], shares, yerr=(shares - low, high - shares), label=fact,
-                color=FACT_COLOURS[fact], marker=_MARKS[fact], markersize=4, linewidth=1.0, elinewidth=1.6,
+                color=FACT_COLORS[fact], marker=_MARKS[fact], markersize=4, linewidth=1.0, elinewidth=1.6,
             )  # fmt: skip
         _across(axes, key)
         axes.set(ylim=(-0.03, 1.03))
@@ -143,13 +143,13 @@ def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, viol
         some = some[np.unique(np.linspace(0, len(some) - 1, _POINTS).astype(int))]
     figure, panels = _panels(min(len(keys), _MAX_KEYS), 2.1)
     for axes, key in zip(panels, keys, strict=False):
-        for what, of, colour, mark in (
+        for what, of, color, mark in (
             ("reached, nothing violated", reached & ~violated, GREEN, "o"),
             ("not reached, nothing violated", ~reached & ~violated, ORANGE, "^"),
             ("violated", violated, RED, "x"),
         ):
             if (at := some[of[some]]).size:
-                axes.plot(key.values[at], values[at], mark, color=colour, markersize=3.5, alpha=0.7, label=what)
+                axes.plot(key.values[at], values[at], mark, color=color, markersize=3.5, alpha=0.7, label=what)
         axes.axhline(0.0, color=BLACK, linewidth=0.8)
         _across(axes, key)
         axes.set(ylabel=label)

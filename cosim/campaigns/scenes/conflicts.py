@@ -82,7 +82,7 @@ def _region(name: str, criterion: str, keep: str, hard: bool, shape: Table, velo
 
 def _box(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> Table:
     spans = np.array([x, y, z], dtype=float)
-    return {"type": "box", "centre": spans.mean(axis=1).tolist(), "size": np.ptp(spans, axis=1).tolist()}
+    return {"type": "box", "center": spans.mean(axis=1).tolist(), "size": np.ptp(spans, axis=1).tolist()}
 
 
 def _beyond(axis: int, at: float, sign: float = 1.0) -> Table:
@@ -192,9 +192,9 @@ def _sides_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
 def _depths_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
     """Make goals near a minimum and a maximum depth in turn, both soft, which exclude each other."""
     goal, regions = _squeeze(rng)
-    x, y, z = goal["centre"]
+    x, y, z = goal["center"]
     deep, shallow = z + rng.uniform(0.2, 0.8), z - rng.uniform(0.2, 0.8)
-    goal["centre"][2] = float(deep)
+    goal["center"][2] = float(deep)
     return _in_turn(goal, (rng.uniform(0.0, 4.0), rng.uniform(-2.0, 2.0), shallow), (x, y, deep)), regions
 
 
@@ -202,7 +202,7 @@ def _views_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
     """Make places from which a structure is viewed in turn, with a pillar between them."""
     # A path outside of the pillar loses the view; one inside of it violates the region around the structure. A greatest
     # depth excludes the deeper places.
-    x, y, z = 4.0, 4.0, 4.2  # m, NED: centre of the structure
+    x, y, z = 4.0, 4.0, 4.2  # m, NED: center of the structure
     off, pillar, radius = rng.uniform(1.7, 2.2), rng.uniform(1.8, 2.2), rng.uniform(0.5, 0.9)
     angles = rng.uniform(0.7, 1.0, 3) * [-1.0, 1.0, -1.0]  # rad, about the structure, from east
     places = [(x + off * np.sin(a), y - off * np.cos(a), z + rng.uniform(-0.6, 0.4)) for a in angles]

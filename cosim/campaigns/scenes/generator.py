@@ -85,11 +85,11 @@ def draw_scene(rng: Any, of_obstacles: Iterable[Any], seed: int, kind: str) -> d
 def _make_obstacle(rng: Any, start: NDArray[np.float64], goal: NDArray[np.float64]) -> dict[str, Any]:
     while True:
         radius = rng.uniform(0.3, 0.9)
-        centre = start + rng.uniform(0.2, 0.8) * (goal - start) + rng.normal(0.0, [0.3, 0.6, 0.5])
-        clear_start = np.linalg.norm(centre - start) - radius
-        clear_goal = np.linalg.norm(centre - goal) - radius - _GOAL_RADIUS
+        center = start + rng.uniform(0.2, 0.8) * (goal - start) + rng.normal(0.0, [0.3, 0.6, 0.5])
+        clear_start = np.linalg.norm(center - start) - radius
+        clear_goal = np.linalg.norm(center - goal) - radius - _GOAL_RADIUS
         if min(clear_start, clear_goal) > _FREE:
-            return {"centre": centre.tolist(), "radius": radius, "velocity": [0.0, 0.0, 0.0]}
+            return {"centre": center.tolist(), "radius": radius, "velocity": [0.0, 0.0, 0.0]}
 
 
 MAKERS: dict[str, Callable[[int], dict[str, Any]]] = {

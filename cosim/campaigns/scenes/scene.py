@@ -24,7 +24,7 @@ Vector3 = tuple[Moderate, Moderate, Moderate]
 class SphereSpec(Table, frozen=True):
     """The goal region."""
 
-    centre: Vector3  # m, NED
+    centre: Vector3  # m, NED; spelled as in files of scenes
     radius: Radius  # m
 
 

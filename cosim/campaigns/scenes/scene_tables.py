@@ -48,6 +48,6 @@ def thruster_lags(vehicle: Vehicle, lag: float) -> dict[str, float]:
     return {f"thrust_time_constant[{i + 1}]": lag for i in range(vehicle.n_thrusters)}
 
 
-def sphere_table(centre: Iterable[float], radius: float) -> Table:
+def sphere_table(center: Iterable[float], radius: float) -> Table:
     """Return the table of a sphere [m]."""
-    return {"type": "sphere", "centre": [float(x) for x in centre], "radius": float(radius)}
+    return {"type": "sphere", "center": [float(x) for x in center], "radius": float(radius)}

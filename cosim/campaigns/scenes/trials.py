@@ -50,10 +50,10 @@ def _sphere(rng: Generator) -> Table:
     """Return a sphere near the path, at a distance from start and goal."""
     while True:
         radius = rng.uniform(0.3, 0.9)
-        centre = _START + rng.uniform(0.2, 0.8) * (_GOAL - _START) + rng.normal(0.0, [0.3, 0.8, 0.8])
-        free = np.linalg.norm(centre - _START), np.linalg.norm(centre - _GOAL) - _GOAL_RADIUS
+        center = _START + rng.uniform(0.2, 0.8) * (_GOAL - _START) + rng.normal(0.0, [0.3, 0.8, 0.8])
+        free = np.linalg.norm(center - _START), np.linalg.norm(center - _GOAL) - _GOAL_RADIUS
         if min(free) - radius > _FREE:
-            return sphere_table(centre, radius)
+            return sphere_table(center, radius)
 
 
 def _net_weight(rng: Generator, vehicle: Vehicle, table: Table) -> None:
@@ -70,7 +70,7 @@ def _current(rng: Generator, vehicle: Vehicle, table: Table) -> None:
 
 
 def _moments(rng: Generator, vehicle: Vehicle, table: Table) -> None:
-    """Displace the centre of buoyancy horizontally by 2 to 5 cm, so that the vehicle would rest tilted."""
+    """Displace the center of buoyancy horizontally by 2 to 5 cm, so that the vehicle would rest tilted."""
     heading, arm = rng.uniform(-np.pi, np.pi), rng.uniform(0.02, 0.05)
     parameters = table["plant"]["parameters"]
     parameters["r_B.x"] = float(vehicle.r_B[0] + arm * np.cos(heading))
@@ -103,7 +103,7 @@ def _pocket(rng: Generator, vehicle: Vehicle, table: Table) -> None:
         "right": ((at - deep, at), (half, half + 0.4)),
     }
     boxes = {
-        name: {"type": "box", "centre": [sum(x) / 2.0, sum(y) / 2.0, 4.0], "size": [x[1] - x[0], y[1] - y[0], 8.0]}
+        name: {"type": "box", "center": [sum(x) / 2.0, sum(y) / 2.0, 4.0], "size": [x[1] - x[0], y[1] - y[0], 8.0]}
         for name, (x, y) in walls.items()
     }
     table["regions"] = [table["regions"][-1], *(_region(name, box) for name, box in boxes.items())]

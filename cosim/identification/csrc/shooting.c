@@ -185,7 +185,7 @@ static void sample(const Shooter *s, int n, double part, const double from[N_RIG
 }
 
 /* Scales the quaternion to unit length, and the tangents with it. */
-static int normalise(Shooter *s)
+static int normalize(Shooter *s)
 {
     double *e = s->model.state.rigid + 3;
     const double norm = sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2] + e[3] * e[3]);
@@ -232,7 +232,7 @@ static int advance(Shooter *s, int k, int *next)
     for (int i = 0; i < asked->n_directions * N_RIGID; i++)
         s->tangent[i] +=
             h / 6.0 * (s->slopes[0][i] + 2.0 * (s->slopes[1][i] + s->slopes[2][i]) + s->slopes[3][i]);
-    return is_a_motion(s->model.state.rigid) && normalise(s);
+    return is_a_motion(s->model.state.rigid) && normalize(s);
 }
 
 const char *shooting_predict(const Prediction *asked)
@@ -255,7 +255,7 @@ const char *shooting_predict(const Prediction *asked)
         return wrong;
     memcpy(s.model.state.rigid, asked->start, sizeof s.model.state.rigid);
     memcpy(s.tangent, asked->start_tangents, size * sizeof(double));
-    if (!is_a_motion(s.model.state.rigid) || !normalise(&s))
+    if (!is_a_motion(s.model.state.rigid) || !normalize(&s))
         return LOST;
     for (int k = 0, next = 0; k < asked->n_steps; k++)
         if (!advance(&s, k, &next))

@@ -43,7 +43,7 @@ class _Signal(msgspec.Struct):
 
 class _Criterion(msgspec.Struct):
     name: str
-    colour: Annotated[str, msgspec.Meta(pattern="^#[0-9A-Fa-f]{6}$")]
+    color: Annotated[str, msgspec.Meta(pattern="^#[0-9A-Fa-f]{6}$")]
 
 
 class _Region(msgspec.Struct):

@@ -60,7 +60,7 @@ def _state(snapshot: Snapshot) -> Iterator[tuple[str, str, str]]:
         yield "Mode", f"{MODES[int(mode)]}, {'armed' if snapshot['commands.armed'] else 'DISARMED'}", ""
     for criterion in header["criteria"]:
         weight, membership = (_number(snapshot[f"{kind}.{criterion['name']}"]) for kind in ("weight", "membership"))
-        yield criterion["name"], f"weight {weight}, membership {membership}", criterion["colour"]
+        yield criterion["name"], f"weight {weight}, membership {membership}", criterion["color"]
     yield "North east depth", f"{_numbers(snapshot[f'position.{axis}'] for axis in 'xyz')} m", ""
     angles = (math.degrees(snapshot[f"attitude.{angle}"]) for angle in ("roll", "pitch", "yaw"))
     yield "Roll pitch yaw", f"{_numbers(angles, 'z.0f')} degrees", ""
@@ -93,7 +93,7 @@ def _active(snapshot: Snapshot) -> tuple[str, str, str]:
 
 
 def _color(snapshot: Snapshot, criterion: str | None) -> str:
-    colors: dict[str | None, str] = {one["name"]: one["colour"] for one in snapshot.header["criteria"]}
+    colors: dict[str | None, str] = {one["name"]: one["color"] for one in snapshot.header["criteria"]}
     return colors.get(criterion, "green")
 
 

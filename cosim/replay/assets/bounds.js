@@ -19,15 +19,15 @@ function placesOf(run) {
   const stride = Math.max(1, Math.floor(run.rows / 200));
   const rows = [...run.time.keys()].filter((i) => i % stride === 0 || i === run.rows - 1);
   const { radius } = run.header.vehicle;
-  const balls = rows.map((i) => ({ centre: columns.map((column) => column[i]), radius }));
+  const balls = rows.map((i) => ({ center: columns.map((column) => column[i]), radius }));
   const { shape, places } = run.header.regions[0]; // the goal
   const solid = surfaceOf(shape);
-  if (solid && isThere(solid.centre)) {
+  if (solid && isThere(solid.center)) {
     const shifts = places ?? [run.start, run.end].map((t) => run.shift(0, t));
-    balls.push(...shifts.map((shift) => ({ centre: Vec.add(solid.centre, shift), radius: solid.radius })));
+    balls.push(...shifts.map((shift) => ({ center: Vec.add(solid.center, shift), radius: solid.radius })));
   }
-  const shown = balls.filter(({ centre }) => Vec.finite(centre));
-  return shown.flatMap(({ centre, radius: r }) => cornersOf(widenedBox([centre, centre], r)));
+  const shown = balls.filter(({ center }) => Vec.finite(center));
+  return shown.flatMap(({ center, radius: r }) => cornersOf(widenedBox([center, center], r)));
 }
 
 /**
@@ -39,7 +39,7 @@ function placesOf(run) {
 function reachOf(shape, shift, middle, limits) {
   const solid = surfaceOf(shape);
   if (!solid) return planePoints(shape, shift, middle).filter((p) => isInBox(p, limits));
-  if (!isThere(Vec.add(solid.centre, shift))) return [];
+  if (!isThere(Vec.add(solid.center, shift))) return [];
   const [low, high] = boxAbout(solid.points).map((corner) => Vec.add(corner, shift));
   if (low.some((x, k) => x > limits[1][k]) || high.some((x, k) => x < limits[0][k])) return [];
   return cornersOf([low, high].map((corner) => corner.map((x, k) => clamp(x, limits[0][k], limits[1][k]))));

@@ -47,8 +47,8 @@ class Camera {
 
   /** Translate the camera so that the scene at the target moves by dx, dy [CSS pixels]. */
   pan(dx, dy) {
-    const metres = this.distance / this.focal;
-    this.aim(Vec.along(Vec.along(this.target, this.right, -dx * metres), this.up, dy * metres));
+    const meters = this.distance / this.focal;
+    this.aim(Vec.along(Vec.along(this.target, this.right, -dx * meters), this.up, dy * meters));
   }
 
   /** Divide the distance to the target by a factor. */

@@ -60,7 +60,7 @@ class Chart {
     this.frame = new Frame(width, height, this.window, this.rest, range, down);
     paintPlot(context, this.frame, this.spec, this.curves);
     const { top, bottom, x } = this.frame;
-    context.fillStyle = COLOURS.ink;
+    context.fillStyle = COLORS.ink;
     if (cursor !== null) context.fillRect(x(cursor) - 0.75, top, 1.5, bottom - top);
     this.stale = false;
   }
@@ -124,7 +124,7 @@ class Chart {
     this._entries = this.spec.signals.filter((of) => !of.faint).map((of) => ({ of, value: h("span.value") }));
     const items = this._entries.map(({ of, value }) => {
       const { name, label, context } = of;
-      const line = swatch(hueColour(of.hue, of.shade), this._several && !context ? [] : of.dash);
+      const line = swatch(hueColor(of.hue, of.shade), this._several && !context ? [] : of.dash);
       const onclick = () => {
         if (!this._off.delete(name)) this._off.add(name);
         key.ariaPressed = !this._off.has(name);
@@ -135,7 +135,7 @@ class Chart {
       const key = h("button.key", props, line, label, value);
       return key;
     });
-    const rest = faint ? [h("span.key", {}, swatch(COLOURS.grey, []), `${faint} farther regions`)] : [];
+    const rest = faint ? [h("span.key", {}, swatch(COLORS.gray, []), `${faint} farther regions`)] : [];
     this.legend.replaceChildren(...items, ...rest);
     this.stale = true;
   }

@@ -3,7 +3,7 @@
 const MODE_NAMES = ["manual", "hold", "reach", "mission", "surface", "stabilize", "depth_hold"];
 const SURE = 4000; // ms, within which Reset must be pressed again
 const NEW_OBSTACLES = 1001; // first number of obstacles from this page, above the numbers that sensors use
-const HINT = "Drag target and regions in the scene (Shift: up and down), or give numbers in metres: north, east, down.";
+const HINT = "Drag target and regions in the scene (Shift: up and down), or give numbers in meters: north, east, down.";
 
 /** Panel of buttons and number fields over the scene. */
 class CommandPanel extends FieldPanel {
@@ -79,7 +79,7 @@ class CommandPanel extends FieldPanel {
     const name = index === 0 ? "target" : regionName;
     const fields = DIRECTIONS.map(([letter, direction], axis) => {
       const props = { disabled: axis < 2 && isFlat(this.run, index), onchange: () => this._moved(row) };
-      return numberField(letter, `${name}, ${direction} in metres`, 0.1, props);
+      return numberField(letter, `${name}, ${direction} in meters`, 0.1, props);
     });
     const set = fieldSet(name, ...fields.map(([label]) => label));
     if (comes) set.append(h("button.gone", { onclick: () => this._forget(index) }, "Remove"));

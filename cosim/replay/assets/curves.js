@@ -8,12 +8,12 @@ const NAMED = 6; // number of regions that the distance chart names
 const runDash = (index) => DASHES[index % DASHES.length];
 
 /** Return the hue of the theme for a color of the header in the palette; other colors stay. */
-const hueOf = (colour) => Object.keys(PALETTE).find((hue) => PALETTE[hue] === colour.toLowerCase()) ?? colour;
+const hueOf = (color) => Object.keys(PALETTE).find((hue) => PALETTE[hue] === color.toLowerCase()) ?? color;
 
 /** Return the CSS color of a hue or of "#rrggbb", mixed with the share `shade` of ink. */
-function hueColour(hue, shade = 0) {
-  const base = COLOURS[hue] ?? legible(hue);
-  return shade ? mixedColour(base, COLOURS.ink, shade) : base;
+function hueColor(hue, shade = 0) {
+  const base = COLORS[hue] ?? legible(hue);
+  return shade ? mixedColor(base, COLORS.ink, shade) : base;
 }
 
 /** Return the criteria of some runs, each name once, in the order of priority. */
@@ -42,7 +42,7 @@ const clearanceOf = ({ name, comes }) => (run) => {
   return values.map((value, row) => (shifts.some((shift) => shift[row] !== 0) ? value : NaN));
 };
 
-/** Return the clearance signals of regions with one unit: the nearest named, the others thin and grey. */
+/** Return the clearance signals of regions with one unit: the nearest named, the others thin and gray. */
 function clearances(runs, unit) {
   const byName = new Map();
   for (const run of runs) {
@@ -57,9 +57,9 @@ function clearances(runs, unit) {
   const near = all.filter(({ region }) => region.criterion).sort((a, b) => a.least - b.least).slice(0, NAMED);
   let dashIndex = 0;
   return all.map((one) => {
-    const { name, criterion, colour } = one.region;
+    const { name, criterion, color } = one.region;
     const faint = Boolean(criterion) && !near.includes(one);
-    return signal(`${name}.clearance`, name, faint ? "grey" : hueOf(colour), {
+    return signal(`${name}.clearance`, name, faint ? "gray" : hueOf(color), {
       dash: faint ? [] : DASHES[dashIndex++ % DASHES.length], faint, values: clearanceOf(one.region),
     });
   });
@@ -85,8 +85,8 @@ const estimates = (indices) => indices.flatMap((i) => {
  *   optional are zero (values below 0 are violations), fixed ([least, most]), down (the axis points down)
  */
 function chartsOf(runs) {
-  const criteria = (kind) => criteriaOf(runs).map(({ name, colour }, i) =>
-    signal(`${kind}.${name}`, name, hueOf(colour), { dash: runDash(i) }));
+  const criteria = (kind) => criteriaOf(runs).map(({ name, color }, i) =>
+    signal(`${kind}.${name}`, name, hueOf(color), { dash: runDash(i) }));
   const axes = (kind, letters) => inTurn([...letters].map((axis) => `${kind}.${axis}`), [...letters]);
   const size = (kind, label, hue, dash) =>
     signal(`${kind}.size`, label, hue, { dash, values: (run) => sizes(run, kind) });

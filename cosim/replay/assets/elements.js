@@ -25,9 +25,9 @@ function setText(node, text) {
 }
 
 /** Return a short SVG line in the color and dash of a curve; SVG also prints. */
-function swatch(colour, dash) {
+function swatch(color, dash) {
   const svg = byId("swatch").content.firstElementChild.cloneNode(true);
-  svg.firstElementChild.setAttribute("stroke", colour);
+  svg.firstElementChild.setAttribute("stroke", color);
   svg.firstElementChild.setAttribute("stroke-dasharray", dash.join(" "));
   return svg;
 }
@@ -58,8 +58,8 @@ function beginLines(context, ...lines) {
 }
 
 /** Begin a path of a rounded rectangle and fill it. */
-function fillRounded(context, colour, x, y, width, height, radius) {
-  context.fillStyle = colour;
+function fillRounded(context, color, x, y, width, height, radius) {
+  context.fillStyle = color;
   context.beginPath();
   context.roundRect(x, y, width, height, radius);
   context.fill();

@@ -84,7 +84,7 @@ const otherEnd = (key) => key.replace(/\.(start|end)\./, (_, end) => (end === "s
 /** Return the shifts of the goal to its places in turn [m, NED], from the numbers of `value(key)`. */
 function goalPlaces({ goals, goal_center: recorded }, value) {
   const center = recorded.map((x, axis) => {
-    const [middle, start, end] = ["centre", "start", "end"].map((name) => value(`goal.${name}.${axis}`));
+    const [middle, start, end] = ["center", "start", "end"].map((name) => value(`goal.${name}.${axis}`));
     return middle ?? (start === undefined ? x : (start + end) / 2);
   });
   const later = Array.from({ length: goals }, (_, i) => center.map((x, axis) => value(`goal.then.${i}.${axis}`) - x));

@@ -1,7 +1,7 @@
 // Reference marks of the scene: floor grid, depth ruler, water surface, compass and scale bar.
 
 /** Return a length [m] as text, with the digits that a step needs. */
-function metres(x, step) {
+function meters(x, step) {
   const text = decimals(x, digitsOf(step));
   return Number(text) === 0 ? "0" : text;
 }
@@ -24,14 +24,14 @@ function paintFloor(painter, labels, bounds, named) {
   const [norths, easts] = [multiples(n0, n1, step), multiples(e0, e1, step)];
   painter.begin();
   painter.polygon(levelCorners(bounds, floor));
-  painter.fill(COLOURS.floor);
+  painter.fill(COLORS.floor);
   painter.begin();
   for (const n of norths) painter.segment([n, e0, floor], [n, e1, floor]);
   for (const e of easts) painter.segment([n0, e, floor], [n1, e, floor]);
-  painter.stroke(COLOURS.gridMinor, 1);
+  painter.stroke(COLORS.gridMinor, 1);
   painter.begin();
   painter.polygon(levelCorners(bounds, floor));
-  painter.stroke(COLOURS.gridMajor, 1.2);
+  painter.stroke(COLORS.gridMajor, 1.2);
   if (!named) return;
   // the side nearer to the eye, unless fewer than two of its labels are in the picture
   const nearSide = (ticks, at, low, high) => {
@@ -49,7 +49,7 @@ function paintFloor(painter, labels, bounds, named) {
     const length = Math.hypot(q[0] - p[0], q[1] - p[1]) || 1;
     const x = p[0] + (off * (q[0] - p[0])) / length;
     const y = p[1] + (off * (q[1] - p[1])) / length + (length < 2 ? off : 0);
-    labels.add({ key, text, x, y, colour: COLOURS.soft, size: 11, rank, gap: 0, pad: 7, sides: ["here"] });
+    labels.add({ key, text, x, y, color: COLORS.soft, size: 11, rank, gap: 0, pad: 7, sides: ["here"] });
   };
   const out = 0.02 * camera.distance;
   const axes = [
@@ -59,7 +59,7 @@ function paintFloor(painter, labels, bounds, named) {
   for (const [axis, ticks, low, high, at, outward] of axes.filter(([, list]) => list.length)) {
     const { side, sign, shown } = nearSide(ticks, at, low, high);
     const away = Vec.scale(outward, sign);
-    for (const tick of shown) name(`${axis} ${tick}`, at(tick, side), away, metres(tick, step), 60, 13);
+    for (const tick of shown) name(`${axis} ${tick}`, at(tick, side), away, meters(tick, step), 60, 13);
     const [first, last] = [shown[0] ?? ticks[0], shown.at(-1) ?? ticks.at(-1)];
     name(axis, at(0.5 * (first + last), side), away, `${axis} [m]`, 40, 32);
   }
@@ -79,13 +79,13 @@ function paintRuler(painter, labels, bounds, named) {
   const step = roundStep(((floor - top) * 34) / pixels);
   painter.begin();
   painter.segment([n, e, top], [n, e, floor]);
-  painter.stroke(COLOURS.gridMajor, 1.2);
-  const word = { colour: COLOURS.soft, size: 11, gap: 9 };
+  painter.stroke(COLORS.gridMajor, 1.2);
+  const word = { color: COLORS.soft, size: 11, gap: 9 };
   const ticks = multiples(top, floor, step).map((depth) => ({ depth, pixel: camera.project([n, e, depth]) }));
-  painter.strokeLines(ticks.map(({ pixel: [x, y] }) => [[x, y], [x - 5, y]]), COLOURS.gridMajor, 1.2);
+  painter.strokeLines(ticks.map(({ pixel: [x, y] }) => [[x, y], [x - 5, y]]), COLORS.gridMajor, 1.2);
   if (!named) return;
   for (const { depth, pixel: [x, y] } of ticks) {
-    labels.add({ ...word, x, y, key: `d${depth}`, text: metres(depth, step), rank: 50, sides: ["left"] });
+    labels.add({ ...word, x, y, key: `d${depth}`, text: meters(depth, step), rank: 50, sides: ["left"] });
   }
   labels.add({ ...word, x: head[0], y: head[1], key: "depth", text: "depth [m]", rank: 40, sides: ["above"] });
 }
@@ -95,7 +95,7 @@ function paintSurface(painter, bounds) {
   if (bounds[0][2] > 0) return;
   painter.begin();
   painter.polygon(levelCorners(bounds, 0));
-  painter.stroke(COLOURS.gridMajor, 1, 0.9, [2, 4]);
+  painter.stroke(COLORS.gridMajor, 1, 0.9, [2, 4]);
 }
 
 /** Paint the directions north, east and down in a corner. */
@@ -106,7 +106,7 @@ function paintCompass(painter, labels) {
   Object.assign(context, { lineCap: "round", textAlign: "center", textBaseline: "middle" });
   [..."NED"].forEach((name, i) => {
     const [dx, dy] = [size * camera.right[i], -size * camera.up[i]];
-    const fillStyle = name === "N" ? COLOURS.ink : COLOURS.soft;
+    const fillStyle = name === "N" ? COLORS.ink : COLORS.soft;
     painter.strokeLines([[[x, y], [x + dx, y + dy]]], fillStyle, name === "N" ? 2.6 : 1.8);
     const length = Math.hypot(dx, dy);
     const [u, v] = [x + (dx * (length + 9)) / length, y + (dy * (length + 9)) / length];
@@ -124,10 +124,10 @@ function paintScale(painter, labels, magnified) {
   const pixels = camera.focal / camera.distance;
   const length = roundStep(60 / pixels) > 110 / pixels ? roundStep(30 / pixels) : roundStep(60 / pixels);
   const [left, right, y] = [camera.width - 16 - length * pixels, camera.width - 16, camera.height - 18];
-  painter.strokeLines([[[left, y - 4], [left, y], [right, y], [right, y - 4]]], COLOURS.ink, 1.5);
+  painter.strokeLines([[[left, y - 4], [left, y], [right, y], [right, y - 4]]], COLORS.ink, 1.5);
   const text = length < 1000 ? `${length} m` : `${length / 1000} km`;
   const size = magnified > 1.05 ? ` · vehicle ×${magnified.toPrecision(2)}` : "";
-  const style = { font: FONT, textAlign: "right", textBaseline: "bottom", fillStyle: COLOURS.ink };
+  const style = { font: FONT, textAlign: "right", textBaseline: "bottom", fillStyle: COLORS.ink };
   writeText(context, text + size, right, y - 6, style);
   labels.block(Math.min(left, camera.width - 150) - 6, y - 22, 180, 40);
 }

@@ -62,7 +62,7 @@ function paintForces(painter, { pose: { position, R }, size }, forces, radius) {
     return Math.min(a[2], b[2]) > camera.near ? arrowLines(a, b, 7 * fine) : [];
   });
   context.lineCap = "round";
-  painter.strokeLines(lines, COLOURS.halo, 5 * fine);
-  painter.strokeLines(lines, COLOURS.thrust, 2.4 * fine);
+  painter.strokeLines(lines, COLORS.halo, 5 * fine);
+  painter.strokeLines(lines, COLORS.thrust, 2.4 * fine);
   context.lineCap = "butt";
 }

@@ -7,7 +7,7 @@ function paintGhost({ context, camera }, { run, region, place, time, from, to })
   const shift = Vec.add(run.shift(region, time, place), by);
   const points = surfaceOf(run.shape(region, time))?.points ?? [];
   const outline = convexRing(pixels(points.map((p) => Vec.add(p, shift))));
-  Object.assign(context, { strokeStyle: COLOURS.ink, fillStyle: COLOURS.ink, lineWidth: 2 });
+  Object.assign(context, { strokeStyle: COLORS.ink, fillStyle: COLORS.ink, lineWidth: 2 });
   context.setLineDash([6, 4]);
   beginLines(context, outline);
   context.closePath();
@@ -31,8 +31,8 @@ function paintGhost({ context, camera }, { run, region, place, time, from, to })
   // on the side towards the middle of the picture
   const left = Math.max(4, x > camera.width / 2 ? x - width - 12 : x + 12);
   const top = Math.max(4, y - 30);
-  fillRounded(context, COLOURS.ink, left, top, width, 20, 5);
-  writeText(context, text, left + 6, top + 10.5, { fillStyle: COLOURS.card, textAlign: "left", textBaseline: "middle" });
+  fillRounded(context, COLORS.ink, left, top, width, 20, 5);
+  writeText(context, text, left + 6, top + 10.5, { fillStyle: COLORS.card, textAlign: "left", textBaseline: "middle" });
 }
 
 /** Return the convex hull of points in a plane, after Andrew. */

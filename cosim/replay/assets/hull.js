@@ -4,29 +4,29 @@
 /**
  * Face of a hull for a radius of 1, body axes: forward, starboard, down.
  * @typedef {object} HullFace
- * @property {string} colour name of a color of the theme
+ * @property {string} color name of a color of the theme
  * @property {number[][]} corners  @property {number[]} middle, normal
  */
 
 /** Return the faces of a closed body between rings of as many points each, anticlockwise as seen from outside. */
-function hullTube(colour, rings) {
+function hullTube(color, rings) {
   const bands = rings.slice(1).flatMap((ring, k) => ring.map((_, i) => {
     const next = (i + 1) % ring.length;
     return [rings[k][i], rings[k][next], ring[next], ring[i]];
   }));
   const faces = [rings[0].toReversed(), rings.at(-1), ...bands];
-  return faces.map((corners) => ({ colour, corners, middle: Vec.mean(corners), normal: normalOf(corners) }));
+  return faces.map((corners) => ({ color, corners, middle: Vec.mean(corners), normal: normalOf(corners) }));
 }
 
 /** Return the faces of a profile (forward, down) that is extruded from one side to the other. */
-const hullProfile = (colour, profile, from, to) =>
-  hullTube(colour, [from, to].map((y) => profile.toReversed().map(([x, z]) => [x, y, z])));
+const hullProfile = (color, profile, from, to) =>
+  hullTube(color, [from, to].map((y) => profile.toReversed().map(([x, z]) => [x, y, z])));
 
-const hullBar = (colour, [x, y, z], [a, b, c]) =>
-  hullProfile(colour, [[x + a, z - c], [x - a, z - c], [x - a, z + c], [x + a, z + c]], y - b, y + b);
+const hullBar = (color, [x, y, z], [a, b, c]) =>
+  hullProfile(color, [[x + a, z - c], [x - a, z - c], [x - a, z + c], [x + a, z + c]], y - b, y + b);
 
 /** Return a ring of `count` points about an axis. */
-const hullRing = (centre, axis, radius, count) => Vec.circle(centre, axis, radius, count, 0.5);
+const hullRing = (center, axis, radius, count) => Vec.circle(center, axis, radius, count, 0.5);
 
 /** Return the faces of an open frame with floats, a tube and a dome. */
 function frameFaces() {

@@ -31,7 +31,7 @@ class Labels {
 
   /**
    * Add a label for the next draw().
-   * @param {object} word {key, text, x, y, colour, rank: lower is more important, gap: pixels from the point, bold,
+   * @param {object} word {key, text, x, y, color, rank: lower is more important, gap: pixels from the point, bold,
    * chip: background color or null, pad: pixels that stay free beside it, far: true if it may stand farther off, with
    * a leader line in the color `edge`, sides: of "above below right left here" in the order in which they are tried}
    */
@@ -72,7 +72,7 @@ class Labels {
       Object.assign(context, { strokeStyle: word.edge, lineWidth: 1.5 });
       context.stroke();
     }
-    const style = { font: fontOf(word), fillStyle: word.colour, textAlign: "left", textBaseline: "middle" };
+    const style = { font: fontOf(word), fillStyle: word.color, textAlign: "left", textBaseline: "middle" };
     writeText(context, word.text, x + (word.chip ? 5 : 1), y + 0.5 * height + 0.5, style);
   }
 

@@ -152,7 +152,7 @@ class Page {
   _setTheme(theme) {
     this.theme = theme;
     document.documentElement.dataset.theme = theme;
-    readColours();
+    readColors();
   }
 
   /** Lay out the scenes; `same` as for show(). */

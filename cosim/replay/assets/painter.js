@@ -55,25 +55,25 @@ class Painter {
     this.context.closePath();
   }
 
-  stroke(colour, width, alpha = 1, dash = []) {
+  stroke(color, width, alpha = 1, dash = []) {
     const { context } = this;
-    Object.assign(context, { globalAlpha: alpha, strokeStyle: colour, lineWidth: width });
+    Object.assign(context, { globalAlpha: alpha, strokeStyle: color, lineWidth: width });
     context.setLineDash(dash);
     context.stroke();
     context.setLineDash([]);
     context.globalAlpha = 1;
   }
 
-  fill(colour, alpha = 1) {
-    Object.assign(this.context, { globalAlpha: alpha, fillStyle: colour });
+  fill(color, alpha = 1) {
+    Object.assign(this.context, { globalAlpha: alpha, fillStyle: color });
     this.context.fill();
     this.context.globalAlpha = 1;
   }
 
   /** Draw lines of pixels. */
-  strokeLines(lines, colour, width) {
+  strokeLines(lines, color, width) {
     beginLines(this.context, ...lines);
-    this.stroke(colour, width);
+    this.stroke(color, width);
   }
 
   _add(pixels) {
@@ -83,10 +83,10 @@ class Painter {
 }
 
 /** Return the style of a region, from its kind (keep in or out) and from being active or not. */
-function styleOf(keep, active, colour) {
+function styleOf(keep, active, color) {
   const [alpha, width, dash, hidden] = active ? [0.5, 2.6, [9, 5], 0.5] : [0.24, 1.2, [6, 5], 0.28];
   // hidden: opacity of edges on the far side
-  return { colour, filled: keep === "out", alpha, width, dash: keep === "in" ? dash : [], hidden };
+  return { color, filled: keep === "out", alpha, width, dash: keep === "in" ? dash : [], hidden };
 }
 
 /** Draw the far side of a surface, over which lies what is in it; or with `near` the near side. */
@@ -102,8 +102,8 @@ function paintSurfaceSide(painter, view, style, near) {
 }
 
 /** Return the ellipse that an ellipsoid projects to: center and matrix from the unit circle; null if it is none. */
-function outlineOf(camera, { centre, axes }, shift) {
-  const c = Vec.sub(Vec.add(centre, shift), camera.eye);
+function outlineOf(camera, { center, axes }, shift) {
+  const c = Vec.sub(Vec.add(center, shift), camera.eye);
   const rows = [camera.right, Vec.scale(camera.up, -1), camera.forward];
   const C = rows.map((row) => Vec.dot(row, c));
   const A = rows.map((row) => axes.map((axis) => Vec.dot(row, axis)));
@@ -123,7 +123,7 @@ function outlineOf(camera, { centre, axes }, shift) {
 }
 
 /** Draw the fill and the outline of an ellipse; the fill is brighter where light from above falls. */
-function paintBall(painter, outline, { filled, colour, alpha, width, dash }) {
+function paintBall(painter, outline, { filled, color, alpha, width, dash }) {
   const { context, camera } = painter;
   context.beginPath();
   context.save();
@@ -132,22 +132,22 @@ function paintBall(painter, outline, { filled, colour, alpha, width, dash }) {
   if (filled) {
     const [lx, ly] = [0.25 * camera.right[2] - 0.22, -0.62 * Math.abs(camera.up[2])];
     const light = context.createRadialGradient(lx, ly, 0, 0, 0, 1);
-    light.addColorStop(0, mixedColour(colour, "#ffffff", 0.55));
-    light.addColorStop(0.55, colour);
-    light.addColorStop(1, mixedColour(colour, "#000000", 0.22));
+    light.addColorStop(0, mixedColor(color, "#ffffff", 0.55));
+    light.addColorStop(0.55, color);
+    light.addColorStop(1, mixedColor(color, "#000000", 0.22));
     painter.fill(light, alpha + 0.15);
   }
   context.restore();
-  painter.stroke(colour, width, 1, dash);
+  painter.stroke(color, width, 1, dash);
 }
 
 /** Draw the great circles of an ellipsoid, on the near or on the far side. */
-function paintCircles(painter, { solid, eye, seen }, { colour, hidden }, near) {
+function paintCircles(painter, { solid, eye, seen }, { color, hidden }, near) {
   const { context, camera } = painter;
-  const { inverse, centre, points } = solid;
+  const { inverse, center, points } = solid;
   // the near side is where (p - c)' M (e - c) > 1, with M of the ellipsoid
-  const e = Vec.turned(inverse, Vec.sub(eye, centre));
-  const isNear = (p) => Vec.dot(Vec.turned(inverse, Vec.sub(p, centre)), e) > 1;
+  const e = Vec.turned(inverse, Vec.sub(eye, center));
+  const isNear = (p) => Vec.dot(Vec.turned(inverse, Vec.sub(p, center)), e) > 1;
   context.beginPath();
   for (const line of solid.lines) {
     let drawing = false;
@@ -159,13 +159,13 @@ function paintCircles(painter, { solid, eye, seen }, { colour, hidden }, near) {
       drawing = shown;
     }
   }
-  painter.stroke(colour, 0.8, near ? 0.55 : hidden * 0.7);
+  painter.stroke(color, 0.8, near ? 0.55 : hidden * 0.7);
 }
 
 const LIGHT_SIDE = 0.35; // down component of normals beyond which faces are lit (upward) or shaded (downward)
 
 /** Fill the visible faces, in one path so that no seam shows; lit from above in three steps. */
-function paintFaces(painter, view, { colour, alpha }) {
+function paintFaces(painter, view, { color, alpha }) {
   const paint = (least, most, ...fill) => {
     painter.begin();
     view.solid.faces.forEach((face, i) => {
@@ -174,8 +174,8 @@ function paintFaces(painter, view, { colour, alpha }) {
     });
     painter.fill(...fill);
   };
-  paint(-2, 2, colour, alpha);
-  paint(-2, -LIGHT_SIDE, mixedColour(colour, "#ffffff", 0.6), 0.22);
+  paint(-2, 2, color, alpha);
+  paint(-2, -LIGHT_SIDE, mixedColor(color, "#ffffff", 0.6), 0.22);
   paint(LIGHT_SIDE, 2, "#000000", 0.16);
 }
 
@@ -198,22 +198,22 @@ function linesOf(edges) {
 }
 
 /** Draw the sharp edges of a surface on the near or far side; on the near side also its outline. */
-function paintEdges(painter, view, { colour, width, hidden, dash }, near) {
+function paintEdges(painter, view, { color, width, hidden, dash }, near) {
   const { front } = view;
   const drawn = view.solid.edges.filter(([, , f, g, sharp]) =>
     sharp ? (front[f] || front[g]) === near : near && front[f] !== front[g]);
   painter.begin();
   for (const line of dash.length ? linesOf(drawn) : drawn) painter.trace(view, dash.length ? line : line.slice(0, 2));
-  painter.stroke(colour, near ? width : 1, near ? 1 : hidden, dash);
+  painter.stroke(color, near ? width : 1, near ? 1 : hidden, dash);
 }
 
 /** Draw a part of a plane: nearly clear, with a rim and hatching on the forbidden side. */
-function paintSheet(painter, { corners, hatch }, { colour, filled, alpha, width, dash, hidden }) {
+function paintSheet(painter, { corners, hatch }, { color, filled, alpha, width, dash, hidden }) {
   painter.begin();
   painter.polygon(corners);
-  painter.fill(colour, (filled ? 0.6 : 0.25) * alpha);
-  painter.stroke(colour, width, 0.9, dash);
+  painter.fill(color, (filled ? 0.6 : 0.25) * alpha);
+  painter.stroke(color, width, 0.9, dash);
   painter.begin();
   for (const [a, b] of hatch) painter.segment(a, b);
-  painter.stroke(colour, 1, Math.min(1, 2 * hidden));
+  painter.stroke(color, 1, Math.min(1, 2 * hidden));
 }

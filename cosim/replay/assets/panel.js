@@ -1,20 +1,20 @@
 // Side panel: state of the selected run at the cursor, as text and bars.
 
 /** Return the CSS color of a region or criterion in text: as in the header if the palette has it, else legible. */
-const textColour = (colour) => (hueOf(colour) === colour ? legible(colour) : colour);
+const textColor = (color) => (hueOf(color) === color ? legible(color) : color);
 
 /** Set the shape and color of a mark to those of a region's criterion; without a region clear them. */
 function setMark(mark, run, region) {
   const index = run.header.criteria.findIndex((one) => one.name === region?.criterion);
   mark.className = `mark ${region ? (index < 0 ? "goal" : `of-${index % 4}`) : "unknown"}`;
-  mark.style.background = region ? textColour(region.colour) : "";
+  mark.style.background = region ? textColor(region.color) : "";
 }
 
 /** Row with a bar. */
 class BarRow {
-  constructor(label, colour, title = "") {
+  constructor(label, color, title = "") {
     this.value = h("span.value");
-    this.fill = h("span.fill", { style: `--hue: ${colour}` });
+    this.fill = h("span.fill", { style: `--hue: ${color}` });
     this.tick = h("span.tick", { hidden: true });
     const track = h("span.track", {}, this.fill, this.tick);
     this.element = h("li.bar-row", { title }, h("span.name", {}, label), this.value, track);
@@ -50,7 +50,7 @@ class Panel {
     for (const [name, is] of Object.entries(hidden)) this._at(`.${name}`).hidden = is;
     const choices = runNames(runs).map((name, index) => this._choice(name, index, shown[index], index === selected));
     this._fill(".runs ul", choices);
-    this.weights = criteria.map(({ name, colour }, i) => new BarRow(`${name} α${i + 1}`, textColour(colour)));
+    this.weights = criteria.map(({ name, color }, i) => new BarRow(`${name} α${i + 1}`, textColor(color)));
     this.rules = rules.map(({ words, text }) => new BarRow(words, "var(--ink)", text));
     this._fill(".weights ul", this.weights.map(({ element }) => element));
     this._fill(".rules ul", this.rules.map(({ element }) => element));
@@ -108,7 +108,7 @@ class Panel {
   _choice(name, index, shown, selected) {
     const box = checkbox(shown, `Show ${name}`, () => this.on.show(index, box.checked));
     const props = { title: `Show ${name} in this panel`, ariaPressed: selected, onclick: () => this.on.select(index) };
-    const choose = h("button.choose", props, swatch(runColour(index), runDash(index)), name);
+    const choose = h("button.choose", props, swatch(runColor(index), runDash(index)), name);
     return h("li", { className: selected ? "selected" : "" }, box, choose);
   }
 

@@ -20,9 +20,9 @@ function sheetsOf(shape, keep, shift, bounds) {
 /** Return the polygon in which a plane cuts an axis-aligned box; empty if it does not cut the box. */
 function cutOfBounds(point, normal, bounds) {
   // a square that is larger than the box, clipped by the six sides of the box
-  const centre = Vec.mean(bounds);
+  const center = Vec.mean(bounds);
   const size = Vec.distance(...bounds);
-  const middle = Vec.along(centre, normal, Vec.dot(Vec.sub(point, centre), normal));
+  const middle = Vec.along(center, normal, Vec.dot(Vec.sub(point, center), normal));
   const [a, b] = Vec.aside(normal);
   const square = [[-1, -1], [1, -1], [1, 1], [-1, 1]].map(([u, v]) =>
     Vec.along(Vec.along(middle, a, u * size), b, v * size));

@@ -22,13 +22,13 @@ function paintPlot(context, frame, spec, curves) {
   const { left, right, top, bottom, range, window, x, y } = frame;
   Object.assign(context, { font: FONT, lineJoin: "round" });
   if (!range) {
-    const style = { fillStyle: COLOURS.muted, textAlign: "center" };
+    const style = { fillStyle: COLORS.muted, textAlign: "center" };
     writeText(context, "no numbers in this window", (left + right) / 2, (top + bottom) / 2, style);
     return;
   }
   if (spec.zero) {
     const zero = clamp(y(0), top, bottom);
-    context.fillStyle = COLOURS.zone;
+    context.fillStyle = COLORS.zone;
     context.fillRect(left, zero, right - left, bottom - zero);
   }
   paintAxes(context, frame, spec);
@@ -39,14 +39,14 @@ function paintPlot(context, frame, spec, curves) {
   for (const curve of [...curves].sort((a, b) => b.signal.faint - a.signal.faint)) {
     const { hue, shade, faint } = curve.signal;
     const [lineWidth, globalAlpha] = faint ? [0.8, 0.75] : [1.6, 1];
-    Object.assign(context, { strokeStyle: hueColour(hue, shade), lineWidth, globalAlpha });
+    Object.assign(context, { strokeStyle: hueColor(hue, shade), lineWidth, globalAlpha });
     context.setLineDash(curve.dash);
     traceCurve(context, curve, window, x, y);
     context.stroke();
   }
   context.restore();
   if (spec.zero && bottom - y(0) >= 16) {
-    const style = { textAlign: "right", textBaseline: "bottom", fillStyle: COLOURS.bad };
+    const style = { textAlign: "right", textBaseline: "bottom", fillStyle: COLORS.bad };
     writeOutlined(context, "below 0: violated (goal: outside)", right - 4, bottom - 3, style);
   }
   if (frame.axis.broken) nameRest(context, frame, curves);
@@ -55,7 +55,7 @@ function paintPlot(context, frame, spec, curves) {
 
 /** Draw a text with an outline in the background color, so that it is legible over curves. */
 function writeOutlined(context, text, x, y, style) {
-  Object.assign(context, style, { lineWidth: 4, strokeStyle: COLOURS.card });
+  Object.assign(context, style, { lineWidth: 4, strokeStyle: COLORS.card });
   context.strokeText(text, x, y);
   context.fillText(text, x, y);
 }
@@ -69,7 +69,7 @@ function paintAxes(context, { left, right, top, bottom, range, window, width, ax
   const level = (value) => [[left, rowOf(value)], [right, rowOf(value)]];
   const upright = (t) => [top, bottom].map((end) => [Math.round(x(t)) + 0.5, end]);
   beginLines(context, ...heights.map(level), ...times.map(upright));
-  Object.assign(context, { lineWidth: 1, strokeStyle: COLOURS.grid, fillStyle: COLOURS.muted });
+  Object.assign(context, { lineWidth: 1, strokeStyle: COLORS.grid, fillStyle: COLORS.muted });
   context.stroke();
   const style = { textAlign: "right", textBaseline: "middle" };
   tickTexts(heights).forEach((text, i) => writeText(context, text, left - 6, rowOf(heights[i]), style));
@@ -84,10 +84,10 @@ function paintAxes(context, { left, right, top, bottom, range, window, width, ax
     const textX = Math.min(x(t), width - half - 1);
     writeText(context, texts[i], textX, bottom + 5, { textAlign: "center", textBaseline: "top" });
   });
-  context.strokeStyle = COLOURS.muted;
+  context.strokeStyle = COLORS.muted;
   if (axis.broken) {
     const breakX = x(axis.rest); // nothing moves after it
-    Object.assign(context, { fillStyle: COLOURS.grid, globalAlpha: 0.45, lineWidth: 1.5 });
+    Object.assign(context, { fillStyle: COLORS.grid, globalAlpha: 0.45, lineWidth: 1.5 });
     context.fillRect(breakX, top, right - breakX, bottom - top);
     context.globalAlpha = 1;
     beginLines(context, ...[breakX - 2, breakX + 2].map((cut) => [[cut - 2.5, bottom + 4], [cut + 2.5, bottom - 4]]));
@@ -107,7 +107,7 @@ function nameRest(context, { axis, x, y, top, bottom, right }, curves) {
   const rows = [top + 8, (top + bottom) / 2, bottom - 24];
   const free = rows.find((row) => !lines.some((line) => Math.abs(line - row) < 10));
   if (free === undefined || right - breakX <= 40) return;
-  const style = { textAlign: "center", textBaseline: "middle", fillStyle: COLOURS.muted };
+  const style = { textAlign: "center", textBaseline: "middle", fillStyle: COLORS.muted };
   writeOutlined(context, "at rest", (breakX + right) / 2, free, style);
 }
 
@@ -117,7 +117,7 @@ function paintBeyond(context, { range: [low, high], right, top }, { unit }, curv
     isContext && (value < low || value > high));
   beyond.forEach(({ signal: { label, hue, shade }, values: [value] }, line) => {
     const text = `${label} is at ${quantity(value, unit)} ${value > high ? "↑" : "↓"}`;
-    const style = { textAlign: "right", textBaseline: "top", fillStyle: hueColour(hue, shade) };
+    const style = { textAlign: "right", textBaseline: "top", fillStyle: hueColor(hue, shade) };
     writeOutlined(context, text, right - 4, top + 2 + 14 * line, style);
   });
 }

@@ -37,9 +37,9 @@ function regionsAt(runs, t, poses, target, bounds) {
 /** Return what is drawn of a region, with the position for the drawing order. */
 function partsOf(shape, shift, { keep }, pose, target, bounds) {
   const solid = surfaceOf(shape);
-  if (solid && !isThere(Vec.add(solid.centre, shift))) return [];
+  if (solid && !isThere(Vec.add(solid.center, shift))) return [];
   if (solid) {
-    const middle = solid.long ? nearestOnSurface(solid, Vec.sub(target, shift)) : solid.centre;
+    const middle = solid.long ? nearestOnSurface(solid, Vec.sub(target, shift)) : solid.center;
     return [{ solid, middle: Vec.add(middle, shift) }];
   }
   if (shape.drawing?.planes) {
@@ -59,8 +59,8 @@ function placesOfRegion(run, index, t) {
 /** Set color and style of an entry: an active region in full, the goal seen through others, the next one dotted. */
 function dressEntry(entry) {
   const { region, active, next } = entry;
-  entry.colour = regionColour(region, active);
-  entry.style = styleOf(region.keep, active, entry.colour);
+  entry.color = regionColor(region, active);
+  entry.style = styleOf(region.keep, active, entry.color);
   if (!region.criterion) Object.assign(entry.style, { filled: true, alpha: 0.1, width: 2.6, hidden: 0.6 });
   if (next) Object.assign(entry.style, { filled: false, width: 1.6, dash: [2, 5], hidden: 0.35 });
 }
@@ -103,7 +103,7 @@ function nearestFirst(entries, runs, t) {
  */
 function nameRegions(labels, camera, entries, runs, t) {
   for (const { region, solid, middle } of entries) {
-    const half = solid && (solid.centre[2] - solid.top) * camera.scaleAt(middle);
+    const half = solid && (solid.center[2] - solid.top) * camera.scaleAt(middle);
     const fits = half < 0.2 * Math.min(camera.width, camera.height); // else it fills the picture
     if (!region.criterion && fits) labels.blockAround(camera.project(middle), half);
   }
@@ -124,7 +124,7 @@ function nameRegions(labels, camera, entries, runs, t) {
     labels.add({
       key, x: pixel[0], y: pixel[1], gap: 6, of, size: camera.width < 480 && !active ? 10 : 12,
       text: (active ? "▶ " : "") + name + (entry.solid && isTwice ? `, ${names[of.run]}` : ""),
-      colour: active ? COLOURS.ink : COLOURS.soft, edge: entry.colour, bold: active, chip: COLOURS.chip,
+      color: active ? COLORS.ink : COLORS.soft, edge: entry.color, bold: active, chip: COLORS.chip,
       rank: active ? 0 : isGoal ? 1 + Number(next) : 10 + rank, far: active || isGoal,
       sides: ["above", "right", "left", "below"],
     });
@@ -136,10 +136,10 @@ function nameVehicles(labels, camera, marks, vehicles) {
   vehicles.forEach((vehicle, i) => {
     const [x, y, depth] = vehicle ? camera.project(vehicle.pose.position) : [];
     if (!(depth >= camera.near)) return;
-    const { name, colour } = marks[i];
+    const { name, color } = marks[i];
     labels.add({
       key: `vehicle ${i}`, x, y, gap: 1.5 * vehicle.size * camera.scaleAt(vehicle.pose.position),
-      text: name, colour: COLOURS.ink, edge: colour, bold: true, chip: COLOURS.chip, rank: 0.5, far: true,
+      text: name, color: COLORS.ink, edge: color, bold: true, chip: COLORS.chip, rank: 0.5, far: true,
       sides: ["below", "right", "left", "above"],
     });
   });

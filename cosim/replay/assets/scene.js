@@ -32,7 +32,7 @@ class Scene {
   /**
    * Show other runs; the camera stays.
    * @param {Run[]} runs
-   * @param {{name: string, colour: string}[]|null} marks of the runs; null for one run, whose path has the colors of
+   * @param {{name: string, color: string}[]|null} marks of the runs; null for one run, whose path has the colors of
    * the active regions
    */
   setRuns(runs, marks) {
@@ -200,8 +200,8 @@ class Scene {
       this._sky = new OffscreenCanvas(width, height);
       const sky = this._sky.getContext("2d", { alpha: false });
       sky.fillStyle = sky.createLinearGradient(0, 0, 0, height);
-      sky.fillStyle.addColorStop(0, COLOURS.skyTop);
-      sky.fillStyle.addColorStop(1, COLOURS.skyBottom);
+      sky.fillStyle.addColorStop(0, COLORS.skyTop);
+      sky.fillStyle.addColorStop(1, COLORS.skyBottom);
       sky.fillRect(0, 0, width, height);
     }
     context.setTransform(1, 0, 0, 1, 0, 0);
@@ -221,14 +221,14 @@ class Scene {
 
   _way(index, t) {
     const chunks = this._trails[index].chunks(this.camera, t);
-    for (const chunk of chunks) chunk.colour = this._wayColour(index, chunk.past, chunk.active);
+    for (const chunk of chunks) chunk.color = this._wayColor(index, chunk.past, chunk.active);
     return chunks;
   }
 
   /** Return the color of a piece of a path: the run's, if there are several; else the active region's for the past. */
-  _wayColour(index, past, active) {
-    if (this._runMarks) return this._runMarks[index].colour;
-    return past ? this.runs[index].header.regions[active || 0].colour : COLOURS.future;
+  _wayColor(index, past, active) {
+    if (this._runMarks) return this._runMarks[index].color;
+    return past ? this.runs[index].header.regions[active || 0].color : COLORS.future;
   }
 
   _marks(index, t, vehicle) {
@@ -242,8 +242,8 @@ class Scene {
       if (Math.min(near, depth) < camera.near || !(length > 1) || onHull) return [];
       const past = time <= t;
       const onTop = Vec.along(middle, Vec.sub(camera.eye, middle), 0.02); // above the line that it marks
-      const colour = this._wayColour(index, past, active?.[row]);
-      return [{ mark: [u, v, (u - x) / length, (v - y) / length], middle: onTop, past, colour }];
+      const color = this._wayColor(index, past, active?.[row]);
+      return [{ mark: [u, v, (u - x) / length, (v - y) / length], middle: onTop, past, color }];
     });
   }
 
@@ -252,21 +252,21 @@ class Scene {
     const { painter } = this;
     let lines = [];
     things.forEach((thing, k) => {
-      const { points, sight, line, mark, corners, colour, past, style } = thing;
+      const { points, sight, line, mark, corners, color, past, style } = thing;
       if (sight) paintSight(painter, sight, style);
       else if (line) paintBodyAxis(painter, thing);
       else if (mark) paintMark(painter, thing);
       else if (corners) {
         painter.begin();
         painter.polygon(corners);
-        painter.fill(colour);
-        painter.stroke(colour, 0.7); // closes the seams between faces
+        painter.fill(color);
+        painter.stroke(color, 0.7); // closes the seams between faces
       } else {
         lines.push(points);
         const next = things[k + 1];
-        if (next?.points && next.colour === colour && next.past === past) return;
-        if (past) painter.strokeLines(lines, COLOURS.halo, 6);
-        painter.strokeLines(lines, colour, past ? 3 : 1);
+        if (next?.points && next.color === color && next.past === past) return;
+        if (past) painter.strokeLines(lines, COLORS.halo, 6);
+        painter.strokeLines(lines, color, past ? 3 : 1);
         lines = [];
       }
     });
@@ -274,10 +274,10 @@ class Scene {
 
   _note(t, poses, entries) {
     const runs = this.runs.map((run, r) => {
-      const colours = run.header.regions.map((_, i) =>
-        entries.find(({ owners }) => owners.some(([a, b]) => a === r && b === i))?.colour ?? null);
+      const colors = run.header.regions.map((_, i) =>
+        entries.find(({ owners }) => owners.some(([a, b]) => a === r && b === i))?.color ?? null);
       const { position = null, quaternion = null } = poses[r] ?? {};
-      return { position, quaternion, active: run.active(t), current: run.current(t), colours };
+      return { position, quaternion, active: run.active(t), current: run.current(t), colors };
     });
     this._drawn = { time: t, runs };
   }

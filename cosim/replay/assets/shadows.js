@@ -26,14 +26,14 @@ function shadowsOf({ points, faces, normals }) {
 }
 
 /** Return the outline of an ellipsoid from above: the unit circle times a root of the sum of squared half axes. */
-function ellipseFromAbove(centre, axes) {
+function ellipseFromAbove(center, axes) {
   const sum = (i, j) => axes.reduce((total, axis) => total + axis[i] * axis[j], 0);
   const a = Math.sqrt(sum(0, 0));
   const b = sum(0, 1) / a;
   const c = Math.sqrt(Math.max(0, sum(1, 1) - b * b));
   return Array.from({ length: 48 }, (_, i) => {
     const [u, v] = [Math.cos((Math.PI * i) / 24), Math.sin((Math.PI * i) / 24)];
-    return [centre[0] + a * u, centre[1] + b * u + c * v];
+    return [center[0] + a * u, center[1] + b * u + c * v];
   });
 }
 
@@ -50,9 +50,9 @@ function paintShadows(painter, entries, bounds) {
     }
   };
   trace(true);
-  painter.fill(COLOURS.shadow);
+  painter.fill(COLORS.shadow);
   trace(false);
-  painter.stroke(COLOURS.soft, 1, 0.5, [4, 4]);
+  painter.stroke(COLORS.soft, 1, 0.5, [4, 4]);
 }
 
 /** Paint the shadow of a vehicle, and the plumb line to it. */
@@ -60,11 +60,11 @@ function paintPlumb(painter, { pose: { position }, size }, floor) {
   const foot = [position[0], position[1], floor];
   painter.begin();
   painter.segment(position, foot);
-  painter.stroke(COLOURS.soft, 1, 0.9, [3, 3]);
+  painter.stroke(COLORS.soft, 1, 0.9, [3, 3]);
   painter.begin();
   painter.polygon(Vec.circle(foot, [0, 0, 1], size, 36));
-  painter.fill(COLOURS.shadow);
-  painter.stroke(COLOURS.soft, 1, 0.6);
+  painter.fill(COLORS.shadow);
+  painter.stroke(COLORS.soft, 1, 0.6);
 }
 
 /** Paint the shadow of the past path, through the first points of its chunks. */
@@ -73,5 +73,5 @@ function paintWayBelow(painter, chunks, floor) {
   for (const { middle, past, next } of chunks) {
     if (past && next) painter.segment([middle[0], middle[1], floor], [next.middle[0], next.middle[1], floor]);
   }
-  painter.stroke(COLOURS.shadow, 2.5);
+  painter.stroke(COLORS.shadow, 2.5);
 }

@@ -31,22 +31,22 @@ function sightOf({ sight }, { position, quaternion }, shift, size) {
 }
 
 /** Draw a region of attitude: a clear cone with its rim, the lines in it, and the feature as a cross in a circle. */
-function paintSight(painter, { apex, rim, lines, feature }, { colour, alpha, width, dash }) {
+function paintSight(painter, { apex, rim, lines, feature }, { color, alpha, width, dash }) {
   const { context, camera } = painter;
   painter.begin();
   painter.polygon(rim);
-  painter.fill(colour, 0.25 * alpha);
+  painter.fill(color, 0.25 * alpha);
   // the flanks: the triangles between the apex and all rim points cover the outline of the cone
   painter.begin();
   rim.forEach((p, i) => painter.polygon([apex, p, rim[(i + 1) % SIGHT_RINGS]]));
-  painter.fill(colour, 0.16 * alpha);
+  painter.fill(color, 0.16 * alpha);
   painter.begin();
   painter.polygon(rim);
   for (let i = 0; i < SIGHT_RINGS; i += SIGHT_RINGS / 4) painter.segment(apex, rim[i]);
-  painter.stroke(colour, width, 0.9, dash);
+  painter.stroke(color, width, 0.9, dash);
   painter.begin();
   for (const line of lines) painter.line(line);
-  painter.stroke(colour, width, 0.8);
+  painter.stroke(color, width, 0.8);
   const [x, y, depth] = feature ? camera.project(feature) : [];
   if (!(depth >= camera.near)) return;
   const r = width > 2 ? 9 : 7;
@@ -54,5 +54,5 @@ function paintSight(painter, { apex, rim, lines, feature }, { colour, alpha, wid
   beginLines(context, ...rays.map(([u, v]) => [0.4 * r, 1.5 * r].map((off) => [x + off * u, y + off * v])));
   context.moveTo(x + r, y);
   context.arc(x, y, r, 0, 2 * Math.PI);
-  painter.stroke(colour, Math.max(1.8, width));
+  painter.stroke(color, Math.max(1.8, width));
 }

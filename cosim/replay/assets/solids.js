@@ -13,9 +13,9 @@ const LONG = 3; // times the radius of a sphere of equal volume-to-area ratio; a
  * @property {number[][]} normals outward, of each face
  * @property {number[][]} edges [point, point, face, face, 1 if sharp]
  * @property {number[][]} lines of points on an ellipsoid, drawn to show its form
- * @property {number[]} centre, {number} radius of its bounding sphere  @property {number} top its least depth [m]
+ * @property {number[]} center, {number} radius of its bounding sphere  @property {number} top its least depth [m]
  * @property {boolean} long true if its position is its nearest point, not its center
- * @property {object|null} ellipsoid {centre, axes} of an ellipsoid: three half axes as vectors
+ * @property {object|null} ellipsoid {center, axes} of an ellipsoid: three half axes as vectors
  * @property {number[][][]} shadows closed lines, north and east, about what it hides from above
  * @property {function(number[]): function(number[]): boolean} from returns a test for an eye; the test is true for
  * points inside or behind the solid
@@ -35,10 +35,10 @@ function solidOf(points, faces) {
   return solid;
 }
 
-/** Return a bounding sphere of some points: {centre, radius}. */
+/** Return a bounding sphere of some points: {center, radius}. */
 function ballAbout(points) {
-  const centre = Vec.mean(boxAbout(points));
-  return { centre, radius: points.reduce((most, p) => Math.max(most, Vec.distance(p, centre)), 0) };
+  const center = Vec.mean(boxAbout(points));
+  return { center, radius: points.reduce((most, p) => Math.max(most, Vec.distance(p, center)), 0) };
 }
 
 /** Return runs of consecutive faces with bounding spheres, as most of a large surface is far from a line of sight. */
@@ -107,8 +107,8 @@ function edgesOf(faces, normals) {
 }
 
 /** Return true if the line from an eye to a point crosses the bounding sphere of a solid. */
-function nearSight({ centre, radius }, eye, p) {
-  const [sight, off] = [Vec.sub(eye, p), Vec.sub(p, centre)];
+function nearSight({ center, radius }, eye, p) {
+  const [sight, off] = [Vec.sub(eye, p), Vec.sub(p, center)];
   const part = clamp(-Vec.dot(off, sight) / Vec.dot(sight, sight), 0, 1);
   return Vec.norm(Vec.along(off, sight, part)) < radius;
 }
@@ -139,14 +139,14 @@ function holds(polygon, p, normal) {
 }
 
 /** Return an ellipsoid; it is drawn by its projected conic, so it has no faces, only points on great circles. */
-function ellipsoidOf(centre, axes) {
+function ellipsoidOf(center, axes) {
   const circles = [[0, 1], [1, 2], [2, 0]].map(([a, b]) => Array.from({ length: 2 * AROUND }, (_, i) => {
     const angle = (Math.PI * i) / AROUND;
-    return Vec.along(Vec.along(centre, axes[a], Math.cos(angle)), axes[b], Math.sin(angle));
+    return Vec.along(Vec.along(center, axes[a], Math.cos(angle)), axes[b], Math.sin(angle));
   }));
   const lines = circles.map((circle, c) => [...circle.keys(), 0].map((i) => 2 * AROUND * c + i));
   const inverse = axes.map((axis) => Vec.scale(axis, 1 / Vec.dot(axis, axis))).flat(); // maps to the unit sphere
-  const mapped = (p) => Vec.turned(inverse, Vec.sub(p, centre));
+  const mapped = (p) => Vec.turned(inverse, Vec.sub(p, center));
   const from = (eye) => {
     const unitEye = mapped(eye);
     return (p) => {
@@ -159,9 +159,9 @@ function ellipsoidOf(centre, axes) {
     };
   };
   return {
-    points: circles.flat(), faces: [], normals: [], edges: [], lines, ellipsoid: { centre, axes }, inverse, from,
-    centre, radius: Math.max(...axes.map(Vec.norm)), top: centre[2] - Math.hypot(...axes.map((axis) => axis[2])),
-    long: false, shadows: [ellipseFromAbove(centre, axes)],
+    points: circles.flat(), faces: [], normals: [], edges: [], lines, ellipsoid: { center, axes }, inverse, from,
+    center, radius: Math.max(...axes.map(Vec.norm)), top: center[2] - Math.hypot(...axes.map((axis) => axis[2])),
+    long: false, shadows: [ellipseFromAbove(center, axes)],
   };
 }
 
@@ -170,8 +170,8 @@ const SURFACES = new WeakMap();
 /** Return the surface of a bounded shape, made once for each object; null if the shape has no surface. */
 function surfaceOf(shape) {
   if (!SURFACES.has(shape)) {
-    const { centre, half_axes: axes, points, faces } = shape.drawing ?? {};
-    SURFACES.set(shape, axes ? ellipsoidOf(centre, axes) : points ? solidOf(points, faces) : null);
+    const { center, half_axes: axes, points, faces } = shape.drawing ?? {};
+    SURFACES.set(shape, axes ? ellipsoidOf(center, axes) : points ? solidOf(points, faces) : null);
   }
   return SURFACES.get(shape);
 }

@@ -39,9 +39,9 @@ class Stage {
     while (this.views.length < groups.length) this.views.push(this._view(this._another()));
     groups.forEach((indices, i) => {
       const view = this.views[i];
-      const marks = runs.length > 1 ? indices.map((index) => ({ name: names[index], colour: runColour(index) })) : [];
-      const captions = marks.map(({ name, colour }, k) =>
-        h("span.run-name", {}, swatch(colour, runDash(indices[k])), name));
+      const marks = runs.length > 1 ? indices.map((index) => ({ name: names[index], color: runColor(index) })) : [];
+      const captions = marks.map(({ name, color }, k) =>
+        h("span.run-name", {}, swatch(color, runDash(indices[k])), name));
       view.caption.replaceChildren(...captions);
       Object.assign(view, { indices, blank: !indices.length });
       if (view.blank) return;

@@ -9,7 +9,7 @@ function placeOf(run, index, t, place = null) {
   if (index === 0 && run.has("target.x")) return run.vectorHeld("target", t);
   const shape = run.shape(index, t);
   const planes = shape.drawing?.planes?.map(({ point }) => point);
-  const handle = surfaceOf(shape)?.centre ?? (planes ? Vec.mean(planes) : shape.sight?.feature);
+  const handle = surfaceOf(shape)?.center ?? (planes ? Vec.mean(planes) : shape.sight?.feature);
   return handle ? Vec.add(handle, run.shift(index, t, place)) : null;
 }
 

@@ -51,7 +51,7 @@ class Timeline {
   /** Paint the ribbon: the color of the active region in full height, violations as notches below. */
   paint() {
     const { context, width, height } = clearedCanvas(this.canvas);
-    context.fillStyle = COLOURS.grid;
+    context.fillStyle = COLORS.grid;
     context.fillRect(0, 0, width, height);
     const active = this.run?.column("active");
     if (!active || this.run.rows < 2) return;
@@ -60,11 +60,11 @@ class Timeline {
     const bar = (from, to, top, least) =>
       context.fillRect(x(from), top, Math.max(least, x(to) - x(from)), height - top);
     for (const { from, until, value } of stretches(active)) {
-      const { colour, criterion } = header.regions[value] ?? { colour: COLOURS.grid };
-      Object.assign(context, { fillStyle: colour, globalAlpha: criterion ? 1 : 0.45 });
+      const { color, criterion } = header.regions[value] ?? { color: COLORS.grid };
+      Object.assign(context, { fillStyle: color, globalAlpha: criterion ? 1 : 0.45 });
       bar(time[from], time[until], 0, 1);
     }
-    Object.assign(context, { fillStyle: COLOURS.ink, globalAlpha: 1, strokeStyle: COLOURS.card, lineWidth: 2.5 });
+    Object.assign(context, { fillStyle: COLORS.ink, globalAlpha: 1, strokeStyle: COLORS.card, lineWidth: 2.5 });
     for (const { name } of header.regions.filter(({ criterion }) => criterion)) {
       for (const [from, until] of below(this.run, `${name}.clearance`)) bar(from, until, height - 4, 2);
     }

@@ -107,11 +107,11 @@ function touchesPicture(points, { width, height }) {
 }
 
 /** Draw a mark of direction: a small arrow head on the path. */
-function paintMark(painter, { mark: [x, y, u, v], colour, past }) {
+function paintMark(painter, { mark: [x, y, u, v], color, past }) {
   const size = past ? 6.5 : 4.5;
   const corners = [[1, 0], [-0.7, 0.75], [-0.7, -0.75]];
   beginLines(painter.context, corners.map(([a, b]) => [x + size * (a * u - b * v), y + size * (a * v + b * u)]));
   painter.context.closePath();
-  if (past) painter.stroke(COLOURS.halo, 2.5);
-  painter.fill(colour);
+  if (past) painter.stroke(COLORS.halo, 2.5);
+  painter.fill(color);
 }

@@ -42,11 +42,11 @@ const Vec = {
   },
 
   /** Return `count` points of a circle about an axis; the first is turned by `phase` of their spacing. */
-  circle(centre, axis, radius, count, phase = 0) {
+  circle(center, axis, radius, count, phase = 0) {
     const [first, second] = Vec.aside(axis);
     return Array.from({ length: count }, (_, i) => {
       const angle = (2 * Math.PI * (i + phase)) / count;
-      return Vec.along(Vec.along(centre, first, radius * Math.cos(angle)), second, radius * Math.sin(angle));
+      return Vec.along(Vec.along(center, first, radius * Math.cos(angle)), second, radius * Math.sin(angle));
     });
   },
 };

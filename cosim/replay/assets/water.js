@@ -20,13 +20,13 @@ function paintCurrents(painter, labels, runs, t) {
     const text = `current ${words}${whose.length < runs.length ? `, ${whose.join(", ")}` : ""}`;
     context.font = "600 12px system-ui, sans-serif";
     const width = Math.min(context.measureText(text).width, camera.width - x - 44);
-    fillRounded(context, COLOURS.chip, x - 20, y - 16, width + 56, 32, 6);
+    fillRounded(context, COLORS.chip, x - 20, y - 16, width + 56, 32, 6);
     labels.block(x - 20, y - 16, width + 56, 32);
     const along = Vec.scale(Vec.unit(current), 0.5 * ARROW);
     const [dx, dy] = [Vec.dot(along, camera.right), -Vec.dot(along, camera.up)];
     context.lineCap = "round";
-    painter.strokeLines(arrowLines([x - dx, y - dy], [x + dx, y + dy], 9), COLOURS.accent, 2.6);
-    Object.assign(context, { lineCap: "butt", fillStyle: COLOURS.ink, textAlign: "left", textBaseline: "middle" });
+    painter.strokeLines(arrowLines([x - dx, y - dy], [x + dx, y + dy], 9), COLORS.accent, 2.6);
+    Object.assign(context, { lineCap: "butt", fillStyle: COLORS.ink, textAlign: "left", textBaseline: "middle" });
     context.fillText(text, x + 26, y + 0.5, width);
     y -= 36;
   }

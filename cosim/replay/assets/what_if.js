@@ -192,7 +192,7 @@ function movedShape(shape, by) {
   const all = (points) => points.map(add);
   const deeper = (depth) => depth + by[2];
   const moves = {
-    centre: add, feature: add, point: add, start: add, end: add, points: all, corners: all,
+    center: add, feature: add, point: add, start: add, end: add, points: all, corners: all,
     top: deeper, bottom: deeper, depth: deeper,
     drawing: (drawing) => movedShape(drawing, by),
     planes: (planes) => planes.map((plane) => movedShape(plane, by)),

@@ -63,7 +63,7 @@ class WhatIfPanel extends FieldPanel {
   _water() {
     const { whatIf } = this;
     const current = DIRECTIONS.map(([letter, direction], axis) =>
-      this._ofKey(letter, `current ${direction} in metres a second`, 0.05, `plant.current.${axis}`));
+      this._ofKey(letter, `current ${direction} in meters a second`, 0.05, `plant.current.${axis}`));
     const { key, weight } = whatIf.flight.data.restoring;
     const sets = [fieldSet("Current, m/s", ...current)];
     if (!this.slots.has(key)) return sets;
@@ -120,13 +120,13 @@ class WhatIfPanel extends FieldPanel {
       const fields = [...axes.keys()].filter((axis) => axes[axis].length).map((axis) => {
         const [letter, direction] = DIRECTIONS[axis];
         const changed = (value) => whatIf.move(region, handle(), handle().with(axis, value), place);
-        return this._number(letter, `${name}, ${direction} in metres`, 0.1, () => handle()[axis], changed);
+        return this._number(letter, `${name}, ${direction} in meters`, 0.1, () => handle()[axis], changed);
       });
       return fieldSet(name, ...fields);
     });
     const fixed = regions.filter((_, region) => !whatIf.canMove(region));
     if (fixed.length) sets.push(h("p.hint", {}, wordsOfFixed(fixed)));
-    return h("div.command-list", {}, h("p.hint", {}, "Places in metres:"), ...sets);
+    return h("div.command-list", {}, h("p.hint", {}, "Places in meters:"), ...sets);
   }
 }
 

@@ -27,7 +27,7 @@ CURRENT = tuple(f"plant.current.{axis}" for axis in range(3))
 BUOYANCY = f"{PARAMETERS}buoyancy"
 NOISE = ("sensing.position_noise", "sensing.velocity_noise")
 # keys of shapes that hold a position, a list of positions, or a depth
-_POINTS = ("centre", "feature", "point", "start", "end")
+_POINTS = ("center", "feature", "point", "start", "end")
 _LISTS = ("points", "corners")
 _DEPTHS = ("top", "bottom", "depth")
 # tried numbers differ from the scenario's by the first, and these differences from each other by the second

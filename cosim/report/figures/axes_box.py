@@ -28,7 +28,7 @@ class Box:
         corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
         self.outline = hull_of(corners, self.view)
         self._least, self._most = self.outline.min(axis=0), self.outline.max(axis=0)
-        self._scale = 1.0  # inches a metre
+        self._scale = 1.0  # inches a meter
 
     def scale_to(self, width: float, max_height: float) -> float:
         """Scale the box to a picture of a `width` and at most a `max_height`; return its height [inch]."""

@@ -35,9 +35,7 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
         )
     if targets_of(data):
         moving_note += " Diamonds: the targets before the last one, numbered as they were commanded."
-    way = (
-        "" if data.scenario.log else "; the path is in a criterion's colour while the arbiter gives way to its regions"
-    )
+    way = "" if data.scenario.log else "; the path is in a criterion's color while the arbiter gives way to its regions"
     after = dict.fromkeys(("5a", "5b", "7"), "") if data.scenario.log else _AFTER
     outlines = ", with outlines of the regions: full to be kept out of, dashed to be kept within"
     if not (data.scenario.has_goal or data.scenario.regions):
@@ -45,7 +43,7 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
     if is_known(data):
         yield (
             "path-3d",
-            f"Path in space{after['5a']}, seen from the south-east{way}. Grey: its shadow on the deepest plane.",
+            f"Path in space{after['5a']}, seen from the south-east{way}. Gray: its shadow on the deepest plane.",
             in_space.path_3d,
         )
         yield (
@@ -77,7 +75,7 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
             over_time.clearance,
         )
     if data.scenario.commands.enabled:
-        yield "control-mode", "Who steered, as it was commanded; grey where disarmed.", over_time.control_mode
+        yield "control-mode", "Who steered, as it was commanded; gray where disarmed.", over_time.control_mode
     if imported:
         yield "velocity", "Velocity over ground and angular velocity, body frame.", over_time.velocities
     if math.isfinite(data.summary["max_force_asked"]):
@@ -106,4 +104,4 @@ def _figures(data: FigureData) -> Iterator[tuple[str, str, Callable[[FigureData]
 
 
 def _zoom(data: FigureData) -> str:
-    return " Left, where there are two: the time of the first overlap (grey)." if over_time.zooms(data) else ""
+    return " Left, where there are two: the time of the first overlap (gray)." if over_time.zooms(data) else ""

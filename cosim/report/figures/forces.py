@@ -32,12 +32,12 @@ def forces(data: FigureData) -> Figure:
     labels = [f"norm, {which}" for which in norms] + names
     figure, (norm, parts) = over_time(data, [1.7, 1.7], labels)
     entries: dict[str, Artist] = {}
-    for label, force, colour, dashes in zip(labels, norms.values(), (BLACK, RED), DASHES, strict=False):
-        entries[label] = curve(norm, data, force, color=colour, linestyle=dashes)
+    for label, force, color, dashes in zip(labels, norms.values(), (BLACK, RED), DASHES, strict=False):
+        entries[label] = curve(norm, data, force, color=color, linestyle=dashes)
     log_axis(norm, list(norms.values()))
     norm.set_ylabel("force, norm [N]")
-    for i, (name, colour, dashes) in enumerate(zip(names, (BLUE, RED, GREEN), DASHES, strict=False)):
-        entries[name] = curve(parts, data, acting[:, i], color=colour, linestyle=dashes)
+    for i, (name, color, dashes) in enumerate(zip(names, (BLUE, RED, GREEN), DASHES, strict=False)):
+        entries[name] = curve(parts, data, acting[:, i], color=color, linestyle=dashes)
     size = norms["acting"][np.isfinite(norms["acting"])]
     largest, typical = (float(size.max()), float(np.percentile(size, 90))) if size.size else (0.0, 0.0)
     if largest > 20.0 * max(typical, 1.0):  # on a linear axis a spike would hide the rest
@@ -101,10 +101,10 @@ def estimates(data: FigureData) -> Figure:
     entries: dict[str, Artist] = {}
     shown: dict[bool, list[Array]] = {True: [], False: []}
     for i, label in enumerate(labels):
-        ax, colour = (force, BLUE) if i == 0 else (moment, CYCLE[i])
+        ax, color = (force, BLUE) if i == 0 else (moment, CYCLE[i])
         signal = data.record[f"estimate.phi{i + 1}"]
-        entries[label] = curve(ax, data, signal, color=colour, linestyle=DASHES[max(0, i - 1)])
-        entries["truth"] = ax.axhline(true_values[i], color=colour, linestyle=(0, (1, 3)), linewidth=1.2)
+        entries[label] = curve(ax, data, signal, color=color, linestyle=DASHES[max(0, i - 1)])
+        entries["truth"] = ax.axhline(true_values[i], color=color, linestyle=(0, (1, 3)), linewidth=1.2)
         shown[i == 0] += [signal, true_values[i : i + 1]]
     force.set_ylim(*limits_of(shown[True], least=0.1))
     moment.set_ylim(*limits_of(shown[False], least=0.1))

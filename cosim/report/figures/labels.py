@@ -13,7 +13,7 @@ _LETTER, _HIGH = 0.066, 0.130  # inches, width of a letter and height of a line 
 _MARK = 0.06  # inches, radius of a marker
 _MAX_SHARE = 0.7  # fraction of the picture's width and height; larger areas get their label in a corner
 _SIZE = 7
-_COLOUR = "#333333"
+_COLOR = "#333333"
 _CORNERS = np.array([[i, j] for i in (-1.0, 1.0) for j in (-1.0, 1.0)])
 
 
@@ -47,12 +47,12 @@ class Labels:
                 if ((path > label_low) & (path < label_high)).all(axis=1).any():
                     continue
                 placed.append((label_low, label_high))
-                self._ax.text(middle[0], middle[1], name, fontsize=_SIZE, color=_COLOUR, ha="center", va="center")
+                self._ax.text(middle[0], middle[1], name, fontsize=_SIZE, color=_COLOR, ha="center", va="center")
                 break
 
 
 def _candidates(low: Array, high: Array, size: Array, wide: bool) -> list[Array]:
-    """Return centres for a label, best first: within, then beside; for a large outline in its corners only."""
+    """Return centers for a label, best first: within, then beside; for a large outline in its corners only."""
     middle, half = (low + high) / 2.0, size / 2.0
     inner, outer = (high - low) / 2.0 - 1.1 * half, (high - low) / 2.0 + 1.2 * half
     corners = list(middle + inner * _CORNERS[::-1])

@@ -19,7 +19,7 @@ LEFT, RIGHT, BOTTOM, TOP = 0.80, 0.14, 0.46, 0.10  # inches around the axes
 LEGEND_ROW = 0.19  # inches, height of a row
 _GAP = 0.14  # inches between axes
 _MARGIN = 0.06  # margin beyond signals, as a fraction of their span
-_LABEL = 0.17  # inches from the figure's edge to the centre of an axis label
+_LABEL = 0.17  # inches from the figure's edge to the center of an axis label
 _MAX_LETTERS = 34  # maximum number of letters of a name in a legend
 _LETTERS, _MARK = 104, 7  # widths in letters of a legend: width of the figure; width of a line with its gap
 

@@ -27,14 +27,14 @@ from cosim.report.figures.layout import (
 from cosim.report.figures.shape_outlines import cover, lines_of_shape
 from cosim.report.figures.style import (
     BLACK,
-    PATH_COLOUR,
+    PATH_COLOR,
     FigureData,
     Place,
     features_of,
     places_of,
 )
 from cosim.report.figures.trajectory import SampledPath, sample_path
-from cosim.scenario.colours import GOAL_COLOUR
+from cosim.scenario.colors import GOAL_COLOR
 from cosim.simulation.signals import Array
 
 SIDE = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])  # view of north and depth, looking west
@@ -42,7 +42,7 @@ ABOVE = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # view of north and east
 _TALLEST = 7.6  # inches, maximum height of both planes together
 _FAINT = 0.35  # opacity of a region where it began or ended
 _GAP = 0.34  # inches between the planes
-_NAMED = 8  # maximum number of regions that are labelled in space
+_NAMED = 8  # maximum number of regions that are labeled in space
 
 
 def path_3d(data: FigureData) -> Figure:
@@ -65,8 +65,8 @@ def path_3d(data: FigureData) -> Figure:
         seen = _region(ax, place, low, high, box.view, clip)
         if seen and not place.faint and few:
             labels.request(place.region.name, np.vstack(seen))
-    for name, colour, feature in features_of(data):
-        ax.plot(*(box.view @ feature), "*", color=colour, markersize=9)
+    for name, color, feature in features_of(data):
+        ax.plot(*(box.view @ feature), "*", color=color, markersize=9)
         labels.request(name, (box.view @ feature)[None])
     floor = np.column_stack([sampled.points[:, :2], np.full(len(sampled.points), high[2])])
     ax.plot(*(floor @ box.view.T).T, color=BLACK, linewidth=0.8, alpha=0.25)
@@ -84,7 +84,7 @@ def path_plane(data: FigureData) -> Figure:
     entries = _entries(data, sampled)
     top = TOP + LEGEND_ROW * legend_rows(list(entries)) + 0.16
     across = WIDTH - LEFT - RIGHT
-    scale = min(across / along, _TALLEST / (side + above))  # inches a metre
+    scale = min(across / along, _TALLEST / (side + above))  # inches a meter
     # a narrow picture shows more of the surroundings to fill the width
     room = (across / scale - along) / 2.0
     low, high = low - np.array([room, 0.0, 0.0]), high + np.array([room, 0.0, 0.0])
@@ -110,8 +110,8 @@ def path_plane(data: FigureData) -> Figure:
             seen = _region(ax, place, low, high, view)
             if seen and not place.faint:
                 labels.request(place.region.name, np.vstack(seen))
-        for name, colour, feature in features_of(data):
-            ax.plot(*(view @ feature), "*", color=colour, markersize=9)
+        for name, color, feature in features_of(data):
+            ax.plot(*(view @ feature), "*", color=color, markersize=9)
             labels.request(name, (view @ feature)[None])
         _targets(ax, sampled, view)
         _path(ax, data, sampled, view)
@@ -136,12 +136,12 @@ def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: 
     whole = Path.make_compound_path(*(Path(area, closed=True) for area in areas))
     dashes = "-" if place.region.keep == "out" else "--"
     drawn: list[Artist] = [
-        ax.add_patch(PathPatch(whole, color=place.colour, alpha=(0.15 if clip is None else 0.08) * alpha, linewidth=0)),
-        *ax.plot(*_with_gaps(outline), color=place.colour, linewidth=1.1, linestyle=dashes, alpha=alpha),
+        ax.add_patch(PathPatch(whole, color=place.color, alpha=(0.15 if clip is None else 0.08) * alpha, linewidth=0)),
+        *ax.plot(*_with_gaps(outline), color=place.color, linewidth=1.1, linestyle=dashes, alpha=alpha),
     ]
     if clip is not None:
         if edges:
-            drawn += ax.plot(*_with_gaps(edges), color=place.colour, linewidth=0.5, alpha=0.7 * alpha)
+            drawn += ax.plot(*_with_gaps(edges), color=place.color, linewidth=0.5, alpha=0.7 * alpha)
         for artist in drawn:
             artist.set_clip_path(clip, ax.transData)
     return areas
@@ -153,14 +153,14 @@ def _frame(low: Array, high: Array) -> Array:
 
 
 def _path(ax: Axes, data: FigureData, sampled: SampledPath, view: Array) -> None:
-    """Draw the path, in the colour of a criterion while one of its regions is active."""
+    """Draw the path, in the color of a criterion while one of its regions is active."""
     flat = sampled.points @ view.T
-    ax.plot(*flat.T, color=PATH_COLOUR, linewidth=1.6)
+    ax.plot(*flat.T, color=PATH_COLOR, linewidth=1.6)
     for i, criterion in enumerate(data.scenario.criteria):
         there = sampled.given_way == i
         if there.any():
             there[:-1] |= there[1:]  # up to the beginning of the next piece
-            ax.plot(*np.where(there[:, None], flat, np.nan).T, color=criterion.colour, linewidth=2.4)
+            ax.plot(*np.where(there[:, None], flat, np.nan).T, color=criterion.color, linewidth=2.4)
     if sampled.overlap.any():
         ax.plot(*np.where(sampled.overlap[:, None], flat, np.nan).T, color=BLACK, linewidth=3)
     ax.plot(*flat[0], "x", color=BLACK, mew=2, markersize=7)
@@ -170,16 +170,16 @@ def _path(ax: Axes, data: FigureData, sampled: SampledPath, view: Array) -> None
 def _targets(ax: Axes, sampled: SampledPath, view: Array) -> None:
     """Draw the targets that were commanded before the last one, faint, with their numbers in order."""
     for i, (middle, radius) in enumerate(sampled.targets):
-        centre = view @ middle
+        center = view @ middle
         if radius > 0.0:
             turn = np.linspace(0.0, 2.0 * np.pi, 49)
             ax.plot(
-                *(centre[:, None] + radius * np.array([np.cos(turn), np.sin(turn)])),
-                color=GOAL_COLOUR, alpha=0.6, linewidth=0.9, linestyle="--",
+                *(center[:, None] + radius * np.array([np.cos(turn), np.sin(turn)])),
+                color=GOAL_COLOR, alpha=0.6, linewidth=0.9, linestyle="--",
             )  # fmt: skip
-        ax.plot(*centre, "D", color=GOAL_COLOUR, alpha=0.6, markersize=3)
+        ax.plot(*center, "D", color=GOAL_COLOR, alpha=0.6, markersize=3)
         ax.annotate(
-            str(i + 1), (centre[0], centre[1]), (3, 3), textcoords="offset points", fontsize=7, color=GOAL_COLOUR
+            str(i + 1), (center[0], center[1]), (3, 3), textcoords="offset points", fontsize=7, color=GOAL_COLOR
         )
 
 
@@ -188,18 +188,18 @@ def _entries(data: FigureData, sampled: SampledPath) -> dict[str, Artist]:
     shown = {secondary.criterion for secondary in data.scenario.regions}
     entries: dict[str, Artist] = {}
     if data.scenario.has_goal:
-        entries["goal"] = Patch(color=GOAL_COLOUR, alpha=0.4)
-    entries |= {c.name: Patch(color=c.colour, alpha=0.4) for c in data.scenario.criteria if c.name in shown}
-    entries["path"] = Line2D([], [], color=PATH_COLOUR, linewidth=1.6)
+        entries["goal"] = Patch(color=GOAL_COLOR, alpha=0.4)
+    entries |= {c.name: Patch(color=c.color, alpha=0.4) for c in data.scenario.criteria if c.name in shown}
+    entries["path"] = Line2D([], [], color=PATH_COLOR, linewidth=1.6)
     for i, criterion in enumerate(data.scenario.criteria):
         if (sampled.given_way == i).any():
-            entries[f"gives way to {criterion.name}"] = Line2D([], [], color=criterion.colour, linewidth=2.4)
+            entries[f"gives way to {criterion.name}"] = Line2D([], [], color=criterion.color, linewidth=2.4)
     if sampled.overlap.any():
         entries["in the overlap"] = Line2D([], [], color=BLACK, linewidth=3)
     entries["start"] = Line2D([], [], color=BLACK, linestyle="", marker="x", mew=2)
     entries["end"] = Line2D([], [], color=BLACK, linestyle="", marker="o", markersize=4)
     if sampled.targets:
-        entries["earlier targets"] = Line2D([], [], color=GOAL_COLOUR, linestyle="", marker="D", markersize=3)
+        entries["earlier targets"] = Line2D([], [], color=GOAL_COLOR, linestyle="", marker="D", markersize=3)
     return entries
 
 

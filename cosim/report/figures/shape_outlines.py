@@ -67,11 +67,11 @@ def _meet(least: Array, most: Array, low: Array, high: Array) -> bool:
     return bool((least < high).all() and (most > low).all())
 
 
-def _ellipsoid(centre: Array, half_axes: Array, low: Array, high: Array, view: Array) -> ShapeLines | None:
+def _ellipsoid(center: Array, half_axes: Array, low: Array, high: Array, view: Array) -> ShapeLines | None:
     reach = np.linalg.norm(half_axes, axis=0)
-    if not _meet(centre - reach, centre + reach, low, high):
+    if not _meet(center - reach, center + reach, low, high):
         return None
-    middle, flat = view @ centre, half_axes @ view.T
+    middle, flat = view @ center, half_axes @ view.T
     outline = middle + _AROUND @ np.linalg.cholesky(flat.T @ flat).T
     circles = [middle + _AROUND @ flat[[i, j]] for i, j in ((0, 1), (0, 2), (1, 2))]
     return ShapeLines([outline], [outline], circles)

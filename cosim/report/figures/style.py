@@ -1,4 +1,4 @@
-"""Shared code of all figures: data of the run, colours, style, and thinning of curves."""
+"""Shared code of all figures: data of the run, colors, style, and thinning of curves."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from matplotlib.rcsetup import cycler
 from controller.regions import Region
 from controller.regions.region_set import of_attitude, shape_entry
 from cosim.results.record import Rows
-from cosim.scenario.colours import colours_of_regions
+from cosim.scenario.colors import colors_of_regions
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-# Okabe & Ito, safe for colour blindness
+# Okabe & Ito, safe for color blindness
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, RED, PURPLE = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7"
 )  # fmt: skip
 CYCLE = (BLUE, RED, GREEN, ORANGE, PURPLE, SKY, BLACK, YELLOW)
-PATH_COLOUR = BLUE
+PATH_COLOR = BLUE
 
 STYLE: Any = {
     "font.size": 9,
@@ -87,11 +87,11 @@ def thin(time: Array, signal: Array) -> tuple[Array, Array]:
 
 
 def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
-    """Yield the goal and every secondary region with its colour."""
-    goal, *colours = colours_of_regions(scenario)
+    """Yield the goal and every secondary region with its color."""
+    goal, *colors = colors_of_regions(scenario)
     if scenario.has_goal:
         yield scenario.goal_region, goal
-    yield from zip((secondary.region for secondary in scenario.regions), colours, strict=True)
+    yield from zip((secondary.region for secondary in scenario.regions), colors, strict=True)
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,7 @@ class Place:
     """A region in space at one time."""
 
     region: Region
-    colour: str
+    color: str
     shift: Array  # (3,) m, NED, from the region's position in the scenario
     faint: bool  # True at the start or end of the region's motion
 
@@ -109,7 +109,7 @@ def places_of(data: FigureData) -> Iterator[Place]:
     # A moving region is preceded by itself at the start and at the end, marked as faint. Regions of attitude have no
     # position and are skipped.
     dynamic = {secondary.region.name for secondary in data.scenario.regions if secondary.is_dynamic}
-    for region, colour in regions_of(data.scenario):
+    for region, color in regions_of(data.scenario):
         if of_attitude(region.shape):
             continue
         shifts = shifts_of(data.record, region.name)
@@ -117,18 +117,18 @@ def places_of(data: FigureData) -> Iterator[Place]:
         # NaN is not the least
         at = -1 if region.name == "goal" else int(np.argmin(np.where(np.isnan(clearance), np.inf, clearance)))
         if shifts.any() and region.name not in dynamic:
-            yield Place(region, colour, shifts[0], faint=True)
-            yield Place(region, colour, shifts[-1], faint=True)
-        yield Place(region, colour, shifts[at], faint=False)
+            yield Place(region, color, shifts[0], faint=True)
+            yield Place(region, color, shifts[-1], faint=True)
+        yield Place(region, color, shifts[at], faint=False)
 
 
 def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:
-    """Yield name, colour and final position [m, NED], shape (3,), of the feature of every visibility region."""
-    for region, colour in regions_of(data.scenario):
+    """Yield name, color and final position [m, NED], shape (3,), of the feature of every visibility region."""
+    for region, color in regions_of(data.scenario):
         cone = shape_entry(region.shape).cone
         feature = cone(region.shape).feature if cone else None
         if feature is not None:
-            yield region.name, colour, np.array(feature) + shifts_of(data.record, region.name)[-1]
+            yield region.name, color, np.array(feature) + shifts_of(data.record, region.name)[-1]
 
 
 def shifts_of(record: Rows, name: str) -> Array:

@@ -31,7 +31,7 @@ from cosim.report.figures.style import (
 )
 from cosim.results.record import Rows
 from cosim.results.spans import spans
-from cosim.scenario.colours import GOAL_COLOUR
+from cosim.scenario.colors import GOAL_COLOR
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.signals import Array
@@ -108,18 +108,18 @@ def _zero_line(ax: Axes) -> None:
 
 
 def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
-    """Return name and values of the RMS error to the goal's centre, or of the distance to a goal without one."""
+    """Return name and values of the RMS error to the goal's center, or of the distance to a goal without one."""
     # with returns [m]
     bounds = np.array(scenario.goal.bounds())
     if not np.isfinite(bounds).all():
         return "distance to the goal", np.maximum(0.0, -record["goal.clearance"])
-    centre = bounds.mean(axis=0) + shifts_of(record, "goal")
+    center = bounds.mean(axis=0) + shifts_of(record, "goal")
     path = record.stack([f"position.{a}" for a in "xyz"])
-    return "RMS error", np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0)
+    return "RMS error", np.linalg.norm(path - center, axis=1) / np.sqrt(3.0)
 
 
 def position_error(data: FigureData) -> Figure:
-    """Draw the RMS error to the goal's centre, or the distance to a goal without one."""
+    """Draw the RMS error to the goal's center, or the distance to a goal without one."""
     what, error = error_of(data.scenario, data.record)
     sphere = data.scenario.goal if isinstance(data.scenario.goal, Sphere) else None
     labels = [what, "tolerance r_v/√3"] if sphere else [what]
@@ -127,7 +127,7 @@ def position_error(data: FigureData) -> Figure:
     lines = [curve(ax, data, error)]
     ax.set_ylabel(f"{what} [m]")
     if sphere:
-        lines.append(ax.axhline(sphere.radius / np.sqrt(3.0), color=GOAL_COLOUR, linestyle="--"))
+        lines.append(ax.axhline(sphere.radius / np.sqrt(3.0), color=GOAL_COLOR, linestyle="--"))
     ax.set_ylim(0.0, limits_of([error, np.array([sphere.radius if sphere else 0.0])])[1])
     legend(figure, dict(zip(labels, lines, strict=True)))
     return figure
@@ -151,8 +151,8 @@ def velocities(data: FigureData) -> Figure:
     entries: dict[str, Artist] = {}
     for ax, (names, label, least) in zip(axes, groups, strict=True):
         signals = {name: data.record[f"velocity.{name}"] for name in names}
-        for (name, signal), colour, dashes in zip(signals.items(), (BLUE, RED, GREEN), DASHES, strict=False):
-            entries[name] = curve(ax, data, signal, color=colour, linestyle=dashes)
+        for (name, signal), color, dashes in zip(signals.items(), (BLUE, RED, GREEN), DASHES, strict=False):
+            entries[name] = curve(ax, data, signal, color=color, linestyle=dashes)
         ax.set_ylim(*limits_of(list(signals.values()), least=least))
         ax.set_ylabel(label)
     legend(figure, entries)
@@ -172,7 +172,7 @@ def weights_overlap(data: FigureData) -> Figure:
         entries: dict[str, Artist] = {}
         for label, criterion, dashes in zip(labels, criteria, cycle(DASHES), strict=False):
             curve = thin(time[shown], data.record[f"weight.{criterion.name}"][shown])
-            (entries[label],) = ax.plot(*curve, color=criterion.colour, linestyle=dashes)
+            (entries[label],) = ax.plot(*curve, color=criterion.color, linestyle=dashes)
         entries["overlap"] = ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
         ax.set_title(f"{start:.3f} s to {end:.3f} s", fontsize=8, pad=3)
         ax.set_xlim(float(time[shown][0]), float(time[shown][-1]) + 1e-9)
@@ -186,13 +186,13 @@ def weights_overlap(data: FigureData) -> Figure:
 
 def weights(data: FigureData) -> Figure:
     """Draw memberships and weights of each criterion."""
-    labels = ["weight, in its criterion's colour", "membership"]
+    labels = ["weight, in its criterion's color", "membership"]
     criteria = data.scenario.criteria
     figure, axes = _zoomed(data, [0.95] * len(criteria), labels)
     for i, (row, criterion) in enumerate(zip(axes, criteria, strict=True)):
         name = criterion.name
         lines = [
-            curve(row, data, data.record[f"weight.{name}"], color=criterion.colour, linewidth=1.8),
+            curve(row, data, data.record[f"weight.{name}"], color=criterion.color, linewidth=1.8),
             curve(row, data, data.record[f"membership.{name}"], color=BLACK, linestyle=":", linewidth=1.0),
         ]
         row[0].set(ylim=(-0.06, 1.06), yticks=(0.0, 0.5, 1.0))
@@ -215,16 +215,16 @@ def clearance(data: FigureData) -> Figure:
     command = [region.name for region, _ in regions if region.name in named]
     for row, group, unit in zip(axes, (of_places, of_angles), ("m", "°"), strict=False):
         signals = []
-        for region, colour in sorted(group, key=lambda entry: entry[0].name in named):  # the others behind
+        for region, color in sorted(group, key=lambda entry: entry[0].name in named):  # the others behind
             signal = data.record[f"{region.name}.clearance"]
             signal = np.rad2deg(signal) if unit == "°" else np.where(np.abs(signal) < _AWAY, signal, np.nan)
             signals.append(signal)
             if region.name in named:
                 i = command.index(region.name)
                 dashes, width = DASHES[i % len(DASHES)], 1.3 if i < len(DASHES) else 0.8
-                entries[region.name] = curve(row, data, signal, color=colour, linestyle=dashes, linewidth=width)
+                entries[region.name] = curve(row, data, signal, color=color, linestyle=dashes, linewidth=width)
             else:
-                entries[other_labels[0]] = curve(row, data, signal, color=colour, alpha=0.3, linewidth=0.6)
+                entries[other_labels[0]] = curve(row, data, signal, color=color, alpha=0.3, linewidth=0.6)
         low, high = limits_of(signals)
         low = min(low, -0.08 * (high - min(low, 0.0)))  # always shows some of the range below 0
         row[0].set_ylim(low, max(high, -0.2 * low))
@@ -267,7 +267,7 @@ def lyapunov(data: FigureData) -> Figure:
     labels = ("V as printed", "V, potential of the force", "V, primary region alone")
     figure, axes = _zoomed(data, [1.8, 1.8], labels)
     styles = zip(forms.values(), (ORANGE, BLUE, BLACK), DASHES, strict=False)
-    lines = [curve(axes[0], data, V, color=colour, linestyle=style) for V, colour, style in styles]
+    lines = [curve(axes[0], data, V, color=color, linestyle=style) for V, color, style in styles]
     rate = data.record["lyapunov.rate"]
     curve(axes[1], data, rate, color=BLUE)
     for row, signal, bad_sign in ((axes[0], forms["normalized"], -1.0), (axes[1], rate, 1.0)):

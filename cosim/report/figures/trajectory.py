@@ -41,7 +41,7 @@ def sample_path(data: FigureData) -> SampledPath:
 
 
 def targets_of(data: FigureData) -> list[tuple[Array, float]]:
-    """Return the targets that were commanded before the last one: centre [m, NED] and radius [m]; returns (3,)."""
+    """Return the targets that were commanded before the last one: center [m, NED] and radius [m]; returns (3,)."""
     if not data.scenario.commands.enabled:
         return []
     targets = data.record.stack([*(f"target.{axis}" for axis in "xyz"), "target.radius"])

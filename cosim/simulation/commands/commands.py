@@ -52,7 +52,7 @@ class SetTarget(_Command, frozen=True):
     """Move the target region, and reach it."""
 
     # With a radius the target is a sphere about `position` [m, NED]; otherwise the scenario's goal region, moved so
-    # that its centre is there. It travels from there at `velocity` [m/s, NED].
+    # that its center is there. It travels from there at `velocity` [m/s, NED].
 
     position: Vector3  # m, NED
     radius: float | None = None  # m

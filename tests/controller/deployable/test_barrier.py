@@ -229,9 +229,9 @@ def test_gradient_rate_is_zero_at_a_switch_of_flat_faces():
 
 def planes(box, position):
     """Return the distance to each face from within, and its slope inwards."""
-    from_centre = position - np.array(box.centre)
+    from_center = position - np.array(box.center)
     half = np.array(box.size) / 2.0
-    return [(half[a] - s * from_centre[a], -s * np.eye(3)[a]) for a in range(3) for s in (1.0, -1.0)]
+    return [(half[a] - s * from_center[a], -s * np.eye(3)[a]) for a in range(3) for s in (1.0, -1.0)]
 
 
 def test_faces_ahead_are_box_planes():
@@ -239,7 +239,7 @@ def test_faces_ahead_are_box_planes():
     rng, box, two, three = np.random.default_rng(2), Box((0.5, -0.4, 0.3), (3.0, 4.0, 5.0)), 0, 0
     region = Region("box", box, "in", (0.05, -0.02, 0.03))
     for _ in range(80):
-        at = np.array(box.centre) + rng.uniform(-0.49, 0.49, 3) * np.array(box.size)
+        at = np.array(box.center) + rng.uniform(-0.49, 0.49, 3) * np.array(box.size)
         motion = moving(rng, np.r_[rng.normal(size=3) * 0.5, np.zeros(3)], position_spread=0.02)
         motion = motion._replace(position=at + 1.5 * np.array(region.velocity), free_acceleration=np.zeros(6))
         relative = motion.velocity - np.r_[region.velocity, np.zeros(3)]

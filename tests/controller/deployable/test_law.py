@@ -68,13 +68,13 @@ def test_goal_is_reached_without_violation_and_within_force_limits():
     law, sea, clear = law_for(REGIONS), Sea(noise=NOISE), []
 
     def check(t):
-        at = [np.add(r.shape.centre, np.multiply(r.velocity, t)) for r in REGIONS[:2]]
+        at = [np.add(r.shape.center, np.multiply(r.velocity, t)) for r in REGIONS[:2]]
         clear.extend(np.linalg.norm(sea.position - c) - r.shape.radius for c, r in zip(at, REGIONS, strict=False))
 
     forces = fly(law, sea, steps=1500, each=check)
     assert min(clear) > 0.0
     assert np.abs(forces).max() <= 27.0
-    assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
+    assert np.linalg.norm(sea.position - GOAL.shape.center) < 0.5
     assert np.linalg.norm(sea.velocity) < 0.05
     assert law.estimate[0] == pytest.approx(sea.net_weight, abs=1.0)
 
@@ -112,13 +112,13 @@ def test_one_second_sensor_outage_is_tolerated(which):
     ball = REGIONS[0].shape
 
     def check(t):
-        clear.append(np.linalg.norm(sea.position - ball.centre) - ball.radius)
+        clear.append(np.linalg.norm(sea.position - ball.center) - ball.radius)
         assert law.memory.thrusters.health.all(), t
 
     forces = fly(law, sea, steps=1500, change=dead(which), each=check)
     assert np.isfinite(forces).all() and np.abs(forces).max() <= 27.0
     assert min(clear) > 0.0
-    assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
+    assert np.linalg.norm(sea.position - GOAL.shape.center) < 0.5
 
 
 @pytest.mark.medium
@@ -163,12 +163,12 @@ def test_with_attitude_alone_the_weight_is_compensated(rise):
 def test_state_uncertainty_widens_margins():
     """At a goal that a ball covers it waits at the margin, which grows by three standard deviations."""
     ball, waits = REGIONS[0], []
-    goal = Region("goal", Sphere(ball.shape.centre, 0.5), "in")
+    goal = Region("goal", Sphere(ball.shape.center, 0.5), "in")
     for deviation in (0.0, 0.1):
         own, sea = law_for([ball]), Sea()
         given = np.r_[np.full(3, deviation), np.full(9, 1e-3)]
         fly(own, sea, goal, [ball], 1500, change=lambda t, state, given=given: state._replace(deviation=given))
-        waits.append(np.linalg.norm(sea.position - ball.shape.centre) - ball.shape.radius)
+        waits.append(np.linalg.norm(sea.position - ball.shape.center) - ball.shape.radius)
     assert 0.03 <= waits[0] < 0.04
     assert waits[1] - waits[0] == pytest.approx(0.3, abs=0.01)
 
@@ -212,10 +212,10 @@ def test_region_uncertainty_widens_its_clearance():
         regions, least, sea = [dataclasses.replace(REGIONS[0], deviation=deviation), *REGIONS[1:]], [], Sea()
 
         def check(t, least=least, sea=sea, ball=REGIONS[0].shape):
-            least.append(np.linalg.norm(sea.position - ball.centre) - ball.radius)
+            least.append(np.linalg.norm(sea.position - ball.center) - ball.radius)
 
         fly(law_for(regions), sea, regions=regions, steps=1500, each=check)
-        assert np.linalg.norm(sea.position - GOAL.shape.centre) < 0.5
+        assert np.linalg.norm(sea.position - GOAL.shape.center) < 0.5
         clear.append(min(least))
     assert clear[1] > clear[0] + 0.2
 

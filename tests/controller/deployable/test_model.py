@@ -42,7 +42,7 @@ def test_model_acceleration_matches_the_plant(name):
             values |= {f"current.{a}": c for a, c in zip("xyz", current, strict=True)}
             values |= {f"thrust_time_constant[{i + 1}]": 0.0 for i in range(8)}
             plant.set(values)
-            plant.initialise()
+            plant.initialize()
             # phi_2..phi_4 of (12): r_G W - r_B B, with r_G at the origin
             moments = -(vehicle.weight - restoring) * np.array([plant[f"r_B.{a}"] for a in "xyz"])
             for j in range(8):
@@ -118,7 +118,7 @@ def test_without_redundancy_least_force_after_a_loss_is_the_nominal_one():
 
 
 def test_model_does_not_depend_on_weight_and_buoyancy():
-    """Another weight, buoyancy and other centres make the same numbers."""
+    """Another weight, buoyancy and other centers make the same numbers."""
     import dataclasses
 
     vehicle = load_vehicle("odin")

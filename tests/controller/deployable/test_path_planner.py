@@ -45,16 +45,16 @@ def scene(seed, moving=False):
 
 
 def least_clearance(way, count, regions):
-    """Sample the way each centimetre, with every region where it is by then."""
-    least, travelled = np.inf, 0.0
+    """Sample the way each centimeter, with every region where it is by then."""
+    least, traveled = np.inf, 0.0
     still = regions._replace(shifts=regions.shifts.copy())
     for a, b in zip([START, *way[: count - 1]], way[:count], strict=True):
         length = np.linalg.norm(b - a)
         for s in np.arange(0.0, length, 0.01):
-            still.shifts[:] = regions.shifts + regions.velocities * (travelled + s) / GAINS.speed
+            still.shifts[:] = regions.shifts + regions.velocities * (traveled + s) / GAINS.speed
             at = a + (b - a) * s / length
             least = min(least, *(clearance_at(still, i, at) for i in range(still.kinds.size)))
-        travelled += length
+        traveled += length
     return least
 
 

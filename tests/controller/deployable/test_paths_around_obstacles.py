@@ -47,12 +47,12 @@ def soft_clearance(packed, point, later=0.0):
 
 
 def price(depth, away=0.0):
-    """Return what a soft region costs beside its own price: by its depth, and half a metre for being entered."""
+    """Return what a soft region costs beside its own price: by its depth, and half a meter for being entered."""
     return max(depth, 0.0) + 0.5 * np.clip((depth + away) / 0.2, 0.0, 1.0)
 
 
 def near_price(free, gains=GAINS):
-    """Return what a metre costs at a clearance of hard regions."""
+    """Return what a meter costs at a clearance of hard regions."""
     deep, lack = max(gains.margin - free, 0.0), max(gains.clearance - free, 0.0)
     return 3.0 * (lack / gains.clearance) ** 2 + 200.0 * (min(deep / 0.1, 1.0) + deep)
 
@@ -210,11 +210,11 @@ def test_nearest_goal_point_follows_the_gradient():
             at = np.array([4.0, *rng.uniform([0.0, 2.0], [1.0, 3.0])])
             nearest_goal_point(packed, at, depth, end)
             assert clearance_at(packed, 0, end) == pytest.approx(depth, abs=2e-3)
-            from_centre = end - [8.0, 0.5, 2.5]
+            from_center = end - [8.0, 0.5, 2.5]
             if goal is GOAL:
-                assert from_centre == pytest.approx(0.2 * (at - end + from_centre) / np.linalg.norm(at - [8, 0.5, 2.5]))
+                assert from_center == pytest.approx(0.2 * (at - end + from_center) / np.linalg.norm(at - [8, 0.5, 2.5]))
             else:
-                assert from_centre == pytest.approx([-0.7, *(at[1:] - [0.5, 2.5])], abs=1e-9)
+                assert from_center == pytest.approx([-0.7, *(at[1:] - [0.5, 2.5])], abs=1e-9)
 
 
 def test_line_check_matches_dense_sampling():

@@ -42,6 +42,6 @@ def test_all_region_evaluations_agree():
             if region.name == "sphere":
                 asked += 1
                 assert clearance_of_sphere(packed, i, p) == pytest.approx(clearances[i], rel=1e-12)
-                distance = np.linalg.norm(p - packed.shifts[i] - region.shape.centre) - region.shape.radius
+                distance = np.linalg.norm(p - packed.shifts[i] - region.shape.center) - region.shape.radius
                 assert clearances[i] == pytest.approx(-distance if region.keep == "in" else distance, rel=1e-12)
     assert asked == 40

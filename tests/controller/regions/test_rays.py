@@ -68,10 +68,10 @@ def out(*shapes):
 @given(origins, directions, st.floats(0.1, 2.0))
 def test_ray_to_sphere_matches_closed_form(origin, way, radius):
     (met,) = rays(out(Sphere((1.0, 2.0, 0.5), radius)), origin, way)
-    to_centre = np.array([1.0, 2.0, 0.5]) - origin
-    along = to_centre @ way
-    aside = math.sqrt(max(to_centre @ to_centre - along * along, 0.0))
-    if np.linalg.norm(to_centre) <= radius:
+    to_center = np.array([1.0, 2.0, 0.5]) - origin
+    along = to_center @ way
+    aside = math.sqrt(max(to_center @ to_center - along * along, 0.0))
+    if np.linalg.norm(to_center) <= radius:
         assert met == 0.0
     elif along <= 0.0 or aside > radius + 2.0 * TOUCHING:
         assert met == math.inf

@@ -149,7 +149,7 @@ def test_a_ring_is_closed_faces_outward_and_has_its_volume():
     mesh = closed_grid(np.stack([out * np.cos(turn), out * np.sin(turn), 0.5 * np.sin(around)], axis=-1))
     assert_closed(mesh)
     sides = np.linalg.norm(np.diff(mesh.vertices[mesh.triangles], axis=1), axis=2)
-    assert sides.max() < 1.0  # of neighbours alone
+    assert sides.max() < 1.0  # of neighbors alone
     assert signed_volume(mesh) == pytest.approx(2.0 * math.pi**2 * 3.0 * 0.5**2, rel=0.05)
 
 
@@ -172,9 +172,9 @@ def test_half_axes_and_planes_of_shapes_lie_on_the_surface(name):
     entry = ENTRIES[name]
     shape = entry.example
     if entry.half_axes:
-        centre, axes = entry.half_axes(shape)
+        center, axes = entry.half_axes(shape)
         ways = np.random.default_rng(6).normal(size=(50, 3))
-        points = centre + ways / np.linalg.norm(ways, axis=1, keepdims=True) @ axes
+        points = center + ways / np.linalg.norm(ways, axis=1, keepdims=True) @ axes
         outward = np.empty((0, 3))
     else:
         points = np.array([point for point, _ in entry.planes(shape)])

@@ -45,7 +45,7 @@ def test_second_condition_of_38_fails_as_printed_but_the_matrix_test_of_attitude
     assert least_of_potential_test(M, 1.0, GAINS) > 0.0
 
 
-def test_38_holds_within_1_64_metres_of_the_goals_centre():
+def test_38_holds_within_1_64_meters_of_the_goals_center():
     potential, *_ = sphere_radii(M, DRAG, RADIUS, GAINS)
     assert potential == pytest.approx(1.64, abs=0.005)
     assert 2.0 * potential == pytest.approx(greatest_gradient(M, GAINS))
@@ -82,7 +82,7 @@ def test_first_condition_of_45_fails_at_the_papers_start():
     assert not translation.holds
 
 
-def test_45_can_hold_within_0_73_or_1_04_metres():
+def test_45_can_hold_within_0_73_or_1_04_meters():
     _, all_six, translation = sphere_radii(M, DRAG, RADIUS, GAINS)
     assert all_six == pytest.approx(0.73, abs=0.005)
     assert translation == pytest.approx(1.04, abs=0.005)

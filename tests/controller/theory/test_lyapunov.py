@@ -140,7 +140,7 @@ def test_with_unit_gradients_the_three_forms_are_one():
         (Region("d", DepthBand(2.5, 1.8), "in"), (0.0, 0.0, 5.0), (0.0, 0.0, -0.7)),
         (FLAT, (0.0, 0.1, 0.5), (0.0, 0.0, 0.25)),
     ],
-    ids=["sphere out", "sphere in", "sphere aslant", "its centre", "band out", "band in", "box out"],
+    ids=["sphere out", "sphere in", "sphere aslant", "its center", "band out", "band in", "box out"],
 )
 def test_potential_is_the_integral_of_g_along_the_normal(region, position, inward):
     g, dg, clearance = evaluated([region], position)

@@ -64,7 +64,7 @@ def test_forces_and_memory_are_those_of_numba_for_long(library, seed):
 @pytest.mark.parametrize(
     "flags", [("-O0",), ("-O3",), ("-O3", "-march=native", "-fno-tree-slp-vectorize")], ids=" ".join
 )
-def test_any_optimisation_gives_the_same_bits(library, flags, tmp_path):
+def test_any_optimization_gives_the_same_bits(library, flags, tmp_path):
     law, text, _ = library
     assert first_difference(law, compiled(text, tmp_path, *flags), 3000, 6, by_numba) is None
 

@@ -10,7 +10,7 @@ from cosim.batch.variation import Variation
 from cosim.errors import RunError
 from cosim.results.record import load_record
 from cosim.results.recorder import Recorder
-from cosim.results.summary import summarise
+from cosim.results.summary import summarize
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from tests.cosim.simulation.keep import kept_rows
@@ -103,7 +103,7 @@ def test_outcome_equals_the_summary_of_a_recorded_run(name, tmp_path):
         recorder = Recorder(tmp_path, master.signals.columns)
         master.run([recorder])
         recorder.close()
-    said = summarise(scenario, load_record(tmp_path), "completed", None)
+    said = summarize(scenario, load_record(tmp_path), "completed", None)
     with FusedFlyer(Variation(scenario, [])) as flyer:
         outcome, _ = flyer.fly_one(scenario)
 

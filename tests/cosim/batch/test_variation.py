@@ -9,7 +9,7 @@ from cosim.errors import ScenarioError
 from cosim.scenario.scenario import load_scenario
 
 KEYS = (
-    "initial.position.1", "regions.SR1.gain", "regions.0.shape.centre.0", "goal.centre.2", "law.gains.k_p1",
+    "initial.position.1", "regions.SR1.gain", "regions.0.shape.center.0", "goal.center.2", "law.gains.k_p1",
     "plant.parameters.weight", "plant.parameters.r_B.z", "limit.force", "time.duration",
 )  # fmt: skip
 VALUES = (0.1, 50.0, 2.1, 5.0, 10.0, 1230.0, 0.01, 200.0, 30.0)
@@ -28,7 +28,7 @@ def test_varied_values_equal_overrides_of_the_file(paper, tmp_path):
     overrides += ["sensing.seed=7", "plant.parameters.seed=7"]
     file.write_text(paper.toml())
     assert made.table == load_scenario(file, overrides).table | {
-        "changed": tuple(key for key in KEYS if key != "goal.centre.2")  # which has that value already
+        "changed": tuple(key for key in KEYS if key != "goal.center.2")  # which has that value already
     }
     assert made.initial.position[1] == 0.1 and made.plant.parameters["r_B.z"] == 0.01 and made.steps == 30_000
     assert made.sensing.seed == 7 and made.plant.parameters["seed"] == 7
@@ -82,6 +82,6 @@ def test_invalid_value_is_rejected_by_name(paper, key, value, words):
 
 
 def test_integer_shape_parameters_accept_fractions(paper):
-    whole = load_scenario("paper-limited", ["goal.radius=1", "regions.SR1.shape.centre=[2, 0, 2]"])
-    made = Variation(whole, ["goal.radius", "regions.SR1.shape.centre.1"]).scenario([0.5, 0.25], 0)
-    assert made.goal.radius == 0.5 and made.regions[0].region.shape.centre == (2.0, 0.25, 2.0)
+    whole = load_scenario("paper-limited", ["goal.radius=1", "regions.SR1.shape.center=[2, 0, 2]"])
+    made = Variation(whole, ["goal.radius", "regions.SR1.shape.center.1"]).scenario([0.5, 0.25], 0)
+    assert made.goal.radius == 0.5 and made.regions[0].region.shape.center == (2.0, 0.25, 2.0)

@@ -224,11 +224,11 @@ def test_spheres_as_they_are_drawn_give_the_recorded_clearances(read_steered, st
         for entity in scene.entities:
             for ball in entity.spheres:
                 if set(vector(ball.size)) == {ball.size.x}:
-                    centre = vector(ball.pose.position) + shifts.get(entity.frame_id, 0.0)
-                    gap = np.linalg.norm(shifts["place"] - centre) - ball.size.x / 2.0
+                    center = vector(ball.pose.position) + shifts.get(entity.frame_id, 0.0)
+                    gap = np.linalg.norm(shifts["place"] - center) - ball.size.x / 2.0
                     sign = -1.0 if entity.id == "goal" else 1.0
                     clearance = record[f"{entity.id}.clearance"][k]
-                    # while an obstacle waits, it is a hundred kilometres up
+                    # while an obstacle waits, it is a hundred kilometers up
                     assert sign * gap == pytest.approx(clearance, abs=1e-6 if clearance < 1e3 else 10.0)
                     sizes.add((entity.id, round(ball.size.x, 6)))
     assert {size for name, size in sizes if name != "goal"} >= {0.8, 1.6}

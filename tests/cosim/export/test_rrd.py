@@ -85,8 +85,8 @@ def test_events_are_logged_as_text(read):
 
 def test_commanded_change_is_drawn_from_its_time(run, tmp_path, monkeypatch):
     changes = [
-        {"time": 0.5, "region": 0, "shape": {"kind": "sphere", "centre": (7.0, 0.0, 4.0), "radius": 0.9}},
-        {"time": 0.8, "region": 0, "shape": {"kind": "box", "centre": (7.0, 0.0, 4.0), "size": (1.0, 1.0, 1.0)}},
+        {"time": 0.5, "region": 0, "shape": {"kind": "sphere", "center": (7.0, 0.0, 4.0), "radius": 0.9}},
+        {"time": 0.8, "region": 0, "shape": {"kind": "box", "center": (7.0, 0.0, 4.0), "size": (1.0, 1.0, 1.0)}},
     ]
     monkeypatch.setattr("cosim.export.scene.changes_of", lambda *_: changes)
     (path,) = export_run(run, "rrd", tmp_path / "out.rrd")

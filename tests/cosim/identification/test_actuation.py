@@ -40,7 +40,7 @@ def test_wrench_matches_the_plant(vehicle):
         plant.set({f"thrust[{i + 1}]": x for i, x in enumerate(log.thrust[0])})
         plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", log.wrench[0], strict=True)})
         plant.set({f"actuator.thrust[{i + 1}]": x for i, x in enumerate(steady_forces(log.thrust[:1], bent)[0])})
-        plant.initialise()
+        plant.initialize()
         for k in range(10 * 20):
             row = int(k * STEP / 4 / 0.05 + 1e-9)
             plant.set({f"thrust[{i + 1}]": x for i, x in enumerate(log.thrust[row])})

@@ -37,7 +37,7 @@ def whole(vehicle):
     states = []
     with Plant(vehicle) as plant:
         plant.set({"position.z": 8.0, "quadratic_damping[1]": 110.0, "added_mass[1,1]": 8.0})
-        plant.initialise()
+        plant.initialize()
         for row in thrust:
             states.append([plant[name] for name in names])
             plant.set({f"thrust[{i + 1}]": x for i, x in enumerate(row)})

@@ -53,7 +53,7 @@ def flown(vehicle, wrench, times, rng, force):
     states = []
     with Plant(vehicle) as plant:
         plant.set(TRUTH | {"position.z": 5.0})
-        plant.initialise()
+        plant.initialize()
         for tau, push in zip(wrench, force, strict=True):
             states.append([plant[name] for name in names])
             q = np.array(states[-1][3:7])

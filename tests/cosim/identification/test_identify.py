@@ -16,7 +16,7 @@ SCENARIO = """
 vehicle = "bluerov2_heavy"
 time = { duration = 26.0, step = 0.01, control = 0.05 }
 initial = { position = [0.0, 0.0, 3.0] }
-goal = { type = "sphere", centre = [0.0, 0.0, 3.0], radius = 5.0 }
+goal = { type = "sphere", center = [0.0, 0.0, 3.0], radius = 5.0 }
 law = { name = "pd" }
 actuation = { through = "thrusters" }
 commands = { enabled = true }
@@ -55,7 +55,7 @@ def test_identified_vehicle_file_builds(run, tmp_path, capsys):
     page = out.with_suffix(".html").read_text()
     assert not re.search(r'(src|href)="https?:', page) and "Hold the start velocity" in page
     with Plant(found) as plant:
-        plant.initialise()
+        plant.initialize()
         plant.step(0.1)
 
 

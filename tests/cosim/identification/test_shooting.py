@@ -40,7 +40,7 @@ def test_prediction_matches_the_fmu(vehicle, shooter):
     names += [f"velocity.{name}" for name in "uvwpqr"]
     with Plant(vehicle) as plant:
         plant.set(BODY | dict(zip(names, start, strict=True)))
-        plant.initialise()
+        plant.initialize()
         expected = []
         for tau in wrench[:, 0]:
             plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", tau, strict=True)})

@@ -83,7 +83,7 @@ def test_the_target_is_dragged_with_the_mouse(browser, live, tmp_path):
     assert browser.execute_script(HELD, *after) == pytest.approx([x - 40, y + 60], abs=5)
 
     # without a mouse: a number beside the scene
-    field = browser.find_element("css selector", '#commands input[aria-label="ship, east in metres"]')
+    field = browser.find_element("css selector", '#commands input[aria-label="ship, east in meters"]')
     browser.execute_script("arguments[0].scrollIntoView()", field)
     field.send_keys("\ue009" + "a" + "\ue009", "7", "\ue007")  # Control A, 7, Enter
     ship = "const r = subreach.runs[0]; return r.held('ship.shift.y', r.end)"

@@ -88,7 +88,7 @@ def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
     with running.viewer() as viewer:
         viewer.until("header")
         deep = "[" * 5000, '{"a":' * 3000  # deeper than a parser goes
-        number = '{"command":"change_setting","key":"goal.centre.' + "9" * 5000 + '","value":1}'
+        number = '{"command":"change_setting","key":"goal.center.' + "9" * 5000 + '","value":1}'
         brief = "", "null", "[]", "{", '{"command":1}', '"arm"', '{"command":"arm","armed":1e999}'
         for bad in (b"\x00" * 100, *brief, *deep, number):
             viewer.socket.send(bad)

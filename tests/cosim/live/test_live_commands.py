@@ -50,8 +50,8 @@ def test_commands_are_applied_broadcast_and_reproducible(live, tmp_path):
     changes = received or other.headers[0]["changes"]
     shapes = {names[change["region"]]: change["shape"] for change in changes}
     assert shapes["pile 1"]["radius"] == 0.9 and shapes["seen 1"]["radius"] == 0.3
-    drawing = {"centre": [12.0, 2.0, 3.0], "half_axes": (0.4 * np.eye(3)).tolist()}
-    assert shapes["goal"] == {"kind": "sphere", "centre": [12.0, 2.0, 3.0], "radius": 0.4, "drawing": drawing}
+    drawing = {"center": [12.0, 2.0, 3.0], "half_axes": (0.4 * np.eye(3)).tolist()}
+    assert shapes["goal"] == {"kind": "sphere", "center": [12.0, 2.0, 3.0], "radius": 0.4, "drawing": drawing}
     again = run_scenario(
         load_scenario(done.folder / "scenario.toml"), tmp_path / "again", report=False,
         commands_log=done.folder / "commands.jsonl",

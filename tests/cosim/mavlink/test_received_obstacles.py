@@ -16,9 +16,9 @@ AHEAD, RIGHT, BEHIND, LEFT = 0, 18, 36, 54
 HERE = np.array([1.0, 2.0, 5.0])  # of the station's vehicle [m, NED]
 
 
-def station(centre=(1.0, 8.0, 5.0), radius=1.0, **options):
+def station(center=(1.0, 8.0, 5.0), radius=1.0, **options):
     """Return a station whose only obstacle is a sphere, by default 6 m east of the vehicle."""
-    where = f"regions.SR1.shape.centre={list(map(float, centre))}"
+    where = f"regions.SR1.shape.center={list(map(float, center))}"
     return Station(of=scenario(where, f"regions.SR1.shape.radius={radius}"), **options)
 
 
@@ -96,13 +96,13 @@ def test_obstacle_is_in_the_sector_of_its_bearing(yaw, sector):
 
 
 def test_sectors_go_clockwise():
-    distances = scan(station(centre=at(6.0, 6.0, 0.0)))
+    distances = scan(station(center=at(6.0, 6.0, 0.0)))
     assert distances[9] == pytest.approx(100.0 * (math.sqrt(72.0) - 1.0), abs=1)
     assert set(met(distances)) <= set(range(7, 12))
 
 
 def test_each_sector_holds_its_nearest_obstacle():
-    distances = scan(station(centre=at(6.0, 0.0, 0.0), radius=2.0))
+    distances = scan(station(center=at(6.0, 0.0, 0.0), radius=2.0))
     for i, distance in enumerate(distances):
         near, far = (math.radians(max(abs((i + 36) % 72 - 36) * 5.0 + s, 0.0)) for s in (-2.5, 2.5))
         nearest, farthest = (
@@ -119,7 +119,7 @@ def test_each_sector_holds_its_nearest_obstacle():
 @pytest.mark.parametrize("bearing", np.radians(np.arange(0.0, 360.0, 7.3)))
 def test_obstacle_of_documented_size_is_always_detected(bearing):
     away = 19.6 * np.array([math.cos(bearing), math.sin(bearing), 0.0])
-    assert met(scan(station(centre=HERE + away, radius=0.3)))
+    assert met(scan(station(center=HERE + away, radius=0.3)))
 
 
 def test_scan_plane_stays_horizontal():
@@ -128,22 +128,22 @@ def test_scan_plane_stays_horizontal():
 
 
 def test_obstacles_above_or_below_are_excluded():
-    assert met(scan(station(centre=at(0.0, 6.0, 1.05)))) == {}
-    assert met(scan(station(centre=at(0.0, 6.0, -0.8))))[RIGHT] == 540
+    assert met(scan(station(center=at(0.0, 6.0, 1.05)))) == {}
+    assert met(scan(station(center=at(0.0, 6.0, -0.8))))[RIGHT] == 540
 
 
 def test_empty_sector_holds_maximum_plus_one():
-    assert scan(station(centre=at(0.0, 21.5, 0.0))) == [NOTHING] * 72
-    assert min(scan(station(centre=at(0.0, 20.5, 0.0)))) == 1950
+    assert scan(station(center=at(0.0, 21.5, 0.0))) == [NOTHING] * 72
+    assert min(scan(station(center=at(0.0, 20.5, 0.0)))) == 1950
 
 
 def test_inside_an_obstacle_all_distances_are_minimal():
-    assert scan(station(centre=at(0.0, 0.3, 0.0))) == [0] * 72
+    assert scan(station(center=at(0.0, 0.3, 0.0))) == [0] * 72
 
 
 def test_only_keep_out_obstacle_regions_are_scanned():
-    base = ["regions.SR1.shape.centre=[90.0, 0.0, 5.0]"]
-    near = "regions.{}.shape={{type='sphere', centre=[4.0, 2.0, 5.0], radius=1.0}}"
+    base = ["regions.SR1.shape.center=[90.0, 0.0, 5.0]"]
+    near = "regions.{}.shape={{type='sphere', center=[4.0, 2.0, 5.0], radius=1.0}}"
     other = Station(of=scenario(*base, near.format("SR2")))  # of the criterion shape
     assert met(scan(other)) == {}
     obstacle = Station(of=scenario(*base, near.format("SR2"), "regions.SR2.criterion='obstacle'"))
@@ -151,7 +151,7 @@ def test_only_keep_out_obstacle_regions_are_scanned():
     within = [
         "intersection=[]",
         "regions.SR1.keep='in'",
-        "regions.SR1.shape.centre=[1.0, 2.0, 5.0]",
+        "regions.SR1.shape.center=[1.0, 2.0, 5.0]",
         "regions.SR1.shape.radius=4.0",
     ]
     assert met(scan(Station(of=scenario(*within)))) == {}
@@ -171,7 +171,7 @@ def test_a_moving_region_is_where_it_is_now():
 
 
 def test_dynamic_obstacle_width_follows_its_clearance():
-    stood = station(centre=(90.0, 0.0, 0.0))
+    stood = station(center=(90.0, 0.0, 0.0))
     assert met(scan(stood)) == {}
     for radius in (0.5, 1.5):
         distances = scan(stood, **seen((0.0, 6.0, 0.0), radius))
@@ -182,7 +182,7 @@ def test_dynamic_obstacle_width_follows_its_clearance():
 
 
 def test_before_the_first_snapshot_only_scenario_obstacles_are_reported():
-    stood = station(centre=(0.0, 6.0, 1.0))  # the scenario begins at depth 1
+    stood = station(center=(0.0, 6.0, 1.0))  # the scenario begins at depth 1
     stood.wait(3.0)  # streams go by the wall clock
     assert stood.wire.of("OBSTACLE_DISTANCE_3D") == []
     (message,) = request(stood)

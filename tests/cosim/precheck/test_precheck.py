@@ -125,7 +125,7 @@ def test_start_near_the_goal_holds():
 
 @pytest.mark.medium
 def test_non_spherical_goals_are_checked():
-    box = "goal={type='box',centre=[8,0,5],size=[1,1,1]}"
+    box = "goal={type='box',center=[8,0,5],size=[1,1,1]}"
     found = of_law(box)
     assert found["(38) 1, 2"].status == "holds"  # |df/dp| = 1
     assert found["(45) 1"].status == "holds"
@@ -134,7 +134,7 @@ def test_non_spherical_goals_are_checked():
 
 
 def test_start_inside_a_hard_region_fails_and_the_advice_leads_out():
-    found = of_regions("regions.SR1.shape.centre=[0,0,1.2]")["start, SR1"]
+    found = of_regions("regions.SR1.shape.center=[0,0,1.2]")["start, SR1"]
     assert found.status == "fails" and found.numbers["clearance"] == pytest.approx(-0.3)
     place = re.search(r"\((.*?)\) m", found.advice)[1]
     assert [float(x) for x in place.split(",")] == pytest.approx([0.0, 0.0, 0.7], abs=0.01)
@@ -142,10 +142,10 @@ def test_start_inside_a_hard_region_fails_and_the_advice_leads_out():
 
 @pytest.mark.medium
 def test_covered_goal_fails_and_names_the_covering_region():
-    found = of_regions("regions.SR2.shape.centre=[8,0,5.1]", "regions.SR2.shape.radius=0.8")
+    found = of_regions("regions.SR2.shape.center=[8,0,5.1]", "regions.SR2.shape.radius=0.8")
     assert found["goal and regions"].status == "fails"
     assert "SR2 alone" in found["goal and regions"].advice
-    # the farthest point of the goal from SR2's centre is 0.6 m away
+    # the farthest point of the goal from SR2's center is 0.6 m away
     assert found["goal and regions"].numbers["depth"] == pytest.approx(-0.1, abs=0.01)
     relaxed = float(re.search(r"relax SR2 by ([0-9.]+) m", found["goal and regions"].advice)[1])
     assert relaxed == pytest.approx(0.2, abs=0.02)
@@ -159,7 +159,7 @@ def test_contradictory_regions_fail():
         "regions.SR1.keep=in",
         "regions.SR2.keep=in",
         "intersection=[]",
-        "regions.SR2.shape.centre=[2,0,4.2]",
+        "regions.SR2.shape.center=[2,0,4.2]",
         "regions.SR3.shape.depth=20",
     )
     assert found["regions together"].status == "fails"
@@ -167,9 +167,9 @@ def test_contradictory_regions_fail():
 
 
 def test_overlaps_of_keep_out_regions_are_measured(paper):
-    # centres 0.4 m apart, radii 0.5 m
+    # centers 0.4 m apart, radii 0.5 m
     assert paper["overlaps"].numbers["SR1, SR2"] == pytest.approx(0.3, abs=1e-3)
-    assert "overlaps" not in of_regions("regions.SR2.shape.centre=[2,0,9]", "regions.SR1.shape.centre=[2,9,9]")
+    assert "overlaps" not in of_regions("regions.SR2.shape.center=[2,0,9]", "regions.SR1.shape.center=[2,9,9]")
 
 
 def test_excessive_current_fails_with_the_admissible_speed():
@@ -229,13 +229,13 @@ IN_THE_AIR = 'regions=[{name="b",criterion="depth",keep="in",gain=1,shape={type=
     ("changes", "status", "words"),
     [
         (["initial.position=[0,0,-1.5]"], "fails", "the start by 1.50 m. The plant has water everywhere"),
-        (["goal.centre.2=-5"], "fails", r"the goal by 4.\d0 m"),
+        (["goal.center.2=-5"], "fails", r"the goal by 4.\d0 m"),
         (["goal.then=[[8,0,5],[8,0,-3]]"], "fails", "the goal's place 3 by"),
         ([IN_THE_AIR, "intersection=[]"], "fails", r"\): b by 3.00 m. The plant has water everywhere"),
         (["initial.position=[0,0,-1.5]", "plant.parameters.free_surface=true"], "note", "the vehicle falls"),
-        (["goal.centre.2=-5", "plant.parameters.free_surface=true"], "fails", "the vehicle cannot stay"),
+        (["goal.center.2=-5", "plant.parameters.free_surface=true"], "fails", "the vehicle cannot stay"),
         (["initial.position=[0,0,0]"], "", ""),
-        (["goal.centre.2=0"], "", ""),
+        (["goal.center.2=0"], "", ""),
         ([IN_THE_AIR.replace('"in"', '"out"'), "intersection=[]"], "", ""),  # the air may be kept out of
     ],
 )

@@ -41,7 +41,7 @@ COMMANDS_LOG = {
     120: [cmd.AddObstacle(7, (5.0, 0.2, 2.0), 0.4, (0.1, 0.0, 0.0))],
     140: [cmd.AddObstacle(7, (5.0, 0.3, 2.0), 0.8)],
     160: [cmd.RemoveObstacle(7)],
-    180: [cmd.SetTarget((4.0, 0.0, 2.0)), cmd.ChangeSetting("goal.centre.0", 12.5)],
+    180: [cmd.SetTarget((4.0, 0.0, 2.0)), cmd.ChangeSetting("goal.center.0", 12.5)],
     200: [cmd.SetMission(ITEMS), cmd.SetMode("mission")],
     260: [cmd.ChangeSetting(RADIUS, 0.7), cmd.SetCurrentItem(1)],
 }

@@ -64,12 +64,12 @@ def test_charts_are_painted_and_move_their_cursor(browser, shown, docking):
     browser.open(shown(docking).file)
     visible = "window.subreach.charts.filter((c) => !c.element.hidden)"
     browser.js(f"{visible}.forEach((c) => {{ c.stale = true; c.paint(); }})")
-    colours = browser.js(
+    colors = browser.js(
         f"return {visible}.map((c) => {{ const k = c.canvas; if (!k.width) return 0;"
         "const d = new Uint32Array(k.getContext('2d').getImageData(0, 0, k.width, k.height).data.buffer);"
         "return new Set(d).size; })"
     )
-    assert colours and min(colours) > 3
+    assert colors and min(colors) > 3
     places = []
     for time in (5.0, 30.0):
         browser.scrub(time)

@@ -119,5 +119,5 @@ def test_region_curves_of_one_criterion_have_distinct_colors(browser, shown, doc
     for scheme in ("light", "dark"):
         browser.open(shown(docking).file, scheme=scheme)
         lines = "[...subreach.charts[0].legend.querySelectorAll('line')]"
-        colours = browser.js(f"return {lines}.map((line) => line.getAttribute('stroke'))")
-        assert len(colours) == 6 and len(set(colours)) == 6
+        colors = browser.js(f"return {lines}.map((line) => line.getAttribute('stroke'))")
+        assert len(colors) == 6 and len(set(colors)) == 6

@@ -38,11 +38,11 @@ def ruled(tmp_path_factory):
 
 def test_header_lists_criteria_and_regions_with_colors(four):
     header = header_of(four.scenario, four.record.columns)
-    assert [(one["name"], one["colour"]) for one in header["criteria"]] == CRITERIA
-    colours = dict(CRITERIA)
-    assert [r["colour"] for r in header["regions"]] == [
+    assert [(one["name"], one["color"]) for one in header["criteria"]] == CRITERIA
+    colors = dict(CRITERIA)
+    assert [r["color"] for r in header["regions"]] == [
         "#009E73",
-        *(colours[r["criterion"]] for r in header["regions"][1:]),
+        *(colors[r["criterion"]] for r in header["regions"][1:]),
     ]
     assert [rule["label"] for rule in header["rules"]] == [f"R{i}" for i in range(1, 12)]
     assert "visibility pressing → α4 high" in header["rules"][-1]["words"]
@@ -81,8 +81,8 @@ def test_terminal_view_lists_all_criteria(four):
 
 def test_exported_solids_use_criterion_colors(four):
     everything = tuple(range(len(four.record.columns)))
-    colours = [solid.colour for solid in Scene(Excerpt(four, everything, 1, None)).solids]
-    assert colours[-1] == (0xCC, 0x79, 0xA7)
+    colors = [solid.color for solid in Scene(Excerpt(four, everything, 1, None)).solids]
+    assert colors[-1] == (0xCC, 0x79, 0xA7)
 
 
 def test_rules_of_an_arbiter_file_match_its_explanation(ruled):

@@ -1,4 +1,4 @@
-"""The scene in a real browser: it opens from disk alone, and shows the pose and the colours of the record."""
+"""The scene in a real browser: it opens from disk alone, and shows the pose and the colors of the record."""
 
 import re
 
@@ -83,7 +83,7 @@ def test_active_region_color_matches_the_record(name, browser, shown, request):
     browser.open(page.file)
     instants, seen = ten_instants(page), set()
     assert len(instants) == 10
-    first = {region["criterion"]: region["colour"].lower() for region in reversed(page.header["regions"])}
+    first = {region["criterion"]: region["color"].lower() for region in reversed(page.header["regions"])}
     assert first == {criterion: FULL[criterion] for criterion in first}
     signals = {
         column: record[column] for column in record.units if column.startswith(("weight.", "membership.", "velocity."))
@@ -96,8 +96,8 @@ def test_active_region_color_matches_the_record(name, browser, shown, request):
         drawn = browser.drawn["runs"][0]
         assert drawn["active"] == expected
         for i, region in enumerate(page.header["regions"]):
-            is_full = drawn["colours"][i].lower() == region["colour"].lower()
-            assert is_full == (i == expected), (record["time"][step], region["name"], drawn["colours"][i])
+            is_full = drawn["colors"][i].lower() == region["color"].lower()
+            assert is_full == (i == expected), (record["time"][step], region["name"], drawn["colors"][i])
         seen.add(expected)
     assert len(seen) >= {"paper": 4, "docking": 2}[name]
 

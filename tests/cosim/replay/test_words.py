@@ -14,7 +14,7 @@ SCRIPTS = ("vectors.js", "data.js", "words.js", "axes.js", "floor.js", "outcome.
 EACH = """
 const numbers = [NaN, Infinity, -Infinity, null, undefined, -0, -0.00004, 0.5, 12345.678, -99.99];
 const formats = {
-  decimals: (x) => decimals(x, 2), figure, clock, metres: (x) => metres(x, 0.1), shortNumber,
+  decimals: (x) => decimals(x, 2), figure, clock, meters: (x) => meters(x, 0.1), shortNumber,
   quantity: (x) => ["m", "rad", "rad/s", "N.m", ""].map((unit) => quantity(x, unit)).join(" "),
   reading: (x) => ["m", "rad", ""].map((unit) => reading(x, unit)).join(" "),
   clearanceWords: (x) => [null, "obstacle"].map((criterion) => clearanceWords(x, { criterion, unit: "m" })).join(" "),

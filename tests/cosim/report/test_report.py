@@ -12,7 +12,7 @@ from cosim.report.contents import contents_of
 from cosim.report.figures.figures import drawings
 from cosim.report.figures.sampled_rows import make_figure_data
 from cosim.report.figures.style import thin
-from cosim.report.inline_svg import contrast, dark_colour
+from cosim.report.inline_svg import contrast, dark_color
 from cosim.results.paper_claims import paper_claims
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
@@ -100,14 +100,14 @@ def test_figures_follow_the_theme_and_are_described(shipped_run):
         assert f'aria-label="{html.escape(captions[name])}"' in inline
         dark = dict(re.findall(r"--c(\w{6}):(#\w{6});", theme[1]))
         assert set(re.findall(r"var\(--c(\w{6})", inline)) == dark.keys()
-        for light, colour in dark.items():
+        for light, color in dark.items():
             on_white = contrast(f"#{light}", "#ffffff")
-            assert contrast(colour, "#16181a") >= min(3.0, on_white) - 0.1, (name, light, colour)
+            assert contrast(color, "#16181a") >= min(3.0, on_white) - 0.1, (name, light, color)
 
 
 @pytest.mark.parametrize(("light", "dark"), [("#000000", "#e6e6e3"), ("#ffffff", "#16181a"), ("#e69f00", "#e69f00")])
-def test_greys_change_places_and_light_hues_stay_in_the_dark(light, dark):
-    assert dark_colour(light) == dark
+def test_grays_change_places_and_light_hues_stay_in_the_dark(light, dark):
+    assert dark_color(light) == dark
 
 
 def test_every_link_target_of_the_page_exists(shipped_run):
@@ -122,7 +122,7 @@ def test_every_link_target_of_the_page_exists(shipped_run):
 @pytest.mark.slow
 def test_report_of_another_scenario_with_a_hostile_title_and_a_distant_goal(tmp_path):
     """No overlap, hence no figure of it; not the paper's scenario, hence no claims."""
-    changes = ["arbiter.engine=closed", "time.duration=0.05", 'compare=""', "goal.centre=[0,20,5]"]
+    changes = ["arbiter.engine=closed", "time.duration=0.05", 'compare=""', "goal.center=[0,20,5]"]
     scenario = load_scenario("paper", [*changes, 'title="<script>alert(1)</script> & $x"'])
     run = run_scenario(scenario, tmp_path / "run")
     assert sorted(p.stem for p in run.folder.glob("figures/*.svg")) == FIGURES
@@ -172,9 +172,9 @@ def test_claims_mention_only_entered_spheres(tmp_path):
 
 
 SHAPES = {
-    "box": '{type="box",centre=[2,0,2],size=[1,1,1]}',
+    "box": '{type="box",center=[2,0,2],size=[1,1,1]}',
     "cylinder": '{type="cylinder",start=[2,0,0],end=[2,0,4],radius=0.4}',
-    "ellipsoid": '{type="ellipsoid",centre=[2,0,2],semi_axes=[1,0.5,0.3]}',
+    "ellipsoid": '{type="ellipsoid",center=[2,0,2],semi_axes=[1,0.5,0.3]}',
     "half_space": '{type="half_space",point=[6,0,0],normal=[-1,0,0]}',
     "prism": '{type="prism",corners=[[1,-1],[3,-1],[2,1]],top=1,bottom=3}',
     "pipe": '{type="pipe",points=[[0,1,1],[2,1,2],[4,1,2]],radius=0.3}',

@@ -50,10 +50,10 @@ def test_moving_regions_are_drawn_at_start_end_and_closest_approach(drifting):
     assert list(first.shift) == [0.0, 0.0, 0.0]
     assert last.shift == pytest.approx([-8.0, 2.6, 0.0])
     path = drifting.record.stack(["position.x", "position.y", "position.z"])
-    centre = np.array(nearest.region.shape.centre) + shifts_of(drifting.record, "crossing buoy")
-    at = np.argmin(np.linalg.norm(path - centre, axis=1))
+    center = np.array(nearest.region.shape.center) + shifts_of(drifting.record, "crossing buoy")
+    at = np.argmin(np.linalg.norm(path - center, axis=1))
     assert 20 < at < 180
-    assert nearest.shift == pytest.approx(centre[at] - nearest.region.shape.centre)
+    assert nearest.shift == pytest.approx(center[at] - nearest.region.shape.center)
 
 
 @pytest.mark.slow
@@ -66,12 +66,12 @@ def test_every_figure_can_be_drawn(request, name):
     assert labels == (["clearance [m]", "clearance [°]"] if name == "inspection" else ["clearance [m]"])
     (error,) = figures["position-error"].figure.axes
     drawn = error.lines[0].get_ydata()
-    centre = np.array(data.scenario.goal.centre) + shifts_of(data.record, "goal")
+    center = np.array(data.scenario.goal.center) + shifts_of(data.record, "goal")
     path = data.record.stack(["position.x", "position.y", "position.z"])
-    assert drawn == pytest.approx(np.linalg.norm(path - centre, axis=1) / np.sqrt(3.0))
+    assert drawn == pytest.approx(np.linalg.norm(path - center, axis=1) / np.sqrt(3.0))
 
 
-LABELLED = re.compile(r"\[(m|s|N|N m|W|°|–)\]$")
+LABELED = re.compile(r"\[(m|s|N|N m|W|°|–)\]$")
 
 
 @pytest.mark.medium
@@ -80,13 +80,13 @@ def test_every_axis_of_every_figure_has_a_name_and_a_unit(request, name):
     for drawing in drawings(request.getfixturevalue(name)):
         for ax in drawing.figure.axes:
             if drawing.name == "path-3d":  # draws its own axes
-                names = [text.get_text() for text in ax.texts if LABELLED.search(text.get_text())]
+                names = [text.get_text() for text in ax.texts if LABELED.search(text.get_text())]
                 assert names == ["north, NED x [m]", "east, NED y [m]", "depth, NED z [m]"]
                 continue
             for axis in (ax.xaxis, ax.yaxis):
                 sides = axis.get_tick_params()
                 if sides.get("labelleft") or sides.get("labelbottom"):
-                    assert LABELLED.search(axis.get_label_text()), (drawing.name, axis.get_label_text())
+                    assert LABELED.search(axis.get_label_text()), (drawing.name, axis.get_label_text())
 
 
 @pytest.mark.slow

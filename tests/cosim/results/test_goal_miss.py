@@ -23,7 +23,7 @@ substep = 0.02
 position = [0.0, 0.0, 2.0]
 [goal]
 type = "sphere"
-centre = [{goal}, 0.0, 2.0]
+center = [{goal}, 0.0, 2.0]
 radius = 0.5
 [law]
 name = "deployable"
@@ -42,7 +42,7 @@ gain = 100.0
 shape = {shape}
 """
 SENSING = "[sensing]\nposition_noise = 0.02\nvelocity_noise = 0.01\n"
-BALL = '{ type = "sphere", centre = [3.0, 0.0, 2.0], radius = 1.0 }'
+BALL = '{ type = "sphere", center = [3.0, 0.0, 2.0], radius = 1.0 }'
 WALL = '{ type = "half_space", point = [1.5, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }'
 
 

@@ -95,7 +95,7 @@ SETTINGS = {
     "a deep parameter": f"plant.parameters.{DEEP}=1",
     "open brackets": f"limit.force={'[' * 5000}",
     "brackets": f"limit.force={'[' * 5000}{']' * 5000}",
-    "brackets that Python can parse": f"goal.centre={'[' * 300}1{']' * 300}",
+    "brackets that Python can parse": f"goal.center={'[' * 300}1{']' * 300}",
     "tables": f"goal={'{a=' * 5000}1{'}' * 5000}",
     "a deep key in a value": f"goal={{{DEEP}=1}}",
     "digits": f"limit.force={'9' * 5000}",

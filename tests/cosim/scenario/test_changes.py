@@ -65,8 +65,8 @@ def test_the_numbers_of_shipped_titles_are_those_of_their_scenarios():
         (["regions.1.gain=7"], " (changed: regions.SR2.gain = 7)"),
         (["initial.position.1=2"], " (changed: initial.position.1 = 2 m)"),
         (["initial.position=[1,2,3]"], " (changed: initial.position = (1, 2, 3) m)"),
-        (["regions.SR1.shape.centre.0=3"], " (changed: regions.SR1.shape.centre.0 = 3 m)"),
-        (['goal={type="box",centre=[8,0,5],size=[1,1,1]}'], " (changed: goal)"),
+        (["regions.SR1.shape.center.0=3"], " (changed: regions.SR1.shape.center.0 = 3 m)"),
+        (['goal={type="box",center=[8,0,5],size=[1,1,1]}'], " (changed: goal)"),
         (["intersection=[]", "regions=[]"], " (changed: regions = none)"),
         (["vehicle=rexrov"], " (changed: vehicle = rexrov)"),
         (["report_failures=true"], " (changed: report_failures = true)"),
@@ -106,7 +106,7 @@ def test_inherited_title_lists_overridden_keys(tmp_path):
 
 def test_title_lists_settings_that_complete_a_partial_scenario(tmp_path):
     half = saved(tmp_path / "half.toml", 'title = "Half"\nvehicle = "odin"\ntime = { duration = 2.0 }\n')
-    rest = ["initial.position=[0,0,1]", 'goal={type="sphere",centre=[3,0,2],radius=0.5}']
+    rest = ["initial.position=[0,0,1]", 'goal={type="sphere",center=[3,0,2],radius=0.5}']
     assert load_scenario(half, rest).title == "Half (changed: initial, goal)"
 
 

@@ -92,8 +92,8 @@ def test_default_criterion_colors_are_distinct():
     names = ["obstacle", "a", "b", "depth"]
     criteria = ", ".join(f'{{name = "{name}"}}' for name in names)
     scenario = load_scenario("sitl", [f"criteria=[{criteria}]"])
-    colours = [criterion.colour for criterion in scenario.criteria]
-    assert colours[0] == "#D55E00" and colours[3] == "#56B4E9" and len(set(colours)) == 4
+    colors = [criterion.color for criterion in scenario.criteria]
+    assert colors[0] == "#D55E00" and colors[3] == "#56B4E9" and len(set(colors)) == 4
 
 
 def test_keys_of_the_default_can_be_set():
@@ -111,7 +111,7 @@ def test_keys_of_the_default_can_be_set():
         ("criteria.visibility.name=shape", "criteria[3].name is 'shape', used twice"),
         ('criteria.visibility.name="a b"', "criteria[3].name is 'a b', expected a letter"),
         ("criteria.visibility.name=then", "no word of rules"),
-        ("criteria.visibility.colour=red", "criteria[3].colour is 'red', expected #RRGGBB"),
+        ("criteria.visibility.color=red", "criteria[3].color is 'red', expected #RRGGBB"),
         ("criteria.visibility.membership={clarance={falling=[0,1]}}", "clarance: unknown key; did you mean 'clear"),
         ("criteria.visibility.membership={clearance={faling=[0,1]}}", "membership.clearance.faling: unknown key"),
         ("criteria.visibility.membership={clearance={falling=[1,0]}}", "criteria[3].membership.clearance: shape"),

@@ -18,7 +18,7 @@ MINIMAL = """
 vehicle = "bluerov2_heavy"
 time = { duration = 2.0 }
 initial = { position = [0.0, 0.0, 1.0] }
-goal = { type = "sphere", centre = [3.0, 0.0, 2.0], radius = 0.5 }
+goal = { type = "sphere", center = [3.0, 0.0, 2.0], radius = 0.5 }
 """
 
 

@@ -47,7 +47,7 @@ def fly(regions, goal=GOAL, weights=None, duration=30.0, spoil=None, start=(0.0,
     with Plant(ODIN) as odin:
         odin.set({f"position.{axis}": x for axis, x in zip("xyz", start, strict=True)} | {"substep": 0.01})
         odin.set(plant or {})
-        odin.initialise()
+        odin.initialize()
         for k in range(round(duration / PERIOD)):
             now, out = k * PERIOD, odin.outputs.values
             state = VehicleState(out[0:3].copy(), out[3:7].copy(), out[7:13].copy(), np.ones(8))
@@ -76,8 +76,8 @@ COMER = Region("comer", Sphere((9.0, 0.0, 2.0), 0.6), "out", velocity=(-0.15, 0.
 LEAVING = Region("goal", Sphere((4.0, 0.0, 2.0), 0.5), "in", velocity=(0.1, 0.15, 0.0))
 # open behind: a potential alone would stay in it
 POCKET = [
-    Region(name, Box(centre, size), "out")
-    for name, centre, size in (
+    Region(name, Box(center, size), "out")
+    for name, center, size in (
         ("front", (2.0, 0.0, 2.0), (0.2, 3.0, 3.0)),
         ("left", (1.0, -1.5, 2.0), (2.2, 0.2, 3.0)),
         ("right", (1.0, 1.5, 2.0), (2.2, 0.2, 3.0)),

@@ -33,7 +33,7 @@ ODIN = vehicle_model(load_vehicle("odin"))
 LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
 PERIOD = 0.02
 HERE = np.array([0.0, 0.0, 2.0])
-# every shape where its slope is hardest to tell: centres, axes, edges, a feature in the camera, half a turn away
+# every shape where its slope is hardest to tell: centers, axes, edges, a feature in the camera, half a turn away
 SHAPES = (
     Sphere((0.0, 0.0, 2.0), 0.5),
     DepthBand(2.0, 0.2),

@@ -35,8 +35,8 @@ def test_given_velocities_move_regions_and_goal():
     kept = run("regions.SR1.velocity=[0.5,-0.2,0.1]", "goal.velocity=[0.0,0.3,0.0]")
     t = kept["time"][:, None]
     assert shift(kept, "SR1") == pytest.approx(t * [0.5, -0.2, 0.1], abs=1e-15)
-    for name, centre in (("SR1", (2.0, 0.0, 1.8)), ("goal", (8.0, 0.0, 5.0))):
-        distance = np.linalg.norm(position(kept) - centre - shift(kept, name), axis=1) - 0.5
+    for name, center in (("SR1", (2.0, 0.0, 1.8)), ("goal", (8.0, 0.0, 5.0))):
+        distance = np.linalg.norm(position(kept) - center - shift(kept, name), axis=1) - 0.5
         assert kept[f"{name}.clearance"] == pytest.approx(distance if name == "SR1" else -distance, abs=1e-12)
 
 

@@ -17,7 +17,7 @@ PLACES = [(0.0, 0.0, 2.0), (2.0, 1.0, 2.5), (0.0, 0.0, 2.0)]
 TOUR = [
     "vehicle=bluerov2_heavy", "law.name=deployable", "actuation.through=thrusters", "regions=[]", "time.step=0.01",
     "time.control=0.02", "time.arbiter=0.02", "initial.position=[-1.5, 0.0, 2.0]", "time.duration=40.0",
-    "goal={type='sphere', centre=[0.0, 0.0, 2.0], radius=0.4, then=[[2.0, 1.0, 2.5], [0.0, 0.0, 2.0]], stay=2.0}",
+    "goal={type='sphere', center=[0.0, 0.0, 2.0], radius=0.4, then=[[2.0, 1.0, 2.5], [0.0, 0.0, 2.0]], stay=2.0}",
     "sensing.position_noise=0.02", "sensing.velocity_noise=0.01", "intersection=[]",
 ]  # fmt: skip
 
@@ -68,7 +68,7 @@ def test_soft_region_does_not_block_a_goal_inside_it(net_weight):
     """The top of the goal is 0.6 m deep in a soft region, whose push there is more than what brings the vehicle on."""
     shape = "{type='half_space', point=[0.0, 0.0, 3.3], normal=[0.0, 0.0, 1.0]}"
     changes = [
-        "goal={type='sphere', centre=[2.0, 0.0, 4.8], radius=0.9}",
+        "goal={type='sphere', center=[2.0, 0.0, 4.8], radius=0.9}",
         f"regions=[{{name='greatest', criterion='depth', keep='in', hard=false, gain=100.0, shape={shape}}}]",
         f"plant.parameters.buoyancy={load_vehicle('bluerov2_heavy').weight - net_weight}",
         "arbiter.engine=closed",

@@ -25,7 +25,7 @@ arbiter = 0.02
 position = {start}
 [goal]
 type = "sphere"
-centre = {goal}
+center = {goal}
 radius = 0.5
 [law]
 name = "deployable"
@@ -69,15 +69,15 @@ def room(kind, rng):
     R = Rotation.from_quat(np.roll(quaternion, -1)).as_matrix()
     if kind == "ellipsoid":
         axes = rng.uniform(0.6, 4.0, 3)
-        shape = f"centre = {text(MIDDLE)}, semi_axes = {text(axes)}, quaternion = {text(quaternion)}"
+        shape = f"center = {text(MIDDLE)}, semi_axes = {text(axes)}, quaternion = {text(quaternion)}"
         start, goal = MIDDLE + R @ (0.4 * rng.uniform() * axes * way), MIDDLE + R @ (rng.uniform(1.2, 3.0) * axes * way)
     elif kind == "sphere":
         radius = rng.uniform(0.6, 3.0)
-        shape = f"centre = {text(MIDDLE)}, radius = {radius}"
+        shape = f"center = {text(MIDDLE)}, radius = {radius}"
         start, goal = MIDDLE - rng.uniform(-0.5, 0.5) * radius * way, MIDDLE + rng.uniform(1.5, 4.0) * radius * way
     elif kind == "box":
         half = rng.uniform(0.7, 4.0, 3)
-        shape = f"centre = {text(MIDDLE)}, size = {text(2.0 * half)}, quaternion = {text(quaternion)}"
+        shape = f"center = {text(MIDDLE)}, size = {text(2.0 * half)}, quaternion = {text(quaternion)}"
         corner = R @ (half * rng.choice([-1.0, 1.0], 3) * rng.uniform(0.9, 2.0, 3))
         start, goal = MIDDLE + R @ (half * rng.uniform(-0.4, 0.4, 3)), MIDDLE + corner
     elif kind == "cylinder":
@@ -102,7 +102,7 @@ def kept_in(kind, vehicle, seed):
 
 def block(name, x, y, half):
     size = 2.0 * np.array(half)
-    return REGION.format(name=name, keep="out", shape=f'type = "box", centre = {[x, y, 12.0]}, size = {text(size)}')
+    return REGION.format(name=name, keep="out", shape=f'type = "box", center = {[x, y, 12.0]}, size = {text(size)}')
 
 
 def barred(kind, vehicle, seed):
@@ -163,9 +163,9 @@ def rocks(vehicle, seed):
     rng, length, rocks = np.random.default_rng([seed, 79]), 30.0, ""
     start, goal, count = np.array([0.0, 0.0, 15.0]), np.array([length, rng.uniform(-4.0, 4.0), 15.0]), 0
     while count < 200:
-        centre, radius = rng.uniform([1.0, -8.0, 8.0], [length - 1.0, 8.0, 22.0]), rng.uniform(0.2, 0.9)
-        if min(np.linalg.norm(centre - start), np.linalg.norm(centre - goal)) > radius + 1.4:
-            shape = f'type = "sphere", centre = {text(centre)}, radius = {radius}'
+        center, radius = rng.uniform([1.0, -8.0, 8.0], [length - 1.0, 8.0, 22.0]), rng.uniform(0.2, 0.9)
+        if min(np.linalg.norm(center - start), np.linalg.norm(center - goal)) > radius + 1.4:
+            shape = f'type = "sphere", center = {text(center)}, radius = {radius}'
             rocks, count = rocks + REGION.format(name=f"rock {count}", keep="out", shape=shape), count + 1
     flight = scenario_text(vehicle, seed, start, goal, duration=120.0)
     return flight + rocks

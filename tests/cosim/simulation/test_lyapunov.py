@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cosim.errors import ScenarioError
-from cosim.results.lyapunov_summary import summarise_lyapunov
+from cosim.results.lyapunov_summary import summarize_lyapunov
 from cosim.results.record import Rows, load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
@@ -91,7 +91,7 @@ def test_summary_counts_increases_of_v():
         "lyapunov.normalized": np.array([5.0, 4.0, 3.0, -1.0, -1.0 + 1e-12, -2.0]),  # rises by rounding alone
         "lyapunov.primary": np.array([5.0, 4.0, 3.0, 2.0, 1.0, 0.0]),
     }
-    summary = summarise_lyapunov(Rows([Column(name, "", "") for name in signals], signals))
+    summary = summarize_lyapunov(Rows([Column(name, "", "") for name in signals], signals))
     assert summary["printed"]["increases"] == 2
     assert summary["printed"]["first_rise"] == 1.0
     assert summary["printed"]["first_negative"] is None

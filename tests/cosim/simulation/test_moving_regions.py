@@ -28,7 +28,7 @@ def flight(vehicle, lag, rng, **changes):
             "parameters": {"buoyancy": given.weight * rng.uniform(0.99, 1.01), **lags},
         },
         "initial": {"position": [0.0, 0.0, 4.0]},
-        "goal": {"type": "sphere", "centre": GOAL.tolist(), "radius": 0.5},
+        "goal": {"type": "sphere", "center": GOAL.tolist(), "radius": 0.5},
         "arbiter": {"engine": "closed"},
         "actuation": {"through": "thrusters"},
         "sensing": {"position_noise": 0.02, "velocity_noise": 0.01, "seed": int(rng.integers(1000))},
@@ -40,14 +40,14 @@ def hard(name, shape, keep="out", velocity=(0.0, 0.0, 0.0), **more):
     return region | {"velocity": [float(v) for v in velocity]} | more
 
 
-def moved_shape(kind, rng, centre):
+def moved_shape(kind, rng, center):
     turned = rng.normal(size=4)
     turned = (turned / np.linalg.norm(turned)).tolist()
     if kind == "ellipsoid":
-        return {"type": kind, "centre": centre, "semi_axes": rng.uniform(0.5, 2.0, 3).tolist(), "quaternion": turned}
+        return {"type": kind, "center": center, "semi_axes": rng.uniform(0.5, 2.0, 3).tolist(), "quaternion": turned}
     if kind == "box":
-        return {"type": kind, "centre": centre, "size": rng.uniform(0.8, 3.0, 3).tolist(), "quaternion": turned}
-    return {"type": "sphere", "centre": centre, "radius": rng.uniform(0.8, 2.0)}
+        return {"type": kind, "center": center, "size": rng.uniform(0.8, 3.0, 3).tolist(), "quaternion": turned}
+    return {"type": "sphere", "center": center, "radius": rng.uniform(0.8, 2.0)}
 
 
 def chase(kind, vehicle, lag, seed):
@@ -73,24 +73,24 @@ def room(kind, vehicle, lag, seed):
     """Return a flight in a box to be kept in that moves with a goal at its rear face."""
     rng = np.random.default_rng([seed, *kind.encode()])
     speed, size = rng.uniform(0.3, 0.6), rng.uniform(2.2, 3.2)
-    velocity, box = [speed, 0.0, 0.0], {"type": "box", "centre": [0.0, 0.0, 4.0], "size": [size, size, size]}
+    velocity, box = [speed, 0.0, 0.0], {"type": "box", "center": [0.0, 0.0, 4.0], "size": [size, size, size]}
     return flight(
         vehicle, lag, rng, regions=[hard("room", box, "in", velocity)],
         time={"duration": 40.0, "step": 0.01, "control": 0.02, "arbiter": 0.02},
         initial={"position": [-0.3 * size, 0.0, 4.0], "velocity": [*velocity, 0.0, 0.0, 0.0]},
-        goal={"type": "sphere", "centre": [0.25 - size / 2.0, 0.2, 4.0], "radius": 0.2, "velocity": velocity},
+        goal={"type": "sphere", "center": [0.25 - size / 2.0, 0.2, 4.0], "radius": 0.2, "velocity": velocity},
     )  # fmt: skip
 
 
 def start_inside(kind, vehicle, lag, seed):
     """Return a flight that starts in a sphere to be kept out of, at rest or moving."""
     rng = np.random.default_rng([seed, *kind.encode()])
-    centre = (np.array([0.0, 0.0, 4.0]) + rng.normal(0.0, 0.25, 3)).tolist()
+    center = (np.array([0.0, 0.0, 4.0]) + rng.normal(0.0, 0.25, 3)).tolist()
     velocity = rng.normal(size=3) * [0.2, 0.2, 0.05] * rng.integers(2)
-    ball = {"type": "sphere", "centre": centre, "radius": rng.uniform(0.8, 1.6)}
+    ball = {"type": "sphere", "center": center, "radius": rng.uniform(0.8, 1.6)}
     return flight(
         vehicle, lag, rng, regions=[hard("ball", ball, velocity=velocity), hard("depth", DEPTHS, "in")],
-        goal={"type": "sphere", "centre": [8.0, 0.0, 4.0], "radius": 0.5},
+        goal={"type": "sphere", "center": [8.0, 0.0, 4.0], "radius": 0.5},
     )  # fmt: skip
 
 
@@ -138,7 +138,7 @@ class Circle:
         self.rate, self.phase = rng.uniform(0.4, 0.8) / self.radius, rng.uniform(-np.pi, np.pi)
         self.begin = self.place(0.0)
         self.region = hard(
-            "ship", {"type": "sphere", "centre": (GOAL + self.begin).tolist(), "radius": rng.uniform(0.8, 1.6)},
+            "ship", {"type": "sphere", "center": (GOAL + self.begin).tolist(), "radius": rng.uniform(0.8, 1.6)},
             streamed=True,
         )  # fmt: skip
 

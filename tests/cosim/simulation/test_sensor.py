@@ -155,12 +155,12 @@ def test_noise_depends_only_on_the_seed():
 
 
 def test_arbiter_uses_measurements_and_record_holds_true_clearances():
-    """Large noise: the measured position is metres off, so that memberships differ from the true ones."""
+    """Large noise: the measured position is meters off, so that memberships differ from the true ones."""
     kept = run("sensing.position_noise=3.0", "law.gains.k_p1=0.001", "arbiter.ramp=1.0")
     p, told = stack(kept, *TRUE[:3]), stack(kept, *SENSED[:3])
-    centre = np.array([2.0, 0.0, 1.8])
-    assert kept["SR1.clearance"] == pytest.approx(np.linalg.norm(p - centre, axis=1) - 0.5)
-    seen = np.linalg.norm(told - centre, axis=1) - 0.5
+    center = np.array([2.0, 0.0, 1.8])
+    assert kept["SR1.clearance"] == pytest.approx(np.linalg.norm(p - center, axis=1) - 0.5)
+    seen = np.linalg.norm(told - center, axis=1) - 0.5
     assert kept["membership.obstacle"] == pytest.approx(np.clip(1.0 - seen, 0.0, 1.0), abs=1e-9)
     assert np.ptp(kept["membership.obstacle"]) > 0.5
 

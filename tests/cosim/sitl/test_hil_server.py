@@ -222,7 +222,7 @@ def test_silence_ends_the_run(serve_px4):
 
 
 def test_pressure_is_that_of_water_below_the_surface_and_of_air_above():
-    """Ten metres of fresh water are 0.968 atmospheres; ten metres of air are 1.2 hPa."""
+    """Ten meters of fresh water are 0.968 atmospheres; ten meters of air are 1.2 hPa."""
     assert pressure_at(10.0) == pytest.approx(1013.25 * 1.9678, rel=1e-4)
     assert pressure_at(-10.0) == pytest.approx(1013.25 - 1.2, abs=0.01)
 

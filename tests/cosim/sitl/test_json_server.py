@@ -145,7 +145,7 @@ def test_without_a_bottom_there_is_no_rangefinder(serve, tmp_path):
     path = tmp_path / "deep.toml"
     path.write_text(
         'vehicle = "bluerov2_heavy"\ntime = { duration = 0.01 }\ninitial = { position = [0.0, 0.0, 2.0] }\n'
-        'goal = { type = "sphere", centre = [0.0, 0.0, 2.0], radius = 1.0 }\n'
+        'goal = { type = "sphere", center = [0.0, 0.0, 2.0], radius = 1.0 }\n'
     )
     options = FlightOptions(path, out=tmp_path / "deep", report=False)
     server = JsonServer(SitlSession(options, "ardupilot", make_pwm_law), ("127.0.0.1", 0), 0.2)

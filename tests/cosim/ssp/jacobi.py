@@ -53,7 +53,7 @@ def jacobi(scenario):
     parts, wrench, memberships, weights = Parts(scenario), np.zeros(6), np.zeros(3), np.zeros(3)
     with Plant(scenario.vehicle, 3) as plant:
         plant.set(start_values(scenario))
-        plant.initialise()
+        plant.initialize()
         sent = [plant.inputs.names.index(name) for name in WRENCH]
         read = [plant.outputs.names.index(name) for name in MOTION]
         rows = [plant.outputs.values[read]]

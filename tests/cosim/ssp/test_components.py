@@ -77,7 +77,7 @@ def assert_step(slave, parts, k, motion, weights):
 def test_controller_is_the_python_law_over_random_inputs(controller, scenario):
     """Every shape, regions on the move, a law at every third step, an estimate that is carried on."""
     rng, parts = np.random.default_rng(4), Parts(scenario)
-    controller.initialise()
+    controller.initialize()
     assert not controller.outputs.values.any()  # before the first step there is nothing
     for k in range(600):
         motion, weights = random_motion(rng), rng.uniform(0.0, 1.0, 3)
@@ -95,7 +95,7 @@ def test_noise_of_the_controller_is_philox(seed, fmi):
     )
     drawn, parts, rng = Noise(seed), Parts(noisy), np.random.default_rng(8)
     with CoSimulationInstance(cached_fmu(controller_component(noisy), fmi)) as slave:
-        slave.initialise()
+        slave.initialize()
         for k in range(30):
             if k % noisy.control_every == 0:
                 noise = np.repeat([0.02, 0.01], 3) * drawn.standard_normal(6)
@@ -106,7 +106,7 @@ def test_noise_of_the_controller_is_philox(seed, fmi):
 
 
 def test_controller_uses_the_initial_state_while_inputs_are_zero(controller, scenario):
-    controller.initialise()
+    controller.initialize()
     initial = scenario.initial
     start = np.array([*initial.position, *initial.quaternion, *initial.velocity])
     assert_step(controller, Parts(scenario), 0, start, np.zeros(3))
@@ -114,7 +114,7 @@ def test_controller_uses_the_initial_state_while_inputs_are_zero(controller, sce
 
 
 def test_controller_reads_a_quaternion_of_zeros_as_identity(controller, scenario):
-    controller.initialise()
+    controller.initialize()
     motion = np.zeros(13)
     motion[0] = 1.5
     send(controller, MOTION, motion)
@@ -134,7 +134,7 @@ def test_numbers_of_the_scenario_are_parameters(controller):
         "regions.ball.shape.radius": 0.9, "regions.line.shape.radius": 0.5,
         "initial.position.x": 1.0, "initial.position.y": 1.0, "initial.position.z": 2.0,
     })  # fmt: skip
-    controller.initialise()
+    controller.initialize()
     initial = other.initial
     start = np.array([*initial.position, *initial.quaternion, *initial.velocity])
     assert_step(controller, Parts(other), 0, start, np.zeros(3))
@@ -154,7 +154,7 @@ def test_numbers_of_the_scenario_are_parameters(controller):
 def test_invalid_shape_parameters_are_rejected(controller, values, said):
     controller.set(values)
     with pytest.raises(PlantError, match=re.escape(said)):
-        controller.initialise()
+        controller.initialize()
 
 
 def test_parameter_ranges_are_enforced(controller):
@@ -165,10 +165,10 @@ def test_parameter_ranges_are_enforced(controller):
 
 @pytest.mark.medium
 def test_steps_longer_than_a_period_are_refused(controller, arbiter):
-    controller.initialise()
+    controller.initialize()
     with pytest.raises(PlantError, match=re.escape("step of 0.04 s is longer than time.control = 0.03 s")):
         controller.step(0.04)
-    arbiter.initialise()
+    arbiter.initialize()
     with pytest.raises(PlantError, match=re.escape("step of 0.04 s is longer than time.arbiter = 0.02 s")):
         arbiter.step(0.04)
 
@@ -184,7 +184,7 @@ def test_steps_longer_than_a_period_are_refused(controller, arbiter):
     ],
 )
 def test_steps_that_do_not_divide_the_period_are_warned_about(controller, steps, said, caplog):
-    controller.initialise()
+    controller.initialize()
     with caplog.at_level(logging.DEBUG, "plant_fmu"):
         for step in steps:
             controller.step(step)
@@ -193,7 +193,7 @@ def test_steps_that_do_not_divide_the_period_are_warned_about(controller, steps,
 
 @pytest.mark.medium
 def test_steps_that_do_not_divide_the_arbiter_period_are_warned_about(arbiter, caplog):
-    arbiter.initialise()
+    arbiter.initialize()
     with caplog.at_level(logging.DEBUG, "plant_fmu"):
         for _ in range(9):
             arbiter.step(0.015)
@@ -204,7 +204,7 @@ def test_steps_that_do_not_divide_the_arbiter_period_are_warned_about(arbiter, c
 def test_periods_are_counted_not_summed(arbiter):
     """Steps whose sum is no multiple of the period, to the last bit: still one tick at every second one."""
     closed, expected = Arbiter(engine="closed"), 0.0
-    arbiter.initialise()
+    arbiter.initialize()
     for k in range(20_000):
         arbiter.inputs.values[0] = membership = k % 7 / 10.0
         arbiter.step(STEP)
@@ -216,7 +216,7 @@ def test_periods_are_counted_not_summed(arbiter):
 def test_arbiter_is_the_python_one_over_random_inputs(arbiter):
     closed, rng = Arbiter(engine="closed"), np.random.default_rng(5)
     arbiter.set({"time.arbiter": STEP})
-    arbiter.initialise()
+    arbiter.initialize()
     assert not arbiter.outputs.values.any()
     corners = np.array(np.meshgrid(*[[0.0, 0.25, 0.5, 1.0]] * 3)).reshape(3, -1).T
     for memberships in np.concatenate([corners, rng.uniform(0.0, 1.0, (500, 3))]):
@@ -231,7 +231,7 @@ def test_restored_controller_continues_identically(scenario, fmi):
 
     rng = np.random.default_rng(6)
     with Plant(cached_fmu(controller_component(scenario), fmi)) as unit:
-        unit.initialise()
+        unit.initialize()
 
         def go(motions):
             rows = []

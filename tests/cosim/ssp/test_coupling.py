@@ -51,7 +51,7 @@ def in_turn(steps, step):
     vehicle = make_vehicle_component(load_vehicle("odin"), {"weight": WEIGHT}, coupled=True)
     rows, force, water, rate, before = [], np.zeros(3), 0j, 0j, 0.0
     with Plant(cached_fmu(vehicle, 2)) as plant:
-        plant.initialise()
+        plant.initialize()
         motion = np.array([plant[name] for name in MOTION])
         for k in range(steps):
             for i, axis in enumerate("xyz"):

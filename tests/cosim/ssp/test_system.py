@@ -148,7 +148,7 @@ def test_masters_reproduce_flights_on_sensors(master, fmi, tmp_path):
         # its yaw swings up, and with it what is rounded: by 9 % a step, above 1e-10 after 1.2 s
         ("docking", ["law.name='pid_cbf'", "time.duration=1.0"]),
         ("docking", ["sensing.dead_from=0.5", "sensing.dead_for=0.3"]),
-        ("docking", ["goal.then=[[6.5, -3.0, 3.0]]", "goal.stay=0.2", "goal.centre=[6.8, -3.0, 3.0]"]),
+        ("docking", ["goal.then=[[6.5, -3.0, 3.0]]", "goal.stay=0.2", "goal.center=[6.8, -3.0, 3.0]"]),
     ],
 )
 def test_every_law_equals_its_python_run(name, settings, tmp_path):
@@ -202,7 +202,7 @@ def test_plant_start_values_match_the_scenario(packed, tmp_path):
     with zipfile.ZipFile(packed) as archive:
         archive.extract("resources/plant.fmu", tmp_path)
     with CoSimulationInstance(tmp_path / "resources" / "plant.fmu") as plant:
-        plant.initialise()
+        plant.initialize()
         got = {name: plant[name] for name in ("position.x", "quaternion.e2", "velocity.u", "current.y", "weight")}
         assert got == {"position.x": 0.5, "quaternion.e2": 0.6, "velocity.u": 0.1, "current.y": -0.05, "weight": 1230.0}
         assert plant["wrench_force_limit"] == 200.0 and plant["seed"] == 7 and plant["free_surface"] is True

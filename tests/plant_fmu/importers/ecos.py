@@ -41,7 +41,7 @@ def run(fmu: FmuFile, task: Task, folder: Path) -> Answer:
         structure.add_parameter_set("start", start)
         with EcosSimulation(structure=structure, step_size=task.step) as simulation:
             if not simulation.init(parameter_set="start"):
-                raise ImporterError(EcosLib.get_last_error() or "initialisation failed")
+                raise ImporterError(EcosLib.get_last_error() or "initialization failed")
             time = simulation.step(task.steps)
             if not abs(time - task.stop_time) < 0.5 * task.step:
                 raise ImporterError(f"stopped at t = {time:g} s: {EcosLib.get_last_error()}")

@@ -186,12 +186,12 @@ def description_run(seeds: Seeds) -> Case:
 @reader("state of a plant", "bytes", "plant_fmu.running.state:from_bytes")
 def state(seeds: Seeds) -> Case:
     plant = Plant("odin")
-    plant.initialise()
+    plant.initialize()
 
     def read(content: bytes) -> None:
-        plant.free(plant.deserialise(content))
+        plant.free(plant.deserialize(content))
 
-    return Case((plant.serialise(plant.save()),), read)
+    return Case((plant.serialize(plant.save()),), read)
 
 
 # ---- logs of vehicles ----------------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """Cost of a path: its length, and penalties for passing close to hard regions, or through soft ones."""
 
 # Regions are evaluated along the path, each at its predicted position. A clearance changes by at most the distance
-# travelled: so strides are long where clearances are large, and a far region is not evaluated before it could be near.
+# traveled: so strides are long where clearances are large, and a far region is not evaluated before it could be near.
 # An evaluation may take several periods, each with a bounded number of strides.
 
 from __future__ import annotations
@@ -25,9 +25,9 @@ Array = NDArray[np.float64]
 _SAMPLES = (64, 512)
 _STRIDE = (0.08, 3.0)  # m, minimum and maximum distance between two evaluations
 _TRUST = 0.7  # ratio of a stride to the clearance beyond the desired one
-_INSIDE = 200.0  # penalty per metre of path closer to a hard region than the margin; added once more per metre closer
+_INSIDE = 200.0  # penalty per meter of path closer to a hard region than the margin; added once more per meter closer
 _EDGE = 0.1  # m closer than the margin at which it is full; proportional before, so that no stride's end decides
-_NEAR = 3.0  # penalty per metre of path on the surface of a hard region; 0 at the desired clearance
+_NEAR = 3.0  # penalty per meter of path on the surface of a hard region; 0 at the desired clearance
 _ENTERED = 0.5  # m, added to the depth in a soft region as the penalty for being inside at all
 _SHALLOW = 0.2  # m, depth from which that is added in full; proportional at less depth
 _STAY = 3.0  # m, length of path that the stay at its end counts for
@@ -51,7 +51,7 @@ class PathCost(NamedTuple):
     drift: Array  # (3,) m/s, NED: velocity of the path's end, which moves with the goal
     counts: NDArray[np.int64]  # (2,) index of the next leg to evaluate; number of evaluations so far
     waits: NDArray[np.bool_]  # (1,) True if the vehicle waits at the first corner until fast regions have passed
-    travelled: Array  # (2,) m: length of the evaluated legs; evaluated length of the present leg
+    traveled: Array  # (2,) m: length of the evaluated legs; evaluated length of the present leg
     cost: Array  # (4,) m: cost so far; parts by hard regions and soft ones on the way; by fast ones at rest
     clear_until: Array  # (n,) m: length of path before which each region needs no evaluation
 
@@ -70,7 +70,7 @@ def begin_cost(cost: PathCost, start: Array, drift: Array, waits: bool) -> None:
     copy(drift, cost.drift)
     cost.waits[0] = waits
     cost.counts[:] = 0
-    cost.travelled[:] = 0.0
+    cost.traveled[:] = 0.0
     cost.cost[:] = 0.0
     cost.clear_until[:] = 0.0
 
@@ -81,7 +81,7 @@ def add_cost(
     """Continue to evaluate a path [m, NED]; return True once it is complete, or the cost exceeds `cost_limit` [m]."""
     point = zeros(3)
     for _ in range(_SAMPLES[0]):
-        leg, s = cost.counts[0], cost.travelled[1]
+        leg, s = cost.counts[0], cost.traveled[1]
         if cost.cost[0] > cost_limit:
             return True
         if leg == count:
@@ -93,8 +93,8 @@ def add_cost(
         length = length3(path[leg, 0] - begin[0], path[leg, 1] - begin[1], path[leg, 2] - begin[2])
         if s >= length:
             cost.counts[0] += 1
-            cost.travelled[0] += length
-            cost.travelled[1] = 0.0
+            cost.traveled[0] += length
+            cost.traveled[1] = 0.0
             if leg == 0 and cost.waits[0]:
                 cost.cost[0] += _WAIT
                 _add_rest_cost(cost, path[0], regions, limits)
@@ -113,8 +113,8 @@ def add_cost(
 
 
 def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> None:
-    """Add a stride [m] with the extra cost per metre of `soft` regions and `penalty` of hard ones."""
-    cost.travelled[1] += stride
+    """Add a stride [m] with the extra cost per meter of `soft` regions and `penalty` of hard ones."""
+    cost.traveled[1] += stride
     cost.cost[0] += stride * (1.0 + soft + penalty)
     cost.cost[1] += stride * penalty
     cost.cost[2] += stride * soft
@@ -124,12 +124,12 @@ def _evaluate_point(
     cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits
 ) -> tuple[float, float, float]:
     """Return the minimum clearance of hard regions [m], the penalty of soft ones per meter, the stride limit [m]."""
-    travelled = cost.travelled[0] + cost.travelled[1]
-    later = travelled / limits.speed  # s
+    traveled = cost.traveled[0] + cost.traveled[1]
+    later = traveled / limits.speed  # s
     effect_distance = limits.clearance + _STRIDE[1] / _TRUST  # m, clearance beyond which a hard region has no effect
     free, soft, reach, point, scratch = effect_distance, 0.0, _STRIDE[1], zeros(3), zeros(3)
     for i in range(regions.kinds.size):
-        if travelled < cost.clear_until[i] or regions.kinds[i] >= _ATTITUDE:
+        if traveled < cost.clear_until[i] or regions.kinds[i] >= _ATTITUDE:
             continue
         if cost.waits[0] and cost.counts[0] > 0 and is_fast(regions, i, limits):
             continue  # it has passed by then
@@ -150,7 +150,7 @@ def _evaluate_point(
             soft += regions.crossing_costs[i] * _depth_cost(-clearance, 0.0)
             reach = min(reach, max(abs(clearance), _COARSE))
         if excess >= 0.0:
-            cost.clear_until[i] = travelled + excess / (1.0 + region_speed / limits.speed)
+            cost.clear_until[i] = traveled + excess / (1.0 + region_speed / limits.speed)
     return free, soft, reach
 
 
@@ -161,7 +161,7 @@ def _depth_cost(depth: float, away: float) -> float:
 
 
 def _near_cost(free: float, limits: PathLimits) -> float:
-    """Return the cost per metre at a clearance of hard regions [m]."""
+    """Return the cost per meter at a clearance of hard regions [m]."""
     lack = limits.clearance - free
     if lack <= 0.0:
         return 0.0
@@ -189,7 +189,7 @@ def _add_rest_cost(cost: PathCost, place: Array, regions: PackedRegions, limits:
     for i in range(regions.kinds.size):
         if not is_fast(regions, i, limits):
             continue
-        v, later = regions.velocities[i], cost.travelled[0] / limits.speed
+        v, later = regions.velocities[i], cost.traveled[0] / limits.speed
         speed = length3(v[0], v[1], v[2])
         while later < _HORIZON:
             for axis in range(3):
@@ -203,7 +203,7 @@ def _add_rest_cost(cost: PathCost, place: Array, regions: PackedRegions, limits:
 
 
 def _stay_cost(end: Array, drift: Array, regions: PackedRegions, limits: PathLimits) -> float:
-    """Return the cost per metre of a stay at the end of a path [m, NED]."""
+    """Return the cost per meter of a stay at the end of a path [m, NED]."""
     # An end that drifts [m/s, NED] with the goal is also evaluated at later positions, and against hard regions, which
     # it may meet there. The cost is the mean over these times.
     drifts = _drifts(drift)

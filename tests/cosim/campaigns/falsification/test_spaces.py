@@ -118,7 +118,7 @@ def numbers(conflict):
     return {
         "kind": sum(map(ord, conflict["kind"])),
         "order": table["criteria"][0]["order"],
-        "goal": table["goal"]["centre"][0],
+        "goal": table["goal"]["center"][0],
         "regions": len(table["regions"]),
         "priority": max(region["priority"] for region in table["regions"]),
         "drift": table["regions"][0]["velocity"][2],

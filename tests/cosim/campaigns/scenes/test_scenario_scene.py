@@ -69,7 +69,7 @@ def test_tour_has_successive_goals_on_both_sides_of_the_conflict():
     assert len(kinds) == 9 and min(kinds.values()) > 15  # 33 expected
     for seed in range(20):
         scenario = scenario_of(make_conflict(seed, "tour"))
-        first, then = np.array(scenario.goal.centre), np.array(scenario.goal_then)
+        first, then = np.array(scenario.goal.center), np.array(scenario.goal_then)
         assert then.shape == (2, 3) and scenario.goal_stay == 3.0
         kind = scenario.title.removeprefix(f"Tour {seed}: ").split()[0]
         axis, middle = {"sides": (0, 5.0), "views": (0, 4.0), "depths": (2, 0.5 * (first[2] + then[0, 2]))}[kind]

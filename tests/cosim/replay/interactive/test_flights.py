@@ -18,7 +18,7 @@ from cosim.scenario.scenario import load_scenario
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]  # the first build compiles a C library too
 
 HARD = Path(__file__).parents[3] / "data" / "scenes" / "hard.jsonl"
-MOVED = {"goal.centre.1": 0.05, "goal.centre.2": 4.02, "regions.3.shape.centre.0": 7.15}
+MOVED = {"goal.center.1": 0.05, "goal.center.2": 4.02, "regions.3.shape.center.0": 7.15}
 WATER = {"plant.current.0": 0.05, "plant.current.1": -0.12, "plant.parameters.buoyancy": 127.3}
 NOISE = {"sensing.position_noise": 0.02, "sensing.velocity_noise": 0.0}
 GAINS = {"law.gains.speed": 0.7, "law.gains.barriers": 0.0}
@@ -94,7 +94,7 @@ def test_saved_scenario_reproduces_the_run_bit_for_bit(values, failure, fly, shi
 
 @pytest.mark.parametrize(
     ("goal", "then"),
-    [("type='sphere', centre=[7.1,0,4], radius=0.4", 0),
+    [("type='sphere', center=[7.1,0,4], radius=0.4", 0),
      ("type='cylinder', start=[7.1,0,3.6], end=[7.1,0.1,4.4], radius=0.4", 1)],
     ids=["a sphere", "a cylinder"],
 )  # fmt: skip
@@ -103,7 +103,7 @@ def test_goals_in_turn_move_each_by_itself(goal, then, fly, tmp_path):
     changed = [f"goal={{{places}}}", "time.duration=40", "plant.current=[0,0,0]"]
     run = flown_run(load_scenario("docking", changed), tmp_path / "first")
     values = {f"goal.then.{then}.0": 5.87, "goal.then.0.2": 3.31}
-    values |= {"goal.start.1": 0.125, "goal.end.1": 0.225} if then else {"goal.centre.1": 0.13}
+    values |= {"goal.start.1": 0.125, "goal.end.1": 0.225} if then else {"goal.center.1": 0.13}
     flown = fly(run, values)
     (tmp_path / "saved.toml").write_text(flown.toml)
     saved = flown_run(load_scenario(tmp_path / "saved.toml"), tmp_path / "run")

@@ -79,8 +79,8 @@ def test_a_cylinder_moves_by_its_middle():
 
 @pytest.mark.parametrize(
     ("shape", "movable"),
-    [("type='box', centre=[7.1,0.1,4], size=[1,2,1], quaternion=[0.9,0.1,0,0.4]", True),
-     ("type='ellipsoid', centre=[7.1,0.3,4], semi_axes=[0.3,0.7,1.1]", True),
+    [("type='box', center=[7.1,0.1,4], size=[1,2,1], quaternion=[0.9,0.1,0,0.4]", True),
+     ("type='ellipsoid', center=[7.1,0.3,4], semi_axes=[0.3,0.7,1.1]", True),
      ("type='cylinder', start=[7.1,0,3], end=[7.2,0,5], radius=0.7", True),
      ("type='prism', corners=[[6,-1],[8,-1],[8,1],[6,2]], top=3, bottom=5", False)],
     ids=["box", "ellipsoid", "cylinder", "prism"],
@@ -97,7 +97,7 @@ def test_each_place_of_goals_in_turn_is_offered(shape, movable):
     changed = Flight(changed_scenario(flight.scenario, changes)).setup.goal_places.ravel()
     ends = [[changes.get(f"goal.{end}.{axis}", 0.0) for axis in range(3)] for end in ("start", "end")]
     middle = [(a + b) / 2.0 for a, b in zip(*ends, strict=True)] if any(map(any, ends)) else [None] * 3
-    center = [changes.get(f"goal.centre.{axis}", middle[axis]) for axis in range(3)]
+    center = [changes.get(f"goal.center.{axis}", middle[axis]) for axis in range(3)]
     center = [x if x is not None else y for x, y in zip(center, shape_center(flight.scenario.goal), strict=True)]
     places = {
         place: changes[s.key] - center[int(s.key[-1])] for s in slots for kind, place in s.places if kind == "shift"

@@ -112,9 +112,9 @@ def test_dragged_goal_is_simulated_and_r_resets(browser, page):
     drag.click_and_hold().move_by_offset(-40, -10).move_by_offset(-60, -20).release().perform()
     wait_until(browser, FLOWN)
     moved = dict(browser.js("return [...subreach.whatIf.values]"))
-    assert moved and set(moved) <= {f"goal.centre.{axis}" for axis in range(3)}
-    goal = browser.js("return subreach.runs[1].header.regions[0].shape.centre")
-    assert goal[:2] == [moved.get("goal.centre.0", 7.1), moved.get("goal.centre.1", 0.0)]
+    assert moved and set(moved) <= {f"goal.center.{axis}" for axis in range(3)}
+    goal = browser.js("return subreach.runs[1].header.regions[0].shape.center")
+    assert goal[:2] == [moved.get("goal.center.0", 7.1), moved.get("goal.center.1", 0.0)]
     assert max(abs(a - b) for a, b in zip(end_of(browser, 0), end_of(browser, 1), strict=True)) > 0.3
     assert browser.js("return document.getElementById('panel').textContent").count("what if") == 1
     browser.press("r")
@@ -129,7 +129,7 @@ def test_each_goal_in_turn_is_labeled_and_dragged(builds, browser, tmp_path):
     run_scenario(load_scenario("docking", goals), tmp_path / "run", report=False)
     opened(browser, replay([tmp_path / "run"], tmp_path / "page.html", interactive=True))
     assert browser.js(GOALS) == ["present goal (1 of 3)", "next goal (2 of 3)"]
-    for place, key in ((1, "goal.then.0"), (0, "goal.centre")):
+    for place, key in ((1, "goal.then.0"), (0, "goal.center")):
         before = dict(browser.js("return [...subreach.whatIf.values]"))
         x, y = browser.js(GOAL, place)
         width, height = browser.js("const c = subreach.scene.canvas; return [c.clientWidth, c.clientHeight]")
@@ -162,7 +162,7 @@ def test_view_follows_the_flight_until_the_reader_turns_it(browser, page):
 
     near = fly("plant.current.1", 0.102)
     assert fly("plant.current.1", 0.104) == near  # which shows all
-    for key, value in (("goal.centre.0", 20.0), ("goal.centre.1", -15.0)):
+    for key, value in (("goal.center.0", 20.0), ("goal.center.1", -15.0)):
         far = fly(key, value)
         assert far[:2] == above[:2] and far[2] > 1.2 * near[2] and browser.js(ALL_SEEN)
     browser.press("r")
@@ -170,7 +170,7 @@ def test_view_follows_the_flight_until_the_reader_turns_it(browser, page):
     assert browser.js(VIEW) == pytest.approx(above)
     browser.js("subreach.scene.camera.orbit(30, 20)")
     turned = browser.js(VIEW)
-    assert fly("goal.centre.0", 20.0) == fly("goal.centre.0", 25.0) == turned
+    assert fly("goal.center.0", 20.0) == fly("goal.center.0", 25.0) == turned
 
 
 def test_page_is_operable_by_keyboard(browser, page):
@@ -179,7 +179,7 @@ def test_page_is_operable_by_keyboard(browser, page):
     opened(browser, page)
     said = browser.js("return document.getElementById('commands').textContent")
     assert "without a place: heading. Change these" in said
-    field = browser.driver.find_element("css selector", "[aria-label='current east in metres a second']")
+    field = browser.driver.find_element("css selector", "[aria-label='current east in meters a second']")
     field.send_keys(Keys.ARROW_UP, Keys.ARROW_UP)
     wait_until(browser, FLOWN)
     assert dict(browser.js("return [...subreach.whatIf.values]")) == {"plant.current.1": pytest.approx(0.2)}
@@ -190,10 +190,10 @@ def test_page_is_operable_by_keyboard(browser, page):
     wait_until(browser, FLOWN)
     assert "failure" in browser.js("return subreach.runs[1].header.events.map((event) => event.kind)")
     browser.js("subreach.whatIf.took = null")
-    place = browser.driver.find_element("css selector", "[aria-label='port wall, east in metres']")
+    place = browser.driver.find_element("css selector", "[aria-label='port wall, east in meters']")
     place.send_keys(Keys.ARROW_UP)
     wait_until(browser, FLOWN)
-    assert "regions.1.shape.centre.1" in dict(browser.js("return [...subreach.whatIf.values]"))
+    assert "regions.1.shape.center.1" in dict(browser.js("return [...subreach.whatIf.values]"))
 
 
 @pytest.mark.parametrize("size", [(1280, 720), (390, 844)], ids=["desktop", "phone"])

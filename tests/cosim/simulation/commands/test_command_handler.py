@@ -55,7 +55,7 @@ def test_target_without_radius_keeps_the_goal_shape(fly):
     radius = load_scenario("pipe-inspection").goal.radius
     assert run["goal.clearance"][k] == pytest.approx(radius - np.linalg.norm(run.position[k] - middle), abs=1e-9)
     shifts = run.stack("goal.shift.x", "goal.shift.y", "goal.shift.z")[k]
-    assert shifts + load_scenario("pipe-inspection").goal.centre == pytest.approx(middle, abs=1e-9)
+    assert shifts + load_scenario("pipe-inspection").goal.center == pytest.approx(middle, abs=1e-9)
 
 
 def test_hold_keeps_the_position_at_the_command(fly):
@@ -221,16 +221,16 @@ def test_commanded_heading_is_held(fly):
 
 @pytest.mark.medium
 def test_added_obstacle_is_avoided(fly):
-    centre = (2.5, 0.0, 3.0)
+    center = (2.5, 0.0, 3.0)
     way = [cmd.SetTarget((5.0, 0.0, 3.0), 0.4)]
     through = fly({0: way}, SHORT, *OPEN)
-    round_it = fly({0: way, 50: [cmd.AddObstacle(7, centre, 0.6)]}, SHORT, *OPEN)
-    assert np.linalg.norm(through.position - centre, axis=1).min() < 0.1
-    assert np.linalg.norm(round_it.position - centre, axis=1).min() >= 0.6
+    round_it = fly({0: way, 50: [cmd.AddObstacle(7, center, 0.6)]}, SHORT, *OPEN)
+    assert np.linalg.norm(through.position - center, axis=1).min() < 0.1
+    assert np.linalg.norm(round_it.position - center, axis=1).min() >= 0.6
     assert np.linalg.norm(round_it.position[-1] - [5.0, 0.0, 3.0]) < 0.4
-    assert round_it["seen 1.clearance"][-1] == pytest.approx(np.linalg.norm(round_it.position[-1] - centre) - 0.6)
-    gone = fly({0: way, 50: [cmd.AddObstacle(7, centre, 0.6)], 60: [cmd.RemoveObstacle(7)]}, SHORT, *OPEN)
-    assert np.linalg.norm(gone.position - centre, axis=1).min() < 0.3
+    assert round_it["seen 1.clearance"][-1] == pytest.approx(np.linalg.norm(round_it.position[-1] - center) - 0.6)
+    gone = fly({0: way, 50: [cmd.AddObstacle(7, center, 0.6)], 60: [cmd.RemoveObstacle(7)]}, SHORT, *OPEN)
+    assert np.linalg.norm(gone.position - center, axis=1).min() < 0.3
 
 
 def test_excess_obstacles_are_rejected_and_known_obstacles_move(fly, caplog):
@@ -299,7 +299,7 @@ def test_force_limit_and_region_gain_change_during_a_run(fly):
         (cmd.ShiftRegion("goal", (1.0, 1.0, 1.0)), "expected one of view"),
         (cmd.ShiftRegion("seen 2", (1.0, 1.0, 1.0)), "no such obstacle has been added"),
         (cmd.ChangeSetting("law.gains.nonsense", 1.0), "is no setting"),
-        (cmd.ChangeSetting("regions.pipe.shape.colour", 1.0), "is no setting"),
+        (cmd.ChangeSetting("regions.pipe.shape.color", 1.0), "is no setting"),
         (cmd.ChangeSetting("goal.radius", -1.0), "radius is -1.0, expected above 0 m"),
         (cmd.ChangeSetting("arbiter.ramp", -1.0), "arbiter.ramp is -1, expected 0 to 1000"),
         (cmd.ChangeSetting("law.gains.speed", 0.0), "expected a finite number above 0"),

@@ -207,4 +207,4 @@ def test_last_line_that_is_whole_or_has_its_end_is_checked(tmp_path, line):
 @pytest.mark.parametrize("index", ["9" * 5000, "٣", "-1", "01", "", "0.0"])
 def test_d4_invalid_index_is_rejected(index):
     with pytest.raises(CommandError, match="no setting"):
-        LiveSettings(load_scenario("paper")).change(f"goal.centre.{index}", 1.0)
+        LiveSettings(load_scenario("paper")).change(f"goal.center.{index}", 1.0)
