@@ -11,6 +11,8 @@ FORMER = """base = "docking"
 [goal]
 centre = [7.0, 0.0, 4.0]
 [[criteria]]
+name = "obstacle"
+[[criteria]]
 name = "shape"
 colour = "#112233"
 """
@@ -20,7 +22,7 @@ def test_former_keys_are_read_and_named(tmp_path, caplog):
     file = tmp_path / "former.toml"
     file.write_text(FORMER)
     scenario = load_scenario(file, ["goal.centre.2=3.5", 'criteria.shape.colour="#445566"'])
-    assert scenario.goal.center == (7.0, 0.0, 3.5) and scenario.criteria[0].color == "#445566"
+    assert scenario.goal.center == (7.0, 0.0, 3.5) and scenario.criteria[1].color == "#445566"
     assert [record.getMessage() for record in caplog.records] == ["key centre is now center", "key colour is now color"]
     file.write_text(FORMER.replace("centre", "center = [0.0, 0.0, 0.0]\ncentre"))
     with pytest.raises(ScenarioError, match="pass either center or centre"):
