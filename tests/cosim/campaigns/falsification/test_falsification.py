@@ -121,7 +121,7 @@ def test_conflicts_are_searched_for_the_greatest_violation_weighted_by_priority(
 def test_resumed_search_gives_the_same_rows(make, tmp_path, monkeypatch):
     whole = run_falsification(make(), tmp_path / "whole")
     with monkeypatch.context() as patch:
-        interrupt_after(patch, 6)
+        interrupt_after(patch, 3)
         with pytest.raises(KeyboardInterrupt):
             run_falsification(make(), tmp_path / "out")
     assert (tmp_path / "out" / PARTS).exists()
