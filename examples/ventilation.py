@@ -9,7 +9,7 @@ running it cell by cell; importing it does neither.
 #
 # A ventilation plant has one fan and three reasons to use it, in this order: *smoke* must leave the building, stale
 # *air* must be replaced, a warm *room* should be cooled. A caretaker would not switch between the three at sharp
-# limits; the more it smells of fire, the less the temperature matters. That is what an arbiter of prioritised
+# limits; the more it smells of fire, the less the temperature matters. That is what an arbiter of prioritized
 # criteria does.
 
 # %%

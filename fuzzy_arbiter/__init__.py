@@ -1,17 +1,18 @@
-"""A fuzzy arbiter of prioritised criteria, which decides to what degree each one matters now.
+"""A fuzzy arbiter of prioritized criteria, which decides to what degree each one matters now.
 
 `Arbiter` loads, saves, decides, explains and verifies. The modules `terms` (curves, values), `pictures`, `formats`
 (files as systems, `fold_normalization`) and `export` (C and Python code) serve more detailed uses.
 """
 
 import importlib
+import warnings
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from fuzzy_arbiter.arbiter import Arbiter
     from fuzzy_arbiter.definition import Output, System, Variable
     from fuzzy_arbiter.errors import ArbiterError
-    from fuzzy_arbiter.hierarchy import SECTION_VI, Criterion, prioritised
+    from fuzzy_arbiter.hierarchy import SECTION_VI, Criterion, prioritized
     from fuzzy_arbiter.hysteresis import HysteresisArbiter
     from fuzzy_arbiter.membership import ramp
     from fuzzy_arbiter.result import Result
@@ -43,7 +44,7 @@ __all__ = [
     "auto_terms",
     "curve",
     "falling",
-    "prioritised",
+    "prioritized",
     "ramp",
     "rising",
     "trapezoid",
@@ -56,7 +57,7 @@ _HOMES = {
     "terms.automatic": {"auto_terms"},
     "definition": {"Output", "System", "Variable"},
     "errors": {"ArbiterError"},
-    "hierarchy": {"SECTION_VI", "Criterion", "prioritised"},
+    "hierarchy": {"SECTION_VI", "Criterion", "prioritized"},
     "hysteresis": {"HysteresisArbiter"},
     "membership": {"ramp"},
     "result": {"Result"},
@@ -69,6 +70,9 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
+    if name == "prioritised":  # its former spelling
+        warnings.warn("fuzzy_arbiter.prioritised is now prioritized", DeprecationWarning, stacklevel=2)
+        name = "prioritized"
     for home, names in _HOMES.items():
         if name in names:
             return getattr(importlib.import_module(f"{__name__}.{home}"), name)

@@ -69,7 +69,7 @@ class _Parser(argparse.ArgumentParser):
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(
         prog="python -m fuzzy_arbiter",
-        description="Fuzzy arbiters of prioritised criteria.",
+        description="Fuzzy arbiters of prioritized criteria.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )

@@ -14,7 +14,7 @@ from fuzzy_arbiter.definition import Normalization, Output, Outside, System, var
 from fuzzy_arbiter.engines import choose
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError, InputError
-from fuzzy_arbiter.hierarchy import SECTION_VI, WEIGHT, Criterion, Form, prioritised
+from fuzzy_arbiter.hierarchy import SECTION_VI, WEIGHT, Criterion, Form, prioritized
 from fuzzy_arbiter.result import Result, result_class
 from fuzzy_arbiter.samples import Columns, Sample, Samples
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 class Arbiter:
-    """Decide to what degree each of several prioritised criteria matters now, in the manner of a human pilot.
+    """Decide to what degree each of several prioritized criteria matters now, in the manner of a human pilot.
 
     Nothing in it changes after it is made; threads may share it.
 
@@ -33,7 +33,7 @@ class Arbiter:
     criteria : sequence of Criterion
         Criteria by descending priority; default: obstacle, shape, depth of the paper's section VI.
     form, weight, normalization, outside, points
-        Form of the system, as for `prioritised`.
+        Form of the system, as for `prioritized`.
     system : System, optional
         A Mamdani system, in place of all of the above.
     engine : {"auto", "closed", "exact", "grid", "skfuzzy"}
@@ -68,7 +68,7 @@ class Arbiter:
         if isinstance(criteria, System):
             raise DefinitionError("criteria: got a System, expected Arbiter(system=...)")
         if system is None:
-            system = prioritised(criteria, form, weight, normalization, outside, points)
+            system = prioritized(criteria, form, weight, normalization, outside, points)
         elif (criteria, form, weight, normalization, outside, points) != (*_DEFAULTS,):
             raise DefinitionError(
                 "system: pass either a system, or criteria with form, weight, normalization, outside and points"

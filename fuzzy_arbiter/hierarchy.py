@@ -1,4 +1,4 @@
-"""Prioritised criteria, and the rule bases that weigh each criterion if none of higher priority is active."""
+"""Prioritized criteria, and the rule bases that weigh each criterion if none of higher priority is active."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ SECTION_VI = (
 )
 
 
-def prioritised(
+def prioritized(
     criteria: Sequence[Criterion] = SECTION_VI,
     form: Form = "hierarchical",
     weight: Output = WEIGHT,
@@ -123,8 +123,8 @@ def prioritised(
 
     Examples
     --------
-    >>> from fuzzy_arbiter import prioritised
-    >>> len(prioritised().rules), len(prioritised(form="complete").rules)
+    >>> from fuzzy_arbiter import prioritized
+    >>> len(prioritized().rules), len(prioritized(form="complete").rules)
     (8, 24)
     """
     criteria = all_of(Criterion, criteria, "criteria", "a sequence of Criterion")

@@ -27,7 +27,7 @@ EFFORT = 100_000_000  # maximum number of statements of the search for the row a
 
 
 class HysteresisArbiter:
-    """An arbiter of prioritised criteria with a latch on each of them.
+    """An arbiter of prioritized criteria with a latch on each of them.
 
     Each criterion has a latch. It closes as soon as the criterion's degree reaches `enter`, and opens when the degree
     has come down to `release` and the latch has been closed for `dwell`. While it is closed the criterion counts as

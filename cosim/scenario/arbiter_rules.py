@@ -16,7 +16,7 @@ from cosim.errors import ScenarioError
 from cosim.scenario.criteria import PAPER, CriterionSetup
 from cosim.scenario.region_tables import SecondaryRegion
 from cosim.scenario.tables import ArbiterSetup, RuleVariant
-from fuzzy_arbiter import Arbiter, ArbiterError, Rule, Shape, System, Term, Variable, prioritised
+from fuzzy_arbiter import Arbiter, ArbiterError, Rule, Shape, System, Term, Variable, prioritized
 from fuzzy_arbiter.formats import FORMATS, reads
 from plant_fmu.toml_tables import hint
 
@@ -127,9 +127,9 @@ def rules_by_order(variant: RuleVariant, criteria: tuple[CriterionSetup, ...], p
     """Make the fuzzy system that weighs criteria by their order."""
     fuzzy = [criterion.fuzzy for criterion in criteria]
     if variant == "reversed":
-        system = prioritised(fuzzy[::-1], points=points)
+        system = prioritized(fuzzy[::-1], points=points)
         return replace(system, outputs=system.outputs[::-1], weights_of=system.weights_of[::-1])
-    system = prioritised(fuzzy, points=points)
+    system = prioritized(fuzzy, points=points)
     if variant == "crisp":
         inputs = [Variable(c.name, (0.0, 1.0), (Term(c.off, _OFF), Term(c.on, _ON))) for c in fuzzy]
         return replace(system, inputs=tuple(inputs))

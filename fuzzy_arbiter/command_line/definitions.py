@@ -8,7 +8,7 @@ from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.command_line.files import require_suffix
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.files import write_atomic
-from fuzzy_arbiter.hierarchy import prioritised
+from fuzzy_arbiter.hierarchy import prioritized
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.term import Term
@@ -21,7 +21,7 @@ EXPORTS = ("c", "py")
 def load_system(file: str, block: str | None = None) -> System:
     """Return the system of a file, or the built-in one."""
     if file == BUILT_IN:
-        return prioritised()
+        return prioritized()
     from fuzzy_arbiter.formats import load
 
     return load(file, block)

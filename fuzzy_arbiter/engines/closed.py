@@ -1,7 +1,7 @@
 """The closed form: exact, and thousands of times faster than sampling."""
 
 # If the cuts of an output's two terms are 1 - h and h for all inputs, its centroid is a function C(h) alone, piecewise
-# cubic over quadratic. For prioritised criteria, with m the degree to which each asks for attention,
+# cubic over quadratic. For prioritized criteria, with m the degree to which each asks for attention,
 #
 #     h_k = min(1 - m_1, 1 - m_2 ... 1 - m_(k-1), m_k),
 #
@@ -77,7 +77,7 @@ class ClosedEngine(Engine):
         self._cubic = _one_cubic(self.scaled)
         # true if such weights are then clipped to [0, 1]: between h = 0 and 1 a C(h) may lie beyond C(0) and C(1)
         self.clips = system.normalization != "none" and self._cubic != SMOOTHSTEP
-        # prioritised criteria in the order of the inputs, which are the degrees themselves: nothing to look up
+        # prioritized criteria in the order of the inputs, which are the degrees themselves: nothing to look up
         self._plain = self._cubic is not None and self.ladder is not None and len(self.ladder) == len(system.inputs)
         for step, variable in zip(self.ladder or (), system.inputs, strict=False):
             name, term, affirmed = step

@@ -21,7 +21,7 @@ MAX_CLAUSES = 512  # a form with more is not computed
 
 
 def ladder(system: System, clauses: Sequence[Sequence[Clause]]) -> tuple[Literal, ...] | None:
-    """Return the literals of prioritised criteria, if the clauses have this form."""
+    """Return the literals of prioritized criteria, if the clauses have this form."""
     complements = _complements(system)
     steps: list[Literal] = []
     above: set[Literal] = set()  # literals by which the criteria before do not hold

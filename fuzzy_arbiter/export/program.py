@@ -260,7 +260,7 @@ def _closed(engine: ClosedEngine) -> Iterator[Statement]:
     values: list[Statement] = []
     unclaimed = ""
     for k, (output, clauses) in enumerate(zip(engine.system.outputs, engine.clauses, strict=True), 1):
-        if engine.ladder is not None:  # the running minimum of prioritised criteria
+        if engine.ladder is not None:  # the running minimum of prioritized criteria
             m = _literal(engine.ladder[k - 1], degrees)
             high = f"least({m}, {unclaimed})" if unclaimed else m
             free = f"least({unclaimed}, 1.0 - {m})" if unclaimed else f"1.0 - {m}"

@@ -42,9 +42,9 @@ def fold_normalization(system: System) -> System:
 
     Examples
     --------
-    >>> from fuzzy_arbiter import prioritised
+    >>> from fuzzy_arbiter import prioritized
     >>> from fuzzy_arbiter.formats import fold_normalization
-    >>> fold_normalization(prioritised()).outputs[0].universe
+    >>> fold_normalization(prioritized()).outputs[0].universe
     (-1.0, 2.0)
     """
     if system.normalization == "none":

@@ -11,7 +11,7 @@ from fuzzy_arbiter.checks import finite, shown
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.notation import located
-from fuzzy_arbiter.hierarchy import DEGREE, WEIGHT, Criterion, prioritised
+from fuzzy_arbiter.hierarchy import DEGREE, WEIGHT, Criterion, prioritized
 from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.rule import Operators, Rule
 from fuzzy_arbiter.rule_text import parse_rule
@@ -41,7 +41,7 @@ _KINDS = (*_SHAPES, *KINDS, *_VALUES)
 def system_of(data: object) -> System:
     """Build the system that the values of a file define."""
     # Either `inputs`, `outputs` and `rules` are given, with the keys of `System`; or, in short, `criteria` in order of
-    # priority, with the keys of `prioritised`. Terms are given by their points; as one of `triangle`, `trapezoid`,
+    # priority, with the keys of `prioritized`. Terms are given by their points; as one of `triangle`, `trapezoid`,
     # `rising` and `falling` with its places; as a curve with its parameters, such as `gaussian`, and perhaps a
     # `height`; or, of an output, as a `constant`, as `linear` with a coefficient for each input and a constant, or as a
     # `formula`. A rule is a text, or a table with the text and the operators of its block.
@@ -56,7 +56,7 @@ def system_of(data: object) -> System:
             _refuse("form", form, "text")
         criteria = tuple(_criterion(c, f"criteria[{i}]") for i, c in enumerate(_list(table, "criteria", "")))
         weight = _variable(table["weight"], "weight", Output) if "weight" in table else WEIGHT
-        return prioritised(criteria, form, weight, **settings)  # type: ignore[arg-type]  # which it checks itself
+        return prioritized(criteria, form, weight, **settings)  # type: ignore[arg-type]  # which it checks itself
     inputs = tuple(_variable(v, f"inputs[{i}]", Variable) for i, v in enumerate(_list(table, "inputs", "")))
     outputs = tuple(_variable(v, f"outputs[{i}]", Output) for i, v in enumerate(_list(table, "outputs", "")))
     rules = []

@@ -31,7 +31,7 @@ from fuzzy_arbiter.verification.report import Check, Finding, Row, Severity, Ver
 from fuzzy_arbiter.verification.rules import labels, redundant, unused
 from fuzzy_arbiter.verification.search import Answer, Goal
 
-EFFORT = 4_000_000_000  # maximum number of statements, some seconds; forty prioritised criteria need 1/500 of it
+EFFORT = 4_000_000_000  # maximum number of statements, some seconds; forty prioritized criteria need 1/500 of it
 MAX_ROWS = 256
 MAX_TERMS = 200  # maximum number of terms of a variable, as the time grows with its square
 NAMED_ROWS = 8

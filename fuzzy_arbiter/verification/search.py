@@ -2,7 +2,7 @@
 
 # Inputs are settled one after the other. As long as one is open, a statement about it has bounds, the least and the
 # greatest rank of its term. *and*, *or* and *not* take bounds to bounds, so a question is often answered for a whole
-# box of combinations at once: for prioritised criteria the work grows with a power of their number, not with two to the
+# box of combinations at once: for prioritized criteria the work grows with a power of their number, not with two to the
 # power of it.
 
 from __future__ import annotations

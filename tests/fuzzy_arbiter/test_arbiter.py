@@ -14,7 +14,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, prioritised, ramp, rising
+from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, prioritized, ramp, rising
 from fuzzy_arbiter.errors import DefinitionError, EngineError, InputError
 
 ENGINES = ("closed", "exact", "grid", "skfuzzy")
@@ -141,14 +141,14 @@ def test_inputs_outside_may_be_clipped():
     [
         ({"criteria": []}, "at least one"),
         ({"criteria": [SECTION_VI[0], SECTION_VI[0]]}, "'obstacle'"),
-        ({"criteria": prioritised()}, r"got a System, expected Arbiter\(system="),
+        ({"criteria": prioritized()}, r"got a System, expected Arbiter\(system="),
         ({"form": "short"}, "hierarchical, minimal, conjunctive, complete"),
         ({"criteria": [Criterion(f"c{i}") for i in range(17)], "form": "complete"}, "at most 16"),
         ({"engine": "fast"}, "auto, closed, exact, grid, skfuzzy"),
         ({"points": 2}, "points is 2, expected a whole number, 3 or more"),
         ({"normalization": "sun"}, "normalization is 'sun', expected one of none, range, sum, max"),
         ({"outside": "wrap"}, "refuse, clip"),
-        ({"system": prioritised(), "points": 11}, "system: pass either"),
+        ({"system": prioritized(), "points": 11}, "system: pass either"),
         ({"engine": "closed", "form": "complete"}, "engine 'closed'"),
     ],
 )
@@ -193,7 +193,7 @@ def test_arbiter_reports_its_engine_and_the_reason():
 
 def test_arbiter_is_immutable_and_copyable(arbiter):
     with pytest.raises(AttributeError):
-        arbiter.system = prioritised()
+        arbiter.system = prioritized()
     with pytest.raises(AttributeError):
         arbiter.system.points = 5
     for other in (copy.copy(arbiter), copy.deepcopy(arbiter), pickle.loads(pickle.dumps(arbiter))):

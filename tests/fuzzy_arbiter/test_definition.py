@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import Criterion, Output, Rule, Shape, System, Term, Variable, falling, prioritised, rising
+from fuzzy_arbiter import Criterion, Output, Rule, Shape, System, Term, Variable, falling, prioritized, rising
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.propositions import Is, Not, Or
@@ -73,9 +73,9 @@ def nested(depth):
         (lambda: system(outputs=(wind,)), r"outputs: got Variable\(.* among them, expected a sequence of Output"),
         (lambda: system(normalization=np.array(["sum", "max"])), "normalization is array.*, expected one of none"),
         (lambda: system(points=HUGE), "points is a int that is too long to show, expected a whole number, 3 or more"),
-        (lambda: prioritised(["a", "b"]), "criteria: got 'a' among them, expected a sequence of Criterion"),
-        (lambda: prioritised(weight="w"), "weight is 'w', expected an Output"),
-        (lambda: prioritised(form=["minimal"]), r"form is \['minimal'\], expected one of hierarchical"),
+        (lambda: prioritized(["a", "b"]), "criteria: got 'a' among them, expected a sequence of Criterion"),
+        (lambda: prioritized(weight="w"), "weight is 'w', expected an Output"),
+        (lambda: prioritized(form=["minimal"]), r"form is \['minimal'\], expected one of hierarchical"),
         (lambda: Criterion("a", membership=[(0, 0), (1, 1)]), "criterion 'a': membership is .*, expected such as"),
         (lambda: Criterion(None), "criterion name is None, expected printable text"),
         (lambda: Criterion("a", on=3), "criterion 'a': on name is 3, expected printable text"),

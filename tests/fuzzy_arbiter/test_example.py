@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import Arbiter, Criterion, Rule, Shape, Term, prioritised
+from fuzzy_arbiter import Arbiter, Criterion, Rule, Shape, Term, prioritized
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
@@ -119,7 +119,7 @@ def test_rule_counts_match_the_manual():
     for form, _, sizes, _ in table("Four forms of the same rules")[1:]:
         for n, size in zip((3, 10), sizes.split(","), strict=True):
             criteria = [Criterion(f"c{i}") for i in range(n)]
-            assert len(prioritised(criteria, form=form).rules) == int(size)
+            assert len(prioritized(criteria, form=form).rules) == int(size)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 4])
@@ -134,7 +134,7 @@ def test_cuts_of_the_forms_are_those_of_the_manual(n):
     decided = np.column_stack([np.maximum(m, 1.0 - m)[:, k + 1 :].min(axis=1, initial=1.0) for k in range(n)])
     cuts = {}
     for form in FORMS:
-        firing = Firing(prioritised([Criterion(f"c{i}") for i in range(n)], form=form))
+        firing = Firing(prioritized([Criterion(f"c{i}") for i in range(n)], form=form))
         low, high = np.array(firing.cuts_of_many(firing.strengths_of_many(m))).transpose(1, 2, 0)
         if form != "complete":
             np.testing.assert_array_equal(high, h)
@@ -171,7 +171,7 @@ def test_scikit_fuzzy_error_is_within_the_documented_bound():
 
 def changed(what):
     """The rules of section VI with one feature that some formats do not support."""
-    system = prioritised(normalization="none")
+    system = prioritized(normalization="none")
     a, b, c = (v.terms[1].name for v in system.inputs)
     obstacle, shape, depth = Is("obstacle", a), Is("shape", b), Is("depth", c)
     low = (Is("alpha_1", "low"),)
@@ -213,7 +213,7 @@ def changed(what):
     if what == "keeping the value before":
         return replace(system, outputs=tuple(replace(v, lock_previous=True) for v in system.outputs))
     assert what == "names with spaces"
-    return prioritised([Criterion("a wall", on="near by", off="far off")], normalization="none")
+    return prioritized([Criterion("a wall", on="near by", off="far off")], normalization="none")
 
 
 @pytest.mark.parametrize("row", table("Formats")[2:-1], ids=lambda row: row[0])

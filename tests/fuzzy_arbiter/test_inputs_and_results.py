@@ -26,7 +26,7 @@ from fuzzy_arbiter import (
     auto_terms,
     curve,
     falling,
-    prioritised,
+    prioritized,
     rising,
     triangle,
 )
@@ -51,12 +51,12 @@ def tipping():
     return Arbiter(system=TIPPING)
 
 
-def test_systems_return_quantities_and_prioritised_criteria_return_shares(tipping):
+def test_systems_return_quantities_and_prioritized_criteria_return_shares(tipping):
     assert tipping([9.8, 6.5])[0] == pytest.approx(EXACT, abs=1e-13)
     for text in (writes(TIPPING, "toml").replace('normalization = "none"\n', ""), '{"criteria": [{"name": "a"}]}'):
         system = reads(text, "json" if text.startswith("{") else "toml")
         assert system.normalization == ("range" if text.startswith("{") else "none")
-    assert prioritised().normalization == Arbiter().system.normalization == "range"
+    assert prioritized().normalization == Arbiter().system.normalization == "range"
 
 
 @pytest.mark.parametrize(
@@ -105,17 +105,17 @@ def test_weights_go_by_the_names_of_the_criteria(tmp_path):
 @pytest.mark.parametrize("names", ["a", ("a",), ("a", "a", "b"), ("a", "b", ""), (1, 2, 3)])
 def test_names_of_weights_are_one_for_each_output(names):
     with pytest.raises(DefinitionError, match="weights_of"):
-        replace(prioritised(), weights_of=names)
+        replace(prioritized(), weights_of=names)
 
 
 @pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
 def test_weight_names_may_hold_comment_syntax(format):
-    system = replace(prioritised(), weights_of=("a, b", "c = d", "fuzzy_arbiter: points = 7"))
+    system = replace(prioritized(), weights_of=("a, b", "c = d", "fuzzy_arbiter: points = 7"))
     assert reads(writes(system, format), format) == system
     with pytest.raises(ArbiterError, match="weights_of"):
         writes(replace(system, weights_of=("a *)", "b", "c")), format)
     for said in ("weights_of = obstacle", 'weights_of = ""', "weights_of = "):
-        text = writes(prioritised(), format).replace('weights_of = "obstacle" "shape" "depth"', said)
+        text = writes(prioritized(), format).replace('weights_of = "obstacle" "shape" "depth"', said)
         with pytest.raises(FormatError, match="line 1"):
             reads(text, format)
 
@@ -273,8 +273,8 @@ def test_default_and_outside_can_be_overridden_when_loading(tmp_path):
     "system",
     [
         TIPPING,
-        prioritised(),
-        prioritised([Criterion("a wall", on="near by", off="far off")], outside="clip", points=7),
+        prioritized(),
+        prioritized([Criterion("a wall", on="near by", off="far off")], outside="clip", points=7),
         System(
             (SERVICE,), (replace(TIP, default=3.0),), ("if not (service is poor) then tip is low with 0.25",), "x y"
         ),

@@ -8,13 +8,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import Arbiter, prioritised
+from fuzzy_arbiter import Arbiter, prioritized
 from fuzzy_arbiter.engines.scikit import ScikitEngine
 from tests.fuzzy_arbiter import reference
 from tests.fuzzy_arbiter.engines.test_scikit import TIP, TIPPING
 
 DATA = Path(__file__).parents[1] / "data" / "fuzzy" / "libraries"
-SYSTEMS = {"section_vi": prioritised(normalization="none"), "tipping": TIPPING}
+SYSTEMS = {"section_vi": prioritized(normalization="none"), "tipping": TIPPING}
 # greatest error, as a part of the universe, for a step of 1 / resolution: a sum at the middles of cells is of second
 # order, a sum that gives both ends the weight of the other places of first order
 BOUNDS = {

@@ -18,7 +18,7 @@ from fuzzy_arbiter import (
     Term,
     Variable,
     falling,
-    prioritised,
+    prioritized,
     rising,
     trapezoid,
     triangle,
@@ -96,7 +96,7 @@ def test_as_dict_is_json():
 
 
 def test_gap_between_independent_terms_is_reported():
-    s = prioritised()
+    s = prioritized()
     gap = Variable("obstacle", (0, 1), (Term("not_exist", falling(0, 0.25)), Term("exist", rising(0.5, 1))))
     s = System((gap, *s.inputs[1:]), s.outputs, s.rules)
     v = verify(s)
@@ -125,7 +125,7 @@ def test_with_a_default_a_gap_is_no_fault():
 @pytest.mark.parametrize("form", ["hierarchical", "minimal", "conjunctive", "complete"])
 @pytest.mark.parametrize("n", [1, 2, 3, 5])
 def test_every_rule_form_verifies(form, n):
-    v = verify(prioritised([Criterion(f"c{i}") for i in range(n)], form))
+    v = verify(prioritized([Criterion(f"c{i}") for i in range(n)], form))
     assert v.ok
     assert verdicts(v) == (True,) * 6
     assert texts(v, "warning") == []
@@ -134,7 +134,7 @@ def test_every_rule_form_verifies(form, n):
 
 @pytest.mark.parametrize("n", [12, pytest.param(40, marks=pytest.mark.slow)])
 def test_many_criteria_are_decided(n):
-    v = verify(prioritised([Criterion(f"c{i}") for i in range(n)]))
+    v = verify(prioritized([Criterion(f"c{i}") for i in range(n)]))
     assert v.ok
     assert verdicts(v) == (True,) * 6
     assert v.rows == ()  # too many
@@ -145,12 +145,12 @@ def test_many_criteria_are_decided(n):
 
 @pytest.mark.medium
 def test_the_order_of_inputs_does_not_matter():
-    s = prioritised([Criterion(f"c{i}") for i in range(20)])
+    s = prioritized([Criterion(f"c{i}") for i in range(20)])
     assert verdicts(verify(System(s.inputs[::-1], s.outputs, s.rules))) == (True,) * 6
 
 
 def test_exceeding_the_effort_limit_leaves_checks_undecided():
-    v = verify(prioritised(), effort=8)
+    v = verify(prioritized(), effort=8)
     assert verdicts(v) == (None,) * 6
     assert not v.ok
     assert any("not decided" in text for text in texts(v, "warning"))
@@ -210,7 +210,7 @@ def test_greatest_term_is_identified_by_its_centroid():
 
 
 def test_products_are_bounded_by_the_minimum():
-    s = prioritised()
+    s = prioritized()
     v = verify(System(s.inputs, s.outputs, s.rules, conjunction="prod"))
     assert verdicts(v) == (True,) * 6
     (check,) = [check for check in v.checks if check.name == "graded_exclusive"]
@@ -218,7 +218,7 @@ def test_products_are_bounded_by_the_minimum():
 
 
 def test_inconclusive_bound_is_undecided_or_refuted_by_sampling():
-    s = prioritised()
+    s = prioritized()
     v = verify(System(s.inputs, s.outputs, s.rules, conjunction="prod", disjunction="probor"))
     assert v.graded_complete is True
     assert v.graded_exclusive is True  # the rules for high have no or
@@ -337,7 +337,7 @@ def test_repeated_product_condition_is_not_equal_to_its_factor():
 
 @pytest.mark.slow
 def test_hundreds_of_rules_with_one_conclusion_are_not_compared():
-    v = verify(prioritised([Criterion(f"c{i}") for i in range(7)], "complete"))
+    v = verify(prioritized([Criterion(f"c{i}") for i in range(7)], "complete"))
     (note,) = [f for f in v.findings if f.about == "rules"]
     assert note.severity == "note"
     assert note.text.startswith("not compared with each other")

@@ -43,7 +43,7 @@ START = dict(zip(STATES[3:], (0.6, 0.5, -0.4, 0.48, 0.7, -0.3, 0.4, 0.5, -0.6, 0
 @pytest.mark.medium
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 def test_asymmetric_vehicle_follows_fossens_matrix_equation(make_slave, fmi):
-    """A direct transcription with C(nu) from the parametrisation theorem (Fossen 2011, 3.46), integrated by SciPy."""
+    """A direct transcription with C(nu) from the parametrization theorem (Fossen 2011, 3.46), integrated by SciPy."""
     M_RB, M_A = mass_matrices()
     current, tau = np.array([0.3, -0.2, 0.1]), np.array([3.0, -2.0, 4.0, 0.4, -0.5, 0.3])
     linear, quadratic = np.array([2, 3, 4, 0.1, 0.2, 0.3]), np.array([5, 6, 7, 0.4, 0.5, 0.6])

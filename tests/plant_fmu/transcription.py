@@ -30,7 +30,7 @@ def vector(v, prefix, parts=AXES):
 
 
 def coriolis(M, nu):
-    """From the parametrisation theorem (Fossen 2011, 3.46)."""
+    """From the parametrization theorem (Fossen 2011, 3.46)."""
     a, b = (M @ nu)[:3], (M @ nu)[3:]
     return np.block([[np.zeros((3, 3)), -skew(a)], [-skew(a), -skew(b)]])
 

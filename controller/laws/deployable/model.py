@@ -41,7 +41,7 @@ class Thrusters(NamedTuple):
     upper: Array  # (m,) N, present upper limits
     nominal_lower: Array  # (m,) N, lower limits of the vehicle
     nominal_upper: Array  # (m,) N, upper limits of the vehicle
-    inverse: Array  # (m, m) H^-1 with H = B^T Q B + regularisation
+    inverse: Array  # (m, m) H^-1 with H = B^T Q B + regularization
     allocator: Array  # (m, 6) H^-1 B^T Q: maps a wrench to its least-squares forces
     metric: Array  # (6,) 1/N2, 1/(N m)2: Q, cost of an error of the wrench
     health: Array  # (m,) 1 working, 0 failed

@@ -130,7 +130,7 @@ def test_available_modes_list_settable_modes(station):
 
 @pytest.mark.parametrize("armed", [0.0, 1.0])
 def test_base_mode_equals_that_of_ardusub(armed):
-    """ArduSub's base_mode(): stabilised and manual input in all modes, guided where it finds its own way."""
+    """ArduSub's base_mode(): stabilized and manual input in all modes, guided where it finds its own way."""
     station = Station("ardusub")
     for number, guided in ((0, 0), (2, 0), (3, 8), (4, 8), (9, 0), (16, 8), (19, 0)):
         mode = PROFILES["ardusub"].find_mode(number)

@@ -6,7 +6,7 @@ import pytest
 
 from cosim.errors import ScenarioError
 from cosim.scenario.scenario import load_scenario
-from fuzzy_arbiter import Arbiter, Criterion, falling, prioritised
+from fuzzy_arbiter import Arbiter, Criterion, falling, prioritized
 from fuzzy_arbiter.formats import save
 
 FOUR = "inspection-visibility"
@@ -163,7 +163,7 @@ def test_arbiter_file_is_saved_with_the_scenario(own, tmp_path):
 
 
 def test_clearing_the_arbiter_file_drops_its_inputs(own):
-    assert load_scenario(own, ['arbiter.file=""']).rules.system == prioritised(
+    assert load_scenario(own, ['arbiter.file=""']).rules.system == prioritized(
         [Criterion("obstacle", "exist", "not_exist"), Criterion("depth", "not_maintain", "maintain")]
     )
 

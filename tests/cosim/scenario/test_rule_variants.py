@@ -9,7 +9,7 @@ from cosim.errors import ScenarioError
 from cosim.scenario.arbiter_rules import rules_by_order
 from cosim.scenario.criteria import PAPER, CriterionSetup, Reason
 from cosim.scenario.scenario import load_scenario
-from fuzzy_arbiter import SECTION_VI, Arbiter, prioritised
+from fuzzy_arbiter import SECTION_VI, Arbiter, prioritized
 
 FOUR = (*PAPER, CriterionSetup("visibility", "#CC79A7", (Reason("ramp", None),)))
 PLACES = (0.0, 0.2, 0.4, 0.6, 1.0)
@@ -24,7 +24,7 @@ def weights(variant, criteria, memberships):
 
 @pytest.mark.medium
 def test_reversed_rules_are_those_of_the_reversed_order():
-    last_first = Arbiter(system=prioritised(SECTION_VI[::-1]))
+    last_first = Arbiter(system=prioritized(SECTION_VI[::-1]))
     for memberships in itertools.product(PLACES, repeat=3):
         found = weights("reversed", PAPER, memberships)
         assert found._fields == ("obstacle", "shape", "depth")
@@ -52,7 +52,7 @@ def test_rule_variants_use_the_closed_form_engine(variant):
 
 
 def test_rule_variant_is_rejected_with_an_arbiter_file(tmp_path):
-    Arbiter(system=prioritised()).save(tmp_path / "mine.json")
+    Arbiter(system=prioritized()).save(tmp_path / "mine.json")
     table = "".join(f'arbiter.inputs.{name}="membership.{name}"\n' for name in ("obstacle", "shape", "depth"))
     changes = [f'arbiter.file="{tmp_path / "mine.json"}"', *table.splitlines()]
     assert load_scenario("docking", changes).arbiter.rules == "ordered"

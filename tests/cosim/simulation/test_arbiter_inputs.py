@@ -12,7 +12,7 @@ from cosim.scenario.arbiter_rules import ArbiterRules, InputSignal
 from cosim.scenario.criteria import PAPER
 from cosim.scenario.region_tables import SecondaryRegion
 from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, empty_state, pack_inputs, write_arbiter_state
-from fuzzy_arbiter import Criterion, prioritised, rising
+from fuzzy_arbiter import Criterion, prioritized, rising
 
 GOAL = Region("goal", Sphere((5.0, 0.0, 2.0), 1.0), "in", velocity=(0.1, 0.0, 0.0))
 REGIONS = [
@@ -27,7 +27,7 @@ UNIVERSE = (-100.0, 100.0)
 
 
 def rules(*signals):
-    return ArbiterRules(prioritised([Criterion(s.name, membership=rising(*UNIVERSE)) for s in signals]), signals)
+    return ArbiterRules(prioritized([Criterion(s.name, membership=rising(*UNIVERSE)) for s in signals]), signals)
 
 
 def state_of(position, turn, velocity):

@@ -18,7 +18,7 @@ from fuzzy_arbiter import (
     Term,
     Variable,
     falling,
-    prioritised,
+    prioritized,
     rising,
     triangle,
 )
@@ -63,7 +63,7 @@ def test_closed_form_equals_exact_centroid_on_100_000_inputs():
 @settings(max_examples=examples(60), deadline=None)
 @given(st.lists(st.fractions(0, 1, max_denominator=64), min_size=1, max_size=5))
 def test_closed_form_equals_rational_centroid(memberships):
-    system = prioritised(criteria(len(memberships)))
+    system = prioritized(criteria(len(memberships)))
     inputs = [float(m) for m in memberships]
     exact = [float(w) for w in reference.weights(system, inputs)]
     assert Arbiter(system=system, engine="closed")(inputs) == pytest.approx(exact, abs=4 * EPS)
@@ -75,7 +75,7 @@ def test_closed_form_equals_rational_centroid(memberships):
 def test_any_pair_of_output_terms_has_its_pieces(low, high, h):
     output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
     exact = reference.centroid(output, [1 - Fraction(h), Fraction(h)])
-    engine = ClosedEngine(prioritised(criteria(1), weight=output, normalization="none"))
+    engine = ClosedEngine(prioritized(criteria(1), weight=output, normalization="none"))
     assert engine.weights([h])[0] == pytest.approx(float(exact), abs=16 * EPS)
     assert engine.weights_of_many(np.array([[h]]))[0] == pytest.approx(engine.weights([h]), abs=EPS)
 
@@ -88,7 +88,7 @@ def test_weights_of_any_pair_are_those_of_the_exact_engine(low, high, h, normali
     output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
     ends = [reference.centroid(output, [Fraction(1 - i), Fraction(i)]) for i in (0, 1)]
     assume(abs(ends[1] - ends[0]) > Fraction(1, 64))
-    system = prioritised(criteria(2), weight=output, normalization=normalization)
+    system = prioritized(criteria(2), weight=output, normalization=normalization)
     inputs = [h, 0.25]
     expected = np.array([float(w) for w in reference.weights(system, inputs)])
     whole = {"range": 1.0, "sum": expected.sum(), "max": expected.max()}[normalization]
@@ -124,7 +124,7 @@ def test_terms_of_very_different_areas_are_exact(height):
     for low, high in ((plateau, low_triangle), (low_triangle, plateau), (plateau, narrow), (narrow, plateau)):
         output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
         raw, _ = pieces(output)
-        engine = ClosedEngine(prioritised(criteria(1), weight=output, normalization="none"))
+        engine = ClosedEngine(prioritized(criteria(1), weight=output, normalization="none"))
         starts = [x for p in raw for x in (p.start, math.nextafter(p.start, 0), math.nextafter(p.start, 1))]
         for h in [*near, *(1 - x for x in near), *starts]:
             exact = float(reference.centroid(output, [1 - Fraction(h), Fraction(h)]))
@@ -137,7 +137,7 @@ def test_piecewise_evaluation_is_exact_next_to_breakpoints(height):
     low = Shape(((0, 1), (0.01, 1), (0.01, height), (1, height)))
     high = Shape(((0.7, 0), (0.7, 3 * height), (0.9, 3 * height), (0.9, 0)))
     output = Output("y", (0, 1), (Term("low", low), Term("high", high)))
-    engine = ClosedEngine(prioritised(criteria(1), weight=output, normalization="none"))
+    engine = ClosedEngine(prioritized(criteria(1), weight=output, normalization="none"))
     for piece in engine.raw[0][1:]:
         for h in (piece.start, math.nextafter(piece.start, 0)):
             exact = float(reference.centroid(output, [1 - Fraction(h), Fraction(h)]))

@@ -18,7 +18,7 @@ from fuzzy_arbiter import (
     Term,
     Variable,
     falling,
-    prioritised,
+    prioritized,
     rising,
     trapezoid,
     triangle,
@@ -101,8 +101,8 @@ def stock(system):
     "system",
     [
         TIPPING,
-        prioritised(points=11),
-        prioritised(form="complete"),
+        prioritized(points=11),
+        prioritized(form="complete"),
         mixed(),
         mixed("prod", "probor", 37),
         mixed("prod"),
@@ -184,8 +184,8 @@ def test_edges_at_the_ends_of_an_input_are_no_jumps():
 @pytest.mark.slow
 def test_scikit_fuzzy_warnings_are_suppressed():
     code = (
-        "from fuzzy_arbiter import prioritised; from fuzzy_arbiter.engines.scikit import ScikitEngine;"
-        "print(ScikitEngine(prioritised()).weights([1, 0, 0]))"
+        "from fuzzy_arbiter import prioritized; from fuzzy_arbiter.engines.scikit import ScikitEngine;"
+        "print(ScikitEngine(prioritized()).weights([1, 0, 0]))"
     )
     done = subprocess.run([sys.executable, "-W", "error", "-c", code], capture_output=True, text=True, check=False)
     assert (done.stdout.strip(), done.stderr) == ("(1.0, 0.0, 0.0)", "")

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Arbiter, Output, Shape, Term, Variable, falling, prioritised, rising, triangle
+from fuzzy_arbiter import Arbiter, Output, Shape, Term, Variable, falling, prioritized, rising, triangle
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.rule import Operators
@@ -106,7 +106,7 @@ def test_missing_operator_is_the_dual_of_the_given_one(operators, norms):
 
 
 def test_input_range_is_written_only_if_not_implied_by_its_points():
-    assert "RANGE" not in writes(prioritised(), "fcl").split("END_VAR")[0]
+    assert "RANGE" not in writes(prioritized(), "fcl").split("END_VAR")[0]
     wide = replace(TIPPING.inputs[0], universe=(-1.5, 10))
     text = writes(replace(TIPPING, inputs=(wide, TIPPING.inputs[1])), "fcl")
     assert "  quality : REAL; RANGE := (-1.5 .. 10);\n  service : REAL;\n" in text

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import prioritised
+from fuzzy_arbiter import prioritized
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, load, save
 from tests.fuzzy_arbiter.formats.systems import TIPPING
@@ -22,8 +22,8 @@ def test_file_suffix_selects_the_format_case_insensitively(format, tmp_path):
 def test_existing_file_is_replaced_without_temporary_files(tmp_path):
     path = tmp_path / "a.json"
     save(TIPPING, path)
-    save(prioritised(), path)
-    assert load(path) == prioritised()
+    save(prioritized(), path)
+    assert load(path) == prioritized()
     assert os.listdir(tmp_path) == ["a.json"]
     assert path.stat().st_mode & 0o777 == 0o644
 
@@ -57,7 +57,7 @@ def test_write_error_leaves_the_existing_file(tmp_path, monkeypatch):
 
     monkeypatch.setattr("os.replace", full)
     with pytest.raises(FormatError, match=r"a\.toml: No space left on device"):
-        save(prioritised(), path)
+        save(prioritized(), path)
     assert load(path) == TIPPING
     assert os.listdir(tmp_path) == ["a.toml"]
 

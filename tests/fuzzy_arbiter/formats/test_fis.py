@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, prioritised, rising, trapezoid, triangle
+from fuzzy_arbiter import Output, Rule, Shape, System, Term, Variable, falling, prioritized, rising, trapezoid, triangle
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.terms.curves import curve
@@ -89,7 +89,7 @@ def test_empty_operators_default_to_min_and_max():
 
 
 def test_half_triangles_are_extended_beyond_the_range():
-    text = writes(prioritised(), "fis")
+    text = writes(prioritized(), "fis")
     assert "MF1='low':'trimf',[-1 0 1]\nMF2='high':'trimf',[0 1 2]" in text
 
 
@@ -196,7 +196,7 @@ def test_unsupported_features_are_rejected_by_name(change, fault):
 
 
 def test_conclusions_must_follow_the_output_order():
-    system = prioritised(form="minimal")
+    system = prioritized(form="minimal")
     rule = Rule(system.rules[0].condition, (system.outputs[1]["low"], system.outputs[0]["high"]))
     with pytest.raises(
         UnsupportedError, match=r"fis cannot say the conclusions of R1 .*: expected each output in the order"

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Output, Shape, Term, Variable, falling, prioritised, rising, trapezoid, triangle
+from fuzzy_arbiter import Output, Shape, Term, Variable, falling, prioritized, rising, trapezoid, triangle
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.rule import Operators
@@ -67,7 +67,7 @@ def test_foreign_engine_is_read():
 
 
 def test_points_and_clipping_use_fll_keywords():
-    system = prioritised(outside="clip", points=64)
+    system = prioritized(outside="clip", points=64)
     text = writes(system, "fll")
     assert text.count("lock-range: true") == 3
     assert text.count("defuzzifier: Centroid 64\n") == 3
@@ -139,7 +139,7 @@ def test_unknown_constructs_are_rejected_with_their_line(old, new, fault):
 
 
 def test_outputs_share_one_resolution_and_locking():
-    text = writes(prioritised(), "fll")
+    text = writes(prioritized(), "fll")
     assert reads(text.replace("Centroid 101", "Centroid 100", 1), "fll").points == 101  # the most of any
     with pytest.raises(FormatError, match="'shape' has another lock-range than 'obstacle'"):
         reads(text.replace("lock-range: false", "lock-range: true", 1), "fll")
@@ -155,7 +155,7 @@ def test_rules_keep_the_operators_of_their_block():
 
 
 def test_file_with_two_engines_is_rejected():
-    text = writes(prioritised(), "fll")
+    text = writes(prioritized(), "fll")
     with pytest.raises(FormatError, match="expected one Engine in a FLL file, got 2"):
         reads(f"{text}Engine: twin\n", "fll")
 

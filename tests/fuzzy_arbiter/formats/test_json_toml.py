@@ -14,7 +14,7 @@ from fuzzy_arbiter import (
     Term,
     Variable,
     falling,
-    prioritised,
+    prioritized,
     rising,
     trapezoid,
     triangle,
@@ -89,8 +89,8 @@ weight = {name = "w", universe = [0, 1], terms = {low = {falling = [0.3, 0.7]}, 
 def test_criteria_are_the_short_form():
     criteria = (Criterion("obstacle", "near", "far", falling(1, 3)), Criterion("depth"))
     weight = Output("w", (0, 1), (Term("low", falling(0.3, 0.7)), Term("high", rising(0.3, 0.7))))
-    assert reads(SHORT, "toml") == prioritised(criteria, "minimal", weight, "sum", "clip", 55, "regions")
-    assert reads('{"criteria": [{"name": "a"}]}', "json") == prioritised([Criterion("a")])
+    assert reads(SHORT, "toml") == prioritized(criteria, "minimal", weight, "sum", "clip", 55, "regions")
+    assert reads('{"criteria": [{"name": "a"}]}', "json") == prioritized([Criterion("a")])
 
 
 def test_term_points_are_on_one_line_of_standard_json_and_toml():

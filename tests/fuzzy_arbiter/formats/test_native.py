@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Arbiter, Output, System, Term, Variable, falling, prioritised, rising, trapezoid, triangle
+from fuzzy_arbiter import Arbiter, Output, System, Term, Variable, falling, prioritized, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.errors import EngineError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, fold_normalization, reads, writes
@@ -28,7 +28,7 @@ def weight(pair, universe=(0.0, 1.0), default=None):
 
 
 def test_triangles_extend_one_width_beyond_both_ends():
-    output = fold_normalization(prioritised()).outputs[0]
+    output = fold_normalization(prioritized()).outputs[0]
     assert output.universe == (-1.0, 2.0)
     assert [term.shape for term in output.terms] == [falling(-1, 2), rising(-1, 2)]
 
@@ -41,43 +41,43 @@ def test_the_ends_are_exact():
 @pytest.mark.parametrize("pair", PAIRS)
 @given(st.lists(st.floats(0, 1), min_size=3, max_size=3))
 def test_its_centroids_are_the_weights(pair, memberships):
-    system = prioritised(weight=weight(pair))
+    system = prioritized(weight=weight(pair))
     centroids = ExactEngine(fold_normalization(system)).weights(memberships)
     assert np.clip(centroids, 0, 1) == pytest.approx(ExactEngine(system).weights(memberships), abs=16 * EPS)
 
 
 def test_a_default_is_mapped_and_held_within_the_range():
     for default, mapped in ((0.5, 0.5), (0.0, 0.0), (1.0, 1.0), (0.4, 0.2)):
-        output = fold_normalization(prioritised(weight=weight("triangles", default=default))).outputs[0]
+        output = fold_normalization(prioritized(weight=weight("triangles", default=default))).outputs[0]
         assert output.default == pytest.approx(mapped, abs=EPS)
 
 
 def test_system_without_normalization_is_unchanged():
-    system = prioritised(normalization="none")
+    system = prioritized(normalization="none")
     assert fold_normalization(system) is system
 
 
 @pytest.mark.parametrize("normalization", ["sum", "max"])
 def test_a_normalization_over_all_outputs_is_refused(normalization):
     with pytest.raises(UnsupportedError, match=f"no universe can say the normalization '{normalization}'"):
-        fold_normalization(prioritised(normalization=normalization))
+        fold_normalization(prioritized(normalization=normalization))
 
 
 def test_terms_with_one_centroid_are_refused():
     twin = Output("w", (0, 1), (Term("low", triangle(0, 0.5, 1)), Term("high", trapezoid(0, 0.4, 0.6, 1))))
     with pytest.raises(UnsupportedError, match=r"output 'w_1': its terms have one centroid, 0\.5"):
-        fold_normalization(prioritised(weight=twin))
+        fold_normalization(prioritized(weight=twin))
 
 
 def test_terms_too_close_for_floating_point_are_refused():
     near = Output("w", (0, 1), (Term("low", falling(0, 1e-200)), Term("high", falling(0, 2e-200))))
     with pytest.raises(UnsupportedError, match="too far apart, or too close"):
-        fold_normalization(prioritised(weight=near))
+        fold_normalization(prioritized(weight=near))
 
 
 @pytest.mark.parametrize("format", FORMATS)
 def test_folded_normalization_round_trips_in_every_format(format):
-    system = fold_normalization(prioritised(form="minimal"))
+    system = fold_normalization(prioritized(form="minimal"))
     assert reads(writes(system, format), format) == system
     assert reads(writes(system, format), format) == replace(system, normalization="none")
 
@@ -92,7 +92,7 @@ def test_what_no_universe_can_fold_is_refused(defuzzifier):
 
 
 def test_locks_survive_folding():
-    made = prioritised()
+    made = prioritized()
     locked = replace(made, outputs=tuple(replace(v, lock_range=True, lock_previous=True) for v in made.outputs))
     assert all(v.lock_range and v.lock_previous for v in fold_normalization(locked).outputs)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import Output, Shape, System, Term, Variable, falling, prioritised, rising, trapezoid, triangle
+from fuzzy_arbiter import Output, Shape, System, Term, Variable, falling, prioritized, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.formats import FORMATS, fold_normalization, load, reads, writes
 from tests.fuzzy_arbiter.formats.other_tools import DATA, TOOLS
@@ -112,10 +112,10 @@ WILD = replace(
         replace(ALL_CAN_SAY, implication="prod"),
         WILD,
         replace(WILD, conjunction="prod", disjunction="probor"),
-        prioritised(outside="clip", points=1000),
-        fold_normalization(prioritised(points=1000)),
+        prioritized(outside="clip", points=1000),
+        fold_normalization(prioritized(points=1000)),
     ],
-    ids=["plain", "scaled", "wild", "product", "prioritised", "natively"],
+    ids=["plain", "scaled", "wild", "product", "prioritized", "natively"],
 )
 @pytest.mark.parametrize("tool", TOOLS)
 def test_other_tools_give_the_same_centroids(tool, system, tmp_path, request):

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Arbiter, ArbiterError, Output, Shape, System, Term, Variable, prioritised
+from fuzzy_arbiter import Arbiter, ArbiterError, Output, Shape, System, Term, Variable, prioritized
 from fuzzy_arbiter.definition import CHOICES
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, reads, writes
@@ -21,8 +21,8 @@ relaxed = settings(max_examples=examples(40), suppress_health_check=[HealthCheck
 
 @pytest.mark.parametrize("format", FORMATS)
 @pytest.mark.parametrize("form", FORMS)
-def test_prioritised_systems_round_trip(format, form):
-    for system in (prioritised(form=form), prioritised(form=form, normalization="sum", outside="clip", points=77)):
+def test_prioritized_systems_round_trip(format, form):
+    for system in (prioritized(form=form), prioritized(form=form, normalization="sum", outside="clip", points=77)):
         assert reads(writes(system, format), format) == system
 
 
@@ -71,7 +71,7 @@ def _require_one_line(text, format):
     assert len(fault) < 1000
 
 
-texts = {f: writes(prioritised(outside="clip", points=55), f) for f in FORMATS}
+texts = {f: writes(prioritized(outside="clip", points=55), f) for f in FORMATS}
 SIGNS = st.sampled_from("()[]{}\"'%#*:=;,.0123 -eE\nabct_\\/\u00e9\u2028\0")
 
 
@@ -147,7 +147,7 @@ def test_deepest_allowed_rule_round_trips(format):
 
 @pytest.mark.parametrize("format", FORMATS)
 def test_line_endings_and_byte_order_mark_are_ignored(format):
-    system = prioritised(points=33)
+    system = prioritized(points=33)
     assert reads("\ufeff" + writes(system, format).replace("\n", "\r\n"), format) == system
 
 
@@ -162,10 +162,10 @@ def test_numbers_are_not_rounded(format):
 
 @pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
 def test_settings_round_trip_in_one_comment(format):
-    text = writes(prioritised(), format)
+    text = writes(prioritized(), format)
     assert "fuzzy_arbiter: normalization = range" in text.splitlines()[0]
     assert "(c - 0.3333333333333333) / 0.3333333333333333, held within [0, 1], for alpha_1" in text
-    plain = replace(prioritised(), normalization="none", weights_of=())
+    plain = replace(prioritized(), normalization="none", weights_of=())
     assert "fuzzy_arbiter" not in writes(plain, format)
     assert reads(writes(plain, format), format) == plain
 
@@ -190,14 +190,14 @@ def test_settings_round_trip_in_one_comment(format):
     ],
 )
 def test_unknown_settings_are_rejected(format, said, fault):
-    text = writes(prioritised(), format).replace("fuzzy_arbiter: normalization = range", said)
+    text = writes(prioritized(), format).replace("fuzzy_arbiter: normalization = range", said)
     with pytest.raises(FormatError, match=fault):
         reads(text, format)
 
 
 @pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
 def test_duplicate_settings_are_rejected(format):
-    text = writes(prioritised(), format)
+    text = writes(prioritized(), format)
     with pytest.raises(FormatError, match=r"line 2: .* is the second such comment after line 1, expected one"):
         reads(f"{text.splitlines()[0]}\n{text}", format)
 

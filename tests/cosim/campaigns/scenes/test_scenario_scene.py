@@ -17,7 +17,7 @@ from cosim.campaigns.scenes.kinds import kind_of
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.trials import make_trial
 from cosim.errors import ScenarioError
-from fuzzy_arbiter import Arbiter, prioritised
+from fuzzy_arbiter import Arbiter, prioritized
 from plant_fmu import load_vehicle
 
 GAINS = LAWS["deployable"].gains_type()
@@ -160,7 +160,7 @@ def test_scene_uses_its_own_vehicle():
 def test_arbiter_file_weights_the_criteria_of_any_scene(tmp_path):
     """The paper's rules, from a file, give the same run as the scenario's own; others reject unknown criteria."""
     file = tmp_path / "mine.json"
-    Arbiter(system=prioritised()).save(file)
+    Arbiter(system=prioritized()).save(file)
     (scene,) = (decode_scene(line.encode()) for line in generate_scenes(1, 3, "hard"))
     ends = []
     for arbiter in ("ordered", str(file)):
