@@ -31,9 +31,7 @@ from cosim.mavlink.wire.signing import SigningClock
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from cosim.simulation.signals import Array
-from tests.cosim.mavlink.conformance.client import Client
-from tests.cosim.mavlink.conformance.connect import qgc_connect
-from tests.cosim.mavlink.conformance.vehicle import own_vehicle
+from tests.cosim.mavlink.running import GroundStation, running_vehicle
 
 STEPS = 20_000
 RATIO = "how many times as long as what it is compared with"
@@ -194,12 +192,16 @@ def _connecting(repeats: int) -> list[Row]:
     """Connect as QGroundControl does, to a run of each profile that steps in real time."""
     rows = []
     for profile in PROFILES:
-        found = []
+        seconds, retries = [], 0
         for _ in range(repeats):
-            with own_vehicle(profile) as link:
-                found.append(qgc_connect(Client(link)))
-        name = f"QGroundControl connects, {profile}, with {max(one.retries for one in found)} retries at the most"
-        rows.append(Row(name, Timing(tuple(one.seconds for one in found))))
+            with (
+                GroundStation() as station,
+                running_vehicle([station.endpoint], MavlinkOptions(profile=profile, commands=True)),
+            ):
+                seconds.append(sum(station.connect().values()))
+                retries = max(retries, station.retries)
+        name = f"QGroundControl connects, {profile}, with {retries} retries at the most"
+        rows.append(Row(name, Timing(tuple(seconds))))
     return rows
 
 

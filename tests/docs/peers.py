@@ -11,11 +11,11 @@ from benchmarks.sitl_pilot import HEAD, MAGIC, PULSES, RATE
 from cosim.errors import TelemetryError
 from cosim.live.address import parse_live
 from cosim.live.live_view import LiveView
+from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
-from tests.cosim.mavlink.conformance.client import Client
 
 _ARM = 400  # MAV_CMD_COMPONENT_ARM_DISARM
 _PAUSE = 0.05  # s
@@ -50,9 +50,11 @@ def arming(endpoint: str) -> Iterator[None]:
     def arm() -> None:
         while not ended.is_set():
             with contextlib.suppress(TelemetryError), GroundLink(parse_endpoint(endpoint, False), None) as link:
-                client = Client(link)
-                if client.find(1.0) is not None and (answer := client.command(_ARM, (1.0,))) and answer.result == 0:
-                    return
+                link.send_heartbeat()
+                if any(received.name == "HEARTBEAT" for received in link.receive(1.0)):
+                    link.send(dialect().MAVLink_command_long_message(1, 1, _ARM, 0, 1.0, *[0.0] * 6))
+                    if any(r.name == "COMMAND_ACK" and r.message.result == 0 for r in link.receive(1.0)):
+                        return
             ended.wait(_PAUSE)
 
     with _beside(arm):

@@ -189,7 +189,7 @@ def test_heartbeat_identifies_the_emulated_autopilot(profile, autopilot, number)
     station.look()
     station.command(512, 0)
     beat = station.wire.of("HEARTBEAT")[-1]
-    assert (beat.type, beat.autopilot, beat.custom_mode) == (12, autopilot, number)
+    assert (beat.type, beat.autopilot, beat.custom_mode, beat.mavlink_version) == (12, autopilot, number, 3)
     assert beat.base_mode & 1 and beat.base_mode & 128 and beat.system_status == mavlink.MAV_STATE_ACTIVE
     assert (beat.get_srcSystem(), beat.get_srcComponent()) == (1, 1)
 

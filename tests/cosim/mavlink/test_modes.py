@@ -16,6 +16,7 @@ EXCHANGES = {
     "arm and disarm": ([(ARM, (1.0,), ACCEPTED), (ARM, (0.0, 21196.0), ACCEPTED), (ARM, (NAN,), DENIED),
                         (ARM, (2.0,), DENIED)], [Arm(True), Arm(False)]),
     "no bit of custom modes": ([(SET_MODE, (208, 0.0), FAILED), (SET_MODE, (NAN, 4.0), FAILED)], []),
+    "no such command": ([(65000, (), UNSUPPORTED)], []),
     "no mission": ([(STANDARD_MODE, (6,), FAILED)], []),
     "no such standard mode": ([(STANDARD_MODE, (number,), FAILED) for number in (0, 2, 3, 8, NAN)], []),
     "pause and continue": (

@@ -258,6 +258,7 @@ def test_px4_parameter_hash_identifies_the_list():
     station.wire.clear()
     station.wait(0.1)
     assert station.wire.of("PARAM_VALUE") == []
+    assert read(station, "_HASH_CHECK")[0].param_value == first.param_value
     assert hash_parameters({}) == 0
 
 

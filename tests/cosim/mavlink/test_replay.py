@@ -14,11 +14,9 @@ from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.mavlink.replay import replay
 from cosim.mavlink.wire.endpoint import parse_endpoint
-from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.results.record import load_record
-from tests.cosim.mavlink.conformance.client import Client
-from tests.cosim.mavlink.stubs import free_port
+from tests.cosim.mavlink.running import GroundStation
 
 OVERRIDES = ("arbiter.engine=closed", "time.duration=4")
 COMMANDED = (*OVERRIDES, "commands.enabled=true")
@@ -93,18 +91,14 @@ def test_killed_run_is_streamed_to_its_last_row(recorded, tmp_path):
 
 
 @pytest.mark.slow
-def test_streaming_over_udp_answers_requests_and_rejects_commands(recorded, tmp_path):
-    port, done = free_port(), []
-    with GroundLink(parse_endpoint(f"udpin:127.0.0.1:{port}")) as link:
-        endpoint = parse_endpoint(f"udpout:127.0.0.1:{port}")
-        thread = threading.Thread(target=lambda: done.append(replay(recorded, [endpoint], MavlinkOptions(), 1.0)))
+def test_streaming_over_udp_answers_requests_and_rejects_commands(recorded):
+    done = []
+    with GroundStation() as station:
+        thread = threading.Thread(target=lambda: done.append(replay(recorded, [station.endpoint], MavlinkOptions())))
         thread.start()
-        client = Client(link)
-        assert client.find(10.0) is not None
-        version = client.request(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
-        ack = client.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, [0, 0, 0, 0, 0, 0, 0])
+        station.connect()
+        assert station.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM).result == mavlink.MAV_RESULT_DENIED
         thread.join()
-    assert version is not None and ack.result == mavlink.MAV_RESULT_DENIED
     assert done[0].wall >= 4.0
 
 

@@ -25,7 +25,7 @@ from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.results.record import load_record
 from cosim.run.run_folder import report_again
-from tests.cosim.mavlink.conformance.vehicle import running_vehicle
+from tests.cosim.mavlink.running import running_vehicle
 from tests.docs.peers import flying
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals, pipes and devices of POSIX")

@@ -1,1 +1,0 @@
-"""Checks, from the client's side, of what ground stations require of a vehicle."""
