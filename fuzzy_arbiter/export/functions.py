@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import ast
-import inspect
 import re
 from collections.abc import Iterable
 
 from fuzzy_arbiter.errors import UnsupportedError
-from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, T_NORMS, formula
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, T_NORMS
 
 # each by IEEE 754, where Python raises
 _PYTHON = {
@@ -42,12 +41,10 @@ _CALL = re.compile(r"\b([a-z_][a-z_0-9]*)\(")
 def called(texts: Iterable[str]) -> list[str]:
     """Return the functions that some expressions call."""
     names = {name for text in texts for name in _CALL.findall(text) if name not in ("or", "and", "not")}
-    inner = {name for operator in names & _OPERATORS.keys() for name in _CALL.findall(_body_in_c(operator))}
-    names |= inner - {"sqrt", "pow"}
     for name in names:
         if name not in (*_OPERATORS, *_PYTHON, *_COMPARED, *_C_MATH):
             raise UnsupportedError(f"export: the function {name!r} of a formula is not exported")
-    return sorted(names)  # an operator calls those before it
+    return sorted(names)
 
 
 def in_python(name: str) -> str:
@@ -61,8 +58,8 @@ def in_python(name: str) -> str:
         return (
             f'def {name}(a, b):\n    """Return 1 if {comparison}, else 0."""\n    return 1.0 if {comparison} else 0.0'
         )
-    source = inspect.getsource(_OPERATORS[name].number).rstrip()
-    return re.sub(r"(?<=[ab]): float|( -> float)(?=:)", "", source)
+    operator = _OPERATORS[name]
+    return f'def {name}({operator.arguments}):\n    """Return the degree."""\n    return {operator.formula}'
 
 
 def in_c(name: str) -> str:
@@ -73,7 +70,7 @@ def in_c(name: str) -> str:
 
 
 def _body_in_c(name: str) -> str:
-    return _expression_in_c(formula(_OPERATORS[name].number)).replace("math.", "")
+    return _expression_in_c(_OPERATORS[name].tree).replace("math.", "")
 
 
 def _expression_in_c(node: ast.expr) -> str:

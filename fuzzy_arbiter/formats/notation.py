@@ -13,7 +13,7 @@ from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.rule import Operators, Rule
-from fuzzy_arbiter.terms.norms import Norm
+from fuzzy_arbiter.terms.norms import Operator
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
@@ -101,7 +101,7 @@ def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
         raise UnsupportedError(f"{format} cannot say the name {name!r}: it is a word of the language")
 
 
-def word_of(format: str, what: str, name: str, norms: Mapping[str, Norm]) -> str:
+def word_of(format: str, what: str, name: str, norms: Mapping[str, Operator]) -> str:
     """Return a format's word for a norm."""
     word: str = getattr(norms[name], format)
     if not word:

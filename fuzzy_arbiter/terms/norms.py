@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import ast
-import inspect
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -15,30 +13,56 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-_ARITHMETIC: dict[type[ast.AST], Any] = {
+_ARRAY_FUNCTIONS: dict[Any, Any] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide,
     ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal, ast.Eq: np.equal,
+    "sqrt": np.sqrt, "pow": np.power,
 }  # fmt: skip
-_FUNCTIONS: dict[str, Any] = {"sqrt": np.sqrt, "pow": np.power}
+# functions in exported code, where the words of the norms are functions of Python or of another meaning
+_NAMES = {
+    "min": "least",
+    "max": "greatest",
+    "prod": "product",
+    "probor": "probabilistic_sum",
+    "sum": "unbounded_sum",
+}
 
 
-@cache
-def formula(number: Callable[..., float]) -> ast.expr:
-    """Return the expression that a function of numbers returns."""
-    (function,) = ast.parse(inspect.getsource(number)).body
-    assert isinstance(function, ast.FunctionDef)
-    returned = function.body[-1]
-    assert isinstance(returned, ast.Return) and returned.value is not None
-    return returned.value
+@dataclass(frozen=True, slots=True)
+class Operator:
+    """An operator on degrees ``a`` and, for a norm, ``b``, with its words in files; empty where a format has none."""
 
+    fis: str  # its own word, which is also Octave's, and MATLAB's where it has one
+    formula: str  # Python expression, from which all else follows
+    fll: str = ""
+    fcl: str = ""
+    number: Callable[..., float] = field(init=False, repr=False, compare=False)  # on numbers
+    _arrays: Callable[[dict[str, Any]], Any] = field(init=False, repr=False, compare=False)
 
-@cache
-def _on_arrays(number: Callable[..., float]) -> Callable[[dict[str, Any]], Any]:
-    try:
-        return _vectorized(formula(number))
-    except OSError:  # without sources, as in a frozen program: slower
-        each = np.vectorize(number, otypes=[np.float64])
-        return lambda values: each(*values.values())
+    def __post_init__(self) -> None:
+        number = eval(f"lambda {self.arguments}: {self.formula}", {"math": math})  # noqa: S307  # of the tables below
+        object.__setattr__(self, "number", number)
+        object.__setattr__(self, "_arrays", _vectorized(self.tree))
+
+    @property
+    def name(self) -> str:
+        """Name of the function in exported code."""
+        return _NAMES.get(self.fis, self.fis)
+
+    @property
+    def arguments(self) -> str:
+        """Arguments of the function: ``a, b`` for a norm, ``a`` for a hedge."""
+        return "a, b" if self.fcl else "a"
+
+    @property
+    def tree(self) -> ast.expr:
+        """The formula as a syntax tree."""
+        return ast.parse(self.formula, mode="eval").body
+
+    def array(self, *degrees: Any) -> Array:
+        """Return the result for arrays, or an array and a number, of each as `number` gives it."""
+        with np.errstate(all="ignore"):
+            return np.asarray(self._arrays(dict(zip("ab", degrees, strict=False))))
 
 
 def _vectorized(node: ast.expr) -> Callable[[dict[str, Any]], Any]:
@@ -48,205 +72,71 @@ def _vectorized(node: ast.expr) -> Callable[[dict[str, Any]], Any]:
             return lambda values: value
         case ast.Name(name):
             return lambda values: values[name]
-        case ast.Call(ast.Name(name), arguments):
-            called = globals()[name]
-            names, inner = list(inspect.signature(called).parameters), [_vectorized(part) for part in arguments]
-            body = _on_arrays(called)
-            return lambda values: body({key: part(values) for key, part in zip(names, inner, strict=True)})
-        case ast.Call(ast.Attribute(_, name), arguments):
-            function, parts = _FUNCTIONS[name], [_vectorized(part) for part in arguments]
         case ast.IfExp(ast.Compare(left, [ast.Lt() | ast.Gt() as sign], [right]), yes, no) if ast.dump(
             left
         ) == ast.dump(yes) and ast.dump(right) == ast.dump(no):
-            function = np.minimum if isinstance(sign, ast.Lt) else np.maximum
-            parts = [_vectorized(yes), _vectorized(no)]
+            function, parts = np.minimum if isinstance(sign, ast.Lt) else np.maximum, [yes, no]
         case ast.IfExp(test, yes, no):
-            function, parts = np.where, [_vectorized(part) for part in (test, yes, no)]
-        case ast.BoolOp(ast.And(), [left, right]):
-            function, parts = np.logical_and, [_vectorized(left), _vectorized(right)]
+            function, parts = np.where, [test, yes, no]
+        case ast.BoolOp(ast.And(), parts):
+            function = np.logical_and
+        case ast.Call(ast.Attribute(_, name), parts):
+            function = _ARRAY_FUNCTIONS[name]
         case ast.BinOp(left, sign, right) | ast.Compare(left, [sign], [right]):
-            function, parts = _ARITHMETIC[type(sign)], [_vectorized(left), _vectorized(right)]
+            function, parts = _ARRAY_FUNCTIONS[type(sign)], [left, right]
         case _:
             raise NotImplementedError(ast.dump(node))
-    return lambda values: function(*[part(values) for part in parts])
+    inner = [_vectorized(part) for part in parts]
+    return lambda values: function(*[part(values) for part in inner])
 
 
-@dataclass(frozen=True, slots=True)
-class Operator:
-    """An operator on degrees ``a`` and, for a norm, ``b``."""
-
-    number: Callable[..., float]  # on numbers, in one expression, from which all else follows
-
-    @property
-    def name(self) -> str:
-        """Name of the function in exported code."""
-        return self.number.__name__
-
-    def array(self, *degrees: Any) -> Array:
-        """Return the result for arrays, or an array and a number, of each as `number` gives it."""
-        with np.errstate(all="ignore"):
-            return np.asarray(_on_arrays(self.number)(dict(zip("ab", degrees, strict=False))))
+def _by_name(*operators: Operator) -> dict[str, Operator]:
+    return {operator.fis: operator for operator in operators}
 
 
-@dataclass(frozen=True, slots=True)
-class Norm(Operator):
-    """An operator that joins two degrees, with its words in all formats; empty where a format has none."""
-
-    fll: str
-    fcl: str
-    fis: str  # Octave's word, and MATLAB's where it has one
-
-
-def least(a: float, b: float) -> float:
-    """Return the lesser degree."""
-    return a if a < b else b
-
-
-def product(a: float, b: float) -> float:
-    """Return a b."""
-    return a * b
-
-
-def bounded_difference(a: float, b: float) -> float:
-    """Return max(0, a + b - 1)."""
-    return a + b - 1.0 if a + b > 1.0 else 0.0
-
-
-def drastic_product(a: float, b: float) -> float:
-    """Return the other degree where one is 1, else 0."""
-    return b if a == 1.0 else a if b == 1.0 else 0.0
-
-
-def einstein_product(a: float, b: float) -> float:
-    """Return a b / (1 + (1 - a) (1 - b))."""
-    return a * b / (1.0 + (1.0 - a) * (1.0 - b))
-
-
-def hamacher_product(a: float, b: float) -> float:
-    """Return 1 / (1/a + 1/b - 1), and 0 where one is 0."""
-    return 1.0 / (1.0 / a + 1.0 / b - 1.0) if a > 1e-308 and b > 1e-308 else 0.0
-
-
-def nilpotent_minimum(a: float, b: float) -> float:
-    """Return the lesser degree where both sum to more than 1, else 0."""
-    return 0.0 if a + b <= 1.0 else a if a < b else b
-
-
-def greatest(a: float, b: float) -> float:
-    """Return the greater degree."""
-    return a if a > b else b
-
-
-def probabilistic_sum(a: float, b: float) -> float:
-    """Return a + b - a b."""
-    return a + b - a * b
-
-
-def bounded_sum(a: float, b: float) -> float:
-    """Return min(1, a + b)."""
-    return a + b if a + b < 1.0 else 1.0
-
-
-def drastic_sum(a: float, b: float) -> float:
-    """Return the other degree where one is 0, else 1."""
-    return b if a == 0.0 else a if b == 0.0 else 1.0
-
-
-def einstein_sum(a: float, b: float) -> float:
-    """Return (a + b) / (1 + a b)."""
-    return (a + b) / (1.0 + a * b)
-
-
-def hamacher_sum(a: float, b: float) -> float:
-    """Return (a + b - 2 a b) / (1 - a b); near two ones that is 1 less the product of what lacks."""
-    return (a * (1.0 - b) + b * (1.0 - a)) / (1.0 - a * b) if a + b <= 1.0 else 1.0 - hamacher_product(1.0 - a, 1.0 - b)
-
-
-def nilpotent_maximum(a: float, b: float) -> float:
-    """Return the greater degree where both sum to less than 1, else 1."""
-    return 1.0 if a + b >= 1.0 else a if a > b else b
-
-
-def normalized_sum(a: float, b: float) -> float:
-    """Return (a + b) / max(1, a + b)."""
-    return (a + b) / greatest(1.0, a + b)
-
-
-def unbounded_sum(a: float, b: float) -> float:
-    """Return a + b."""
-    return a + b
-
-
-def very(a: float) -> float:
-    """Return a^2."""
-    return a * a
-
-
-def somewhat(a: float) -> float:
-    """Return the square root."""
-    return math.sqrt(a)
-
-
-def extremely(a: float) -> float:
-    """Return 2 a^2 up to 1/2, and from there 1 - 2 (1 - a)^2."""
-    return 2.0 * a * a if a <= 0.5 else 1.0 - 2.0 * (1.0 - a) * (1.0 - a)
-
-
-def seldom(a: float) -> float:
-    """Return sqrt(a / 2) up to 1/2, and from there 1 - sqrt((1 - a) / 2)."""
-    return math.sqrt(0.5 * a) if a <= 0.5 else 1.0 - math.sqrt(0.5 * (1.0 - a))
-
-
-def cubed(a: float) -> float:
-    """Return a^3."""
-    return a * a * a
-
-
-def cube_root(a: float) -> float:
-    """Return the cube root."""
-    return math.pow(a, 1.0 / 3.0)
-
-
-T_NORMS: dict[str, Norm] = {
-    "min": Norm(least, "Minimum", "MIN", "min"),
-    "prod": Norm(product, "AlgebraicProduct", "PROD", "prod"),
-    "bounded_difference": Norm(bounded_difference, "BoundedDifference", "BDIF", "bounded_difference"),
-    "drastic_product": Norm(drastic_product, "DrasticProduct", "DMIN", "drastic_product"),
-    "einstein_product": Norm(einstein_product, "EinsteinProduct", "EPROD", "einstein_product"),
-    "hamacher_product": Norm(hamacher_product, "HamacherProduct", "HAMACHER", "hamacher_product"),
-    "nilpotent_minimum": Norm(nilpotent_minimum, "NilpotentMinimum", "NIPMIN", "nilpotent_minimum"),
-}
+T_NORMS = _by_name(
+    Operator("min", "a if a < b else b", "Minimum", "MIN"),
+    Operator("prod", "a * b", "AlgebraicProduct", "PROD"),
+    Operator("bounded_difference", "a + b - 1.0 if a + b > 1.0 else 0.0", "BoundedDifference", "BDIF"),
+    Operator("drastic_product", "b if a == 1.0 else a if b == 1.0 else 0.0", "DrasticProduct", "DMIN"),
+    Operator("einstein_product", "a * b / (1.0 + (1.0 - a) * (1.0 - b))", "EinsteinProduct", "EPROD"),
+    Operator(
+        "hamacher_product",
+        "1.0 / (1.0 / a + 1.0 / b - 1.0) if a > 1e-308 and b > 1e-308 else 0.0",
+        "HamacherProduct",
+        "HAMACHER",
+    ),
+    Operator("nilpotent_minimum", "0.0 if a + b <= 1.0 else a if a < b else b", "NilpotentMinimum", "NIPMIN"),
+)
 """Those for *and* and for implication, by name."""
 
-S_NORMS: dict[str, Norm] = {
-    "max": Norm(greatest, "Maximum", "MAX", "max"),
-    "probor": Norm(probabilistic_sum, "AlgebraicSum", "ASUM", "probor"),
-    "bounded_sum": Norm(bounded_sum, "BoundedSum", "BSUM", "bounded_sum"),
-    "drastic_sum": Norm(drastic_sum, "DrasticSum", "DMAX", "drastic_sum"),
-    "einstein_sum": Norm(einstein_sum, "EinsteinSum", "EINSTEIN", "einstein_sum"),
-    "hamacher_sum": Norm(hamacher_sum, "HamacherSum", "HSUM", "hamacher_sum"),
-    "nilpotent_maximum": Norm(nilpotent_maximum, "NilpotentMaximum", "NIPMAX", "nilpotent_maximum"),
-    "normalized_sum": Norm(normalized_sum, "NormalizedSum", "NSUM", "normalized_sum"),
-}
+S_NORMS = _by_name(
+    Operator("max", "a if a > b else b", "Maximum", "MAX"),
+    Operator("probor", "a + b - a * b", "AlgebraicSum", "ASUM"),
+    Operator("bounded_sum", "a + b if a + b < 1.0 else 1.0", "BoundedSum", "BSUM"),
+    Operator("drastic_sum", "b if a == 0.0 else a if b == 0.0 else 1.0", "DrasticSum", "DMAX"),
+    Operator("einstein_sum", "(a + b) / (1.0 + a * b)", "EinsteinSum", "EINSTEIN"),
+    Operator(  # (a + b - 2 a b) / (1 - a b), near two ones as 1 less the product of what lacks
+        "hamacher_sum",
+        "(a * (1.0 - b) + b * (1.0 - a)) / (1.0 - a * b) if a + b <= 1.0 else"
+        " 1.0 - 1.0 / (1.0 / (1.0 - a) + 1.0 / (1.0 - b) - 1.0) if 1.0 - a > 1e-308 and 1.0 - b > 1e-308 else 1.0",
+        "HamacherSum",
+        "HSUM",
+    ),
+    Operator("nilpotent_maximum", "1.0 if a + b >= 1.0 else a if a > b else b", "NilpotentMaximum", "NIPMAX"),
+    Operator("normalized_sum", "(a + b) / (a + b if a + b > 1.0 else 1.0)", "NormalizedSum", "NSUM"),
+)
 """Those for *or* and for aggregation, by name."""
 
-AGGREGATIONS: dict[str, Norm] = {**S_NORMS, "sum": Norm(unbounded_sum, "UnboundedSum", "SUM", "sum")}
+AGGREGATIONS = {**S_NORMS, **_by_name(Operator("sum", "a + b", "UnboundedSum", "SUM"))}
 """Those that join the terms of an output: of these a plain sum may exceed 1."""
 
-
-@dataclass(frozen=True, slots=True)
-class Hedge(Operator):
-    """A word that bends a degree: *very* cold."""
-
-    fll: bool = True  # True if fuzzylite has the hedge
-
-
-HEDGES: dict[str, Hedge] = {
-    "very": Hedge(very),
-    "somewhat": Hedge(somewhat),
-    "extremely": Hedge(extremely),
-    "seldom": Hedge(seldom),
-    "cubed": Hedge(cubed, fll=False),  # Octave's *extremely*
-    "cube_root": Hedge(cube_root, fll=False),
-}
+HEDGES = _by_name(
+    Operator("very", "a * a", "very"),
+    Operator("somewhat", "math.sqrt(a)", "somewhat"),
+    Operator("extremely", "2.0 * a * a if a <= 0.5 else 1.0 - 2.0 * (1.0 - a) * (1.0 - a)", "extremely"),
+    Operator("seldom", "math.sqrt(0.5 * a) if a <= 0.5 else 1.0 - math.sqrt(0.5 * (1.0 - a))", "seldom"),
+    Operator("cubed", "a * a * a"),  # Octave's *extremely*
+    Operator("cube_root", "math.pow(a, 1.0 / 3.0)"),
+)
 """Hedges by their word; *not* and *any* are propositions of their own."""
