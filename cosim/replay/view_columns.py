@@ -55,7 +55,7 @@ class ViewColumns:
         strengths = np.full((len(picked), len(self.columns) - len(self.picked) - 1), np.nan)
         if numbers.any():
             strengths[numbers] = np.column_stack(
-                self._firing.strengths_of_many(np.clip(inputs[numbers], self._low, self._high))
+                self._firing.strengths(np.clip(inputs[numbers], self._low, self._high))
             )
         return np.column_stack([picked, active, strengths])
 

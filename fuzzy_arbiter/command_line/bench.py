@@ -117,7 +117,7 @@ def _samples(system: System) -> Array:
     low, high = np.array([v.universe for v in system.inputs]).T
     samples: Array = np.random.default_rng(0).uniform(low, high, (_MOST_ROWS, len(system.inputs)))
     firing, defined = Firing(system), np.ones(_MOST_ROWS, dtype=np.bool_)
-    for output, cuts in zip(system.outputs, firing.cuts_of_many(firing.strengths_of_many(samples)), strict=True):
+    for output, cuts in zip(system.outputs, firing.cuts(firing.strengths(samples)), strict=True):
         if output.default is None:
             defined &= cuts.any(axis=0)
     return samples[defined]

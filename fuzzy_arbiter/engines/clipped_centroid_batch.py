@@ -8,10 +8,11 @@ import numpy as np
 
 from fuzzy_arbiter.definition import Output
 from fuzzy_arbiter.engines.clipped_centroid import LARGER, TINY, Outline, centroid, outline
+from fuzzy_arbiter.engines.engine import Defuzzifier
 from fuzzy_arbiter.shapes import Array
 
 
-class Centroid:
+class Centroid(Defuzzifier):
     """The centroid of straight terms, clipped or scaled, joined by their maximum."""
 
     method = "exact integrals, to rounding"

@@ -13,23 +13,23 @@
 
 from __future__ import annotations
 
-from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import ClassVar
+from functools import reduce
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
-from fuzzy_arbiter.engines.engine import Engine, Shortcut, normalize_weights, normalize_weights_of_many
+from fuzzy_arbiter.engines.engine import Defuzzifier, Engine, Shortcut
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.engines.normal_form import Clause, Literal, high_clauses, ladder
-from fuzzy_arbiter.engines.rational_pieces import Piece, pieces
+from fuzzy_arbiter.engines.rational_pieces import Piece, evaluate, pieces
 from fuzzy_arbiter.engines.supported import unsupported_reason
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
-SMOOTHSTEP = (0.0, 0.0, 3.0, -2.0)  # coefficients of 3 h^2 - 2 h^3, which stays within [0, 1]
+SMOOTHSTEP = (3.0, -2.0)  # coefficients of 3 h^2 - 2 h^3, which stays within [0, 1]
 _BLOCK = 8192  # number of samples evaluated at a time; longer arrays leave the caches and are allocated anew each time
 
 
@@ -41,7 +41,7 @@ class NoClosedFormError(EngineError):
         self.reason = reason
 
 
-class _ClosedForm:
+class _ClosedForm(Defuzzifier):
     """C(h) of one output, whose cuts are 1 - h and h."""
 
     method = "closed form"
@@ -51,11 +51,7 @@ class _ClosedForm:
 
     def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
         """Return the value for one sample."""
-        return _value(self._forms, cuts[1])
-
-    def values(self, cuts: Array, inputs: Array) -> Array:
-        """Return the values for many samples."""
-        return _values(self._forms, cuts[1])
+        return float(evaluate(self._forms, cuts[1]))
 
 
 class ClosedEngine(Engine):
@@ -72,96 +68,81 @@ class ClosedEngine(Engine):
         self.raw, scaled = _pieces(system.outputs)
         self.scaled = self.raw if system.normalization == "none" else scaled
         super().__init__(system, [_ClosedForm(forms) for forms in self.raw])
-        self._index = {v.name: i for i, v in enumerate(system.inputs)}
-        self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
-        self._cubic = _one_cubic(self.scaled)
+        # index of each literal's input, and its term's membership function; None where the input is the degree itself
+        self._sources = {
+            (v.name, t.name, affirmed): (i, None if (v.universe, t.shape) == ((0.0, 1.0), DEGREE) else t.membership)
+            for i, v in enumerate(system.inputs)
+            for t in v.terms
+            for affirmed in (True, False)
+        }
+        self._smooth = _smooth_cubic(self.scaled)
         # true if such weights are then clipped to [0, 1]: between h = 0 and 1 a C(h) may lie beyond C(0) and C(1)
-        self.clips = system.normalization != "none" and self._cubic != SMOOTHSTEP
-        # prioritized criteria in the order of the inputs, which are the degrees themselves: nothing to look up
-        self._plain = self._cubic is not None and self.ladder is not None and len(self.ladder) == len(system.inputs)
-        for step, variable in zip(self.ladder or (), system.inputs, strict=False):
-            name, term, affirmed = step
-            plain = name == variable.name and affirmed and variable.universe == (0.0, 1.0)
-            self._plain = self._plain and plain and self._shapes[name, term] == DEGREE
+        self.clips = system.normalization != "none" and self._smooth != SMOOTHSTEP
 
     def centroids(self, inputs: Sequence[float]) -> list[float]:
         """Return the raw value of each output for one sample; see `Engine`."""
-        return [_value(forms, h) for forms, h in zip(self.raw, self._highs(inputs), strict=True)]
+        return [evaluate(forms, h) for forms, h in zip(self.raw, self._highs(inputs), strict=True)]
 
     def centroids_of_many(self, inputs: Array) -> Array:
         """Return the raw value of each output for many samples; see `Engine`."""
-        highs = self._highs_of_many(inputs)
-        return np.stack([_values(forms, h) for forms, h in zip(self.raw, highs, strict=True)], axis=1)
+        return np.stack([evaluate(forms, h) for forms, h in zip(self.raw, self._highs(inputs), strict=True)], axis=1)
 
     def weights(self, inputs: Sequence[float]) -> tuple[float, ...]:
         """Return the normalized value of each output for one sample; see `Engine`."""
-        result = [_value(forms, h) for forms, h in zip(self.scaled, self._highs(inputs), strict=True)]
-        if self.clips:
-            result = [min(max(weight, 0.0), 1.0) for weight in result]
-        return normalize_weights(result, self.system.normalization)
+        result = [evaluate(forms, h) for forms, h in zip(self.scaled, self._highs(inputs), strict=True)]
+        return self.normalized([min(max(weight, 0.0), 1.0) for weight in result] if self.clips else result)
 
     def weights_of_many(self, inputs: Array) -> Array:
         """Return the normalized value of each output for many samples; see `Engine`."""
         result = np.empty((len(inputs), len(self.system.outputs)))
         for start in range(0, len(inputs), _BLOCK):
-            block = inputs[start : start + _BLOCK]
-            highs = self._highs_of_many(block)
-            if self._cubic is not None:
-                values = _horner(self._cubic, highs)
-            else:
-                values = np.stack([_values(forms, h) for forms, h in zip(self.scaled, highs, strict=True)])
-            if self.clips:
-                np.clip(values, 0.0, 1.0, out=values)
+            highs = self._highs(inputs[start : start + _BLOCK])
+            values = np.empty((len(highs), len(highs[0])))
+            for row, h, forms in zip(values, highs, self.scaled, strict=True):
+                if self._smooth:  # in place, one row after the other: three times as fast
+                    np.multiply(h, self._smooth[1], out=row)
+                    row += self._smooth[0]
+                    row *= h
+                    row *= h
+                else:
+                    row[:] = evaluate(forms, h)
             result[start : start + _BLOCK] = values.T
-        return normalize_weights_of_many(result, self.system.normalization)
+        if self.clips:
+            np.clip(result, 0.0, 1.0, out=result)
+        return self.normalized_of_many(result)
 
     def shortcut(self) -> Shortcut | None:
         """Return a faster function for the weights where the inputs are the criteria's degrees; see `Engine`."""
+        steps = [(*self._sources[step], step[2]) for step in self.ladder or ()]
+        plain = steps == [(i, None, True) for i in range(len(self.system.inputs))]  # in the order of the inputs
         whole = self.clips or self.system.normalization not in ("range", "none")  # more to be done with the weights
-        if self._plain and not whole and self._cubic is not None and self._cubic[:2] == (0.0, 0.0):
-            return _smooth_ladder(len(self.system.inputs), *self._cubic[2:])
+        if plain and not whole and self._smooth:
+            return _smooth_ladder(len(self.system.inputs), *self._smooth)
         return None
 
-    def _highs(self, inputs: Sequence[float]) -> list[float]:
-        """Return the cut h of each output's second term."""
+    def _highs(self, inputs: Any) -> list[Any]:
+        """Return the cut h of each output's second term: numbers for one sample, arrays (n,) for many, (n, inputs)."""
+        lesser, greater = (np.minimum, np.maximum) if isinstance(inputs, np.ndarray) else (min, max)
+        columns = inputs.T.copy() if isinstance(inputs, np.ndarray) else inputs
         if self.ladder is None:
-            return [max(min(self._degree(x, inputs) for x in clause) for clause in forms) for forms in self.clauses]
-        result = []
-        unclaimed = 1.0
-        for step in self.ladder:
-            m = self._degree(step, inputs)
-            result.append(min(m, unclaimed))
-            unclaimed = min(unclaimed, 1.0 - m)
+            known = {x: self._degree(x, columns) for clauses in self.clauses for clause in clauses for x in clause}
+            return [
+                reduce(greater, (reduce(lesser, [known[x] for x in clause]) for clause in clauses))
+                for clauses in self.clauses
+            ]
+        first, *rest = (self._degree(step, columns) for step in self.ladder)
+        result, unclaimed = [first], 1.0 - first
+        for m in rest:
+            result.append(lesser(m, unclaimed))
+            unclaimed = lesser(unclaimed, 1.0 - m)
         return result
 
-    def _degree(self, literal: Literal, inputs: Sequence[float]) -> float:
-        variable, term, affirmed = literal
-        degree = self._shapes[variable, term](inputs[self._index[variable]])
-        return degree if affirmed else 1.0 - degree
-
-    def _highs_of_many(self, inputs: Array) -> Array:
-        """Return the cuts h, shape (outputs, n)."""
-        if self._plain:
-            degrees = inputs.T.copy()  # rows to be read one after another
-        elif self.ladder is not None:
-            degrees = np.stack([self._degrees(step, inputs) for step in self.ladder])
-        else:
-            known = {x: self._degrees(x, inputs) for forms in self.clauses for clause in forms for x in clause}
-            return np.stack(
-                [np.max([np.min([known[x] for x in c], axis=0) for c in forms], axis=0) for forms in self.clauses]
-            )
-        unclaimed = np.ones(len(inputs))
-        rest = np.empty(len(inputs))
-        for m in degrees:  # the degrees become the cuts
-            np.subtract(1.0, m, out=rest)
-            np.minimum(m, unclaimed, out=m)
-            np.minimum(unclaimed, rest, out=unclaimed)
-        return degrees
-
-    def _degrees(self, literal: Literal, inputs: Array) -> Array:
-        variable, term, affirmed = literal
-        degrees = self._shapes[variable, term].of_many(inputs[:, self._index[variable]])
-        return degrees if affirmed else 1.0 - degrees
+    def _degree(self, literal: Literal, columns: Any) -> Any:
+        index, shape = self._sources[literal]
+        x = columns[index]
+        if shape is not None:
+            x = shape.of_many(x) if isinstance(x, np.ndarray) else shape(x)
+        return x if literal[2] else 1.0 - x
 
 
 def _proved(system: System) -> tuple[tuple[Clause, ...], ...] | str:
@@ -187,11 +168,13 @@ def _pieces(outputs: Sequence[Output]) -> tuple[tuple[tuple[Piece, ...], ...], t
     return tuple(known[pattern][0] for pattern in patterns), tuple(known[pattern][1] for pattern in patterns)
 
 
-def _one_cubic(forms: Sequence[tuple[Piece, ...]]) -> tuple[float, ...] | None:
-    """Return the coefficients of the cubic that all outputs share; None if they differ."""
-    if len(set(forms)) > 1 or len(forms[0]) != 1 or forms[0][0].denominator != (1.0, 0.0, 0.0):
+def _smooth_cubic(forms: Sequence[tuple[Piece, ...]]) -> tuple[float, float] | None:
+    """Return n2 and n3 if each output is (n2 + n3 h) h^2."""
+    first = forms[0][0] if forms[0] else None
+    if first is None or len(set(forms)) > 1 or len(forms[0]) > 1:
         return None
-    return forms[0][0].numerator
+    smooth = first.numerator[:2] == (0.0, 0.0) and first.denominator == (1.0, 0.0, 0.0)
+    return first.numerator[2:] if smooth else None
 
 
 def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
@@ -212,32 +195,3 @@ def _smooth_ladder(n: int, n2: float, n3: float) -> Shortcut:
         return result
 
     return weights
-
-
-def _value(forms: tuple[Piece, ...], h: float) -> float:
-    if len(forms) == 1:
-        return forms[0](h)
-    return forms[bisect_right(forms, h, key=_start) - 1](h)
-
-
-def _start(piece: Piece) -> float:
-    return piece.start
-
-
-def _values(forms: tuple[Piece, ...], h: Array) -> Array:
-    piece = np.searchsorted([p.start for p in forms], h, side="right") - 1
-    t = h - np.array([p.start for p in forms])[piece]
-    above, below = (np.array(c)[piece].T for c in zip(*((p.numerator, p.denominator) for p in forms), strict=True))
-    return np.asarray(_horner(above, t) / _horner(below, t))
-
-
-def _horner(coefficients: Sequence[float] | Array, t: Array) -> Array:
-    """Evaluate a polynomial; coefficients that are the number 0 cost nothing."""
-    result = coefficients[-1] * t
-    for c in reversed(coefficients[1:-1]):
-        if not (isinstance(c, float) and c == 0.0):
-            result += c
-        result *= t
-    if not (isinstance(coefficients[0], float) and coefficients[0] == 0.0):
-        result += coefficients[0]
-    return result

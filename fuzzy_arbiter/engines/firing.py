@@ -16,7 +16,7 @@ from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
 
 Array = NDArray[np.float64]
-Degrees = Mapping[tuple[str, str], Callable[[float], float]]  # of each input's terms, by the names of both
+Degrees = Mapping[tuple[str, str], Callable[[Any], Any]]  # of each input's terms, by the names of both
 D = TypeVar("D")
 
 
@@ -28,7 +28,7 @@ class Logic(Generic[D]):
     disjunction: Callable[[D, D], D]
     negation: Callable[[D], D]
     hedge: Callable[[str, D], D] | None = None
-    certain: Callable[[], D] | None = None
+    certain: D | None = None  # degree of *any*
 
     def degree(self, proposition: Proposition, of: Callable[[Is], D]) -> D:
         """Return the degree to which a proposition holds."""
@@ -41,29 +41,23 @@ class Logic(Generic[D]):
             return self.hedge(proposition.hedge, self.degree(proposition.part, of))
         if isinstance(proposition, Anything):
             assert self.certain is not None
-            return self.certain()
+            return self.certain
         assert isinstance(proposition, And | Or)
         join = self.conjunction if isinstance(proposition, And) else self.disjunction
         return functools.reduce(join, (self.degree(part, of) for part in proposition.parts))
 
 
-def number_logic(operators: System | Operators) -> Logic[float]:
-    """Return the logic of single degrees."""
+def logic_of(operators: System | Operators, many: bool = False) -> Logic[Any]:
+    """Return the logic of single degrees, or of arrays of degrees."""
+    word = "array" if many else "number"
     conjunction, disjunction = T_NORMS[operators.conjunction], S_NORMS[operators.disjunction]
+    hedges: dict[str, Callable[[Any], Any]] = {name: getattr(hedge, word) for name, hedge in HEDGES.items()}
     return Logic(
-        conjunction.number, disjunction.number, lambda a: 1.0 - a, lambda word, a: HEDGES[word].number(a), lambda: 1.0
-    )
-
-
-def array_logic(operators: System | Operators, n: int = 1) -> Logic[Array]:
-    """Return the logic of arrays of degrees."""
-    conjunction, disjunction = T_NORMS[operators.conjunction], S_NORMS[operators.disjunction]
-    return Logic(
-        conjunction.array,
-        disjunction.array,
+        getattr(conjunction, word),
+        getattr(disjunction, word),
         lambda a: 1.0 - a,
-        lambda word, a: HEDGES[word].array(a),
-        lambda: np.ones(n),
+        lambda name, a: hedges[name](a),
+        1.0,
     )
 
 
@@ -93,78 +87,63 @@ def slots_of(system: System, output: Output) -> tuple[Slot, ...]:
 
 
 class Firing:
-    """The first half of every engine: degrees of input terms, strengths of rules, cuts of output terms."""
+    """The first half of every engine: degrees of input terms, strengths of rules, cuts of output terms.
+
+    Each function takes numbers of one sample, or arrays of many samples' numbers.
+    """
 
     def __init__(self, system: System, degrees: Degrees | None = None) -> None:
         self.system = system
         self.slots = tuple(slots_of(system, output) for output in system.outputs)
         self._inputs = {v.name: i for i, v in enumerate(system.inputs)}
-        self._shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
-        self._degrees = degrees or self._shapes
-        logics = {o: number_logic(o or system) for o in {rule.operators for rule in system.rules}}
-        self._rules = [(rule.condition, logics[rule.operators], rule.weight) for rule in system.rules]
-        self._joins = [AGGREGATIONS[output.aggregation] for output in system.outputs]
+        shapes = {(v.name, t.name): t.membership for v in system.inputs for t in v.terms}
+        # of one sample, and of many
+        many = {name: shape.of_many for name, shape in shapes.items()}
+        self._degrees: tuple[Degrees, Degrees] = degrees or shapes, degrees or many
+        operators = {rule.operators: rule.operators or system for rule in system.rules}
+        self._logics = [{key: logic_of(of, many) for key, of in operators.items()} for many in (False, True)]
+        joins = [AGGREGATIONS[output.aggregation] for output in system.outputs]
+        self._joins: tuple[list[Callable[..., Any]], ...] = [j.number for j in joins], [j.array for j in joins]
 
-    def strengths(self, inputs: Sequence[float]) -> list[float]:
-        """Return the firing strength of each rule for one sample."""
+    def strengths(self, inputs: Sequence[float] | Array) -> list[Any]:
+        """Return the firing strength of each rule; an array of many samples is (n, inputs), and each strength (n,)."""
+        many = isinstance(inputs, np.ndarray)
+        degrees, logics, columns = self._degrees[many], self._logics[many], np.transpose(inputs) if many else inputs
+        known: dict[tuple[str, str], Any] = {}
+        result: list[Any] = []
 
-        def of(statement: Is) -> float:
-            index = self._inputs.get(statement.variable)
-            if index is None:  # an output: its degree by the rules before this one
-                return float(self._concluded(statement, result, number=True))
-            return self._degrees[statement.variable, statement.term](inputs[index])
+        def of(statement: Is) -> Any:
+            key = statement.variable, statement.term
+            degree = known.get(key)
+            if degree is not None:
+                return degree
+            if key not in degrees:  # of an output: its degree by the rules before this one
+                return self._concluded(statement, result)
+            degree = known[key] = degrees[key](columns[self._inputs[statement.variable]])
+            return degree
 
-        result: list[float] = []
-        for condition, logic, weight in self._rules:
-            result.append(logic.degree(condition, of) * weight)
+        for rule in self.system.rules:
+            strength = logics[rule.operators].degree(rule.condition, of) * rule.weight
+            result.append(np.broadcast_to(strength, len(inputs)) if many else strength)
         return result
 
-    def _concluded(self, statement: Is, strengths: Sequence[Any], number: bool) -> Any:
+    def _concluded(self, statement: Is, strengths: Sequence[Any]) -> Any:
         """Return the joined strength of the rules so far that conclude a statement on an output."""
         earlier = [s for s, rule in zip(strengths, self.system.rules, strict=False) if statement in rule.conclusions]
-        if not earlier:
-            return 0.0 if number else np.zeros_like(strengths[0])
         k = next(k for k, output in enumerate(self.system.outputs) if output.name == statement.variable)
-        return functools.reduce(self._joins[k].number if number else self._joins[k].array, earlier)
+        if not earlier:
+            return 0.0
+        return functools.reduce(self._joins[isinstance(earlier[0], np.ndarray)][k], earlier)
 
-    def strengths_of_many(self, inputs: Array) -> list[Array]:
-        """Return the firing strength of each rule for many samples; inputs (n, inputs), returns (n,)."""
-        known: dict[tuple[str, str], Array] = {}
-
-        def of(statement: Is) -> Array:
-            key = (statement.variable, statement.term)
-            if statement.variable not in self._inputs:
-                return np.asarray(self._concluded(statement, result, number=False))
-            if key not in known:
-                known[key] = self._shapes[key].of_many(inputs[:, self._inputs[statement.variable]])
-            return known[key]
-
-        result: list[Array] = []
-        for rule in self.system.rules:
-            logic = array_logic(rule.operators or self.system, len(inputs))
-            result.append(logic.degree(rule.condition, of) * rule.weight)
-        return result
-
-    def cuts(self, strengths: Sequence[float]) -> list[list[float]]:
-        """Return the strength of each slot of each output."""
-        result = []
-        for slots, norm in zip(self.slots, self._joins, strict=True):
-            join = norm.number
-            result.append(
-                [functools.reduce(join, [strengths[i] for i in slot.rules]) if slot.rules else 0.0 for slot in slots]
-            )
-        return result
-
-    def cuts_of_many(self, strengths: Sequence[Array]) -> list[Array]:
-        """Return the strength of each slot of each output, for each of many samples."""
-        result = []
-        for slots, norm in zip(self.slots, self._joins, strict=True):
-            cuts = np.zeros((len(slots), len(strengths[0])))
-            for row, slot in zip(cuts, slots, strict=True):
-                if slot.rules:
-                    row[:] = functools.reduce(norm.array, [strengths[i] for i in slot.rules])
-            result.append(cuts)
-        return result
+    def cuts(self, strengths: Sequence[Any]) -> list[Any]:
+        """Return the strength of each slot of each output: lists of numbers, or arrays (slots, n)."""
+        many = isinstance(strengths[0], np.ndarray)
+        none = 0.0 * strengths[0]
+        result: list[Any] = [
+            [functools.reduce(join, [strengths[i] for i in slot.rules]) if slot.rules else none for slot in slots]
+            for slots, join in zip(self.slots, self._joins[many], strict=True)
+        ]
+        return [np.array(cuts).reshape(len(cuts), len(none)) for cuts in result] if many else result
 
     def term_cuts(self, k: int, strengths: Sequence[float]) -> list[float]:
         """Return the greatest strength with which each term of an output is concluded."""

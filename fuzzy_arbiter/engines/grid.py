@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import ClassVar
 
 import numpy as np
@@ -27,7 +26,7 @@ class GridEngine(ExactEngine):
         return _Sampler(output, system)
 
 
-class _Sampler:
+class _Sampler(Defuzzifier):
     """The value of one output from samples of its joined terms."""
 
     def __init__(self, output: Output, system: System) -> None:
@@ -37,10 +36,6 @@ class _Sampler:
         slots = slots_of(system, output)
         self._slots = [(T_NORMS[slot.implication].array, degrees[slot.term]) for slot in slots]
         self._join = AGGREGATIONS[output.aggregation].array
-
-    def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
-        """Return the value for one sample."""
-        return float(self._defuzzified(np.array(cuts)[:, None])[0])
 
     def values(self, cuts: Array, inputs: Array) -> Array:
         """Return the values for many samples."""

@@ -14,6 +14,7 @@ import numpy as np
 
 from fuzzy_arbiter.definition import Output
 from fuzzy_arbiter.engines import defuzzification
+from fuzzy_arbiter.engines.engine import Defuzzifier
 from fuzzy_arbiter.engines.firing import Slot
 from fuzzy_arbiter.engines.panels import (
     INNER,
@@ -67,7 +68,7 @@ class Joined(NamedTuple):
     height: Array
 
 
-class Quadrature:
+class Quadrature(Defuzzifier):
     """The value of one output whose terms are joined."""
 
     def __init__(self, output: Output, slots: Sequence[Slot]) -> None:
@@ -128,11 +129,7 @@ class Quadrature:
         bound = max(BOUND, 4 * self.precision / self.width)  # positions far from 0 are rounded more
         return f"adaptive quadrature, within {bound:g} of the universe's width"
 
-    def value(self, cuts: Sequence[float], inputs: Sequence[float] = ()) -> float:
-        """Return the output's value for one sample, as `values` does."""
-        return float(self.values(np.array(cuts, dtype=np.float64)[:, None])[0])
-
-    def values(self, cuts: Array, inputs: Array | None = None) -> Array:
+    def values(self, cuts: Array, inputs: Array) -> Array:
         """Return the output's values for many samples; cuts (slots, n), returns (n,)."""
         count = max(1, _BLOCK // (len(POINTS) * len(self.edges) * max(1, len(cuts))))
         result = np.empty(cuts.shape[1])

@@ -7,14 +7,21 @@
 from __future__ import annotations
 
 import math
+import operator
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from typing import Any
+
+import numpy as np
 
 from fuzzy_arbiter.definition import Output
 from fuzzy_arbiter.engines.clipped_centroid import Outline, clipped, outline, term_centroids
 
 Polynomial = tuple[Fraction, ...]  # coefficients of t^0, t^1, ..
+_START = operator.attrgetter("start")
+_NODES = tuple(Fraction(i, 3) for i in range(4))
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,15 +29,23 @@ class Piece:
     """A piece of C(h): a cubic over a quadratic of t = h - start."""
 
     start: float  # start of the piece; its end is the start of the next one, and that of the last one 1
-    numerator: tuple[float, ...]  # coefficients of t^0 to t^3
-    denominator: tuple[float, ...]  # coefficients of t^0 to t^2; (1, 0, 0) if it is constant
+    numerator: tuple[float, float, float, float]  # coefficients of t^0 to t^3
+    denominator: tuple[float, float, float]  # coefficients of t^0 to t^2; (1, 0, 0) if it is constant
 
-    def __call__(self, h: float) -> float:
-        """Return C(h)."""
-        t = h - self.start
-        n0, n1, n2, n3 = self.numerator
-        d0, d1, d2 = self.denominator
-        return (n0 + t * (n1 + t * (n2 + t * n3))) / (d0 + t * (d1 + t * d2))
+
+def evaluate(forms: tuple[Piece, ...], h: Any) -> Any:
+    """Return C(h) for a number or for an array."""
+    n0: Any
+    if len(forms) > 1 and isinstance(h, np.ndarray):
+        index = np.searchsorted([piece.start for piece in forms], h, side="right") - 1
+        table = np.array([(piece.start, *piece.numerator, *piece.denominator) for piece in forms])
+        start, n0, n1, n2, n3, d0, d1, d2 = table[index].T
+    else:
+        piece = forms[bisect_right(forms, h, key=_START) - 1 if len(forms) > 1 else 0]
+        start, (n0, n1, n2, n3), (d0, d1, d2) = piece.start, piece.numerator, piece.denominator
+    t = h - start
+    above = n0 + t * (n1 + t * (n2 + t * n3))
+    return above if type(d1) is float and d1 == d2 == 0.0 else above / (d0 + t * (d1 + t * d2))
 
 
 def pieces(output: Output) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
@@ -39,9 +54,9 @@ def pieces(output: Output) -> tuple[tuple[Piece, ...], tuple[Piece, ...]]:
     fits: list[tuple[Fraction, Polynomial, Polynomial]] = []  # start, area, moment
     events = _events(shape)
     for start, end in zip(events, events[1:], strict=False):
-        at = [start + (end - start) * Fraction(i, 3) for i in range(4)]
-        areas, moments = zip(*(clipped((1 - h, h), *shape) for h in at), strict=True)
-        fit = (_fitted(at, areas), _fitted(at, moments))
+        heights = [start + (end - start) * node for node in _NODES]
+        areas, moments = zip(*(clipped((1 - h, h), *shape) for h in heights), strict=True)
+        fit = (_fitted(heights, areas), _fitted(heights, moments))
         if not fits or fit != fits[-1][1:]:
             fits.append((start, *fit))
     ends = term_centroids(output, Fraction)  # C(0) is of the first term alone, C(1) of the second
@@ -61,11 +76,14 @@ def _forms(
     for (first, area, moment), end in zip(fits, ends_of_fits, strict=True):
         for start in map(_not_below, _starts(first, end, area)):
             about = Fraction(start)  # the very number that h is measured from
-            above = _about(about, [m + shift * a for m, a in zip(moment, area, strict=True)])
-            below = _about(about, [a * span for a in area])
-            unit = below[0]  # above 0, as the area is
-            forms.append(Piece(start, tuple(float(c / unit) for c in above), tuple(float(c / unit) for c in below[:3])))
-    if forms[-1](1.0) != float(last):  # rounded
+            t = [about + node for node in _NODES]
+            areas = _fitted(_NODES, [_at(h, area) for h in t])
+            moments = _fitted(_NODES, [_at(h, moment) for h in t])
+            unit = areas[0] * span  # above 0, as the area is
+            n0, n1, n2, n3 = (float((m + shift * a) / unit) for m, a in zip(moments, areas, strict=True))
+            d0, d1, d2, _ = (float(a * span / unit) for a in areas)
+            forms.append(Piece(start, (n0, n1, n2, n3), (d0, d1, d2)))
+    if evaluate((forms[-1],), 1.0) != float(last):  # rounded
         forms.append(Piece(1.0, (float(last), 0.0, 0.0, 0.0), (1.0, 0.0, 0.0)))
     return tuple(forms)
 
@@ -96,24 +114,12 @@ def _events(shape: Outline) -> list[Fraction]:
 
 
 def _fitted(at: Sequence[Fraction], values: Sequence[Fraction]) -> Polynomial:
-    """Return the coefficients of the polynomial through some values, by Newton's divided differences."""
-    differences = list(values)
-    for order in range(1, len(at)):
-        for i in range(len(at) - 1, order - 1, -1):
-            differences[i] = (differences[i] - differences[i - 1]) / (at[i] - at[i - order])
+    """Return the coefficients of the polynomial through some values, as Lagrange does."""
     coefficients = [Fraction(0)] * len(at)
-    for place, difference in zip(reversed(at), reversed(differences), strict=True):
-        # multiply by (h - place), add the difference
-        shifted = [Fraction(0), *coefficients[:-1]]
-        coefficients = [s - place * c for s, c in zip(shifted, coefficients, strict=True)]
-        coefficients[0] += difference
-    return tuple(coefficients)
-
-
-def _about(start: Fraction, polynomial: Sequence[Fraction]) -> Polynomial:
-    """Return the coefficients of the same polynomial in t = h - start."""
-    coefficients = list(polynomial)
-    for low in range(len(coefficients)):
-        for i in range(len(coefficients) - 2, low - 1, -1):
-            coefficients[i] += start * coefficients[i + 1]
+    for x, value in zip(at, values, strict=True):
+        others = [z for z in at if z != x]
+        basis = [value / math.prod(x - z for z in others)]
+        for z in others:  # times h - z
+            basis = [up - z * own for up, own in zip([Fraction(0), *basis], [*basis, Fraction(0)], strict=True)]
+        coefficients = list(map(operator.add, coefficients, basis))
     return tuple(coefficients)

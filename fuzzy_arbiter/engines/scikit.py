@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from skfuzzy import defuzz
@@ -12,7 +12,7 @@ from skfuzzy.defuzzify import EmptyMembershipError
 from skfuzzy.fuzzymath.fuzzy_ops import _interp_universe_fast, interp_membership
 
 from fuzzy_arbiter.definition import Output, System, Variable
-from fuzzy_arbiter.engines.engine import Engine
+from fuzzy_arbiter.engines.engine import Defuzzifier, Engine
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.engines.grid import sampled
 from fuzzy_arbiter.engines.supported import unsupported_reason
@@ -49,17 +49,13 @@ class ScikitEngine(Engine):
         knots = np.array(variable.knots)
         return partial(_degree, knots, term.straight.of_many(knots))
 
-    def centroids_of_many(self, inputs: Array) -> Array:
-        """Return the raw value of each output for many samples, one by one."""
-        rows = [self.centroids(row) for row in inputs.tolist()]
-        return np.array(rows).reshape(len(rows), len(self.system.outputs))
+
+def _degree(knots: Array, degrees: Array, x: Any) -> Any:
+    degree = interp_membership(knots, degrees, x)
+    return degree if isinstance(x, np.ndarray) else float(degree)
 
 
-def _degree(knots: Array, degrees: Array, x: float) -> float:
-    return float(interp_membership(knots, degrees, x))
-
-
-class _Sampled:
+class _Sampled(Defuzzifier):
     """The centroid of one output, whose terms are sampled."""
 
     method = "scikit-fuzzy's own"
@@ -83,7 +79,3 @@ class _Sampled:
             return float(defuzz(places, outline, "centroid"))
         except EmptyMembershipError:
             return float("nan")
-
-    def values(self, cuts: Array, inputs: Array) -> Array:
-        """Return the centroids for many samples."""
-        return np.array([self.value(column, ()) for column in cuts.T.tolist()])

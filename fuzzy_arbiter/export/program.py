@@ -312,7 +312,7 @@ def _swept(engine: Engine) -> Iterator[Statement]:
             partial(logic.said, _JOINS[norms.disjunction]),
             partial(logic.said, "(1.0 - {})"),
             lambda word, degree: logic.said(f"{word}({{}})", degree),
-            lambda: "1.0",
+            "1.0",
         )
         degree = operators.degree(rule.condition, degrees.of)
         weighted = degree if rule.weight == 1.0 else f"{degree} * {rule.weight!r}"

@@ -67,6 +67,7 @@ class Operator:
 
 def _vectorized(node: ast.expr) -> Callable[[dict[str, Any]], Any]:
     """Return a function that evaluates an expression on arrays by name, both branches of a condition."""
+    function: Any
     match node:
         case ast.Constant(value):
             return lambda values: value

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,20 +26,15 @@ class Value(ABC):
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
         """Return the value as an expression of the inputs and of earlier outputs."""
 
-    def number(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Sequence[float]], float]:
-        """Return a function from one sample, (inputs and outputs,), to the number."""
-        whole, names = self.expression(inputs, outputs), (*inputs, *outputs)
-        return lambda sample: whole(dict(zip(names, sample, strict=True)))
-
-    def array(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Array], Array]:
-        """Return a function from many samples, shape (n, inputs and outputs), to the numbers, shape (n,)."""
+    def function(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Any], Any]:
+        """Return a function from the inputs and outputs, a number or an array (n,) of each, to the value."""
         whole, names = self.expression(inputs, outputs), (*inputs, *outputs)
 
-        def numbers(samples: Array) -> Array:
-            values: Mapping[str, Any] = dict(zip(names, samples.T, strict=True))
-            return np.broadcast_to(whole.of_many(values), len(samples))
+        def value(columns: Any) -> Any:
+            evaluate = whole.of_many if isinstance(columns, np.ndarray) else whole
+            return evaluate(dict(zip(names, columns, strict=True)))
 
-        return numbers
+        return value
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from fuzzy_arbiter.definition import System, variable_names
-from fuzzy_arbiter.engines.firing import Firing, array_logic
+from fuzzy_arbiter.engines.firing import Firing, logic_of
 from fuzzy_arbiter.engines.supported import unsupported_reason
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.propositions import Is
@@ -246,7 +246,7 @@ def _rows(system: System) -> Iterator[Row]:
     names = variable_names(system.inputs)
     rows = list(itertools.product(*(v.term_names[::-1] for v in system.inputs)))
     columns = dict(zip(names, np.array(rows, dtype=object).T, strict=True))
-    logic = array_logic(Operators())
+    logic = logic_of(Operators(), many=True)
     labeled = {Is(v.name, t): (columns[v.name] == t).astype(np.float64) for v in system.inputs for t in v.term_names}
     fires = [logic.degree(rule.condition, labeled.__getitem__) > 0.0 for rule in system.rules]
     for i, terms in enumerate(rows):

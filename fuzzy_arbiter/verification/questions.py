@@ -151,7 +151,7 @@ def sampled(system: System, questions: Questions, statements: Sequence[Is]) -> d
     """Return a sample at which two of some statements are concluded above 1/2."""
     samples = questions.samples()
     firing = Firing(system)
-    cuts = firing.cuts_of_many(firing.strengths_of_many(samples))
+    cuts = firing.cuts(firing.strengths(samples))
     terms = {v.name: (k, v.term_names) for k, v in enumerate(system.outputs)}
     chosen = [cuts[terms[s.variable][0]][terms[s.variable][1].index(s.term)] for s in statements]
     rows = np.flatnonzero((np.array(chosen) > 0.5 + 1e-9).sum(axis=0) >= 2)

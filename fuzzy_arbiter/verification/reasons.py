@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from fuzzy_arbiter.definition import System
-from fuzzy_arbiter.engines.firing import number_logic
+from fuzzy_arbiter.engines.firing import logic_of
 from fuzzy_arbiter.propositions import Is
 
 
 def row_strengths(system: System, place: Mapping[str, float | str]) -> list[float]:
     """Return the firing strength of each rule in a crisp row."""
     row = {v.name: place.get(v.name, v.term_names[-1]) for v in system.inputs}
-    logic = number_logic(system)
+    logic = logic_of(system)
     return [
         rule.weight * logic.degree(rule.condition, lambda s: float(row[s.variable] == s.term)) for rule in system.rules
     ]

@@ -135,7 +135,7 @@ def test_cuts_of_the_forms_are_those_of_the_manual(n):
     cuts = {}
     for form in FORMS:
         firing = Firing(prioritized([Criterion(f"c{i}") for i in range(n)], form=form))
-        low, high = np.array(firing.cuts_of_many(firing.strengths_of_many(m))).transpose(1, 2, 0)
+        low, high = np.array(firing.cuts(firing.strengths(m))).transpose(1, 2, 0)
         if form != "complete":
             np.testing.assert_array_equal(high, h)
             np.testing.assert_allclose(low, 1.0 - h, rtol=0.0, atol=1e-16)

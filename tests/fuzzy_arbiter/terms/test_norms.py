@@ -1,21 +1,14 @@
 """Norms and hedges, against their definitions in rational numbers and the laws that make them norms."""
 
-import compileall
 import itertools
-import shutil
-import subprocess
-import sys
 from fractions import Fraction
 from math import sqrt
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Arbiter
-from fuzzy_arbiter.terms import norms
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
 
 # Klement, Mesiar, Pap: Triangular Norms, 2000; and fuzzylite's manual for the normalized sum
@@ -48,19 +41,6 @@ def test_a_norm_is_as_defined_for_numbers_and_arrays(name):
     a, b = np.array(pairs, dtype=float).T
     assert [NORMS[name].number(*map(float, pair)) for pair in pairs] == pytest.approx(expected, abs=1e-15)
     assert NORMS[name].array(a, b) == pytest.approx(expected, abs=1e-15)
-
-
-@pytest.mark.medium
-def test_arrays_need_no_sources(tmp_path):
-    """A frozen program has the bytecode alone."""
-    package = tmp_path / "fuzzy_arbiter"
-    shutil.copytree(Path(norms.__file__).parents[1], package, ignore=shutil.ignore_patterns("__pycache__"))
-    compileall.compile_dir(package, quiet=1, legacy=True)
-    for source in package.rglob("*.py"):
-        source.unlink()
-    code = "from fuzzy_arbiter import Arbiter; print(Arbiter(form='complete').batch([[1, 0.25, 0.5]]).tolist())"
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=True)
-    assert done.stdout.strip() == str(Arbiter(form="complete").batch([[1, 0.25, 0.5]]).tolist())
 
 
 # of which each operation is monotone as it is rounded, and so are they; others may fall by a few units of rounding
