@@ -17,7 +17,7 @@ from cosim.logs.chunked_file import OnProgress
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import require_map
 from cosim.logs.spool import LogContents
-from cosim.logs.vehicle_messages import AUTOPILOT, NO_AUTOPILOT, VehicleMessages
+from cosim.logs.vehicle_messages import AUTOPILOT, MESSAGES, NO_AUTOPILOT, VehicleMessages
 from cosim.mavlink.wire.dialect import dialect
 
 _ALL_MESSAGES = "mavlink/out"  # topic of all messages; each is also recorded with the topic of its kind
@@ -39,7 +39,7 @@ def read_recording(path: Path, contents: LogContents, on_progress: OnProgress) -
         try:
             header, fields = _parts(stored)
             name = fields["type"]
-            if name in messages.message_names:
+            if name in MESSAGES:
                 message = kinds[name](**_values(kinds[name], fields))
                 messages.add(header["system_id"], header["component_id"], message, written)
             elif name != "HEARTBEAT":

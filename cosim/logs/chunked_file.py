@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 OnProgress = Callable[[float], None]  # receives the fraction of the log read so far, 0 to 1
 _CHUNK = 1 << 20  # bytes that are read at once
@@ -19,10 +17,8 @@ class ChunkedFile:
         self.start = 0  # offset in the file of the first byte of `data`
         self._file, self._size, self._on_progress = path.open("rb"), max(1, path.stat().st_size), on_progress
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+    def close(self) -> None:
+        """Close the file."""
         self._file.close()
 
     def ahead(self, count: int) -> int:

@@ -47,30 +47,12 @@ class MappedQuantity(Table, frozen=True):
 
 
 class ColumnMap(Table, frozen=True):
-    """A whole column map: default time, frames and the columns of each quantity."""
+    """A column map: default time and frames, and in the type of a file a `MappedQuantity` for each quantity."""
 
     time: TimeColumn | None = None
     world: World = "NED"
     body: Body = "FRD"
     messages: str = ""  # folder of .msg files, for types that a bag does not define
-    position: MappedQuantity | None = None
-    attitude: MappedQuantity | None = None
-    velocity_world: MappedQuantity | None = None
-    velocity: MappedQuantity | None = None
-    rates: MappedQuantity | None = None
-    altitude: MappedQuantity | None = None
-    depth: MappedQuantity | None = None
-    dvl: MappedQuantity | None = None
-    acceleration: MappedQuantity | None = None
-    gyro: MappedQuantity | None = None
-    heading: MappedQuantity | None = None
-    fix: MappedQuantity | None = None
-    thrust: MappedQuantity | None = None
-    effort: MappedQuantity | None = None
-    pulses: MappedQuantity | None = None
-    wrench: MappedQuantity | None = None
-    sticks: MappedQuantity | None = None
-    voltage: MappedQuantity | None = None
 
     @property
     def quantities(self) -> dict[str, MappedQuantity]:
@@ -101,6 +83,12 @@ class ColumnMap(Table, frozen=True):
             parts = [values[:, i : i + 3] @ turn.T for i in range(0, quantity.size, 3)]
             values = np.hstack(parts)
         return values
+
+
+_MAP = msgspec.defstruct(
+    "_Map", [(name, MappedQuantity | None, None) for name in QUANTITIES if name != "pressure"], bases=(ColumnMap,),
+    frozen=True, forbid_unknown_fields=True,
+)  # fmt: skip
 
 
 def require_map(columns: ColumnMap | None) -> ColumnMap:
@@ -153,7 +141,7 @@ def _require_angles(mapped: MappedQuantity, angles: Array) -> None:
 def read_map(path: Path) -> ColumnMap:
     """Read a column map."""
     try:
-        columns: ColumnMap = decode(read_toml(path), ColumnMap)
+        columns: ColumnMap = decode(read_toml(path), _MAP)
         for name, mapped in columns.quantities.items():
             _check(name, mapped)
         if columns.messages:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from cosim.simulation.signals import Array
+
+Components = Callable[[Callable[[str], Any]], Sequence[float]]  # from a function that returns a message's field
 
 WORLDS = {  # matrix from the named world frame to NED
     "NED": np.eye(3),
@@ -84,3 +87,21 @@ def quaternion_of_angles(roll: float, pitch: float, yaw: float) -> Sequence[floa
         cr * sp * cy + sr * cp * sy,
         cr * cp * sy - sr * sp * cy,
     )
+
+
+def scaled(fields: str, factor: float = 1.0) -> Components:
+    """Return a function from a message's fields to them, times a factor."""
+    names = fields.split()
+    return lambda field: [factor * field(name) for name in names]
+
+
+def attitude_of_angles(fields: str, factor: float = 1.0) -> Components:
+    """Return a function from roll, pitch and yaw of a message, times a factor [rad], to the unit quaternion."""
+    angles = scaled(fields, factor)
+    return lambda field: quaternion_of_angles(*angles(field))
+
+
+def attitude_of_quaternion(fields: str) -> Components:
+    """Return a function from the components of a quaternion, or a list of them, to the unit quaternion."""
+    names = fields.split()
+    return lambda field: unit_quaternion(field(fields) if len(names) == 1 else [field(name) for name in names])

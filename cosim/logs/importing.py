@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
-import functools
 import itertools
 import math
 import warnings
@@ -222,18 +222,16 @@ def _write(path: Path, contents: LogContents, scratch: Path, vehicle: Vehicle, o
     columns = columns_without_plant(draft)
     if commands:
         columns.append(Column(COMMAND_TIME, "s", "When the commands were sampled"))
-    make_rows = functools.partial(
-        RowMaker, columns=columns, topics=topics, commands=commands, voltage=volts, start=start
-    )
-    with make_rows(draft) as maker:
-        first = next(maker.blocks())
+    maker = RowMaker(draft, columns, topics, commands, volts, start)
+    with contextlib.closing(maker.blocks()) as blocks:
+        first = next(blocks)
     scenario = _with_first_pose(draft, first, [column.name for column in columns], contents.autopilot or "log")
     facts = _facts(path, contents, topics, commands, clock, hertz, start)
     folder = claim(options.out, scenario, options.overwrite)
     try:
         recorder = Recorder(folder.path, columns)
-        with make_rows(scenario) as maker:
-            for k, row in enumerate(itertools.chain.from_iterable(maker.blocks())):
+        with contextlib.closing(dataclasses.replace(maker, scenario=scenario).blocks()) as blocks:
+            for k, row in enumerate(itertools.chain.from_iterable(blocks)):
                 recorder.observe(k, row)
         recorder.close()
         write_atomic(folder.path / IMPORT, json_text(msgspec.to_builtins(facts)))

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import Self
-
 import numpy as np
 
 from cosim.logs.spool import BLOCK
@@ -24,10 +21,8 @@ class TopicReader:
         self._rows: Array = np.empty((0, self._width))
         self._more = True
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: type[BaseException] | BaseException | TracebackType | None) -> None:
+    def close(self) -> None:
+        """Close the topic's file."""
         self._file.close()
 
     def window(self, start: float, end: float) -> tuple[Array, Array]:

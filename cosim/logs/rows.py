@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Mapping
+import functools
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,6 +18,9 @@ from cosim.results.log_facts import COMMAND_TIME
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array, Column
+
+Put = Callable[[Sequence[str], Array], None]
+Readers = Mapping[str, TopicReader]
 
 BLOCK = 4096  # rows that are made at once
 _SPAN = 60.0  # s, maximum duration of these rows: at a low rate, the samples between rows are in memory too
@@ -32,61 +37,50 @@ _SENSORS = {  # quantity: columns, and name of the sensor's time column
 }
 
 
+@dataclass(frozen=True)
 class RowMaker:
-    """Make the rows of a record from topics; voltage [V], start [s]."""
+    """Make the rows of a record from topics."""
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        columns: list[Column],
-        topics: Mapping[str, Topic],
-        commands: CommandForces | None,
-        voltage: float,
-        start: float,
-    ) -> None:
-        self._scenario, self._topics, self._commands = scenario, topics, commands
-        self._voltage, self._start = voltage, start
-        self._at = {column.name: i for i, column in enumerate(columns)}
-        self._stack = contextlib.ExitStack()
-        self._readers = {name: self._stack.enter_context(TopicReader(topic)) for name, topic in topics.items()}
-        self._region_columns = _RegionColumns(scenario, self._at) if scenario.has_goal or scenario.regions else None
+    scenario: Scenario
+    columns: list[Column]
+    topics: Mapping[str, Topic]
+    commands: CommandForces | None
+    voltage: float  # V
+    start: float  # s
 
-    def __enter__(self) -> RowMaker:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._stack.close()
-
-    def blocks(self) -> Iterator[Array]:
+    def blocks(self) -> Generator[Array]:
         """Yield the rows of the whole run in order, each block of shape (n, columns)."""
-        step, rows = self._scenario.time.step, self._scenario.steps + 1
+        index = {column.name: i for i, column in enumerate(self.columns)}
+        step, rows = self.scenario.time.step, self.scenario.steps + 1
         count = max(1, min(BLOCK, int(_SPAN / step)))
-        for first in range(0, rows, count):
-            yield self._block(np.arange(first, min(first + count, rows)) * np.float64(step))
+        has_regions = self.scenario.has_goal or self.scenario.regions
+        region_columns = _RegionColumns(self.scenario, index) if has_regions else None
+        with contextlib.ExitStack() as stack:
+            readers = {n: stack.enter_context(contextlib.closing(TopicReader(t))) for n, t in self.topics.items()}
+            for first in range(0, rows, count):
+                time = np.arange(first, min(first + count, rows)) * np.float64(step)
+                block = np.full((len(time), len(index)), np.nan)
+                self._fill(functools.partial(_put, block, index), readers, time)
+                if region_columns is not None:
+                    region_columns.put(block)
+                yield block
 
-    def _block(self, time: Array) -> Array:
-        rows = np.full((len(time), len(self._at)), np.nan)
-
-        def put(names: tuple[str, ...] | list[str], values: Array) -> None:
-            rows[:, [self._at[name] for name in names]] = values
-
+    def _fill(self, put: Put, readers: Readers, time: Array) -> None:
         put(["time"], time[:, None])
-        log_time = time + self._start
-        self._put_motion(put, log_time)
+        log_time = time + self.start
+        self._put_motion(put, readers, log_time)
         for quantity, (names, sensor) in _SENSORS.items():
-            if quantity in self._readers:
-                values, when = self._readers[quantity].held(log_time)
+            if quantity in readers:
+                values, when = readers[quantity].held(log_time)
                 put(names, values)
-                put([f"measured.time.{sensor}"], (when - self._start)[:, None])
+                put([f"measured.time.{sensor}"], (when - self.start)[:, None])
                 if quantity == "altitude":
                     put(["altitude"], values)
-        self._put_commands(put, log_time)
-        if self._region_columns is not None:
-            self._region_columns.put(rows)
-        return rows
+        if self.commands is not None:
+            self._put_commands(put, readers, log_time, self.commands)
 
-    def _put_motion(self, put: Callable[..., None], times: Array) -> None:
-        readers = self._readers
+    @staticmethod
+    def _put_motion(put: Put, readers: Readers, times: Array) -> None:
         if "position" in readers:
             put(_POSITION, readers["position"].interpolated(times))
         elif "depth" in readers:
@@ -104,18 +98,15 @@ class RowMaker:
         if rates is not None:
             put([f"velocity.{a}" for a in "pqr"], rates.interpolated(times))
 
-    def _put_commands(self, put: Callable[..., None], times: Array) -> None:
-        if self._commands is None:
-            return
-        quantity = next(name for name in self._readers if name == self._commands.quantity)
-        values, when = self._readers[quantity].held(times)
-        put([COMMAND_TIME], (when - self._start)[:, None])
-        volts = np.full(len(times), self._voltage)
-        if "voltage" in self._readers and not np.isfinite(self._voltage):
-            volts = self._readers["voltage"].held(times)[0][:, 0]
-        forces = self._commands.forces(values, volts)
-        vehicle = self._scenario.vehicle
-        if self._commands.through == "wrench":
+    def _put_commands(self, put: Put, readers: Readers, times: Array, commands: CommandForces) -> None:
+        values, when = readers[commands.quantity].held(times)
+        put([COMMAND_TIME], (when - self.start)[:, None])
+        volts = np.full(len(times), self.voltage)
+        if "voltage" in readers and not np.isfinite(self.voltage):
+            volts = readers["voltage"].held(times)[0][:, 0]
+        forces = commands.forces(values, volts)
+        vehicle = self.scenario.vehicle
+        if commands.through == "wrench":
             put([f"wrench.{a}" for a in _WRENCH], forces)
             put([f"thrust[{i + 1}]" for i in range(vehicle.n_thrusters)], np.zeros((len(times), vehicle.n_thrusters)))
             for kind in ("command", "actuation"):
@@ -131,6 +122,10 @@ class RowMaker:
         saturated = np.where(np.isnan(forces), np.nan, acting != forces)
         put([f"thrust_saturated[{i}]" for i in names], saturated)
         put(["allocation_saturated"], saturated.max(axis=1, keepdims=True, initial=0.0))
+
+
+def _put(rows: Array, index: Mapping[str, int], names: Sequence[str], values: Array) -> None:
+    rows[:, [index[name] for name in names]] = values
 
 
 class _RegionColumns:

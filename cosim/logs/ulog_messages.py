@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 import struct
 from collections.abc import Iterator
@@ -143,7 +144,7 @@ class ULogMessages:
 
     def _messages(self, on_progress: OnProgress) -> Iterator[tuple[int, bytes]]:
         """Yield type and body of each message; after invalid bytes, go on at a sync mark or a likely head."""
-        with ChunkedFile(self._path, on_progress) as file:
+        with contextlib.closing(ChunkedFile(self._path, on_progress)) as file:
             if file.ahead(_FILE_HEAD) < len(_MAGIC) or not file.data.startswith(_MAGIC):
                 raise ImportLogError("cannot be read as a ULog file: it does not begin as one")
             file.offset = min(_FILE_HEAD, len(file.data))

@@ -6,7 +6,7 @@ import contextlib
 import io
 import math
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from cosim.errors import ImportLogError
 from cosim.logs.chunked_file import ChunkedFile, OnProgress
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import ColumnMap
-from cosim.logs.frames import quaternion_of_angles, unit_quaternion
+from cosim.logs.frames import Components, attitude_of_angles, attitude_of_quaternion, scaled
 from cosim.logs.spool import LogContents
 from cosim.logs.vehicle_messages import DOWNWARD
 
@@ -28,14 +28,18 @@ _FRAMES = (  # names of ArduSub's FRAME_CONFIG, from 0
 )  # fmt: skip
 _OTHERS = ("ArduCopter", "ArduPlane", "ArduRover", "AntennaTracker", "Blimp")  # firmware of other vehicles
 _ABOUT_LOG = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "VER"}  # messages that are not counted as unread
-_SAMPLES = {  # message: the quantities that it holds, with their fields and the factor to SI units
-    "XKF1": (("position", "PN PE PD", 1.0), ("velocity_world", "VN VE VD", 1.0)),
-    "RATE": (("rates", "R P Y", math.pi / 180.0),),
-    "IMU": (("gyro", "GyrX GyrY GyrZ", 1.0), ("acceleration", "AccX AccY AccZ", 1.0)),
-    "BARO": (("depth", "Alt", -1.0),),
-    "RFND": (("altitude", "Dist", 1.0),),
-    "BAT": (("voltage", "Volt", 1.0),),
+_SAMPLES: dict[str, tuple[tuple[str, Components], ...]] = {  # message: quantities in SI units, by its fields
+    "ATT": (("attitude", attitude_of_angles("Roll Pitch Yaw", math.pi / 180.0)),),
+    "XKQ": (("attitude", attitude_of_quaternion("Q1 Q2 Q3 Q4")),),
+    "XKF1": (("position", scaled("PN PE PD")), ("velocity_world", scaled("VN VE VD"))),
+    "RATE": (("rates", scaled("R P Y", math.pi / 180.0)),),
+    "IMU": (("gyro", scaled("GyrX GyrY GyrZ")), ("acceleration", scaled("AccX AccY AccZ"))),
+    "BARO": (("depth", scaled("Alt", -1.0)),),
+    "RFND": (("altitude", scaled("Dist")),),
+    "BAT": (("voltage", scaled("Volt")),),
 }
+# these and the ones that `_Messages` converts by hand
+_READ = frozenset(_SAMPLES.keys() | {"PARM", "MSG", "VISO", "RCOU"})
 
 Fields = dict[str, Any]
 
@@ -45,7 +49,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
     contents.autopilot = "ardupilot"
     messages = _Messages(contents)
     lost, any_message = 0, False
-    for name, fields in parse_messages(path, messages.names, on_progress):
+    for name, fields in parse_messages(path, _READ, on_progress):
         if name is None:
             lost += 1
             continue
@@ -84,14 +88,9 @@ class _Messages:
         self._contents = contents
         self.clock = Clock()
         self._rate_stamp = math.nan
-        self._handlers: dict[str, Callable[[Fields, str, float], None]] = {
-            "PARM": self._store_parameter, "MSG": self._store_kind, "ATT": self._put_angles,
-            "XKQ": self._put_quaternion, "VISO": self._put_dvl, "RCOU": self._put_pulses,
-        }  # fmt: skip
-        self.names = frozenset(self._handlers) | _SAMPLES.keys()
 
     def add(self, name: str, m: Fields) -> None:
-        """Add a message of `names` with its fields."""
+        """Add one of the messages that are read, with its fields."""
         try:
             self._add(name, m)
         except KeyError as error:
@@ -111,44 +110,26 @@ class _Messages:
             return
         instance = m.get("C", m.get("I"))
         source = name if instance is None else f"{name}[{instance}]"
-        for quantity, fields, factor in _SAMPLES.get(name, ()):
-            self._put(quantity, source, time, *(factor * m[field] for field in fields.split()))
-        if name in self._handlers:
-            self._handlers[name](m, source, time)
+        for quantity, components in _SAMPLES.get(name, ()):
+            self._contents.put(quantity, source, math.nan, time, components(m.__getitem__))
+        match name:
+            case "PARM":
+                self._contents.put_parameter(str(m["Name"]), float(m["Value"]))
+                if m["Name"] == "FRAME_CONFIG" and 0 <= m["Value"] < len(_FRAMES):
+                    self._contents.frame = _FRAMES[int(m["Value"])]
+            case "MSG" if (firmware := str(m["Message"]).split(" ")[0]) in _OTHERS:
+                self._contents.kind = f"vehicle of {firmware}"
+            case "VISO" if m["dt"] > 0.0:  # the mean over dt, which ends at the stamp
+                velocity = [m[f"PosD{axis}"] / m["dt"] for axis in "XYZ"]
+                self._contents.put("dvl", source, math.nan, time - 0.5 * m["dt"], velocity)
+            case "RCOU":
+                pulses = [float(m[f"C{i}"]) for i in range(1, 33) if f"C{i}" in m]
+                self._contents.put("pulses", source, math.nan, time, pulses)
 
     def _is_stale(self, stamp: float) -> bool:
         """Return True for a RATE that repeats an old stamp [s], since the rate controller rests, as in MANUAL."""
         last, self._rate_stamp = self._rate_stamp, stamp
         return stamp == last or self.clock.is_behind(stamp)
-
-    def _put(self, quantity: str, source: str, time: float, *values: float) -> None:
-        self._contents.put(quantity, source, math.nan, time, values)
-
-    # ---- messages that are no plain samples ----
-
-    def _store_parameter(self, m: Fields, source: str, time: float) -> None:
-        self._contents.put_parameter(str(m["Name"]), float(m["Value"]))
-        if m["Name"] == "FRAME_CONFIG" and 0 <= m["Value"] < len(_FRAMES):
-            self._contents.frame = _FRAMES[int(m["Value"])]
-
-    def _store_kind(self, m: Fields, source: str, time: float) -> None:
-        firmware = str(m["Message"]).split(" ")[0]
-        if firmware in _OTHERS:
-            self._contents.kind = f"vehicle of {firmware}"
-
-    def _put_angles(self, m: Fields, source: str, time: float) -> None:
-        angles = (math.radians(m[name]) for name in ("Roll", "Pitch", "Yaw"))
-        self._put("attitude", source, time, *quaternion_of_angles(*angles))
-
-    def _put_quaternion(self, m: Fields, source: str, time: float) -> None:
-        self._put("attitude", source, time, *unit_quaternion([m[f"Q{i}"] for i in range(1, 5)]))
-
-    def _put_dvl(self, m: Fields, source: str, time: float) -> None:
-        if m["dt"] > 0.0:  # the mean over dt, which ends at the stamp
-            self._put("dvl", source, time - 0.5 * m["dt"], *(m[f"PosD{axis}"] / m["dt"] for axis in "XYZ"))
-
-    def _put_pulses(self, m: Fields, source: str, time: float) -> None:
-        self._put("pulses", source, time, *(float(m[f"C{i}"]) for i in range(1, 33) if f"C{i}" in m))
 
 
 def parse_messages(
@@ -158,7 +139,7 @@ def parse_messages(
     formats: dict[int, tuple[DFFormat, struct.Struct]] = {}
     first = DFFormat(_FMT, "FMT", _FMT_SIZE, "BBnNZ", "Type,Length,Name,Format,Columns")
     formats[_FMT] = first, struct.Struct(first.msg_struct)
-    with ChunkedFile(path, on_progress) as file:
+    with contextlib.closing(ChunkedFile(path, on_progress)) as file:
         while (ahead := file.ahead(_MAX_MESSAGE)) >= 3:
             data, offset = file.data, file.offset
             form, unpack = formats.get(data[offset + 2], (None, None))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,7 +12,7 @@ from cosim.logs.chunked_file import ChunkedFile, OnProgress
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.spool import LogContents
-from cosim.logs.vehicle_messages import AUTOPILOT, NO_AUTOPILOT, VehicleMessages
+from cosim.logs.vehicle_messages import AUTOPILOT, MESSAGES, NO_AUTOPILOT, VehicleMessages
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.framing import FrameFilter, Header, RxStats, parse_header
 
@@ -33,7 +34,7 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
             continue
         written = clock.time(stamp)
         info = infos.get(header.message_id)
-        if info is None or info.msgname not in messages.message_names:
+        if info is None or info.msgname not in MESSAGES:
             if header.message_id != _HEARTBEAT:
                 contents.unread[info.msgname if info else f"message {header.message_id}"] += 1
             continue
@@ -58,7 +59,7 @@ def _find_vehicle(path: Path) -> tuple[int, int, int]:
 def _frames(path: Path, on_progress: OnProgress) -> Iterator[tuple[float, bytes, Header | None]]:
     """Yield reception time [s since 1970], frame and header of each frame; None as header for invalid bytes."""
     frames = FrameFilter(RxStats())
-    with ChunkedFile(path, on_progress) as file:
+    with contextlib.closing(ChunkedFile(path, on_progress)) as file:
         while (ahead := file.ahead(_MAX_FRAME)) >= _MIN_FRAME:
             data, first = file.data, file.offset + _STAMP.size
             header = parse_header(data, first) if data[first] in (0xFE, 0xFD) else None

@@ -14,20 +14,19 @@ from cosim.logs.spool import LogContents
 from cosim.logs.ulog_messages import ULogMessages
 from cosim.logs.vehicle_messages import DOWNWARD, vehicle_kind
 
+
+def _elements(name: str, count: int) -> tuple[str, ...]:
+    return tuple(f"{name}[{i}]" for i in range(count))
+
+
 # topic: quantities and their fields, in SI units, NED and FRD
 _TOPICS: dict[str, tuple[tuple[str, tuple[str, ...]], ...]] = {
-    "vehicle_attitude": (
-        ("attitude", ("q[0]", "q[1]", "q[2]", "q[3]")),
-        ("rates", ("rollspeed", "pitchspeed", "yawspeed")),
-    ),
-    "vehicle_angular_velocity": (("rates", ("xyz[0]", "xyz[1]", "xyz[2]")),),
+    "vehicle_attitude": (("attitude", _elements("q", 4)), ("rates", ("rollspeed", "pitchspeed", "yawspeed"))),
+    "vehicle_angular_velocity": (("rates", _elements("xyz", 3)),),
     "vehicle_local_position": (("position", ("x", "y", "z")), ("velocity_world", ("vx", "vy", "vz"))),
-    "sensor_combined": (
-        ("gyro", ("gyro_rad[0]", "gyro_rad[1]", "gyro_rad[2]")),
-        ("acceleration", ("accelerometer_m_s2[0]", "accelerometer_m_s2[1]", "accelerometer_m_s2[2]")),
-    ),
-    "actuator_outputs": (("pulses", tuple(f"output[{i}]" for i in range(16))),),
-    "actuator_motors": (("effort", tuple(f"control[{i}]" for i in range(12))),),
+    "sensor_combined": (("gyro", _elements("gyro_rad", 3)), ("acceleration", _elements("accelerometer_m_s2", 3))),
+    "actuator_outputs": (("pulses", _elements("output", 16)),),
+    "actuator_motors": (("effort", _elements("control", 12)),),
     "battery_status": (("voltage", ("voltage_v",)),),
     "distance_sensor": (("altitude", ("current_distance",)),),
 }

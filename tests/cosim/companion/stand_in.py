@@ -127,6 +127,10 @@ class StandIn:
         self.autopilot.tick(self.clock())
         self._speaking = False
 
+    def of_type(self, *kinds):
+        """Return the messages of these types that the companion sent."""
+        return [message for _, message in self.sent if message.get_type() in kinds]
+
     def now(self, name):
         return self.rows[-1][self.at[name]]
 

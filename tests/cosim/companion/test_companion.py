@@ -148,7 +148,7 @@ def test_no_setpoints_are_sent_before_frame_alignment(tmp_path):
     link = StandIn(profile="generic", silent=["GLOBAL_POSITION_INT"])
     with pytest.raises(RunError, match="the autopilot has no global position"):
         Flight(tmp_path, link=link)
-    assert not [m for _, m in link.sent if m.get_type() in STICKS]
+    assert not link.of_type(*STICKS)
     assert not (tmp_path / "run").exists()
 
 
@@ -157,7 +157,7 @@ def test_companion_waits_for_arming_by_default(tmp_path):
     link = StandIn(profile="generic", armed=False)
     with pytest.raises(RunError, match="waiting for arming"):
         Flight(tmp_path, link=link)
-    assert not [m for _, m in link.sent if m.get_type() == "COMMAND_LONG" and m.command == 400]
+    assert 400 not in {m.command for m in link.of_type("COMMAND_LONG")}
     armed = Flight(tmp_path, 2.0, link=StandIn(profile="generic", armed=False), arm=True)
     assert armed.status == "completed" and armed.link.now("commands.armed") == 1.0
 
@@ -176,20 +176,15 @@ def test_an_ardusub_that_was_armed_here_dives_level_before_it_is_steered(tmp_pat
 
 
 @pytest.mark.medium
-def test_dry_run_sends_no_setpoints_and_only_message_requests(tmp_path):
-    flight = Flight(tmp_path, 3.0, dry_run=True)
-    assert flight.status == "completed" and flight.states[-1][1] == "dry_run"
-    assert not [m for _, m in flight.link.sent if m.get_type() in STICKS]
-    assert {m.command for _, m in flight.link.sent if m.get_type() == "COMMAND_LONG"} == {511}
+@pytest.mark.parametrize("ends", [False, True])
+def test_dry_run_sends_no_setpoints_and_only_message_requests(tmp_path, link, ends):
+    """Nor when something ends it."""
+    events = [lambda: link.silent.add("LOCAL_POSITION_NED")] if ends else ()
+    flight = Flight(tmp_path, 4.0, dry_run=True, events=events, link=link)
+    assert flight.status == ("held: stale estimate" if ends else "completed")
+    assert flight.states[-1][1] == ("held" if ends else "dry_run")
+    assert not link.of_type(*STICKS) and {m.command for m in link.of_type("COMMAND_LONG")} == {511}
     assert np.abs(flight.run.table()["stick.Y"].to_numpy()).max() > 0.05  # what it would have sent
-
-
-def test_a_dry_run_sends_nothing_either_once_something_ends_it(tmp_path):
-    flight = Flight(tmp_path, 4.0, dry_run=True, events=[lambda: flight_link.silent.add("LOCAL_POSITION_NED")], link=(
-        flight_link := StandIn(profile="generic", shift=SHIFT)))  # fmt: skip
-    assert flight.status == "held: stale estimate"
-    assert not [m for _, m in flight_link.sent if m.get_type() in STICKS]
-    assert {m.command for _, m in flight_link.sent if m.get_type() == "COMMAND_LONG"} == {511}
 
 
 # ---- what ends steering: each condition of the table ----
@@ -359,7 +354,7 @@ def test_an_ardusub_that_would_ignore_or_misread_sticks_gets_none(tmp_path, mess
     link.events = [(0.5, lambda: link.hear(message, 1, 1))]
     with pytest.raises(RunError, match=words):
         Flight(tmp_path, link=link, profile="ardusub")
-    assert not [m for _, m in link.sent if m.get_type() in STICKS]
+    assert not link.of_type(*STICKS)
 
 
 @pytest.mark.medium

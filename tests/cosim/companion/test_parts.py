@@ -76,38 +76,46 @@ def reported(position, geodetic=None, depth=None, heard=0.0, state=None):
     return state
 
 
+ORIGIN = (55.9097, -3.3203)
+
+
+def follow(positions, origin, depth, spread=None):
+    """Report positions every 0.1 s, with where the vehicle is on the globe; return the alignment and the state."""
+    alignment, frame, state = FrameAlignment(origin), LocalFrame(*ORIGIN), None
+    for k, position in enumerate(positions):
+        geodetic = frame.to_global(tuple(spread[k])) if spread is not None else None
+        state = reported(position, geodetic, depth, 0.1 * k, state)
+        assert origin.surveyed or alignment.offset is None
+        alignment.update(state, 0.1 * k)
+    return alignment, state
+
+
 def test_frame_offset_is_derived_from_global_position_and_pressure():
-    origin = (55.9097, -3.3203)
-    alignment, frame, state = FrameAlignment(SceneOrigin(geodetic=origin)), LocalFrame(*origin), None
     true = np.array([3.0, -2.0, 4.0])
-    for k in range(10):
-        assert alignment.offset is None
-        state = reported(true + np.array(SHIFT), frame.to_global(tuple(true)), true[2], k * 0.1, state)
-        alignment.update(state, k * 0.1)
+    alignment, state = follow([true + SHIFT] * 10, SceneOrigin(geodetic=ORIGIN), true[2], [true] * 10)
     assert alignment.offset == pytest.approx([-0.9, 1.6, -1.9], abs=0.02)  # 1e-7 deg is a centimeter
     assert alignment.to_scene(state.position) == pytest.approx(true, abs=0.02)
 
 
 def test_depth_that_drifts_from_the_second_pressure_is_seen_in_a_surveyed_frame():
     """SCALED_PRESSURE2 may be the only pressure."""
-    alignment, state = FrameAlignment(SceneOrigin(surveyed=(0.0, 0.0, 0.0))), None
-    for k in range(600):
-        state = reported((0.0, 0.0, 2.0 + min(0.01 * k, 2.0)), depth=2.0, heard=0.1 * k, state=state)
-        alignment.update(state, 0.1 * k)
+    positions = [(0.0, 0.0, 2.0 + min(0.01 * k, 2.0)) for k in range(600)]
+    alignment, _ = follow(positions, SceneOrigin(surveyed=(0.0, 0.0, 0.0)), 2.0)
     assert alignment.drift == pytest.approx(2.0, abs=0.1)
 
 
 def test_inconsistent_positions_give_no_frame_offset():
-    origin, rng = (55.9097, -3.3203), np.random.default_rng(1)
-    alignment, frame, state = FrameAlignment(SceneOrigin(geodetic=origin)), LocalFrame(*origin), None
-    for k in range(60):
-        where = rng.normal(0.0, 0.5, 3)
-        state = reported((0.0, 0.0, 0.0), frame.to_global(tuple(where)), 1.0, k * 0.1, state)
-        alignment.update(state, k * 0.1)
+    spread = np.random.default_rng(1).normal(0.0, 0.5, (60, 3))
+    alignment, state = follow(np.zeros((60, 3)), SceneOrigin(geodetic=ORIGIN), 1.0, spread)
     assert alignment.offset is None and "agree" in alignment.missing(state)
 
 
 # ---- what is sent ----
+
+
+def force_of_motors(motors):
+    """The wrench of an ArduSub's motor commands: force goes with the square, and our thrusters push the other way."""
+    return HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
 
 
 def test_full_surge_of_a_bluerov2_at_half_gain_is_28_newtons():
@@ -120,16 +128,15 @@ def test_full_surge_of_a_bluerov2_at_half_gain_is_28_newtons():
 
 
 @pytest.mark.parametrize(
-    "wrench", [(113, 0, 0, 0, 0, 0), (28, 28, 0, 0, 0, 0), (28, -20, 10, 0, 0, 1), (0, 0, -40, 2, 2, 0)]
+    "wrench", [(28, 0, 0, 0, 0, 0), (7, 7, 0, 0, 0, 0), (7, -5, 2.5, 0, 0, 0.25), (0, 0, -10, 0.5, 0.5, 0)]
 )
-def test_ardusub_motor_mix_realizes_the_desired_wrench(wrench):
-    """It adds the sticks in each motor, and its force goes with the square; our thrusters push the other way."""
-    scale = make_stick_scale(HEAVY, ARDUSUB, 0.5, "manual-control")
-    sticks = scale.sticks(0.25 * np.array(wrench, dtype=float))
-    pilot = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 0.5])  # the gain leaves roll and pitch alone
-    motors = VECTORED_6DOF @ (pilot * sticks)
-    made = HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
-    assert made == pytest.approx(0.25 * np.array(wrench), rel=0.01, abs=0.05)
+@pytest.mark.parametrize("sticks_by", ["manual-control", "rc-override"])
+def test_ardusub_motor_mix_realizes_the_desired_wrench(wrench, sticks_by):
+    """It adds the sticks in each motor. The pilot's gain leaves roll and pitch, and overridden channels, alone."""
+    sticks = make_stick_scale(HEAVY, ARDUSUB, 0.5, sticks_by).sticks(np.array(wrench, dtype=float))
+    pilot = np.array([0.5, 0.5, 0.5, 1.0, 1.0, 0.5]) if sticks_by == "manual-control" else np.ones(6)
+    made = force_of_motors(VECTORED_6DOF @ (pilot * sticks))
+    assert made == pytest.approx(np.array(wrench), rel=0.01, abs=0.05)
 
 
 @pytest.mark.parametrize("force", [(30.0, 60.0, 110.0), (100.0, 0.0, -150.0), (0.0, 90.0, 30.0)])
@@ -139,7 +146,7 @@ def test_a_force_beyond_the_thrusters_leaves_the_moments_whole(force):
     motors = VECTORED_6DOF @ scale.sticks(np.concatenate([force, moment]))
     for group in (slice(0, 4), slice(4, 8)):
         motors[group] /= max(1.0, np.abs(motors[group]).max())
-    made = HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
+    made = force_of_motors(motors)
     assert made[3:] == pytest.approx(moment, abs=0.05)
     assert np.dot(made[:3], force) / np.linalg.norm(force) > 30.0
 
@@ -157,55 +164,45 @@ def test_manual_control_realizes_the_desired_wrench(profile):
     assert 0.5 * np.array(command.wrench) / np.diag(scale.efforts) == pytest.approx(wrench, rel=0.02)
 
 
-@pytest.mark.parametrize("sticks_by", ["manual-control", "rc-override"])
-def test_rate_sticks_realize_the_desired_rates_in_ardusub(sticks_by):
-    """As its Sub::get_pilot_desired_climb_rate and pwm_to_angle_dz have it, at a pilot gain of 0.5."""
-    scale, gain = make_stick_scale(HEAVY, ARDUSUB, 0.5, sticks_by), 0.5
+@pytest.mark.parametrize(
+    ("sticks_by", "gain", "parameters", "speeds", "yaw"),  # speeds up and down [m/s], and yaw rate at 45 deg
+    [
+        ("manual-control", 0.5, {}, (0.5, 0.5), 4.5),
+        ("rc-override", 0.5, {}, (0.5, 0.5), 4.5),
+        ("manual-control", 1.0, {"ACRO_YAW_P": 3.375, "PILOT_SPEED_UP": 200.0, "PILOT_SPEED_DN": 100.0}, (2.0, 1.0),
+         3.375),
+        ("manual-control", 1.0, {"PILOT_SPEED_UP": 150.0, "PILOT_SPEED_DN": 0.0}, (1.5, 1.5), 4.5),
+    ],
+)  # fmt: skip
+def test_rate_sticks_realize_the_desired_rates_in_ardusub(sticks_by, gain, parameters, speeds, yaw):
+    """As its Sub::get_pilot_desired_climb_rate and pwm_to_angle_dz have it, also by its parameters."""
+    scale = make_stick_scale(HEAVY, ARDUSUB, gain, sticks_by).with_rates(parameters)
     scaled = gain if sticks_by == "manual-control" else 1.0
     for rate in (0.02, -0.1, 0.2):
         throttle = 500.0 - 500.0 * scaled * scale.climb_stick(rate)
         top, bottom = 500.0 + 100.0 * gain, 500.0 - 100.0 * gain
         climb = (throttle - top) / (1000.0 - top) if throttle > top else (throttle - bottom) / bottom
-        assert -0.5 * climb == pytest.approx(rate)
+        assert -speeds[rate > 0.0] * climb == pytest.approx(rate)
         pulse, dead = 400.0 * scaled * scale.yaw_rate_stick(rate), 40.0 * gain
         angle = 45.0 * math.copysign(abs(pulse) - dead, pulse) / (400.0 - dead)
-        assert math.radians(4.5 * angle) == pytest.approx(rate)
+        assert math.radians(yaw * angle) == pytest.approx(rate)
     assert scale.climb_stick(0.0) == scale.yaw_rate_stick(0.0) == scale.yaw_rate_stick(math.nan) == 0.0
 
 
-def test_rate_sticks_follow_the_parameters_of_the_autopilot():
-    """As the same functions of ArduSub have it: by ACRO_YAW_P of 4.7, and by speeds of 2 m/s up and 1 m/s down."""
-    scale = make_stick_scale(HEAVY, ARDUSUB, 1.0, "manual-control")
-    scale = scale.with_rates({"ACRO_YAW_P": 3.375, "PILOT_SPEED_UP": 200.0, "PILOT_SPEED_DN": 100.0})
-    for rate, most in ((0.3, 1.0), (-0.3, 2.0)):
-        throttle = 500.0 - 500.0 * scale.climb_stick(rate)
-        climb = (throttle - 600.0) / 400.0 if throttle > 600.0 else (throttle - 400.0) / 400.0
-        assert -most * climb == pytest.approx(rate)
-        pulse = 400.0 * scale.yaw_rate_stick(rate)
-        angle = 45.0 * math.copysign(abs(pulse) - 40.0, pulse) / 360.0
-        assert math.radians(3.375 * angle) == pytest.approx(rate)
-    assert scale.with_rates({"PILOT_SPEED_DN": 0.0, "PILOT_SPEED_UP": 150.0}).climb_rates == (1.5, 1.5)
-    assert scale.with_rates({}) == scale
-    for most in ({"ATC_ANGLE_MAX": 30.0}, {"ANGLE_MAX": 3000.0}):
-        stick = scale.with_rates(most).lean_sticks(np.array([math.radians(15.0), math.radians(40.0)]))
-        assert (400.0 * stick[0] - 30.0) / 370.0 * 30.0 == pytest.approx(15.0) and stick[1] == 1.0
+@pytest.mark.parametrize("parameters", [{"ATC_ANGLE_MAX": 30.0}, {"ANGLE_MAX": 3000.0}])
+def test_lean_sticks_realize_the_desired_angles_in_ardusub(parameters):
+    scale = make_stick_scale(HEAVY, ARDUSUB, 1.0, "manual-control").with_rates(parameters)
+    stick = scale.lean_sticks(np.array([math.radians(15.0), math.radians(40.0)]))
+    assert (400.0 * stick[0] - 30.0) / 370.0 * 30.0 == pytest.approx(15.0) and stick[1] == 1.0
 
 
 def test_rc_override_follows_the_ardusub_order_and_zero_releases():
-    message = decoded(override_channels(mavlink, 1, np.array([1.0, -1.0, 0.5, 0.25, -0.25, 0.1])))
-    pulses = [getattr(message, f"chan{i}_raw") for i in range(1, 9)]
-    assert pulses == [1400, 1600, 1300, 1540, 1900, 1100, 0xFFFF, 0xFFFF]  # pitch roll up yaw ahead right
-    message = decoded(release_channels(mavlink, 1))
-    assert [getattr(message, f"chan{i}_raw") for i in range(1, 9)] == [0] * 6 + [0xFFFF] * 2
-
-
-@pytest.mark.parametrize("wrench", [(20, 0, 0, 0, 0, 0), (28, -20, 10, 0, 0, 1)])
-def test_rc_override_realizes_the_desired_wrench(wrench):
-    """As sticks do, but for the pilot's gain, which does not scale them."""
-    sticks = make_stick_scale(HEAVY, ARDUSUB, 0.5, "rc-override").sticks(np.array(wrench, dtype=float))
-    motors = VECTORED_6DOF @ sticks
-    made = HEAVY.thruster_matrix @ (-40.0 * motors * np.abs(motors))
-    assert made == pytest.approx(np.array(wrench), rel=0.01, abs=0.05)
+    for message, first in (
+        (override_channels(mavlink, 1, np.array([1.0, -1.0, 0.5, 0.25, -0.25, 0.1])),
+         [1400, 1600, 1300, 1540, 1900, 1100]),  # pitch roll up yaw ahead right
+        (release_channels(mavlink, 1), [0] * 6),
+    ):  # fmt: skip
+        assert [getattr(decoded(message), f"chan{i}_raw") for i in range(1, 9)] == [*first, 0xFFFF, 0xFFFF]
 
 
 def test_state_is_predicted_over_its_age():
@@ -421,19 +418,25 @@ def test_supervisor_states_advance_in_order():
     assert [supervisor.update(seen) for seen in dives] == ["diving", "engaging", "steering"]
 
 
+def sticks(x, z):
+    return mavlink.MAVLink_manual_control_message(1, x, 0, z, 0, 0)
+
+
 @pytest.mark.parametrize(
-    ("system", "component", "x", "z", "counts"),
+    ("system", "component", "message", "counts"),
     [
-        (255, 191, 900, 500, False),  # ours
-        (255, 190, 20, 500, False),  # at rest, as an ArduSub's sticks are
-        (255, 190, 0, 0, True),  # full down
-        (255, 190, 0, 700, True),
-        (254, 1, 300, 500, True),
+        (255, 191, sticks(900, 500), False),  # ours
+        (255, 190, sticks(20, 500), False),  # at rest, as an ArduSub's sticks are
+        (255, 190, sticks(0, 0), True),  # full down
+        (255, 190, sticks(0, 700), True),
+        (254, 1, sticks(300, 500), True),
+        (255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, 0, 0xFFFF, 1500, 1500, 1700, 0, 0, 0), True),
+        (255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, 0, 0xFFFF, 1500, 1500, 1510, 0, 0, 0), False),
     ],
 )
-def test_deflected_foreign_sticks_count_as_a_pilot(system, component, x, z, counts):
+def test_deflected_foreign_sticks_count_as_a_pilot(system, component, message, counts):
     state = reported((0.0, 0.0, 0.0))
-    state.receive(system, component, mavlink.MAVLink_manual_control_message(1, x, 0, z, 0, 0), 5.0)
+    state.receive(system, component, message, 5.0)
     assert (state.pilot_at == 5.0) == counts
 
 
@@ -443,13 +446,6 @@ def test_a_px4_mode_is_known_before_its_next_heartbeat():
     state.receive(1, 1, mavlink.MAVLink_current_mode_message(0, offboard, offboard), 5.0)
     assert state.mode == offboard
     assert RATES["CURRENT_MODE"] >= 5.0
-
-
-def test_rc_override_counts_as_a_pilot():
-    state = reported((0.0, 0.0, 0.0))
-    pulses = [0, 0xFFFF, 1500, 1500, 1700, 0, 0, 0]
-    state.receive(255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, *pulses), 6.0)
-    assert state.pilot_at == 6.0
 
 
 # ---- the autopilot's own failsafes ----

@@ -86,9 +86,8 @@ def test_nothing_is_armed_or_steered_far_from_the_scene(origin, armed, tmp_path)
     link = StandIn(profile="generic", armed=armed)
     with pytest.raises(RunError, match=r"waiting for a position near the scene, not [\d.]+ k?m from everything in it"):
         fly(link, tmp_path / "run", origin)
-    sent = [message for _, message in link.sent]
-    assert not [m for m in sent if m.get_type() in STEERS]
-    assert {m.command for m in sent if m.get_type() == "COMMAND_LONG"} == {511}  # message rates
+    assert not link.of_type(*STEERS)
+    assert {m.command for m in link.of_type("COMMAND_LONG")} == {511}  # message rates
     assert any("from everything in it" in placement for *_, placement, _ in link.notes)
     assert not (tmp_path / "run").exists()
 

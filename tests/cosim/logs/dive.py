@@ -20,8 +20,13 @@ class Dive:
         self.thrust = np.column_stack([10.0 * np.sin(0.5 * t + i) for i in range(8)])
 
 
-def errors(record, dive, names, expected):
-    """The greatest error of signals, and of how many rows they are known."""
-    found = record.stack(names)
-    known = np.isfinite(found).all(axis=1)
-    return np.abs(found - expected)[known].max(), known.mean()
+def assert_flown(record, dive, bound, known=0.99):
+    """Check that position, attitude and thrust of a record are those of a dive."""
+    for names, expected in (
+        ([f"position.{a}" for a in "xyz"], dive.position),
+        (["attitude.roll", "attitude.pitch", "attitude.yaw"], np.column_stack([dive.roll, dive.pitch, dive.yaw])),
+        ([f"thrust[{i}]" for i in range(1, 9)], dive.thrust),
+    ):
+        found = record.stack(names)
+        rows = np.isfinite(found).all(axis=1)
+        assert rows.mean() >= known and np.abs(found - expected)[rows].max() < bound, names

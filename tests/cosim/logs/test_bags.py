@@ -3,17 +3,16 @@
 import contextlib
 import shutil
 import sqlite3
+import sys
 
 import numpy as np
 import pytest
 
-import cosim
-from cosim.errors import ImportLogError
 from cosim.logs.bag_storage import stored_messages
 from cosim.logs.formats.bag import Decoder
 from cosim.results.log_facts import load_log_facts
-from tests.cosim.logs.conftest import LOGS
-from tests.cosim.logs.dive import Dive, errors
+from tests.cosim.logs.conftest import LOGS, has_remark
+from tests.cosim.logs.dive import Dive, assert_flown
 
 zstandard = pytest.importorskip("zstandard")
 writer = pytest.importorskip("mcap_ros2.writer")
@@ -89,49 +88,30 @@ def write_bag(path, dive):
         bag.finish()
 
 
-def typestore(distribution):
-    store = typesys.get_typestore(distribution)
-    types = typesys.get_types_from_msg(FORCES, "test_msgs/msg/Forces")
-    types |= typesys.get_types_from_msg(ODOMETRY, "test_msgs/msg/Odometry")
-    store.register({name: fields for name, fields in types.items() if name not in store.types})
-    return store
-
-
 def made(store, name, values):
     """Return a message of rosbags from nested dictionaries."""
-    kinds = dict(store.fielddefs[name][1])
-    fields = {}
+    kinds, fields = dict(store.fielddefs[name][1]), {"seq": 0} if name == "std_msgs/msg/Header" else {}
     for field, value in values.items():
         if isinstance(value, dict):
             fields[field] = made(store, kinds[field][1], value)
         else:
             fields[field] = np.array(value, float) if isinstance(value, list) else value
-    if name == "std_msgs/msg/Header" and "seq" in kinds:
-        fields["seq"] = 0
-    return store.types[name](**fields)
+    return store.types[name](**{field: fields[field] for field in kinds})
 
 
 TYPES = {"/odom": "test_msgs/msg/Odometry", "/thrusters": "test_msgs/msg/Forces", "/else": "test_msgs/msg/Forces"}
 
 
-def write_database(folder, dive):
-    """A bag of SQLite as a folder."""
-    store = typestore(typesys.Stores.ROS2_HUMBLE)
-    with rosbag2.Writer(folder, version=8) as bag:
+def write_by_rosbags(bag, dive, distribution, serialize):
+    store = typesys.get_typestore(distribution)
+    types = typesys.get_types_from_msg(FORCES, "test_msgs/msg/Forces")
+    types |= typesys.get_types_from_msg(ODOMETRY, "test_msgs/msg/Odometry")
+    store.register({name: fields for name, fields in types.items() if name not in store.types})
+    with bag:
         topics = {topic: bag.add_connection(topic, name, typestore=store) for topic, name in TYPES.items()}
         for topic, message, time in messages_of(dive):
             name = TYPES[topic]
-            bag.write(topics[topic], time, store.serialize_cdr(made(store, name, message), name))
-    return folder / f"{folder.name}.db3"
-
-
-def write_ros1(path, dive):
-    store = typestore(typesys.Stores.ROS1_NOETIC)
-    with rosbag1.Writer(path) as bag:
-        topics = {topic: bag.add_connection(topic, name, typestore=store) for topic, name in TYPES.items()}
-        for topic, message, time in messages_of(dive):
-            name = TYPES[topic]
-            bag.write(topics[topic], time, store.serialize_ros1(made(store, name, message), name))
+            bag.write(topics[topic], time, getattr(store, serialize)(made(store, name, message), name))
 
 
 def change(path, script):
@@ -161,25 +141,56 @@ def bag(tmp_path_factory, dive):
     return path
 
 
+def compress_messages(path):
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        for key, data in database.execute("SELECT id, data FROM messages").fetchall():
+            packed = zstandard.ZstdCompressor().compress(data)
+            database.execute("UPDATE messages SET data = ? WHERE id = ?", (packed, key))
+        database.commit()
+    return path
+
+
+def kill_recorder(path, folder):
+    """Copy a database with its journal, which corrects the name of a topic, as a killed recorder leaves them."""
+    change(path, "UPDATE topics SET name = '/unnamed' WHERE name = '/odom'")
+    with contextlib.closing(sqlite3.connect(path)) as database:
+        database.execute("PRAGMA journal_mode = WAL")
+        database.execute("UPDATE topics SET name = '/odom' WHERE name = '/unnamed'")
+        database.commit()
+        folder.mkdir()
+        for file in (path, path.with_name(f"{path.name}-wal")):
+            shutil.copyfile(file, folder / file.name)
+    return folder / path.name
+
+
 @pytest.fixture(scope="module")
 def bags(tmp_path_factory, dive, bag):
     """The same dive in every storage."""
     folder = tmp_path_factory.mktemp("bags")
-    database = write_database(folder / "whole", dive)
+    write_by_rosbags(rosbag2.Writer(folder / "whole", version=8), dive, typesys.Stores.ROS2_HUMBLE, "serialize_cdr")
+    write_by_rosbags(rosbag1.Writer(folder / "dive.bag"), dive, typesys.Stores.ROS1_NOETIC, "serialize_ros1")
+    database = folder / "whole" / "whole.db3"
     old = shutil.copyfile(database, folder / "old.db3")
     change(old, "DROP TABLE message_definitions; UPDATE schema SET schema_version = 3;")
     early = shutil.copyfile(old, folder / "early.db3")
     change(early, "UPDATE topics SET type = replace(type, '/msg/', '/')")
-    write_ros1(folder / "dive.bag", dive)
     return {
         "MCAP": bag,
         "SQLite": database,
         "folder": database.parent,
         "two files": split(database, folder / "two"),
+        "compressed messages": compress_messages(shutil.copyfile(database, folder / "packed.db3")),
+        "journal": kill_recorder(shutil.copyfile(database, folder / "killed.db3"), folder / "killed"),
         "no definitions": old,
         "short names of types": early,
         "ROS 1": folder / "dive.bag",
     }
+
+
+STORAGES = (
+    "MCAP", "SQLite", "folder", "two files", "compressed messages", "journal", "no definitions",
+    "short names of types", "ROS 1",
+)  # fmt: skip
 
 
 @pytest.fixture
@@ -193,18 +204,10 @@ def columns(tmp_path):
     return tmp_path / "map.toml"
 
 
-@pytest.mark.parametrize(
-    "storage", ["MCAP", "SQLite", "folder", "two files", "no definitions", "short names of types", "ROS 1"]
-)
-def test_imported_bag_matches_the_dive(bags, storage, columns, dive, tmp_path):
-    run = cosim.import_log(bags[storage], "bluerov2_heavy", tmp_path / "run", columns=columns, report=False)
-    for names, expected in (
-        ([f"position.{a}" for a in "xyz"], dive.position),
-        (["attitude.roll", "attitude.pitch", "attitude.yaw"], np.column_stack([dive.roll, dive.pitch, dive.yaw])),
-        ([f"thrust[{i}]" for i in range(1, 9)], dive.thrust),
-    ):
-        error, known = errors(run.record, dive, names, expected)
-        assert error < 1e-6 and known > 0.99, names
+@pytest.mark.parametrize("storage", STORAGES)
+def test_imported_bag_matches_the_dive(bags, storage, columns, dive, imported):
+    run = imported(bags[storage], columns=columns)
+    assert_flown(run.record, dive, 1e-6)
     facts = load_log_facts(run.folder)
     assert facts.unread == {"/else": len(dive.times)}
     assert facts.start == pytest.approx(START, abs=1e-3)
@@ -222,31 +225,6 @@ def test_bag_of_a_recorder_is_read():
     assert all(message.bool_values.tolist() == [True, False, True] for message in arrays) and len(arrays) == 4
 
 
-def test_journal_of_a_killed_recorder_is_read(bags, columns, tmp_path):
-    """The messages of a recorder that was killed are in the journal beside its database."""
-    path = shutil.copyfile(bags["SQLite"], tmp_path / "dive.db3")
-    database = sqlite3.connect(path)
-    database.execute("PRAGMA journal_mode = WAL")
-    database.execute("DELETE FROM messages WHERE id > 900")
-    database.commit()
-    try:
-        run = cosim.import_log(path, "bluerov2_heavy", tmp_path / "run", columns=columns, report=False)
-    finally:
-        database.close()
-    assert run.summary["simulated_time"] == pytest.approx(14.95, abs=0.1)
-
-
-def test_messages_that_were_compressed_one_by_one_are_read(bags, columns, tmp_path):
-    path = shutil.copyfile(bags["SQLite"], tmp_path / "dive.db3")
-    with contextlib.closing(sqlite3.connect(path)) as database:
-        for key, data in database.execute("SELECT id, data FROM messages").fetchall():
-            packed = zstandard.ZstdCompressor().compress(data)
-            database.execute("UPDATE messages SET data = ? WHERE id = ?", (packed, key))
-        database.commit()
-    run = cosim.import_log(path, "bluerov2_heavy", tmp_path / "run", columns=columns, report=False)
-    assert run.summary["simulated_time"] == pytest.approx(29.95, abs=0.1)
-
-
 @pytest.mark.parametrize(
     ("files", "what"),
     [
@@ -257,36 +235,32 @@ def test_messages_that_were_compressed_one_by_one_are_read(bags, columns, tmp_pa
         (["a.bag"], "cannot be read as a bag"),
     ],
 )
-def test_folders_without_a_bag_are_refused(files, what, columns, tmp_path):
+def test_folders_without_a_bag_are_refused(files, what, columns, tmp_path, refused):
     folder = tmp_path / "bag"
     folder.mkdir()
     for name in files:
         (folder / name).write_bytes(b"no bag at all" * 100)
-    with pytest.raises(ImportLogError, match=what):
-        cosim.import_log(folder, "bluerov2_heavy", tmp_path / "run", columns=columns)
-    assert not (tmp_path / "run").exists()
+    refused(what, folder, columns=columns)
 
 
-def test_type_without_definition_is_named(bags, columns, tmp_path):
-    columns.write_text(MAP)
-    with pytest.raises(
-        ImportLogError, match=r"of type test_msgs/msg/\w+, of which the bag has no definition; .*messages"
+def test_type_without_definition_is_named(bags, columns, tmp_path, refused):
+    bad = tmp_path / "bad" / "test_msgs"
+    bad.mkdir(parents=True)
+    (bad / "Odometry.msg").write_text("float64 x[\n")
+    for folder, what in (
+        ("", r"of type test_msgs/msg/\w+, of which the bag has no definition; .*messages"),
+        ('messages = "nowhere"\n', r"messages is '.*nowhere', expected a folder"),
+        ('messages = "bad"\n', r"messages: .*Odometry\.msg is no message definition"),
     ):
-        cosim.import_log(bags["no definitions"], "bluerov2_heavy", tmp_path / "run", columns=columns)
-    columns.write_text('messages = "nowhere"\n' + MAP)
-    with pytest.raises(ImportLogError, match=r"messages is '.*nowhere', expected a folder"):
-        cosim.import_log(bags["no definitions"], "bluerov2_heavy", tmp_path / "run", columns=columns)
-    columns.write_text('messages = "share"\n' + MAP)
-    (tmp_path / "share" / "test_msgs" / "msg" / "Odometry.msg").write_text("float64 x[\n")
-    with pytest.raises(ImportLogError, match=r"messages: .*Odometry\.msg is no message definition"):
-        cosim.import_log(bags["no definitions"], "bluerov2_heavy", tmp_path / "run", columns=columns)
+        columns.write_text(folder + MAP)
+        refused(what, bags["no definitions"], columns=columns)
 
 
-def test_truncated_bag_is_read_to_its_end(bag, columns, tmp_path):
+def test_truncated_bag_is_read_to_its_end(bag, columns, tmp_path, imported):
     data = bag.read_bytes()
     (tmp_path / "cut.mcap").write_bytes(data[: len(data) // 2])
-    run = cosim.import_log(tmp_path / "cut.mcap", "bluerov2_heavy", tmp_path / "run", columns=columns, report=False)
-    assert any("breaks off" in remark for remark in load_log_facts(run.folder).remarks)
+    run = imported(tmp_path / "cut.mcap", columns=columns)
+    assert has_remark(run, "breaks off")
     assert 0.0 < run.summary["simulated_time"] < 20.0
 
 
@@ -301,18 +275,13 @@ def test_truncated_bag_is_read_to_its_end(bag, columns, tmp_path):
         ("data[7]", "data[8]", r"/thrusters has no field 'data\[8\]'"),
     ],
 )
-def test_missing_bag_topics_are_named(bag, columns, tmp_path, old, new, what):
+def test_missing_bag_topics_are_named(bag, columns, refused, old, new, what):
     columns.write_text(MAP.replace(old, new, 1))
-    with pytest.raises(ImportLogError, match=what):
-        cosim.import_log(bag, "bluerov2_heavy", tmp_path / "run", columns=columns)
-    assert not (tmp_path / "run").exists()
+    refused(what, bag, columns=columns)
 
 
-def test_missing_library_is_reported(tmp_path, columns, monkeypatch):
-    import sys
-
+def test_missing_library_is_reported(tmp_path, columns, monkeypatch, refused):
     for name in ("rosbags", "rosbags.rosbag1"):
         monkeypatch.setitem(sys.modules, name, None)
     (tmp_path / "it.mcap").write_bytes(b"x" * 100)
-    with pytest.raises(ImportLogError, match=r"needs rosbags.*pip install"):
-        cosim.import_log(tmp_path / "it.mcap", "bluerov2_heavy", tmp_path / "run", columns=columns)
+    refused(r"needs rosbags.*pip install", tmp_path / "it.mcap", columns=columns)

@@ -8,11 +8,10 @@ import tracemalloc
 import numpy as np
 import pytest
 
-import cosim
 from cosim.logs import chunked_file, ulog_messages
 from cosim.logs.ulog_messages import ULogMessages
 from cosim.results.log_facts import load_log_facts
-from tests.cosim.logs.dive import Dive, errors
+from tests.cosim.logs.dive import Dive, assert_flown
 
 pyulog = pytest.importorskip("pyulog")
 
@@ -61,30 +60,23 @@ def write_ulog(path, dive):
                 file.write(message("S", SYNC))
 
 
-def test_imported_px4_log_matches_the_dive(dive, tmp_path):
-    path = tmp_path / "dive.ulg"
-    write_ulog(path, dive)
-    theirs = {data.name: data.data for data in pyulog.ULog(str(path)).data_list}
-    assert len(theirs["vehicle_attitude"]["timestamp"]) == len(dive.times)
-    run = cosim.import_log(path, "bluerov2_heavy", tmp_path / "run", report=False)
-    for names, expected in (
-        ([f"position.{a}" for a in "xyz"], dive.position),
-        (["attitude.roll", "attitude.pitch", "attitude.yaw"], np.column_stack([dive.roll, dive.pitch, dive.yaw])),
-        ([f"thrust[{i}]" for i in range(1, 9)], dive.thrust),
-    ):
-        error, known = errors(run.record, dive, names, expected)
-        assert error < 2e-6 and known == 1.0, names
+@pytest.fixture
+def path(dive, tmp_path):
+    write_ulog(tmp_path / "dive.ulg", dive)
+    return tmp_path / "dive.ulg"
+
+
+def test_imported_px4_log_matches_the_dive(dive, path, imported):
+    run = imported(path)
+    assert_flown(run.record, dive, 2e-6, known=1.0)
     assert run.summary["law"] == "px4"
     assert "something_else" in load_log_facts(run.folder).unread
 
 
-def test_truncated_px4_log_is_read_to_its_end(dive, tmp_path):
-    path = tmp_path / "dive.ulg"
-    write_ulog(path, dive)
+def test_truncated_px4_log_is_read_to_its_end(path, imported):
     data = path.read_bytes()
     path.write_bytes(data[: int(0.6 * len(data))])
-    run = cosim.import_log(path, "bluerov2_heavy", tmp_path / "run", report=False)
-    assert 15.0 < run.summary["simulated_time"] < 19.0
+    assert 15.0 < imported(path).summary["simulated_time"] < 19.0
 
 
 def read_samples(path):
@@ -110,19 +102,16 @@ def assert_equal_samples(ours, theirs):
             np.testing.assert_array_equal(ours[f"{data.name}[{data.multi_id}]"][field], values)
 
 
-def test_samples_are_those_of_pyulog(dive, tmp_path):
+def test_samples_are_those_of_pyulog(dive, path):
     """Types in types, arrays, and padding at the end, block by block."""
-    write_ulog(tmp_path / "dive.ulg", dive)
-    log, ours, theirs = samples_of(tmp_path / "dive.ulg")
+    log, ours, theirs = samples_of(path)
     assert_equal_samples(ours, theirs)
     assert log.parameters == {"MAV_TYPE": 12.0} == theirs.initial_parameters
     assert not log.is_damaged and ours["battery_status[0]"]["cells[1].raw[1]"][-1] == len(dive.times) - 1
 
 
-def test_data_appended_after_a_crash_are_read(dive, tmp_path):
+def test_data_appended_after_a_crash_are_read(path):
     """The message that the crash cut ends where the appended data begin."""
-    path = tmp_path / "dive.ulg"
-    write_ulog(path, dive)
     _, _, theirs = samples_of(path)
     whole = path.read_bytes()
     middle = whole.index(struct.pack("<HB", 8, ord("S")) + SYNC, len(whole) // 2)
@@ -135,9 +124,7 @@ def test_data_appended_after_a_crash_are_read(dive, tmp_path):
     assert not log.is_damaged
 
 
-def test_reading_goes_on_behind_damage(dive, tmp_path):
-    path = tmp_path / "dive.ulg"
-    write_ulog(path, dive)
+def test_reading_goes_on_behind_damage(path):
     data = bytearray(path.read_bytes())
     at = len(data) // 2
     data[at : at + 300] = bytes(300)
@@ -151,9 +138,7 @@ def test_reading_goes_on_behind_damage(dive, tmp_path):
 
 
 @pytest.mark.parametrize("junk", [bytes(300_000), np.random.default_rng(3).bytes(300_000)], ids=["zeros", "random"])
-def test_junk_behind_a_log_leaves_what_came_before(dive, tmp_path, junk):
-    path = tmp_path / "dive.ulg"
-    write_ulog(path, dive)
+def test_junk_behind_a_log_leaves_what_came_before(path, junk):
     _, _, theirs = samples_of(path)
     path.write_bytes(path.read_bytes() + junk)
     log, ours = read_samples(path)
@@ -173,12 +158,10 @@ def test_nested_formats_are_bounded(tmp_path):
 
 
 @pytest.mark.medium
-def test_memory_does_not_grow_with_the_log(dive, tmp_path, monkeypatch):
+def test_memory_does_not_grow_with_the_log(path, monkeypatch):
     """Samples are given in blocks: a log of four times the length needs the same memory."""
     monkeypatch.setattr(chunked_file, "_CHUNK", 1 << 15)
     monkeypatch.setattr(ulog_messages, "_BLOCK", 1 << 10)
-    path = tmp_path / "dive.ulg"
-    write_ulog(path, dive)
     whole = path.read_bytes()
     section = whole[whole.index(struct.pack("<HB", 8, ord("S")) + SYNC) :]
 

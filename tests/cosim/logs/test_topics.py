@@ -1,5 +1,7 @@
 """Dirt in samples: held values, bursts, gaps, what is out of order, and units that cannot be."""
 
+import contextlib
+
 import numpy as np
 import pytest
 
@@ -65,7 +67,7 @@ def test_gaps_are_counted_and_contain_no_row(contents, tmp_path):
     np.testing.assert_allclose(topic.gaps, [(10.0, 13.0), (40.0, 41.0)], atol=1e-6)
     grid = np.arange(0.0, 60.0, 0.05)
     for read in ("interpolated", "held"):
-        with TopicReader(topic) as reader:
+        with contextlib.closing(TopicReader(topic)) as reader:
             parts = [getattr(reader, read)(part) for part in np.array_split(grid, 13)]
         values = np.vstack([part if read == "interpolated" else part[0] for part in parts])[:, 0]
         known = np.isfinite(values)
@@ -74,21 +76,13 @@ def test_gaps_are_counted_and_contain_no_row(contents, tmp_path):
         np.testing.assert_allclose(values[known], grid[known], atol=0.31 if read == "held" else 1e-9)
 
 
-def test_unordered_samples_are_dropped_and_counted(contents, tmp_path):
-    times = np.arange(0.0, 10.0, 0.1)
+def test_unordered_and_non_finite_samples_are_dropped_and_counted(contents, tmp_path):
+    times, values = 0.1 * np.arange(100.0), np.arange(100.0)
     times[50] = times[47]
-    topic, rows = cleaned(contents, tmp_path, "heading", times, 0.1 * times)
-    assert topic.late == 1
-    assert (np.diff(rows[:, 0]) > 0.0).all()
-
-
-def test_non_finite_samples_are_dropped_and_counted(contents, tmp_path):
-    values = np.arange(30.0)
-    values[3] = np.nan
-    values[7] = np.inf
-    topic, rows = cleaned(contents, tmp_path, "depth", np.arange(30.0), values)
-    assert (topic.broken, topic.count) == (2, 28)
-    assert np.isfinite(rows).all()
+    values[[3, 7]] = np.nan, np.inf
+    topic, rows = cleaned(contents, tmp_path, "depth", times, values)
+    assert (topic.late, topic.broken, topic.count) == (1, 2, 97)
+    assert (np.diff(rows[:, 0]) > 0.0).all() and np.isfinite(rows).all()
 
 
 @pytest.mark.parametrize(
@@ -105,7 +99,7 @@ def test_attitudes_are_interpolated_along_the_shorter_arc(contents, tmp_path):
     q[::2] *= -1.0  # the same attitudes
     topic, _ = cleaned(contents, tmp_path, "attitude", angle, q)
     grid = np.arange(0.0, 19.5, 0.1)
-    with TopicReader(topic) as reader:
+    with contextlib.closing(TopicReader(topic)) as reader:
         found = reader.interpolated(grid)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
     expected = np.column_stack([np.cos(grid / 2), np.sin(grid / 2)])
