@@ -239,7 +239,7 @@ time.duration = 1
 position = [0, 0, 3]
 [goal]
 type = "sphere"
-centre = [1.0, 0.0, 3.4]
+center = [1.0, 0.0, 3.4]
 radius = 0.3
 [[regions]]
 name = "band"
