@@ -70,11 +70,12 @@ class Residuals:
         self._forces = [CommandedForces(log, vehicle, step) for log in logs]
         has_position = any(topic.name == "position" for log in logs for topic in log.topics)
         has_depth = has_position or any(topic.name == "depth" for log in logs for topic in log.topics)
-        self._starts = [*((0, 1) if has_position else ()), *((2,) if has_depth else ()), *range(3, 12)]
+        # coordinates of a start that are solved for: of its state, and of its force behind them
+        known = [*((0, 1) if has_position else ()), *((2,) if has_depth else ()), *range(3, 12)]
+        self._starts = [*known, *(_FORCES if random_force else ())]
         self.force_deviation = np.full(3, _FORCE) if random_force else None  # N, north, east, down
-        self._deviations = np.array([_START_DEVIATIONS[k] for k in self._starts])
-        if random_force:
-            self._starts += [*_FORCES]
+        # (12, starts) derivatives of the weak prior of a start
+        self._prior: Array = np.eye(len(known), len(self._starts)) / np.array(_START_DEVIATIONS)[known][:, None]
         self.holds_starts = False  # as samples have them, while the free numbers are far off
         self._found: dict[int, _Start] = {}
         self._tried: dict[int, _Start] = {}
@@ -191,13 +192,7 @@ class Residuals:
     def _directions(self, moving: Sequence[int], setting: Setting, inside: slice, start: Array) -> Directions:
         n, count = len(self._starts), len(self._starts) + len(moving)
         tangents, force = np.zeros((count, STATE_SIZE)), np.zeros((count, 3))
-        for row, which in enumerate(self._starts):
-            if which in _FORCES:
-                force[row, which - _FORCES.start] = 1.0
-            elif 3 <= which < 6:
-                tangents[row, 3:7] = 0.5 * half_turns(start[3:7])[which - 3]
-            else:
-                tangents[row, which if which < 3 else which + 1] = 1.0
+        tangents[:n], force[:n] = np.split(self._basis(start), [STATE_SIZE], axis=1)
         names: list[str | None] = [None] * count
         inputs: list[int | None] = [None] * count
         wrenches: list[Array] = []
@@ -277,7 +272,7 @@ class Residuals:
         if added := len(left) - len(times):
             jacobian = np.concatenate([jacobian, np.zeros((added, jacobian.shape[1]))])
             times = np.concatenate([times, np.zeros(added)])
-        q, r = np.linalg.qr(np.concatenate([by_start, self._start_prior()]))
+        q, r = np.linalg.qr(np.concatenate([by_start, self._prior]))
         top = q[: len(by_start)]
         slope: Array = -np.linalg.solve(r, top.T @ jacobian)
         if self.holds_starts:
@@ -309,28 +304,23 @@ class Residuals:
         rows[:, -3:] = np.diag(1.0 / self.force_deviation)
         return np.concatenate([left, state[13:] / self.force_deviation]), np.concatenate([by_start, rows])
 
-    def _start_prior(self) -> Array:
-        """Return the derivatives of the weak prior of a start, shape (12, starts)."""
-        result: Array = np.eye(len(self._deviations), len(self._starts)) / self._deviations[:, None]
-        return result
+    def _basis(self, start: Array) -> Array:
+        """Return the change of state and force of a start along each of its coordinates, shape (starts, 16)."""
+        rows = np.zeros((_FORCES.stop, STATE_SIZE + len(_FORCES)))
+        rows[[0, 1, 2, *range(6, 15)], [0, 1, 2, *range(7, 16)]] = 1.0
+        rows[3:6, 3:7] = 0.5 * half_turns(start[3:7])
+        return rows[self._starts]
 
     def _row_times(self, i: int) -> Array:
         return np.concatenate([np.repeat(t.times, len(t.components)) for t in self.windows[i].topics])
 
     def _step_of(self, residual: Array, by_start: Array) -> Array:
-        prior = self._start_prior()
-        normal = by_start.T @ by_start + prior.T @ prior
-        result: Any = np.linalg.solve(normal, by_start.T @ residual)
-        step: Array = -result
+        normal = by_start.T @ by_start + self._prior.T @ self._prior
+        step: Array = -np.linalg.solve(normal, by_start.T @ residual)
         return step
 
     def _moved(self, state: Array, step: Array) -> Array:
         """Return a start that is moved along its own directions."""
-        moved = state.copy()
-        for which, by in zip(self._starts, step, strict=True):
-            if 3 <= which < 6:
-                moved[3:7] += by * (0.5 * half_turns(state[3:7])[which - 3])
-            else:
-                moved[which if which < 3 else which + 1] += by
+        moved: Array = state + (step @ self._basis(state))[: len(state)]
         moved[3:7] /= np.linalg.norm(moved[3:7])
         return moved

@@ -98,7 +98,7 @@ class Shooter:
         motion = Motion(np.empty((n, STATE_SIZE)), np.empty((n, STATE_SIZE)), np.empty((n, d, STATE_SIZE)))
         arrays: dict[str, NDArray[Any]] = {
             "references": np.array(references, np.uint32),
-            "values": np.array(list(parameters.values()), float),
+            "values": np.array([*parameters.values()], float),
             "start": np.ascontiguousarray(start, float),
             "wrench": np.ascontiguousarray(wrench, float).reshape(len(wrench), 2, 6),
             "force": np.zeros(3) if force is None else np.ascontiguousarray(force, float),

@@ -402,22 +402,6 @@ def test_steering_ends_only_beyond_a_condition_limit(condition):
     assert supervisor.update(seen()) == "steering" and supervisor.reason == ""
 
 
-def test_supervisor_states_advance_in_order():
-    supervisor, nothing = Supervisor(), Observation(0.0, False, False, False, False, {})
-    known = {"has_state": True}
-    expected = [
-        ({}, "waiting"), (known, "aligning"), (known | {"is_aligned": True}, "disarmed"),
-        (known | {"is_aligned": True, "is_armed": True}, "engaging"),
-        (known | {"is_aligned": True, "is_armed": True, "is_in_mode": True}, "steering"),
-    ]  # fmt: skip
-    for changes, state in expected:
-        assert supervisor.update(nothing._replace(**changes)) == state
-    all_known = nothing._replace(has_state=True, is_aligned=True, is_armed=True)
-    dives = [all_known._replace(needs_dive=True), all_known, all_known._replace(is_in_mode=True)]
-    supervisor = Supervisor()
-    assert [supervisor.update(seen) for seen in dives] == ["diving", "engaging", "steering"]
-
-
 def sticks(x, z):
     return mavlink.MAVLink_manual_control_message(1, x, 0, z, 0, 0)
 

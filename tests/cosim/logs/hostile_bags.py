@@ -10,13 +10,13 @@ import contextlib
 import json
 import os
 import random
-import re
 import resource
 import signal
 import sqlite3
 import struct
 import sys
-import time
+import traceback
+from collections.abc import Callable
 from io import BytesIO
 from pathlib import Path
 
@@ -348,68 +348,57 @@ def write_hostile_bag(seed: int, folder: Path) -> Path:
     return path
 
 
-def write_in_child(seed: int, folder: Path) -> Path:
-    """Write a hostile bag in a child, so that this process stays small; return its path."""
-    child = os.fork()
-    if child == 0:
-        try:
-            path = write_hostile_bag(seed, folder)
-            (folder / "path").write_text(str(path))
-        finally:
-            os._exit(0)
-    os.wait4(child, 0)
-    return Path((folder / "path").read_text())
-
-
-def import_in_child(path: Path, folder: Path) -> dict[str, object]:
-    """Import a bag by the command line in a child with limits; return what became of it."""
-    said, started = folder / "stderr", time.monotonic()
+def in_child(work: Callable[[], int]) -> tuple[int, resource.struct_rusage]:
+    """Do work in a child, so that this process stays small; return how it ended, and what it used."""
     child = os.fork()
     if child == 0:
         status = 99
         try:
-            for stream, name in ((1, "stdout"), (2, "stderr")):
-                os.dup2(os.open(folder / name, os.O_CREAT | os.O_WRONLY), stream)
-            resource.setrlimit(resource.RLIMIT_AS, (ADDRESSES, ADDRESSES))
-            resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
-            resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 30, 1 << 30))
-            signal.alarm(30 * SECONDS)
-            from cosim.command_line.cli import main
-
-            options = ["--vehicle", "bluerov2_heavy", "--map", str(folder / "map.toml"), "--no-report"]
-            status = main(["import", str(path), *options, "--out", str(folder / "run")])
-            sys.stdout.flush()
-            sys.stderr.flush()
+            status = work()
         except SystemExit as ended:
             status = ended.code if isinstance(ended.code, int) else 98
         except BaseException:  # noqa: BLE001 - the child must end here
-            import traceback
-
             traceback.print_exc()
         finally:
             os._exit(status)
     _, status, usage = os.wait4(child, 0)
-    words = said.read_text() if said.exists() else ""
-    return {
-        "status": os.waitstatus_to_exitcode(status),
-        "stderr": words[-2000:],
-        "memory": usage.ru_maxrss * 1024,
-        "processor": usage.ru_utime + usage.ru_stime,
-        "wall": time.monotonic() - started,
-    }
+    return os.waitstatus_to_exitcode(status), usage
 
 
-def fault_of(outcome: dict[str, object]) -> str:
-    """Return what is wrong with an outcome, "" if nothing: it is a run, or one line on stderr."""
-    words, status = str(outcome["stderr"]), outcome["status"]
-    lines = [line for line in words.splitlines() if not re.fullmatch(r"\s*", line)]
+def write_in_child(seed: int, folder: Path) -> Path:
+    """Write a hostile bag; return its path."""
+    in_child(lambda: int(not (folder / "path").write_text(str(write_hostile_bag(seed, folder)))))
+    return Path((folder / "path").read_text())
+
+
+def import_in_child(path: Path, folder: Path) -> str:
+    """Import a bag by the command line with limits; return what is wrong, "" for a run, or one line on stderr."""
+
+    def work() -> int:
+        for stream, name in ((1, "stdout"), (2, "stderr")):
+            os.dup2(os.open(folder / name, os.O_CREAT | os.O_WRONLY), stream)
+        for limit, most in ((resource.RLIMIT_AS, ADDRESSES), (resource.RLIMIT_CPU, SECONDS)):
+            resource.setrlimit(limit, (most, most))
+        resource.setrlimit(resource.RLIMIT_FSIZE, (1 << 30, 1 << 30))
+        signal.alarm(30 * SECONDS)
+        from cosim.command_line.cli import main
+
+        options = ["--vehicle", "bluerov2_heavy", "--map", str(folder / "map.toml"), "--no-report"]
+        status = main(["import", str(path), *options, "--out", str(folder / "run")])
+        sys.stdout.flush()
+        sys.stderr.flush()
+        return status
+
+    status, usage = in_child(work)
+    words = (folder / "stderr").read_text() if (folder / "stderr").exists() else ""
+    lines = [line for line in words.splitlines() if line.strip()]
     if status not in (0, 2):
         return f"ended with {status}: {words[-300:]}"
     if "Traceback" in words or (status == 2 and len(lines) != 1) or len(words) > 2000:
         return f"said {words[-300:]!r}"
-    if int(str(outcome["memory"])) > MEMORY:
-        return f"took {outcome['memory']} bytes"
-    return ""
+    if usage.ru_maxrss * 1024 > MEMORY:
+        return f"took {usage.ru_maxrss * 1024} bytes"
+    return "half a run" if status and (folder / "run").exists() else ""
 
 
 def main() -> None:
@@ -424,12 +413,8 @@ def main() -> None:
 
     for seed in range(int(sys.argv[2]), int(sys.argv[3])):
         folder = Path(tempfile.mkdtemp(dir=sys.argv[1]))
-        path = write_in_child(seed, folder)
-        size = sum(file.stat().st_size for file in (path.iterdir() if path.is_dir() else [path]))
-        outcome = import_in_child(path, folder)
-        left = (folder / "run").exists() and outcome["status"] != 0
-        outcome |= {"seed": seed, "size": size, "fault": fault_of(outcome) or "half a run" * left}
-        sys.stdout.write(json.dumps(outcome) + "\n")
+        fault = import_in_child(write_in_child(seed, folder), folder)
+        sys.stdout.write(json.dumps({"seed": seed, "fault": fault}) + "\n")
         sys.stdout.flush()
         shutil.rmtree(folder)
 
