@@ -8,7 +8,8 @@ import pytest
 from cosim.errors import IdentificationError
 from cosim.identification.actuation import CommandedForces, steady_forces
 from cosim.identification.log import Log
-from plant_fmu import Plant, load_vehicle
+from plant_fmu import load_vehicle
+from tests.cosim.identification.pool import THRUST, WRENCH, fly
 
 STEP = 0.02
 
@@ -34,21 +35,13 @@ def test_wrench_matches_the_plant(vehicle):
     log = log_of(vehicle)
     forces = CommandedForces(log, bent, STEP / 4)
     found = forces.actuation(0.12, np.ones(8)).wrench[:, 0]
-    names = [f"actuation.{name}" for name in "XYZKMN"]
-    with Plant(bent) as plant:
-        plant.set({"position.z": 5.0})
-        plant.set({f"thrust[{i + 1}]": x for i, x in enumerate(log.thrust[0])})
-        plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", log.wrench[0], strict=True)})
-        plant.set({f"actuator.thrust[{i + 1}]": x for i, x in enumerate(steady_forces(log.thrust[:1], bent)[0])})
-        plant.initialize()
-        for k in range(10 * 20):
-            row = int(k * STEP / 4 / 0.05 + 1e-9)
-            plant.set({f"thrust[{i + 1}]": x for i, x in enumerate(log.thrust[row])})
-            plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", log.wrench[row], strict=True)})
-            plant.step(STEP / 8)
-            middle = [plant[name] for name in names]
-            plant.step(STEP / 8)
-            assert found[k] == pytest.approx(middle, abs=2e-2)  # mean and middle differ by h^2/24 of the curvature
+    rows = np.floor(np.arange(10 * 20) * STEP / 4 / 0.05 + 1e-9).astype(int)
+    names, inputs = (*THRUST, *WRENCH), np.repeat(np.hstack([log.thrust, log.wrench])[rows], 2, axis=0)
+    start = dict(zip(names, inputs[0], strict=True)) | {"position.z": 5.0}
+    start |= dict(zip((f"actuator.{name}" for name in THRUST), steady_forces(log.thrust[:1], bent)[0], strict=True))
+    flown = fly(bent, start, names, inputs, STEP / 8, [f"actuation.{name}" for name in "XYZKMN"])
+    # mean and middle differ by h^2/24 of the curvature
+    assert found[: len(rows)] == pytest.approx(flown[1::2], abs=2e-2)
 
 
 @pytest.mark.parametrize(("lag", "is_sampled"), [(0.03, False), (0.1, True), (0.4, False)])

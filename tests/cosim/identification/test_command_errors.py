@@ -13,7 +13,8 @@ from cosim.identification.log import Log, make_topic
 from cosim.identification.parameters import free_parameters, nuisances
 from cosim.identification.residuals import Residuals
 from cosim.identification.windows import cut_windows
-from plant_fmu import Plant, load_vehicle
+from plant_fmu import load_vehicle
+from tests.cosim.identification.pool import THRUST, fly
 
 LAG, STEP, PERIOD = 0.12, 0.01, 0.107  # s; the period is no multiple of that of the sticks
 FREE = ("hydrodynamics.quadratic_damping.1", "hydrodynamics.added_mass.1.1", "thrusters.time_constant")
@@ -33,26 +34,18 @@ def whole(vehicle):
     wrench = np.zeros((len(times), 6))
     wrench[:, [0, 2]], wrench[:, 5] = sticks[:, :2], 0.1 * sticks[:, 2]
     thrust = wrench @ np.linalg.pinv(vehicle.thruster_matrix).T
-    names = [f"quaternion.e{i}" for i in range(4)] + ["position.z"] + [f"velocity.{a}" for a in "uvwpqr"]
-    states = []
-    with Plant(vehicle) as plant:
-        plant.set({"position.z": 8.0, "quadratic_damping[1]": 110.0, "added_mass[1,1]": 8.0})
-        plant.initialize()
-        for row in thrust:
-            states.append([plant[name] for name in names])
-            plant.set({f"thrust[{i + 1}]": x for i, x in enumerate(row)})
-            plant.step(STEP)
-    states = np.array(states)
+    start = {"position.z": 8.0, "quadratic_damping[1]": 110.0, "added_mass[1,1]": 8.0}
+    states = fly(vehicle, start, THRUST, thrust, STEP)[:-1]
 
     def noisy(columns, every, deviation):
         chosen = states[::every, columns]
         return times[::every], chosen + deviation * rng.standard_normal(chosen.shape), deviation
 
     topics = (
-        make_topic("velocity", *noisy(slice(5, 8), 15, 0.005)),
-        make_topic("angular_velocity", *noisy(slice(8, 11), 5, 0.002)),
-        make_topic("depth", *noisy(slice(4, 5), 5, 0.003)),
-        make_topic("attitude", *noisy(slice(0, 4), 5, 0.001)[:2], 0.002),  # half a rotation
+        make_topic("velocity", *noisy(slice(7, 10), 15, 0.005)),
+        make_topic("angular_velocity", *noisy(slice(10, 13), 5, 0.002)),
+        make_topic("depth", *noisy(slice(2, 3), 5, 0.003)),
+        make_topic("attitude", *noisy(slice(3, 7), 5, 0.001)[:2], 0.002),  # half a rotation
     )  # fmt: skip
     return Log("pool", times, thrust, np.zeros((len(times), 6)), topics)
 

@@ -16,7 +16,8 @@ from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisa
 from cosim.identification.residuals import Residuals
 from cosim.identification.validation import validate
 from cosim.identification.windows import cut_windows
-from plant_fmu import Plant, load_vehicle
+from plant_fmu import load_vehicle
+from tests.cosim.identification.pool import WRENCH, fly
 
 TRUTH = {
     "quadratic_damping[1]": 110.0, "added_mass[1,1]": 8.0, "buoyancy": 131.0, "current.x": 0.06, "current.y": -0.04,
@@ -47,21 +48,12 @@ def wrench_of(times):
 
 def flown(vehicle, wrench, times, rng, force):
     """The log of a run under a wrench, and under a force along the world's axes that the log does not have."""
-    names = (
-        [f"position.{a}" for a in "xyz"] + [f"quaternion.e{i}" for i in range(4)] + [f"velocity.{a}" for a in "uvwpqr"]
-    )
-    states = []
-    with Plant(vehicle) as plant:
-        plant.set(TRUTH | {"position.z": 5.0})
-        plant.initialize()
-        for tau, push in zip(wrench, force, strict=True):
-            states.append([plant[name] for name in names])
-            q = np.array(states[-1][3:7])
-            along = rotation_matrix(q).T @ push
-            tau = tau + np.concatenate([along, np.zeros(3)])
-            plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", tau, strict=True)})
-            plant.step(PERIOD)
-    states = np.array(states)
+
+    def under(tau, push):
+        return lambda state: tau + np.append(rotation_matrix(state[3:7]).T @ push, np.zeros(3))
+
+    inputs = [under(*row) for row in zip(wrench, force, strict=True)]
+    states = fly(vehicle, TRUTH | {"position.z": 5.0}, WRENCH, inputs, PERIOD)[:-1]
 
     def noisy(columns, deviation):
         return states[:, columns] + deviation * rng.standard_normal((len(states), len(states[0, columns])))

@@ -59,29 +59,23 @@ def test_held_values_and_gaps_are_excluded_from_samples(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("without", "message"),
+    ("changes", "scenario", "message"),
     [
-        (("thrust[8]",), r"no column 'thrust\[8\]'"),
-        (("quaternion.e0",), "no attitude"),
-        (("measured.velocity.u", "velocity.u"), "no velocity or position"),
+        ({"thrust[8]": None}, "", r"no column 'thrust\[8\]'"),
+        ({"quaternion.e0": None}, "", "no attitude"),
+        ({"measured.velocity.u": None, "velocity.u": None}, "", "no velocity or position"),
+        ({f"thrust[{i}]": np.zeros(ROWS) for i in range(1, 9)}, "", "the thrusters rest"),
+        ({"thrust[9]": np.ones(ROWS)}, "", "more thrusters than the 8"),
+        ({}, "failures = [{ thruster = 1, time = 3.0 }]", "thrusters fail"),
+        ({"wrench.X": np.ones(ROWS)}, "limit = { force = 50.0 }", "has a limit or a lag"),
     ],
 )
-def test_missing_columns_are_named(tmp_path, without, message):
-    columns = {name: x for name, x in signals().items() if name not in without}
+def test_unusable_runs_are_rejected_with_the_reason(tmp_path, changes, scenario, message):
+    columns = {name: x for name, x in (signals() | changes).items() if x is not None}
+    folder = write(tmp_path, columns)
+    (folder / "scenario.toml").write_text(scenario)
     with pytest.raises(IdentificationError, match=message):
-        load_log(write(tmp_path, columns), VEHICLE)
-
-
-def test_resting_thrusters_are_rejected(tmp_path):
-    columns = {name: 0.0 * x if name.startswith("thrust[") else x for name, x in signals().items()}
-    with pytest.raises(IdentificationError, match="the thrusters rest"):
-        load_log(write(tmp_path, columns), VEHICLE)
-
-
-def test_log_of_another_vehicle_is_rejected(tmp_path):
-    columns = signals() | {"thrust[9]": signals()["time"]}
-    with pytest.raises(IdentificationError, match="more thrusters than the 8"):
-        load_log(write(tmp_path, columns), VEHICLE)
+        load_log(folder, VEHICLE)
 
 
 def test_positions_replace_missing_velocities(tmp_path):
@@ -89,20 +83,6 @@ def test_positions_replace_missing_velocities(tmp_path):
     columns |= {f"position.{axis}": np.sin(columns["time"]) for axis in "xy"}
     log = load_log(write(tmp_path, columns), VEHICLE)
     assert log.topic("velocity") is None and len(log.topic("position").times) == ROWS
-
-
-@pytest.mark.parametrize(
-    ("scenario", "message"),
-    [
-        ("failures = [{ thruster = 1, time = 3.0 }]", "thrusters fail"),
-        ("limit = { force = 50.0 }", "has a limit or a lag"),
-    ],
-)
-def test_scenario_settings_that_alter_commands_are_rejected(tmp_path, scenario, message):
-    folder = write(tmp_path, signals() | {"wrench.X": signals()["thrust[1]"]})
-    (folder / "scenario.toml").write_text(scenario)
-    with pytest.raises(IdentificationError, match=message):
-        load_log(folder, VEHICLE)
 
 
 @pytest.mark.parametrize(("source", "is_mean"), [("VISO", True), ("VISION_POSITION_DELTA", True), ("dvl.csv", False)])

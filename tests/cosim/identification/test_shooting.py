@@ -5,7 +5,8 @@ import pytest
 
 from cosim.errors import IdentificationError
 from cosim.identification.shooting import STATE_SIZE, Directions, Shooter
-from plant_fmu import Plant, load_vehicle
+from plant_fmu import load_vehicle
+from tests.cosim.identification.pool import STATES, WRENCH, fly
 
 BODY = {
     "current.x": 0.1, "current.y": -0.2, "added_mass[1,5]": 0.4, "added_mass[2,4]": -0.3, "linear_damping[6]": 0.2,
@@ -36,16 +37,8 @@ def start_and_wrench(seed=1):
 def test_prediction_matches_the_fmu(vehicle, shooter):
     start, wrench = start_and_wrench()
     times = np.arange(1, STEPS + 1) * STEP
-    names = [f"position.{axis}" for axis in "xyz"] + [f"quaternion.e{i}" for i in range(4)]
-    names += [f"velocity.{name}" for name in "uvwpqr"]
-    with Plant(vehicle) as plant:
-        plant.set(BODY | dict(zip(names, start, strict=True)))
-        plant.initialize()
-        expected = []
-        for tau in wrench[:, 0]:
-            plant.set({f"wrench.{name}": x for name, x in zip("XYZKMN", tau, strict=True)})
-            plant.step(STEP)
-            expected.append([plant[name] for name in names])
+    begin = BODY | dict(zip(STATES, start, strict=True))
+    expected = fly(vehicle, begin, WRENCH, wrench[:, 0], STEP)[1:]
     # the FMU's own steps are of 5 ms; a quarter of the step leaves 1/256 of the difference
     coarse = shooter.predict(BODY, start, wrench, STEP, times).states
     fine = shooter.predict(BODY, start, np.repeat(wrench, 4, axis=0), STEP / 4, times).states
