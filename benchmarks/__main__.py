@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from benchmarks import (
     autopilot,
@@ -31,8 +31,8 @@ from benchmarks.autopilot.simulated_link import FAULTS
 from benchmarks.machine import description
 from benchmarks.peer_environment import Environment
 from benchmarks.table import Table, as_json, print_tables, write_json
-from cosim.companion.outputs import STEER_BY
-from cosim.companion.sticks import STICKS_BY
+from cosim.companion.outputs import SteerBy
+from cosim.companion.sticks import SticksBy
 from cosim.errors import ScenarioError
 
 BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl, "view": view}
@@ -111,8 +111,8 @@ def _add_autopilot(verbs: Any) -> None:
     verb.add_argument("--scenario", nargs="+", default=[], metavar="NAME", help="shipped ones, or random-SEED")
     verb.add_argument("--random", type=int, default=0, metavar="N", help="so many random scenes, from random-SEED on")
     verb.add_argument("--seed", type=int, default=0, help="of the first random scene (default: %(default)s)")
-    verb.add_argument("--steer-by", nargs="+", choices=STEER_BY, default=["sticks"], help="default: sticks")
-    verb.add_argument("--sticks-by", choices=STICKS_BY, default="manual-control", help="default: %(default)s")
+    verb.add_argument("--steer-by", nargs="+", choices=get_args(SteerBy), default=["sticks"], help="default: sticks")
+    verb.add_argument("--sticks-by", choices=get_args(SticksBy), default="manual-control", help="default: %(default)s")
     verb.add_argument(
         "--fault", nargs="+", choices=FAULTS, default=[""], help="what fails after 5 s", metavar="WHAT"
     )  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
@@ -18,7 +18,6 @@ from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
 SteerBy = Literal["sticks", "wrench", "velocity", "attitude"]
-STEER_BY: tuple[SteerBy, ...] = get_args(SteerBy)
 _STEERING_MODES: dict[SteerBy, Mode] = {
     "sticks": "stabilize",
     "wrench": "manual",
@@ -76,12 +75,8 @@ class Output:
         self._all_axes = steer_by == "wrench" or (steer_by == "sticks" and profile == "ardusub")
         self._turn, self._lead, self._level_lead = TurnLead(vehicle), VelocityLead(vehicle, *lags), LevelLead(vehicle)
         self._overridden = False  # True while overridden channels are not released
-        # attitude: last commands: sticks X Y Z K M N, -1 to 1; velocity [m/s, NED]; quaternion from body to world,
-        # scalar first. Unused ones are zero
-        # velocity: last commands: sticks X Y Z K M N, -1 to 1; velocity [m/s, NED]; quaternion from body to world,
-        # scalar first. Unused ones are zero
-        # sticks: last commands: sticks X Y Z K M N, -1 to 1; velocity [m/s, NED]; quaternion from body to world,
-        # scalar first. Unused ones are zero
+        # last commands: sticks X Y Z K M N, -1 to 1; velocity [m/s, NED]; quaternion from body to world, scalar first;
+        # unused ones are zero
         self.sticks, self.velocity, self.attitude = np.zeros(6), np.zeros(3), np.zeros(4)
 
     def restart(self) -> None:

@@ -16,7 +16,7 @@ from cosim.simulation.stepped_plant import vehicle_channels
 from plant_fmu.autopilot import effort_of_pulse
 from plant_fmu.running.channels import Channel, Channels
 
-_NAMES = tuple(condition.name for condition in CONDITIONS)
+_REASONS = {condition.name: number for number, condition in enumerate(CONDITIONS, 1)}
 _MAX_DELAY = 0.1  # s, delay beyond which the loop shifts its schedule instead of catching up
 _REPORTED_CHANNELS = (  # channels that the autopilot reports, at the beginning of a step
     Channel("autopilot.age", "s", "Age of the older of position and attitude"),
@@ -59,12 +59,11 @@ class RemoteVehicle:
         self._index = {channel.name: i for i, channel in enumerate(self.outputs.channels)}
         # the vehicle's table ``autopilot`` describes an ArduSub's servo outputs, not a PX4's
         table = scenario.vehicle.autopilot if session.profile.name != "px4" else None
-        signs = () if table is None else table.sign_of_each(scenario.vehicle.n_thrusters)
-        self._efforts = (
-            [(channel, effort_of_pulse(table, sign)) for channel, sign in zip(table.channels, signs, strict=True)]
-            if table
-            else []
-        )
+        n = scenario.vehicle.n_thrusters
+        self._efforts = [] if table is None else [
+            (channel, effort_of_pulse(table, sign))
+            for channel, sign in zip(table.channels, table.sign_of_each(n), strict=True)
+        ]  # fmt: skip
         self._updates = -1
         self._position: Array = np.full(3, math.nan)
         self._quaternion: Array = np.array([1.0, 0.0, 0.0, 0.0])
@@ -101,7 +100,6 @@ class RemoteVehicle:
 
     def _read(self) -> None:
         session, reported = self._session, self._session.reported
-        rates = reported.rates
         if reported.updates != self._updates:
             self._updates = reported.updates
             self._position, self._quaternion = reported.predict(session.clock())
@@ -114,13 +112,13 @@ class RemoteVehicle:
         self._write("measured.depth", (position[2],))
         self._write("measured.velocity.u", reported.velocity_body[:3])
         self._write("measured.altitude", (reported.altitude,))
-        self._write("measured.angular_velocity.p", rates)
+        self._write("measured.angular_velocity.p", reported.rates)
         self._write("measured.heading", (quaternion_to_euler(quaternion.tolist())[2],))
         self._write("measured.position.x", position)
         self._write_forces()
         supervisor = session.supervisor
-        reason = _NAMES.index(supervisor.reason) + 1 if supervisor.reason in _NAMES else 0
-        state = float(STATES.index(supervisor.state))
+        reason = _REASONS.get(supervisor.reason, 0)
+        state = STATES.index(supervisor.state)
         status = reported.age(session.clock()), reported.mode, reported.is_armed
         self._write(
             "autopilot.age",
@@ -135,10 +133,9 @@ class RemoteVehicle:
         pulses, vehicle = self._session.reported.pulses, self._vehicle
         if not self._efforts or not pulses:
             return
-        forces = np.zeros(vehicle.n_thrusters)
-        for i, (channel, effort) in enumerate(self._efforts):
-            fraction = effort(pulses[channel - 1]) if 0 < channel <= len(pulses) else 0.0
-            forces[i] = fraction * (vehicle.thrust_max[i] if fraction >= 0.0 else -vehicle.thrust_min[i])
+        padded = (0, *pulses)  # channels count from 1
+        efforts = np.array([effort(padded[c]) if 0 < c < len(padded) else 0.0 for c, effort in self._efforts])
+        forces = efforts * np.where(efforts >= 0.0, vehicle.thrust_max, -vehicle.thrust_min)
         self._write("thruster_force[1]", forces)
         self._write("actuation.X", vehicle.thruster_matrix @ forces)
 

@@ -9,18 +9,6 @@ State = Literal["waiting", "aligning", "disarmed", "engaging", "dry_run", "steer
 
 STATES: tuple[State, ...] = get_args(State)  # a state's index is its number in the record
 
-MEANINGS: dict[State, str] = {
-    "waiting": "no vehicle, or no position, attitude or failsafe parameters from it; only requests are sent",
-    "aligning": "the autopilot's frame is not aligned with the scene yet; only requests are sent",
-    "disarmed": "all is known; waits for arming, or requests it if the user allows it",
-    "engaging": "armed; the steering mode is requested",
-    "dry_run": "the law is computed and recorded, and nothing is sent",
-    "steering": "sticks or velocities are sent at each step",
-    "held": "sticks are released and the hold mode is requested until steering is resumed",
-    "pilot": "another controller steers; sticks are released once, and nothing is sent until steering is resumed",
-    "diving": "an armed ArduSub dives level until its heading is aligned; the mode for that is requested",
-}
-
 
 @dataclass(frozen=True)
 class Condition:

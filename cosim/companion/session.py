@@ -276,8 +276,11 @@ class AutopilotSession:
         reason = f": {self.supervisor.reason}" if self.supervisor.reason else ""
         text = f"Companion {state.replace('_', ' ')}{reason}"
         log.log(logging.WARNING if reason else logging.INFO, "%s", text)
+        self._send_text(text, is_warning=bool(reason))
+
+    def _send_text(self, text: str, is_warning: bool) -> None:
         m = self._mavlink
-        severity = m.MAV_SEVERITY_WARNING if reason else m.MAV_SEVERITY_NOTICE
+        severity = m.MAV_SEVERITY_WARNING if is_warning else m.MAV_SEVERITY_NOTICE
         self._link.send(m.MAVLink_statustext_message(severity, text[:50].encode()))
 
     # ---- receiving ----
@@ -302,9 +305,7 @@ class AutopilotSession:
             self._shared_ids.add(component)
             text = "component %d has the companion's system id %d: its sticks compete; change its system id"
             log.warning(text, component, system)
-            m = self._mavlink
-            text = f"Companion: component {component} shares system id {system}"
-            self._link.send(m.MAVLink_statustext_message(m.MAV_SEVERITY_WARNING, text[:50].encode()))
+            self._send_text(f"Companion: component {component} shares system id {system}", is_warning=True)
 
     def _handle_command(self, system: int, component: int, message: Any) -> None:
         """Apply a DO_PAUSE_CONTINUE that is addressed to the companion: 0 ends steering, 1 resumes it."""

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal, get_args
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,7 +25,6 @@ from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
 SticksBy = Literal["manual-control", "rc-override"]
-STICKS_BY: tuple[SticksBy, ...] = get_args(SticksBy)
 
 PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD, if PILOT_SPEED_UP is not known
 _FULL_YAW = math.radians(45.0)  # rad/s, yaw rate of a full stick at ACRO_YAW_P 1

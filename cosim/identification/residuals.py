@@ -316,7 +316,7 @@ class Residuals:
 
     def _step_of(self, residual: Array, by_start: Array) -> Array:
         normal = by_start.T @ by_start + self._prior.T @ self._prior
-        step: Array = -np.linalg.solve(normal, by_start.T @ residual)
+        step: Array = np.asarray(-np.linalg.solve(normal, by_start.T @ residual), float)
         return step
 
     def _moved(self, state: Array, step: Array) -> Array:

@@ -10,6 +10,7 @@ from websockets.sync.client import connect
 
 from cosim.live.address import parse_live
 from cosim.live.live_view import LiveView
+from cosim.results.record import load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
 from tests.threads import ended
@@ -48,6 +49,11 @@ class Viewer:
         self.texts.append(message)
         return message["type"]
 
+    def fly(self):
+        """Arm the vehicle, and return the message at the end of the run."""
+        self.command(**ARM)
+        return self.until("end")
+
     def until(self, kind):
         while self.receive() != kind:
             pass
@@ -69,6 +75,9 @@ class Running:
 
     def __init__(self, view, folder):
         self.view, self.url, self.folder, self.done = view, view.url, folder, None
+        self.socket_url = view.url.replace("http", "ws") + "ws"
+        host, port = view.url.removeprefix("http://").strip("/").split(":")
+        self.address = host, int(port)
 
     def start(self, scenario, **options):
         def go():
@@ -81,6 +90,12 @@ class Running:
     def end(self):
         assert ended(self.thread, WAIT)
         return self.done
+
+    def fly(self):
+        """Arm the vehicle, and return the run."""
+        with self.viewer() as viewer:
+            viewer.fly()
+        return self.end()
 
     def viewer(self):
         return Viewer(self.url)
@@ -102,5 +117,13 @@ def live(tmp_path):
         yield start
 
 
-def same(a, b):
-    return list(a.units) == list(b.units) and all(np.array_equal(a[name], b[name], equal_nan=True) for name in a.units)
+def require_same_record(done, other):
+    a, b = (load_record(run.folder) for run in (done, other))
+    assert list(a.units) == list(b.units)
+    assert all(np.array_equal(a[name], b[name], equal_nan=True) for name in a.units)
+
+
+def replayed(done, folder):
+    """Run the scenario and the commands of a run again."""
+    scenario = load_scenario(done.folder / "scenario.toml")
+    return run_scenario(scenario, folder, report=False, commands_log=done.folder / "commands.jsonl")

@@ -15,13 +15,11 @@ from websockets.sync.client import connect
 from cosim.live.command_desk import MAX_LENGTH
 from cosim.live.hub import Cursor, Hub
 from cosim.live.view_server import MAX_CONNECTIONS
-from cosim.results.record import load_record
-from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.columns import columns_without_plant
 from cosim.simulation.commands import CommandQueue, sources
 from cosim.simulation.commands.commands import ChangeSetting
-from tests.cosim.live.conftest import ARM, WAIT, same
+from tests.cosim.live.conftest import WAIT, replayed, require_same_record
 
 
 def request(url, **headers):
@@ -34,12 +32,6 @@ def refused(url, status, **headers):
         request(url, **headers)
     caught.value.close()
     assert caught.value.code == status
-
-
-def fly(running):
-    with running.viewer() as viewer:
-        viewer.command(**ARM)
-        viewer.until("end")
 
 
 def closed_with(client):
@@ -62,20 +54,18 @@ def test_only_the_page_is_served_and_only_to_own_origin(live):
     refused(running.url, 403, Origin="http://evil.example")
     for headers in ({"Origin": "http://evil.example"}, {"Origin": "null"}):
         with pytest.raises(InvalidStatus) as caught:
-            connect(running.url.replace("http", "ws") + "ws", additional_headers=headers)
+            connect(running.socket_url, additional_headers=headers)
         assert caught.value.response.status_code == 403
-    fly(running)
+    running.fly()
 
 
 @pytest.mark.medium
 def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
     running = live(commands=True)
-    host, port = running.url.removeprefix("http://").strip("/").split(":")
-    place = (host, int(port))
-    url = running.url.replace("http", "ws") + "ws"
+    url = running.socket_url
     requests = b"GET / HTTP/1.1\r\n\r\n", b"POST /ws HTTP/1.1\r\nHost: a\r\n\r\n"
     for garbage in (b"\x00\xff" * 5000, *requests, b"\r\n" * 999):
-        with socket.create_connection(place, timeout=WAIT) as foreign, contextlib.suppress(OSError):
+        with socket.create_connection(running.address, timeout=WAIT) as foreign, contextlib.suppress(OSError):
             foreign.sendall(garbage)
             foreign.recv(100)
     with connect(url) as client:  # more than a message may have
@@ -100,27 +90,21 @@ def test_malformed_requests_do_not_affect_the_run(live, tmp_path, caplog):
         assert closed_with(client) == 1007
     with connect(url) as left:  # who goes without a word
         left.socket.shutdown(socket.SHUT_RDWR)
-    fly(running)
+    done = running.fly()
     assert "Traceback" not in caplog.text
-    done = running.end()
     assert done.summary["commands"] == 1
-    alone = run_scenario(
-        load_scenario(done.folder / "scenario.toml"), tmp_path / "alone", report=False,
-        commands_log=done.folder / "commands.jsonl",
-    )  # fmt: skip
-    assert same(load_record(done.folder), load_record(alone.folder))
+    require_same_record(done, replayed(done, tmp_path / "alone"))
 
 
 @pytest.mark.slow
 def test_flooding_viewer_is_throttled_and_disconnected(live):
     running = live(commands=True)
-    with connect(running.url.replace("http", "ws") + "ws") as flood:
+    with connect(running.socket_url) as flood:
         with contextlib.suppress(ConnectionClosed):
             for _ in range(5000):
                 flood.send('{"command":"set_mode","mode":"reach"}')
         assert closed_with(flood) == 1008
-    fly(running)
-    assert running.end().summary["commands"] < 500
+    assert running.fly().summary["commands"] < 500
 
 
 def test_excess_viewers_are_rejected(live):
@@ -132,16 +116,14 @@ def test_excess_viewers_are_rejected(live):
         with pytest.raises(InvalidStatus) as caught, running.viewer():
             pass
         assert caught.value.response.status_code == 503
-        viewers[0].command(**ARM)
-        viewers[0].until("end")
+        viewers[0].fly()
 
 
 def test_excess_connections_are_closed_to_preserve_file_descriptors(live):
     running = live(commands=True)
-    host, port = running.url.removeprefix("http://").strip("/").split(":")
     with contextlib.ExitStack() as stack:
         idle = [
-            stack.enter_context(socket.create_connection((host, int(port)), timeout=WAIT))
+            stack.enter_context(socket.create_connection(running.address, timeout=WAIT))
             for _ in range(2 * MAX_CONNECTIONS)
         ]
         for late in idle[MAX_CONNECTIONS:]:
@@ -151,8 +133,7 @@ def test_excess_connections_are_closed_to_preserve_file_descriptors(live):
             early.setblocking(False)
             with pytest.raises(BlockingIOError):
                 early.recv(1)
-    fly(running)
-    assert running.end().summary["status"] == "completed"
+    assert running.fly().summary["status"] == "completed"
 
 
 @pytest.mark.medium

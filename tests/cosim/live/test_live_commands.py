@@ -6,9 +6,7 @@ import numpy as np
 import pytest
 
 from cosim.results.record import load_record
-from cosim.run.run import run_scenario
-from cosim.scenario.scenario import load_scenario
-from tests.cosim.live.conftest import ARM, same
+from tests.cosim.live.conftest import replayed, require_same_record
 
 
 def commanded(viewer, *commands):
@@ -34,8 +32,7 @@ def test_commands_are_applied_broadcast_and_reproducible(live, tmp_path):
             {"command": "change_setting", "key": "regions.pile 1.shape.radius", "value": 0.9},
         )
         assert not refused
-        viewer.command(**ARM)
-        viewer.until("end")
+        viewer.fly()
         other.until("end")
     done = running.end()
     record = load_record(done.folder)
@@ -52,11 +49,7 @@ def test_commands_are_applied_broadcast_and_reproducible(live, tmp_path):
     assert shapes["pile 1"]["radius"] == 0.9 and shapes["seen 1"]["radius"] == 0.3
     drawing = {"center": [12.0, 2.0, 3.0], "half_axes": (0.4 * np.eye(3)).tolist()}
     assert shapes["goal"] == {"kind": "sphere", "center": [12.0, 2.0, 3.0], "radius": 0.4, "drawing": drawing}
-    again = run_scenario(
-        load_scenario(done.folder / "scenario.toml"), tmp_path / "again", report=False,
-        commands_log=done.folder / "commands.jsonl",
-    )  # fmt: skip
-    assert same(record, load_record(again.folder))
+    require_same_record(done, replayed(done, tmp_path / "again"))
 
 
 def test_invalid_commands_are_rejected_with_a_reason(live):
@@ -75,8 +68,7 @@ def test_invalid_commands_are_rejected_with_a_reason(live):
     }
     with running.viewer() as viewer:
         refused = commanded(viewer, *wrong.values())
-        viewer.command(**ARM)
-        viewer.until("end")
+        viewer.fly()
     for reason, text in zip(wrong, refused, strict=True):
         assert reason in text
     assert running.end().summary["commands"] == 1
@@ -87,8 +79,7 @@ def test_without_commands_flag_every_command_is_rejected(live):
     running = live(rate=4.0)
     with running.viewer() as viewer:
         assert viewer.until("header")["run"]["commands"] is False
-        viewer.command(**ARM)
-        viewer.until("end")
+        viewer.fly()
     assert viewer.texts_of("refused") == ["commands are off: start with --commands"]
     assert not (running.end().folder / "commands.jsonl").exists()
 

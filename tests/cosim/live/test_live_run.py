@@ -11,7 +11,7 @@ from cosim.results.record import load_record
 from cosim.results.wording import verdict
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
-from tests.cosim.live.conftest import ARM, same
+from tests.cosim.live.conftest import require_same_record
 
 
 @pytest.mark.medium
@@ -36,7 +36,7 @@ def test_viewers_do_not_change_the_record(live, tmp_path):
     with running.viewer() as one, running.viewer() as other:
         one.until("end")
         other.until("end")
-    assert same(load_record(alone.folder), load_record(running.end().folder))
+    require_same_record(alone, running.end())
     assert np.array_equal(one.column("time")[-5:], other.column("time")[-5:])
 
 
@@ -57,8 +57,8 @@ def test_late_viewer_receives_the_history(live):
 @pytest.mark.slow
 def test_stalled_viewer_does_not_block_others(live, tmp_path):
     running = live(rate=2.0)
-    host, port = running.url.removeprefix("http://").strip("/").split(":")
-    with socket.create_connection((host, int(port))) as lazy:
+    host, port = running.address
+    with socket.create_connection(running.address) as lazy:
         lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
         ask = f"GET /ws HTTP/1.1\r\nHost: {host}:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
         lazy.sendall(
@@ -104,6 +104,5 @@ def test_late_command_rejection_reaches_the_viewer(live, caplog):
         viewer.until("header")
         for number in (1, 2):
             viewer.command(command="add_obstacle", number=number, position=[1.0, 50.0, 3.0], radius=0.5)
-        viewer.command(**ARM)
-        viewer.until("end")
+        viewer.fly()
     assert any("no room for obstacle 2" in text for text in viewer.texts_of("warning"))

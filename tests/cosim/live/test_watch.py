@@ -20,13 +20,12 @@ import pytest
 from rich.console import Console
 
 from cosim.command_line.cli import main
-from cosim.errors import RunError, TelemetryError
+from cosim.errors import CosimError, RunError
 from cosim.live.watching import Snapshot, snapshot_table, snapshots
 from cosim.results.record import RECORD, STREAM, load_record
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import SCENARIO
 from cosim.simulation.signals import Column
-from tests.cosim.live.conftest import ARM
 from tests.threads import ended
 
 PAPER = "arbiter.engine=closed"
@@ -161,8 +160,7 @@ def test_a_live_run_is_watched_to_its_end(live):
         source = running.url.replace("http", "ws")
         watching = threading.Thread(target=lambda: seen.extend(snapshots(source)), daemon=True)
         watching.start()
-        viewer.command(**ARM)
-        viewer.until("end")
+        viewer.fly()
         assert ended(watching)
     assert seen[-1].ended == ("completed", viewer.messages_of("end")[0]["verdict"])
     assert seen[-1]["time"] == 2.0 and len(seen) > 2
@@ -175,11 +173,10 @@ def test_missing_run_gives_one_line_error(what, capsys):
     assert error.count("\n") == 1 and "cosim: " in error
 
 
-def test_missing_run_or_server_is_reported():
-    with pytest.raises(Exception, match="holds no run"):
-        next(snapshots("no/such/folder"))
-    with pytest.raises(TelemetryError, match="cannot be watched"):
-        next(snapshots("1"))
+@pytest.mark.parametrize(("what", "said"), [("no/such/folder", "holds no run"), ("1", "cannot be watched")])
+def test_missing_run_or_server_is_reported(what, said):
+    with pytest.raises(CosimError, match=said):
+        next(snapshots(what))
 
 
 def test_run_killed_before_its_first_rows_does_not_block_watch(paper, tmp_path, monkeypatch):

@@ -1,0 +1,23 @@
+"""A vehicle's FMU flown under inputs that a test chooses."""
+
+import numpy as np
+
+from plant_fmu import Plant
+
+STATES = (
+    *(f"position.{a}" for a in "xyz"), *(f"quaternion.e{i}" for i in range(4)), *(f"velocity.{a}" for a in "uvwpqr"),
+)  # fmt: skip
+THRUST, WRENCH = tuple(f"thrust[{i}]" for i in range(1, 9)), tuple(f"wrench.{name}" for name in "XYZKMN")
+
+
+def fly(vehicle, start, names, inputs, step, outputs=STATES):
+    """Return outputs before each step and at the end, from start values, under rows of inputs or functions to these."""
+    with Plant(vehicle) as plant:
+        plant.set(start)
+        plant.initialize()
+        found = [[plant[name] for name in outputs]]
+        for row in inputs:
+            plant.set(dict(zip(names, row(np.array(found[-1])) if callable(row) else row, strict=True)))
+            plant.step(step)
+            found.append([plant[name] for name in outputs])
+    return np.array(found)
