@@ -85,9 +85,10 @@ class ColumnMap(Table, frozen=True):
         return values
 
 
+MAPPED = tuple(name for name in QUANTITIES if name != "pressure")  # quantities that a map may have
 _MAP = msgspec.defstruct(
-    "_Map", [(name, MappedQuantity | None, None) for name in QUANTITIES if name != "pressure"], bases=(ColumnMap,),
-    frozen=True, forbid_unknown_fields=True,
+    "_MAP", [(name, MappedQuantity | None, None) for name in MAPPED], bases=(ColumnMap,), frozen=True,
+    forbid_unknown_fields=True,
 )  # fmt: skip
 
 

@@ -114,6 +114,16 @@ def write_by_rosbags(bag, dive, distribution, serialize):
             bag.write(topics[topic], time, getattr(store, serialize)(made(store, name, message), name))
 
 
+def write_database(folder, dive):
+    """Write a bag of SQLite as a folder; return the path of its database."""
+    write_by_rosbags(rosbag2.Writer(folder, version=8), dive, typesys.Stores.ROS2_HUMBLE, "serialize_cdr")
+    return folder / f"{folder.name}.db3"
+
+
+def write_ros1(path, dive):
+    write_by_rosbags(rosbag1.Writer(path), dive, typesys.Stores.ROS1_NOETIC, "serialize_ros1")
+
+
 def change(path, script):
     """Run a script of SQL on a database."""
     with contextlib.closing(sqlite3.connect(path)) as database:
@@ -167,9 +177,8 @@ def kill_recorder(path, folder):
 def bags(tmp_path_factory, dive, bag):
     """The same dive in every storage."""
     folder = tmp_path_factory.mktemp("bags")
-    write_by_rosbags(rosbag2.Writer(folder / "whole", version=8), dive, typesys.Stores.ROS2_HUMBLE, "serialize_cdr")
-    write_by_rosbags(rosbag1.Writer(folder / "dive.bag"), dive, typesys.Stores.ROS1_NOETIC, "serialize_ros1")
-    database = folder / "whole" / "whole.db3"
+    database = write_database(folder / "whole", dive)
+    write_ros1(folder / "dive.bag", dive)
     old = shutil.copyfile(database, folder / "old.db3")
     change(old, "DROP TABLE message_definitions; UPDATE schema SET schema_version = 3;")
     early = shutil.copyfile(old, folder / "early.db3")
