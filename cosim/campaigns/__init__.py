@@ -3,7 +3,7 @@
 Scenes flown by one law or by several, or one scenario with varied numbers. Public: `run_campaign`, `compare`,
 `run_sweep`, `vary_from`.
 
-Imports: controller, io, plant_fmu, report, run, scenario, simulation.
+Imports: batch, controller, io, plant_fmu, report, results, run, scenario, simulation.
 """
 
 import importlib

@@ -11,7 +11,7 @@ from cosim.campaigns.analysis.summary import summarize_campaign
 from cosim.campaigns.runner import Campaign, carry_out
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import gains_from
-from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.scenes.scene_file import SceneStore
 from cosim.campaigns.scenes.work import SceneTask, SceneWork
 
 

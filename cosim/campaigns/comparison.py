@@ -19,7 +19,7 @@ from cosim.campaigns.pages.replays import WORST
 from cosim.campaigns.runner import Campaign
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import gains_from, law_named
-from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.scenes.scene_file import SceneStore
 from cosim.campaigns.scenes.work import SceneTask
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError

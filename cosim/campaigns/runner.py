@@ -16,8 +16,7 @@ import pyarrow.compute as pc
 
 from cosim.campaigns.store.folder import CampaignFolder, campaign_folder
 from cosim.campaigns.store.results import Results
-from cosim.campaigns.workers.batch_sizing import Batches
-from cosim.campaigns.workers.dispatch import fly_all
+from cosim.campaigns.workers.dispatch import Batches, fly_all
 from cosim.campaigns.workers.work import Rows, Task, Work
 from cosim.campaigns.workers.worker import hold_flyer
 from cosim.campaigns.workers.worker_pools import ExternalExecutor, Processes, WorkerPool

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from concurrent.futures import Executor
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+
+from cosim.batch.outcome import FIELDS
+from cosim.campaigns.analysis.statistics import Facts, effect, quantiles, rate
+from cosim.campaigns.analysis.summary import refusal_reasons, worst_table
 from cosim.campaigns.runner import Campaign, carry_out
+from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.design import Design
 from cosim.campaigns.sweeps.rows import SweepWork
-from cosim.campaigns.sweeps.summary import summarize_sweep
+from cosim.scenario.key_names import key_name
 from cosim.scenario.scenario import Scenario, to_scenario
+from cosim.simulation.signals import Array
+
+FACTS = ("reached", "settled", "violated")  # columns with rates
+SPREADS = ("reach_time", "settle_time", "min_clearance", "effort", "max_force", "max_speed")  # columns with quantiles
 
 
 def run_sweep(
@@ -69,3 +81,47 @@ def run_sweep(
     """
     work, out = SweepWork(to_scenario(scenario), design), Path(out)
     return carry_out(work, out, lambda results: summarize_sweep(work, results, out), workers, executor, progress)
+
+
+def summarize_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str, Any]:
+    """Summarize a sweep."""
+    is_flown, base = results.is_null("refused"), work.variation.base
+    return {
+        "name": work.name,
+        "title": base.title,
+        "words": {key: key_name(key, base.table, base.vehicle).label for key in work.variation.keys},
+        "rows": len(results),
+        "flown": int(is_flown.sum()),
+        "refused": int((~is_flown).sum()),
+        "reasons": refusal_reasons(results),
+        "stopped": int(np.isfinite(results.number("stopped_at")).sum()),
+        **{name: rate(results.fact(name)[is_flown]) for name in FACTS},
+        "quantiles": {name: quantiles(results.number(name)) for name in SPREADS},
+        "worst": worst_table(results, folder),
+        "effects": _of_keys(work, results, is_flown, effect),
+        "rank_correlations": _of_keys(work, results, is_flown, _rank_correlation),
+        **{key: value for key, value in work.plan.items() if key != "name"},
+    }
+
+
+def _of_keys(
+    work: SweepWork, results: Results, flown: Facts, measure: Callable[[Array, Array], dict[str, float] | None]
+) -> dict[str, dict[str, Any]]:
+    """Return a measure of each key with each outcome, over the flown rows with a finite outcome."""
+    keys = {key: results.number(key) for key in work.variation.keys}
+    measures: dict[str, dict[str, Any]] = {key: {} for key in keys}
+    for name, (kind, _, _) in FIELDS.items():
+        outcome = results.fact(name).astype(float) if kind is np.bool_ else results.number(name)
+        rows = flown & np.isfinite(outcome)
+        for key, values in keys.items():
+            measures[key][name] = measure(values[rows], outcome[rows])
+    return measures
+
+
+def _rank_correlation(values: Array, outcome: Array) -> dict[str, float] | None:
+    if len(values) < 3 or np.ptp(values) == 0.0 or np.ptp(outcome) == 0.0:
+        return None
+    from scipy.stats import spearmanr  # as in `cosim.campaigns.analysis.statistics`
+
+    result = spearmanr(values, outcome)
+    return {"rho": float(result.statistic), "p": float(result.pvalue)}

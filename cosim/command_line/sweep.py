@@ -64,7 +64,7 @@ def sweep(options: argparse.Namespace) -> int:
 
 def rerun(options: argparse.Namespace) -> int:
     """Run ``cosim rerun``."""
-    from cosim.campaigns.reruns.rerun import rerun as rerun_row
+    from cosim.campaigns.rerun import rerun as rerun_row
 
     done = rerun_row(options.folder, options.row, options.out, progress=not options.quiet)
     if done.other_code:

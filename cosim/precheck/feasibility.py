@@ -14,8 +14,7 @@ from controller.regions import Region
 from controller.regions.region_set import of_attitude
 from cosim.precheck.finding import Finding, status
 from cosim.precheck.path_search import SearchedPath, find_path, path_limits
-from cosim.precheck.region_intersection import Overlap, box_about, box_within, search
-from cosim.precheck.region_values import evaluate_regions
+from cosim.precheck.region_intersection import Overlap, box_about, box_within, evaluate_regions, search
 from cosim.results.water_surface import heights_above_surface, is_submerged_model
 from cosim.scenario.scenario import Scenario
 

@@ -27,7 +27,7 @@ from controller.theory import (
 from controller.theory.conditions import least_of_potential_test
 from controller.theory.model import asymmetry, damping, least_inertia, restoring_defect, skew_defect
 from cosim.precheck.finding import Finding, status
-from cosim.precheck.region_values import evaluate_regions
+from cosim.precheck.region_intersection import evaluate_regions
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_model, true_vehicle
 from cosim.simulation.arbitration import Arbitration

@@ -12,7 +12,7 @@ from controller import paper_law
 from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error_parts, rotation_rows
 from cosim.precheck.finding import Finding, status
-from cosim.precheck.region_values import evaluate_regions
+from cosim.precheck.region_intersection import evaluate_regions
 from cosim.precheck.thrust_margin import Margin, ThrustMargin, greatest_force, held_wrench, least_margin, thrust_margin
 from cosim.results.wording import format_force
 from cosim.scenario.scenario import Scenario

@@ -5,7 +5,8 @@ from __future__ import annotations
 import contextlib
 import logging
 from collections import OrderedDict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +24,6 @@ log = logging.getLogger(__name__)
 MAX_ROWS = 100_000_001  # rows of a run with the maximum number of steps that a scenario may have
 RECORD = "record.parquet"
 STREAM = "record.arrows"  # Arrow stream of the rows of a run that is under way or was killed
-PARTS = "record.parts"  # folder in which earlier versions left the rows of a killed run, as Parquet files
 _DIGITS = 9  # maximum number of digits of a format number
 _BLOCK = 10_000  # rows that are read at once
 _SMALL = 2**22  # numbers; a record of at most so many is read as a whole
@@ -80,15 +80,15 @@ class Rows:
 
 
 class Record(Rows):
-    """A run's signals, each an array over its steps, read from the files at their first use.
+    """A run's signals, each an array over its steps, read from the file at their first use.
 
     A small record is kept in memory as a whole. Read a larger one by `blocks` or `take`: a single signal may exceed the
     memory.
 
     Parameters
     ----------
-    files : sequence of Path
-        Parquet files or Arrow streams of one schema, in the order of their rows.
+    file : Path
+        Parquet file or Arrow stream.
 
     Attributes
     ----------
@@ -97,12 +97,12 @@ class Record(Rows):
     units : dict
         Unit of each signal, by name, in the order of the columns.
     file : Path
-        The first of the files.
+        The file.
 
     Raises
     ------
     RunError
-        If the files cannot be read, or are not parts of one record.
+        If the file cannot be read, or is no record.
 
     Examples
     --------
@@ -114,22 +114,17 @@ class Record(Rows):
     'm'
     """
 
-    def __init__(self, files: Sequence[Path]) -> None:
-        self._files, self.file = list(files), files[0]
-        columns, rows = [], 0
-        for file in self._files:
-            with _opened(file) as source:
-                rows += sum(source.group_rows)
-                _require_numbers(file, source.schema, rows)
-                if (format_number := _format_of(source.schema)) is not None:
-                    require_format(file, format_number)
-                columns.append(tuple(map(_column_of, source.schema)))
-            if columns[-1] != columns[0]:
-                raise RunError(f"{file}: has other columns than {self._files[0].name}, expected parts of one record")
+    def __init__(self, file: Path) -> None:
+        self.file = file
+        with _opened(file) as source:
+            self._count = sum(source.group_rows)
+            _require_numbers(file, source.schema, self._count)
+            if (format_number := _format_of(source.schema)) is not None:
+                require_format(file, format_number)
+            columns = tuple(map(_column_of, source.schema))
         self._kept: OrderedDict[str, Array] = OrderedDict()
-        super().__init__(columns[0], self._kept)
-        self._count = rows
-        self._small = rows * len(self.columns) <= _SMALL  # reading one signal takes a tenth of the time of all
+        super().__init__(columns, self._kept)
+        self._small = self._count * len(columns) <= _SMALL  # reading one signal takes a tenth of the time of all
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -160,10 +155,9 @@ class Record(Rows):
         yield from self._batches(self._columns_of(names))
 
     def _batches(self, columns: Sequence[Column]) -> Iterator[Rows]:
-        """Yield all rows in order, from the files."""
-        for file in self._files:
-            with _opened(file) as source:
-                yield from source.read(columns, range(len(source.group_rows)))
+        """Yield all rows in order, from the file."""
+        with _opened(self.file) as source:
+            yield from source.read(columns, range(len(source.group_rows)))
 
     def take(self, rows: Sequence[int] | NDArray[np.intp], names: Sequence[str] | None = None) -> Rows:
         """Return a selection of `rows` (rising, from 0), of all signals or of those in `names`."""
@@ -172,26 +166,27 @@ class Record(Rows):
         columns, rows = self._columns_of(names), np.asarray(rows, np.intp)
         pieces: dict[str, list[Array]] = {column.name: [np.empty(0)] for column in columns}
         first = 0
-        for file in self._files:
-            with _opened(file) as source:
-                for group, length in enumerate(source.group_rows):
-                    if np.searchsorted(rows, first) == np.searchsorted(rows, first + length):
-                        first += length
-                        continue
-                    for batch in source.read(columns, [group]):
-                        begin, stop = np.searchsorted(rows, [first, first + len(batch)])
-                        for name, arrays in pieces.items():
-                            arrays.append(batch[name][rows[begin:stop] - first])
-                        first += len(batch)
+        with _opened(self.file) as source:
+            for group, length in enumerate(source.group_rows):
+                if np.searchsorted(rows, first) == np.searchsorted(rows, first + length):
+                    first += length
+                    continue
+                for batch in source.read(columns, [group]):
+                    begin, stop = np.searchsorted(rows, [first, first + len(batch)])
+                    for name, arrays in pieces.items():
+                        arrays.append(batch[name][rows[begin:stop] - first])
+                    first += len(batch)
         return Rows(columns, {name: np.concatenate(arrays) for name, arrays in pieces.items()})
 
 
 def load_record(folder: Path) -> Record:
     """Open the record of a run, whether it was finished or killed."""
     require_utf8(folder)
-    if not (files := record_files(folder)):
+    files = (folder / name for name in (RECORD, STREAM))
+    file = next((file for file in files if file.exists() and file.stat().st_size), None)
+    if file is None:
         raise RunError(f"{folder}: holds no record of a run")
-    record = Record(files)
+    record = Record(file)
     if not len(record):
         raise RunError(f"{folder}: the record of the run is empty")
     return record
@@ -202,38 +197,23 @@ def _column_of(field: pa.Field) -> Column:
     return Column(field.name, about.get(b"unit", b"").decode(), about.get(b"description", b"").decode())
 
 
-class _ParquetSource:
-    """Rows of a Parquet file, by row group."""
+@dataclass(frozen=True)
+class _Source:
+    """The rows of a file by group: row groups of Parquet, or batches of an Arrow stream."""
 
-    def __init__(self, parquet: Any) -> None:
-        self._parquet, self.schema = parquet, parquet.schema_arrow
-        metadata = parquet.metadata
-        self.group_rows = [metadata.row_group(i).num_rows for i in range(metadata.num_row_groups)]
-        if metadata.num_rows != sum(self.group_rows):
-            raise TypeError("its groups have another number of rows than the file")
+    schema: pa.Schema
+    group_rows: list[int]
+    batches: Callable[[list[int], list[str]], Iterable[pa.RecordBatch]]  # of some groups, with some columns
 
     def read(self, columns: Sequence[Column], groups: Sequence[int]) -> Iterator[Rows]:
-        """Yield the rows of some row groups."""
+        """Yield the rows of some groups."""
         names, rows = [column.name for column in columns], 0
-        for batch in self._parquet.iter_batches(_BLOCK, row_groups=list(groups), columns=names):
+        for batch in self.batches(list(groups), names):
             rows += len(batch)
-            yield _rows_of(batch, columns)
+            yield Rows(columns, {name: _numbers(batch.column(name)) for name in names})
         expected_rows = sum(self.group_rows[group] for group in groups)
         if rows != expected_rows:
             raise TypeError(f"{rows} rows are there, expected {expected_rows}")
-
-
-class _StreamSource:
-    """Rows of an Arrow stream, by batch, up to the first that is incomplete."""
-
-    def __init__(self, schema: pa.Schema, batches: Iterator[pa.RecordBatch]) -> None:
-        self.schema, self._batches = schema, list(batches)
-        self.group_rows = [len(batch) for batch in self._batches]
-
-    def read(self, columns: Sequence[Column], groups: Sequence[int]) -> Iterator[Rows]:
-        """Yield the rows of some batches."""
-        for group in groups:
-            yield _rows_of(self._batches[group], columns)
 
 
 def _complete_batches(file: Path, stream: Any) -> Iterator[pa.RecordBatch]:
@@ -247,14 +227,10 @@ def _complete_batches(file: Path, stream: Any) -> Iterator[pa.RecordBatch]:
 
 
 @contextlib.contextmanager
-def stream_batches(file: Path) -> Iterator[Iterator[pa.RecordBatch]]:
-    """Open an Arrow stream to read its complete batches, whose memory is the file's."""
+def stream_batches(file: Path) -> Iterator[tuple[pa.Schema, Iterator[pa.RecordBatch]]]:
+    """Open an Arrow stream to read its schema and complete batches, whose memory is the file's."""
     with pa.memory_map(str(file)) as memory, pa.ipc.open_stream(memory) as stream:
-        yield _complete_batches(file, stream)
-
-
-def _rows_of(batch: pa.RecordBatch, columns: Sequence[Column]) -> Rows:
-    return Rows(columns, {column.name: _numbers(batch.column(column.name)) for column in columns})
+        yield stream.schema, _complete_batches(file, stream)
 
 
 def _numbers(column: pa.Array) -> Array:
@@ -266,17 +242,24 @@ def _numbers(column: pa.Array) -> Array:
 
 
 @contextlib.contextmanager
-def _opened(file: Path) -> Iterator[_ParquetSource | _StreamSource]:
-    """Open a file of a record; convert all errors of reading it to a RunError."""
+def _opened(file: Path) -> Iterator[_Source]:
+    """Open the file of a record; convert all errors of reading it to a RunError."""
     require_utf8(file)
     try:
         if file.suffix == Path(STREAM).suffix:
-            with pa.memory_map(str(file)) as memory, pa.ipc.open_stream(memory) as stream:
-                yield _StreamSource(stream.schema, _complete_batches(file, stream))
+            with stream_batches(file) as (schema, complete):
+                batches = list(complete)
+                yield _Source(schema, list(map(len, batches)), lambda groups, _: [batches[i] for i in groups])
         else:
             # with pre_buffer all that was read of a file would stay in memory until it is closed
             with pq.ParquetFile(file, pre_buffer=False) as parquet:
-                yield _ParquetSource(parquet)
+                group_rows = [parquet.metadata.row_group(i).num_rows for i in range(parquet.num_row_groups)]
+                if parquet.metadata.num_rows != sum(group_rows):
+                    raise TypeError("its groups have another number of rows than the file")
+                yield _Source(
+                    parquet.schema_arrow, group_rows,
+                    lambda groups, names: parquet.iter_batches(_BLOCK, row_groups=groups, columns=names),
+                )  # fmt: skip
     except (OSError, pa.ArrowException, UnicodeDecodeError, TypeError, BufferError, KeyError) as error:
         raise RunError(f"{file}: cannot be read: {error}") from error
 
@@ -298,7 +281,7 @@ def _require_numbers(file: Path, schema: pa.Schema, rows: int) -> None:
     if not schema.names or len(set(schema.names)) < len(schema.names):
         raise RunError(f"{file}: has no columns, or two of one name; expected the record of a run")
     if rows > MAX_ROWS:
-        raise RunError(f"{file}: the record has {rows} rows up to here, expected at most {MAX_ROWS}")
+        raise RunError(f"{file}: the record has {rows} rows, expected at most {MAX_ROWS}")
 
 
 def _format_of(schema: pa.Schema) -> int | str | None:
@@ -307,10 +290,3 @@ def _format_of(schema: pa.Schema) -> int | str | None:
     if not number:
         return 1 if any(name.startswith("helm.") for name in schema.names) else None
     return int(number) if number.isdecimal() and len(number) < _DIGITS else number
-
-
-def record_files(folder: Path) -> list[Path]:
-    """Return the files that hold the rows of a run: its record, or what a killed run has left."""
-    files = [folder / RECORD, folder / STREAM, *sorted((folder / PARTS).glob("*.parquet"))]
-    files = [file for file in files if file.exists() and file.stat().st_size]
-    return files[:1] if files and files[0].parent == folder else files

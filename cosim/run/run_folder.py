@@ -19,14 +19,14 @@ from cosim.replay.pages import write_replay
 from cosim.report.report import write_report
 from cosim.report.web_page import FIGURES
 from cosim.results.log_facts import IMPORT
-from cosim.results.record import PARTS, RECORD, STREAM, load_record, require_utf8
+from cosim.results.record import RECORD, STREAM, load_record, require_utf8
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUMMARY, Run, load_run, open_run
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 from plant_fmu.archive import is_temporary, temporary_folder
 
 _MADE = frozenset(
-    {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, STREAM, PARTS, SUMMARY, REPORT, REPLAY, FIGURES}
+    {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, STREAM, SUMMARY, REPORT, REPLAY, FIGURES}
 )  # names of the files and folders that a run makes
 
 

@@ -13,9 +13,8 @@ from cosim.mavlink.replay import replay as stream
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.replay.pages import replay
-from cosim.results.record import PARTS, RECORD
+from cosim.results.record import RECORD
 from cosim.results.required_columns import require_columns
-from cosim.results.run_result import SUMMARY
 from cosim.run.run_folder import report_again
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios
@@ -152,12 +151,3 @@ def test_d6_readers_work_without_unused_columns(read, lacking, caplog):
     folder = lacking("water_velocity.y", "goal.value")
     read(folder)
     assert "has no columns 'water_velocity.y', 'goal.value'" in caplog.text and str(folder / RECORD) in caplog.text
-
-
-def test_d6_unfinished_run_is_checked(lacking):
-    folder = lacking("membership.depth")
-    (folder / PARTS).mkdir()
-    (folder / SUMMARY).unlink()
-    (folder / RECORD).rename(folder / PARTS / "000000.parquet")
-    with pytest.raises(RunError, match=r"000000\.parquet: has no column 'membership.depth'"):
-        list(snapshots(str(folder), None))

@@ -11,7 +11,7 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from cosim.campaigns.analysis.worst_rows import LISTED, rerun_command, violated_column
+from cosim.campaigns.analysis.summary import LISTED, rerun_command, violated_column
 from cosim.campaigns.falsification.search import minimize
 from cosim.campaigns.falsification.splitting import estimate_probability
 from cosim.campaigns.falsification.work import Objective, ScenarioSearch, SceneSearch

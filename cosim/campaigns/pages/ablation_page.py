@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.campaigns.ablation import NUMBERS, PAGE, VARIANTS, WHOLE
-from cosim.campaigns.analysis.worst_rows import LISTED
-from cosim.campaigns.pages.replays import write_page_with_replays
-from cosim.campaigns.reruns.repeat import complete_results
+from cosim.campaigns.analysis.summary import LISTED
+from cosim.campaigns.pages.replays import PageContents, write_page_with_replays
+from cosim.campaigns.rerun import complete_results
 from cosim.campaigns.scenes.kinds import scene_kinds
 from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.io.strict_json import read_json, understood
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
@@ -24,21 +23,21 @@ if TYPE_CHECKING:
 
 def write_ablation_page(folder: Path, replays: int) -> Path:
     """Write ``ablation.html`` and its figures, and replays of the scenes that a part changes most."""
-    numbers = read_json(folder / NUMBERS)
-    variants = numbers.get("variants")
-    if not (isinstance(variants, dict) and WHOLE in variants and variants.keys() <= {WHOLE, *VARIANTS}):
-        raise RunError(f"{folder / NUMBERS}: holds no ablation")
-    results = {name: complete_results(folder / name, SCHEMA) for name in variants}
-    changed = _changed(results)[: max(LISTED, replays)]
-    with understood(folder / NUMBERS):
+
+    def compute(numbers: dict[str, Any]) -> PageContents:
+        variants = numbers.get("variants")
+        if not (isinstance(variants, dict) and WHOLE in variants and variants.keys() <= {WHOLE, *VARIANTS}):
+            raise RunError(f"{folder / NUMBERS}: holds no ablation")
+        results = {name: complete_results(folder / name, SCHEMA) for name in variants}
+        changed = _changed(results)[: max(LISTED, replays)]
         worse = [name for name, effect in variants.items() if name != WHOLE and _helps(effect)]
-    same = [name for name in variants if name not in (WHOLE, *worse)]
-    return write_page_with_replays(
-        folder / PAGE, folder / NUMBERS, _drawings(numbers),
-        {"s": numbers, "changed": changed, "worse": worse, "same": same},
-        [change["seed"] for change in changed[:replays]], [folder / name for name in results],
-        lambda key: f"Scene {key} by {', '.join(results)}",
-    )  # fmt: skip
+        return PageContents(
+            {"changed": changed, "worse": worse, "same": [name for name in variants if name not in (WHOLE, *worse)]},
+            _drawings(numbers), [change["seed"] for change in changed[:replays]], [folder / name for name in results],
+            lambda key: f"Scene {key} by {', '.join(results)}",
+        )  # fmt: skip
+
+    return write_page_with_replays(folder / PAGE, folder / NUMBERS, compute)
 
 
 def _changed(results: Mapping[str, Results]) -> list[dict[str, Any]]:

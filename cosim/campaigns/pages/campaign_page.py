@@ -8,18 +8,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.campaigns.analysis.summary import OF_ALL, SPREADS, rates_of
-from cosim.campaigns.analysis.worst_rows import LISTED, worst_table
-from cosim.campaigns.pages.replays import write_page_with_replays
+from cosim.campaigns.analysis.summary import LISTED, OF_ALL, SPREADS, rates_of, worst_table
+from cosim.campaigns.pages.replays import PageContents, write_page_with_replays
 from cosim.campaigns.pages.sections import LABELS
-from cosim.campaigns.reruns.repeat import complete_results, require_complete
+from cosim.campaigns.rerun import complete_results
 from cosim.campaigns.scenes.kinds import FEATURES, SceneKinds, scene_kinds
 from cosim.campaigns.scenes.rows import SCHEMA
-from cosim.campaigns.store.folder import SUMMARY, lock_folder
+from cosim.campaigns.store.folder import SUMMARY
 from cosim.campaigns.store.plan import SCENES
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.io.strict_json import read_json, understood
 from cosim.report.web_page import interval
 
 if TYPE_CHECKING:
@@ -32,23 +30,23 @@ _DRAWN = ("completed", "violation")  # rates that are drawn over the features of
 
 def write_campaign_page(folder: Path, replays: int) -> Path:
     """Write ``campaign.html`` and its figures, and replays of the worst scenes."""
-    require_complete(folder)
-    summary = read_json(folder / SUMMARY)
-    if summary.get("kind") != SCENES:
-        raise RunError(f"{folder / SUMMARY}: holds no campaign of scenes")
-    results = complete_results(folder, SCHEMA)
-    with lock_folder(folder):
+
+    def compute(summary: dict[str, Any]) -> PageContents:
+        if summary.get("kind") != SCENES:
+            raise RunError(f"{folder / SUMMARY}: holds no campaign of scenes")
+        results = complete_results(folder, SCHEMA)
         kinds, worst = scene_kinds(results), worst_table(results, folder, max(LISTED, replays))
-        with understood(folder / SUMMARY):
-            groups = {"all": summary} | summary["kinds"]
-            values = {
-                "s": summary, "worst": worst, "groups": groups, "stopped": summary["stopped"] - summary["refused"],
-                "kinds": dict(zip(results["seed"].tolist(), kinds.kinds.tolist(), strict=True)),
-            }  # fmt: skip
-        return write_page_with_replays(
-            folder / PAGE, folder / SUMMARY, _drawings(results, kinds, groups) if worst else [], values,
-            [row["row"] for row in worst[:replays]], [folder], lambda key: f"Scene {key} by the {summary['law']} law",
+        groups = {"all": summary} | summary["kinds"]
+        values = {
+            "worst": worst, "groups": groups, "stopped": summary["stopped"] - summary["refused"],
+            "kinds": dict(zip(results["seed"].tolist(), kinds.kinds.tolist(), strict=True)),
+        }  # fmt: skip
+        return PageContents(
+            values, _drawings(results, kinds, groups) if worst else [], [row["row"] for row in worst[:replays]],
+            [folder], lambda key: f"Scene {key} by the {summary['law']} law",
         )  # fmt: skip
+
+    return write_page_with_replays(folder / PAGE, folder / SUMMARY, compute)
 
 
 def campaign_lines(summary: dict[str, Any]) -> Iterator[str]:

@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from controller import LAWS
-from cosim.campaigns.analysis.summary import SPREADS
-from cosim.campaigns.analysis.worst_rows import worst_table
+from cosim.campaigns.analysis.summary import SPREADS, worst_table
 from cosim.campaigns.pages.campaign_page import FACTS, spreads_of
-from cosim.campaigns.pages.replays import write_page_with_replays
+from cosim.campaigns.pages.replays import PageContents, write_page_with_replays
 from cosim.campaigns.pages.sections import LABELS
-from cosim.campaigns.reruns.repeat import complete_results
+from cosim.campaigns.rerun import complete_results
 from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
-from cosim.io.strict_json import read_json
 
 if TYPE_CHECKING:
     from cosim.report.figures.style import NamedFigure
@@ -31,26 +29,28 @@ _SEEN = ("reach_time", "min_clearance")  # columns that are drawn scene by scene
 
 def write_comparison_page(folder: Path, replays: int) -> Path:
     """Write ``compare.html`` and its figures, and replays of each law's worst scenes, with all laws on one page."""
-    numbers = read_json(folder / NUMBERS)
-    laws = numbers.get("laws")
-    if not (isinstance(laws, dict) and laws and laws.keys() <= LAWS.keys()):
-        raise RunError(f"{folder / NUMBERS}: holds no comparison of laws")
-    results = {law: complete_results(folder / law, SCHEMA) for law in laws}
-    worst = [
-        {"law": law, "number": i} | row
-        for law, rows in results.items()
-        for i, row in enumerate(worst_table(rows, folder / law, max(_LISTED, replays)))
-    ]
-    return write_page_with_replays(
-        folder / PAGE, folder / NUMBERS, _drawings(results, numbers) if worst else [], {"s": numbers, "worst": worst},
-        dict.fromkeys(row["row"] for row in worst if row["number"] < replays), [folder / law for law in results],
-        lambda key: f"Scene {key} by {', '.join(results)}",
-    )  # fmt: skip
+
+    def compute(numbers: dict[str, Any]) -> PageContents:
+        laws = numbers.get("laws")
+        if not (isinstance(laws, dict) and laws and laws.keys() <= LAWS.keys()):
+            raise RunError(f"{folder / NUMBERS}: holds no comparison of laws")
+        results = {law: complete_results(folder / law, SCHEMA) for law in laws}
+        worst = [
+            {"law": law, "number": i} | row
+            for law, rows in results.items()
+            for i, row in enumerate(worst_table(rows, folder / law, max(_LISTED, replays)))
+        ]
+        return PageContents(
+            {"worst": worst}, _drawings(results, numbers) if worst else [],
+            dict.fromkeys(row["row"] for row in worst if row["number"] < replays), [folder / law for law in results],
+            lambda key: f"Scene {key} by {', '.join(results)}",
+        )  # fmt: skip
+
+    return write_page_with_replays(folder / PAGE, folder / NUMBERS, compute)
 
 
 def _drawings(results: Mapping[str, Results], numbers: dict[str, Any]) -> Iterator[NamedFigure]:
-    from cosim.campaigns.pages.comparison_figures import side_by_side
-    from cosim.campaigns.pages.figures import Rated, distributions, forest
+    from cosim.campaigns.pages.figures import Rated, distributions, forest, side_by_side
     from cosim.report.figures.style import NamedFigure
 
     laws = numbers["laws"]

@@ -7,11 +7,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.campaigns.pages.replays import write_page_with_replays
-from cosim.campaigns.reruns.repeat import require_complete
-from cosim.campaigns.store.folder import SUMMARY, lock_folder
+from cosim.campaigns.pages.replays import PageContents, write_page_with_replays
+from cosim.campaigns.store.folder import SUMMARY
 from cosim.errors import RunError
-from cosim.io.strict_json import read_json, understood
 from cosim.report.web_page import number
 
 if TYPE_CHECKING:
@@ -24,24 +22,21 @@ _UNITS = {objective: label[label.index("[") + 1 : -1] for objective, label in _L
 
 def write_falsification_page(folder: Path, replays: int) -> Path:
     """Write ``falsification.html`` and its figure, and replays of the worst rows."""
-    require_complete(folder)
-    summary = read_json(folder / SUMMARY)
-    if not isinstance(summary.get("search"), dict):
-        raise RunError(f"{folder / SUMMARY}: holds no search")
-    with lock_folder(folder):
-        with understood(folder / SUMMARY):
-            random = summary["random"]["worst"] if summary["random"] else []
-            values = {
-                "s": summary, "unit": "scene" if summary["kind"] == "scenes" else "row", "random": random,
-                "label": _LABELS[summary["search"]["objective"]], "worst": list(zip_longest(summary["worst"], random)),
-                "estimate": _estimated(summary["estimate"]) if summary["estimate"] else "",
-                "value": lambda row, unit=False: _value(summary, row, unit),
-            }  # fmt: skip
-            keys = [row["row"] for row in summary["worst"]][:replays]
-        return write_page_with_replays(
-            folder / PAGE, folder / SUMMARY, _drawings(summary), values, keys, [folder],
-            lambda key: f"{summary['title']}: {key}",
-        )  # fmt: skip
+
+    def compute(summary: dict[str, Any]) -> PageContents:
+        if not isinstance(summary.get("search"), dict):
+            raise RunError(f"{folder / SUMMARY}: holds no search")
+        random = summary["random"]["worst"] if summary["random"] else []
+        values = {
+            "unit": "scene" if summary["kind"] == "scenes" else "row", "random": random,
+            "label": _LABELS[summary["search"]["objective"]], "worst": list(zip_longest(summary["worst"], random)),
+            "estimate": _estimated(summary["estimate"]) if summary["estimate"] else "",
+            "value": lambda row, unit=False: _value(summary, row, unit),
+        }  # fmt: skip
+        keys = [row["row"] for row in summary["worst"]][:replays]
+        return PageContents(values, _drawings(summary), keys, [folder], lambda key: f"{summary['title']}: {key}")
+
+    return write_page_with_replays(folder / PAGE, folder / SUMMARY, compute)
 
 
 def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:

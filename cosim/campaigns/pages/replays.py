@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import contextlib
 import shutil
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from cosim.campaigns.pages.sections import SECTIONS
-from cosim.campaigns.reruns.repeat import Repeat, repeat_of
+from cosim.campaigns.rerun import Repeat, repeat_of, require_complete
+from cosim.campaigns.store.folder import SUMMARY, lock_folder
 from cosim.errors import CosimError, RunError
 from cosim.io.atomic_file import write_atomic
 from cosim.io.strict_json import json_text, read_json, understood
@@ -36,30 +38,41 @@ class Replay:
     remarks: tuple[str, ...]  # remarks, such as differences between flight and row
 
 
-def write_page_with_replays(
-    path: Path,
-    numbers: Path,
-    drawings: Iterable[NamedFigure],
-    values: Mapping[str, Any],
-    keys: Iterable[int],
-    folders: Sequence[Path],
-    title: Callable[[int], str],
-) -> Path:
+class PageContents(NamedTuple):
+    """What a page shows, computed from its numbers."""
+
+    values: Mapping[str, Any]  # values of the template
+    drawings: Iterable[NamedFigure]
+    keys: Iterable[int]  # rows that have a replay
+    folders: Sequence[Path]  # campaigns whose flights of a row are shown together
+    title: Callable[[int], str]  # title of the replay of a row
+
+
+def write_page_with_replays(path: Path, numbers: Path, compute: Callable[[dict[str, Any]], PageContents]) -> Path:
     """Write a page and its figures, fly rows again, and write the page again with their replays."""
-    template = f"cosim.campaigns.pages/{path.name}.j2"
-
-    def write(shown: Mapping[int, Replay]) -> None:
+    has_campaign = numbers.name == SUMMARY
+    if has_campaign:
+        require_complete(path.parent)
+    table = read_json(numbers)
+    with lock_folder(path.parent) if has_campaign else contextlib.nullcontext():
         with understood(numbers):
-            write_atomic(path, render_page(template, **values, **SECTIONS, figures=figures, shown=shown))
+            contents = compute(table)
 
-    try:
-        with understood(numbers):
-            figures = write_figures(path.parent, drawings)
-        write({})
-        if shown := {key: replay_of(path.parent, key, folders, title(key)) for key in keys}:
-            write(shown)
-    except OSError as error:
-        raise RunError(f"{path.parent}: {error.strerror or error}") from error
+        def write(shown: Mapping[int, Replay]) -> None:
+            with understood(numbers):
+                template, values = f"cosim.campaigns.pages/{path.name}.j2", {**contents.values, **SECTIONS}
+                write_atomic(path, render_page(template, s=table, **values, figures=figures, shown=shown))
+
+        try:
+            with understood(numbers):
+                figures = write_figures(path.parent, contents.drawings)
+            write({})
+            if shown := {
+                key: replay_of(path.parent, key, contents.folders, contents.title(key)) for key in contents.keys
+            }:
+                write(shown)
+        except OSError as error:
+            raise RunError(f"{path.parent}: {error.strerror or error}") from error
     return path
 
 

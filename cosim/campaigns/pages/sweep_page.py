@@ -10,17 +10,16 @@ import numpy as np
 
 from cosim.batch.outcome import FIELDS
 from cosim.campaigns.analysis.statistics import CHANCE
-from cosim.campaigns.analysis.worst_rows import LISTED, worst_table
-from cosim.campaigns.pages.replays import write_page_with_replays
+from cosim.campaigns.analysis.summary import LISTED, worst_table
+from cosim.campaigns.pages.replays import PageContents, write_page_with_replays
 from cosim.campaigns.pages.sections import LABELS
-from cosim.campaigns.reruns.repeat import complete_results, require_complete
-from cosim.campaigns.store.folder import SUMMARY, lock_folder
+from cosim.campaigns.rerun import complete_results
+from cosim.campaigns.store.folder import SUMMARY
 from cosim.campaigns.store.plan import SWEEP
 from cosim.campaigns.store.results import Results
+from cosim.campaigns.sweep import FACTS
 from cosim.campaigns.sweeps.rows import schema_of
-from cosim.campaigns.sweeps.summary import FACTS
 from cosim.errors import RunError
-from cosim.io.strict_json import read_json, understood
 from cosim.report.web_page import interval
 
 if TYPE_CHECKING:
@@ -33,28 +32,26 @@ _SHOWN, _VALUES = 8, 12  # maximum numbers of keys in figures and table, and of 
 
 def write_sweep_page(folder: Path, replays: int) -> Path:
     """Write ``sweep.html`` and its figures, and replays of the worst rows."""
-    require_complete(folder)
-    summary = read_json(folder / SUMMARY)
-    if summary.get("kind") != SWEEP or not isinstance(summary.get("vary"), dict):
-        raise RunError(f"{folder / SUMMARY}: holds no sweep")
-    with understood(folder / SUMMARY):
-        schema = schema_of(tuple(summary["vary"]))
-    results = complete_results(folder, schema)
-    with lock_folder(folder):
+
+    def compute(summary: dict[str, Any]) -> PageContents:
+        if summary.get("kind") != SWEEP or not isinstance(summary.get("vary"), dict):
+            raise RunError(f"{folder / SUMMARY}: holds no sweep")
+        results = complete_results(folder, schema_of(tuple(summary["vary"])))
         worst = worst_table(results, folder, max(LISTED, replays))
-        with understood(folder / SUMMARY):
-            most = set(_by_weight(summary)[:_SHOWN])
-            ranked = [key for key in summary["vary"] if key in most]
-            rates = {fact: summary[fact] for fact in FACTS}
-            values = {
-                "s": summary, "worst": worst, "min_rho": _MIN_RHO, "max_values": _VALUES,
-                "groups": {"all": {"scenes": summary["flown"], "rates": rates, "quantiles": summary["quantiles"]}},
-                "ranked": [summary["words"][key] for key in ranked], "effects": list(_effects(summary, ranked)),
-            }  # fmt: skip
-        return write_page_with_replays(
-            folder / PAGE, folder / SUMMARY, _drawings(results, summary) if worst else [], values,
-            [row["row"] for row in worst[:replays]], [folder], lambda key: f"Row {key} of the sweep {summary['name']}",
+        most = set(_by_weight(summary)[:_SHOWN])
+        ranked = [key for key in summary["vary"] if key in most]
+        rates = {fact: summary[fact] for fact in FACTS}
+        values = {
+            "worst": worst, "min_rho": _MIN_RHO, "max_values": _VALUES,
+            "groups": {"all": {"scenes": summary["flown"], "rates": rates, "quantiles": summary["quantiles"]}},
+            "ranked": [summary["words"][key] for key in ranked], "effects": list(_effects(summary, ranked)),
+        }  # fmt: skip
+        return PageContents(
+            values, _drawings(results, summary) if worst else [], [row["row"] for row in worst[:replays]], [folder],
+            lambda key: f"Row {key} of the sweep {summary['name']}",
         )  # fmt: skip
+
+    return write_page_with_replays(folder / PAGE, folder / SUMMARY, compute)
 
 
 def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:

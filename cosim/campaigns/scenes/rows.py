@@ -33,19 +33,15 @@ SCHEMA: Any = make_schema((*column, column[1] in (_FLOAT, _TEXT)) for column in 
 
 def row_of(seed: int, score: Score, plant_step: float, scene: str = "") -> Row:
     """Make the row of a flight; plant_step [s]."""
-    stopped = score.failed_step >= 0
-    row = {
+    row = score._asdict()
+    failed_step, stopped = row.pop("failed_step"), score.failed_step >= 0
+    row |= {
         "seed": seed,
         "reached": bool(score.reached),
         "violation": bool(stopped or not score.min_clearance >= 0.0),
-        "min_clearance": score.min_clearance,
-        "bound_excess": score.bound_excess,
-        "weighted_violation": score.weighted_violation,
         "reach_time": score.reach_time if score.reached else None,
-        "effort": score.effort,
-        "thrust_variation": score.thrust_variation,
-        "worst_step_time": score.worst_step,
-        "stopped_at": score.failed_step * plant_step if stopped else None,
+        "worst_step_time": row.pop("worst_step"),
+        "stopped_at": failed_step * plant_step if stopped else None,
         "scene": scene,
     }
     return {key: None if isinstance(x, float) and not math.isfinite(x) else x for key, x in row.items()}

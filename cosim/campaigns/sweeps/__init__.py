@@ -2,5 +2,5 @@
 
 Designs that choose the values, and their rows.
 
-Imports: batch, campaigns.analysis, campaigns.store, campaigns.workers, results, scenario, simulation.
+Imports: batch, campaigns.store, campaigns.workers, results, scenario.
 """

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.rows import SCHEMA, table_of
 from cosim.campaigns.store.results import Results
-from cosim.campaigns.workers import batch_sizing
+from cosim.campaigns.workers import dispatch
 
 DATA = Path(__file__).parents[2] / "data" / "scenes"
 PLAIN, HARD = ([json.loads(line) for line in (DATA / f"{k}.jsonl").read_text().splitlines()] for k in ("plain", "hard"))
@@ -40,7 +40,7 @@ def results_of(path, rows):
 def batches_of(monkeypatch, n):
     """Make every batch hold `n` rows, independent of their duration."""
     for name, value in {"FIRST": n, "MAX_ROWS": n, "TARGET": 1e9, "MIN_TIME": 1e9}.items():
-        monkeypatch.setattr(batch_sizing, name, value)
+        monkeypatch.setattr(dispatch, name, value)
 
 
 def interrupt_after(patch, tables, error=KeyboardInterrupt):

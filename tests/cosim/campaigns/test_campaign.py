@@ -17,8 +17,7 @@ from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer, Score
 from cosim.campaigns.scenes.law_gains import gains_by_law, gains_from
 from cosim.campaigns.scenes.rows import SCHEMA, row_of
-from cosim.campaigns.scenes.scene_file import decode_scene
-from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.scenes.scene_file import SceneStore, decode_scene
 from cosim.campaigns.scenes.work import SceneTask
 from cosim.campaigns.store.folder import PARTS, RESULTS, SUMMARY, CampaignFolder, lock_folder
 from cosim.campaigns.store.plan import difference

@@ -5,8 +5,7 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 
-from cosim.campaigns.workers.batch_sizing import Batch, Batches
-from cosim.campaigns.workers.dispatch import fly_all
+from cosim.campaigns.workers.dispatch import Batch, Batches, fly_all
 from cosim.campaigns.workers.worker_pools import FATAL, WorkerCrash
 from cosim.errors import RunError
 

@@ -148,7 +148,7 @@ def test_ctrl_c_during_replays_leaves_a_page_without_them(tmp_path, monkeypatch)
 
 @pytest.mark.medium
 def test_replay_that_differs_is_marked_on_the_page(tmp_path, monkeypatch):
-    from cosim.campaigns.reruns.repeat import Repeat
+    from cosim.campaigns.rerun import Repeat
 
     out = tmp_path / "out"
     run_campaign(write(tmp_path / "s.jsonl", PLAIN[:1]), "ismail_dunnigan", out, BRIEF)

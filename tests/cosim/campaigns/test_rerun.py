@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cosim.campaigns import Design, run_campaign, run_sweep, vary_from
-from cosim.campaigns.reruns.rerun import rerun
+from cosim.campaigns.rerun import rerun
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.store.folder import RESULTS
@@ -82,7 +82,7 @@ def test_values_that_differ_from_the_design_are_reported(folder, tmp_path):
 
 @pytest.mark.slow
 def test_changed_code_is_reported(folder, tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr("cosim.campaigns.reruns.rerun.code_digest", lambda: "other")
+    monkeypatch.setattr("cosim.campaigns.rerun.code_digest", lambda: "other")
     assert main(["rerun", str(folder), "0", "--out", str(tmp_path / "run")]) == 0
     assert "the code is not that which flew the row" in capsys.readouterr().err
 

@@ -9,7 +9,7 @@ from scipy.stats import f as f_test
 from scipy.stats import f_oneway, spearmanr
 
 from cosim.campaigns.analysis.statistics import bins, effect, median_difference, paired, rate
-from cosim.campaigns.analysis.worst_rows import worst_table
+from cosim.campaigns.analysis.summary import worst_table
 from cosim.campaigns.scenes.flyer import Score
 from cosim.campaigns.scenes.rows import row_of
 from tests.cosim.campaigns.scene_data import results_of

@@ -343,10 +343,10 @@ from pathlib import Path
 from cosim.campaigns import run_sweep
 from cosim.campaigns.store import row_log
 from cosim.campaigns.sweeps import rows
-from cosim.campaigns.workers import batch_sizing
+from cosim.campaigns.workers import dispatch
 from tests.cosim.campaigns.fake import Fake, design, paper
 rows.FusedFlyer = Fake
-batch_sizing.FIRST = batch_sizing.MAX_ROWS = 48
+dispatch.FIRST = dispatch.MAX_ROWS = 48
 
 def resident():
     pages = int(Path("/proc/self/statm").read_text().split()[1])

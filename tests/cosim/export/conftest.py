@@ -33,7 +33,7 @@ def moving_run(shipped_run):
 def killed(run, tmp_path_factory):
     """The folder of a run that was killed; some of its rows have no pose, one number is below zero by no amount."""
     folder = tmp_path_factory.mktemp("killed") / "killed"
-    (folder / "record.parts").mkdir(parents=True)
+    folder.mkdir()
     shutil.copy(run / "scenario.toml", folder)
     table = pq.read_table(run / "record.parquet")
     for name in table.schema.names:
@@ -44,6 +44,6 @@ def killed(run, tmp_path_factory):
             table = table.set_column(at, table.schema.field(at), pa.array(values))
     at = table.schema.get_field_index("bottom_contact")
     table = table.set_column(at, table.schema.field(at), pa.array(np.full(len(table), -0.0)))
-    pq.write_table(table.slice(0, 70), folder / "record.parts" / "000000.parquet")
-    pq.write_table(table.slice(70), folder / "record.parts" / "000001.parquet")
+    with pa.ipc.new_stream(folder / "record.arrows", table.schema) as stream:
+        stream.write_table(table, max_chunksize=70)
     return folder

@@ -229,7 +229,7 @@ def test_memory_does_not_grow_with_the_rows(tmp_path, monkeypatch):
     for n, path in rows.items():
         write_long_run(path, n)
     few, many = rows.values()
-    more = 8 * len(Record([few / "record.parquet"]).units) * 120_000  # bytes
+    more = 8 * len(Record(few / "record.parquet").units) * 120_000  # bytes
     for work in (_told, _exported):
         work(few)  # what is imported and compiled is not counted
         for least, most in zip(_peaks(few, work), _peaks(many, work), strict=True):

@@ -5,6 +5,7 @@ import shutil
 from importlib import resources
 
 import numpy as np
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -105,9 +106,11 @@ def test_plant_error_keeps_recorded_rows(tmp_path):
 def test_a_killed_run_can_be_reported(tmp_path):
     whole = run_scenario(load_scenario("paper", SHORT), tmp_path / "run", report=False)
     killed = tmp_path / "killed"
-    (killed / "record.parts").mkdir(parents=True)
+    killed.mkdir()
     shutil.copy(whole.folder / "scenario.toml", killed)
-    shutil.copy(whole.folder / "record.parquet", killed / "record.parts" / "000000.parquet")
+    table = pq.read_table(whole.folder / "record.parquet")
+    with pa.ipc.new_stream(killed / "record.arrows", table.schema) as stream:
+        stream.write_table(table)
     summary, _ = report_again(killed)
     assert summary["status"] == "killed"
     assert summary["real_time_factor"] is None

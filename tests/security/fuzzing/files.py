@@ -18,8 +18,7 @@ import pyarrow.parquet as pq
 from controller import LAWS
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.scene_file import decode_scene
-from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.scenes.scene_file import SceneStore, decode_scene
 from cosim.logs import import_log
 from cosim.logs.column_map import read_map
 from cosim.mavlink.wire.signing import load_key
@@ -90,7 +89,7 @@ def samples(seeds: Seeds) -> Case:
     "scenes",
     "jsonl",
     "cosim.campaigns.scenes.scene_file:decode_scene",
-    "cosim.campaigns.scenes.scene_store:SceneStore.__init__",
+    "cosim.campaigns.scenes.scene_file:SceneStore.__init__",
 )
 def scenes(seeds: Seeds) -> Case:
     gains = LAWS["ismail_dunnigan"].gains_type()

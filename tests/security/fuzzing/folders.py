@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import msgspec
+import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -17,7 +18,7 @@ from cosim.campaigns.pages.campaign_page import write_campaign_page
 from cosim.campaigns.pages.comparison_page import NUMBERS, write_comparison_page
 from cosim.campaigns.pages.replays import replay_of
 from cosim.campaigns.pages.sweep_page import write_sweep_page
-from cosim.campaigns.reruns.repeat import repeat_of
+from cosim.campaigns.rerun import repeat_of
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.scenes.work import SceneTask
@@ -31,7 +32,7 @@ from cosim.replay.region_changes import changes_of
 from cosim.replay.trace import trace_of
 from cosim.report.web_page import InlineFigure
 from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
-from cosim.results.record import PARTS, RECORD, load_record
+from cosim.results.record import RECORD, STREAM, load_record
 from cosim.results.run_result import _read_summary, load_run, open_run
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.columns import column_names
@@ -90,19 +91,14 @@ def record(seeds: Seeds) -> Case:
     return replace(case, named=str(Path(case.named).parent))
 
 
-@reader("part of a record", "parquet", "cosim.results.record:_opened")
-def part(seeds: Seeds) -> Case:
-    case = record(seeds)
-    folder = seeds.folder()
-    (folder / PARTS).mkdir()
-    (folder / PARTS / "000000.parquet").write_bytes(case.contents[0])
-    path = folder / PARTS / "000001.parquet"
-
-    def read(content: bytes) -> None:
-        path.write_bytes(content)
-        list(load_record(folder).blocks())
-
-    return Case(case.contents, read, str(folder))
+@reader("record of a killed run", "bytes", "cosim.results.record:_opened", "cosim.results.record:_complete_batches")
+def stream(seeds: Seeds) -> Case:
+    table = pq.read_table(io.BytesIO(record(seeds).contents[0]))
+    made = io.BytesIO()
+    with pa.ipc.new_stream(made, table.schema) as writer:
+        writer.write_table(table, max_chunksize=3)
+    case = seeds.file(STREAM, lambda path: list(load_record(path.parent).blocks()), made.getvalue())
+    return replace(case, named=str(Path(case.named).parent))
 
 
 @reader("run", "parquet", "cosim.results.record:_opened", "cosim.results.run_result:open_run")
@@ -142,7 +138,7 @@ def _with_its_scenario(seeds: Seeds, name: str) -> Case:
 
     def read(content: bytes) -> None:
         with pytest.MonkeyPatch.context() as patch:
-            patch.setattr("cosim.campaigns.reruns.repeat.load_scenario", lambda _: scenario)
+            patch.setattr("cosim.campaigns.rerun.load_scenario", lambda _: scenario)
             case.read(content)
 
     return Case(case.contents, read, str(Path(case.named).parent))

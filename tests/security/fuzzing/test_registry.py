@@ -25,7 +25,7 @@ METHODS = {
 ITS_OWN = {  # what parses nothing that comes from outside: why
     "controller.laws.deployable.braking:_least_forces": "an array in memory",
     "cosim.companion.failsafes:Failsafes.receive": "the four bytes of a number of a message",
-    "cosim.campaigns.reruns.repeat:_of_sweep": "a copy of the plan, which was read",
+    "cosim.campaigns.rerun:_of_sweep": "a copy of the plan, which was read",
     "cosim.campaigns.store.folder:CampaignFolder.__init__": "a copy of its own plan",
     "cosim.campaigns.sweeps.rows:_for_json": "a copy of its own plan",
     "cosim.mavlink.services.parameter_protocol:ParameterProtocol._send_hash": "its own hash",

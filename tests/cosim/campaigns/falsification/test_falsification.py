@@ -13,7 +13,7 @@ from cosim.campaigns.falsification import falsification as module
 from cosim.campaigns.falsification.falsification import costs_of, run_falsification
 from cosim.campaigns.falsification.work import ScenarioSearch, SceneSearch, SearchSettings
 from cosim.campaigns.pages.falsification_page import write_falsification_page
-from cosim.campaigns.reruns.rerun import rerun
+from cosim.campaigns.rerun import rerun
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.law_gains import gains_from

@@ -16,8 +16,7 @@ from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.generator import MAKERS, generate_scenes
 from cosim.campaigns.scenes.scene import Failure, plant_parameters
-from cosim.campaigns.scenes.scene_file import read_scenes
-from cosim.campaigns.scenes.scene_store import SceneStore
+from cosim.campaigns.scenes.scene_file import SceneStore, read_scenes
 from cosim.errors import ScenarioError
 from plant_fmu import load_vehicle
 
