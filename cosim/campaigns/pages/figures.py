@@ -177,7 +177,7 @@ def side_by_side(one: str, results: Results, other: str, others: Results, column
                 upright = {"rotation": 90, "ha": "right"} if line == axes.axvline else {}
                 axes.annotate("never", at, (-2, 2), textcoords="offset points", fontsize=8, **upright)
         x, y = (np.where(np.isfinite(values), values, never) for values in (x, y))
-        for what, mask, colour, mark in (
+        for what, mask, color, mark in (
             ("both complete", mine & theirs, GREEN, "o"),
             (f"only {one}", mine & ~theirs, BLUE, "<"),
             (f"only {other}", theirs & ~mine, ORANGE, "^"),
@@ -186,7 +186,7 @@ def side_by_side(one: str, results: Results, other: str, others: Results, column
             if not mask.any():
                 continue
             at = some[mask[some]]
-            axes.plot(x[at], y[at], mark, color=colour, markersize=3.5, alpha=0.7, label=f"{what} ({mask.sum()})")
+            axes.plot(x[at], y[at], mark, color=color, markersize=3.5, alpha=0.7, label=f"{what} ({mask.sum()})")
         axes.plot([low, high], [low, high], color=BLACK, linewidth=0.8)
         axes.set(xlabel=f"{label}, {one}", ylabel=f"{label}, {other}")
     legend_above(figure, panels[0])
