@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
+import functools
 import os
 from typing import Any
 
@@ -27,6 +28,7 @@ void entry(const void *words)
 """
 
 
+@functools.cache
 def rules_text(system: System) -> str:
     """Return the C source of rules with the function ``entry``, from which their library is compiled."""
     return to_c(dataclasses.replace(system, name="rules")) + _ENTRY
