@@ -2,14 +2,9 @@
 
 import contextlib
 import errno
-import io
-import itertools
-import os
 import shlex
 import shutil
-import subprocess
 from pathlib import Path
-from types import SimpleNamespace
 from unittest import mock
 
 import pytest
@@ -17,7 +12,6 @@ import pytest
 from cosim.errors import RunError
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, load_run
 from cosim.run.run import run_scenario
-from cosim.run.run_folder import claim
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.commands import ManualControl, SetTarget
 from cosim.simulation.commands.sources import ScheduledCommands, read_log
@@ -71,22 +65,6 @@ def test_d9_command_succeeds_after_disk_space_is_freed(tmp_path, monkeypatch, of
     assert run_scenario(own, out, report=False).summary["status"] == "completed"
 
 
-def test_d9_rows_recorded_before_a_full_disk_are_kept(tmp_path, monkeypatch):
-    """The first rows are written at once here; the next ones find no space."""
-    opened = itertools.count()
-
-    def space_for_one(*arguments):
-        if next(opened) > 1:  # the schema, and rows
-            raise OSError(errno.ENOSPC, "No space left on device")
-        return io.FileIO(*arguments)
-
-    monkeypatch.setattr("cosim.results.recorder._PERIOD", 0.0)
-    monkeypatch.setattr("cosim.results.recorder.io", SimpleNamespace(FileIO=space_for_one))
-    with pytest.raises(RunError, match="No space left"):
-        run_scenario(scenario(), tmp_path / "run", report=False)
-    assert load_run(tmp_path / "run").summary["status"] == "killed"
-
-
 @pytest.mark.parametrize("steps", [1, 3])
 def test_d9_autopilot_run_on_a_full_disk_leaves_no_folder(tmp_path, monkeypatch, steps):
     own = scenario_to_fly("sitl", [], None, 400, "ardupilot")
@@ -105,46 +83,6 @@ def test_d9_autopilot_run_on_a_full_disk_leaves_no_folder(tmp_path, monkeypatch,
     again.step()
     again.end()
     assert again.conclude("completed", report=False).summary["steps"] == 0
-
-
-@pytest.mark.skipif(os.name != "posix", reason="such a limit is POSIX's")
-def test_d9_run_beyond_the_file_size_limit_leaves_no_folder(tmp_path, monkeypatch):
-    """As a quota has it: the system itself refuses what is longer."""
-    import resource
-
-    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
-
-    def claimed(*arguments):  # by then the FMU is extracted
-        resource.setrlimit(resource.RLIMIT_FSIZE, (ROOM, hard))
-        return claim(*arguments)
-
-    try:
-        with monkeypatch.context() as patch:
-            patch.setattr("cosim.run.run.claim", claimed)
-            with pytest.raises(RunError, match="File too large"):
-                run_scenario(scenario(), tmp_path / "run", report=False)
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
-    assert not (tmp_path / "run").exists()
-    assert run_scenario(scenario(), tmp_path / "run", report=False).summary["status"] == "completed"
-
-
-@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="only root mounts")
-def test_d9_run_on_a_full_small_disk_is_rejected(tmp_path):
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    if subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", disk], capture_output=True).returncode:
-        pytest.skip("nothing can be mounted here")
-    try:
-        (disk / "filling").write_bytes(bytes(52 * 1024))
-        with pytest.raises(RunError, match="No space left"):
-            run_scenario(scenario(), disk / "run", report=False)
-        assert [file.name for file in disk.iterdir()] == ["filling"]
-        (disk / "filling").unlink()
-        subprocess.run(["mount", "-o", "remount,size=4m", disk], check=True)
-        assert run_scenario(scenario(), disk / "run", report=False).summary["status"] == "completed"
-    finally:
-        subprocess.run(["umount", disk], check=True)
 
 
 # ---- the n-th system call that changes a file fails, for each n ----

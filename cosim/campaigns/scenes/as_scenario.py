@@ -11,6 +11,7 @@ from controller.regions.region_set import name_of
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.scenario_scene import AnyScene, ScenarioScene
 from cosim.campaigns.scenes.scene import Scene, plant_parameters, scene_regions
+from cosim.campaigns.scenes.scene_tables import sphere_table
 from cosim.scenario.scenario import Scenario, validate_scenario
 from plant_fmu.vehicle import load_vehicle
 
@@ -37,7 +38,7 @@ def scene_scenario(scene: AnyScene, law: str, gains: Any, conditions: Conditions
             "parameters": plant_parameters(scene, vehicle),
         },
         "initial": {"position": scene.start},
-        "goal": {"type": "sphere", **msgspec.to_builtins(scene.goal)},
+        "goal": sphere_table(scene.goal.centre, scene.goal.radius),
         "law": {"name": law, "gains": gains._asdict()},
         "arbiter": conditions.arbiter_table({"ramp": conditions.ramp}),
         "actuation": {"through": "thrusters"},

@@ -2,6 +2,7 @@
 
 import json
 import math
+import os
 
 import numpy as np
 import pyarrow as pa
@@ -9,7 +10,6 @@ import pyarrow.parquet as pq
 import pytest
 from msgspec.structs import replace
 
-from controller import LawError
 from controller.paper_law import Gains
 from cosim.campaigns import run_campaign
 from cosim.campaigns.analysis.summary import summarize_campaign
@@ -41,8 +41,9 @@ def scenes(tmp_path):
     return write(tmp_path / "scenes.jsonl", many(20))
 
 
-def test_one_row_per_scene_ordered_by_seed(tmp_path, scenes):
+def test_one_row_per_scene_ordered_by_seed(tmp_path, scenes, caplog):
     done = run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
+    assert "is now" not in caplog.text  # what scenes spell as ever warns of no old key
     assert done.flown == 20 and done.summary["medians"]["reach_time"] is None
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [
         ".lock", "campaign.json", "results.parquet", "summary.json"
@@ -76,10 +77,11 @@ def test_rows_equal_the_flyer_scores(tmp_path):
 def test_resumed_campaign_neither_loses_nor_repeats_rows(tmp_path, scenes, monkeypatch):
     whole = run_campaign(scenes, "ismail_dunnigan", tmp_path / "whole", BRIEF)
     batches_of(monkeypatch, 3)
-    for tables in (2, 3):
+    full = OSError(28, os.strerror(28))
+    for tables, error, raised in (2, KeyboardInterrupt, KeyboardInterrupt), (3, full, RunError):
         with monkeypatch.context() as patch:
-            interrupt_after(patch, tables)
-            with pytest.raises(KeyboardInterrupt):
+            interrupt_after(patch, tables, error)
+            with pytest.raises(raised, match="what is flown is kept" if error is full else None):
                 run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
         assert not (tmp_path / "out" / RESULTS).exists()
     last = max((tmp_path / "out" / PARTS).iterdir())
@@ -140,25 +142,11 @@ def test_foreign_folder_is_rejected(tmp_path, scenes):
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["precious"]
 
 
-@pytest.mark.parametrize("content", ["{", "[]", "\xff"])
-def test_a_damaged_plan_is_refused(tmp_path, scenes, content):
-    (tmp_path / "out").mkdir()
-    (tmp_path / "out" / "campaign.json").write_bytes(content.encode("latin-1"))
-    with pytest.raises(RunError, match=r"campaign\.json"):
-        run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
-
-
 def test_a_folder_in_use_is_refused(tmp_path, scenes):
     (tmp_path / "out").mkdir()
     with lock_folder(tmp_path / "out"), pytest.raises(RunError, match="another process is at work"):
         run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF)
     assert run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF).flown == 20
-
-
-def test_unwritable_folder_is_rejected(tmp_path, scenes):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(RunError, match="file"):
-        run_campaign(scenes, "ismail_dunnigan", tmp_path / "file" / "out", BRIEF)
 
 
 def test_scene_rejected_by_the_plant_has_a_marked_row(tmp_path):
@@ -175,23 +163,19 @@ def test_scene_rejected_by_the_plant_has_a_marked_row(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("score", "violation", "stopped_at"),
+    ("score", "violation", "stopped_at", "reach_time"),
     [
-        (Score(True, 5.0, 0.0, 1.0, 1.0, 1e-6, -1), False, None),
-        (Score(True, 5.0, -1e-9, 1.0, 1.0, 1e-6, -1), True, None),
-        (Score(False, math.inf, math.nan, math.nan, math.inf, 1e-6, -1), True, None),
-        (Score(False, math.inf, 0.5, 1.0, 1.0, 1e-6, 150), True, 1.5),
+        (Score(True, 5.0, 0.0, 1.0, 1.0, 1e-6, -1), False, None, 5.0),
+        (Score(True, 5.0, -1e-9, 1.0, 1.0, 1e-6, -1), True, None, 5.0),
+        (Score(False, 115.0, 0.1, 1.0, 1.0, 1e-6, -1), False, None, None),
+        (Score(False, math.inf, math.nan, math.nan, math.inf, 1e-6, -1), True, None, None),
+        (Score(False, math.inf, 0.5, 1.0, 1.0, 1e-6, 150), True, 1.5, None),
     ],
 )
-def test_unproven_safety_counts_as_violation(score, violation, stopped_at):
+def test_unproven_safety_counts_as_violation(score, violation, stopped_at, reach_time):
     row = row_of(7, score, 0.01)
-    assert (row["violation"], row["stopped_at"]) == (violation, stopped_at)
+    assert (row["violation"], row["stopped_at"], row["reach_time"]) == (violation, stopped_at, reach_time)
     assert all(math.isfinite(x) for x in row.values() if isinstance(x, float))
-
-
-def test_reach_time_exists_only_if_goal_was_reached():
-    late, early = (Score(reached, 115.0, 0.1, 1.0, 1.0, 1e-6, -1) for reached in (False, True))
-    assert [row_of(7, score, 0.01)["reach_time"] for score in (late, early)] == [None, 115.0]
 
 
 def test_the_summary_follows_from_the_rows(tmp_path):
@@ -256,31 +240,8 @@ def test_scene_store_returns_each_scene_and_ignores_whitespace(tmp_path):
 def test_gains_are_parsed_from_text():
     assert gains_from("ismail_dunnigan", ["k_p1=10", " gamma = 3e0 "]) == Gains(k_p1=10.0, gamma=3.0)
     assert gains_by_law(["ismail_dunnigan"], ["ismail_dunnigan.k_q=2"]) == {"ismail_dunnigan": Gains(k_q=2.0)}
-
-
-@pytest.mark.parametrize(
-    ("law", "settings", "words"),
-    [
-        ("ismail_dunigan", [], "law 'ismail_dunigan' is unknown; did you mean 'ismail_dunnigan'"),
-        ("ismail_dunnigan", ["k_p1"], "expected key=value"),
-        ("ismail_dunnigan", ["kp1=3"], "no such gain; did you mean 'k_p1'"),
-        ("ismail_dunnigan", ["k_p1=much"], "'much' is no number"),
-    ],
-)
-def test_invalid_gains_are_rejected(law, settings, words):
-    with pytest.raises(RunError, match=words):
-        gains_from(law, settings)
-
-
-def test_gains_of_an_absent_law_are_rejected():
     with pytest.raises(RunError, match=r"expected LAW\.KEY=VALUE with one of ismail_dunnigan"):
         gains_by_law(["ismail_dunnigan"], ["k_p1=3"])
-
-
-def test_gains_rejected_by_the_law_leave_no_folder(tmp_path, scenes):
-    with pytest.raises(LawError, match="gamma"):
-        run_campaign(scenes, "ismail_dunnigan", tmp_path / "out", BRIEF, gains_from("ismail_dunnigan", ["gamma=0"]))
-    assert not (tmp_path / "out").exists()
 
 
 def test_zero_workers_are_rejected(tmp_path, scenes):

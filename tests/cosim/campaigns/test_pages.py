@@ -255,36 +255,34 @@ def hostile(value, free=False):
     return ATTACK if isinstance(value, str) else value
 
 
-def attack(numbers, write_page):
-    """Check that a page whose numbers hold attacks has the elements that it has without them."""
-    page = write_page(numbers.parent, 0)
+def campaign_to_attack(out, flown, fakes, idle):
+    shutil.copytree(flown, out)
+    return out / "summary.json", write_campaign_page
+
+
+def sweep_to_attack(out, flown, fakes, idle):
+    fakes(Choosy)
+    run_sweep(paper(), design(20), out)
+    return out / "summary.json", write_sweep_page
+
+
+def comparison_to_attack(out, flown, fakes, idle):
+    compare(write(out.parent / "s.jsonl", [*HARD[:2], REFUSED]), ["ismail_dunnigan", "idle"], out, BRIEF)
+    return out / "compare.json", write_comparison_page
+
+
+@pytest.mark.medium(fast=1)
+@pytest.mark.parametrize("make", [sweep_to_attack, campaign_to_attack, comparison_to_attack])
+def test_hostile_texts_are_escaped(make, flown, tmp_path, fakes, idle):
+    """A page whose numbers hold attacks has the elements that it has without them."""
+    numbers, write_page = make(tmp_path / "out", flown, fakes, idle)
+    page, table = write_page(numbers.parent, 0), json.loads(numbers.read_text())
     plain = Elements(page.read_text()).found
-    table = json.loads(numbers.read_text())
-    assert hostile(table) != table
     numbers.write_text(json.dumps(hostile(table)))
     write_page(numbers.parent, 0)
     attacked = page.read_text()
     assert Elements(attacked).found == plain and "script" not in {tag for tag, _ in plain}
     assert "harm()" in attacked and "{{ s }} 5\N{NO-BREAK SPACE}%" in attacked
-
-
-@pytest.mark.medium
-def test_hostile_texts_of_a_campaign_are_escaped(flown, tmp_path):
-    shutil.copytree(flown, tmp_path / "out")
-    attack(tmp_path / "out" / "summary.json", write_campaign_page)
-
-
-@pytest.mark.medium
-def test_hostile_texts_of_a_sweep_are_escaped(tmp_path, fakes):
-    fakes(Choosy)
-    run_sweep(paper(), design(20), tmp_path / "out")
-    attack(tmp_path / "out" / "summary.json", write_sweep_page)
-
-
-@pytest.mark.slow
-def test_hostile_texts_of_a_comparison_are_escaped(tmp_path, idle):
-    compare(write(tmp_path / "s.jsonl", [*HARD[:2], REFUSED]), ["ismail_dunnigan", "idle"], tmp_path / "out", BRIEF)
-    attack(tmp_path / "out" / "compare.json", write_comparison_page)
 
 
 @pytest.mark.parametrize(

@@ -34,23 +34,6 @@ def rows_of(folder):
 
 @needs_posix
 @pytest.mark.slow
-def test_killed_sweep_resumes_with_the_same_command(command):
-    words = [*SLOW, "--workers", 2]
-    killed = command(*words)
-    killed.wait_for_rows(4)
-    os.kill(killed.process.pid, signal.SIGKILL)
-    killed.process.communicate(timeout=240)  # which its workers, who follow, hold open
-    assert killed.gone()
-    before = killed.keys()
-    assert 4 <= len(before) < N and len(set(before)) == len(before)
-    again = command(*words)
-    said, complaints = again.process.communicate(timeout=240)
-    assert (again.process.returncode, complaints) == (0, "")
-    assert f"{N} of {N} rows flown" in said and rows_of(again.out) == expected(N)
-
-
-@needs_posix
-@pytest.mark.slow
 def test_workers_that_are_killed_are_replaced(command):
     bereft = command(*SLOW, "--workers", 2)
     for count in (30, 200):
@@ -64,9 +47,8 @@ def test_workers_that_are_killed_are_replaced(command):
 
 @needs_posix
 @pytest.mark.slow
-@pytest.mark.parametrize("words", [("--workers", 1), ("--workers", 2), ("--workers", 2, "--dask")])
-def test_ctrl_c_keeps_completed_rows(command, words):
-    interrupted = command(*SLOW, *words)
+def test_ctrl_c_on_dask_keeps_completed_rows(command):
+    interrupted = command(*SLOW, "--workers", 2, "--dask")
     interrupted.wait_for_rows(3)
     os.killpg(interrupted.process.pid, signal.SIGINT)  # as a terminal does
     said, complaints = interrupted.process.communicate(timeout=240)

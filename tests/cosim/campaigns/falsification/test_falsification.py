@@ -21,7 +21,6 @@ from cosim.campaigns.scenes.rows import refused_row, row_of, table_of
 from cosim.campaigns.scenes.work import SceneTask
 from cosim.campaigns.store.folder import PARTS
 from cosim.command_line.cli import main
-from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
 from tests.cosim.campaigns.fake import Choosy, fakes
 from tests.cosim.campaigns.scene_data import BRIEF, interrupt_after, rows
@@ -136,13 +135,6 @@ def test_resumed_search_gives_the_same_rows(make, tmp_path, monkeypatch):
 def test_rows_are_the_same_for_any_number_of_workers(tmp_path):
     one, two = (run_falsification(search(), tmp_path / str(n), workers=n) for n in (1, 2))
     assert rows(one.results) == rows(two.results)
-
-
-@pytest.mark.medium
-def test_folder_of_another_search_is_rejected(tmp_path):
-    run_falsification(search(), tmp_path / "out")
-    with pytest.raises(RunError, match=r"holds another campaign \(search.seed is 0, now 1\)"):
-        run_falsification(search(seed=1), tmp_path / "out")
 
 
 @pytest.mark.slow
