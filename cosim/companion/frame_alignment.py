@@ -72,14 +72,12 @@ class FrameAlignment:
         sample = self._sample(state) if self._processed[1] != before[1] else None
         if sample is None:
             return
-        if self.offset is None:
+        if self._reference is None:
             self._samples.append(sample)
-            if len(self._samples) == _SAMPLES and np.max(np.std(self._samples, axis=0)) < _SPREAD:
-                self.offset = self._reference = np.mean(self._samples, axis=0)
-        elif self._reference is None:
-            self._samples.append(sample)
-            if len(self._samples) == _SAMPLES:
+            agree = self.offset is not None or np.max(np.std(self._samples, axis=0)) < _SPREAD
+            if len(self._samples) == _SAMPLES and agree:
                 self._reference = np.mean(self._samples, axis=0)
+                self.offset = self._reference if self.offset is None else self.offset
         else:
             error = np.where(np.isfinite(sample), sample - self._reference, 0.0)
             self._drift += _SMOOTHING * (error - self._drift)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification.fit import STAGES, single_thread
-from cosim.identification.log import Log, make_topic
+from cosim.identification.log import STATES, Log, make_topic
 from cosim.identification.parameters import DEFAULT_FREE, DEFAULT_NUISANCES, Parameter, free_parameters, nuisances
 from cosim.identification.residuals import Residuals
 from cosim.identification.windows import cut_windows
@@ -87,15 +87,11 @@ class Rehearsal:
     def log(self) -> Log:
         """Return the sensors' measurements without noise, together with the standard deviations of the noise."""
         dvl = slice(None, None, max(1, round(DVL_PERIOD / float(self.times[1] - self.times[0]))))
-        samples = {
-            "velocity": (dvl, slice(7, 10)), "angular_velocity": (slice(None), slice(10, 13)),
-            "depth": (slice(None), slice(2, 3)), "attitude": (slice(None), slice(3, 7)),
-        }  # fmt: skip
-        topics = tuple(
-            make_topic(name, self.times[rows], self.states[rows, columns], NOISE[name])
-            for name, (rows, columns) in samples.items()
-        )
-        return Log("rehearsal", self.times, self.thrust, np.zeros((len(self.times), 6)), topics)
+        topics = []
+        for name, noise in NOISE.items():
+            rows = dvl if name == "velocity" else slice(None)
+            topics.append(make_topic(name, self.times[rows], self.states[rows, STATES[name]], noise))
+        return Log("rehearsal", self.times, self.thrust, np.zeros((len(self.times), 6)), tuple(topics))
 
 
 @dataclass(frozen=True)

@@ -36,25 +36,16 @@ _MAD = 1.4826  # standard deviation of a normal distribution, in median absolute
 _SAMPLED = ("pulses", "effort")  # quantities of commands that an autopilot logs slower than it changes them
 _MEANS = ("VISO", "VISION_POSITION_DELTA")  # DVL messages with the displacement since the last message
 
-# topic: columns that may hold it, in order of preference, each with the column of its samples' times or ""
-_COLUMNS: dict[str, tuple[tuple[tuple[str, ...], str], ...]] = {
-    name: tuple((tuple(f"{prefix}{axis}" for axis in axes), stamp) for prefix, axes, stamp in columns)
-    for name, columns in {
-        "velocity": (
-            ("measured.velocity.", "uvw", "measured.time.dvl"),
-            ("sensed.", "uvw", ""),
-            ("velocity.", "uvw", ""),
-        ),
-        "angular_velocity": (("measured.angular_velocity.", "pqr", "measured.time.imu"), ("velocity.", "pqr", "")),
-        "depth": (("measured.", ("depth",), "measured.time.depth_sensor"), ("position.", "z", "")),
-        "attitude": (("sensed.e", "0123", ""), ("quaternion.e", "0123", "")),
-        "position": (
-            ("measured.position.", "xyz", "measured.time.usbl"),
-            ("sensed.", "xyz", ""),
-            ("position.", "xyz", ""),
-        ),
-    }.items()
-}
+# topic: columns that may hold it, in order of preference, by prefix and axes, and the column of their samples' times
+_COLUMNS: dict[str, tuple[tuple[str, str, str], ...]] = {
+    "velocity": (("measured.velocity.", "uvw", "measured.time.dvl"), ("sensed.", "uvw", ""), ("velocity.", "uvw", "")),
+    "angular_velocity": (("measured.angular_velocity.", "pqr", "measured.time.imu"), ("velocity.", "pqr", "")),
+    "depth": (("measured.depth", "", "measured.time.depth_sensor"), ("position.", "z", "")),
+    "attitude": (("sensed.e", "0123", ""), ("quaternion.e", "0123", "")),
+    "position": (
+        ("measured.position.", "xyz", "measured.time.usbl"), ("sensed.", "xyz", ""), ("position.", "xyz", ""),
+    ),
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -181,7 +172,8 @@ def _topics(record: Record, time: Array) -> Iterator[Topic]:
     for name in TOPICS:
         if name == "position" and has_velocity:
             continue
-        for columns, stamp in _COLUMNS[name]:
+        for prefix, axes, stamp in _COLUMNS[name]:
+            columns = [prefix + axis for axis in axes] or [prefix]
             if not all(column in record.units for column in columns):
                 continue
             times, values = _samples(record, time, columns, stamp if stamp in record.units else "")

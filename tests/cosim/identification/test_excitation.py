@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from cosim.identification.excitation import (
 )  # fmt: skip
 from cosim.identification.parameters import free_parameters
 from cosim.simulation.commands.commands import SetMode, validate_command
-from plant_fmu import load_vehicle
+from plant_fmu import Plant, load_vehicle
 
 FREE = ("hydrodynamics.quadratic_damping.1", "hydrodynamics.added_mass.1.1", "hydrostatics.buoyancy")
 
@@ -148,7 +149,15 @@ def test_identification_recovers_the_plant_from_an_excitation_run(tmp_path, monk
     replay = ["--replay-commands", str(pool / "commands.jsonl"), "--no-report", "--out", str(run), "-q"]
     assert main(["run", str(pool / "excite.toml"), *replay, *truth]) == 0
     assert main(["identify", str(run), *start, "--free", *FREE, "--out", str(mine)]) == 0
+    assert "chi² is" in capsys.readouterr().out
+    text, page = mine.read_text(), mine.with_suffix(".html").read_text()
+    assert text.startswith("# Identified by cosim identify from run") and " ± " in text
+    assert not re.search(r'(src|href)="https?:', page) and "Hold the start velocity" in page
     found = load_vehicle(mine)
+    assert found.name == "mine" and found.linear_damping == pytest.approx(VEHICLE.linear_damping)
     assert found.quadratic_damping[0] == pytest.approx(100.0, rel=0.01)
-    assert found.added_mass[0, 0] == pytest.approx(load_vehicle("bluerov2_heavy").added_mass[0, 0], rel=0.02)
+    assert found.added_mass[0, 0] == pytest.approx(VEHICLE.added_mass[0, 0], rel=0.02)
     assert found.buoyancy == pytest.approx(130.5, abs=0.02)
+    with Plant(found) as plant:
+        plant.initialize()
+        plant.step(0.1)
