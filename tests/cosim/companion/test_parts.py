@@ -15,7 +15,6 @@ from cosim.companion.companion_run import Companion
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
 from cosim.companion.heading import HeadingWatch, LevelDive
-from cosim.companion.outputs import require_supported
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
 from cosim.companion.set_points import TurnLead, VelocityLead, make_attitude_message, make_velocity_target
 from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels, release_channels
@@ -61,18 +60,19 @@ def test_autopilot_restart_resets_the_clock_offset():
 
 
 def reported(position, geodetic=None, depth=None, heard=0.0, state=None):
+    """Let a state receive position and, where they are given, latitude and longitude and the pressure of a depth."""
     state = state or ReportedState((255, 191))
-    beat = mavlink.MAVLink_heartbeat_message(12, 3, 1, 0, 4, 3)
-    state.receive(1, 1, beat, heard)
-    x, y, z = map(float, position)
-    state.receive(1, 1, mavlink.MAVLink_local_position_ned_message(round(heard * 1e3), x, y, z, 0, 0, 0), heard)
+    messages = [
+        mavlink.MAVLink_heartbeat_message(12, 3, 1, 0, 4, 3),
+        mavlink.MAVLink_local_position_ned_message(round(heard * 1e3), *map(float, position), 0, 0, 0),
+    ]
     if depth is not None:
-        pressure = 1013.25 + 1000.0 * 9.80665 * depth / 100.0
-        state.receive(1, 1, mavlink.MAVLink_scaled_pressure2_message(0, pressure, 0, 0), heard)
+        messages += [mavlink.MAVLink_scaled_pressure2_message(0, 1013.25 + 1000.0 * 9.80665 * depth / 100.0, 0, 0)]
     if geodetic is not None:
-        latitude, longitude, _ = geodetic
-        state.receive(1, 1, mavlink.MAVLink_global_position_int_message(
-            0, round(latitude * 1e7), round(longitude * 1e7), 0, 0, 0, 0, 0, 0), heard)  # fmt: skip
+        degrees = (round(angle * 1e7) for angle in geodetic[:2])
+        messages += [mavlink.MAVLink_global_position_int_message(0, *degrees, 0, 0, 0, 0, 0, 0)]
+    for message in messages:
+        state.receive(1, 1, message, heard)
     return state
 
 
@@ -221,17 +221,12 @@ def test_state_is_predicted_over_its_age():
 @pytest.mark.parametrize(
     ("profile", "steer_by", "sticks_by", "word"),
     [
-        ("px4", "sticks", "manual-control", "forward stick"),
-        ("px4", "wrench", "manual-control", "no roll and pitch"),
-        ("px4", "velocity", "manual-control", "pushes nowhere"),
-        ("px4", "attitude", "rc-override", "no sticks are sent"),
-        ("ardusub", "velocity", "rc-override", "no sticks are sent"),
-        ("generic", "attitude", "rc-override", "no sticks are sent"),
+        ("px4", "sticks", "manual-control", "forward stick"), ("px4", "wrench", "manual-control", "no roll and pitch"),
+        ("px4", "velocity", "manual-control", "pushes nowhere"), ("px4", "attitude", "rc-override", "no sticks are"),
+        ("ardusub", "velocity", "rc-override", "no sticks"), ("generic", "attitude", "rc-override", "no sticks are"),
     ],
-)
+)  # fmt: skip
 def test_unsupported_setpoints_are_rejected_by_name(profile, steer_by, sticks_by, word):
-    with pytest.raises(RunError, match=word):
-        require_supported(profile, steer_by, sticks_by)
     with pytest.raises(RunError, match=word):
         Companion(scenario(name="pipe-inspection"), None, CompanionOptions(profile, steer_by, sticks_by))
 
@@ -365,21 +360,21 @@ def dived(texts=(), clearance=None, armed_first=False):
     raise AssertionError("it dives on")
 
 
-def test_an_ardusub_dives_until_its_heading_is_aligned():
-    _, state, since = dived(["EKF3 IMU0 MAG0 in-flight yaw alignment complete"])
-    assert state.position[2] == pytest.approx(1.6, abs=0.06) and 6.0 < since < 8.0
-    _, state, without = dived()  # an older one says nothing
-    assert state.position[2] == pytest.approx(1.6, abs=0.06) and without > since
-
-
-def test_a_vehicle_that_was_armed_before_is_not_dived():
-    assert dived(armed_first=True)[2] == 0.0
-
-
-def test_there_is_no_dive_without_room(caplog):
-    assert dived(clearance=lambda position: 1.5 - position[2])[2] == 0.0
-    assert "too near within 0.6 m below" in caplog.text
-    assert dived(clearance=lambda position: 2.0 - position[2])[1].position[2] > 1.5
+@pytest.mark.parametrize(
+    ("texts", "clearance", "armed_first", "depth", "seconds"),
+    [
+        (["EKF3 IMU0 MAG0 in-flight yaw alignment complete"], None, False, 1.6, 7.0),
+        ((), None, False, 1.6, 9.0),  # an older one says nothing
+        ((), None, True, 1.0, 0.0),
+        ((), 1.5, False, 1.0, 0.0),
+        ((), 2.0, False, 1.6, 9.0),
+    ],
+)
+def test_an_ardusub_dives_until_its_heading_is_aligned(texts, clearance, armed_first, depth, seconds, caplog):
+    """Unless it was armed before, or a hard region is near below."""
+    _, state, since = dived(texts, clearance and (lambda position: clearance - position[2]), armed_first)
+    assert state.position[2] == pytest.approx(depth, abs=0.06) and since == pytest.approx(seconds, abs=1.0)
+    assert ("too near within 0.6 m below" in caplog.text) == (clearance == 1.5)
 
 
 # ---- who may steer ----
