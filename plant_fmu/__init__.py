@@ -9,22 +9,10 @@ if TYPE_CHECKING:
     from plant_fmu.running import Plant
     from plant_fmu.vehicle import Vehicle, load_vehicle, shipped_vehicles
 
-__all__ = [
-    "Plant",
-    "PlantError",
-    "PlantFmuError",
-    "Vehicle",
-    "build_fmu",
-    "load_vehicle",
-    "shipped_vehicles",
-]
+__all__ = ["Plant", "PlantError", "PlantFmuError", "Vehicle", "build_fmu", "load_vehicle", "shipped_vehicles"]
 
 # imported on first use, so that the command can report a dependency that is not installed
-_HOMES = {
-    "build": {"build_fmu"},
-    "running": {"Plant"},
-    "vehicle": {"Vehicle", "load_vehicle", "shipped_vehicles"},
-}
+_HOMES = {"build": {"build_fmu"}, "running": {"Plant"}, "vehicle": {"Vehicle", "load_vehicle", "shipped_vehicles"}}
 
 
 def __getattr__(name: str) -> object:

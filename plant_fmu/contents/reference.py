@@ -26,9 +26,7 @@ STATES = (
 COLUMNS = ("time", *STATES, "attitude.roll", "attitude.pitch", "attitude.yaw")
 
 # moving and turning at the start, in a current; well below the surface
-START = dict(
-    zip(STATES, (0.0, 0.0, 10.0, 0.96, 0.0, 0.0, 0.28, 0.2, -0.1, 0.05, 0.05, -0.04, 0.1), strict=True),
-)
+START = dict(zip(STATES, (0.0, 0.0, 10.0, 0.96, 0.0, 0.0, 0.28, 0.2, -0.1, 0.05, 0.05, -0.04, 0.1), strict=True))
 _START_QUATERNION = np.array([START[f"quaternion.e{i}"] for i in range(4)])
 CURRENT = {"current.x": 0.3, "current.y": -0.2, "current.z": 0.05}  # m/s, world frame
 

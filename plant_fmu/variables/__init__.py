@@ -6,11 +6,4 @@ Imports: nothing.
 from plant_fmu.variables.table import variables
 from plant_fmu.variables.variable import AXES, FORCES, VELOCITIES, Role, Variable
 
-__all__ = [
-    "AXES",
-    "FORCES",
-    "VELOCITIES",
-    "Role",
-    "Variable",
-    "variables",
-]
+__all__ = ["AXES", "FORCES", "VELOCITIES", "Role", "Variable", "variables"]

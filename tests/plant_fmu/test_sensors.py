@@ -104,8 +104,7 @@ def test_samples_do_not_depend_on_the_communication_step(make_slave, fmi):
 
 def test_noise_is_normal_and_white(make_slave):
     slave = make_slave().start(
-        weight=1228.25,
-        **{"depth_sensor.rate": 1e3, "depth_sensor.noise": 0.5, "usbl.rate": 1e3, "usbl.noise": 2.0},
+        weight=1228.25, **{"depth_sensor.rate": 1e3, "depth_sensor.noise": 0.5, "usbl.rate": 1e3, "usbl.noise": 2.0}
     )
     rows = []
     for k in range(4000):
