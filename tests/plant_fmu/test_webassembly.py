@@ -18,7 +18,6 @@ from plant_fmu import build_fmu, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling import webassembly
-from plant_fmu.compiling.component_model import wit
 from plant_fmu.compiling.libraries import FMI_HEADERS
 from plant_fmu.compiling.platforms import without_wasm
 from plant_fmu.compiling.sources import c_sources, compiled_files, header
@@ -258,11 +257,11 @@ def test_fmu_follows_the_wasm_draft_and_remains_readable(binaries):
 
 def test_interfaces_match_the_draft():
     """57 functions of co-simulation and 65 of model exchange: counted in the draft's own files."""
-    text = wit(model_exchange=True)
+    text = webassembly.wit(model_exchange=True)
     parts = {part.partition(" ")[0]: part.count(": func(") + part.count(": static func(")
              for part in text.split("interface ")[1:]}  # fmt: skip
     assert parts == {"types": 0, "callbacks": 4, "common": 1, "co-simulation": 57, "model-exchange": 65}
-    assert "model-exchange" not in wit(model_exchange=False)
+    assert "model-exchange" not in webassembly.wit(model_exchange=False)
 
 
 @pytest.mark.parametrize(
