@@ -3,33 +3,37 @@
 from __future__ import annotations
 
 import functools
-import re
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
-from plant_fmu.autopilot import Autopilot, validate_autopilot
+from plant_fmu.autopilot import Autopilot
 from plant_fmu.errors import TableError, VehicleError
-from plant_fmu.toml_tables import Table, decode, read_toml
-
-Vector3 = tuple[float, float, float]
-Vector6 = tuple[float, float, float, float, float, float]
-Rows = tuple[tuple[float, ...], ...]
-Matrix = tuple[float | tuple[float, ...], ...]  # rows, or a diagonal
+from plant_fmu.toml_tables import Table, decode, key, read_toml, require
 
 MAX_NUMBER = 1e15  # bound of every number of a vehicle, so that derived numbers are finite
 MAX_THRUSTERS = 100  # maximum number of thrusters of a vehicle
 
+Number = Annotated[float, Meta(ge=-MAX_NUMBER, le=MAX_NUMBER)]
+Amount = Annotated[float, Meta(ge=0.0, le=MAX_NUMBER)]
+Fraction = Annotated[float, Meta(ge=0.0, le=1.0)]
+Vector3 = tuple[Number, Number, Number]
+Damping = tuple[Amount, Amount, Amount, Amount, Amount, Amount]  # of u v w p q r (Property 3)
+Rows = tuple[tuple[Number, ...], ...]
+Matrix = tuple[Number | tuple[Number, ...], ...]  # rows, or a diagonal
+
 # a name becomes C text and a file's name: neither may be a word that C99 or Windows keep for themselves
-_RESERVED = re.compile(
+_RESERVED = (
     "auto|break|case|char|const|continue|default|do|double|else|enum|extern|float|for|goto|if|inline|int|long|register|"
     "restrict|return|short|signed|sizeof|static|struct|switch|typedef|union|unsigned|void|volatile|while|"
     "(?i:con|prn|aux|nul|com[1-9]|lpt[1-9])"
 )
+_NAME = "at most 64 letters, digits, _ and -, the first a letter or _, and no word that C or Windows reserves"
 
 # key of the file for each number of a vehicle
 _KEYS = {
@@ -51,21 +55,22 @@ _KEYS = {
     "thrust_curve": "thrusters.curve",
     "hull_radius": "hull.radius",
 }
+_ORDERS = {"inertia": 3, "added_mass": 6}  # symmetric matrices
 
 
 class RigidBody(Table, frozen=True):
     """Mass, inertia about the body origin, center of gravity and weight."""
 
-    mass: float  # kg
+    mass: Annotated[float, key("Mass", "kg", gt=0.0, le=MAX_NUMBER)]
     inertia: Matrix  # kg m2, 3 by 3 about the body origin, or its diagonal
     center_of_gravity: Vector3  # m, body frame
-    weight: float  # N
+    weight: Annotated[float, key("Weight", "N", ge=0.0, le=MAX_NUMBER)]
 
 
 class Hydrostatics(Table, frozen=True):
     """Buoyancy and its center."""
 
-    buoyancy: float  # N
+    buoyancy: Annotated[float, key("Buoyancy", "N", ge=0.0, le=MAX_NUMBER)]
     center_of_buoyancy: Vector3  # m, body frame
 
 
@@ -73,31 +78,31 @@ class Hydrodynamics(Table, frozen=True):
     """Added mass and damping, positive in the equation of motion."""
 
     added_mass: Matrix  # kg, kg m, kg m2: 6 by 6, or its diagonal
-    linear_damping: Vector6  # N s/m, N m s/rad
-    quadratic_damping: Vector6  # N s2/m2, N m s2/rad2
+    linear_damping: Damping  # N s/m, N m s/rad
+    quadratic_damping: Damping  # N s2/m2, N m s2/rad2
 
 
 class Thrusters(Table, frozen=True):
     """Wrench, limits and dynamics of each thruster."""
 
     matrix: Rows  # 6 rows (X Y Z K M N), a column for each thruster: wrench of one newton
-    force_min: float | tuple[float, ...]  # N, most negative force
-    force_max: float | tuple[float, ...]  # N, maximum force
-    time_constant: float | tuple[float, ...] = 0.0  # s, time constant of the lag
-    rate_limit: float | tuple[float, ...] = 0.0  # N/s, maximum rate of the force; 0: none
-    dead_band: float | tuple[float, ...] = 0.0  # fraction of the command's range that gives no force
-    curve: float | tuple[float, ...] = 0.0  # 0: force linear in the command; 1: quadratic; between: a mixture
+    force_min: Number | tuple[Number, ...]  # N, most negative force
+    force_max: Number | tuple[Number, ...]  # N, maximum force
+    time_constant: Amount | tuple[Amount, ...] = 0.0  # s, time constant of the lag
+    rate_limit: Amount | tuple[Amount, ...] = 0.0  # N/s, maximum rate of the force; 0: none
+    dead_band: Fraction | tuple[Fraction, ...] = 0.0  # fraction of the command's range that gives no force
+    curve: Fraction | tuple[Fraction, ...] = 0.0  # 0: force linear in the command; 1: quadratic; between: a mixture
 
 
 class Hull(Table, frozen=True):
     """The sphere about the body origin that meets surface and bottom, and the shape in pictures."""
 
-    radius: float = 0.0  # m
+    radius: Amount = 0.0  # m
     shape: Literal["frame", "sphere"] = "frame"  # shape in pictures; the dynamics do not depend on it
 
 
 class _File(Table, frozen=True):
-    name: str
+    name: Annotated[str, key("Name", pattern=f"^(?!({_RESERVED})$)[A-Za-z_][A-Za-z0-9_-]{{0,63}}\\Z", expected=_NAME)]
     title: str
     source: str
     rigid_body: RigidBody
@@ -184,9 +189,9 @@ def load_vehicle(name_or_file: str | Path) -> Vehicle:
     Raises
     ------
     VehicleError
-        If there is no such vehicle, or a number is impossible.
+        If there is no such vehicle, or its numbers contradict each other.
     TableError
-        If the file has a missing, unknown or mistyped key.
+        If the file has a missing, unknown or mistyped key, or a number out of range.
 
     Examples
     --------
@@ -213,117 +218,70 @@ def _shipped(name: str) -> Vehicle:
 
 def _decode(path: Path, where: str) -> Vehicle:
     try:
-        file: _File = decode(read_toml(path), _File)
+        return _make_vehicle(decode(read_toml(path), _File))
     except TableError as error:
         raise TableError(f"{where}: {error}") from error
-    return _make_vehicle(file, where)
+    except ValueError as error:
+        raise VehicleError(f"{where}: {error}") from error
 
 
 def _folder() -> resources.abc.Traversable:
     return resources.files("plant_fmu") / "vehicles"
 
 
-def _make_vehicle(file: _File, where: str) -> Vehicle:
-    """Convert the file's numbers to arrays, and name the first impossible one."""
-
-    def require(ok: bool, key: str, received: object, expected: str) -> None:
-        if not ok:
-            raise VehicleError(f"{where}: {key} is {received}, expected {expected}")
-
-    def square(value: Matrix, n: int, key: str) -> NDArray[np.float64]:
-        widths = {len(row) or -1 if isinstance(row, tuple) else 0 for row in value}  # 0: a number, no row
-        ok = len(value) == n and widths in ({0}, {n})
-        rows = f"rows of {sorted(max(width, 0) for width in widths)} " if widths != {0} else ""
-        received = f"{len(value)} {rows}numbers"
-        require(ok, key, received, f"a diagonal of {n}, or {n} by {n}")
-        return np.diag(np.array(value)) if widths == {0} else np.array(value, dtype=float)
-
-    body, statics, dynamics, thrusters = file.rigid_body, file.hydrostatics, file.hydrodynamics, file.thrusters
-    name_ok = re.fullmatch("[A-Za-z_][A-Za-z0-9_-]{0,63}", file.name) is not None
-    require(name_ok, "name", repr(file.name[:80]), "at most 64 letters, digits, _ and -, the first a letter or _")
-    require(not _RESERVED.fullmatch(file.name), "name", repr(file.name), "a word that neither C nor Windows reserves")
-    require(file.title.isprintable(), "title", repr(file.title), "one line of printable characters")
-    unprintable = next((c for c in " ".join(file.source.split()) if not c.isprintable()), "")
-    require(not unprintable, "source", f"text with {unprintable!r}", "printable characters")
-
-    widths = {len(row) for row in thrusters.matrix}
+def _make_vehicle(file: _File) -> Vehicle:
+    """Convert the file's numbers to arrays, and refuse those that contradict each other."""
+    source = " ".join(file.source.split())
+    for field, text in (("title", file.title), ("source", source)):
+        unprintable = next((c for c in text if not c.isprintable()), "")
+        require(not unprintable, field, f"text with {unprintable!r}", "one line of printable characters")
+    matrix = file.thrusters.matrix
+    widths = {len(row) for row in matrix}
     require(
-        len(thrusters.matrix) == 6 and len(widths) == 1 and 1 <= min(widths) <= MAX_THRUSTERS,
-        "thrusters.matrix",
-        f"{len(thrusters.matrix)} rows of {sorted(widths)} numbers",
+        len(matrix) == 6 and len(widths) == 1 and 1 <= min(widths) <= MAX_THRUSTERS,
+        "thrusters.matrix", f"{len(matrix)} rows of {sorted(widths)} numbers",
         f"6 rows (X Y Z K M N) with one number for each of 1 to {MAX_THRUSTERS} thrusters",
-    )
+    )  # fmt: skip
     (n,) = widths
 
-    def per_thruster(value: float | tuple[float, ...], key: str) -> NDArray[np.float64]:
-        if isinstance(value, tuple):
-            require(len(value) == n, f"thrusters.{key}", f"{len(value)} numbers", f"one, or {n}")
-        return np.broadcast_to(np.asarray(value, dtype=float), (n,)).copy()
-
+    arrays = {field: _array(file, field, n) for field in _KEYS}
     vehicle = Vehicle(
-        name=file.name,
-        title=file.title,
-        source=" ".join(file.source.split()),
-        mass=body.mass,
-        inertia=square(body.inertia, 3, "rigid_body.inertia"),
-        r_G=np.array(body.center_of_gravity),
-        r_B=np.array(statics.center_of_buoyancy),
-        weight=body.weight,
-        buoyancy=statics.buoyancy,
-        added_mass=square(dynamics.added_mass, 6, "hydrodynamics.added_mass"),
-        linear_damping=np.array(dynamics.linear_damping),
-        quadratic_damping=np.array(dynamics.quadratic_damping),
-        thruster_matrix=np.array(thrusters.matrix, dtype=float),
-        thrust_min=per_thruster(thrusters.force_min, "force_min"),
-        thrust_max=per_thruster(thrusters.force_max, "force_max"),
-        thrust_time_constant=per_thruster(thrusters.time_constant, "time_constant"),
-        thrust_rate_limit=per_thruster(thrusters.rate_limit, "rate_limit"),
-        thrust_dead_band=per_thruster(thrusters.dead_band, "dead_band"),
-        thrust_curve=per_thruster(thrusters.curve, "curve"),
-        hull_radius=file.hull.radius,
-        autopilot=file.autopilot and validate_autopilot(file.autopilot, n, require),
-        hull_shape=file.hull.shape,
-    )
-
-    for key, value in vars(vehicle).items():
-        if not isinstance(value, str | Autopilot | None):
-            ok = bool(np.all(np.abs(value) <= MAX_NUMBER))  # False for NaN too
-            require(ok, _KEYS.get(key, key), "not finite", f"finite numbers of up to {MAX_NUMBER:g}")
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-    require(vehicle.mass > 0, "rigid_body.mass", f"{vehicle.mass} kg", "above 0")
-    require(vehicle.weight >= 0, "rigid_body.weight", f"{vehicle.weight} N", "0 or above")
-    require(vehicle.buoyancy >= 0, "hydrostatics.buoyancy", f"{vehicle.buoyancy} N", "0 or above")
-    for key in ("linear_damping", "quadratic_damping"):
-        minimum = getattr(vehicle, key).min()
-        require(minimum >= 0, _KEYS[key], minimum, "0 or above (Property 3)")
-    for key in ("inertia", "added_mass"):
-        matrix = getattr(vehicle, key)
-        symmetric = bool(np.allclose(matrix, matrix.T, rtol=1e-9, atol=1e-9))
-        require(symmetric, _KEYS[key], "not symmetric", "a symmetric matrix")
-    require(
-        bool((vehicle.thrust_min <= vehicle.thrust_max).all()),
-        "thrusters.force_min",
-        "above force_max",
-        "at most force_max",
-    )
-    for key, maximum in (
-        ("thrust_time_constant", np.inf),
-        ("thrust_rate_limit", np.inf),
-        ("thrust_dead_band", 1.0),
-        ("thrust_curve", 1.0),
-        ("hull_radius", np.inf),
-    ):
-        values = np.atleast_1d(getattr(vehicle, key))
-        require(bool((values >= 0).all()), _KEYS[key], f"negative, {values.min():g}", "0 or above")
-        require(bool((values <= maximum).all()), _KEYS[key], f"{values.max():g}", f"at most {maximum:g}")
+        name=file.name, title=file.title, source=source, hull_shape=file.hull.shape,
+        autopilot=file.autopilot and file.autopilot.for_thrusters(n), **arrays,
+    )  # fmt: skip
+    above = bool((vehicle.thrust_min > vehicle.thrust_max).any())
+    require(not above, "thrusters.force_min", "above force_max", "at most force_max")
     rigid = vehicle.mass_matrix - vehicle.added_mass
-    for key, matrix in (("rigid-body mass matrix", rigid), ("mass matrix with added mass", vehicle.mass_matrix)):
-        min_eigenvalue = float(np.linalg.eigvalsh(matrix)[0])
-        require(
-            min_eigenvalue > 0,
-            key,
-            f"not positive definite (smallest eigenvalue {min_eigenvalue:.4g})",
-            "positive definite (Property 1)",
-        )
+    for what, mass in (("rigid-body mass matrix", rigid), ("mass matrix with added mass", vehicle.mass_matrix)):
+        smallest = float(np.linalg.eigvalsh(mass)[0])
+        received = f"not positive definite (smallest eigenvalue {smallest:.4g})"
+        require(smallest > 0.0, what, received, "positive definite (Property 1)")
     return vehicle
+
+
+def _array(file: _File, field: str, n: int) -> Any:
+    """Return a number of the vehicle with n thrusters, or an array that cannot be written."""
+    section, name = _KEYS[field].split(".")
+    value = getattr(getattr(file, section), name)
+    if order := _ORDERS.get(field):
+        value = _symmetric(value, order, _KEYS[field])
+    elif field.startswith("thrust_"):
+        received = len(value) if isinstance(value, tuple) else n
+        require(received == n, _KEYS[field], f"{received} numbers", f"one, or {n}")
+        value = np.broadcast_to(np.asarray(value, dtype=float), (n,)).copy()
+    if isinstance(value, float):
+        return value
+    array = np.array(value, dtype=float)
+    array.setflags(write=False)
+    return array
+
+
+def _symmetric(value: Matrix, n: int, key: str) -> NDArray[np.float64]:
+    """Return a symmetric matrix, of which a file may give the diagonal alone."""
+    widths = {len(row) or -1 if isinstance(row, tuple) else 0 for row in value}  # 0: a number, no row
+    rows = f"rows of {sorted(max(width, 0) for width in widths)} " if widths != {0} else ""
+    ok = len(value) == n and widths in ({0}, {n})
+    require(ok, key, f"{len(value)} {rows}numbers", f"a diagonal of {n}, or {n} by {n}")
+    matrix = np.diag(np.array(value)) if widths == {0} else np.array(value, dtype=float)
+    require(bool(np.allclose(matrix, matrix.T, rtol=1e-9, atol=1e-9)), key, "not symmetric", "a symmetric matrix")
+    return matrix

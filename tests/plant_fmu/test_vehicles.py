@@ -1,7 +1,6 @@
 """The shipped vehicles: published values converted independently, and physical validity."""
 
 import dataclasses
-from importlib import resources
 
 import fmpy.validation
 import numpy as np
@@ -9,11 +8,14 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
+from plant_fmu.__main__ import main
+from plant_fmu.autopilot import Autopilot, effort_of_pulse, pulse_of_effort
 from plant_fmu.build import neutral_members
 from plant_fmu.errors import TableError, VehicleError
-from tests.plant_fmu.test_build import written
+from tests.plant_fmu.test_build import ODIN, written
 
 VEHICLES = shipped_vehicles()
+MATRIX = ODIN[ODIN.index("matrix = [") : ODIN.index("force_min")]
 FLU_TO_FRD = Rotation.from_euler("x", 180, degrees=True)  # y left, z up into y right, z down
 
 # Berg 2012 as uuv_simulator publishes it: rexrov_base.xacro, rexrov.gazebo.xacro, rexrov_actuators.xacro
@@ -156,55 +158,106 @@ def test_vehicle_names_may_have_hyphens(tmp_path, fmi):
     assert result["velocity.u"][-1] > 0.005
 
 
-@pytest.mark.parametrize("name", ["3odin", "-odin", "", "a" * 65, "int", "Con", "my boat", "bötchen", "../x"])
-def test_invalid_vehicle_names_are_rejected(tmp_path, name):
-    with pytest.raises(VehicleError, match=r"^\S+boat.toml: name is '.*', expected ") as caught:
-        load_vehicle(written(tmp_path, ('name = "odin"', f'name = "{name}"')))
-    assert len(str(caught.value)) < 400
+INVALID = [  # text of the file, its replacement, words of the message after the file's name
+    *(('name = "odin"', f'name = "{name}"', f"name is '{name[:30]}")
+      for name in ("3odin", "-odin", "", "a" * 65, "int", "Con", "my boat", "bötchen", "../x")),
+    ('title = "ODIN', 'title = "\\u0001 ODIN', "title is text with '\\x01', expected one line of printable"),
+    ("Rest no", "\\u0007 Rest no", "source is text with '\\x07', expected one line of printable"),
+    ("mass = 125.0 ", "mass = -125.0 ", "rigid_body.mass is -125.0, expected above 0 to 1e+15 kg"),
+    ("mass = 125.0 ", "mass = inf ", "rigid_body.mass is inf, expected above 0"),
+    ("mass = 125.0 ", 'mass = "heavy" ', "rigid_body.mass: expected a number, got a text (got 'heavy')"),
+    ("mass = 125.0 ", "mas = 125.0 ", "rigid_body.mas: unknown key; did you mean 'mass'?"),
+    ("mass = 125.0 ", "# ", "rigid_body.mass is missing"),
+    ("weight = ", "weight = -", "rigid_body.weight is -"),
+    ("buoyancy = 1", "buoyancy = -1", "hydrostatics.buoyancy is -"),
+    ("[0.0, 0.0, 0.05] ", "[0.0, 0.0, nan] ", "rigid_body.center_of_gravity[2] is nan, expected -1e+15 to"),
+    ("[0.0, 0.0, 0.05] ", "[0.0, 0.0, 0.3] ", "rigid-body mass matrix is not positive definite (smallest eig"),
+    ("[62.5, 62.5, 62.5, 0.0, 0.0, 0.0]", "[-200.0, 62.5, 62.5, 0.0, 0.0, 0.0]",
+     "mass matrix with added mass is not positive definite (smallest eig"),
+    ("[8.0, 8.0, 8.0]", "[8.0, 8.0, nan]", "rigid_body.inertia[2] is nan, expected -1e+15 to 1e+15"),
+    ("[8.0, 8.0, 8.0]", "[[8, 1, 0], [0, 8, 0], [0, 0, 8]]", "rigid_body.inertia is not symmetric"),
+    ("[8.0, 8.0, 8.0]", "[8.0, [1.0, 2.0, 3.0], 8.0]", "rigid_body.inertia is 3 rows of [0, 3] numbers"),
+    ("[8.0, 8.0, 8.0]", "[8.0, 8.0]", "rigid_body.inertia is 2 numbers, expected a diagonal of 3, or 3 by 3"),
+    ("[8.0, 8.0, 8.0]", "[[], [], []]", "rigid_body.inertia is 3 rows of [0] numbers"),
+    ("[48.0, 48.0, 48.0, 80.0, 80.0, 80.0]", "[48.0, -48.0, 48.0, 80.0, 80.0, 80.0]",
+     "hydrodynamics.quadratic_damping[1] is -48.0, expected 0 to 1e+15"),
+    ("[0.508, -0.508, 0.508, -0.508, 0, 0, 0, 0],", "", "thrusters.matrix is 5 rows of [8] numbers, expected 6 rows"),
+    ("[0.508, -0.508, 0.508, -0.508, 0, 0, 0, 0],", "[0.508],", "thrusters.matrix is 6 rows of [1, 8] numbers"),
+    ("[0.508, -0.508,", "[nan, -0.508,", "thrusters.matrix[5][0] is nan, expected"),
+    ("matrix = [", "matrix = []\nmatrix_was = [", "thrusters.matrix_was: unknown key"),
+    (MATRIX, "matrix = []\n", "thrusters.matrix is 0 rows of [] numbers, expected 6 rows"),
+    (MATRIX, "matrix = [[], [], [], [], [], []]\n", "thrusters.matrix is 6 rows of [0] numbers, expected 6 rows"),
+    ("force_min = -27.0 ", "force_min = [-27.0, -27.0] ", "thrusters.force_min is 2 numbers, expected one, or 8"),
+    ("force_min = -27.0 ", "force_min = 28.0 ", "thrusters.force_min is above force_max"),
+    ("force_max = 27.0 ", "force_max = inf ", "thrusters.force_max is inf, expected"),
+    ("time_constant = 0.0 ", "time_constant = -0.1 ", "thrusters.time_constant is -0.1, expected 0 to"),
+    ("force_min =", "rate_limit = -5.0\nforce_min =", "thrusters.rate_limit is -5.0, expected 0 to"),
+    ("force_min =", "dead_band = 1.5\nforce_min =", "thrusters.dead_band is 1.5, expected 0 to 1"),
+    ("force_min =", "curve = -1.0\nforce_min =", "thrusters.curve is -1.0, expected 0 to 1"),
+    ("radius = 0.315", "radius = -1.0", "hull.radius is -1.0, expected 0 to"),
+    ('shape = "sphere"', 'shape = "egg"', "hull.shape: expected one of 'frame', 'sphere' (got 'egg')"),
+    ("[hydrostatics]", "[hydrostatics", "not valid TOML: "),
+    *(("[hull]", f"[autopilot]\nframe = 'x'\n{lines}\n[hull]", f"autopilot.{words}") for lines, words in (
+        ("signs = 2", "signs: expected one of 1, -1 (got 2)"),
+        ("curve = 'cubic'", "curve: expected one of 'linear', 'quadratic'"),
+        ("sign = 1", "sign: unknown key; did you mean 'signs'"),
+        ("signs = [1, -1]", "signs is 2 numbers, expected 8"),
+        ("channels = [1, 2]", "channels is 2 numbers, expected 8"),
+        ("channels = [1, 1, 3, 4, 5, 6, 7, 8]", "channels is (1, 1, 3, 4, 5, 6, 7, 8), expected each servo output on"),
+        ("channels = [1, 2, 3, 4, 5, 6, 7, 33]", "channels[7] is 33, expected 0 to 32"),
+        ("pwm_dead_band = -1", "pwm_dead_band is -1, expected 0 us or above"),
+        ("pwm_dead_band = 400", "pwm_dead_band is 400 us, expected less than pwm_span"),
+        ("pwm_span = 0", "pwm_span is 0, expected above 0 us"),
+        *((f"pwm_neutral = {neutral}\npwm_span = {span}",
+           f"pwm_neutral and pwm_span is {neutral} and {span} us, expected pulses of 800 to 2200 us")
+          for neutral, span in ((1199, 400), (1801, 400), (1500, 701))),
+    )),
+    ("[hull]", "[autopilot]\nsigns = 1\n[hull]", "autopilot.frame is missing"),
+    ("[hull]", "[autopilot]\nframe = 'a\\tb'\n[hull]".replace("'", '"'), "autopilot.frame is 'a\\tb', expected a name"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "words"), INVALID)
+def test_invalid_files_are_rejected_by_key(tmp_path, capsys, old, new, words):
+    path, out = written(tmp_path, (old, new)), tmp_path / "boat.fmu"
+    assert main(["build", "--vehicle", str(path), "--out", str(out)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and not out.exists()
+    with pytest.raises((VehicleError, TableError)) as caught:
+        load_vehicle(path)
+    assert str(caught.value).startswith(f"{path}: {words}")
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        (("mass = 125.0 ", "mass = inf "), "rigid_body.mass is not finite"),
-        (("[0.0, 0.0, 0.05] ", "[0.0, 0.0, nan] "), "rigid_body.center_of_gravity is not finite"),
-        (("[0.0, 0.0, 0.05] ", "[0.0, 0.0, 0.9] "), r"rigid-body mass matrix is not positive definite \(smallest eig"),
-        (("[0.0, 0.0, 0.05] ", "[0.0, 0.0, 0.3] "), r"rigid-body mass matrix is not positive definite \(smallest eig"),
-        (("force_max = 27.0 ", "force_max = inf "), "thrusters.force_max is not finite"),
-        (("[0.508, -0.508,", "[nan, -0.508,"), "thrusters.matrix is not finite"),
-        (("[8.0, 8.0, 8.0]", "[[8, 1, 0], [0, 8, 0], [0, 0, 8]]"), "rigid_body.inertia is not symmetric"),
-        (("[8.0, 8.0, 8.0]", "[8.0, [1.0, 2.0, 3.0], 8.0]"), r"rigid_body.inertia is 3 rows of \[0, 3\] numbers"),
-        (("[8.0, 8.0, 8.0]", "[8.0, 8.0]"), r"rigid_body.inertia is 2 numbers, expected a diagonal of 3, or 3 by 3"),
-        (("[8.0, 8.0, 8.0]", "[[], [], []]"), r"rigid_body.inertia is 3 rows of \[0\] numbers"),
-        (("matrix = [", "matrix = []\nmatrix_was = ["), "matrix_was: unknown key"),
-        (("Rest no", "\\u0007 Rest no"), r"source is text with '\\x07', expected printable"),
-        (("time_constant = 0.0 ", "time_constant = -0.1 "), "thrusters.time_constant is negative"),
-        (
-            ("force_min =", "rate_limit = -5.0\nforce_min ="),
-            "thrusters.rate_limit is negative, -5, expected 0 or above",
-        ),
-        (("force_min =", "dead_band = 1.5\nforce_min ="), "thrusters.dead_band is 1.5, expected at most 1"),
-        (("force_min =", "curve = -1.0\nforce_min ="), "thrusters.curve is negative"),
-        (("radius = 0.315", "radius = -1.0"), "hull.radius is negative"),
-    ],
-)
-def test_invalid_parameters_are_rejected_by_key(tmp_path, change, words):
-    with pytest.raises(Exception, match=words) as caught:
-        load_vehicle(written(tmp_path, change))
-    assert "boat.toml: " in str(caught.value) and "\n" not in str(caught.value)
+    ("old", "new", "words"),
+    [("mass = 125.0 ", "mass = 1e-4 ", "mass is 0.0001 kg, expected 0.001 to 1e+09"),
+     ("force_max = 27.0 ", "force_max = 2e9 ", "thrust_max[1] is 2e+09 N, expected -1e+09 to 1e+09")],
+)  # fmt: skip
+def test_numbers_outside_the_domain_of_the_plant_are_rejected(tmp_path, capsys, old, new, words):
+    path = written(tmp_path, (old, new))
+    assert main(["build", "--vehicle", str(path), "--out", str(tmp_path / "boat.fmu")]) == 2
+    assert capsys.readouterr().err == f"plant_fmu: odin: {words}\n"
 
 
-@pytest.mark.parametrize("rows", ["[]", "[[], [], [], [], [], []]"])
-def test_a_vehicle_has_a_thruster(tmp_path, rows):
-    text = (written(tmp_path)).read_text()
-    matrix = text[text.index("matrix = [") : text.index("force_min")]
-    with pytest.raises(VehicleError, match=r"thrusters.matrix is \d rows of \[0?\] numbers, expected 6 rows"):
-        load_vehicle(written(tmp_path, (matrix, f"matrix = {rows}\n")))
+def test_autopilot_accepts_every_pulse_of_a_speed_controller(tmp_path):
+    for neutral, span in ((1200, 400), (1800, 400), (1500, 700)):
+        table = f"[autopilot]\nframe = 'x'\nsigns = -1\npwm_neutral = {neutral}\npwm_span = {span}\n[hull]"
+        found = load_vehicle(written(tmp_path, ("[hull]", table))).autopilot
+        assert (found.channels, found.signs) == (tuple(range(1, 9)), (-1,) * 8)
 
 
-def test_hull_shape_defaults_to_frame(tmp_path):
+def test_hull_shape_defaults_to_frame():
     assert {name: load_vehicle(name).hull_shape for name in ("odin", "rexrov")} == {"odin": "sphere", "rexrov": "frame"}
-    odin = (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text()
-    (tmp_path / "egg.toml").write_text(odin.replace('shape = "sphere"', 'shape = "egg"'))
-    with pytest.raises(TableError, match=r"hull\.shape: expected one of 'frame', 'sphere' \(got 'egg'\)"):
-        load_vehicle(tmp_path / "egg.toml")
+
+
+@pytest.mark.parametrize("curve", ["linear", "quadratic"])
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_pulse_and_effort_are_inverse_functions(curve, sign):
+    """Outside the dead band each is the other's inverse; beyond the ends a pulse stays at them, and NaN is neutral."""
+    table = Autopilot("vectored_6dof", curve=curve)
+    pulse, effort = pulse_of_effort(table, sign), effort_of_pulse(table, sign)
+    for fraction in (-1.0, -0.64, -0.25, 0.36, 0.81, 1.0):
+        assert effort(pulse(fraction)) == pytest.approx(fraction, rel=1e-12)
+    ends = [table.pwm_neutral - sign * table.pwm_span, table.pwm_neutral + sign * table.pwm_span]
+    assert [pulse(-1.0), pulse(1.0)] == ends == [pulse(-7.0), pulse(7.0)]
+    assert pulse(0.0) == pulse(float("nan")) == table.pwm_neutral

@@ -10,7 +10,6 @@ from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
 from cosim.sitl.law import make_control_law, make_pwm_law
 from plant_fmu import load_vehicle
-from plant_fmu.errors import TableError, VehicleError
 from tests.cosim.sitl.stand_in import VECTORED_6DOF
 
 SHIPPED = resources.files("plant_fmu") / "vehicles"
@@ -71,38 +70,6 @@ def test_custom_channels_signs_and_curve_are_applied(tmp_path):
     assert forces(law, pulses).tolist() == [10.0, 0.0, -10.0, -10.0, 0.0, 0.0, 0.0, 0.0]
     assert forces(law, pulses[:16])[3] == 0.0  # a packet without that channel
     assert law.report.tolist() == [1600.0, 1600.0, 0.0, 1500.0, 1500.0, 1500.0, 1500.0, 0.0]
-
-
-@pytest.mark.parametrize(
-    ("line", "words"),
-    [
-        ("channels = [1, 2, 3]", r"autopilot.channels is 3 numbers, expected 8"),
-        ("channels = [1, 1, 3, 4, 5, 6, 7, 8]", "each servo output once"),
-        ("channels = [1, 2, 3, 4, 5, 6, 7, 33]", "1 to 32, or 0 for none"),
-        ("signs = 2", "autopilot.signs is .*, expected 1 or -1"),
-        ("signs = [1, -1]", "autopilot.signs is 2 numbers, expected 8"),
-        ("pwm_span = 0", "pulses of 800 to 2200 us"),
-        ("pwm_neutral = 2000", "autopilot.pwm_neutral and pwm_span is 2000 and 400 us"),
-        ("pwm_dead_band = 400", "autopilot.pwm_dead_band is 400 us"),
-        ("pwm_dead_band = -1", "autopilot.pwm_dead_band is -1 us"),
-    ],
-)
-def test_invalid_autopilot_table_is_rejected(tmp_path, line, words):
-    with pytest.raises(VehicleError, match=words):
-        load_vehicle(own(tmp_path, f'[autopilot]\nframe = "mine"\n{line}\n'))
-
-
-@pytest.mark.parametrize(
-    ("table", "words"),
-    [
-        ("[autopilot]\nsigns = 1\n", "frame"),
-        ('[autopilot]\nframe = "a"\ncurve = "cubic"\n', "autopilot.curve: expected one of 'linear', 'quadratic'"),
-        ('[autopilot]\nframe = "a"\nsign = 1\n', "autopilot.sign: unknown key; did you mean 'signs'"),
-    ],
-)
-def test_invalid_autopilot_keys_are_rejected(tmp_path, table, words):
-    with pytest.raises(TableError, match=words):
-        load_vehicle(own(tmp_path, table))
 
 
 def test_vehicle_without_autopilot_table_is_rejected():
