@@ -51,7 +51,6 @@ PEERS = {
         Peer("scikit-fuzzy", ("networkx", "packaging", "scipy")),
         Peer("simpful"),
         Peer("pyfuzzylite", ("numpy<2",), "old-numpy"),
-        Peer("pymavlink"),
         Peer("python-vehicle-simulator"),
         Peer("casadi", ("numpy",)),
     )

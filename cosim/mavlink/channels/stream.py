@@ -13,46 +13,8 @@ _WRITE_THRESHOLD = 1 << 12  # bytes in the queue above which `put` writes at onc
 STALL_TIME = 5.0  # s without progress, after which `flush` reports a stall
 
 
-class Outgoing:
-    """A queue of frames for a stream that accepts partial writes."""
-
-    def __init__(self, write: Callable[[bytes], int], limit: int = QUEUE_SIZE) -> None:
-        self._write: Final = write
-        self._limit: Final = limit
-        self._queue = bytearray()
-        self._stalled_at: float | None = None  # time of the first write without progress
-        self.dropped = 0
-
-    def put(self, frame: bytes) -> bool:
-        """Queue a frame for the next flush; write at once if the queue is long; return False if it was full."""
-        if len(self._queue) > _WRITE_THRESHOLD and self._stalled_at is None:
-            self._write_available()
-        if len(self._queue) + len(frame) > self._limit:
-            self.dropped += 1
-            return False
-        self._queue += frame
-        return True
-
-    def flush(self, now: float) -> bool:
-        """Write as much of the queue as possible; return False after 5 s without progress."""
-        if not self._queue or self._write_available():
-            self._stalled_at = None
-        elif self._stalled_at is None:
-            self._stalled_at = now
-        return self._stalled_at is None or now - self._stalled_at < STALL_TIME
-
-    def _write_available(self) -> bool:
-        """Write as much as the stream accepts; return True if that was anything."""
-        try:
-            written = self._write(bytes(self._queue))
-        except (BlockingIOError, InterruptedError):
-            return False
-        del self._queue[:written]
-        return written > 0
-
-
 class Stream:
-    """An open stream with its queue of frames."""
+    """An open stream that accepts partial writes, with its queue of frames."""
 
     def __init__(
         self,
@@ -61,10 +23,12 @@ class Stream:
         close: Callable[[], None],
         limit: int = QUEUE_SIZE,
     ) -> None:
-        self._read, self._close = read, close
-        self.outgoing = Outgoing(write, limit)
+        self._read, self._write, self._close = read, write, close
+        self._limit: Final = limit
+        self._queue = bytearray()
+        self._stalled_at: float | None = None  # time of the first write without progress
         self.is_open = True
-        self.version = 0
+        self.version = self.dropped = 0
 
     def read(self) -> bytes | None:
         """Return received bytes, or None if there are none; at the end of the stream `is_open` becomes False."""
@@ -80,19 +44,35 @@ class Stream:
     def put(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
         """Queue a frame, or `frame_v1` if the other side sends MAVLink 1; return False if the queue was full."""
         queued = frame_v1 if self.version == 1 else frame
-        try:
-            return queued is None or self.outgoing.put(queued)
-        except OSError:
-            self.is_open = False
+        if queued is None:
+            return True
+        if len(self._queue) > _WRITE_THRESHOLD and self._stalled_at is None:
+            self._write_available()
+        if len(self._queue) + len(queued) > self._limit:
+            self.dropped += 1
             return False
+        self._queue += queued
+        return self.is_open
 
     def flush(self, now: float) -> bool:
-        """Write queued frames; return False if the other side has stalled."""
+        """Write as much of the queue as possible; return False after 5 s without progress."""
+        if not self._queue or self._write_available():
+            self._stalled_at = None
+        elif self._stalled_at is None:
+            self._stalled_at = now
+        return self._stalled_at is None or now - self._stalled_at < STALL_TIME
+
+    def _write_available(self) -> bool:
+        """Write as much as the stream accepts; return True if that was anything."""
         try:
-            return self.outgoing.flush(now)
+            written = self._write(bytes(self._queue))
+        except (BlockingIOError, InterruptedError):
+            return False
         except OSError:
             self.is_open = False
             return True
+        del self._queue[:written]
+        return written > 0
 
     def close(self) -> None:
         """Close the stream."""
@@ -115,8 +95,8 @@ class StreamChannel:
 
     def _close(self, stream: Stream, reason: str) -> None:
         """Close a stream, and count the frames that it dropped."""
-        if stream.outgoing.dropped:
-            self.losses[f"frames dropped {reason}"] += stream.outgoing.dropped
+        if stream.dropped:
+            self.losses[f"frames dropped {reason}"] += stream.dropped
         stream.close()
 
 

@@ -10,7 +10,7 @@ _MAX_FLOAT32 = 3.4028234e38
 _BITS = {"int8_t": 8, "int16_t": 16, "int32_t": 32, "int64_t": 64}
 
 # value of "unknown" where it is not 0, by message and field
-_UNKNOWN: dict[tuple[str, str], int] = {
+UNKNOWN: dict[tuple[str, str], int] = {
     ("GLOBAL_POSITION_INT", "hdg"): 0xFFFF,
     ("GPS_RAW_INT", "cog"): 0xFFFF,
     ("GPS_RAW_INT", "vel"): 0xFFFF,
@@ -58,7 +58,7 @@ class Encoder:
         fields = []
         for field, type_name in zip(message_class.fieldnames, message_class.fieldtypes, strict=True):
             length = message_class.array_lengths[message_class.ordered_fieldnames.index(field)]
-            encode = _number_encoder(type_name, _UNKNOWN.get((name, field), 0))
+            encode = _number_encoder(type_name, UNKNOWN.get((name, field), 0))
             if type_name == "char":
                 encode = _text_encoder(length)
             elif length:

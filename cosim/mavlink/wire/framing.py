@@ -1,10 +1,10 @@
-"""Decode bytes to frames and messages: cheap checks first; no input raises."""
+"""Decode bytes to frames and messages: cheap checks first; no input raises. Frames of MAVLink 1."""
 
 from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ _CRC = 2  # bytes
 _SETUP_SIGNING = 256  # id of SETUP_SIGNING
 _MAX_V1_ID = 255  # highest message id of MAVLink 1
 _V2_HEADER = struct.Struct("<BBBxxBBHB")  # marker, length, flags, system, component, id in two parts
-_V2_FULL_HEADER = struct.Struct("<BBBBBBBHB")  # the same with the compatibility flags and sequence number
+_SOURCE_OFFSET = 5  # of the system in a header of MAVLink 2
 _V1_HEADER = struct.Struct("<BBxBBB")  # marker, length, system, component, id
 _HEADER_SIZES = {b"\xfd": _V2_HEADER.size, b"\xfe": _V1_HEADER.size}
 _MARKER = re.compile(rb"[\xfd\xfe]")
@@ -118,52 +118,16 @@ def parse_header(data: bytes, offset: int) -> Header | None:
     return None
 
 
-class Framer:
-    """Encode messages as unsigned frames, as pymavlink does, in less than half the time."""
-
-    def __init__(self, source: tuple[int, int]) -> None:
-        self._source = source
-        self._crc = dialect().x25crc
-        self._message_id = 0
-        self.seq = self.seq_v1 = 0
-
-    def advance(self, frame_v1: bytes | None) -> None:
-        """Advance the sequence number, also that of MAVLink 1 unless `frame_v1` is None."""
-        self.seq = (self.seq + 1) % 256
-        self.seq_v1 = (self.seq_v1 + (frame_v1 is not None)) % 256
-
-    def encode(self, message: Any) -> bytes:
-        """Encode a message as a frame of MAVLink 2."""
-        return self._pack(message, self._frame_v2)
-
-    def encode_v1(self, message: Any) -> bytes | None:
-        """Encode a message as a frame of MAVLink 1, without extension fields; None for ids above 255."""
-        # It raises as `encode` does.
-        return None if message.get_msgId() > _MAX_V1_ID else self._pack(message, self._frame_v1)
-
-    def _pack(self, message: Any, pack: Callable[..., bytes]) -> bytes:
-        self._message_id = message.get_msgId()  # its `id` may be a field
-        message._pack = pack  # which the message's own `pack` calls with its payload
-        try:
-            frame: bytes = message.pack(None)
-        finally:
-            del message._pack  # another link may sign it
-        return frame
-
-    def _frame_v2(self, codec: None, crc_extra: int, payload: bytes, force_mavlink1: bool = False) -> bytes:
-        payload = payload.rstrip(b"\0") or payload[:1]  # zeros at the end are not sent
-        message_id = self._message_id & 0xFFFF, self._message_id >> 16
-        header = _V2_FULL_HEADER.pack(V2, len(payload), 0, 0, self.seq, *self._source, *message_id)
-        return self._add_checksum(header + payload, crc_extra)
-
-    def _frame_v1(self, codec: None, crc_extra: int, payload: bytes, force_mavlink1: bool = False) -> bytes:
-        payload = payload[: message_infos()[self._message_id].v1_size]
-        header = bytes((V1, len(payload), self.seq_v1, *self._source, self._message_id))
-        return self._add_checksum(header + payload, crc_extra)
-
-    def _add_checksum(self, body: bytes, crc_extra: int) -> bytes:
-        crc: int = self._crc(body[1:] + bytes((crc_extra,))).crc
-        return body + crc.to_bytes(_CRC, "little")
+def encode_v1(frame: bytes, seq: int) -> bytes | None:
+    """Encode an unsigned frame of MAVLink 2 as one of MAVLink 1, without extension fields; None for ids above 255."""
+    system, component, low, high = struct.unpack_from("<BBHB", frame, _SOURCE_OFFSET)
+    if low > _MAX_V1_ID or high:
+        return None
+    info = message_infos()[low]
+    payload = frame[_V2_HEADER.size : -_CRC].ljust(info.v1_size, b"\0")[: info.v1_size]
+    body = bytes((V1, len(payload), seq, system, component, low)) + payload
+    crc: int = dialect().x25crc(body[1:] + bytes((info.crc_extra,))).crc
+    return body + crc.to_bytes(_CRC, "little")
 
 
 class FrameFilter:

@@ -16,7 +16,7 @@ from cosim.mavlink.channels.tlog_file import Tlog
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
-from cosim.mavlink.wire.framing import V1, FrameFilter, Framer, RxStats, StreamReader
+from cosim.mavlink.wire.framing import V1, FrameFilter, RxStats, StreamReader, encode_v1
 from cosim.mavlink.wire.options import COMPONENT_ID, MavlinkOptions
 from cosim.mavlink.wire.signing import SigningClock, Verifier, timestamp_file
 
@@ -102,7 +102,7 @@ class Link:
         self.sent = self.dropped = self.unencodable = 0
         self._filter, self._signer = frame_filter, signer
         self._budget = None if budget is None else Budget(budget)
-        self._framer = Framer(source)
+        self._seq_v1 = 0
         self._codec = dialect().MAVLink(None, *source)
         if signer is not None:
             signing = self._codec.signing
@@ -121,11 +121,9 @@ class Link:
         """Encode, sign if there is a signer, and send a message; return False if it was not sent to all peers."""
         name = message.get_type()
         try:
-            if self._signer is not None:  # frames of MAVLink 1 are unsigned, so such peers are rejected
-                frame, frame_v1 = self._sign(message, self._signer), None
-            else:
-                frame = self._framer.encode(message)
-                frame_v1 = self._framer.encode_v1(message) if self._has_v1_peers else None
+            if self._signer is not None:
+                self._codec.signing.timestamp = self._signer.clock.next()
+            frame: bytes = message.pack(self._codec)
         except _ENCODING_ERRORS as error:
             self.unencodable += 1
             if name not in self._reported:
@@ -136,19 +134,16 @@ class Link:
         if self._budget is not None and not self._budget.spend(len(frame), rule.has_priority):
             self.dropped += 1
             return False
-        self._framer.advance(frame_v1)
+        # frames of MAVLink 1 are unsigned, so with a key such peers are rejected
+        frame_v1 = encode_v1(frame, self._seq_v1) if self._has_v1_peers and self._signer is None else None
+        self._codec.seq = (self._codec.seq + 1) % 256
+        self._seq_v1 = (self._seq_v1 + (frame_v1 is not None)) % 256
         self.sent += 1
         was_sent = self.channel.send(frame, frame_v1)
         if rule.is_answer:
             for tlog in self.logs:
                 tlog.send(message)
         return was_sent
-
-    def _sign(self, message: Any, signer: Signer) -> bytes:
-        self._codec.signing.timestamp = signer.clock.next()
-        self._codec.seq = self._framer.seq
-        frame: bytes = message.pack(self._codec)
-        return frame
 
     def receive(self, until: float) -> Iterator[tuple[bytes, Any]]:
         """Yield accepted frames with their messages, until none is left or a time of `time.perf_counter`."""

@@ -11,7 +11,7 @@ from pymavlink.dialects.v10 import all as v10
 from cosim.errors import TelemetryError
 from cosim.mavlink.channels import stream, tcp, udp
 from cosim.mavlink.channels.serial import Serial
-from cosim.mavlink.channels.stream import Outgoing
+from cosim.mavlink.channels.stream import Stream
 from cosim.mavlink.channels.tcp import TcpIn, TcpOut
 from cosim.mavlink.channels.tlog_file import Tlog
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
@@ -271,7 +271,7 @@ def test_slow_reader_loses_whole_frames_and_other_clients_none():
         read += drained(quick)
     assert [m.time_usec for m in frames_of(read)] == list(range(1, sent + 1))
     got = [m.time_usec for m in frames_of(late)]
-    dropped = [client.outgoing.dropped for client in link.channel.clients]
+    dropped = [client.dropped for client in link.channel.clients]
     assert len(got) == sent - max(dropped) and sum(dropped) > 1000
     assert got == sorted(set(got))
     link.channel.close()
@@ -292,7 +292,7 @@ def test_stalled_client_is_closed_after_a_timeout():
 
 
 def test_send_timeout_restarts_with_progress():
-    out = Outgoing(Taker([None, None, None, 2, None, None, None]))
+    out = Stream(None, Taker([None, None, None, 2, None, None, None]), None)
     out.put(b"frame")
     assert out.flush(10.0)
     assert out.flush(10.0 + stream.STALL_TIME - 0.1)
@@ -319,7 +319,7 @@ class Taker:
 
 def test_partially_sent_frames_arrive_complete():
     taker = Taker([3, None, 5, None, 1, 1000])
-    out = Outgoing(taker, limit=100)
+    out = Stream(None, taker, None, limit=100)
     frames = [bytes([i]) * 30 for i in range(6)]
     kept = [frame for frame in frames if out.put(frame)]
     assert out.dropped == len(frames) - len(kept) > 0
