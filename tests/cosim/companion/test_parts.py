@@ -397,6 +397,19 @@ def test_steering_ends_only_beyond_a_condition_limit(condition):
     assert supervisor.update(seen()) == "steering" and supervisor.reason == ""
 
 
+def test_supervisor_states_advance_in_order():
+    supervisor, diver = Supervisor(), Supervisor()
+    for k, state in enumerate(("waiting", "aligning", "disarmed", "engaging", "steering")):
+        assert supervisor.update(Observation(0.0, *(i < k for i in range(4)), {})) == state
+    for needs_dive, is_in_mode, state in (
+        (True, False, "diving"),
+        (False, False, "engaging"),
+        (False, True, "steering"),
+    ):
+        assert diver.update(Observation(0.0, True, True, True, is_in_mode, {}, needs_dive)) == state
+    assert Supervisor(dry_run=True).update(Observation(0.0, True, True, False, False, {})) == "dry_run"
+
+
 def sticks(x, z):
     return mavlink.MAVLink_manual_control_message(1, x, 0, z, 0, 0)
 

@@ -14,7 +14,6 @@ from cosim.logs.frames import (
     euler_zyx,
     quaternion_of_angles,
     quaternions_of_angles,
-    rotate_to_body,
 )
 
 ANGLES = st.tuples(*[st.floats(-3.0, 3.0)] * 3)
@@ -40,16 +39,3 @@ def test_vector_rotation_commutes_with_frame_conversion(world, body, angles):
     expected = WORLDS[world] @ rotation_matrix(q[0]) @ vector
     turned = rotation_matrix(convert_quaternions(q, world, body)[0]) @ (BODIES[body] @ vector)
     np.testing.assert_allclose(turned, expected, atol=1e-12)
-
-
-@given(angles=ANGLES)
-def test_world_vectors_are_rotated_to_the_body(angles):
-    q = quaternions_of_angles(np.array([angles]), "ZYX")
-    vector = np.array([[0.3, -0.7, 1.1]])
-    np.testing.assert_allclose(rotate_to_body(q, vector)[0], rotation_matrix(q[0]).T @ vector[0], atol=1e-12)
-
-
-@pytest.mark.parametrize("matrix", [*WORLDS.values(), *BODIES.values()])
-def test_frame_conversions_are_proper_rotations(matrix):
-    np.testing.assert_allclose(matrix @ matrix.T, np.eye(3))
-    assert np.linalg.det(matrix) == pytest.approx(1.0)
