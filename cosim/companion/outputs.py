@@ -95,12 +95,10 @@ class Output:
 
     def make_messages(self, wrench: Array, state: ReportedState, period: float) -> Sequence[Any]:
         """Return the messages that command a wrench, shape (6,) [N, N m], body frame, for a `period` [s]."""
-        system = state.system or 0
         match self._steer_by:
             case "velocity":
                 self.velocity[:] = self._lead.velocity(wrench, state, period)
-                turn = self._turn.yaw_rate(wrench, state) if self._profile.name == "ardusub" else None
-                return (make_velocity_target(self._mavlink, system, self.velocity, turn),)
+                return (self._velocity_target(state, self._turn.yaw_rate(wrench, state)),)
             case "attitude":
                 self.attitude[:] = self._turn.attitude(wrench, state)
                 return self._attitude(wrench, state, period)
@@ -112,18 +110,16 @@ class Output:
                 self.sticks[5] = self._scale.yaw_rate_stick(self._yaw_fraction * self._turn.yaw_rate(wrench, state))
             case "wrench":
                 self.sticks[:] = self._scale.sticks(wrench)
-        return (self._sticks(system),)
+        return (self._sticks(state),)
 
     def hold_still(self, state: ReportedState) -> Sequence[Any]:
         """Return the messages that command no motion, to be sent until the autopilot is in its mode."""
         self.clear()
-        system = state.system or 0
         if self._uses_sticks:
-            return (self._sticks(system),)
+            return (self._sticks(state),)
         if self._steer_by == "attitude":
-            return (make_attitude_message(self._mavlink, system, state.quaternion, np.zeros(3)),)
-        turn = 0.0 if self._profile.name == "ardusub" else None
-        return (make_velocity_target(self._mavlink, system, self.velocity, turn),)
+            return (make_attitude_message(self._mavlink, state.system or 0, state.quaternion, np.zeros(3)),)
+        return (self._velocity_target(state, 0.0),)
 
     def descend(self, state: ReportedState, speed: float, back: Array, period: float) -> Sequence[Any]:
         """Return the messages of a level descent at a speed [m/s], by velocity or by stick, for a `period` [s]."""
@@ -132,9 +128,9 @@ class Output:
         self.clear()
         if self._steer_by == "velocity":
             self.velocity[:] = self._lead.hold(back, speed, state, period)
-            return (make_velocity_target(self._mavlink, state.system or 0, self.velocity, 0.0),)
+            return (self._velocity_target(state, 0.0),)
         self.sticks[2] = self._scale.climb_stick(speed)
-        return (self._sticks(state.system or 0),)
+        return (self._sticks(state),)
 
     def release(self, state: ReportedState, since: float) -> Sequence[Any]:
         """Return the messages that release the sticks, `since` [s] after the start of the release."""
@@ -143,12 +139,11 @@ class Output:
         self.clear()
         if not self._uses_sticks:
             return self.hold_still(state) if self._steer_by == "attitude" and since < _CENTERING_TIME else ()
-        system = state.system or 0
         if self._sticks_by == "manual-control" or (self._overridden and since < _CENTERING_TIME):
-            return (self._sticks(system),)
+            return (self._sticks(state),)
         if self._overridden:
             self._overridden = False
-            return (release_channels(self._mavlink, system),)
+            return (release_channels(self._mavlink, state.system or 0),)
         return ()
 
     @property
@@ -167,7 +162,7 @@ class Output:
         level[2] = 0.0
         self.sticks[:] = self._scale.sticks(level)
         self.sticks[2:] = self._scale.climb_stick(rate_down), 0.0, 0.0, 0.0
-        return make_attitude_message(self._mavlink, system, self.attitude, None), self._sticks(system)
+        return make_attitude_message(self._mavlink, system, self.attitude, None), self._sticks(state)
 
     def _lean(self, period: float) -> Array:
         """Return the sticks of roll and pitch, shape (2,), whose lean angles give the commands now in `sticks`."""
@@ -176,7 +171,13 @@ class Output:
             return np.zeros(2)
         return self._scale.lean_sticks(self._level_lead.angles(self.sticks[3:5], period))
 
-    def _sticks(self, system: int) -> Any:
+    def _velocity_target(self, state: ReportedState, yaw_rate: float) -> Any:
+        """Return the message of the velocity, with a yaw rate [rad/s] for an ArduSub."""
+        turn = yaw_rate if self._profile.name == "ardusub" else None
+        return make_velocity_target(self._mavlink, state.system or 0, self.velocity, turn)
+
+    def _sticks(self, state: ReportedState) -> Any:
+        system = state.system or 0
         if self._sticks_by == "manual-control":
             return make_manual_control(self._mavlink, system, self._profile, self.sticks, self._all_axes)
         self._overridden = True

@@ -1,4 +1,4 @@
-"""Frames and units of logs, against elementary rotations and pymavlink's own."""
+"""Frames of logs, against pymavlink's rotations and vectors that are turned alike."""
 
 import numpy as np
 import pytest
