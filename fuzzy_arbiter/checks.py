@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Iterable
 from numbers import Real
 from typing import TypeVar
@@ -32,6 +33,19 @@ def all_of(kind: type[_T] | tuple[type[_T], ...], values: object, where: object,
         if not isinstance(member, kind):
             raise DefinitionError(f"{where}: got {shown(member)} among them, expected {expected}")
     return members
+
+
+def require_choice(value: object, known: Iterable[str], what: str) -> None:
+    """Require that a value is one of some words."""
+    if not isinstance(value, str) or value not in (known := tuple(known)):
+        raise DefinitionError(f"{what} is {shown(value)}, expected one of {', '.join(known)}")
+
+
+def require_distinct(names: Iterable[str], what: str) -> None:
+    """Require that each name occurs once."""
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise DefinitionError(f"{what} are named {name!r}, expected each name once")
 
 
 def require_name(name: object, what: str) -> None:

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from numbers import Integral
-from typing import Literal, TypeVar, get_args
+from typing import Literal, get_args
 
-from fuzzy_arbiter.checks import all_of, finite, require_name, shown
+from fuzzy_arbiter.checks import all_of, finite, require_choice, require_distinct, require_name, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.references import require_rules, require_values
@@ -88,13 +88,8 @@ class Variable:
             raise DefinitionError(f"{what}: no terms, expected at least one")
         for term in terms:
             require_name(term.name, f"{what}: term")
-        twice = _repeated(term.name for term in terms)
-        if twice is not None:
-            raise DefinitionError(f"{what}: two terms are named {twice!r}, expected each name once")
-        if not isinstance(self, Output):
-            object.__setattr__(self, "terms", tuple(map(self._within, terms)))
-        else:
-            object.__setattr__(self, "terms", terms)
+        require_distinct((term.name for term in terms), f"{what}: two terms")
+        object.__setattr__(self, "terms", terms if isinstance(self, Output) else tuple(map(self._within, terms)))
 
     def _within(self, term: Term) -> Term:
         try:
@@ -171,10 +166,7 @@ class Output(Variable):
         if not self.weighted and not WIDTHS[0] <= self.universe[1] - self.universe[0] <= WIDTHS[1]:
             raise DefinitionError(f"{what}: universe is [{_span(self)}], expected a width from 1e-100 to 1e+100")
         for key, known in (("defuzzifier", get_args(Defuzzifier)), ("aggregation", tuple(AGGREGATIONS))):
-            if not isinstance(getattr(self, key), str) or getattr(self, key) not in known:
-                raise DefinitionError(
-                    f"{what}: {key} is {shown(getattr(self, key))}, expected one of {', '.join(known)}"
-                )
+            require_choice(getattr(self, key), known, f"{what}: {key}")
         for key in ("lock_range", "lock_previous"):
             if not isinstance(getattr(self, key), bool):
                 raise DefinitionError(f"{what}: {key} is {shown(getattr(self, key))}, expected True or False")
@@ -284,9 +276,7 @@ class System:
         object.__setattr__(self, "rules", tuple(parse_rule(r) if isinstance(r, str) else r for r in rules))
         require_name(self.name, "system")
         for key, choices in CHOICES.items():
-            choice = getattr(self, key)
-            if not isinstance(choice, str) or choice not in choices:
-                raise DefinitionError(f"{key} is {shown(choice)}, expected one of {', '.join(choices)}")
+            require_choice(getattr(self, key), choices, key)
         if not (isinstance(self.points, Integral) and 3 <= self.points <= MAX_POINTS):
             raise DefinitionError(
                 f"points is {shown(self.points)}, expected a whole number, 3 or more, to {MAX_POINTS}"
@@ -296,9 +286,7 @@ class System:
         for key in ("inputs", "outputs", "rules"):
             if not getattr(self, key):
                 raise DefinitionError(f"{key}: got none, expected at least one")
-        twice = _repeated(v.name for v in (*self.inputs, *self.outputs))
-        if twice is not None:
-            raise DefinitionError(f"variables: two are named {twice!r}, expected each name once")
+        require_distinct((v.name for v in (*self.inputs, *self.outputs)), "variables: two")
         require_rules(self)
         require_values(self)
 
@@ -306,7 +294,7 @@ class System:
         names = all_of(str, self.weights_of, "weights_of", "names of criteria")
         for name in names:
             require_name(name, "weights_of")
-        if len(names) not in (0, len(self.outputs)) or _repeated(names) is not None:
+        if len(names) not in (0, len(self.outputs)) or len(set(names)) < len(names):
             raise DefinitionError(
                 f"weights_of is {shown(names)}, expected a name for each of the {len(self.outputs)} outputs, each once"
             )
@@ -345,16 +333,6 @@ CHOICES = {
     "normalization": get_args(Normalization),
     "outside": get_args(Outside),
 }
-_N = TypeVar("_N", bound=str)
-
-
-def _repeated(names: Iterable[_N]) -> _N | None:
-    seen: set[str] = set()
-    for name in names:
-        if name in seen:
-            return name
-        seen.add(name)
-    return None
 
 
 def _span(variable: Variable) -> str:

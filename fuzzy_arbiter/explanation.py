@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
+from operator import attrgetter
 from typing import Any
 
 from fuzzy_arbiter.definition import System
@@ -127,11 +128,11 @@ def _decided(
 ) -> OutputDecision:
     output = system.outputs[k]
     on = [rule for rule in rules if rule.fired and output.name in rule.conclusions]
-    first = max(on, key=_strength, default=None)  # the first of equally strong ones
+    first = max(on, key=attrgetter("strength"), default=None)  # the first of equally strong ones
     others = [
         rule for rule in on if first is not None and rule.conclusions[output.name] != first.conclusions[output.name]
     ]
-    second = max(others, key=_strength, default=None)
+    second = max(others, key=attrgetter("strength"), default=None)
     return OutputDecision(
         system.result_names[k],
         output.name,
@@ -143,10 +144,6 @@ def _decided(
         (first.strength if first is not None else 0.0) - (second.strength if second is not None else 0.0),
         first is None,
     )
-
-
-def _strength(rule: FiredRule) -> float:
-    return rule.strength
 
 
 def _ranking(names: Sequence[str], weights: Sequence[float]) -> tuple[str | None, str | None, float, tuple[str, ...]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -139,7 +139,12 @@ def prioritized(
     outputs = tuple(replace(weight, name=f"{weight.name}_{k + 1}") for k in range(len(criteria)))
     on = tuple(Is(c.name, c.on) for c in criteria)
     off = tuple(Is(c.name, c.off) for c in criteria)
-    rules = _RULES[form](on, off, outputs)
+    if form == "complete":
+        conditions = list(_complete(on, off))
+    else:
+        conditions = [(k, *each) for k in range(len(criteria)) for each in _conditions(form, on, off, k)]
+    conclusions = [[(output[term],) for term in output.term_names] for output in outputs]
+    rules = tuple(Rule(condition, conclusions[k][is_high]) for k, condition, is_high in conditions)
     inputs = tuple(c.variable for c in criteria)
     names = tuple(c.name for c in criteria)
     return System(
@@ -147,64 +152,33 @@ def prioritized(
     )
 
 
-Statements = tuple[Is, ...]
-Rules = tuple[Rule, ...]
+def _conditions(form: str, on: Sequence[Is], off: Sequence[Is], k: int) -> Iterator[tuple[Proposition, bool]]:
+    """Yield the conditions of the k-th criterion's rules, and True where its weight is then high."""
+    high = _all((*off[:k], on[k])), True  # no criterion above k is active, and k is
+    reasons = (*on[:k], off[k])  # each of which makes it low
+    if form == "minimal":
+        yield from (high, (_any(reasons), False))
+    elif form == "conjunctive":
+        yield from (high, *((reason, False) for reason in reasons))
+    elif k == 0:  # and so on as in section VI, whose eight rules these are for three criteria
+        yield from (high, (off[0], False))
+    else:
+        yield from ((_any(on[:k]), False), (off[k], False), high)
 
 
-def _hierarchical(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """Return the rules of section VI; for three criteria these are its eight rules, in order."""
-    rules = [_high(on, off, outputs, 0), _low(off[0], outputs[0])]
-    for k in range(1, len(on)):
-        rules += [_low(_any(on[:k]), outputs[k]), _low(off[k], outputs[k]), _high(on, off, outputs, k)]
-    return tuple(rules)
-
-
-def _minimal(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """Return one rule for high and one for low for each output."""
-    pairs = ((_high(on, off, outputs, k), _low(_any((*on[:k], off[k])), output)) for k, output in enumerate(outputs))
-    return tuple(itertools.chain.from_iterable(pairs))
-
-
-def _conjunctive(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """Return a rule for low for each criterion that makes an output low."""
-    rules = []
-    for k, output in enumerate(outputs):
-        rules += [_high(on, off, outputs, k), *(_low(reason, output) for reason in (*on[:k], off[k]))]
-    return tuple(rules)
-
-
-def _complete(on: Statements, off: Statements, outputs: Sequence[Output]) -> Rules:
-    """Return a rule for each combination of terms and each output."""
+def _complete(on: Sequence[Is], off: Sequence[Is]) -> Iterator[tuple[int, Proposition, bool]]:
+    """Yield a condition for each combination of terms and each output."""
     if len(on) > MAX_COMPLETE:
         raise DefinitionError(f"complete form of {len(on)} criteria, expected at most {MAX_COMPLETE}")
-    rules = []
     for combination in itertools.product((True, False), repeat=len(on)):
         condition = _all(tuple(on[j] if asks else off[j] for j, asks in enumerate(combination)))
-        floor = combination.index(True) if True in combination else None
-        rules += [Rule(condition, (o[o.term_names[1 if k == floor else 0]],)) for k, o in enumerate(outputs)]
-    return tuple(rules)
+        first = combination.index(True) if True in combination else None
+        yield from ((k, condition, k == first) for k in range(len(on)))
 
 
-_RULES: dict[str, Callable[[Statements, Statements, Sequence[Output]], Rules]] = {
-    "hierarchical": _hierarchical,
-    "minimal": _minimal,
-    "conjunctive": _conjunctive,
-    "complete": _complete,
-}
+def _all(statements: Sequence[Is]) -> Proposition:
+    return And(tuple(statements)) if len(statements) > 1 else statements[0]
 
 
-def _high(on: Statements, off: Statements, outputs: Sequence[Output], k: int) -> Rule:
-    """Return the rule: if no criterion above k is active, and k is, then its weight is high."""
-    return Rule(_all((*off[:k], on[k])), (outputs[k][outputs[k].term_names[1]],))
-
-
-def _low(condition: Proposition, output: Output) -> Rule:
-    return Rule(condition, (output[output.term_names[0]],))
-
-
-def _all(statements: Statements) -> Proposition:
-    return And(statements) if len(statements) > 1 else statements[0]
-
-
-def _any(statements: Statements) -> Proposition:
-    return Or(statements) if len(statements) > 1 else statements[0]
+def _any(statements: Sequence[Is]) -> Proposition:
+    return Or(tuple(statements)) if len(statements) > 1 else statements[0]

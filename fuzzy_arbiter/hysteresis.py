@@ -66,22 +66,6 @@ class HysteresisArbiter:
     [0.0, 1.0, 1.0, 0.0]
     """
 
-    __slots__ = (
-        "_closed",
-        "_dwell",
-        "_enter",
-        "_graded",
-        "_names",
-        "_off_places",
-        "_on",
-        "_on_places",
-        "_release",
-        "_shapes",
-        "_since",
-        "_time",
-        "arbiter",
-    )
-
     def __init__(
         self,
         arbiter: Arbiter,
@@ -99,9 +83,8 @@ class HysteresisArbiter:
         variables = arbiter.system.inputs
         self.arbiter = arbiter
         self._names = variable_names(variables)
-        self._enter = _settings("enter", enter, self._names, "a number in (0, 1]", lambda x: 0.0 < x <= 1.0)
-        self._release = _settings("release", release, self._names, "a number in [0, 1)", lambda x: 0.0 <= x < 1.0)
-        self._dwell = _settings("dwell", dwell, self._names, "seconds, at least 0", lambda x: 0.0 <= x < math.inf)
+        received = {"enter": enter, "release": release, "dwell": dwell}
+        self._enter, self._release, self._dwell = (_settings(key, x, self._names) for key, x in received.items())
         for name, upper, lower in zip(self._names, self._enter, self._release, strict=True):
             if not lower < upper:
                 raise DefinitionError(f"release: got {lower:g} for {name!r}, expected less than enter, {upper:g}")
@@ -114,23 +97,23 @@ class HysteresisArbiter:
 
     def reset(self) -> None:
         """Open all latches and clear the time, as before the first sample."""
-        self._closed = [False] * len(self._names)
-        self._since = [0.0] * len(self._names)
+        # time at which each latch closed [s]; None while it is open
+        self._since: list[float | None] = [None] * len(self._names)
         self._time = -math.inf
 
     @property
     def active(self) -> dict[str, bool]:
         """True for each criterion whose latch is closed, else False; by the input's name."""
-        return dict(zip(self._names, self._closed, strict=True))
+        return {name: since is not None for name, since in zip(self._names, self._since, strict=True)}
 
     def __call__(self, inputs: Sample, time: float | None = None) -> Result[float]:
         """Return the weights for the next sample; time [s]."""
         now = self._time if time is None and not any(self._dwell) else _validate_time(time, self._time)
         values = self.arbiter.samples.one(inputs)
         degrees = [shape(x) for shape, x in zip(self._shapes, values, strict=True)]
-        closed, since, places = self._next(self._closed, self._since, values, degrees, now)
+        since, places = self._next(self._since, values, degrees, now)
         weights = self.arbiter(places)
-        self._closed, self._since, self._time = closed, since, now
+        self._since, self._time = since, now
         return weights
 
     def scan(self, inputs: ArrayLike, times: ArrayLike | None = None) -> Array:
@@ -155,13 +138,13 @@ class HysteresisArbiter:
         else:
             moments = _validate_times(times, len(values), self._time)
         degrees = np.column_stack([s.of_many(values[:, i]) for i, s in enumerate(self._shapes)])
-        closed, since = self._closed, self._since
+        since = self._since
         places = np.empty_like(values)
         for i, (row, degree, now) in enumerate(zip(values.tolist(), degrees.tolist(), moments.tolist(), strict=True)):
-            closed, since, places[i] = self._next(closed, since, row, degree, now)
+            since, places[i] = self._next(since, row, degree, now)
         weights = self.arbiter.batch(places)
         if len(moments):
-            self._closed, self._since, self._time = closed, since, float(moments[-1])
+            self._since, self._time = since, float(moments[-1])
         return weights
 
     def batch(self, inputs: ArrayLike) -> NoReturn:
@@ -169,26 +152,20 @@ class HysteresisArbiter:
         raise InputError("batch: its rows are independent, but latches need an order; expected scan(inputs, times)")
 
     def _next(
-        self,
-        before: Sequence[bool],
-        since_before: Sequence[float],
-        values: Sequence[float],
-        degrees: Sequence[float],
-        now: float,
-    ) -> tuple[list[bool], list[float], list[float]]:
-        """Return the latches after one sample, the times at which they closed, and the inputs of the arbiter."""
-        closed, since, adjusted = list(before), list(since_before), list(values)
-        for i, degree in enumerate(degrees):
+        self, before: Sequence[float | None], values: Sequence[float], degrees: Sequence[float], now: float
+    ) -> tuple[list[float | None], list[float]]:
+        """Return the times at which the latches closed after one sample, and the inputs of the arbiter."""
+        result, adjusted = list(before), list(values)
+        for i, (since, degree, dwell) in enumerate(zip(before, degrees, self._dwell, strict=True)):
             if degree >= self._enter[i]:
-                if not closed[i]:
-                    closed[i], since[i] = True, now
-            elif closed[i] and degree <= self._release[i] and (not self._dwell[i] or now - since[i] >= self._dwell[i]):
-                closed[i] = False
-            if closed[i]:
+                result[i] = now if since is None else since
+            elif since is not None and degree <= self._release[i] and (not dwell or now - since >= dwell):
+                result[i] = None
+            if result[i] is not None:
                 adjusted[i] = self._on_places[i]
             elif not self._graded:
                 adjusted[i] = self._off_places[i]
-        return closed, since, adjusted
+        return result, adjusted
 
     def __repr__(self) -> str:
         settings = {"enter": self._enter, "release": self._release, "dwell": self._dwell}
@@ -197,10 +174,16 @@ class HysteresisArbiter:
         return f"HysteresisArbiter({self.arbiter!r}, {said}, graded={self._graded}, on={on!r})"
 
 
-def _settings(
-    key: str, received: Setting, names: Sequence[str], expected: str, fits: Callable[[float], bool]
-) -> list[float]:
+_RANGES: dict[str, tuple[str, Callable[[float], bool]]] = {
+    "enter": ("a number in (0, 1]", lambda x: 0.0 < x <= 1.0),
+    "release": ("a number in [0, 1)", lambda x: 0.0 <= x < 1.0),
+    "dwell": ("seconds, at least 0", lambda x: 0.0 <= x < math.inf),
+}
+
+
+def _settings(key: str, received: Setting, names: Sequence[str]) -> list[float]:
     """Return one setting for each input, from one for all or from a mapping."""
+    expected, fits = _RANGES[key]
     if isinstance(received, Mapping):
         _require_names(key, received, names)
         each = [received[name] for name in names]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from fuzzy_arbiter.checks import all_of, finite, shown
+from fuzzy_arbiter.checks import all_of, finite, require_choice, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import Is, Proposition
 from fuzzy_arbiter.terms.norms import S_NORMS, T_NORMS
@@ -39,9 +39,7 @@ class Operators:
 
     def __post_init__(self) -> None:
         for key, known in (("conjunction", T_NORMS), ("disjunction", S_NORMS), ("implication", T_NORMS)):
-            word = getattr(self, key)
-            if not isinstance(word, str) or word not in known:
-                raise DefinitionError(f"{key} is {shown(word)}, expected one of {', '.join(known)}")
+            require_choice(getattr(self, key), known, key)
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,11 @@ def parse_rules(text: str) -> list[Rule]:
     """Parse a text whose conclusions may have hedges as rules, in the way of fuzzylite."""
     # A hedge in a conclusion bends the strength of that conclusion and of those after it, as one on the whole condition
     # does. So conclusions with other hedges become a rule of their own.
-    return _Parser(text).bent_rules()
+    parser = _Parser(text)
+    condition, conclusions, weight = parser.parts(hedges=True)
+    if weight != 1.0 and any(hedges for hedges, _ in conclusions):
+        raise parser.fault("a hedge in a conclusion of a rule with a weight, expected the weight 1")
+    return bent_rules(condition, conclusions, weight)
 
 
 def parse_rule(text: str) -> Rule:
@@ -33,7 +37,8 @@ def parse_rule(text: str) -> Rule:
     # Words of rules may be in any case. The hedges very, somewhat, extremely, seldom, cubed and cube_root are written
     # before a term. `&`, `|`, `~` are *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are
     # no identifiers stand in double quotes.
-    return _Parser(text).rule()
+    condition, conclusions, weight = _Parser(text).parts(hedges=False)
+    return Rule(condition, tuple(conclusion for _, conclusion in conclusions), weight)
 
 
 class _Parser:
@@ -78,38 +83,37 @@ class _Parser:
         self.at += 1
         return token
 
-    def rule(self) -> Rule:
-        condition, conclusions, weight = self.parts(self.conclusion)
-        return Rule(condition, tuple(conclusions), weight)
-
-    def parts(self, conclusion: Callable[[], Any]) -> tuple[Proposition, list[Any], float]:
+    def parts(self, hedges: bool) -> tuple[Proposition, list[tuple[tuple[str, ...], Is]], float]:
+        """Read the condition, the conclusions, each with its hedges, and the weight."""
         self.take("if", "'if'")
-        condition = self.disjunction()
+        condition = self.joined(Or)
         self.take("then", "'then', 'and' or 'or'")
-        conclusions = [conclusion()]
+        conclusions = [self.conclusion(hedges)]
         while self.accept("and") or self.accept(","):
-            conclusions.append(conclusion())
+            conclusions.append(self.conclusion(hedges))
         weight = self.number() if self.accept("with") else 1.0
         self.take("end", "'and', 'with' or the end")
         return condition, conclusions, weight
 
-    def bent_rules(self) -> list[Rule]:
-        condition, conclusions, weight = self.parts(self.bent_conclusion)
-        if weight != 1.0 and any(hedges for hedges, _ in conclusions):
-            raise self.fault("a hedge in a conclusion of a rule with a weight, expected the weight 1")
-        return bent_rules(condition, conclusions, weight)
-
-    def bent_conclusion(self) -> tuple[tuple[str, ...], Is]:
-        """Read a conclusion, and the hedges in it."""
+    def conclusion(self, hedges: bool) -> tuple[tuple[str, ...], Is]:
         variable = self.take("name", "an output's name")
         self.take("is", "'is'")
-        hedges: list[str] = []
-        while self.tokens[self.at][0] == "not" or (
-            self.tokens[self.at][1].lower() in HEDGES and self.tokens[self.at + 1][0] in ("name", "not")
-        ):
-            hedges.append(self.tokens[self.at][1].lower())
-            self.at += 1
-        return tuple(hedges), Is(variable, self.take("name", "a term's name"))
+        words = self.hedges("name", "not") if hedges else ()
+        if not hedges and self.accept("any"):  # which in a conclusion is a name like others
+            return words, Is(variable, self.tokens[self.at - 1][1])
+        return words, Is(variable, self.take("name", "a term's name"))
+
+    def hedges(self, *before: str) -> tuple[str, ...]:
+        """Read hedges, which stand before tokens of some kinds, and *not*."""
+        words: list[str] = []
+        while self.accept("not") or self.accept_hedge(*before):
+            words.append(self.tokens[self.at - 1][1].lower())
+        return tuple(words)
+
+    def accept_hedge(self, *before: str) -> bool:
+        is_hedge = self.tokens[self.at][1].lower() in HEDGES and self.tokens[self.at + 1][0] in before
+        self.at += is_hedge
+        return is_hedge
 
     def number(self) -> float:
         token = self.take("number", "the rule's weight")
@@ -118,24 +122,14 @@ class _Parser:
         except ValueError:
             raise self.fault(f"{token!r} is not a number") from None
 
-    def conclusion(self) -> Is:
-        variable = self.take("name", "an output's name")
-        self.take("is", "'is'")
-        if self.accept("any"):  # which in a conclusion is a name like others
-            return Is(variable, self.tokens[self.at - 1][1])
-        return Is(variable, self.take("name", "a term's name"))
-
-    def disjunction(self) -> Proposition:
-        parts = [self.conjunction()]
-        while self.accept("or"):
-            parts.append(self.conjunction())
-        return self.made(Or, tuple(parts)) if len(parts) > 1 else parts[0]
-
-    def conjunction(self) -> Proposition:
-        parts = [self.statement()]
-        while self.accept("and"):
-            parts.append(self.statement())
-        return self.made(And, tuple(parts)) if len(parts) > 1 else parts[0]
+    def joined(self, kind: type[Or | And]) -> Proposition:
+        """Read a disjunction, or a conjunction."""
+        word = "or" if kind is Or else "and"
+        part: Callable[[], Proposition] = partial(self.joined, And) if kind is Or else self.statement
+        parts = [part()]
+        while self.accept(word):
+            parts.append(part())
+        return self.made(kind, tuple(parts)) if len(parts) > 1 else parts[0]
 
     def made(self, kind: Callable[[Any], Proposition], parts: Any) -> Proposition:
         try:
@@ -143,48 +137,34 @@ class _Parser:
         except DefinitionError as error:
             raise self.fault(str(error)) from None
 
-    def deeper(self) -> None:
+    def inner(self, parse: Callable[[], Proposition]) -> Proposition:
+        """Parse what is nested in parentheses, or follows *not* or a hedge."""
         self.depth += 1
         if self.depth > MAX_NESTING:
             raise self.fault(f"nested deeper than {MAX_NESTING} parentheses and negations")
+        proposition = parse()
+        self.depth -= 1
+        return proposition
 
     def statement(self) -> Proposition:
         if self.accept("not"):
-            self.deeper()
-            inner = self.made(Not, self.statement())
-            self.depth -= 1
-            return inner
-        if self.tokens[self.at][1].lower() in HEDGES and self.tokens[self.at + 1][0] == "(":
-            word = self.tokens[self.at][1].lower()
-            self.at += 1
-            self.deeper()
-            inner = self.made(partial(Hedged, word), self.statement())
-            self.depth -= 1
-            return inner
+            return self.made(Not, self.inner(self.statement))
+        if self.accept_hedge("("):
+            word = self.tokens[self.at - 1][1].lower()
+            return self.made(partial(Hedged, word), self.inner(self.statement))
         if self.accept("("):
-            self.deeper()
-            inner = self.disjunction()
-            self.depth -= 1
+            inner = self.inner(lambda: self.joined(Or))
             self.take(")", "')', 'and' or 'or'")
             return inner
         variable = self.take("name", "an input's name, 'not' or '('")
         self.take("is", "'is'")
-        return self.term(variable)
+        words = self.hedges("name", "not", "any")
+        if self.accept("any"):
+            return self.bent(words, Anything(variable))
+        return self.bent(words, Is(variable, self.take("name", "a term's name")))
 
-    def term(self, variable: str) -> Proposition:
-        """Read the statement on a variable: a term, or *any*, perhaps with hedges or *not* before it."""
-        bends: list[str] = []
-        while True:
-            if self.accept("not"):
-                bends.append("not")
-            elif self.tokens[self.at][1].lower() in HEDGES and self.tokens[self.at + 1][0] in ("name", "not", "any"):
-                bends.append(self.tokens[self.at][1].lower())
-                self.at += 1
-            else:
-                break
-        anything = self.accept("any")
-        statement: Proposition = Anything(variable) if anything else Is(variable, self.take("name", "a term's name"))
-        for word in reversed(bends):
+    def bent(self, words: Sequence[str], statement: Proposition) -> Proposition:
+        for word in reversed(words):
             statement = self.made(Not if word == "not" else partial(Hedged, word), statement)
         return statement
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Collection, Mapping, Sequence, Sized
 from numbers import Real
 from operator import itemgetter
 from typing import Any, Protocol
@@ -15,7 +15,7 @@ from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import InputError
 
-_NUMBER = (Real, np.bool_)
+_NUMBER: Any = (Real, np.bool_)
 
 
 class Frame(Protocol):
@@ -54,14 +54,13 @@ class Samples:
         return inputs.tolist() if kind is np.ndarray and inputs.ndim == 1 else None
 
     def one(self, inputs: Sample) -> Sequence[float]:
-        """Return the values of one sample."""
-        try:
-            values = inputs if type(inputs) is list or type(inputs) is tuple else self._in_order(inputs)
-            for x, (low, high) in zip(values, self._limits, strict=True):
-                if type(x) is not float or not low <= x <= high:  # NaN too
-                    return self._converted(values)
-        except (TypeError, ValueError):
-            raise self._fault(inputs) from None
+        """Return the values of one sample, as floats within their universes."""
+        values = inputs if type(inputs) is list or type(inputs) is tuple else self._in_order(inputs)
+        if len(values) != len(self._names):
+            raise InputError(f"inputs: got {len(values)}, expected {len(self._names)}: {', '.join(self._names)}")
+        for x, (low, high) in zip(values, self._limits, strict=True):
+            if type(x) is not float or not low <= x <= high:  # NaN too
+                return self._converted(values, isinstance(inputs, np.ma.MaskedArray))
         return values
 
     def many(self, inputs: ArrayLike) -> Array:
@@ -79,7 +78,7 @@ class Samples:
                 raise TypeError(f"got values of the type {received.dtype.name}")
             if received.dtype.kind == "O" and any(isinstance(x, str | bytes) for x in received.flat):
                 raise TypeError("got a text among the values")
-            masked = self._masked(inputs)
+            masked = np.ma.getmaskarray(inputs) if isinstance(inputs, np.ma.MaskedArray) else None
             if masked is not None and masked.shape == received.shape == (len(received), len(self._names)):
                 masked = np.asarray(masked.any(axis=1))
                 received = np.where(masked[:, None], np.array(self._limits).T[0], received)
@@ -118,34 +117,30 @@ class Samples:
         masks = np.stack([np.broadcast_to(np.ma.getmaskarray(x), n) for x in columns], axis=1)
         return np.ma.MaskedArray(values, masks)
 
-    def _masked(self, inputs: object) -> NDArray[np.bool_] | None:
-        return np.ma.getmaskarray(inputs) if isinstance(inputs, np.ma.MaskedArray) else None
-
-    def _converted(self, values: Sequence[float]) -> list[float]:
+    def _converted(self, values: Sequence[Any], masked: bool) -> list[float]:
         """Return values as floats within their universes, so that other number types add no rounding of their own."""
-        if not all(isinstance(x, _NUMBER) for x in values):
-            raise TypeError
-        if not all(low <= x <= high for x, (low, high) in zip(values, self._limits, strict=True)):
-            if not self._clips or any(x != x for x in values):
-                raise self._fault(values)
-            values = [min(max(x, low), high) for x, (low, high) in zip(values, self._limits, strict=True)]
-        return list(map(float, values))
+        result = []
+        for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
+            if not isinstance(x, _NUMBER) or x != x or (not self._clips and not low <= x <= high):
+                received = "masked" if masked and x is None else shown(x)
+                hint = "; for columns there is batch" if isinstance(x, Sized) and not isinstance(x, str) else ""
+                raise InputError(f"{name}: input is {received}, expected a number in [{low:g}, {high:g}]{hint}")
+            result.append(float(min(max(x, low), high)))
+        return result
 
-    def _in_order(self, inputs: Any) -> list[float]:
-        if isinstance(inputs, Mapping):
-            self._require_names(inputs)
+    def _in_order(self, inputs: Any) -> Sequence[Any]:
+        if hasattr(inputs, "keys"):
+            known = set(inputs.keys())  # of a row of a data frame other columns are passed over
+            self._require_names(inputs if isinstance(inputs, Mapping) else [n for n in self._names if n in known])
             return [inputs[name] for name in self._names]
-        if hasattr(inputs, "keys"):  # a row of a data frame, of which other columns are passed over
-            known = set(inputs.keys())
-            self._require_names({name: None for name in self._names if name in known})
-            return [inputs[name] for name in self._names]
-        if isinstance(inputs, np.ndarray):
-            return list(inputs.tolist())
+        if isinstance(inputs, np.ndarray) and inputs.ndim:
+            values: list[Any] = inputs.tolist()
+            return values
         if isinstance(inputs, Sequence):
             return list(inputs)
-        raise TypeError(inputs)
+        raise InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
 
-    def _require_names(self, inputs: Mapping[str, object]) -> None:
+    def _require_names(self, inputs: Collection[str]) -> None:
         for name in inputs:  # first, for a misspelt one is missing, too
             if name not in self._names:
                 raise InputError(f"{name}: unknown input, expected {', '.join(self._names)}")
@@ -158,19 +153,3 @@ class Samples:
             if columns.count(name) != 1:
                 fault = "stands twice" if name in columns else "is missing"
                 raise InputError(f"{name}: column {fault} in {', '.join(columns)}; expected {', '.join(self._names)}")
-
-    def _fault(self, inputs: Sample) -> InputError:
-        """Return the error for a sample that was refused."""
-        masked = isinstance(inputs, np.ma.MaskedArray)
-        try:
-            values = self._in_order(inputs)
-        except TypeError:
-            return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
-        if len(values) != len(self._names):
-            return InputError(f"inputs: got {len(values)}, expected {len(self._names)}: {', '.join(self._names)}")
-        for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
-            if not isinstance(x, _NUMBER) or x != x or (not self._clips and not low <= x <= high):
-                came = "masked" if masked and x is None else shown(x)
-                hint = "; for columns there is batch" if isinstance(x, Sized) and not isinstance(x, str) else ""
-                return InputError(f"{name}: input is {came}, expected a number in [{low:g}, {high:g}]{hint}")
-        return InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")

@@ -67,8 +67,9 @@ class Curve(Membership):
         height = finite(self.height)
         if height is None or not 0.0 < height <= 1.0:
             raise DefinitionError(f"{words}: height is {shown(self.height)}, expected above 0 and at most 1")
-        if not kind.is_valid(*numbers):
-            raise DefinitionError(f"{words}: got {shown(numbers)}, expected {kind.expected}")
+        is_valid, expected = kind.valid
+        if not is_valid(*numbers):
+            raise DefinitionError(f"{words}: got {shown(numbers)}, expected {expected}")
         named = dict(zip(kind.parameters, numbers, strict=True))
         pieces = [(end, _tree(text, named, height)) for end, text in kind.pieces(*numbers)]
         object.__setattr__(self, "parameters", numbers)

@@ -116,16 +116,8 @@ def _said(node: Node) -> tuple[str, int]:
     binds = _BINDS[word]
     if word == "~":
         return f"-{_within(texts[0], binds)}", binds
-    left, right = texts
     # operators of equal precedence are evaluated from the left, except powers
-    first, second = (
-        (_within(left, binds + 1), _within(right, binds))
-        if word == "^"
-        else (
-            _within(left, binds),
-            _within(right, binds + 1),
-        )
-    )
+    first, second = _within(texts[0], binds + (word == "^")), _within(texts[1], binds + (word != "^"))
     return (f"{first}^{second}" if word == "^" else f"{first} {word} {second}"), binds
 
 

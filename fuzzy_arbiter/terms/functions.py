@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import operator
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -37,15 +38,8 @@ def _divided(a: float, b: float) -> float:
     return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a) * math.copysign(1.0, b)
 
 
-def _compared(name: str) -> Function:
-    function = getattr(np, {"lt": "less", "le": "less_equal", "gt": "greater", "ge": "greater_equal"}[name])
-    number: Callable[[float, float], float] = {
-        "lt": lambda a, b: float(a < b),
-        "le": lambda a, b: float(a <= b),
-        "gt": lambda a, b: float(a > b),
-        "ge": lambda a, b: float(a >= b),
-    }[name]
-    return Function(2, number, lambda a, b: function(a, b).astype(np.float64))
+def _compared(holds: Callable[[Any, Any], Any]) -> Function:
+    return Function(2, lambda a, b: float(holds(a, b)), lambda a, b: np.asarray(holds(a, b), dtype=np.float64))
 
 
 def _log(a: float) -> float:
@@ -65,20 +59,20 @@ FUNCTIONS: dict[str, Function] = {
     "ceil": Function(1, _guarded(math.ceil), np.ceil),
     "cos": Function(1, _guarded(math.cos), np.cos),
     "cosh": Function(1, _guarded(math.cosh), np.cosh),
-    "eq": Function(2, lambda a, b: float(a == b), lambda a, b: np.equal(a, b).astype(np.float64)),
+    "eq": _compared(operator.eq),
     "exp": Function(1, _guarded(math.exp), np.exp),
     "floor": Function(1, _guarded(math.floor), np.floor),
     "fmod": Function(2, _guarded(math.fmod), np.fmod),
-    "ge": _compared("ge"),
-    "gt": _compared("gt"),
-    "le": _compared("le"),
+    "ge": _compared(operator.ge),
+    "gt": _compared(operator.gt),
+    "le": _compared(operator.le),
     "log": Function(1, _guarded(_log), np.log),
     "log10": Function(1, _guarded(lambda a: -math.inf if a == 0.0 else math.log10(a)), np.log10),
     "log1p": Function(1, _guarded(lambda a: -math.inf if a == -1.0 else math.log1p(a)), np.log1p),
-    "lt": _compared("lt"),
+    "lt": _compared(operator.lt),
     "max": Function(2, max, np.maximum),
     "min": Function(2, min, np.minimum),
-    "neq": Function(2, lambda a, b: float(a != b), lambda a, b: np.not_equal(a, b).astype(np.float64)),
+    "neq": _compared(operator.ne),
     "pow": Function(2, _guarded(_power), np.power),
     "round": Function(1, _guarded(round), np.round),
     "sin": Function(1, _guarded(math.sin), np.sin),

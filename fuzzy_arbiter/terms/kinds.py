@@ -22,8 +22,8 @@ class CurveKind:
     fll: str  # word of fuzzylite, which has the parameters in the same order; empty if there is none
     fis: Word  # word of MATLAB or fuzzylite; empty if there is none
     fcl: Word | None = None  # word of jFuzzyLogic; None if there is none
-    is_valid: Callable[..., bool] = lambda *parameters: True  # predicate on the parameters
-    expected: str = "finite numbers"  # valid parameters, in words
+    # predicate on the parameters, and its words
+    valid: tuple[Callable[..., bool], str] = (lambda *parameters: True, "finite numbers")
     polynomial: bool = False  # true if the pieces are polynomials
     # function for a kind that only rises or only falls: from the parameters to pieces over the degree ``w``, which
     # give the place
@@ -127,8 +127,7 @@ KINDS: dict[str, CurveKind] = {
         ("mean", "deviation"),
         lambda mean, deviation: [(_END, _gaussian("mean", "deviation"))],
         fll="Gaussian",
-        is_valid=lambda mean, deviation: deviation != 0.0,
-        expected="a deviation other than 0",
+        valid=(lambda mean, deviation: deviation != 0.0, "a deviation other than 0"),
         fis=("gaussmf", (1, 0)),
         fcl=("GAUSS", (0, 1)),
         features=_around,
@@ -140,8 +139,10 @@ KINDS: dict[str, CurveKind] = {
             [(mean2, "1"), (_END, _gaussian("mean2", "deviation2"))],
         ),
         fll="GaussianProduct",
-        is_valid=lambda mean1, deviation1, mean2, deviation2: deviation1 != 0.0 and deviation2 != 0.0,
-        expected="deviations other than 0",
+        valid=(
+            lambda mean1, deviation1, mean2, deviation2: deviation1 != 0.0 and deviation2 != 0.0,
+            "deviations other than 0",
+        ),
         fis=("gauss2mf", (1, 0, 3, 2)),
         fcl=("GAUSS2", (0, 1, 2, 3)),
         features=_product_of_gaussians,
@@ -150,8 +151,7 @@ KINDS: dict[str, CurveKind] = {
         ("center", "width", "slope"),
         lambda center, width, slope: _peaked(center, "1 / (1 + abs((x - center) / width) ^ (2 * slope))"),
         fll="Bell",
-        is_valid=lambda center, width, slope: width != 0.0,
-        expected="a width other than 0",
+        valid=(lambda center, width, slope: width != 0.0, "a width other than 0"),
         fis=("gbellmf", (1, 2, 0)),
         fcl=("GBELL", (1, 2, 0)),
         features=lambda center, width, slope: [
@@ -192,8 +192,7 @@ KINDS: dict[str, CurveKind] = {
         ("start", "end"),
         _z,
         fll="ZShape",
-        is_valid=lambda start, end: start <= end,
-        expected="a start that is not above the end",
+        valid=(lambda start, end: start <= end, "a start that is not above the end"),
         fis=("zmf", (0, 1)),
         polynomial=True,
         inverse=lambda start, end: [
@@ -205,8 +204,7 @@ KINDS: dict[str, CurveKind] = {
         ("start", "end"),
         _s,
         fll="SShape",
-        is_valid=lambda start, end: start <= end,
-        expected="a start that is not above the end",
+        valid=(lambda start, end: start <= end, "a start that is not above the end"),
         fis=("smf", (0, 1)),
         polynomial=True,
         inverse=lambda start, end: [
@@ -220,8 +218,10 @@ KINDS: dict[str, CurveKind] = {
             _s(foot1, top1, ("foot1", "top1")), _z(top2, foot2, ("top2", "foot2"))
         ),
         fll="PiShape",
-        is_valid=lambda foot1, top1, top2, foot2: foot1 <= top1 and top2 <= foot2,
-        expected="each foot on the outer side of its top",
+        valid=(
+            lambda foot1, top1, top2, foot2: foot1 <= top1 and top2 <= foot2,
+            "each foot on the outer side of its top",
+        ),
         fis=("pimf", (0, 1, 2, 3)),
         polynomial=True,
         monotonic=False,  # where its tops overlap
@@ -234,8 +234,7 @@ KINDS: dict[str, CurveKind] = {
             (_END, "0"),
         ],
         fll="Cosine",
-        is_valid=lambda center, width: width > 0.0,
-        expected="a width above 0",
+        valid=(lambda center, width: width > 0.0, "a width above 0"),
         fis=("cosinemf", (0, 1)),
         features=lambda center, width: [center],
     ),
@@ -243,8 +242,7 @@ KINDS: dict[str, CurveKind] = {
         ("center", "width"),
         lambda center, width: _peaked(center, "exp(-abs(10 / width * (x - center)))"),
         fll="Spike",
-        is_valid=lambda center, width: width != 0.0,
-        expected="a width other than 0",
+        valid=(lambda center, width: width != 0.0, "a width other than 0"),
         fis=("spikemf", (0, 1)),
         features=lambda center, width: _around(center, width / 10.0),
     ),
@@ -260,8 +258,7 @@ KINDS: dict[str, CurveKind] = {
         ("start", "end"),
         _arc,
         fll="Arc",
-        is_valid=lambda start, end: start != end,
-        expected="two places",
+        valid=(lambda start, end: start != end, "two places"),
         fis=("arcmf", (0, 1)),
         inverse=lambda start, end: [
             (_END, f"end {'-' if start < end else '+'} sqrt((end - start) ^ 2 * (1 - w ^ 2))"),
@@ -277,8 +274,7 @@ KINDS: dict[str, CurveKind] = {
         ("start", "end"),
         _ellipse,
         fll="SemiEllipse",
-        is_valid=lambda start, end: start != end,
-        expected="two places",
+        valid=(lambda start, end: start != end, "two places"),
         fis=("semiellipsemf", (0, 1)),
         features=lambda start, end: [(start + end) / 2.0],
     ),

@@ -65,68 +65,48 @@ class _Parser:
             raise self.fault(f"has {depth} operators within each other, expected at most {MAX_DEPTH}")
         return tree
 
-    def deeper(self) -> None:
+    def inner(self, parse: Callable[[], Node]) -> Node:
+        """Parse what is nested in parentheses, or follows a sign."""
         self.depth += 1
         if self.depth > MAX_NESTING:
             raise self.fault(f"nested deeper than {MAX_NESTING} parentheses")
+        tree = parse()
+        self.depth -= 1
+        return tree
 
-    def joined(self, signs: tuple[str, ...], part: Callable[[], Node]) -> Node:
+    def sum(self, signs: tuple[str, ...] = ("+", "-")) -> Node:
+        part = self.signed if "*" in signs else lambda: self.sum(("*", "/", "%"))
         tree = part()
         while sign := self.accept(*signs):
             tree = (sign, tree, part())
         return tree
 
-    def sum(self) -> Node:
-        return self.joined(("+", "-"), self.product)
-
-    def product(self) -> Node:
-        return self.joined(("*", "/", "%"), self.signed)
-
     def signed(self) -> Node:
         if sign := self.accept("+", "-", "~"):
-            self.deeper()
-            tree = self.signed()
-            self.depth -= 1
+            tree = self.inner(self.signed)
             return tree if sign == "+" else -tree if isinstance(tree, float) else ("~", tree)
-        return self.power()
-
-    def power(self) -> Node:
         base = self.atom()
-        if not self.accept("^"):
-            return base
-        self.deeper()
-        tree = ("^", base, self.signed())
-        self.depth -= 1
-        return tree
+        return ("^", base, self.inner(self.signed)) if self.accept("^") else base
 
     def atom(self) -> Node:
         number, name, sign = self.tokens[self.at] if self.at < len(self.tokens) else ("", "", "")
+        if not (number or name or sign == "("):
+            raise self.unexpected("a number, a name, a function or '('")
+        self.at += 1
         if number:
-            self.at += 1
             if not math.isfinite(float(number)):
                 raise self.fault(f"got {number}, expected a finite number")
             return float(number)
+        if name and self.here != "(":
+            if name in WORDS - {"pi"}:
+                raise self.unexpected(f"'(' after the function {name!r}")
+            return math.pi if name == "pi" else name
         if name:
-            self.at += 1
-            return self.called(name) if self.here == "(" else math.pi if name == "pi" else self.plain(name)
-        if sign == "(":
-            self.at += 1
-            tree = self.inner()
-            if not self.accept(")"):
-                raise self.unexpected("')' or an operator")
-            return tree
-        raise self.unexpected("a number, a name, a function or '('")
-
-    def inner(self) -> Node:
-        self.deeper()
-        tree = self.sum()
-        self.depth -= 1
+            return self.called(name)
+        tree = self.inner(self.sum)
+        if not self.accept(")"):
+            raise self.unexpected("')' or an operator")
         return tree
-
-    def plain(self, name: str) -> str:
-        if name in WORDS:
-            raise self.unexpected(f"'(' after the function {name!r}")
-        return name
 
     def called(self, name: str) -> Node:
         word = SAME.get(name.lower(), name.lower())
@@ -138,9 +118,9 @@ class _Parser:
         if word not in FUNCTIONS:
             raise self.fault(f"no function {name!r}, expected one of {', '.join(sorted(WORDS))}")
         self.at += 1
-        arguments = [self.inner()]
+        arguments = [self.inner(self.sum)]
         while self.accept(","):
-            arguments.append(self.inner())
+            arguments.append(self.inner(self.sum))
         if not self.accept(")"):
             raise self.unexpected("')', ',' or an operator")
         if len(arguments) != FUNCTIONS[word].arguments:
