@@ -24,6 +24,7 @@ log = logging.getLogger(__name__)
 MAX_ROWS = 100_000_001  # rows of a run with the maximum number of steps that a scenario may have
 RECORD = "record.parquet"
 STREAM = "record.arrows"  # Arrow stream of the rows of a run that is under way or was killed
+_FORMER = "record.parts"  # folder in which earlier versions left the rows of a killed run
 _DIGITS = 9  # maximum number of digits of a format number
 _BLOCK = 10_000  # rows that are read at once
 _SMALL = 2**22  # numbers; a record of at most so many is read as a whole
@@ -184,6 +185,9 @@ def load_record(folder: Path) -> Record:
     require_utf8(folder)
     files = (folder / name for name in (RECORD, STREAM))
     file = next((file for file in files if file.exists() and file.stat().st_size), None)
+    if file is None and (folder / _FORMER).exists():
+        join = f"import pyarrow.parquet as pq; pq.write_table(pq.read_table('{_FORMER}'), '{RECORD}')"
+        raise RunError(f'{folder}: holds {_FORMER} of an earlier version; join it there by: python -c "{join}"')
     if file is None:
         raise RunError(f"{folder}: holds no record of a run")
     record = Record(file)

@@ -83,9 +83,11 @@ def test_commanded_run_is_streamed(shipped_run, tmp_path):
 
 def test_killed_run_is_streamed_to_its_last_row(recorded, tmp_path):
     killed = tmp_path / "killed"
-    (killed / "record.parts").mkdir(parents=True)
+    killed.mkdir()
     shutil.copy(recorded / "scenario.toml", killed)
-    shutil.copy(recorded / "record.parquet", killed / "record.parts" / "000000.parquet")
+    table = pq.read_table(recorded / "record.parquet")
+    with pa.ipc.new_stream(killed / "record.arrows", table.schema) as stream:
+        stream.write_table(table)
     done = replay(killed, [parse_endpoint(str(tmp_path / "run.tlog"))], MavlinkOptions(), rate=None)
     assert done.simulated == pytest.approx(4.0)
 
