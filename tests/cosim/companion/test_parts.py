@@ -403,7 +403,7 @@ def test_supervisor_states_advance_in_order():
         assert supervisor.update(Observation(0.0, *(i < k for i in range(4)), {})) == state
     for needs_dive, is_in_mode, state in (
         (True, False, "diving"),
-        (False, False, "engaging"),
+        (False, True, "engaging"),
         (False, True, "steering"),
     ):
         assert diver.update(Observation(0.0, True, True, True, is_in_mode, {}, needs_dive)) == state
