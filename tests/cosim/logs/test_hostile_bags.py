@@ -9,6 +9,7 @@ import sys
 import pytest
 
 from cosim.errors import ImportLogError
+from cosim.logs.decompression import Decompressor
 from cosim.logs.message_definitions import parse_definition, reachable_types
 from tests.cosim.logs import hostile_bags
 from tests.cosim.logs.hostile_bags import idl, nested
@@ -36,6 +37,16 @@ def test_a_few_hostile_bags_are_a_run_or_one_line(first, tmp_path):
 @pytest.mark.parametrize("first", range(0, 1000, 100))
 def test_thousand_hostile_bags_are_a_run_or_one_line(first, tmp_path):
     assert not faults(tmp_path, first, first + 100)
+
+
+@pytest.mark.parametrize("compression", ["bz2", "lz4", "zstd"])
+def test_parts_of_a_bag_are_bounded_in_total(compression, tmp_path):
+    """Those of a small file to 16 MiB."""
+    (tmp_path / "bag").write_bytes(bytes(1000))
+    parts, half = Decompressor(tmp_path / "bag"), hostile_bags.PACK[compression](bytes(1 << 23))
+    assert len(parts.decompress(compression, half)) == len(parts.decompress(compression, half)) == 1 << 23
+    with pytest.raises(ImportLogError, match="decompresses to more than 16777216 bytes"):
+        parts.decompress(compression, hostile_bags.PACK[compression](b"\0"))
 
 
 @pytest.mark.parametrize(

@@ -97,8 +97,8 @@ def about(axis, angle):
 
 
 @pytest.mark.medium(fast=5)
-@pytest.mark.parametrize("order", ["ZYX", "zyx", "XZY", "YXZ", "ZXZ"])
 @pytest.mark.parametrize("inverse", [False, True])
+@pytest.mark.parametrize("order", ["ZYX", "zyx", "XZY", "YXZ", "ZXZ"])
 def test_euler_angles_are_products_of_elementary_rotations(write, imported, order, inverse):
     """Capital letters: about the axes of the turned body; small ones: about those of the world."""
     angles = np.cumsum(np.random.default_rng(0).uniform(-0.1, 0.1, (50, 3)), axis=0)
