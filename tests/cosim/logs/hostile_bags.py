@@ -58,36 +58,22 @@ def msg_definition(rng: random.Random) -> tuple[str, str]:
     number = rng.choice(
         ("1e999", "-1e999", "nan", "1<<40", "9" * 5000, "0x" + "f" * n, '\'a"""\'', '"\\"', "1", "-" * n)
     )
-    bodies = (
+    body = rng.choice((
         f"float64 X={number}\n",
         f"{rng.choice(('int8', 'bool', 'string', 'time', 'duration', 'byte', 'char'))} {other}={number}\n",
-        "".join(f"float64 a{k}\n" for k in range(n)),
-        "".join(f"int8 A{k}=1\n" for k in range(n)),
-        f"string[{n}] names\n",
-        f"uint8[{rng.choice((0, -1, n, 2**31, 2**63, 10**30))}] data\n",
-        f"string<={number} s\n",
-        f"float64[] data [{'1,' * n}]\n",
-        f"float64 data {number}\n",
-        f"float64 {word}\nfloat64 {other}\n",
-        "\n" * n,
-        " " * n,
-        "#" * n + "\n",
-        "@" + "a" * n,
-        f"{'a/' * min(n, 3000)}B b\n",
-        f"{word}/{other} b\n",
-        nested("a/C1 c\n", "a/C1 c\n"),
-        nested("a/C1 c\n", "a/B b\n"),
-        nested("C1[] c\n", ""),
-        nested("C1[] c\n", "C2[3] d\n", ""),
-        nested("C1[] c\n", "C2[] d\n", "uint8[0] e\n"),
-        nested("C1[] c\n", "C2[] d\n", "uint8 e\n"),
-        nested(f"C1[{n}] c\n", f"C2[{n}] d\n", "uint8 e\n"),
+        "".join(f"float64 a{k}\n" for k in range(n)), "".join(f"int8 A{k}=1\n" for k in range(n)),
+        f"string[{n}] names\n", f"uint8[{rng.choice((0, -1, n, 2**31, 2**63, 10**30))}] data\n",
+        f"string<={number} s\n", f"float64[] data [{'1,' * n}]\n", f"float64 data {number}\n",
+        f"float64 {word}\nfloat64 {other}\n", "\n" * n, " " * n, "#" * n + "\n", "@" + "a" * n,
+        f"{'a/' * min(n, 3000)}B b\n", f"{word}/{other} b\n",
+        nested("a/C1 c\n", "a/C1 c\n"), nested("a/C1 c\n", "a/B b\n"), nested("C1[] c\n", ""),
+        nested("C1[] c\n", "C2[3] d\n", ""), nested("C1[] c\n", "C2[] d\n", "uint8[0] e\n"),
+        nested("C1[] c\n", "C2[] d\n", "uint8 e\n"), nested(f"C1[{n}] c\n", f"C2[{n}] d\n", "uint8 e\n"),
         nested(*(f"C{k}[2] a\nC{k}[2] b\n" for k in range(1, min(n, 40))), "uint8 e\n"),
         nested(*(f"C{k} a\n" for k in range(1, min(n, 2000))), "uint8 e\n"),
         SEPARATOR + f"a/{word}\nint8 x\n" + SEPARATOR * min(n, 2000),
         "".join(rng.choices("float64 x=[]<>/\n#'\"0123456789\té\0", k=min(n, 5000))),
-    )
-    body = rng.choice(bodies)
+    ))  # fmt: skip
     names = (
         "9x/msg/9Odom",
         "a/msg/B\nint8 q",
