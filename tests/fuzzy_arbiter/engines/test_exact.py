@@ -1,7 +1,6 @@
 """The exact engine against rational arithmetic, for any piecewise-linear system."""
 
 import math
-from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
@@ -42,17 +41,35 @@ def test_centroid_is_exact_for_any_system(system, data):
     assert np.array_equal(arbiter.batch([inputs])[0], arbiter(inputs), equal_nan=True)
 
 
+def system(terms, *concluded, start=0.0, universe=(0, 1), default=None, **options):
+    """A rule for each of some terms, all of the strength of the input, which rises from `start`."""
+    x = Variable("x", (0, 1), {"on": rising(start, 1)})
+    rules = [f"if x is on then y is {term}" for term in concluded]
+    return System((x,), (Output("y", universe, terms, default),), rules, **options)
+
+
+ALMOST_LEVEL = Shape(((0, 1), (1, 1e-20)))
+BOX = Shape(((2, 0), (2, 1), (5, 1), (5, 0)))
+TINY = (5e-324, 1e-310, 1e-200, 1e-121, 1e-119, 1e-60, 1e-30, 1e-17, 1e-12, 1e-9, 1e-6)
+
+
 @pytest.mark.parametrize("implication", ["min", "prod"])
-def test_tiny_degrees_do_not_underflow(implication):
-    """As both cuts vanish alike, the centroid goes to the middle of the joined supports."""
-    output = Output("y", (0, 1), (Term("low", falling(0, 1)), Term("high", rising(0, 1))))
-    rules = ("if x is on then y is low", "if x is on then y is high")
-    inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
-    arbiter = Arbiter(system=System(inputs, (output,), rules, normalization="none", implication=implication))
+@pytest.mark.parametrize(
+    ("terms", "concluded", "universe", "strengths", "value"),
+    [
+        # as both cuts vanish alike, the centroid goes to the middle of the joined supports
+        ({"low": falling(0, 1), "high": rising(0, 1)}, ("low", "high"), (0, 1), TINY[:7], 0.5),
+        ({"mid": triangle(0, 0.5, 1)}, ("mid",), (0, 1), TINY, 0.5),
+        ({"a": falling(0, 1), "b": ALMOST_LEVEL, "c": rising(0, 1)}, ("a", "b"), (0, 1), (1.0,), 1 / 3),
+        ({"box": BOX, "b": rising(9, 10)}, ("box",), (0, 10), (0.5,), 3.5),  # its middle, however it is bounded
+    ],
+)
+def test_centroids_that_are_known(implication, terms, concluded, universe, strengths, value):
+    arbiter = Arbiter(system=system(terms, *concluded, universe=universe, implication=implication))
     assert arbiter.engine == "exact"
-    for x in (5e-324, 1e-310, 1e-121, 1e-119, 1e-30):
-        assert arbiter([x]) == pytest.approx([0.5], abs=4 * EPS)
-        assert arbiter.batch([[x]])[0] == pytest.approx([0.5], abs=4 * EPS)
+    for strength in strengths:
+        assert arbiter([strength]) == pytest.approx([value], abs=4 * EPS)
+        assert arbiter.batch([[strength]])[0].tolist() == list(arbiter([strength]))
 
 
 @settings(max_examples=examples(150), deadline=None)
@@ -71,67 +88,30 @@ def test_cuts_of_any_size_are_exact(terms, data, scaled):
     assert engine.defuzzifiers[0].values(np.array([cuts, cuts]).T, ()).tolist() == [found, found]
 
 
-@pytest.mark.parametrize("cut", [1e-6, 1e-9, 1e-12, 1e-17, 1e-60, 1e-200, 5e-324])
-def test_single_symmetric_term_has_its_center_at_any_cut(cut):
-    output = Output("y", (0, 1), (Term("mid", triangle(0, 0.5, 1)),))
-    inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
-    arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is mid",), normalization="none"))
-    assert arbiter([cut]) == pytest.approx([0.5], abs=4 * EPS)
-    assert arbiter.batch([[cut]])[0].tolist() == list(arbiter([cut]))
-
-
-def test_nearly_parallel_lines_are_exact():
-    almost = Shape(((0, 1), (1, 1e-20)))
-    output = Output("y", (0, 1), (Term("a", falling(0, 1)), Term("b", almost), Term("c", rising(0, 1))))
-    inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
-    rules = ("if x is on then y is a", "if x is on then y is b")
-    for implication in ("min", "prod"):
-        arbiter = Arbiter(system=System(inputs, (output,), rules, normalization="none", implication=implication))
-        assert arbiter([1.0]) == pytest.approx([1 / 3], abs=4 * EPS)
-        assert arbiter.batch([[1.0]])[0].tolist() == list(arbiter([1.0]))
-
-
 def test_output_with_one_centroid_cannot_be_normalized():
-    output = Output("y", (0, 1), (Term("any", triangle(0, 0.5, 1)),))
-    system = System((Variable("x", (0, 1), (Term("on", rising(0, 1)),)),), (output,), ("if x is on then y is any",))
-    system = replace(system, normalization="range")
     with pytest.raises(EngineError, match=r"output 'y': its terms have one centroid, 0\.5"):
-        Arbiter(system=system)
+        Arbiter(system=system({"any": triangle(0, 0.5, 1)}, "any", normalization="range"))
 
 
-def test_default_is_used_if_no_rule_fires():
-    output = Output("y", (0, 10), (Term("a", falling(0, 5)), Term("b", rising(5, 10))), default=7.0)
-    inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
-    rules = ("if x is on then y is b",)
-    raw = Arbiter(system=System(inputs, (output,), rules, normalization="none"))
-    assert raw([0.25]) == (7.0,)
-    assert raw.batch([[0.25], [1.0]])[:, 0] == pytest.approx([7.0, 25 / 3])
-    scaled = Arbiter(system=System(inputs, (output,), rules, normalization="range"))
-    assert scaled([0.25])[0] == pytest.approx((7.0 - 5 / 3) / (25 / 3 - 5 / 3))
+PAIR = {"a": falling(0, 5), "b": rising(5, 10)}
 
 
-@pytest.mark.parametrize(("default", "weight"), [(0.5, 0.0), (9.5, 1.0)])
-def test_default_outside_the_terms_gives_a_weight_in_range(default, weight):
-    output = Output("y", (0, 10), (Term("a", falling(0, 5)), Term("b", rising(5, 10))), default=default)
-    inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
-    arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is b",), normalization="range"))
-    assert arbiter([0.25]) == (weight,)
-    assert arbiter.batch([[0.25], [1.0]])[:, 0].tolist() == [weight, 1.0]
-
-
-def test_batch_rows_without_a_firing_rule_are_nan():
-    output = Output("y", (0, 1), (Term("a", falling(0, 1)), Term("b", rising(0, 1))))
-    inputs = (Variable("x", (0, 1), (Term("on", rising(0.5, 1)),)),)
-    arbiter = Arbiter(system=System(inputs, (output,), ("if x is on then y is b",)))
-    assert np.isnan(arbiter.batch([[1.0], [0.75], [0.25], [0.1]])[:, 0]).tolist() == [False, False, True, True]
-
-
-def test_discontinuous_shapes_are_integrated_exactly():
-    """A box clipped at 1/2 is a box: its centroid is the middle."""
-    output = Output("y", (0, 10), (Term("box", Shape(((2, 0), (2, 1), (5, 1), (5, 0)))), Term("b", rising(9, 10))))
-    inputs = (Variable("x", (0, 1), (Term("on", rising(0, 1)),)),)
-    system = System(inputs, (output,), ("if x is on then y is box",), normalization="none")
-    assert Arbiter(system=system)([0.5]) == pytest.approx([3.5])
+@pytest.mark.parametrize(
+    ("normalization", "default", "weight"),
+    [
+        ("none", 7.0, 7.0),
+        ("none", None, math.nan),
+        ("range", 7.0, (7.0 - 5 / 3) / (25 / 3 - 5 / 3)),
+        ("range", 0.5, 0.0),  # beyond the terms' centroids
+        ("range", 9.5, 1.0),
+    ],
+)
+def test_the_default_counts_where_no_rule_fires(normalization, default, weight):
+    made = system(PAIR, "b", start=0.5, universe=(0, 10), default=default, normalization=normalization)
+    arbiter = Arbiter(system=made)
+    assert arbiter([0.25]) == pytest.approx((weight,), nan_ok=True)
+    assert arbiter.batch([[0.1], [0.25], [0.75]])[:2, 0] == pytest.approx([weight] * 2, nan_ok=True)
+    assert not np.isnan(arbiter.batch([[0.1], [0.75]])[1, 0])
 
 
 def test_an_outline_grows_with_the_number_of_terms():
