@@ -63,56 +63,53 @@ def test_no_winner_where_all_are_zero_and_where_two_tie():
     assert "alike" in str(tie)
 
 
-def test_single_output_has_no_runner_up():
-    e = lamp(("if light is dark then lamp_1 is high", "if light is bright then lamp_1 is low")).explain([3.0])
-    assert (e.winner, e.runner_up, e.margin) == ("lamp_1", None, e.weights[0])
-    assert e.outputs[0].runner_up is None
-    assert e.outputs[0].margin == 0.5
-    assert "by R1 alone" in str(e)
+ON_DARK = "if light is dark then lamp_1 is high"
+ON_BRIGHT = "if light is bright then lamp_1 is low"
+BOTH = (
+    "if light is dark then lamp_1 is high and lamp_2 is low",
+    "if light is not dark then lamp_1 is low, lamp_2 is low",
+)
 
 
-def test_a_rule_for_two_outputs_decides_both():
-    rules = (
-        "if light is dark then lamp_1 is high and lamp_2 is low",
-        "if light is not dark then lamp_1 is low, lamp_2 is low",
-    )
-    e = lamp(rules, outputs=2).explain([2.5])
-    assert e.rules[0].conclusions == {"lamp_1": "high", "lamp_2": "low"}
-    assert [o.decided_by for o in e.outputs] == ["R1", "R1"]
-    assert [o.runner_up for o in e.outputs] == ["R2", None]  # of lamp_2 both rules conclude the same term
-
-
-def test_rule_weights_scale_strengths():
-    e = lamp(("if light is dark then lamp_1 is high with 0.25", "if light is not bright then lamp_1 is low")).explain(
-        [0]
-    )
-    assert [r.strength for r in e.rules] == [0.25, 1.0]
-    assert e.outputs[0].decided_by == "R2"
-    assert e.outputs[0].margin == 0.75
+@pytest.mark.parametrize(
+    ("rules", "light", "strengths", "decisions"),
+    [
+        ((ON_DARK, ON_BRIGHT), 3.0, [0.5, 0.0], [("R1", None, 0.5)]),
+        # of lamp_2 both rules conclude the same term
+        (BOTH, 2.5, [0.75, 0.25], [("R1", "R2", 0.5), ("R1", None, 0.75)]),
+        ((f"{ON_DARK} with 0.25", "if light is not bright then lamp_1 is low"), 0, [0.25, 1.0], [("R2", "R1", 0.75)]),
+    ],
+)
+def test_strongest_rules_for_two_terms_decide(rules, light, strengths, decisions):
+    e = lamp(rules, outputs=len(decisions)).explain([light])
+    assert [r.strength for r in e.rules] == strengths
+    assert [(o.decided_by, o.runner_up, o.margin) for o in e.outputs] == decisions
+    if len(decisions) == 1:  # one output has no ranking
+        assert (e.winner, e.runner_up, e.margin) == (
+            ("lamp_1", None, e.weights[0]) if e.weights[0] else (None, None, 0.0)
+        )
+        assert "winner" not in str(e)
 
 
 def test_used_default_is_reported():
-    arbiter = lamp(("if light is dark then lamp_1 is high",), default=0.25, normalization="none")
-    e = arbiter.explain([5.0])
-    (output,) = e.outputs
-    assert output.default_used
+    arbiter = lamp((ON_DARK,), default=0.25, normalization="none")
+    (output,) = arbiter.explain([5.0]).outputs
     assert (output.centroid, output.weight, output.decided_by, output.margin) == (0.25, 0.25, None, 0.0)
-    assert "no rule fired" in str(e)
-    assert "its default 0.25" in str(e)
-    assert not arbiter.explain([1.0]).outputs[0].default_used
+    assert output.default_used and not arbiter.explain([1.0]).outputs[0].default_used
+    assert "no rule fired: its default 0.25" in str(arbiter.explain([5.0]))
 
 
 def test_output_without_a_firing_rule_is_reported_and_others_are_decided():
-    rules = ("if light is dark then lamp_1 is high", "if light is bright then lamp_1 is low")
-    whole = "if light is dark or light is not dark then lamp_2 is high"
-    e = lamp((*rules, whole), outputs=2).explain([5.0])
+    e = lamp((ON_DARK, ON_BRIGHT, "if light is dark or light is not dark then lamp_2 is high"), outputs=2).explain(
+        [5.0]
+    )
     first, second = e.outputs
     assert math.isnan(first.weight) and math.isnan(first.centroid) and first.default_used and first.decided_by is None
     assert (second.decided_by, e.winner, e.runner_up) == ("R3", "lamp_2", None)
     assert "no rule fired, and no default" in str(e)
     data = json.loads(json.dumps(e.as_dict(), allow_nan=False))
     assert data["outputs"][0]["weight"] is data["outputs"][0]["centroid"] is None
-    nothing = lamp(rules).explain([5.0])
+    nothing = lamp((ON_DARK, ON_BRIGHT)).explain([5.0])
     assert (nothing.winner, nothing.tied) == (None, ())
 
 

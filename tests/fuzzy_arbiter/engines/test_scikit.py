@@ -31,42 +31,35 @@ from tests.fuzzy_arbiter.formats.systems import TIPPING as SYSTEM
 TIPPING = replace(SYSTEM, points=26)
 QUALITY, SERVICE, (TIP,) = *TIPPING.inputs, TIPPING.outputs
 # nested conditions, weights, two conclusions, knots off the grid, a jump, a term that no rule concludes
-MIXED_OUTPUTS = (
-    Output(
-        "u",
-        (-1, 2),
-        (
-            Term("a", triangle(-1.5, -0.4, 0.31)),
-            Term("b", trapezoid(-0.2, 0.5, 0.77, 1.4)),
-            Term("c", Shape(((1.013, 0), (1.013, 0.8), (1.9, 0.2)))),
-            Term("never", triangle(0, 1, 2)),
-        ),
-        default=0.0,
+U_TERMS = {
+    "a": triangle(-1.5, -0.4, 0.31),
+    "b": trapezoid(-0.2, 0.5, 0.77, 1.4),
+    "c": Shape(((1.013, 0), (1.013, 0.8), (1.9, 0.2))),
+    "never": triangle(0, 1, 2),
+}
+MIXED = System(
+    (QUALITY, SERVICE),
+    (
+        Output("u", (-1, 2), U_TERMS, default=0.0),
+        Output("v", (10, 30), {"a": falling(10, 23), "b": rising(13.3, 29)}, default=12.5),
     ),
-    Output("v", (10, 30), (Term("a", falling(10, 23)), Term("b", rising(13.3, 29))), default=12.5),
-)
-MIXED_RULES = (
-    Rule((QUALITY["poor"] | ~SERVICE["poor"]) & ~(QUALITY["good"] & SERVICE["average"]), MIXED_OUTPUTS[0]["a"], 0.7),
-    Rule(
-        QUALITY["average"] & (SERVICE["good"] | QUALITY["good"]), (MIXED_OUTPUTS[0]["b"], MIXED_OUTPUTS[1]["a"]), 0.35
+    (
+        "if (quality is poor or service is not poor) and not (quality is good and service is average)"
+        " then u is a with 0.7",
+        "if quality is average and (service is good or quality is good) then u is b and v is a with 0.35",
+        "if not (quality is average or service is not good) then u is c and v is b",
+        "if service is poor and quality is poor and service is not average then v is b with 0.05",
     ),
-    Rule(~(QUALITY["average"] | ~SERVICE["good"]), (MIXED_OUTPUTS[0]["c"], MIXED_OUTPUTS[1]["b"])),
-    Rule(SERVICE["poor"] & QUALITY["poor"] & ~SERVICE["average"], (MIXED_OUTPUTS[1]["b"],), 0.05),
 )
-
-
-def mixed(conjunction="min", disjunction="max", points=101):
-    options = {"conjunction": conjunction, "disjunction": disjunction, "points": points}
-    return System((QUALITY, SERVICE), MIXED_OUTPUTS, MIXED_RULES, normalization="none", **options)
 
 
 def stock(system):
     """The system in scikit-fuzzy's own classes, as its examples build it, but with knots as universes of the inputs."""
 
     def variable(kind, definition, universe):
-        made = kind(universe, definition.name)
+        made = kind(np.array(universe), definition.name)
         for term in definition.terms:
-            made[term.name] = term.shape.of_many(universe)
+            made[term.name] = term.shape.of_many(made.universe)
         return made
 
     def condition(proposition):
@@ -74,22 +67,16 @@ def stock(system):
             return known[proposition.variable][proposition.term]
         if isinstance(proposition, Not):
             return ~condition(proposition.part)
-        join = {And: and_, Or: or_}[type(proposition)]
-        return reduce(join, map(condition, proposition.parts))
+        return reduce({And: and_, Or: or_}[type(proposition)], map(condition, proposition.parts))
 
-    known = {}
-    for v in system.inputs:
-        knots = {x for term in v.terms for x, _ in term.shape.points if v.universe[0] < x < v.universe[1]}
-        known[v.name] = variable(control.Antecedent, v, np.array(sorted({*knots, *v.universe})))
+    known = {v.name: variable(control.Antecedent, v, v.knots) for v in system.inputs}
     for v in system.outputs:
         known[v.name] = variable(control.Consequent, v, np.linspace(*v.universe, system.points))
     functions = {"min": np.fmin, "max": np.fmax, "prod": np.multiply, "probor": lambda a, b: a + b - a * b}
+    norms = {"and_func": functions[system.conjunction], "or_func": functions[system.disjunction]}
     rules = [
         control.Rule(
-            condition(rule.condition),
-            [known[c.variable][c.term] % rule.weight for c in rule.conclusions],
-            and_func=functions[system.conjunction],
-            or_func=functions[system.disjunction],
+            condition(rule.condition), [known[c.variable][c.term] % rule.weight for c in rule.conclusions], **norms
         )
         for rule in system.rules
     ]
@@ -103,9 +90,9 @@ def stock(system):
         TIPPING,
         prioritized(points=11),
         prioritized(form="complete"),
-        mixed(),
-        mixed("prod", "probor", 37),
-        mixed("prod"),
+        MIXED,
+        replace(MIXED, conjunction="prod", disjunction="probor", points=37),
+        replace(MIXED, conjunction="prod"),
     ],
     ids=lambda system: f"{system.name}, {len(system.rules)} rules, {system.conjunction}, {system.disjunction}",
 )
@@ -137,37 +124,20 @@ def test_output_without_a_firing_rule_is_never_stale():
     assert ScikitEngine(gap(default=5.5)).centroids_of_many(np.array([[5.0], [1.0]]))[:, 0] == pytest.approx([5.5, 5.2])
 
 
+def thin(terms, universe=(0, 1), x=QUALITY, of="poor"):
+    return System((x,), (Output("y", universe, terms),), (f"if {x.name} is {of} then y is t",))
+
+
+STEP = Variable("x", (0, 1), {"step": Shape(((0.5, 0), (0.5, 1)))})
+
+
 @pytest.mark.parametrize(
     ("system", "words"),
     [
-        (System(TIPPING.inputs, TIPPING.outputs, TIPPING.rules, implication="prod"), "implication is 'prod'"),
-        (
-            System(
-                (Variable("x", (0, 1), (Term("step", Shape(((0.5, 0), (0.5, 1)))),)),),
-                (TIP,),
-                ("if x is step then tip is low",),
-                normalization="none",
-            ),
-            "input 'x': term 'step' jumps",
-        ),
-        (
-            System(
-                (QUALITY,),
-                (Output("y", (0, 1), (Term("thin", triangle(0.501, 0.505, 0.509)),)),),
-                ("if quality is poor then y is thin",),
-                normalization="none",
-            ),
-            "term 'thin' is 0 at all 101 points; expected more points",
-        ),
-        (
-            System(
-                (QUALITY,),
-                (Output("y", (1, 1 + 1e-15), (Term("all", Shape(((1, 1),))),)),),
-                ("if quality is poor then y is all",),
-                normalization="none",
-            ),
-            "101 points do not fit",
-        ),
+        (replace(TIPPING, implication="prod"), "implication is 'prod'"),
+        (thin({"t": rising(0, 1)}, x=STEP, of="step"), "input 'x': term 'step' jumps"),
+        (thin({"t": triangle(0.501, 0.505, 0.509)}), "term 't' is 0 at all 101 points; expected more points"),
+        (thin({"t": Shape(((1, 1),))}, (1, 1 + 1e-15)), "101 points do not fit"),
     ],
 )
 def test_systems_unsupported_by_scikit_fuzzy_are_rejected_by_name(system, words):
