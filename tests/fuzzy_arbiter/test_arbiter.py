@@ -60,13 +60,6 @@ def test_one_sample_and_many_agree(arbiter):
     assert arbiter.batch(inputs[:, ::-1][:, ::-1]) == pytest.approx(np.array(one_by_one), abs=1e-13)
 
 
-@pytest.mark.parametrize("inputs", [(0, 1, 0), [0, 1, 0], np.array([0, 1, 0]), {"depth": 0, "obstacle": 0, "shape": 1}])
-def test_inputs_may_be_a_sequence_an_array_or_named(inputs):
-    weights = Arbiter()(inputs)
-    assert weights == (0.0, 1.0, 0.0)
-    assert all(type(w) is float for w in weights)
-
-
 @pytest.mark.parametrize(
     "value", [np.float32(0.1), np.float16(0.1), np.float64(0.1), Fraction(1, 10), np.True_, True, np.int8(1)]
 )
@@ -94,10 +87,7 @@ def test_other_numeric_types_are_converted_to_float(arbiter, value):
         (0.5, "inputs are 0.5"),
         ({0.1, 0.2, 0.3}, "inputs are"),
         ({"obstacle": 0.1, "shape": 0.2}, "depth: input is missing"),
-        (
-            {"obstacle": 0.1, "shape": 0.2, "depth": 0.3, "dept": 0.3},
-            "dept: unknown input, expected obstacle, shape, depth",
-        ),
+        (dict.fromkeys(("obstacle", "shape", "depth", "dept"), 0.3), "dept: unknown input, expected obstacle, shape"),
     ],
 )
 def test_invalid_inputs_are_rejected(arbiter, inputs, words):
@@ -150,20 +140,12 @@ def test_inputs_outside_may_be_clipped():
         ({"outside": "wrap"}, "refuse, clip"),
         ({"system": prioritized(), "points": 11}, "system: pass either"),
         ({"engine": "closed", "form": "complete"}, "engine 'closed'"),
+        ({"engine": ""}, "engine is ''"),
     ],
 )
 def test_invalid_definitions_are_rejected(arguments, words):
     with pytest.raises(DefinitionError, match=words):
         Arbiter(**arguments)
-
-
-def test_invalid_criteria_are_rejected():
-    with pytest.raises(DefinitionError, match="both terms are 'on'"):
-        Criterion("a", "on", "on")
-    with pytest.raises(DefinitionError, match="without jumps"):
-        Criterion("a", membership=rising(1.0, 1.0))
-    with pytest.raises(EngineError):
-        Arbiter(engine="")
 
 
 def test_normalizations_match_their_formulas():
@@ -220,8 +202,7 @@ def test_threads_do_not_disturb_each_other(arbiter):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("count", [20, pytest.param(300, marks=pytest.mark.slow)])
-def test_arbiters_leak_no_memory(count):
+def test_arbiters_leak_no_memory():
     def build(count):
         for _ in range(count):
             Arbiter()([0.3, 0.6, 0.2])
@@ -234,7 +215,7 @@ def test_arbiters_leak_no_memory(count):
     try:
         build(30)
         objects, memory = in_use()
-        build(count)
+        build(300)
         more_objects, more_memory = in_use()
     finally:
         tracemalloc.stop()

@@ -61,10 +61,7 @@ def nested(depth):
         (lambda: Rule(CALM, ~sail["full"]), r"wind is calm: got Not\(.*\), expected as conclusions"),
         (lambda: Rule(CALM, ()), "wind is calm: no conclusions, expected output"),
         *(
-            (
-                lambda weight=weight: Rule(CALM, sail["full"], weight),
-                "'if wind is calm then sail is full': weight is .*, expected above 0 and at most 1",
-            )
+            (lambda w=weight: Rule(CALM, sail["full"], w), "full': weight is .*, expected above 0 and at most 1")
             for weight in (True, "0.5", None, float("nan"), 0, 1.5, np.array([0.5]), Fraction(1, 10**400))
         ),
         (lambda: system(rules="if wind is calm then sail is full"), "rules: got 'if wind .*', expected a sequence"),
@@ -77,6 +74,8 @@ def nested(depth):
         (lambda: prioritized(weight="w"), "weight is 'w', expected an Output"),
         (lambda: prioritized(form=["minimal"]), r"form is \['minimal'\], expected one of hierarchical"),
         (lambda: Criterion("a", membership=[(0, 0), (1, 1)]), "criterion 'a': membership is .*, expected such as"),
+        (lambda: Criterion("a", "on", "on"), "both terms are 'on'"),
+        (lambda: Criterion("a", membership=rising(1.0, 1.0)), "without jumps"),
         (lambda: Criterion(None), "criterion name is None, expected printable text"),
         (lambda: Criterion("a", on=3), "criterion 'a': on name is 3, expected printable text"),
     ],

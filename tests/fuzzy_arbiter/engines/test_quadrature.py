@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy.integrate import quad
 
 from benchmarks.fuzzy_accuracy import BOUND as ACCURACY
 from benchmarks.fuzzy_accuracy import errors, random_cases
@@ -45,6 +46,11 @@ def system(output, implication="min", blocks=None):
     return System(inputs, (output,), rules, implication=implication, normalization="none")
 
 
+def value(output, cuts, implication="min"):
+    """The output's value for some strengths."""
+    return ExactEngine(system(output, implication)).centroids(cuts)[0]
+
+
 def sampled(output, cuts, implications, points=500_000):
     """Places and joined heights in the middles of many cells, whose centroid is off by their width squared."""
     low, high = output.universe
@@ -77,26 +83,7 @@ def test_a_lone_gaussian_has_its_mean_for_all_values(deviation, implication):
         for cut in (1.0, 0.6):
             if implication == "drastic_product" and cut < 1.0 and defuzzifier != "mom":
                 continue  # a single place, which has no area
-            value = ExactEngine(system(output, implication)).centroids([cut])[0]
-            assert value == pytest.approx(9.7, abs=1e-9), (defuzzifier, cut)
-
-
-def gaussian_integrals(mean, deviation, cut, start, end):
-    """Area of a clipped Gaussian from start to end, and its moment, by the error function."""
-    reach = deviation * math.sqrt(-2.0 * math.log(cut))
-    ends = sorted({start, end, *(x for x in (mean - reach, mean + reach) if start < x < end)})
-    area = moment = 0.0
-    for a, b in itertools.pairwise(ends):
-        if abs((a + b) / 2 - mean) < reach:
-            area, moment = area + cut * (b - a), moment + cut * (b * b - a * a) / 2
-            continue
-        u, v = ((x - mean) / deviation / math.sqrt(2.0) for x in (a, b))
-        # by the complement, where the error function is near 1
-        tail = math.erfc(u) - math.erfc(v) if u > 0.0 else math.erfc(-v) - math.erfc(-u)
-        own = deviation * math.sqrt(math.pi / 2.0) * tail
-        area += own
-        moment += mean * own + deviation**2 * (math.exp(-u * u) - math.exp(-v * v))
-    return area, moment
+            assert value(output, [cut], implication) == pytest.approx(9.7, abs=1e-9), (defuzzifier, cut)
 
 
 @pytest.mark.parametrize(
@@ -108,42 +95,27 @@ def gaussian_integrals(mean, deviation, cut, start, end):
         (((3.0, 2e-4), (20.0, 0.3)), (0.9, 0.01)),
     ],
 )
-def test_clipped_gaussians_match_the_error_function(parameters, cuts):
-    def clipped_at(x, p, cut):
-        return min(cut, math.exp(-((x - p[0]) ** 2) / (2 * p[1] ** 2)))
+def test_clipped_gaussians_match_scipy(parameters, cuts):
+    output = gaussians(*parameters)
 
-    # the greatest one changes where two of them are equal; found by bisection between many places
+    def height(x):
+        return max(min(cut, term.shape(x)) for cut, term in zip(cuts, output.terms, strict=True))
+
     near = [m + s * k / 20 for m, s in parameters for k in range(-200, 201)]
-    places = sorted({0.0, 25.0, *(x for x in near if 0 < x < 25), *(25 * k / 2000 for k in range(2001))})
-
-    def top(x):
-        heights = [clipped_at(x, p, cut) for p, cut in zip(parameters, cuts, strict=True)]
-        return heights.index(max(heights))
-
-    area = moment = 0.0
-    for a, b in itertools.pairwise(places):
-        ends = [a, b]
-        if top(a) != top(b):
-            low, high = a, b
-            while (middle := (low + high) / 2) not in (low, high):
-                low, high = (middle, high) if top(middle) == top(a) else (low, middle)
-            ends = [a, low, b]
-        for start, end in itertools.pairwise(ends):
-            i = top((start + end) / 2)
-            own = gaussian_integrals(*parameters[i], cuts[i], start, end)
-            area, moment = area + own[0], moment + own[1]
-    value = ExactEngine(system(gaussians(*parameters))).centroids(cuts)[0]
-    assert value == pytest.approx(moment / area, abs=1e-9 * 25)
+    pieces = list(itertools.pairwise(sorted({0.0, 25.0, *(x for x in near if 0 < x < 25)})))
+    area = math.fsum(quad(height, a, b, epsabs=1e-15)[0] for a, b in pieces)
+    moment = math.fsum(quad(lambda x: x * height(x), a, b, epsabs=1e-15)[0] for a, b in pieces)
+    assert value(output, cuts) == pytest.approx(moment / area, abs=1e-9 * 25)
 
 
 def test_a_narrow_difference_of_sigmoids_is_not_missed():
     """By the antiderivative of the logistic function."""
     left, right, slope = 11.0, 11.2, 80.0
     shape = curve("sigmoid_difference", left, slope, slope, right)
-    made = system(Output("y", (0, 25), {"a": shape, "b": triangle(0, 2, 4)}), "prod")
+    output = Output("y", (0, 25), {"a": shape, "b": triangle(0, 2, 4)})
     area = right - left  # of the whole line, of which the universe lacks nothing that a float shows
     expected = (0.25 * 2 * 2 + area * (left + right) / 2) / (0.25 * 2 + area)
-    assert ExactEngine(made).centroids([1.0, 0.25])[0] == pytest.approx(expected, abs=1e-9)
+    assert value(output, [1.0, 0.25], "prod") == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize("aggregation", ["probor", "sum", "einstein_sum", "normalized_sum"])
@@ -152,10 +124,10 @@ def test_a_height_may_be_greatest_beside_an_open_jump(defuzzifier, aggregation):
     """The first term is 0 up to 5 and 0.5 beyond; the second falls from 0.8 there."""
     terms = (Term("a", rising(0, 10)), Term("b", triangle(0, 4, 9)))
     output = Output("y", (0, 10), terms, None, defuzzifier, aggregation)
-    value = ExactEngine(system(output, "nilpotent_minimum")).centroids([0.5, 0.85])[0]
+    found = value(output, [0.5, 0.85], "nilpotent_minimum")
     # a normalized sum is 1 until the second term is 0.5
     expected = {"som": 5.0, "lom": 6.5, "mom": 5.75}[defuzzifier] if aggregation == "normalized_sum" else 5.0
-    assert value == pytest.approx(expected, abs=1e-9)
+    assert found == pytest.approx(expected, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -169,16 +141,10 @@ def test_a_height_may_be_greatest_beside_an_open_jump(defuzzifier, aggregation):
 def test_the_place_of_a_maximum_is_as_high_as_any(kinds, universe, aggregation, cuts):
     terms = {f"t{i}": curve(*parameters) for i, parameters in enumerate(kinds)}
     output = Output("y", universe, terms, None, "lom", aggregation)
-    value = ExactEngine(system(output, "prod")).centroids(cuts)[0]
-    x = np.concatenate([[value], np.linspace(*universe, 1_000_001)])
+    x = np.concatenate([[value(output, cuts, "prod")], np.linspace(*universe, 1_000_001)])
     implied = [cut * term.shape.of_many(x) for cut, term in zip(cuts, output.terms, strict=True)]
     heights = AGGREGATIONS[aggregation].array(*implied)
     assert heights[0] >= heights.max() * (1 - 1e-12)
-
-
-def test_no_bound_is_printed_for_a_formula():
-    output = Output("y", (0, 10), (Term("a", Formula("max(0, 1 - abs(x - 3.001) * 50)")), Term("b", triangle(4, 5, 6))))
-    assert "without a bound" in ExactEngine(system(output)).methods["y"]
 
 
 @settings(max_examples=examples(40), deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -245,9 +211,9 @@ GAUSSIANS = gaussians((17.9, 0.05), (2.0, 6.0))
 
 
 @pytest.mark.parametrize(
-    ("output", "defuzzifier", "implication", "cuts", "value"),
+    ("output", "defuzzifier", "implication", "cuts", "expected"),
     [
-        *((PLATEAU, name, "min", [0.5], value) for name, value in (("som", 2.5), ("lom", 6.5), ("mom", 4.5))),
+        *((PLATEAU, name, "min", [0.5], place) for name, place in (("som", 2.5), ("lom", 6.5), ("mom", 4.5))),
         *((CORNER, name, "min", [1.0], 4.0) for name in ("som", "lom", "mom")),
         (CORNER, "bisector", "min", [1.0], 4 + 6 * (1 - math.sqrt(0.5))),  # half the area of a right triangle
         (HALVES, "bisector", "min", [0.7, 0.7], 5.0),  # the middle of the gap
@@ -257,16 +223,14 @@ GAUSSIANS = gaussians((17.9, 0.05), (2.0, 6.0))
         (GAUSSIANS, "som", "min", [0.5, 0.5], 0.0),  # clipped alike, both are level: the wider from the start
     ],
 )
-def test_defuzzified_values_match_geometry(output, defuzzifier, implication, cuts, value):
-    made = system(replace(output, defuzzifier=defuzzifier), implication)
-    assert ExactEngine(made).centroids(cuts)[0] == pytest.approx(value, abs=1e-9)
+def test_defuzzified_values_match_geometry(output, defuzzifier, implication, cuts, expected):
+    assert value(replace(output, defuzzifier=defuzzifier), cuts, implication) == pytest.approx(expected, abs=1e-9)
 
 
 def test_singletons_count_only_if_no_area_fires():
-    terms = (Term("a", curve("singleton", 2.0)), Term("b", curve("singleton", 8.0)), Term("c", triangle(3, 4, 5)))
-    engine = ExactEngine(system(Output("y", (0, 10), terms)))
-    assert engine.centroids([0.25, 0.75, 0.0])[0] == pytest.approx(6.5)
-    assert engine.centroids([1.0, 1.0, 0.5])[0] == pytest.approx(4.0)
+    output = Output("y", (0, 10), {"a": curve("singleton", 2.0), "b": curve("singleton", 8.0), "c": triangle(3, 4, 5)})
+    assert value(output, [0.25, 0.75, 0.0]) == pytest.approx(6.5)
+    assert value(output, [1.0, 1.0, 0.5]) == pytest.approx(4.0)
 
 
 def test_rule_blocks_use_their_own_implication():
@@ -295,23 +259,22 @@ def test_batches_equal_single_samples():
 
 
 def test_zero_area_gives_nan():
-    output = Output("y", (0, 10), (Term("a", falling(0, 10)),))
-    made = system(output, "bounded_difference")
-    assert ExactEngine(made).centroids([1.0])[0] == pytest.approx(10 / 3)
+    assert value(Output("y", (0, 10), {"a": falling(0, 10)}), [1.0], "bounded_difference") == pytest.approx(10 / 3)
     # a cut and a degree that never sum to more than 1 leave nothing
-    low = replace(made, outputs=(Output("y", (0, 10), (Term("a", curve("gaussian", 5, 1, height=0.5)),)),))
-    assert math.isnan(ExactEngine(low).centroids([0.25])[0])
+    low = Output("y", (0, 10), {"a": curve("gaussian", 5, 1, height=0.5)})
+    assert math.isnan(value(low, [0.25], "bounded_difference"))
 
 
 def test_unintegrable_terms_are_rejected():
-    output = Output("y", (0, 1), (Term("a", Formula("0.5 + 0.5 * sin(1e6 * x * x)")),))
     with pytest.raises(EngineError, match="output 'y': its joined terms are too rough to be integrated to 1e-09"):
-        ExactEngine(system(output)).centroids([0.6])
+        value(Output("y", (0, 1), {"a": Formula("0.5 + 0.5 * sin(1e6 * x * x)")}), [0.6])
 
 
 def test_arbiter_names_the_evaluation_method_of_each_output():
     made = system(Output("y", (0, 10), TERMS))
     assert Arbiter(system=made).engine_reason.endswith("'y': adaptive quadrature, within 1e-09 of the universe's width")
+    formula = Output("y", (0, 10), {"a": Formula("max(0, 1 - abs(x - 3.001) * 50)"), "b": triangle(4, 5, 6)})
+    assert "without a bound" in Arbiter(system=system(formula)).engine_reason
     straight = system(Output("y", (0, 10), TERMS[3:]))
     assert Arbiter(system=straight).engine_reason.startswith("there is no closed form: ")
     assert "quadrature" not in Arbiter(system=straight).engine_reason

@@ -47,17 +47,14 @@ def test_expression_value_equals_python(text, a, b):
         ("2 ^ 3 ^ 2", 512.0), ("-2 ^ 2", -4.0), ("2 ^ -1", 0.5), ("7 % 4", 3.0), ("2 - 3 - 4", -5.0),
         ("8 / 4 / 2", 1.0),
         ("+3", 3.0), ("1 / 0", math.inf), ("-1 / 0", -math.inf), ("exp(1e9)", math.inf), ("log(0)", -math.inf),
+        ("0 / 0", math.nan), ("sqrt(-1)", math.nan), ("log(-1)", math.nan), ("acos(2)", math.nan),
+        ("(-8) ^ 0.5", math.nan), ("sin(1 / 0)", math.nan), ("fmod(1, 0)", math.nan),
         ("lt(1, 2) + ge(1, 2)", 1.0), ("fabs(-2)", 2.0), ("LN(exp(1))", 1.0), ("pi()", math.pi), (".5e1", 5.0),
     ],
 )  # fmt: skip
 def test_values_that_are_known(text, value):
-    assert Expression(text)({}) == pytest.approx(value)
-    assert float(Expression(text).of_many({})) == pytest.approx(value)
-
-
-@pytest.mark.parametrize("text", ["0 / 0", "sqrt(-1)", "log(-1)", "acos(2)", "(-8) ^ 0.5", "sin(1 / 0)", "fmod(1, 0)"])
-def test_undefined_expression_is_nan(text):
-    assert math.isnan(Expression(text)({}))
+    assert Expression(text)({}) == pytest.approx(value, nan_ok=True)
+    assert float(Expression(text).of_many({})) == pytest.approx(value, nan_ok=True)
 
 
 @pytest.mark.medium(fast=16)
