@@ -7,17 +7,17 @@ import re
 from fuzzy_arbiter.definition import Output, System, Variable, variable_names
 from fuzzy_arbiter.engines.supported import bent
 from fuzzy_arbiter.errors import UnsupportedError
-from fuzzy_arbiter.formats.fcl_reader import system_of
+from fuzzy_arbiter.formats.fcl_reader import read
 from fuzzy_arbiter.formats.fcl_terms import format_shape, universe_of
-from fuzzy_arbiter.formats.fcl_words import METHODS, RESERVED, chosen_block, cut
-from fuzzy_arbiter.formats.notation import blocks, format_number, require_word, require_words, unsupported_rule, word_of
-from fuzzy_arbiter.formats.settings import format_settings, read_settings
+from fuzzy_arbiter.formats.fcl_tokens import RESERVED
+from fuzzy_arbiter.formats.notation import blocks, format_number, require_word, require_words, unsupported_rule
+from fuzzy_arbiter.formats.settings import format_settings
+from fuzzy_arbiter.formats.vocabulary import operator_words, word_of
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Shape
-from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from fuzzy_arbiter.terms.values import Formula, Linear
 
-_SETTINGS = ("normalization", "outside", "points")
+__all__ = ["read", "write"]
 
 
 def write(system: System) -> str:
@@ -25,7 +25,7 @@ def write(system: System) -> str:
     require_word(system.name, "fcl", RESERVED)
     require_words(system, "fcl", RESERVED)
     _require_one_case(system)
-    lines = [f"(* {text} *)" for text in format_settings(system, _SETTINGS)]
+    lines = [f"(* {text} *)" for text in format_settings(system)]
     lines += [f"FUNCTION_BLOCK {system.name}", "", "VAR_INPUT"]
     names = variable_names(system.inputs)
     for v in system.inputs:
@@ -34,22 +34,17 @@ def write(system: System) -> str:
         known = universe_of(points) == v.universe and all(isinstance(t.shape, Shape) for t in v.terms)
         lines.append(f"  {v.name} : REAL;" + ("" if known else f" {_format_range(v)}"))
     lines += ["END_VAR", "", "VAR_OUTPUT", *(f"  {v.name} : REAL;" for v in system.outputs), "END_VAR", ""]
-    for v in system.inputs:
-        lines += [f"FUZZIFY {v.name}", *_format_terms(v, names), "END_FUZZIFY", ""]
-    for output in system.outputs:
-        lines += [
-            f"DEFUZZIFY {output.name}",
-            *_format_terms(output, names),
-            *_format_output(output, system),
-            "END_DEFUZZIFY",
-            "",
-        ]
-    accumulations = {word_of("fcl", "aggregation", o.aggregation, AGGREGATIONS) for o in system.outputs}
+    for v in (*system.inputs, *system.outputs):
+        section = "DEFUZZIFY" if isinstance(v, Output) else "FUZZIFY"
+        lines.append(f"{section} {v.name}")
+        lines += [f"  TERM {term.name} := {format_shape(term.shape, term.name, names)};" for term in v.terms]
+        lines += _format_output(v, system) if isinstance(v, Output) else []
+        lines += [f"END_{section}", ""]
+    accumulations = {word_of("fcl", "aggregation", o.aggregation) for o in system.outputs}
     for k, (operators, rules) in enumerate(blocks(system)):
         lines.append(f"RULEBLOCK rules{k + 1 if k else ''}")
-        lines.append(f"  AND : {word_of('fcl', 'conjunction', operators.conjunction, T_NORMS)};")
-        lines.append(f"  OR : {word_of('fcl', 'disjunction', operators.disjunction, S_NORMS)};")
-        lines.append(f"  ACT : {word_of('fcl', 'implication', operators.implication, T_NORMS)};")
+        words = zip(("AND", "OR", "ACT"), operator_words("fcl", operators), strict=True)
+        lines += [f"  {key} : {word};" for key, word in words]
         lines += [f"  ACCU : {word};" for word in accumulations if len(accumulations) == 1]
         lines += [f"  RULE {i + 1} : {_format_rule(i, rule)};" for i, rule in rules]
         lines += ["END_RULEBLOCK", ""]
@@ -60,20 +55,16 @@ def _format_range(v: Variable) -> str:
     return f"RANGE := ({format_number(v.universe[0])} .. {format_number(v.universe[1])});"
 
 
-def _format_terms(v: Variable, inputs: tuple[str, ...]) -> list[str]:
-    return [f"  TERM {term.name} := {format_shape(term.shape, term.name, inputs)};" for term in v.terms]
-
-
 def _format_output(output: Output, system: System) -> list[str]:
-    method = next(word for word, name in METHODS.items() if name == output.defuzzifier)
+    method = word_of("fcl", "defuzzifier", output.defuzzifier)
     if method == "COGSS":
         raise UnsupportedError(f"fcl cannot say the defuzzifier 'sum' of output {output.name!r}: expected 'average'")
-    if any(isinstance(term.shape, Formula | Linear) for term in output.terms):
-        method = "COGF" if output.weighted else method
+    if output.weighted and any(isinstance(term.shape, Formula | Linear) for term in output.terms):
+        method = "COGF"
     lines = [f"  METHOD : {method};"]
     # an aggregation that is not that of all outputs is said here, as fuzzylite does
     if len({other.aggregation for other in system.outputs}) > 1:
-        lines.append(f"  ACCU : {word_of('fcl', 'aggregation', output.aggregation, AGGREGATIONS)};")
+        lines.append(f"  ACCU : {word_of('fcl', 'aggregation', output.aggregation)};")
     lines.append(f"  DEFAULT := {'NC' if output.default is None else format_number(output.default)};")
     locks = [word for word, on in (("PREVIOUS", output.lock_previous), ("RANGE", output.lock_range)) if on]
     return [*lines, *([f"  LOCK : {' | '.join(locks)};"] if locks else []), f"  {_format_range(output)}"]
@@ -97,12 +88,3 @@ def _require_one_case(system: System) -> None:
             other = known.setdefault(name.lower(), name)
             if other != name:
                 raise UnsupportedError(f"fcl cannot say the names {other!r} and {name!r}: they differ in case alone")
-
-
-def read(text: str, block: str | None = None) -> System:
-    """Parse a function block as a system."""
-    # A variable without RANGE has the universe of its points. NC becomes a missing default. Missing statements have
-    # jFuzzyLogic's defaults: ACT is MIN, ACCU is MAX, METHOD is COG; where fuzzylite wrote the text, values are added.
-    tokens, comments = cut(text)
-    fuzzylite = any("generated with fuzzylite" in text for _, text in comments)
-    return system_of(chosen_block(tokens, block), fuzzylite, read_settings(comments, _SETTINGS))

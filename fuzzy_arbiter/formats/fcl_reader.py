@@ -2,287 +2,193 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+import re
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
-from fuzzy_arbiter.formats.fcl_cursor import Cursor
-from fuzzy_arbiter.formats.fcl_terms import universe_of
-from fuzzy_arbiter.formats.fcl_words import (
-    CONJUNCTIONS,
-    DISJUNCTIONS,
-    JOINS,
-    METHODS,
-    PAIRS,
-    SECTIONS,
-    Token,
-    block_name,
+from fuzzy_arbiter.formats.fcl_terms import read_shape, universe_of
+from fuzzy_arbiter.formats.fcl_tokens import RESERVED, chosen_block, cut, sections_of
+from fuzzy_arbiter.formats.fll_terms import TYPES
+from fuzzy_arbiter.formats.notation import (
+    Block,
+    NumberedRule,
+    assembled,
+    join_rule_blocks,
+    located,
+    read_number,
+    refuse,
 )
-from fuzzy_arbiter.formats.notation import assembled, join_rule_blocks, located, refuse
+from fuzzy_arbiter.formats.settings import read_settings
+from fuzzy_arbiter.formats.vocabulary import WORDS
 from fuzzy_arbiter.propositions import Is, quoted
 from fuzzy_arbiter.rule import Operators, Rule
 from fuzzy_arbiter.rule_text import parse_rules
 from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Constant, Linear, Value
 
-_RULE_WORDS = frozenset(("if", "then", "and", "or", "not", "is", "with"))
+_WORDS = WORDS["fcl"]
+_KEYS = {"AND": "conjunction", "OR": "disjunction", "ACT": "implication", "ACCU": "aggregation"}
+# which the standard and jFuzzyLogic pair, where one alone is said
+_PAIRS = {
+    "min": "max",
+    "prod": "probor",
+    "bounded_difference": "bounded_sum",
+    "drastic_product": "drastic_sum",
+    "nilpotent_minimum": "nilpotent_maximum",
+    "hamacher_product": "einstein_sum",
+    "einstein_product": "einstein_sum",
+}
+_NAME = r"[A-Za-z_][A-Za-z0-9_]*"
+_DECLARATION = re.compile(rf"({_NAME}(?: , {_NAME})*) : REAL", re.IGNORECASE)
+_RANGE = re.compile(r"\( (\S+) \.\. (\S+) \)")
 
 
-def system_of(tokens: list[Token], fuzzylite: bool, settings: dict[str, Any]) -> System:
-    """Build the system of one function block."""
-    return _Reader(tokens, fuzzylite=fuzzylite).system(settings)
+def read(text: str, block: str | None = None) -> System:
+    """Parse a function block as a system."""
+    # A variable without RANGE has the universe of its points. NC becomes a missing default. Missing statements have
+    # jFuzzyLogic's defaults: ACT is MIN, ACCU is MAX, METHOD is COG; where fuzzylite wrote the text, values are added.
+    tokens, comments = cut(text)
+    (begin, *sections), fuzzylite = sections_of(chosen_block(tokens, block))
+    for section in sections:
+        section.word("ENABLED", {"TRUE": True}, "TRUE")
+        if section.kind in ("FUZZIFY", "DEFUZZIFY"):
+            fuzzylite |= section.kind == "FUZZIFY" and "RANGE" in section.entries
+            fuzzylite |= any(term.split(" ")[1] in TYPES for _, term in section.many)
+    fuzzylite |= any("generated with fuzzylite" in text for _, text in comments)
+    rule_blocks = [section for section in sections if section.kind == "RULEBLOCK"]
+    accumulations = {section.word("ACCU", _WORDS["aggregation"] | {"": ""}): section.line for section in rule_blocks}
+    accumulations.pop("", None)
+    if len(accumulations) > 1:
+        refuse(max(accumulations.values()), "RULEBLOCK has another ACCU than that before it, expected the same")
+    usual = {
+        weighted: next(iter(accumulations), "sum" if weighted and fuzzylite else "max") for weighted in (False, True)
+    }
+    input_blocks = _declared(sections, "VAR_INPUT", "FUZZIFY")
+    inputs = []
+    for section in input_blocks:
+        terms, places = _terms(section, None)
+        with located(f"line {section.line}"):
+            inputs.append(Variable(section.name, _universe(section, places), terms))
+    names = [v.name for v in inputs]
+    outputs = [_output(section, names, usual) for section in _declared(sections, "VAR_OUTPUT", "DEFUZZIFY")]
+    for v in outputs:
+        if v.name in names:
+            refuse(begin.line, f"{v.name!r} is declared twice")
+    any_is_term = {term for v in inputs for term in v.term_names if term.lower() == "any"}
+    norms, rules = join_rule_blocks([_rules(section, any_is_term) for section in rule_blocks])
+    if not fuzzylite:
+        rules = [(line, _on_first_of_value(rule, outputs)) for line, rule in rules]
+    settings = read_settings(comments)
+    return assembled(begin.line, inputs, outputs, rules, name=begin.name or "arbiter", **norms, **settings)
 
 
-@dataclass
-class _Draft:
-    """The part of a variable that is read so far."""
+def _declared(sections: Sequence[Block], declaration: str, kind: str) -> list[Block]:
+    """Return the sections of the declared variables in their order, with the ranges of the declarations."""
+    declared: dict[str, tuple[int, str]] = {}  # line and range by name
+    for section in sections:
+        names: list[str] = []
+        for line, text in section.many if section.kind == declaration else ():
+            match = _DECLARATION.fullmatch(text)
+            if match:
+                names = match[1].split(" , ")
+            elif not names or not text.upper().startswith("RANGE "):
+                refuse(line, f"{text!r}, expected a variable's name, a colon and REAL")
+            for name in names:
+                if match and (name in declared or name.lower() in RESERVED):
+                    refuse(line, f"{name!r} is {'declared twice' if name in declared else 'a word of the language'}")
+                declared[name] = (line, "" if match else text[6:].removeprefix(":= "))
+    blocks: dict[str, Block] = {}
+    for section in sections:
+        if section.kind != kind:
+            continue
+        if section.name not in declared:
+            known = ", ".join(declared) or "none: none is declared"
+            refuse(section.line, f"{kind} {section.name!r}, expected one of {known}")
+        if section.name in blocks:
+            refuse(section.line, f"{kind} {section.name!r} appears twice")
+        blocks[section.name] = section
+    for name, (line, universe) in declared.items():
+        if name not in blocks:
+            refuse(line, f"{name!r} has no {kind}")
+        if universe:
+            blocks[name].add(line, "RANGE", universe)
+    return [blocks[name] for name in declared]
 
-    line: int
-    universe: tuple[float, float] | None = None
-    default: float | None = None
-    terms: list[Term] | None = None
-    places: list[float] = field(default_factory=list)
-    method: str | None = None
-    accumulation: str | None = None
-    locks: set[str] = field(default_factory=set)
+
+def _terms(section: Block, inputs: Sequence[str] | None) -> tuple[tuple[Term, ...], list[float]]:
+    """Return the terms of a variable, and their points."""
+    terms, places = [], []
+    for line, text in section.many:
+        name, _, content = text.partition(" ")
+        if not re.fullmatch(_NAME, name) or name.lower() in RESERVED:
+            refuse(line, f"TERM {name!r}, expected a term's name")
+        with located(f"line {line}: term {name!r}"):
+            shape, extent = read_shape(content, line, inputs)
+            terms.append(Term(name, shape))
+        places += extent
+    return tuple(terms), places
 
 
-@dataclass
-class _Block:
-    """The statements of a rule block."""
+def _universe(section: Block, places: Sequence[float], weighted: bool = False) -> tuple[float, float]:
+    line, text = section.entry("RANGE")
+    if text:
+        limits = _RANGE.fullmatch(text)
+        if not limits:
+            refuse(line, f"RANGE of {section.name!r} is {text}, expected (least .. greatest)")
+        low, high = limits.groups()
+        return read_number(low, line, "the least value"), read_number(high, line, "the greatest value")
+    universe = universe_of(places)
+    if universe is None and weighted:  # values do not depend on the universe
+        return min(places, default=0.0) - 1.0, max(places, default=0.0) + 1.0
+    expected = "expected RANGE := (least .. greatest);"
+    return universe or refuse(section.line, f"{section.name!r} has no range, and its points make none; {expected}")
 
-    line: int
-    norms: dict[str, str] = field(default_factory=dict)
-    rules: list[tuple[int, Rule]] = field(default_factory=list)
 
-    def operators(self) -> Operators:
-        """Return the operators; AND and OR imply each other, and a missing ACT is MIN."""
-        conjunction = self.norms.get("AND") or next((a for a, b in PAIRS.items() if b == self.norms.get("OR")), "min")
-        return Operators(conjunction, self.norms.get("OR", PAIRS[conjunction]), self.norms.get("ACT", "min"))
+def _output(section: Block, inputs: Sequence[str], aggregations: dict[bool, str]) -> Output:
+    """Return an output; these aggregations join its sets or values unless it has its own."""
+    terms, places = _terms(section, inputs)
+    values = any(isinstance(term.shape, Constant | Linear) for term in terms)
+    sets = any(not isinstance(term.shape, Value) for term in terms)
+    usual = "average" if values and not sets else "centroid"  # the default of jFuzzyLogic
+    method: Any = section.word("METHOD", {**_WORDS["defuzzifier"], "": usual})
+    weighted = method in WEIGHTED
+    own = section.word("ACCU", {**_WORDS["aggregation"], "": aggregations[weighted]})
+    locks = set(section.entry("LOCK")[1].split(" | "))
+    if not locks <= {"PREVIOUS", "RANGE", ""}:
+        refuse(section.entry("LOCK")[0], f"LOCK is {section.entry('LOCK')[1]}, expected PREVIOUS, RANGE or both")
+    # fuzzylite adds NC where the previous value is kept
+    line, text = section.entry("DEFAULT", "NC")
+    value, _, other = text.partition(" | ")
+    default = None if value in ("NC", "NAN") else read_number(value, line, "the default, or NC,")
+    if other not in ("", "NC"):
+        refuse(line, f"DEFAULT of {section.name!r} is {text}, expected NC after |")
+    with located(f"line {section.line}"):
+        universe, keeps = _universe(section, places, weighted), "PREVIOUS" in locks or bool(other)
+        return Output(section.name, universe, terms, default, method, own, "RANGE" in locks, keeps)
+
+
+def _rules(section: Block, any_is_term: set[str]) -> tuple[Operators, list[NumberedRule]]:
+    """Return the operators of a rule block, of which AND and OR imply each other, and its rules."""
+    norms = {key: section.word(key, _WORDS[kind] | {"": ""}) for key, kind in _KEYS.items()}
+    conjunction = norms["AND"] or next((a for a, b in _PAIRS.items() if b == norms["OR"]), "min")
+    rules: list[NumberedRule] = []
+    for line, text in section.many:
+        with located(f"line {line}"):
+            # fuzzylite has a term *any* of every input, unless one has that name
+            words = [quoted(word) if word in any_is_term else word for word in text.split(" ")]
+            rules += [(line, rule) for rule in parse_rules(" ".join(words))]
+    return Operators(conjunction, norms["OR"] or _PAIRS[conjunction], norms["ACT"] or "min"), rules
 
 
 def _on_first_of_value(rule: Rule, outputs: list[Output]) -> Rule:
     """Return a rule that concludes the first of terms of one value: jFuzzyLogic joins strengths by value."""
-    known = {output.name: output for output in outputs if output.weighted and output.aggregation != "sum"}
-    shapes = {(name, term.name): term.shape for name, output in known.items() for term in output.terms}
-    conclusions = tuple(
-        next(
-            Is(c.variable, term)
-            for (name, term), shape in shapes.items()
-            if name == c.variable and shape == shapes[c.variable, c.term]
-        )
-        if (c.variable, c.term) in shapes
-        else c
-        for c in rule.conclusions
-    )
+    first: dict[Is, Is] = {}
+    for output in outputs:
+        if output.weighted and output.aggregation != "sum":
+            for term in output.terms:
+                alike = next(other.name for other in output.terms if other.shape == term.shape)
+                first[Is(output.name, term.name)] = Is(output.name, alike)
+    conclusions = tuple(first.get(c, c) for c in rule.conclusions)
     return rule if conclusions == rule.conclusions else replace(rule, conclusions=conclusions)
-
-
-@dataclass
-class _Reader(Cursor):
-    """Parse one text by recursive descent."""
-
-    inputs: dict[str, _Draft] = field(default_factory=dict)
-    outputs: dict[str, _Draft] = field(default_factory=dict)
-    blocks: list[_Block] = field(default_factory=list)
-
-    def input_names(self) -> tuple[str, ...]:
-        return tuple(self.inputs)
-
-    def system(self, settings: dict[str, Any]) -> System:
-        begin = self.take("FUNCTION_BLOCK")
-        name = block_name(self.tokens[self.index :])
-        while name and self.here.line == begin.line and self.here.text.upper() not in SECTIONS:
-            self.index += 1
-        sections: dict[str, Callable[[], None]] = {
-            "VAR_INPUT": lambda: self.variables(self.inputs),
-            "VAR_OUTPUT": lambda: self.variables(self.outputs),
-            "FUZZIFY": self.fuzzify,
-            "DEFUZZIFY": self.defuzzify,
-            "RULEBLOCK": self.rule_block,
-        }
-        while not self.accept("END_FUNCTION_BLOCK"):
-            sections[self.take(*sections, "END_FUNCTION_BLOCK").text.upper()]()
-        if self.here.kind != "end":
-            self.unexpected("the end of the file")
-        accumulations = {block.norms["ACCU"]: block.line for block in self.blocks if "ACCU" in block.norms}
-        if len(accumulations) > 1:
-            refuse(max(accumulations.values()), "RULEBLOCK has another ACCU than that before it, expected the same")
-        accumulation = next(iter(accumulations), None)
-        inputs, outputs = [], []
-        for variable, draft in self.inputs.items():
-            with located(f"line {draft.line}"):
-                inputs.append(Variable(*self.parts(variable, draft, "FUZZIFY", False)))
-        for variable, draft in self.outputs.items():
-            outputs.append(self.output(variable, draft, accumulation))
-        norms, rules = join_rule_blocks([(block.operators(), block.rules) for block in self.blocks])
-        if not self.fuzzylite:
-            rules = [(line, _on_first_of_value(rule, outputs)) for line, rule in rules]
-        return assembled(begin.line, inputs, outputs, rules, name=name or "arbiter", **norms, **settings)
-
-    def output(self, name: str, draft: _Draft, accumulation: str | None) -> Output:
-        shapes = [term.shape for term in draft.terms or ()]
-        values = any(isinstance(shape, Constant | Linear) for shape in shapes)
-        sets = any(not isinstance(shape, Value) for shape in shapes)
-        method: Any = draft.method or ("average" if values and not sets else "centroid")  # the default of jFuzzyLogic
-        weighted = method in WEIGHTED
-        own = draft.accumulation or accumulation or ("sum" if weighted and self.fuzzylite else "max")
-        with located(f"line {draft.line}"):
-            parts = self.parts(name, draft, "DEFUZZIFY", weighted)
-            return Output(*parts, draft.default, method, own, "RANGE" in draft.locks, "PREVIOUS" in draft.locks)
-
-    def parts(
-        self, name: str, draft: _Draft, section: str, weighted: bool
-    ) -> tuple[str, tuple[float, float], tuple[Term, ...]]:
-        if draft.terms is None:
-            refuse(draft.line, f"{name!r} has no {section}")
-        universe = draft.universe or universe_of(draft.places)
-        if universe is None and weighted:  # values do not depend on the universe
-            low, high = min(draft.places, default=0.0), max(draft.places, default=0.0)
-            universe = (low - 1.0, high + 1.0)
-        if universe is None:
-            refuse(
-                draft.line, f"{name!r} has no range, and its points make none; expected RANGE := (least .. greatest);"
-            )
-        return name, universe, tuple(draft.terms)
-
-    def variables(self, into: dict[str, _Draft]) -> None:
-        while not self.accept("END_VAR"):
-            names = [self.name("a variable's name or END_VAR")]
-            while self.accept(","):
-                names.append(self.name("a variable's name"))
-            self.take(":")
-            self.take("REAL")
-            self.take(";")
-            universe = self.range() if self.accept("RANGE") else None
-            for token in names:
-                if token.text in self.inputs or token.text in self.outputs:
-                    refuse(token.line, f"{token.text!r} is declared twice")
-                into[token.text] = _Draft(token.line, universe)
-
-    def draft(self, known: dict[str, _Draft], section: str) -> _Draft:
-        token = self.name("a variable's name")
-        if token.text not in known:
-            refuse(
-                token.line, f"{section} {token.text!r}, expected one of {', '.join(known) or 'none: none is declared'}"
-            )
-        draft = known[token.text]
-        if draft.terms is not None:
-            refuse(token.line, f"{section} {token.text!r} appears twice")
-        draft.line, draft.terms = token.line, []
-        return draft
-
-    def fuzzify(self) -> None:
-        draft = self.draft(self.inputs, "FUZZIFY")
-        while not self.accept("END_FUZZIFY"):
-            word = self.take("TERM", "RANGE", "ENABLED", "END_FUZZIFY").text.upper()
-            if word == "TERM":
-                self.term(draft, None)
-            elif word == "ENABLED":
-                self.choice({"TRUE": True})
-            else:
-                self.only_range(draft)
-                self.fuzzylite = True
-
-    def only_range(self, draft: _Draft) -> None:
-        if draft.universe is not None:
-            refuse(self.here.line, "RANGE appears twice")
-        draft.universe = self.range()
-
-    def defuzzify(self) -> None:
-        draft = self.draft(self.outputs, "DEFUZZIFY")
-        keywords: set[str] = set()
-        while not self.accept("END_DEFUZZIFY"):
-            key = self.take("TERM", "METHOD", "DEFAULT", "RANGE", "ACCU", "LOCK", "ENABLED", "END_DEFUZZIFY")
-            word = key.text.upper()
-            if word == "TERM":
-                self.term(draft, len(self.inputs))
-                continue
-            if word in keywords:
-                refuse(key.line, f"{word} appears twice")
-            keywords.add(word)
-            if word == "RANGE":
-                self.only_range(draft)
-            elif word == "DEFAULT":
-                self.default(draft)
-            elif word == "ACCU":
-                draft.accumulation = self.choice(JOINS)
-            elif word == "LOCK":
-                draft.locks |= self.flags(("PREVIOUS", "RANGE"))
-            elif word == "ENABLED":
-                self.choice({"TRUE": True})
-            else:
-                draft.method = self.choice(METHODS)
-
-    def default(self, draft: _Draft) -> None:
-        """Take a default: a number, or none; fuzzylite adds NC where the previous value is kept."""
-        self.take(":=")
-        if not self.accept("NC", "NAN"):
-            draft.default = self.number("the default, or NC")
-        if self.accept("|"):
-            self.take("NC")
-            draft.locks.add("PREVIOUS")
-        self.take(";")
-
-    def term(self, draft: _Draft, inputs: int | None) -> None:
-        assert draft.terms is not None
-        token = self.name("a term's name")
-        self.take(":=")
-        with located(f"line {token.line}: term {token.text!r}"):
-            shape, places = self.shape(inputs)
-            draft.terms.append(Term(token.text, shape))
-        draft.places += places
-        self.take(";")
-
-    def rule_block(self) -> None:
-        block = _Block(self.here.line)
-        self.blocks.append(block)
-        choices = {"AND": CONJUNCTIONS, "OR": DISJUNCTIONS, "ACT": CONJUNCTIONS, "ACCU": JOINS}
-        if self.here.text.upper() not in (*choices, "RULE", "ENABLED", "END_RULEBLOCK"):
-            self.name("the rule block's name")
-        while not self.accept("END_RULEBLOCK"):
-            key = self.take(*choices, "RULE", "ENABLED", "END_RULEBLOCK")
-            word = key.text.upper()
-            if word == "RULE":
-                self.rule(key.line, block)
-            elif word == "ENABLED":
-                self.choice({"TRUE": True})
-            elif word in block.norms:
-                refuse(key.line, f"{word} appears twice")
-            else:
-                block.norms[word] = self.choice(choices[word])
-
-    def rule(self, line: int, block: _Block) -> None:
-        if self.here.kind in ("name", "number"):
-            self.index += 1
-        elif self.here.text != ":":
-            self.unexpected("the rule's number")
-        self.take(":")
-        start = self.index
-        while self.here.text != ";" and self.here.kind != "end":
-            if self.index > start and self.here.line > self.tokens[self.index - 1].line and self.next_statement():
-                self.fuzzylite = True  # fuzzylite ends a rule with its line
-                break
-            self.index += 1
-        # read as names, except the words of rules, since the language has no other words
-        words = [
-            token if token.text.lower() in _RULE_WORDS else self.as_name(token)
-            for token in self.tokens[start : self.index]
-        ]
-        if not self.fuzzylite or self.here.text == ";":
-            self.take(";")
-        with located(f"line {line}"):
-            block.rules += [(line, rule) for rule in parse_rules(" ".join(token.text for token in words))]
-
-    def next_statement(self) -> bool:
-        """Return True if another statement of a rule block begins here."""
-        after = self.tokens[self.index + 1] if self.here.kind != "end" else self.here
-        word = self.here.text.upper()
-        return word in ("RULE", "END_RULEBLOCK") and (word != "RULE" or after.kind in ("name", "number", "sign"))
-
-    def as_name(self, token: Token) -> Token:
-        own = token.text.lower() == "any" and any(
-            term.name == token.text for draft in self.inputs.values() for term in draft.terms or ()
-        )
-        return token._replace(text=quoted(token.text)) if own else token

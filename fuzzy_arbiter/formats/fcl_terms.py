@@ -2,21 +2,51 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from fuzzy_arbiter.errors import UnsupportedError
-from fuzzy_arbiter.formats.notation import format_number, format_numbers
+from fuzzy_arbiter.formats.fll_terms import TYPES
+from fuzzy_arbiter.formats.fll_terms import read_shape as read_typed
+from fuzzy_arbiter.formats.notation import format_number, format_numbers, read_number, refuse
 from fuzzy_arbiter.shapes import Membership, Shape, trapezoid, triangle
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.kinds import KINDS
 from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
-CURVES = {kind.fcl[0]: (name, kind.fcl[1]) for name, kind in KINDS.items() if kind.fcl}
-COUNTS = {"TRIAN": 3, "TRAPE": 4, "COSINE": 2, **{word: len(order) for word, (_, order) in CURVES.items()}}
-"""Number of parameters of each of jFuzzyLogic's functions."""
+_CURVES = {kind.fcl[0]: (name, kind.fcl[1]) for name, kind in KINDS.items() if kind.fcl}
+# number of parameters of each of jFuzzyLogic's functions
+_COUNTS = {"TRIAN": 3, "TRAPE": 4, "COSINE": 2, **{word: len(order) for word, (_, order) in _CURVES.items()}}
+_POINT = re.compile(r"\( (\S+) , (\S+) \)(?: ,)?(?: |$)")  # examples of the standard have commas between points
 
 
-def read_curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[float]]:
+def read_shape(text: str, line: int, inputs: Sequence[str] | None) -> tuple[Membership | Value, list[float]]:
+    """Parse a term's shape, and return its lowest and highest point; the inputs are those before an output."""
+    word, _, rest = text.partition(" ")
+    if word == "FUNCTION":  # jFuzzyLogic's, whose LOG is that to the base of 10
+        formula = Formula(" ".join("log10" if part.upper() == "LOG" else part for part in rest.split(" ")))
+        linear = Linear.of(formula.expression(sorted(formula.names)).tree, inputs or ())
+        return linear or formula, []
+    if word in TYPES:
+        shape = read_typed(word, rest, line, None if inputs is None else len(inputs))
+        return shape, [shape.value] if isinstance(shape, Constant) else []
+    if word.upper() in _COUNTS:
+        numbers = [read_number(part, line, "a parameter") for part in rest.split()]
+        count = _COUNTS[word.upper()]
+        if len(numbers) != count:
+            refuse(line, f"{word} has the numbers {rest!r}, expected {count}")
+        return _curve(word.upper(), numbers)
+    if not rest and word[:1] in "+-.0123456789":
+        value = read_number(word, line, "a value")
+        return Constant(value) if inputs is not None else Curve("singleton", (value,)), [value]
+    if not text or _POINT.sub("", text):
+        expected = f"points such as (0, 0) (5, 1), a number, or one of {', '.join(('FUNCTION', *_COUNTS, *TYPES))}"
+        refuse(line, f"{text!r} is no membership function, expected {expected}")
+    points = [(read_number(x, line, "a place"), read_number(y, line, "a degree")) for x, y in _POINT.findall(text)]
+    return Shape(tuple(points)), [x for x, _ in points]
+
+
+def _curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[float]]:
     """Return the shape of one of jFuzzyLogic's functions and its numbers, and its default universe."""
     if word in ("TRIAN", "TRAPE"):
         places = [numbers[0], numbers[-1]]
@@ -32,7 +62,7 @@ def read_curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[fl
         return Formula(f"max({first} - {second}, 0)"), _extent(
             "sigmoid_difference", (numbers[1], *numbers[::2], numbers[3])
         )
-    name, order = CURVES[word]
+    name, order = _CURVES[word]
     parameters = tuple(number for _, number in sorted(zip(order, numbers, strict=True)))
     return Curve(name, parameters), _extent(name, parameters)
 
@@ -74,18 +104,18 @@ def format_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) ->
         return f"COSINE {format_numbers((shape.parameters[1] / 2.0, shape.parameters[0]))}"
     if shape.kind == "singleton":
         return f"TRIAN {format_numbers(shape.parameters * 3)}"
-    spelled = KINDS[shape.kind].fcl
-    if spelled is None:
+    word, order = KINDS[shape.kind].fcl or ("", ())
+    if not word:
+        known = ", ".join(name for name, _ in _CURVES.values())
         raise UnsupportedError(
-            f"fcl cannot say the kind {shape.kind!r} of term {term!r}: expected points, or one of "
-            f"{', '.join(name for name, _ in CURVES.values())}, cosine"
+            f"fcl cannot say the kind {shape.kind!r} of term {term!r}: expected points, or one of {known}, cosine"
         )
-    word, order = spelled
-    if word == "DSIGM" and not _rises_first(*(shape.parameters[i] for i in order)):
+    numbers = [shape.parameters[i] for i in order]
+    if word == "DSIGM" and not _rises_first(*numbers):
         raise UnsupportedError(
             f"fcl cannot say term {term!r}, a sigmoid_difference of which the second sigmoid may be above the first"
         )
-    return f"{word} {format_numbers(shape.parameters[i] for i in order)}"
+    return f"{word} {format_numbers(numbers)}"
 
 
 def universe_of(places: Sequence[float]) -> tuple[float, float] | None:

@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass, field
+from typing import Any
 
 from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.fis_rules import read_rules, with_complements
 from fuzzy_arbiter.formats.fis_terms import numbers_of, read_function, with_unique_names
-from fuzzy_arbiter.formats.fis_words import (
-    DEFUZZIFIERS,
-    FUZZYLITE_KEYS,
-    METHODS,
-    SETTINGS,
-    TYPES,
-)
-from fuzzy_arbiter.formats.notation import assembled, located, read_number, refuse
+from fuzzy_arbiter.formats.notation import Block, assembled, located, refuse
 from fuzzy_arbiter.formats.settings import read_settings
+from fuzzy_arbiter.formats.vocabulary import WORDS
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.term import Term
@@ -28,38 +22,21 @@ _ENTRY = re.compile(r"(\w+)\s*=\s*(.*)", re.ASCII)
 _QUOTED = re.compile(r"'([^']*)'")
 _LIST = re.compile(r"\[([^][]*)\]")
 _FUNCTION = re.compile(r"'([^']*)'\s*:\s*'([^']*)'\s*,\s*\[([^][]*)\]")
-_COUNTS = ("NumInputs", "NumOutputs", "NumRules")
-_SYSTEM_KEYS = ("Name", "Type", "Version", *_COUNTS, *METHODS, "DefuzzMethod")
+_METHODS = {
+    "AndMethod": "conjunction",
+    "OrMethod": "disjunction",
+    "ImpMethod": "implication",
+    "AggMethod": "aggregation",
+}
+_TEXTS = ("Name", "Type", *_METHODS, "DefuzzMethod")
+_SYSTEM_KEYS = (*_TEXTS, "Version", "NumInputs", "NumOutputs", "NumRules")
+# types, and whether their outputs are values; the last two are fuzzylite's
+_TYPES = {"mamdani": False, "sugeno": True, "tsukamoto": True, "hybrid": None}
+# keys of a variable that fuzzylite's versions 3 to 5 add
+_FUZZYLITE_KEYS = ("Enabled", "Default", "LockRange", "LockPrevious")
+_FLAGS = {"1": True, "0": False}
 
-
-@dataclass
-class _Section:
-    """The lines of one section: entries by key, and lines that are not entries."""
-
-    name: str
-    line: int
-    entries: dict[str, tuple[int, str]] = field(default_factory=dict)
-    rows: list[tuple[int, str]] = field(default_factory=list)
-
-    def string(self, key: str) -> str | None:
-        if key not in self.entries:
-            return None
-        line, value = self.entries[key]
-        match = _QUOTED.fullmatch(value)
-        return match[1] if match else refuse(line, f"{key} is {value}, expected text in single quotes")
-
-    def flag(self, key: str) -> bool:
-        line, value = self.entries.get(key, (self.line, "0"))
-        return value == "1" if value in ("0", "1") else refuse(line, f"{key} is {value}, expected 0 or 1")
-
-    def default(self) -> float | None:
-        line, value = self.entries.get("Default", (self.line, "nan"))
-        return None if value == "nan" else read_number(value, line, "Default")
-
-    def require_count(self, key: str, count: int) -> None:
-        line, value = self.entries.get(key, (self.line, ""))
-        if value != str(count):
-            refuse(line, f"{key} is {value or 'missing'}, expected {count}, since there are {count}")
+_Parts = tuple[str, tuple[float, float], tuple[Term, ...]]
 
 
 def read(text: str) -> System:
@@ -69,33 +46,41 @@ def read(text: str) -> System:
     # whatever AggMethod says, as MATLAB does it; where a comment names the fuzzy-logic-toolkit, they are joined as
     # AggMethod defines, as in Octave.
     sections, comments = _sections(text)
-    settings = read_settings(comments, SETTINGS)
+    settings = read_settings(comments)
     if "System" not in sections or "Rules" not in sections:
         raise FormatError("expected the sections [System] and [Rules] of a FIS file, among others")
     system = sections["System"]
-    norms, defuzzifier, name = _norms(system), _defuzzifier(system), system.string("Name")
+    norms = {kind: system.word(key, WORDS["fis"][kind]) for key, kind in _METHODS.items()}
+    if not system.entry("AndMethod")[1] and norms["disjunction"] == "probor":
+        norms["conjunction"] = "prod"
     aggregation = norms.pop("aggregation")
-    fuzzylite = any("generated with fuzzylite" in text for _, text in comments) or any(
-        key in FUZZYLITE_KEYS for section in sections.values() for key in section.entries
+    words = " ".join(text for _, text in comments)
+    fuzzylite = "generated with fuzzylite" in words or any(
+        key in _FUZZYLITE_KEYS for section in sections.values() for key in section.entries
     )
-    inputs = [Variable(*parts) for parts in _variables(sections, "Input", None)]
-    values = aggregation if any("fuzzy-logic-toolkit" in text for _, text in comments) else "sum"
-    outputs = _outputs(sections, len(inputs), defuzzifier, aggregation, values)
-    counted = {"NumInputs": len(inputs), "NumOutputs": len(outputs), "NumRules": len(sections["Rules"].rows)}
-    for key, count in counted.items():
-        system.require_count(key, count)
+    inputs = []
+    for section in _numbered(sections, "Input"):
+        parts = _parts(section, None)
+        with located(f"line {section.line}"):
+            inputs.append(Variable(*parts))
+    joins = {False: aggregation, True: aggregation if "fuzzy-logic-toolkit" in words else "sum"}
+    outputs = [_output(section, len(inputs), system, joins) for section in _numbered(sections, "Output")]
+    rows = sections["Rules"].many
+    for key, count in (("NumInputs", len(inputs)), ("NumOutputs", len(outputs)), ("NumRules", len(rows))):
+        _require_count(system, key, count)
     rules: list[tuple[int, Rule]] = []
-    for line, row in sections["Rules"].rows:
+    for line, row in rows:
         with located(f"line {line}: {row!r}"):
             rules += [(line, rule) for rule in read_rules(line, row, inputs, outputs, fuzzylite)]
     outputs = [with_complements(output, rules) for output in outputs]
-    return assembled(system.line, inputs, outputs, rules, name=name or "arbiter", **norms, **settings)
+    name = system.entry("Name")[1] or "arbiter"
+    return assembled(system.line, inputs, outputs, rules, name=name, **norms, **settings)
 
 
-def _sections(text: str) -> tuple[dict[str, _Section], list[tuple[int, str]]]:
-    sections: dict[str, _Section] = {}
+def _sections(text: str) -> tuple[dict[str, Block], list[tuple[int, str]]]:
+    sections: dict[str, Block] = {}
     comments: list[tuple[int, str]] = []
-    section: _Section | None = None
+    section: Block | None = None
     for line, raw in enumerate(text.split("\n"), 1):
         content = raw.strip()
         if content.startswith(("%", "#")):
@@ -110,106 +95,76 @@ def _sections(text: str) -> tuple[dict[str, _Section], list[tuple[int, str]]]:
                 refuse(line, f"section {content!r}, expected [System], [Input1], [Output1], [Rules] and so on")
             if name in sections:
                 refuse(line, f"section {content!r} appears twice")
-            section = sections[name] = _Section(name, line)
+            section = sections[name] = Block(head[1], name, line)
         elif section is None or content.startswith("["):
             refuse(line, f"{content!r}, expected a section such as [System], [Input1], [Output1] or [Rules]")
-        elif section.name == "Rules":
-            section.rows.append((line, content))
+        elif section.kind == "Rules":
+            section.many.append((line, content))
         else:
             entry = _ENTRY.fullmatch(content)
             if not entry:
                 refuse(line, f"{content!r}, expected a key, = and its value")
-            if entry[1] in section.entries:
-                refuse(line, f"{entry[1]} appears twice in [{section.name}]")
-            section.entries[entry[1]] = line, entry[2]
+            key, value = entry.groups()
+            if key in _TEXTS:
+                quoted = _QUOTED.fullmatch(value)
+                value = quoted[1] if quoted else refuse(line, f"{key} is {value}, expected text in single quotes")
+            section.add(line, key, value, _SYSTEM_KEYS if section.kind == "System" else ())
     return sections, comments
 
 
-def _norms(system: _Section) -> dict[str, str]:
-    for key, (line, _) in system.entries.items():
-        if key not in _SYSTEM_KEYS:
-            refuse(line, f"{key} is not known in [System], expected one of {', '.join(_SYSTEM_KEYS)}")
-    norms: dict[str, str] = {}
-    for key, known in METHODS.items():
-        value = system.string(key)
-        if value is not None and value not in known:
-            refuse(
-                system.entries[key][0],
-                f"{key} is {value!r}, which is not known here; expected {' or '.join(filter(None, known))}",
-            )
-        norms[key] = known[value or ""]
-    if not system.string("AndMethod") and norms["OrMethod"] == "probor":
-        norms["AndMethod"] = "prod"
-    return {
-        "conjunction": norms["AndMethod"],
-        "disjunction": norms["OrMethod"],
-        "implication": norms["ImpMethod"],
-        "aggregation": norms["AggMethod"],
-    }
+def _require_count(section: Block, key: str, count: int) -> None:
+    line, value = section.entry(key)
+    if value != str(count):
+        refuse(line, f"{key} is {value or 'missing'}, expected {count}, since there are {count}")
 
 
-def _defuzzifier(system: _Section) -> str:
+def _defuzzifier(system: Block) -> Any:
     """Return the defuzzifier of all outputs; in a hybrid file those of values take the weighted mean."""
-    kind = system.string("Type") or "mamdani"
-    if kind not in TYPES:
-        refuse(system.entries["Type"][0], f"Type is {kind!r}, which is not known here; expected {' or '.join(TYPES)}")
-    word = system.string("DefuzzMethod") or ("centroid" if kind == "mamdani" else "wtaver")
-    found = DEFUZZIFIERS.get(word)
-    weighted = {"mamdani": False, "sugeno": True, "tsukamoto": True}.get(kind)
-    if found is None or (weighted is not None and weighted != (found in WEIGHTED)):
-        line = system.entries.get("DefuzzMethod", (system.line, ""))[0]
-        expected = [key for key, name in DEFUZZIFIERS.items() if weighted in (None, name in WEIGHTED)]
-        refuse(line, f"DefuzzMethod is {word!r} in a file of the type {kind!r}, expected {' or '.join(expected)}")
-    return found
+    kind = system.entry("Type")[1] or "mamdani"
+    weighted = system.word("Type", {**_TYPES, "": False})
+    line, word = system.entry("DefuzzMethod")
+    word = word or ("centroid" if kind == "mamdani" else "wtaver")
+    known = {key: name for key, name in WORDS["fis"]["defuzzifier"].items() if weighted in (None, name in WEIGHTED)}
+    if word not in known:
+        refuse(line, f"DefuzzMethod is {word!r} in a file of the type {kind!r}, expected {' or '.join(known)}")
+    return known[word]
 
 
-_Parts = tuple[str, tuple[float, float], tuple[Term, ...]]
+def _numbered(sections: dict[str, Block], kind: str) -> list[Block]:
+    """Return the sections of one kind in the order of their numbers."""
+    alike = [section for section in sections.values() if section.kind == kind]
+    for k in range(1, len(alike) + 1):
+        if f"{kind}{k}" not in sections:
+            refuse(alike[-1].line, f"got [{alike[-1].name}] without [{kind}{k}]; expected them numbered from 1")
+    return [sections[f"{kind}{k}"] for k in range(1, len(alike) + 1)]
 
 
-def _variables(sections: dict[str, _Section], kind: str, inputs: int | None) -> list[_Parts]:
-    found = [s for name, s in sections.items() if name.startswith(kind)]
-    variables: list[_Parts] = []
-    for k in range(1, len(found) + 1):
-        section = sections.get(f"{kind}{k}")
-        if section is None:
-            refuse(found[-1].line, f"got [{found[-1].name}] without [{kind}{k}]; expected them numbered from 1")
-        variables.append(_variable(section, inputs))
-    return variables
+def _output(section: Block, inputs: int, system: Block, joins: dict[bool, str]) -> Output:
+    """Return an output, whose values or sets are joined by these aggregations."""
+    parts, defuzzifier = _parts(section, inputs), _defuzzifier(system)
+    values = any(not isinstance(term.shape, Membership) or isinstance(term.shape, Formula) for term in parts[2])
+    if values and defuzzifier not in WEIGHTED and system.entry("Type")[1] == "hybrid":
+        defuzzifier = "average"
+    locks = section.word("LockRange", _FLAGS, "0"), section.word("LockPrevious", _FLAGS, "0")
+    with located(f"line {section.line}"):
+        return Output(*parts, section.number("Default"), defuzzifier, joins[defuzzifier in WEIGHTED], *locks)
 
 
-def _outputs(
-    sections: dict[str, _Section], inputs: int, defuzzifier: str, aggregation: str, of_values: str
-) -> list[Output]:
-    outputs: list[Output] = []
-    for k, parts in enumerate(_variables(sections, "Output", inputs), 1):
-        values = any(not isinstance(term.shape, Membership) or isinstance(term.shape, Formula) for term in parts[2])
-        own = "average" if values and defuzzifier not in WEIGHTED and _hybrid(sections) else defuzzifier
-        join = of_values if own in WEIGHTED else aggregation
-        section = sections[f"Output{k}"]
-        locks = section.flag("LockRange"), section.flag("LockPrevious")
-        with located(f"line {section.line}"):
-            outputs.append(Output(*parts, section.default(), own, join, *locks))  # type: ignore[arg-type]  # words from a table
-    return outputs
-
-
-def _hybrid(sections: dict[str, _Section]) -> bool:
-    return sections["System"].string("Type") == "hybrid"
-
-
-def _variable(section: _Section, inputs: int | None) -> _Parts:
-    name = section.string("Name")
-    if name is None or "Range" not in section.entries:
-        refuse(section.line, f"[{section.name}] without {'Name' if name is None else 'Range'}")
-    line, value = section.entries["Range"]
+def _parts(section: Block, inputs: int | None) -> _Parts:
+    """Return the name, the universe and the terms of a variable."""
+    for key in ("Name", "Range"):
+        if key not in section.entries:
+            refuse(section.line, f"[{section.name}] without {key}")
+    name = section.entry("Name")[1]
+    line, value = section.entry("Range")
     match = _LIST.fullmatch(value)
     bounds = numbers_of(match[1], line, "Range") if match else []
     if len(bounds) != 2:
         refuse(line, f"Range is {value}, expected two numbers in brackets")
-    if "Enabled" in section.entries and not section.flag("Enabled"):
-        refuse(section.entries["Enabled"][0], f"Enabled is 0 for {name!r}, expected 1")
-    known = ("Name", "Range", "NumMFs", *(FUZZYLITE_KEYS if inputs is not None else FUZZYLITE_KEYS[:1]))
+    section.word("Enabled", {"1": True}, "1")
+    known = ("Name", "Range", "NumMFs", *(_FUZZYLITE_KEYS if inputs is not None else _FUZZYLITE_KEYS[:1]))
     functions = {key: entry for key, entry in section.entries.items() if key not in known}
-    section.require_count("NumMFs", len(functions))
+    _require_count(section, "NumMFs", len(functions))
     terms: list[Term] = []
     for j, (key, (line, value)) in enumerate(functions.items(), 1):
         if key != f"MF{j}":
@@ -220,8 +175,4 @@ def _variable(section: _Section, inputs: int | None) -> _Parts:
         term, function, places = match.groups()
         with located(f"line {line}: term {term!r}"):
             terms.append(Term(term, read_function(function, places, line, term, inputs)))
-    parts = name, (bounds[0], bounds[1]), with_unique_names(terms)
-    with located(f"line {section.line}"):
-        if inputs is None:
-            Variable(*parts)
-    return parts
+    return name, (bounds[0], bounds[1]), with_unique_names(terms)

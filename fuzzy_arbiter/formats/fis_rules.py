@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 from fuzzy_arbiter.definition import Output, Variable
 from fuzzy_arbiter.formats.fis_terms import complement
-from fuzzy_arbiter.formats.fis_words import HEDGES, OCTAVE_HEDGES, OCTAVE_ROOTS
 from fuzzy_arbiter.formats.notation import located, read_number, refuse
 from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.rule_text import bent_rules
 from fuzzy_arbiter.terms.term import Term
 
+# digits after the point of a term's number: fuzzylite's, Octave's in conditions, of which ten times is the power, and
+# Octave's where a rule concludes a value, whose strength it takes to the inverse of that power
+_Words = dict[str, tuple[str, ...]]
+_COMMON: _Words = {"": (), "05": ("somewhat",), "2": ("very",), "4": ("very", "very")}
+_FUZZYLITE: _Words = {**_COMMON, "01": ("seldom",), "3": ("extremely",), "99": ("any",)}
+_OCTAVE: _Words = {**_COMMON, "3": ("cubed",)}
+_ROOTS: _Words = {"": (), "05": ("very",), "2": ("somewhat",), "3": ("cube_root",), "4": ("somewhat", "somewhat")}
 _RULE = re.compile(r"([^,()]*),([^,()]*)\(([^()]*)\)\s*:\s*(\S+)")
 
 
@@ -29,13 +35,13 @@ def read_rules(
     if connective not in ("1", "2"):
         refuse(line, f"{row!r} ends in {connective!r}, expected 1 for and, 2 for or")
     condition: list[Proposition] = []
-    words = HEDGES if fuzzylite else OCTAVE_HEDGES
+    words = _FUZZYLITE if fuzzylite else _OCTAVE
     for (index, negated, hedges), v in zip(_indices(asked, line, row, inputs, words), inputs, strict=True):
         statement = _statement(index, hedges, v)
         if statement is not None:
             condition.append(Not(statement) if negated else statement)
     conclusions: list[tuple[tuple[str, ...], Is]] = []
-    words = HEDGES if fuzzylite else OCTAVE_ROOTS
+    words = _FUZZYLITE if fuzzylite else _ROOTS
     for (index, negated, hedges), v in zip(_indices(concluded, line, row, outputs, words), outputs, strict=True):
         if negated and (fuzzylite or v.weighted):
             refuse(line, f"{row!r} concludes that {v.name!r} is not in a term, expected a set of MATLAB's or Octave's")
@@ -65,7 +71,7 @@ def _statement(index: int, hedges: tuple[str, ...], v: Variable) -> Proposition 
 
 
 def _indices(
-    text: str, line: int, row: str, variables: Sequence[Variable], words: Mapping[str, tuple[str, ...]]
+    text: str, line: int, row: str, variables: Sequence[Variable], words: _Words
 ) -> list[tuple[int, bool, tuple[str, ...]]]:
     """Return of each variable the number of its term from 1, whether it is negated, and its hedges."""
     parts = text.split()

@@ -6,40 +6,54 @@ import re
 from collections.abc import Sequence
 
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.formats.fis_words import CURVES, FUNCTIONS, SHOULDERS, STRAIGHT, VALUES
-from fuzzy_arbiter.formats.fll_terms import curve_of, read_shape, read_value
-from fuzzy_arbiter.formats.notation import format_numbers, read_number, refuse
-from fuzzy_arbiter.shapes import Membership, Shape
+from fuzzy_arbiter.formats.fll_terms import shape_of
+from fuzzy_arbiter.formats.notation import read_number, refuse
+from fuzzy_arbiter.shapes import Membership, Shape, falling, rising
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.expressions import Expression
+from fuzzy_arbiter.terms.kinds import KINDS
 from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Formula, Value
+
+_SHOULDERS = {"linsmf": rising, "linzmf": falling}
+# functions, each with its type in fuzzylite, and the indices of that type's numbers in MATLAB's order
+_TYPES: dict[str, tuple[str, Sequence[int]]] = {
+    "trimf": ("Triangle", range(3)),
+    "trapmf": ("Trapezoid", range(4)),
+    "rampmf": ("Ramp", range(2)),
+    "rectmf": ("Rectangle", range(2)),
+    "binarymf": ("Binary", range(2)),
+    "discretemf": ("Discrete", ()),
+    **{word: ("", range(2)) for word in _SHOULDERS},
+    **{kind.fis[0]: (kind.fll, kind.fis[1]) for kind in KINDS.values() if kind.fll},
+    "constant": ("Constant", ()),
+    "linear": ("Linear", ()),
+    "function": ("Function", ()),
+}
+_WITHOUT_HEIGHT = ("trimf", "trapmf", "binarymf", *_SHOULDERS)
 
 
 def read_function(function: str, text: str, line: int, term: str, inputs: int | None) -> Membership | Value:
     """Return the membership function or value of a function's name and numbers."""
-    if function not in FUNCTIONS:
-        refuse(line, f"term {term!r} is {function!r}, which is not known here; expected {', '.join(FUNCTIONS)}")
+    if function not in _TYPES:
+        refuse(line, f"term {term!r} is {function!r}, which is not known here; expected {', '.join(_TYPES)}")
     if function == "function":
         return Formula(text)
+    kind, order = _TYPES[function]
+    count = len(order)
     numbers = numbers_of(text, line, f"place of {term!r}")
-    if function in VALUES:
-        return read_value(function, numbers, line, inputs)
-    if function in CURVES:
-        name, order = CURVES[function]
-        numbers = _unpadded(numbers, len(order))
-        if function in ("zmf", "smf") and len(numbers) == 2 and numbers[0] > numbers[1]:
-            numbers = [sum(numbers) / 2] * 2  # where MATLAB lets it jump
-        return curve_of(name, order, numbers, line, function)
-    kind, count = STRAIGHT.get(function, ("", 2))
-    numbers = _unpadded(numbers, count) if count else numbers
-    if len(numbers) not in (count or len(numbers), count + 1 if function in ("rampmf", "rectmf") else count):
+    if len(numbers) == 4 > count and order and not any(numbers[count:]):
+        del numbers[count:]  # the zeros with which MATLAB's old files fill all up to four
+    if function in _WITHOUT_HEIGHT and len(numbers) != count:
         refuse(line, f"term {term!r} has the places [{text}], expected {count} for {function}")
-    if function in SHOULDERS:
-        return SHOULDERS[function](*numbers)
+    if function in _SHOULDERS:
+        return _SHOULDERS[function](*numbers)
     if function == "trapmf" and numbers[1] > numbers[2]:
         return _crossed(*numbers)
-    return read_shape(kind, format_numbers(numbers), line)
+    if function in ("zmf", "smf") and len(numbers) == 2 and numbers[0] > numbers[1]:
+        numbers = [sum(numbers) / 2] * 2  # where MATLAB lets it jump
+    sorted_numbers = [number for _, number in sorted(zip(order, numbers, strict=False))]
+    return shape_of(kind, [*sorted_numbers, *numbers[count:]], line, inputs, function)
 
 
 def complement(shape: Membership) -> Membership:
@@ -74,11 +88,6 @@ def _number(text: str, line: int, what: str) -> float:
         return read_number(text, line, what)
     whole = Expression(text)
     return whole({}) if not whole.names else read_number(text, line, what)
-
-
-def _unpadded(numbers: list[float], count: int) -> list[float]:
-    """Return numbers without the zeros with which MATLAB's old files fill all up to four."""
-    return numbers[:count] if len(numbers) == 4 > count and not any(numbers[count:]) else numbers
 
 
 def _crossed(a: float, b: float, c: float, d: float) -> Shape:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 
 from fuzzy_arbiter.errors import UnsupportedError
-from fuzzy_arbiter.formats.notation import format_number, format_numbers, read_number, refuse
+from fuzzy_arbiter.formats.notation import format_numbers, read_number, refuse
 from fuzzy_arbiter.shapes import Membership, Point, Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.functions import WORDS
@@ -20,38 +20,44 @@ RESERVED = frozenset(
 )
 # number of places of each; a height may follow
 _PLACES = {"Triangle": 3, "Trapezoid": 4, "Ramp": 2, "Rectangle": 2, "Binary": 2}
-CURVES = {kind.fll: (name, range(len(kind.parameters))) for name, kind in KINDS.items() if kind.fll}
+_CURVES = {kind.fll: name for name, kind in KINDS.items() if kind.fll}
 VALUES = ("Constant", "Linear", "Function")
-TYPES = (*_PLACES, "Discrete", *CURVES, *VALUES)
+TYPES = (*_PLACES, "Discrete", *_CURVES, *VALUES)
+
+
+def parts_of(shape: Membership | Value) -> tuple[str, tuple[float, ...], str]:
+    """Return the kind of a shape, its numbers, and the text of a formula."""
+    if isinstance(shape, Shape):
+        return "points", tuple(x for point in shape.points for x in point), ""
+    if isinstance(shape, Curve):
+        return shape.kind, shape.parameters, ""
+    if isinstance(shape, Linear):
+        return "linear", (*shape.coefficients, shape.constant), ""
+    if isinstance(shape, Constant):
+        return "constant", (shape.value,), ""
+    if not isinstance(shape, Formula):
+        raise UnsupportedError(f"cannot say the term {shape!r}")
+    return "formula", (), shape.text
 
 
 def format_shape(shape: Membership | Value) -> str:
     """Format a term's shape as its type and numbers."""
-    if isinstance(shape, Curve):
-        word, numbers = KINDS[shape.kind].fll, shape.parameters
-        if shape.kind == "singleton":
-            word, numbers = "Triangle", shape.parameters * 3
-        height = "" if shape.height == 1.0 else f" {format_number(shape.height)}"
-        return f"{word} {format_numbers(numbers)}{height}"
-    if isinstance(shape, Constant):
-        return f"Constant {format_number(shape.value)}"
-    if isinstance(shape, Linear):
-        return f"Linear {format_numbers((*shape.coefficients, shape.constant))}"
-    if isinstance(shape, Formula):
-        return f"Function {shape.text}"
-    if not isinstance(shape, Shape):
-        raise UnsupportedError(f"fll cannot say {shape!r}")
-    positions = [x for x, _ in shape.points]
-    match [degree for _, degree in shape.points]:
-        case [0.0, 1.0, 0.0]:
-            return f"Triangle {format_numbers(positions)}"
-        case [0.0, 1.0, 1.0, 0.0]:
-            return f"Trapezoid {format_numbers(positions)}"
-        case [0.0, 1.0] if not shape.jumps:
-            return f"Ramp {format_numbers(positions)}"
-        case [1.0, 0.0] if not shape.jumps:
-            return f"Ramp {format_numbers(reversed(positions))}"
-    return f"Discrete {format_numbers(x for point in shape.points for x in point)}"
+    kind, numbers, text = parts_of(shape)
+    word = {"constant": "Constant", "linear": "Linear", "formula": f"Function {text}", "points": "Discrete"}.get(kind)
+    if kind == "singleton":
+        word, numbers = "Triangle", numbers * 3
+    if isinstance(shape, Curve) and shape.height != 1.0:
+        numbers = (*numbers, shape.height)
+    if isinstance(shape, Shape):
+        positions = numbers[::2]
+        match numbers[1::2]:
+            case (0.0, 1.0, 0.0):
+                word, numbers = "Triangle", positions
+            case (0.0, 1.0, 1.0, 0.0):
+                word, numbers = "Trapezoid", positions
+            case (0.0, 1.0) | (1.0, 0.0) as degrees if not shape.jumps:
+                word, numbers = "Ramp", positions if degrees[1] else positions[::-1]
+    return f"{word or KINDS[kind].fll} {format_numbers(numbers)}".rstrip(" ")
 
 
 def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Membership | Value:
@@ -60,48 +66,36 @@ def read_shape(kind: str, text: str, line: int, inputs: int | None = None) -> Me
         refuse(line, f"term type {kind!r} is not known here, expected one of {', '.join(TYPES)}")
     if kind == "Function":
         return Formula(text)
-    numbers = [_number(part, line, kind) for part in text.split()]
+    return shape_of(kind, [_number(part, line, kind) for part in text.split()], line, inputs)
+
+
+def shape_of(kind: str, numbers: list[float], line: int, inputs: int | None, word: str = "") -> Membership | Value:
+    """Return the membership function or value of a type's numbers; `word` is the type's in the file."""
+    word = word or kind
     if kind in VALUES:
-        return read_value(kind, numbers, line, inputs)
-    if kind in CURVES:
-        name, order = CURVES[kind]
-        return curve_of(name, order, numbers, line, kind)
-    if kind == "Discrete":
-        height = numbers.pop() if len(numbers) % 2 else 1.0
-        points = list(zip(numbers[::2], numbers[1::2], strict=True))
-    else:
-        count = _PLACES[kind]
-        if len(numbers) not in (count, count + 1):
-            refuse(line, f"{kind} has the numbers {text!r}, expected {count}, and perhaps a height")
-        height = numbers.pop() if len(numbers) > count else 1.0
-        if len(set(numbers)) == 1 and kind in ("Triangle", "Trapezoid", "Rectangle") and height > 0.0:
-            return Curve("singleton", (numbers[0],), height)
-        points = _points(kind, numbers, line)
+        return _value(kind, numbers, line, inputs, word)
+    count = _PLACES.get(kind) or (len(KINDS[_CURVES[kind]].parameters) if kind in _CURVES else len(numbers) // 2 * 2)
+    if len(numbers) not in (count, count + 1):
+        received = format_numbers(numbers)
+        refuse(line, f"{word} has the numbers {received!r}, expected {count}, and perhaps a height")
+    *numbers, height = (*numbers, 1.0)[: count + 1]
+    if kind in _CURVES:
+        return Curve(_CURVES[kind], tuple(numbers), height)
+    if len(set(numbers)) == 1 and kind in ("Triangle", "Trapezoid", "Rectangle") and height > 0.0:
+        return Curve("singleton", (numbers[0],), height)
+    points = _points(kind, numbers, line)
     if not 0.0 <= height <= 1.0:
-        refuse(line, f"{kind} has the height {height!r}, expected 0 to 1")
+        refuse(line, f"{word} has the height {height!r}, expected 0 to 1")
     return Shape(tuple((x, degree * height) for x, degree in points))
 
 
-def read_value(kind: str, numbers: Sequence[float], line: int, inputs: int | None) -> Value:
-    """Return the value of a constant's or linear term's numbers."""
+def _value(kind: str, numbers: Sequence[float], line: int, inputs: int | None, word: str) -> Value:
     if inputs is None:
-        refuse(line, f"an input's term is {kind}, which is a value, expected a membership function")
-    if kind.lower() == "constant":
-        if len(numbers) != 1:
-            refuse(line, f"{kind} has {len(numbers)} numbers, expected 1")
-        return Constant(numbers[0])
-    if len(numbers) not in (inputs, inputs + 1):
-        refuse(line, f"{kind} has {len(numbers)} numbers, expected {inputs} or {inputs + 1} for {inputs} inputs")
-    return Linear(tuple(numbers[:inputs]), *numbers[inputs:])
-
-
-def curve_of(name: str, order: Sequence[int], numbers: Sequence[float], line: int, word: str) -> Curve:
-    """Return the curve of a format's word and numbers."""
-    count = len(order)
-    if len(numbers) not in (count, count + 1):
-        refuse(line, f"{word} has {len(numbers)} numbers, expected {count}, and perhaps a height")
-    parameters = [number for _, number in sorted(zip(order, numbers, strict=False))]
-    return Curve(name, tuple(parameters), *numbers[count:])
+        refuse(line, f"an input's term is {word}, which is a value, expected a membership function")
+    counts = (1,) if kind == "Constant" else (inputs, inputs + 1)
+    if len(numbers) not in counts:
+        refuse(line, f"{word} has {len(numbers)} numbers, expected {' or '.join(map(str, counts))}")
+    return Constant(numbers[0]) if kind == "Constant" else Linear(tuple(numbers[:inputs]), *numbers[inputs:])
 
 
 def _number(text: str, line: int, kind: str) -> float:
@@ -110,6 +104,8 @@ def _number(text: str, line: int, kind: str) -> float:
 
 
 def _points(kind: str, numbers: Sequence[float], line: int) -> list[Point]:
+    if kind == "Discrete":
+        return list(zip(numbers[::2], numbers[1::2], strict=True))
     if kind == "Binary":
         start, direction = numbers
         if not math.isinf(direction):

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NoReturn
 
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.rule import Operators, Rule
-from fuzzy_arbiter.terms.norms import Operator
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
@@ -58,6 +57,45 @@ def located(where: str) -> Iterator[None]:
         raise type(error)(f"{shortened(where)}: {shortened(str(error))}") from None
 
 
+@dataclass
+class Block:
+    """A section of a file, a variable or a block of rules, as keys and values."""
+
+    kind: str
+    name: str
+    line: int
+    entries: dict[str, tuple[int, str]] = field(default_factory=dict)  # line and value by key
+    many: list[tuple[int, str]] = field(default_factory=list)  # line and value of terms or rules
+
+    def add(self, line: int, key: str, value: str, known: Sequence[str] = (), many: Sequence[str] = ()) -> None:
+        """Add an entry; refuse a key that is not known, or that appears twice without being one of many."""
+        if known and key not in known:
+            refuse(line, f"{key!r} is not known in {self.kind}, expected one of {', '.join(known)}")
+        if key in many:
+            self.many.append((line, value))
+        elif key in self.entries:
+            refuse(line, f"{key} appears twice in {self.kind} {self.name!r}")
+        else:
+            self.entries[key] = line, value
+
+    def entry(self, key: str, missing: str = "") -> tuple[int, str]:
+        """Return the line and the value of a key."""
+        return self.entries.get(key, (self.line, missing))
+
+    def word(self, key: str, known: dict[str, Any], missing: str = "") -> Any:
+        """Look up the word of a key in `known`; refuse another word."""
+        line, value = self.entry(key, missing)
+        if value not in known:
+            expected = " or ".join(word for word in known if word)
+            refuse(line, f"{key} of {self.name!r} is {value or 'missing'}, expected {expected}")
+        return known[value]
+
+    def number(self, key: str) -> float | None:
+        """Parse the number of a key; None for `nan`, and where it is missing."""
+        line, value = self.entry(key, "nan")
+        return None if value == "nan" else read_number(value, line, f"{key} of {self.name!r}")
+
+
 NumberedRule = tuple[int, Rule]  # line in the file, and rule
 
 
@@ -87,7 +125,7 @@ def assembled(
 
 
 def require_words(system: System, format: str, reserved: frozenset[str]) -> None:
-    """Require that a format accepts the names of a system."""
+    """Require that a format accepts the names of a system's variables and terms."""
     for variable in (*system.inputs, *system.outputs):
         for name in (variable.name, *variable.term_names):
             require_word(name, format, reserved)
@@ -99,15 +137,6 @@ def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
         raise UnsupportedError(f"{format} cannot say the name {name!r}: expected letters, digits and _, a letter first")
     if name.lower() in reserved:
         raise UnsupportedError(f"{format} cannot say the name {name!r}: it is a word of the language")
-
-
-def word_of(format: str, what: str, name: str, norms: Mapping[str, Operator]) -> str:
-    """Return a format's word for a norm."""
-    word: str = getattr(norms[name], format)
-    if not word:
-        known = ", ".join(other for other, norm in norms.items() if getattr(norm, format))
-        raise UnsupportedError(f"{format} cannot say the {what} {name!r}: expected one of {known}")
-    return word
 
 
 def unsupported_rule(format: str, i: int, rule: Rule, expected: str, what: str = "condition") -> UnsupportedError:

@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-from fuzzy_arbiter.definition import CHOICES, System
+from fuzzy_arbiter.definition import CHOICES, Output, System
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.native import range_ends
 from fuzzy_arbiter.formats.notation import format_number, refuse
@@ -19,7 +19,12 @@ _NAMES = "weights_of"
 _PART = re.compile(r'(?:[^,"]|"[^"]*"|")+')  # between commas outside of quotes
 
 
-def format_settings(system: System, keys: Sequence[str]) -> list[str]:
+def settings_of(outputs: Sequence[Output]) -> tuple[str, ...]:
+    """Return the settings of a system that FLL cannot represent."""
+    return ("normalization", "points") if all(output.weighted for output in outputs) else ("normalization",)
+
+
+def format_settings(system: System, keys: Sequence[str] = tuple(PLAIN)) -> list[str]:
     """Format the comments that a system needs."""
     pairs = [f"{key} = {getattr(system, key)}" for key in keys if getattr(system, key) != PLAIN[key]]
     if system.weights_of:
@@ -38,7 +43,7 @@ def format_settings(system: System, keys: Sequence[str]) -> list[str]:
     return texts
 
 
-def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str]) -> dict[str, Any]:
+def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str] = tuple(PLAIN)) -> dict[str, Any]:
     """Parse the settings in the comments of a file."""
     settings = {**{key: PLAIN[key] for key in keys}, _NAMES: ()}
     first: int | None = None

@@ -200,7 +200,7 @@ def test_hedges_are_fractions(rule, head, said):
             "a hedge in a conclusion and a weight",
         ),
         ({"rule": "1 0.2, 1 (1) : 1"}, "line 32: .*0.2 for 'z', expected a whole number"),
-        ({"function": "linear',[1 2 3 4]"}, "line 29: linear has 4 numbers, expected 2 or 3 for 2 inputs"),
+        ({"function": "linear',[1 2 3 4]"}, "line 29: linear has 4 numbers, expected 2 or 3"),
         ({"function": "constant',[1 2]"}, "line 29: constant has 2 numbers, expected 1"),
         ({"function": "function',[sin(q)]"}, "asks for q, expected inputs"),
         ({"function": "trimf',[0 1 2]"}, "'mf1' is no value, nor does it only rise or only fall"),
@@ -258,7 +258,7 @@ def test_fuzzylite_5_adds_keys_to_outputs(keys, expected):
     output = system.outputs[0]
     assert (output.default, output.lock_range, output.lock_previous) == expected
     assert str(system.rules[0]) == "if x is extremely a and z is any then y is mf1"  # as fuzzylite has hedges
-    with pytest.raises(FormatError, match=r"line \d+: Enabled is 0 for 'z', expected 1"):
+    with pytest.raises(FormatError, match=r"line \d+: Enabled of 'Input2' is 0, expected 1"):
         reads(text.replace("[Input2]", "[Input2]\nEnabled=0"), "fis")
 
 

@@ -100,7 +100,7 @@ def test_terms_are_triangles_trapezoids_and_ramps_where_they_can_be():
         ("range: 0.000 10.000", "range: 0.000 inf", "line 6: range is 'inf', expected a finite number"),
         ("  range: 0.000 10.000\n", "", "line 4: range of 'service' is missing, expected two numbers"),
         ("Triangle -inf 0.000 5.000", "Gauss 0 1", "line 8: term type 'Gauss' is not known here, expected"),
-        ("Triangle -inf 0.000 5.000", "Gaussian 0", "line 8: Gaussian has 1 numbers, expected 2, and perhaps a height"),
+        ("Triangle -inf 0.000 5.000", "Gaussian 0", "line 8: Gaussian has the numbers '0', expected 2, and"),
         ("Triangle -inf 0.000 5.000", "Gaussian 0 0", r"line 8: .*got \(0.0, 0.0\), expected a deviation"),
         ("Triangle -inf 0.000 5.000", "Constant 1", "line 8: an input's term is Constant, which is a value, expected"),
         ("Triangle -inf 0.000 5.000", "Function x * (", "line 8: term 'poor': expression 'x . .': got the end"),

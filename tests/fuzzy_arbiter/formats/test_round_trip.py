@@ -7,12 +7,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from fuzzy_arbiter import Arbiter, ArbiterError, Output, Shape, System, Term, Variable, prioritized
-from fuzzy_arbiter.definition import CHOICES
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, reads, writes
 from fuzzy_arbiter.hierarchy import FORMS
 from fuzzy_arbiter.propositions import Is, Not
-from fuzzy_arbiter.terms.norms import S_NORMS, T_NORMS
+from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 from tests.examples import examples
 from tests.fuzzy_arbiter.formats.systems import RICHER, TIPPING, systems
 
@@ -208,14 +207,16 @@ def test_other_formats_are_refused(call):
         call()
 
 
-@pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
-@pytest.mark.parametrize(
-    ("key", "norms"), [("conjunction", T_NORMS), ("implication", T_NORMS), ("disjunction", S_NORMS)]
-)
-def test_a_norm_without_a_word_is_refused_by_name(format, key, norms, monkeypatch):
-    plain = norms["prod" if norms is T_NORMS else "probor"]
-    monkeypatch.setitem(norms, "unheard", replace(plain, fll="", fcl="", fis=""))
-    monkeypatch.setitem(CHOICES, key, tuple(norms))
-    system = replace(TIPPING, **{key: "unheard"})
-    with pytest.raises(UnsupportedError, match=f"{format} cannot say the {key} 'unheard': expected one of "):
-        writes(system, format)
+@pytest.mark.parametrize("format", FORMATS)
+def test_every_norm_has_a_word(format):
+    norms = [
+        (key, n)
+        for key, known in (("conjunction", T_NORMS), ("implication", T_NORMS), ("disjunction", S_NORMS))
+        for n in known
+    ]
+    for change in (
+        *({key: n} for key, n in norms),
+        *({"outputs": (replace(TIPPING.outputs[0], aggregation=n),)} for n in AGGREGATIONS),
+    ):
+        system = replace(TIPPING, **change)
+        assert reads(writes(system, format), format) == system

@@ -1,0 +1,164 @@
+"""Tokens of the Fuzzy Control Language, and the names in it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple, NoReturn
+
+from fuzzy_arbiter.formats.notation import Block, refuse
+
+# words of IEC 61131-7 and of jFuzzyLogic's grammar
+_WORDS = (
+    "abs accu act and asum bdif bsum coa cog cogf cogs cos cosine default defuzzify dmax dmin dsigm einstein "
+    "end_defuzzify end_function_block end_fuzzify end_option end_options end_ruleblock end_var exp function "
+    "function_block fuzzify gauss gauss2 gbell hamacher if is lm ln log max method min mm nc nipmax nipmin not "
+    "nsum option options or probor prod range real rm rule ruleblock sigm sin singletons sum tan term then trape "
+    "trian var var_input var_output with"
+)
+RESERVED = frozenset(_WORDS.split())
+# sections of a function block, with the keys of their statements and the word that ends them
+SECTIONS: dict[str, tuple[tuple[str, ...], str]] = {
+    "VAR_INPUT": ((), "END_VAR"),
+    "VAR_OUTPUT": ((), "END_VAR"),
+    "FUZZIFY": (("TERM", "RANGE", "ENABLED"), "END_FUZZIFY"),
+    "DEFUZZIFY": (("TERM", "METHOD", "DEFAULT", "RANGE", "ACCU", "LOCK", "ENABLED"), "END_DEFUZZIFY"),
+    "RULEBLOCK": (("AND", "OR", "ACT", "ACCU", "RULE", "ENABLED"), "END_RULEBLOCK"),
+}
+_END = "END_FUNCTION_BLOCK"
+_MANY = ("TERM", "RULE")
+# some texts of the standard leave out the sign of a range
+_STATEMENT = re.compile(r"(?P<key>\w+)(?: (?P<label>\w\S*))?? (?::=? |(?<=RANGE )(?=\())(?P<value>.*)", re.IGNORECASE)
+
+_TOKEN = re.compile(
+    r"""(?P<space>\s+) | (?P<comment>\(\*.*?\*\) | /\*.*?\*/ | //[^\n]*) | (?P<open>\(\*|/\*)
+    | (?P<name>[A-Za-z_][A-Za-z0-9_]*) | (?P<number>[+-]?(?:[0-9]+(?:\.(?!\.)[0-9]*)?|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)
+    | (?P<sign>:=|\.\.|[:;,()|+*/^%-]) | (?P<other>.)""",
+    re.VERBOSE | re.DOTALL,
+)
+
+
+class Token(NamedTuple):
+    """A word, number or sign, with its line; the last of a text is its ``end``."""
+
+    kind: str
+    text: str
+    line: int
+    spaced: bool = False  # True if a space or a comment is before it
+
+
+def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
+    """Split a text into tokens and comments."""
+    tokens: list[Token] = []
+    comments: list[tuple[int, str]] = []
+    line, spaced = 1, False
+    for match in _TOKEN.finditer(text):
+        kind, word = str(match.lastgroup), match.group()
+        if kind == "comment":
+            comments.append((line, word[2:] if word.startswith("//") else word[2:-2]))
+        elif kind == "open":
+            refuse(line, f"the comment that begins here with {word!r} has no end")
+        elif kind == "other":
+            refuse(line, f"{word!r} is no sign of FCL")
+        elif kind != "space":
+            tokens.append(Token(kind, word, line, spaced))
+        spaced = kind in ("space", "comment")
+        line += word.count("\n")
+    tokens.append(Token("end", "the end of the file", line))
+    return tokens, comments
+
+
+def block_name(tokens: Sequence[Token]) -> str:
+    """Return the name that begins a function block: all tokens of its line, up to a word of the language."""
+    words: list[str] = []
+    for token in tokens:
+        if token.line != tokens[0].line or token.text.upper() in (*SECTIONS, _END) or token.kind == "end":
+            break
+        words += [" "] * (token.spaced and bool(words)) + [token.text]
+    return "".join(words)
+
+
+def sections_of(tokens: list[Token]) -> tuple[list[Block], bool]:
+    """Split a function block into its head and its sections; tell if a rule ends with its line, as in fuzzylite."""
+    if tokens[0].text.upper() != "FUNCTION_BLOCK":
+        _unexpected(tokens, 0, "FUNCTION_BLOCK")
+    sections = [Block("FUNCTION_BLOCK", block_name(tokens[1:]), tokens[0].line)]
+    i, by_line = 1, False
+    while sections[0].name and tokens[i].line == tokens[0].line and tokens[i].text.upper() not in (*SECTIONS, _END):
+        i += 1
+    while tokens[i].text.upper() != _END:
+        i, without_sign = _read_section(tokens, i, sections)
+        by_line |= without_sign
+    if tokens[i + 1].kind != "end":
+        _unexpected(tokens, i + 1, "the end of the file")
+    return sections, by_line
+
+
+def _read_section(tokens: Sequence[Token], i: int, sections: list[Block]) -> tuple[int, bool]:
+    """Append the section at index i; return the index after it, and if a rule in it ends with its line."""
+    kind = tokens[i].text.upper()
+    if kind not in SECTIONS:
+        _unexpected(tokens, i, " or ".join((*SECTIONS, _END)))
+    keys, end = SECTIONS[kind]
+    section = Block(kind, "", tokens[i].line)
+    sections.append(section)
+    i, by_line = i + 1, False
+    if keys and tokens[i].kind == "name" and tokens[i].text.upper() not in (*keys, end):
+        section.name, section.line = tokens[i].text, tokens[i].line
+        i += 1
+    while tokens[i].text.upper() != end:
+        start = i
+        while tokens[i].text != ";" and not _ends_rule(tokens, start, i):
+            if tokens[i].kind == "end" or tokens[i].text.upper() == end:
+                _unexpected(tokens, i, ";" if i > start else end)
+            i += 1
+        _add(section, tokens[start:i])
+        by_line |= tokens[i].text != ";"
+        i += tokens[i].text == ";"
+    return i + 1, by_line
+
+
+def _unexpected(tokens: Sequence[Token], i: int, expected: str) -> NoReturn:
+    text = tokens[i].text if tokens[i].kind == "end" else repr(tokens[i].text)
+    before = f" after {tokens[i - 1].text!r}" if i else ""
+    refuse(tokens[i].line, f"got {text}{before}, expected {expected}")
+
+
+def _ends_rule(tokens: Sequence[Token], start: int, i: int) -> bool:
+    """Return True if a rule from one index ends before another, at the end of its line."""
+    if i == start or tokens[start].text.upper() != "RULE" or tokens[i].line == tokens[i - 1].line:
+        return False
+    word = tokens[i].text.upper()
+    return word == "END_RULEBLOCK" or (word == "RULE" and tokens[i + 1].kind in ("name", "number", "sign"))
+
+
+def _add(section: Block, statement: Sequence[Token]) -> None:
+    """Add a statement to its section: a declaration, a term, a rule, or the value of a key."""
+    text = " ".join(token.text for token in statement)
+    line = statement[0].line if statement else section.line
+    keys, _ = SECTIONS[section.kind]
+    match = _STATEMENT.fullmatch(text)
+    if not keys:
+        section.many.append((line, text))
+    elif not match or (match["label"] and match["key"].upper() not in _MANY):
+        refuse(line, f"{text!r}, expected a key, a colon and its value; known keys are {', '.join(keys)}")
+    else:
+        key, value = match["key"].upper(), match["value"]
+        value = f"{match['label'] or ''} {value}" if key == "TERM" else value if key == "RULE" else value.upper()
+        section.add(line, key, value, keys, _MANY)
+
+
+def chosen_block(tokens: list[Token], name: str | None) -> list[Token]:
+    """Return the tokens of one function block."""
+    starts = [i for i, token in enumerate(tokens) if token.text.upper() == "FUNCTION_BLOCK"]
+    if name is None and len(starts) < 2:
+        return tokens
+    ends = [*starts[1:], len(tokens) - 1]
+    names = [block_name(tokens[start + 1 :]) for start in starts]
+    chosen = [i for i, own in enumerate(names) if own == name]
+    if len(chosen) == 1:
+        return [*tokens[starts[chosen[0]] : ends[chosen[0]]], tokens[-1]]
+    listed = ", ".join(names) or "none: there is no FUNCTION_BLOCK"
+    if name is not None:
+        refuse(tokens[0].line, f"block is {name!r}, expected {'one of ' * bool(names)}{listed}, each once")
+    return refuse(tokens[starts[1]].line, f"got another FUNCTION_BLOCK, expected block=, one of {listed}")
