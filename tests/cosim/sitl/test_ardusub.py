@@ -1,7 +1,6 @@
 """A real ArduSub, if one is on the path: it arms, dives in MANUAL, and holds its depth in ALT_HOLD."""
 
 import contextlib
-import os
 import shutil
 import socket
 import subprocess
@@ -9,6 +8,7 @@ import time
 
 import pytest
 
+from benchmarks.autopilot.flights import PARAMETERS
 from cosim.mavlink.wire.dialect import dialect
 from cosim.results.record import load_record
 
@@ -16,46 +16,6 @@ ARDUSUB = shutil.which("ardusub")
 MANUAL, ALT_HOLD = 19, 2
 DEPTH = 4.0  # m, the commanded depth
 WALL = 240.0  # s, after which the test gives up
-
-# what ArduSub is given beside its own defaults: eight thrusters as vectored_6dof, sticks that rest in the middle, a
-# depth sensor in the water of little noise, gains for a vehicle of this size, and sensors that pass for calibrated
-PARAMETERS = """
-FRAME_CONFIG 2
-RC3_TRIM 1500
-RC_OPTIONS 0
-RC_PROTOCOLS 1
-SIM_BARO_RND 0.02
-BARO_EXT_BUS 1
-PSC_ACCZ_P 2
-PSC_ACCZ_I 4
-PSC_ACCZ_FF 0.75
-PSC_VELZ_P 8
-PSC_POSZ_P 3
-PSC_JERK_Z 8
-PILOT_ACCEL_Z 200
-PILOT_SPEED_UP 200
-INS_ACCOFFS_X 0.001
-INS_ACCOFFS_Y 0.001
-INS_ACCOFFS_Z 0.001
-INS_ACC2OFFS_X 0.001
-INS_ACC2OFFS_Y 0.001
-INS_ACC2OFFS_Z 0.001
-INS_ACCSCAL_X 1.001
-INS_ACCSCAL_Y 1.001
-INS_ACCSCAL_Z 1.001
-INS_ACC2SCAL_X 1.001
-INS_ACC2SCAL_Y 1.001
-INS_ACC2SCAL_Z 1.001
-COMPASS_OFS_X 5
-COMPASS_OFS_Y 13
-COMPASS_OFS_Z -18
-COMPASS_OFS2_X 5
-COMPASS_OFS2_Y 13
-COMPASS_OFS2_Z -18
-COMPASS_OFS3_X 5
-COMPASS_OFS3_Y 13
-COMPASS_OFS3_Z -18
-"""
 
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(ARDUSUB is None, reason="no ardusub on the path")]
 
@@ -121,12 +81,12 @@ def test_arms_dives_and_holds_depth_within_5_cm(serve, tmp_path, speedup):
     served = serve(timeout=10.0, record_rate=100.0)
     home = tmp_path / "ardusub"
     home.mkdir()
-    (home / "own.parm").write_text(PARAMETERS)
+    shutil.copy(PARAMETERS, home / "own.parm")
     command = [
         ARDUSUB, "--model", "JSON:127.0.0.1", "--home", "55.9097,-3.3203,0,0", "--speedup", str(speedup),
         "--sim-port-out", str(served.address[1]), "--defaults", "own.parm", "--serial0", "tcp:0",
     ]  # fmt: skip
-    process = subprocess.Popen(command, cwd=home, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, env=os.environ)
+    process = subprocess.Popen(command, cwd=home, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     ground = None
     try:
         ground = Ground(5760, speedup)
