@@ -194,14 +194,6 @@ def test_heartbeat_identifies_the_emulated_autopilot(profile, autopilot, number)
     assert (beat.get_srcSystem(), beat.get_srcComponent()) == (1, 1)
 
 
-def test_disarmed_vehicle_reports_standby():
-    station = Station()
-    station.look(**{"commands.armed": 0.0})
-    station.command(512, 0)
-    beat = station.wire.of("HEARTBEAT")[-1]
-    assert not beat.base_mode & 128 and beat.system_status == mavlink.MAV_STATE_STANDBY
-
-
 def test_last_message_is_a_standby_heartbeat():
     station = Station()
     station.look()

@@ -191,17 +191,6 @@ def frames_of(data):
     return messages
 
 
-def drained(client):
-    client.setblocking(False)
-    data = b""
-    try:
-        while chunk := client.recv(1 << 16):
-            data += chunk
-    except BlockingIOError:
-        pass
-    return data
-
-
 def test_server_receives_from_all_clients():
     link = link_of(TcpIn(HERE, 0))
     a, b = connected(link.channel, 2)
@@ -216,25 +205,18 @@ def test_server_receives_from_all_clients():
     assert sorted(m.time_boot_ms for m in received(link) + received(link)) == [5, 6]
 
 
-def test_disconnected_client_is_removed():
+@pytest.mark.parametrize("resets", [False, True])
+def test_disconnected_client_is_removed(resets):
     link = link_of(TcpIn(HERE, 0))
     for _ in range(3):
         (client,) = connected(link.channel)
+        if resets:
+            client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\x00\x00\x00\x00\x00\x00\x00")
         client.close()
+        for i in range(20 * resets):
+            send_now(link, attitude(i))
         assert until(lambda: not (received(link) or link.channel.poll(time.monotonic()) or link.channel.clients))
     assert link.send(heartbeat())
-
-
-def test_client_reset_during_send_is_removed():
-    link = link_of(TcpIn(HERE, 0))
-    (client,) = connected(link.channel)
-    client.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, b"\x01\x00\x00\x00\x00\x00\x00\x00")
-    client.close()
-    for i in range(20):
-        send_now(link, attitude(i))
-    link.channel.poll(time.monotonic())
-    link.channel.poll(time.monotonic())
-    assert not link.channel.clients
 
 
 def test_excess_clients_are_rejected():
@@ -250,32 +232,6 @@ def test_excess_clients_are_rejected():
             received(link) or link.channel.poll(time.monotonic()) or len(link.channel.clients) == tcp.MAX_CLIENTS - 1
         )
     )
-
-
-@pytest.mark.slow
-def test_slow_reader_loses_whole_frames_and_other_clients_none():
-    """Field notes, 3.1.5: 200 000 unread ODOMETRY left 2 torn frames and no word of the rest."""
-    link = link_of(TcpIn(HERE, 0))
-    slow, quick = connected(link.channel, 2)
-    sent, read = 0, b""
-    while sent < 20_000:
-        for _ in range(50):
-            link.send(odometry(sent + 1))
-            sent += 1
-        link.channel.poll(time.monotonic())
-        read += drained(quick)
-    late = drained(slow)
-    for _ in range(1000):
-        link.channel.poll(time.monotonic())
-        late += drained(slow)
-        read += drained(quick)
-    assert [m.time_usec for m in frames_of(read)] == list(range(1, sent + 1))
-    got = [m.time_usec for m in frames_of(late)]
-    dropped = [client.dropped for client in link.channel.clients]
-    assert len(got) == sent - max(dropped) and sum(dropped) > 1000
-    assert got == sorted(set(got))
-    link.channel.close()
-    assert link.loss_reports() == [f"{sum(dropped)} frames dropped for slow clients"]
 
 
 def test_stalled_client_is_closed_after_a_timeout():
@@ -328,26 +284,13 @@ def test_partially_sent_frames_arrive_complete():
     assert taker.taken == b"".join(kept)
 
 
-def test_tcp_client_waits_for_its_server(monkeypatch):
+def test_tcp_client_waits_for_its_server_and_reconnects_after_a_restart(monkeypatch):
     monkeypatch.setattr(tcp, "_RETRY_PERIOD", 0.0)
-    with socket.create_server((HERE, 0)) as probe:
-        port = probe.getsockname()[1]
+    port = free_port()
     link = link_of(TcpOut(HERE, port))
-    assert not send_now(link, attitude(1))  # nobody is there
-    with socket.create_server((HERE, port)) as server:
-        assert until(lambda: link.channel.poll(time.monotonic()) or link.channel._stream is not None)
-        side, _ = server.accept()
-        side.settimeout(60.0)
-        send_now(link, attitude(2))
-        assert frames_of(side.recv(1000))[0].time_boot_ms == 2
-        side.close()
-
-
-def test_tcp_client_reconnects_after_server_restart(monkeypatch):
-    monkeypatch.setattr(tcp, "_RETRY_PERIOD", 0.0)
-    server = socket.create_server((HERE, 0))
-    port = server.getsockname()[1]
-    link = link_of(TcpOut(HERE, port))
+    assert not send_now(link, attitude(0))  # there is no server yet
+    server = socket.create_server((HERE, port))
+    assert until(lambda: link.channel.poll(time.monotonic()) or link.channel._stream is not None)
     side, _ = server.accept()
     side.settimeout(60.0)
     send_now(link, attitude(1))
@@ -374,7 +317,7 @@ def test_tcp_client_reconnects_after_server_restart(monkeypatch):
         assert frames_of(side.recv(1000))[0].time_boot_ms == 3
         side.close()
     link.channel.close()
-    assert link.loss_reports() == ["1 frames dropped while there was no server"]
+    assert link.loss_reports() == ["2 frames dropped while there was no server"]
 
 
 # ---- serial ----

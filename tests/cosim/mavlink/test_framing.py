@@ -3,7 +3,6 @@
 import random
 import struct
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -204,22 +203,3 @@ def test_valid_checksum_with_any_payload_raises_nothing(number, payload, v1, fla
     frame = body + struct.pack("<H", crc) + bytes(13 * (flags & 1))
     list(open_filter().read_datagram(frame))
     list(StreamReader(open_filter()).read(frame))
-
-
-def test_offsets_of_targets_are_those_of_the_packed_message():
-    for number, kind in mavlink.mavlink_map.items():
-        at = message_infos()[number].target_offset
-        if at is None:
-            continue
-        name = "target" if kind.msgname == "MANUAL_CONTROL" else "target_system"
-        message = any_message(kind)
-        setattr(message, name, 99)
-        payload = np.frombuffer(message.pack(mavlink.MAVLink(None))[10:-2], np.uint8)
-        assert payload[at] == 99, kind.msgname
-
-
-def test_mavlink_1_payload_sizes_match_its_dialect():
-    both = [number for number in v10.mavlink_map if number in message_infos()]
-    assert len(both) > 150
-    for number in both:
-        assert message_infos()[number].v1_size == v10.mavlink_map[number].unpacker.size, v10.mavlink_map[number].msgname

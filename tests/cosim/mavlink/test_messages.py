@@ -13,7 +13,7 @@ from cosim.mavlink.messages.control import weight_names
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.row_layout import RowLayout, quaternion_to_euler
 from cosim.mavlink.vehicle.view import View
-from cosim.mavlink.wire.encode import Encoder, clip_to_float32, round_finite
+from cosim.mavlink.wire.encode import Encoder
 from cosim.simulation.columns import column_names
 from cosim.simulation.signals import Column
 from tests.cosim.mavlink.station import Station, scenario
@@ -254,14 +254,6 @@ def test_out_of_range_values_are_clamped_to_the_field():
     make("BATTERY_STATUS", 0, 0, 0, 0, [1] * 20, 0, 0, 0, 0).pack(coder)
     make("STATUSTEXT", 6, "größer" * 20, 0, 0).pack(coder)
     make("ACTUATOR_OUTPUT_STATUS", 0, 0, [1.0]).pack(coder)
-
-
-def test_link_numbers_are_rounded_and_clamped():
-    assert [round_finite(x) for x in (1.4, math.nan, math.inf, -2.0, 3)] == [1, None, None, -2, 3]
-    assert (
-        clip_to_float32(math.inf) == clip_to_float32(1e300) == pytest.approx(3.4028234e38)
-        and clip_to_float32(-0.5) == -0.5
-    )
 
 
 def test_euler_angles_are_those_of_the_plant():

@@ -139,6 +139,7 @@ def test_base_mode_equals_that_of_ardusub(armed):
         station.command(ONCE, 0)
         beat = station.wire.of("HEARTBEAT")[-1]
         assert (beat.custom_mode, beat.base_mode) == (number, 1 + 16 + 64 + guided + 128 * int(armed))
+        assert beat.system_status == (mavlink.MAV_STATE_ACTIVE if armed else mavlink.MAV_STATE_STANDBY)
 
 
 def test_the_mode_shown_is_that_of_the_snapshot(station):

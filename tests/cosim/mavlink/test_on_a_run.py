@@ -42,16 +42,36 @@ def flight():
         yield Flight(master)
 
 
-def test_disarming_stops_thrusters_and_arming_resumes(flight):
-    flight.fly(0.5)
+def test_commands_take_effect_in_the_run(flight):
+    """Arming, a parameter, an obstacle, a position and the sticks, one after the other in one run."""
+    master = flight.master
+    flight.fly(0.1)
     flight.command(400, 0.0)
     flight.fly(0.5)
-    assert not flight.last("HEARTBEAT").base_mode & 128 and not flight.master.command_handler.armed
-    assert np.all(flight.master.signals.view("thrust[1]", 8) == 0.0)
+    assert not flight.last("HEARTBEAT").base_mode & 128 and not master.signals.view("thrust[1]", 8).any()
     flight.command(400, 1.0)
+    for name, value in ((b"LAW_SPEED", 0.7), (b"SR1_RADIUS", 0.4), (b"THR_MAX_1", 20.0), (b"GOAL_RADIUS", 0.8)):
+        flight.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
+    flight.send(obstacle(place=(4.0, 0.0, 3.0)))
+    flight.send(local(place=(1.5, 0.5, 1.0)))
     flight.fly(0.1)
+    assert [text for text in flight.wire.texts if text.endswith("rmed")] == ["Disarmed", "Armed"]
     assert flight.last("HEARTBEAT").base_mode & 128
-    assert flight.wire.texts[-2:] == ["Disarmed", "Armed"]
+    settings = master.command_handler.settings
+    assert (master.law.gains.speed, settings.shapes["SR1"].radius) == (0.7, 0.4)
+    assert settings["plant.parameters.thrust_max[1]"] == 20.0 and master.environment.target.tolist() == [1.5, 0.5, 1.0]
+    assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._context.settings]
+    view = flight.autopilot._context.view
+    assert view.clearances[4] == pytest.approx(np.linalg.norm(np.array(view.position_ned) - [4.0, 0.0, 3.0]) - 0.5)
+    flight.fly(15.0)
+    assert "Target reached" in flight.wire.texts
+    here = flight.last("LOCAL_POSITION_NED")
+    assert np.linalg.norm([here.x - 1.5, here.y - 0.5, here.z - 1.0]) < 0.81
+    flight.command(176, 1, 19)
+    for _ in range(2):
+        flight.send(sticks(x=1000))
+        flight.fly(0.8)
+    assert flight.last("HEARTBEAT").custom_mode == 19 and flight.last("LOCAL_POSITION_NED").vx > 0.05
 
 
 @pytest.mark.medium
@@ -69,48 +89,6 @@ def test_velocity_setpoint_is_tracked_and_expires(flight):
     rest = x.copy()
     flight.fly(1.0)
     assert np.abs(x - rest).max() < 0.05
-
-
-def test_position_setpoint_is_reached(flight):
-    flight.fly(0.1)
-    flight.send(local(place=(1.5, 0.5, 1.0)))
-    flight.fly(0.1)
-    target = flight.master.environment.target
-    assert target.tolist() == [1.5, 0.5, 1.0]
-    flight.fly(15.0)
-    assert "Target reached" in flight.wire.texts
-    position = flight.last("LOCAL_POSITION_NED")
-    assert np.linalg.norm([position.x - 1.5, position.y - 0.5, position.z - 1.0]) < 0.51
-
-
-def test_parameter_changes_take_effect_in_the_run(flight):
-    flight.fly(0.1)
-    for name, value in ((b"LAW_SPEED", 0.7), (b"SR1_RADIUS", 0.4), (b"THR_MAX_1", 20.0), (b"GOAL_RADIUS", 0.8)):
-        flight.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
-    flight.fly(0.1)
-    assert flight.master.law.gains.speed == 0.7
-    settings = flight.master.command_handler.settings
-    assert settings.shapes["SR1"].radius == 0.4 and settings["plant.parameters.thrust_max[1]"] == 20.0
-    assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._context.settings]
-
-
-def test_sent_obstacle_gets_a_clearance(flight):
-    flight.fly(0.1)
-    flight.send(obstacle(place=(4.0, 0.0, 3.0)))
-    flight.fly(0.1)
-    view = flight.autopilot._context.view
-    here = np.array(view.position_ned)
-    assert view.clearances[4] == pytest.approx(np.linalg.norm(here - [4.0, 0.0, 3.0]) - 0.5)
-
-
-def test_manual_control_moves_the_vehicle(flight):
-    flight.command(176, 1, 19)
-    flight.send(sticks(x=1000))
-    flight.fly(0.2)
-    assert flight.last("HEARTBEAT").custom_mode == 19
-    flight.send(sticks(x=1000))
-    flight.fly(1.5)
-    assert flight.last("LOCAL_POSITION_NED").vx > 0.05
 
 
 @pytest.mark.medium

@@ -222,6 +222,9 @@ def test_speed_command_values_follow_the_protocol(station):
     for commanded, speed in ((-1.0, None), (0.2, 0.2), (-2.0, scenario().law.gains.speed)):
         assert station.command(SPEED, 0.0, commanded) == ACCEPTED
         assert station.commanded() == ([] if speed is None else [ChangeSetting("law.gains.speed", speed)])
+    (value,) = station.send(mavlink.MAVLink_param_request_read_message(1, 1, b"LAW_SPEED", -1))
+    assert value.param_value == pytest.approx(scenario().law.gains.speed)
+    assert Station(of=scenario(name="paper")).command(SPEED, 1.0, 0.6) == UNSUPPORTED
 
 
 @pytest.mark.parametrize("speed", [-0.5, 99.0, 0.0, NAN, math.inf, 1.2])
