@@ -7,36 +7,27 @@ from hypothesis import strategies as st
 from cosim.errors import TelemetryError
 from cosim.mavlink.wire.endpoint import Endpoint, parse_endpoint
 
-
-@pytest.mark.parametrize(
-    ("text", "kind", "host", "port"),
-    [
-        ("udpout:127.0.0.1:14550", "udpout", "127.0.0.1", 14550),
-        ("udpout:localhost:1", "udpout", "127.0.0.1", 1),
-        ("udpin:127.0.0.2:65535", "udpin", "127.0.0.2", 65535),
-        ("tcpin:127.0.0.1:5760", "tcpin", "127.0.0.1", 5760),
-        ("tcp:127.0.0.1:5760", "tcp", "127.0.0.1", 5760),
-        ("udpin://127.0.0.1:14550", "udpin", "127.0.0.1", 14550),
-        ("udpout://127.0.0.1:14550", "udpout", "127.0.0.1", 14550),
-        ("tcpout://127.0.0.1:5760", "tcp", "127.0.0.1", 5760),
-        ("tcpin://localhost:5760", "tcpin", "127.0.0.1", 5760),
-    ],
-)
-def test_network_endpoints_are_parsed(text, kind, host, port):
-    assert parse_endpoint(text) == Endpoint(kind, text, host=host, port=port)
+NETWORK = {
+    "udpout:127.0.0.1:14550": ("udpout", "127.0.0.1", 14550), "udpout:localhost:1": ("udpout", "127.0.0.1", 1),
+    "udpin:127.0.0.2:65535": ("udpin", "127.0.0.2", 65535), "tcpin:127.0.0.1:5760": ("tcpin", "127.0.0.1", 5760),
+    "tcp:127.0.0.1:5760": ("tcp", "127.0.0.1", 5760), "udpin://127.0.0.1:14550": ("udpin", "127.0.0.1", 14550),
+    "udpout://127.0.0.1:14550": ("udpout", "127.0.0.1", 14550), "tcpout://127.0.0.1:5760": ("tcp", "127.0.0.1", 5760),
+    "tcpin://localhost:5760": ("tcpin", "127.0.0.1", 5760),
+}  # fmt: skip
+SERIAL = {
+    "serial:/dev/ttyUSB0": ("/dev/ttyUSB0", 57600), "serial:/dev/ttyUSB0:115200": ("/dev/ttyUSB0", 115200),
+    "serial:///dev/ttyACM0:921600": ("/dev/ttyACM0", 921600), "serial:COM7:57600": ("COM7", 57600),
+}  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("text", "path", "baud"),
-    [
-        ("serial:/dev/ttyUSB0", "/dev/ttyUSB0", 57600),
-        ("serial:/dev/ttyUSB0:115200", "/dev/ttyUSB0", 115200),
-        ("serial:///dev/ttyACM0:921600", "/dev/ttyACM0", 921600),
-        ("serial:COM7:57600", "COM7", 57600),
-    ],
-)
-def test_serial_endpoints_need_no_allow_remote(text, path, baud):
-    assert parse_endpoint(text) == Endpoint("serial", text, path=path, baud=baud)
+@pytest.mark.parametrize("text", [*NETWORK, *SERIAL])
+def test_endpoints_of_this_machine_are_parsed(text):
+    if text in NETWORK:
+        kind, host, port = NETWORK[text]
+        assert parse_endpoint(text) == Endpoint(kind, text, host=host, port=port)
+    else:
+        path, baud = SERIAL[text]
+        assert parse_endpoint(text) == Endpoint("serial", text, path=path, baud=baud)
 
 
 def test_log_endpoint_requires_a_new_file(tmp_path):

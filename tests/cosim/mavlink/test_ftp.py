@@ -85,10 +85,9 @@ def test_single_reads_return_data_until_end_of_file(client):
     (opened,) = client.request(OPEN, FILE)
     (part,) = client.request(READ, session=opened.session, size=80, offset=40)
     assert (part.opcode, part.payload) == (ACK, content[40:120])
-    (end,) = client.request(READ, session=opened.session, size=80, offset=len(content))
-    assert (end.opcode, end.payload) == (NAK, bytes([EOF]))
-    (too_long,) = client.request(READ, session=opened.session, size=240)
-    assert (too_long.opcode, too_long.payload[0]) == (NAK, INVALID_SIZE)
+    for size, offset, error in ((80, len(content), EOF), (240, 0, INVALID_SIZE)):
+        (end,) = client.request(READ, session=opened.session, size=size, offset=offset)
+        assert (end.opcode, end.payload) == (NAK, bytes([error]))
 
 
 def test_file_crc_is_correct(client):
@@ -102,20 +101,15 @@ def test_folders_are_listed(client):
     assert client.request(LISTING, b"@PARAM", offset=1)[0].payload[0] == EOF
 
 
-@pytest.mark.parametrize(
-    "path",
-    [b"", b"/etc/passwd", b"../../etc/passwd", b"@PARAM/../etc/passwd", b"@SYS/threads.txt", b"@PARAM", b"\xff" * 239],
-)
-def test_other_paths_are_not_found(client, path):
-    (reply,) = client.request(OPEN, path)
-    assert (reply.opcode, reply.payload[0]) == (NAK, NOT_FOUND)
+ELSEWHERE = (b"", b"/etc/passwd", b"../../etc/passwd", b"@PARAM/../etc/passwd", b"@SYS/threads.txt", b"@PARAM",
+             b"\xff" * 239)  # fmt: skip
+REFUSED = [*((OPEN, path, NOT_FOUND) for path in ELSEWHERE), *((op, FILE, PROTECTED) for op in (CREATE, WRITE, 8, 13)),
+           (99, FILE, UNKNOWN)]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("opcode", "error"), [(CREATE, PROTECTED), (WRITE, PROTECTED), (8, PROTECTED), (13, PROTECTED), (99, UNKNOWN)]
-)
-def test_write_operations_are_rejected(client, opcode, error):
-    (reply,) = client.request(opcode, FILE)
+@pytest.mark.parametrize(("opcode", "path", "error"), REFUSED)
+def test_other_paths_and_write_operations_are_refused(client, opcode, path, error):
+    (reply,) = client.request(opcode, path)
     assert (reply.opcode, reply.payload[0], reply.req_opcode) == (NAK, error, opcode)
 
 

@@ -1,5 +1,6 @@
 """``cosim mavlink listen``: known vehicles, their display, bounded memory, and terminal safety."""
 
+import math
 import os
 import pty
 import re
@@ -125,9 +126,23 @@ def test_every_message_of_the_dialect_is_displayed(link):
     assert len(watch.rows) == min(MAX_ROWS, len(mavlink.mavlink_map)) and len(shown) >= MAX_ROWS - 5
 
 
-def test_unknown_values_are_shown_as_dashes():
-    status = mavlink.MAVLink_sys_status_message(0, 0, 0, 500, 65535, -1, -1, *[0] * 6)
-    assert format_values(status) == "load 50.0 %  voltage_battery - V  current_battery - A  battery_remaining - %"
+@pytest.mark.parametrize(
+    ("message", "text"),
+    [
+        (mavlink.MAVLink_sys_status_message(0, 0, 0, 500, 65535, -1, -1, *[0] * 6),
+         "load 50.0 %  voltage_battery - V  current_battery - A  battery_remaining - %"),
+        (mavlink.MAVLink_attitude_message(0, math.nan, 0, 0, 0, 0, 0), "nan 0.0 0.0 deg  0.0 0.0 0.0 deg/s"),
+        (mavlink.MAVLink_named_value_float_message(0, b"x", math.inf), "value inf"),
+        (mavlink.MAVLink_global_position_int_message(0, 559_097_000, 0, 0, -3000, 0, 0, 0, 65535),
+         "55.909700 0.000000 deg  relative_alt -3.00 m  hdg - deg"),
+        (mavlink.MAVLink_water_depth_message(0, 0, 1, 0, 0, 0.0, 0.1, 0, 0, 2.5, 0),
+         "id 0 healthy 1  lat 0.000000 lng 0.000000 deg  alt 0.00 m  roll 5.7 pitch 0.0 yaw 0.0 deg"),
+        (mavlink.MAVLink_actuator_output_status_message(0, 3, [0.5] * 32),
+         f"active 3 actuator [{'0.5 ' * 8}...]"),
+    ],
+)  # fmt: skip
+def test_values_have_their_units(message, text):
+    assert format_values(message) == text
 
 
 def test_values_rounded_to_zero_have_no_sign(link):
@@ -140,11 +155,6 @@ def test_values_rounded_to_zero_have_no_sign(link):
     shown = "\n".join(format_table(link, watch, 1.0))
     assert "roll 0.0 pitch 0.0 yaw 0.0 deg" in shown and "depth 0.00 m" in shown
     assert not re.search(r"-0\.0+\b", shown)
-
-
-def test_nan_and_infinity_are_displayed():
-    assert "nan" in format_values(mavlink.MAVLink_attitude_message(0, float("nan"), 0, 0, 0, 0, 0))
-    assert "inf" in format_values(mavlink.MAVLink_named_value_float_message(0, b"x", float("inf")))
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.simulation.commands.commands import MODES, Arm, Reset, SetMode, SetTarget
 from tests.cosim.mavlink.station import NAN, Station, scenario
+from tests.cosim.mavlink.test_mission import upload
 
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)
 ARM, SET_MODE, STANDARD_MODE, ONCE, GOTO, PAUSE, RESTART = 400, 176, 262, 512, 252, 193, 246
@@ -64,7 +65,7 @@ def test_commands_are_answered_and_applied(station, sent, commands):
 def test_mode_numbers_follow_the_profile(profile, numbers, mode):
     station = Station(profile)
     station.look()
-    upload(station)
+    upload(station, {})
     for base in (1, 129):
         assert station.command(SET_MODE, base, *numbers) == ACCEPTED
     assert station.commanded()[-2:] == [SetMode(mode), SetMode(mode)]
@@ -105,7 +106,7 @@ def test_px4_return_mode_surfaces_at_home(profile):
 
 
 def test_standard_modes_are_applied(station):
-    upload(station)
+    upload(station, {})
     station.commanded()
     for number, mode in ((1, "hold"), (6, "mission"), (5, "surface"), (4, "depth_hold")):
         assert station.command(STANDARD_MODE, number) == ACCEPTED
@@ -116,7 +117,7 @@ def test_available_modes_list_settable_modes(station):
     assert station.command(ONCE, 435, 0) == ACCEPTED
     modes = station.wire.of("AVAILABLE_MODES")
     assert [(m.number_modes, m.mode_index) for m in modes] == [(7, i) for i in range(1, 8)]
-    upload(station)
+    upload(station, {})
     station.commanded()
     for message in modes:
         station.send(mavlink.MAVLink_set_mode_message(1, 1, message.custom_mode))
@@ -180,11 +181,3 @@ def test_read_only_rejects_modes():
     assert station.command(SET_MODE, 1, 16) == DENIED
     assert [station.command(n, 30.0, 0.0) for n in (511, 510, ONCE, 520, 42428, 410)] == [ACCEPTED] * 6
     assert "Refused: commands are off: start with --commands" in "".join(station.wire.texts)
-
-
-def upload(station):
-    """Upload a mission of one item."""
-    home = int(station.profile.has_home_item)
-    station.send(mavlink.MAVLink_mission_count_message(1, 1, 1 + home, 0))
-    for seq in range(1 + home):
-        station.send(mavlink.MAVLink_mission_item_int_message(1, 1, seq, 1, 16, 0, 1, 0, 0, 0, 0, 10_000, 0, 2.0, 0))

@@ -15,7 +15,7 @@ from cosim.errors import RunError
 from cosim.mavlink.replay import replay
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.options import MavlinkOptions
-from cosim.results.record import STREAM, load_record
+from cosim.results.record import load_record
 from tests.cosim.mavlink.running import GroundStation
 
 OVERRIDES = ("arbiter.engine=closed", "time.duration=4")

@@ -35,18 +35,11 @@ def test_user_errors_are_one_line(arguments, words, capsys):
 
 @pytest.mark.parametrize(
     "arguments",
-    [
-        ["--port", "0"],
-        ["--port", "65536"],
-        ["--timeout", "0"],
-        ["--timeout", "nan"],
-        ["--record-rate", "-1"],
-        ["--speedup", "0"],
-    ],
+    ["--port 0", "--port 65536", "--timeout 0", "--timeout nan", "--record-rate -1", "--speedup 0"],
 )
 def test_invalid_numbers_are_rejected(arguments, capsys):
     with pytest.raises(SystemExit):
-        main(["sitl", *arguments])
+        main(["sitl", *arguments.split()])
     assert "expected a" in capsys.readouterr().err
 
 

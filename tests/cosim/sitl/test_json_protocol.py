@@ -9,35 +9,25 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cosim.errors import RunError
-from cosim.sitl.json_protocol import format_motion, parse_packet
+from cosim.sitl.json_protocol import ServoPacket, format_motion, parse_packet
 from cosim.sitl.motion import Motion
 from tests.cosim.sitl.stand_in import newest_line, parse
 
 AT_REST = Motion(
-    0.25,
-    (0.0, 0.0, 0.0),
-    (0.0, 0.0, -9.81),
-    (1.0, 2.0, 3.0),
-    (0.1, 0.2, 0.3),
-    (0.0, 0.0, 0.5),
-    (1.0, 0.0, 0.0, 0.0),
-    None,
-    (0.1, 0.2, 0.3),
+    0.25, (0.0, 0.0, 0.0), (0.0, 0.0, -9.81), (1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (0.0, 0.0, 0.5), (1.0, 0.0, 0.0, 0.0),
+    None, (0.1, 0.2, 0.3),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("data", "packet"),
+    [
+        ("1a48 b004 39300000" + "dc05" * 15 + "6c07", ServoPacket(1200, 12345, (1500,) * 15 + (1900,))),
+        ("8173 9001 ffffffff" + "0000" * 31 + "4c04", ServoPacket(400, 2**32 - 1, (0,) * 31 + (1100,))),
+    ],
 )
-
-
-def test_sixteen_channel_packet_is_decoded():
-    data = bytes.fromhex("1a48 b004 39300000" + "dc05" * 15 + "6c07")
-    packet = parse_packet(data)
-    assert (packet.frame_rate, packet.frame_count) == (1200, 12345)
-    assert packet.pwm == (1500,) * 15 + (1900,)
-
-
-def test_thirty_two_channel_packet_is_decoded():
-    data = bytes.fromhex("8173 9001 ffffffff" + "0000" * 31 + "4c04")
-    packet = parse_packet(data)
-    assert (packet.frame_rate, packet.frame_count) == (400, 2**32 - 1)
-    assert packet.pwm == (0,) * 31 + (1100,)
+def test_packets_of_16_and_32_channels_are_decoded(data, packet):
+    assert parse_packet(bytes.fromhex(data)) == packet
 
 
 @pytest.mark.parametrize(
@@ -86,18 +76,7 @@ def test_naive_reader_matches_the_first_key_substring():
 
 finite = st.floats(allow_nan=False, allow_infinity=False, min_value=-1e300, max_value=1e300)
 three = st.tuples(finite, finite, finite)
-motions = st.builds(
-    Motion,
-    finite,
-    three,
-    three,
-    three,
-    three,
-    three,
-    st.tuples(finite, finite, finite, finite),
-    st.none() | finite,
-    three,
-)
+motions = st.builds(Motion, finite, *[three] * 5, st.tuples(*[finite] * 4), st.none() | finite, three)
 
 
 @given(motions)

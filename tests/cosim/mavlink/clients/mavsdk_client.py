@@ -93,7 +93,7 @@ async def steps(vehicle, address):  # noqa: C901 - one step after the other
     async def mode(name=None):
         return (await first(vehicle.stream("flight_mode"), lambda mode: name in (None, mode.name))).name
 
-    async def all_params():
+    async def params():
         found = await vehicle.param.get_all_params()
         return {p.name: p.value for p in [*found.float_params, *found.int_params]}
 
@@ -175,22 +175,9 @@ async def steps(vehicle, address):  # noqa: C901 - one step after the other
                     return factor
             await asyncio.sleep(0.2)
 
-    yield "position", position()
-    yield "ned", ned()
-    yield "attitude", attitude()
-    yield "mode", mode()
-    yield "params", all_params()
-    yield "change_param", change_param()
-    yield "refused_param", refused_param()
-    yield "unknown_param", unknown_param()
-    yield "missions", missions()
-    yield "speed", speed()
-    yield "arm", arm()
-    yield "go_to", go_to()
-    yield "mission", mission()
-    yield "hold", hold()
-    yield "offboard", offboard()
-    yield "disarm", disarm()
+    for step in (position, ned, attitude, mode, params, change_param, refused_param, unknown_param, missions, speed,
+                 arm, go_to, mission, hold, offboard, disarm):  # fmt: skip
+        yield step.__name__, step()
 
 
 async def main(address):
