@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import io
 import json
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -87,8 +89,7 @@ def record(seeds: Seeds) -> Case:
             found[name]
         list(found.blocks())
 
-    case = seeds.file(RECORD, read, made.getvalue())
-    return replace(case, named=str(Path(case.named).parent))
+    return seeds.file(RECORD, read, made.getvalue(), folder=True)
 
 
 @reader("record of a killed run", "bytes", "cosim.results.record:_opened", "cosim.results.record:_complete_batches")
@@ -97,8 +98,7 @@ def stream(seeds: Seeds) -> Case:
     made = io.BytesIO()
     with pa.ipc.new_stream(made, table.schema) as writer:
         writer.write_table(table, max_chunksize=3)
-    case = seeds.file(STREAM, lambda path: list(load_record(path.parent).blocks()), made.getvalue())
-    return replace(case, named=str(Path(case.named).parent))
+    return seeds.file(STREAM, lambda path: list(load_record(path.parent).blocks()), made.getvalue(), folder=True)
 
 
 @reader("run", "parquet", "cosim.results.record:_opened", "cosim.results.run_result:open_run")
@@ -127,21 +127,21 @@ def page(seeds: Seeds) -> Case:
 @reader("plan of a campaign", "json", "cosim.io.strict_json:read_json")
 def plan(seeds: Seeds) -> Case:
     seed = json.loads(SCENES[0])["seed"]
-    case = seeds.file(PLAN, lambda path: repeat_of(path.parent, seed), of=seeds.comparison / "ismail_dunnigan")
-    return replace(case, named=str(Path(case.named).parent))
+    of = seeds.comparison / "ismail_dunnigan"
+    return seeds.file(PLAN, lambda path: repeat_of(path.parent, seed), of=of, folder=True)
 
 
 def _with_its_scenario(seeds: Seeds, name: str) -> Case:
     """Return the case of a file of a sweep, whose scenario was read before."""
     scenario = load_scenario(seeds.sweep / "scenario.toml")
-    case = seeds.file(name, lambda path: repeat_of(path.parent, 1), of=seeds.sweep)
+    case = seeds.file(name, lambda path: repeat_of(path.parent, 1), of=seeds.sweep, folder=True)
 
     def read(content: bytes) -> None:
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr("cosim.campaigns.rerun.load_scenario", lambda _: scenario)
             case.read(content)
 
-    return Case(case.contents, read, str(Path(case.named).parent))
+    return replace(case, read=read)
 
 
 @reader("plan of a sweep", "json", "cosim.io.strict_json:read_json", "cosim.campaigns.sweeps.rows:_files")
@@ -163,8 +163,7 @@ def results(seeds: Seeds) -> Case:
         summarize_campaign(plan, found, path.parent)
         list(found.values("scene"))
 
-    case = seeds.file(RESULTS, read, of=seeds.comparison / "ismail_dunnigan")
-    return replace(case, named=str(Path(case.named).parent))
+    return seeds.file(RESULTS, read, of=seeds.comparison / "ismail_dunnigan", folder=True)
 
 
 @reader(
@@ -195,10 +194,6 @@ def part_of_campaign(seeds: Seeds) -> Case:
     return Case((content,), read, str(folder))
 
 
-def _without_drawing(seeds: Seeds) -> None:
-    seeds.patch.setattr("cosim.campaigns.pages.replays.write_figures", lambda folder, _: _AnyFigure())
-
-
 class _AnyFigure(dict[str, InlineFigure]):
     def __contains__(self, name: object) -> bool:
         return True
@@ -207,26 +202,17 @@ class _AnyFigure(dict[str, InlineFigure]):
         return InlineFigure("", "")
 
 
-@reader("summary of a campaign", "json", "cosim.io.strict_json:read_json")
-def summary_of_campaign(seeds: Seeds) -> Case:
-    _without_drawing(seeds)
-    return seeds.file(
-        SUMMARY, lambda path: write_campaign_page(path.parent, 0), of=seeds.comparison / "ismail_dunnigan"
-    )
+def _page_of(name: str, write_page: Callable[[Path, int], Path], of: Callable[[Seeds], Path], seeds: Seeds) -> Case:
+    seeds.patch.setattr("cosim.campaigns.pages.replays.write_figures", lambda folder, _: _AnyFigure())
+    return seeds.file(name, lambda path: write_page(path.parent, 0), of=of(seeds), folder=True)
 
 
-@reader("summary of a sweep", "json", "cosim.io.strict_json:read_json")
-def summary_of_sweep(seeds: Seeds) -> Case:
-    _without_drawing(seeds)
-    case = seeds.file(SUMMARY, lambda path: write_sweep_page(path.parent, 0), of=seeds.sweep)
-    return replace(case, named=str(Path(case.named).parent))
-
-
-@reader("comparison", "json", "cosim.io.strict_json:read_json")
-def comparison(seeds: Seeds) -> Case:
-    _without_drawing(seeds)
-    case = seeds.file(NUMBERS, lambda path: write_comparison_page(path.parent, 0), of=seeds.comparison)
-    return replace(case, named=str(Path(case.named).parent))
+for _name, _file, _write_page, _of in (
+    ("summary of a campaign", SUMMARY, write_campaign_page, lambda seeds: seeds.comparison / "ismail_dunnigan"),
+    ("summary of a sweep", SUMMARY, write_sweep_page, lambda seeds: seeds.sweep),
+    ("comparison", NUMBERS, write_comparison_page, lambda seeds: seeds.comparison),
+):
+    reader(_name, "json", "cosim.io.strict_json:read_json")(partial(_page_of, _file, _write_page, _of))
 
 
 @reader("remarks on a replay", "json", "cosim.io.strict_json:read_json")

@@ -70,8 +70,10 @@ class Seeds:
         shutil.copytree(of, made) if of else made.mkdir()
         return made
 
-    def file(self, name: str, read: Callable[[Path], object], *contents: bytes, of: Path | None = None) -> Case:
-        """Return the case of a reader of a file that stands alone, or in the copy of a folder."""
+    def file(
+        self, name: str, read: Callable[[Path], object], *contents: bytes, of: Path | None = None, folder: bool = False
+    ) -> Case:
+        """Return the case of a reader of a file that stands alone, or in the copy of a folder, which is then named."""
         path = self.folder(of) / name
         path.parent.mkdir(parents=True, exist_ok=True)
 
@@ -79,7 +81,7 @@ class Seeds:
             path.write_bytes(content)
             return read(path)
 
-        return Case(contents or (path.read_bytes(),), written, str(path))
+        return Case(contents or (path.read_bytes(),), written, str(path.parent if folder else path))
 
     @cached_property
     def scenes(self) -> Path:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -58,21 +58,6 @@ def command(seeds: Seeds) -> Case:
     return Case(tuple(json.dumps(command).encode() for command in COMMANDS_LOG), read)
 
 
-class _Connection:
-    """A live view with given answers."""
-
-    def __init__(self, messages: list[str | bytes]) -> None:
-        self._messages = messages
-
-    def __enter__(self) -> _Connection:
-        return self
-
-    def __exit__(self, *_: object) -> None: ...
-
-    def __iter__(self) -> Iterator[str | bytes]:
-        return iter(self._messages)
-
-
 @reader("live view", "jsonl", "cosim.live.watching.run_views:_live", "cosim.live.viewer_messages:read_rows")
 def live_view(seeds: Seeds) -> Case:
     scenario = load_scenario("paper", ["commands.enabled=true", "commands.obstacles=2"])
@@ -91,7 +76,7 @@ def live_view(seeds: Seeds) -> Case:
         messages: list[str | bytes] = [line.decode("utf-8", "replace") for line in content.splitlines()]
         messages[1:1] = [rows]
         seeds.patch.setattr("socket.create_connection", lambda *_, **__: None)
-        seeds.patch.setattr("websockets.sync.client.connect", lambda *_, **__: _Connection(messages))
+        seeds.patch.setattr("websockets.sync.client.connect", lambda *_, **__: contextlib.nullcontext(messages))
         for look in snapshots("ws://127.0.0.1:8765"):
             console.print(snapshot_table(look))
 
