@@ -5,7 +5,7 @@ from concurrent.futures import Future
 import numpy as np
 import pytest
 
-from cosim.campaigns.workers.dispatch import Batch, Batches, fly_all
+from cosim.campaigns.workers.dispatch import Batches, fly_all
 from cosim.campaigns.workers.worker_pools import FATAL, WorkerCrash
 from cosim.errors import RunError
 
@@ -35,6 +35,8 @@ class WorkerPool:
     def submit(self, task, batch):
         flight = Future()
         flight.rows, flight.crashed = batch, False
+        suspects = self.poison.intersection(*[sum(self.deaths, [])])
+        assert not (suspects & set(batch) and self.under_way), "a suspect flies alone"
         flight.set_result(None)
         self.under_way.append(flight)
         self.sent.append(batch)
@@ -76,33 +78,6 @@ def test_only_rows_that_crash_workers_are_rejected(poison):
     assert len(pool.deaths) <= len(poison) * (FATAL + 8) * 2
 
 
-def test_suspect_row_runs_alone():
-    pool = WorkerPool({77})
-    alone = []
-    submit = pool.submit
-
-    def watched(task, batch):
-        if 77 in batch and pool.deaths:
-            alone.append(not pool.under_way)
-        return submit(task, batch)
-
-    pool.submit = watched
-    flown(pool)
-    assert alone and all(alone)
-
-
-def test_worker_crash_loses_no_row():
-    class Unlucky(WorkerPool):
-        def result(self, flight):
-            if len(self.sent) in (5, 6) and not self.deaths:
-                self.under_way.remove(flight)
-                self.deaths.append(flight.rows)
-                return WorkerCrash()
-            return super().result(flight)
-
-    assert flown(Unlucky()) == list(range(200))
-
-
 def test_persistent_worker_crashes_abort_without_rejecting_rows():
     with pytest.raises(RunError, match="processes crashed in a row, with any rows"):
         flown(WorkerPool(range(200)))
@@ -113,34 +88,16 @@ def test_persistent_worker_crashes_abort_without_rejecting_rows():
 # ---- batches ----
 
 
-def test_batch_size_adapts_to_row_duration():
-    batches = batches_of(100_000)
-    sizes = []
+@pytest.mark.parametrize(("row_time", "size"), [(0.001, 1000), (3.0, 1)])
+def test_batch_size_adapts_to_row_duration(row_time, size):
+    batches, sizes = batches_of(100_000), []
     for _ in range(12):
-        batch = batches.take(4)
-        sizes.append(len(batch.rows))
-        batches.measured(len(batch.rows), 0.001 * len(batch.rows))
-    assert sizes[0] == 1 and sizes[-1] == 1000  # a second
+        sizes.append(len(batches.take(4).rows))
+        batches.measured(sizes[-1], row_time * sizes[-1])
+    assert sizes[0] == 1 and sizes[-1] == size  # a second
     assert all(after <= 4 * before for before, after in zip(sizes, sizes[1:], strict=False))
-
-
-def test_startup_time_of_a_new_worker_does_not_shrink_batches():
-    batches = batches_of(100_000)
-    for _ in range(12):
-        rows = len(batches.take(4).rows)
-        batches.measured(rows, 0.001 * rows)
-    size = len(batches.take(4).rows)
-    batches.measured(1, 0.5)  # that worker had to load what it flies with
+    batches.measured(1, 500.0 * row_time)  # of a new worker, which had to load what it flies with
     assert len(batches.take(4).rows) == size
-
-
-def test_slow_rows_are_dispatched_singly():
-    batches = batches_of(50)
-    for _ in range(50):
-        batch = batches.take(4)
-        assert len(batch.rows) == 1
-        batches.measured(1, 3.0)
-    assert batches.take(4) is None
 
 
 def test_final_batches_are_balanced_with_a_minimum_size():
@@ -152,9 +109,3 @@ def test_final_batches_are_balanced_with_a_minimum_size():
         sizes.append(len(batch.rows))
     assert sum(sizes) == 1000 and sizes[0] == 125 and min(sizes[:-1]) >= 50  # 50 ms
     assert sizes == sorted(sizes, reverse=True)
-
-
-def test_split_batch_keeps_all_rows():
-    one, other = Batch(np.arange(7), 1, True).halves(2)
-    assert one.rows.tolist() + other.rows.tolist() == list(range(7))
-    assert one.crash_count == other.crash_count == 2 and one.alone and other.alone

@@ -61,15 +61,6 @@ def test_tables_of_any_sessions_are_joined_in_order_up_to_a_kill(sessions, data)
         assert log.table().equals(table(taken | {100})) and joined(folder).equals(table(taken | {100}))
 
 
-def test_every_table_before_the_kill_is_kept(tmp_path, caplog):
-    append(tmp_path, {0, 1}, {4, 5})
-    file = tmp_path / "parts" / "000000.arrows"
-    size = file.stat().st_size
-    file.write_bytes(file.read_bytes()[: size - 9])
-    assert append(tmp_path, {4, 5}, {2}).keys().tolist() == [0, 1, 2, 4, 5]
-    assert "its end cannot be read" in caplog.text and joined(tmp_path).equals(table([0, 1, 2, 4, 5]))
-
-
 @pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files")
 def test_full_disk_is_an_error_at_any_byte(tmp_path):
     import resource

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -192,8 +193,22 @@ def servos(seeds: Seeds) -> Case:
 # ---- the command line ----------------------------------------------------------------------------------------------
 
 
-def _argument(read: Callable[[str], object], *sound: str) -> Case:
+def _resolve_host(host: str) -> tuple[str, bool]:
+    if host == "127.0.0.1":
+        return host, True
+    raise OSError("not asked")
+
+
+def _origin(text: str) -> None:
+    host, _, site = text.partition(" ")
+    said = foreign_origin(parse_live(""), host, site or None)
+    assert said is None or "\n" not in said
+
+
+def _argument(read: Callable[[str], object], sound: tuple[str, ...], seeds: Seeds) -> Case:
     """Return the case of a word, which is any bytes without a null among them."""
+    for module in ("cosim.mavlink.wire.endpoint", "cosim.live.address"):
+        seeds.patch.setattr(f"{module}.resolve_host", _resolve_host)
 
     def taken(content: bytes) -> object:
         return read(content.replace(b"\0", b"").decode("utf-8", "surrogateescape"))
@@ -201,55 +216,22 @@ def _argument(read: Callable[[str], object], *sound: str) -> Case:
     return Case(tuple(text.encode() for text in sound), taken)
 
 
-@reader("change of a scenario", "text", "cosim.scenario.toml_file:override")
-def change(seeds: Seeds) -> Case:
-    return _argument(
-        lambda text: load_scenario("paper", [text]),
-        "law.gains.k_p1=10", "regions.SR1.shape.radius=2", "initial.position.0=1", "title='a'", "time={duration=2}",
-    )  # fmt: skip
-
-
-@reader("what varies", "text", "cosim.campaigns.sweeps.design:_parse_vary")
-def varied(seeds: Seeds) -> Case:
-    return _argument(lambda text: vary_from([text]), "limit.force=50:500:4:log", "a.b=-1:1", "c=1,2.5,1e3")
-
-
-@reader("gain", "text", "cosim.campaigns.scenes.law_gains:gains_from")
-def gain(seeds: Seeds) -> Case:
-    return _argument(lambda text: LAWS["pd"].validate(gains_from("pd", [text])), "k_p1=10", "k_v1 = 1.5e2")
-
-
-@reader("endpoint", "text", "cosim.mavlink.wire.endpoint:parse_endpoint")
-def endpoint(seeds: Seeds) -> Case:
-    known = {"127.0.0.1": ("127.0.0.1", True)}
-
-    def resolve_host(host: str) -> tuple[str, bool]:
-        with contextlib.suppress(KeyError):
-            return known[host]
-        raise OSError("not asked")
-
-    seeds.patch.setattr("cosim.mavlink.wire.endpoint.resolve_host", resolve_host)
-    seeds.patch.setattr("cosim.live.address.resolve_host", resolve_host)
-    sound = "udpout:127.0.0.1:14550", "tcpin:127.0.0.1:5760", "serial:/dev/ttyUSB0:57600", "dive.tlog"
-    return _argument(parse_endpoint, *sound)
-
-
-@reader("live address", "text", "cosim.live.address:parse_live")
-def address(seeds: Seeds) -> Case:
-    endpoint(seeds)
-    return _argument(parse_live, "127.0.0.1:8765", "8765")
-
-
-@reader("host and origin", "text", "cosim.live.address:foreign_origin")
-def origin(seeds: Seeds) -> Case:
-    def read(text: str) -> None:
-        host, _, site = text.partition(" ")
-        said = foreign_origin(parse_live(""), host, site or None)
-        assert said is None or "\n" not in said
-
-    return _argument(read, "127.0.0.1:8765 http://127.0.0.1:8765", "localhost:8765")
-
-
-@reader("rule", "text", "fuzzy_arbiter.rule_text:parse_rule")
-def rule(seeds: Seeds) -> Case:
-    return _argument(parse_rule, 'if a is b and (not "c d" is e or f is very_g) then h is i with 0.5')
+_CHANGES = (
+    "law.gains.k_p1=10", "regions.SR1.shape.radius=2", "initial.position.0=1", "title='a'", "time={duration=2}",
+)  # fmt: skip
+_ENDPOINTS = "udpout:127.0.0.1:14550", "tcpin:127.0.0.1:5760", "serial:/dev/ttyUSB0:57600", "dive.tlog"
+_RULE = ('if a is b and (not "c d" is e or f is very_g) then h is i with 0.5',)
+WORDS: list[tuple[str, str, Callable[[str], object], tuple[str, ...]]] = [
+    ("change of a scenario", "scenario.toml_file:override", lambda text: load_scenario("paper", [text]), _CHANGES),
+    ("what varies", "campaigns.sweeps.design:_parse_vary", lambda text: vary_from([text]),
+     ("limit.force=50:500:4:log", "a.b=-1:1", "c=1,2.5,1e3")),
+    ("gain", "campaigns.scenes.law_gains:gains_from", lambda text: LAWS["pd"].validate(gains_from("pd", [text])),
+     ("k_p1=10", "k_v1 = 1.5e2")),
+    ("endpoint", "mavlink.wire.endpoint:parse_endpoint", parse_endpoint, _ENDPOINTS),
+    ("live address", "live.address:parse_live", parse_live, ("127.0.0.1:8765", "8765")),
+    ("host and origin", "live.address:foreign_origin", _origin,
+     ("127.0.0.1:8765 http://127.0.0.1:8765", "localhost:8765")),
+]  # fmt: skip
+for _name, _parser, _read, _sound in WORDS:
+    reader(_name, "text", f"cosim.{_parser}")(partial(_argument, _read, _sound))
+reader("rule", "text", "fuzzy_arbiter.rule_text:parse_rule")(partial(_argument, parse_rule, _RULE))
