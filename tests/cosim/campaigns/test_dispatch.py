@@ -35,7 +35,7 @@ class WorkerPool:
     def submit(self, task, batch):
         flight = Future()
         flight.rows, flight.crashed = batch, False
-        suspects = self.poison.intersection(*[sum(self.deaths, [])])
+        suspects = self.poison & {row for rows in self.deaths for row in rows}
         assert not (suspects & set(batch) and self.under_way), "a suspect flies alone"
         flight.set_result(None)
         self.under_way.append(flight)
