@@ -12,7 +12,6 @@ from fuzzy_arbiter.hierarchy import prioritized
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.term import Term
-from fuzzy_arbiter.terms.values import Constant, Formula, Linear
 
 BUILT_IN = "section-vi"
 EXPORTS = ("c", "py")
@@ -57,14 +56,12 @@ def _numbers(term: Term) -> str:
     shape = term.shape
     if isinstance(shape, Shape):
         return " ".join(f"({x!r}, {degree!r})" for x, degree in shape.points)
-    if isinstance(shape, Curve):
-        height = f", height {shape.height!r}" if shape.height != 1.0 else ""
-        return f"{shape.kind} {' '.join(map(repr, shape.parameters))}{height}"
-    if isinstance(shape, Linear):
-        return f"linear {' '.join(map(repr, (*shape.coefficients, shape.constant)))}"
-    return (
-        shape.text if isinstance(shape, Formula) else repr(shape.value) if isinstance(shape, Constant) else repr(shape)
-    )
+    from fuzzy_arbiter.formats.fll_terms import parts_of
+
+    kind, numbers, text = parts_of(shape)
+    height = f", height {shape.height!r}" if isinstance(shape, Curve) and shape.height != 1.0 else ""
+    words = "" if kind in ("constant", "formula") else f"{kind} "
+    return f"{words}{text or ' '.join(map(repr, numbers))}{height}"
 
 
 def convert(file: str, out: str, native: bool, block: str | None = None) -> None:

@@ -10,12 +10,13 @@ from dataclasses import fields
 from typing import Any, NoReturn
 
 from fuzzy_arbiter.definition import Output, System, Variable
-from fuzzy_arbiter.errors import FormatError, UnsupportedError
+from fuzzy_arbiter.errors import FormatError
+from fuzzy_arbiter.formats.fll_terms import parts_of
 from fuzzy_arbiter.formats.schema import system_of
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
-from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
+from fuzzy_arbiter.terms.values import Value
 
 _OPERATORS = ("conjunction", "disjunction", "implication")
 _SETTINGS = ("name", "conjunction", "disjunction", "implication", "normalization", "outside", "points")
@@ -115,17 +116,10 @@ def _shape(shape: Membership | Value, sign: str, key: Callable[[str], str]) -> s
     """Format a term: its points, or a table of its kind and numbers."""
     if isinstance(shape, Shape):
         return _text([list(point) for point in shape.points])
-    if isinstance(shape, Curve):
-        pairs: list[tuple[str, Any]] = [(shape.kind, list(shape.parameters))]
-        pairs += [("height", shape.height)] if shape.height != 1.0 else []
-    elif isinstance(shape, Formula):
-        pairs = [("formula", shape.text)]
-    elif isinstance(shape, Constant):
-        pairs = [("constant", shape.value)]
-    elif isinstance(shape, Linear):
-        pairs = [("linear", [*shape.coefficients, shape.constant])]
-    else:
-        raise UnsupportedError(f"cannot say the term {shape!r}")
+    kind, numbers, text = parts_of(shape)
+    pairs: list[tuple[str, Any]] = [(kind, text or (numbers[0] if kind == "constant" else list(numbers)))]
+    if isinstance(shape, Curve) and shape.height != 1.0:
+        pairs.append(("height", shape.height))
     return "{" + ", ".join(f"{key(name)}{sign}{_text(value)}" for name, value in pairs) + "}"
 
 

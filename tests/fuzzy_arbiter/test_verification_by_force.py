@@ -15,13 +15,9 @@ from fuzzy_arbiter.verification.cells import stretches
 from tests.examples import examples
 from tests.fuzzy_arbiter import reference
 from tests.fuzzy_arbiter.systems import LOW_HIGH, shapes, systems
+from tests.fuzzy_arbiter.test_verification import NAMES, verdicts
 
-NAMES = ("complete", "consistent", "exclusive", "graded_complete", "graded_consistent", "graded_exclusive")
 small = systems(norms=False, outputs=LOW_HIGH)
-
-
-def verdicts(verification):
-    return tuple(getattr(verification, name) for name in NAMES)
 
 
 def cuts(s, degrees):

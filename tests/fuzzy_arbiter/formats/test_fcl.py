@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Arbiter, Output, Shape, Term, Variable, falling, prioritized, rising, triangle
+from fuzzy_arbiter import Arbiter, Output, Term, Variable, falling, prioritized, rising, triangle
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.rule import Operators
@@ -199,14 +199,6 @@ def test_names_that_differ_only_in_case_are_rejected():
     twin = Variable("QUALITY", (0, 1), TIPPING.inputs[0].terms)
     with pytest.raises(UnsupportedError, match="the names 'quality' and 'QUALITY': they differ in case alone"):
         writes(replace(TIPPING, inputs=(*TIPPING.inputs, twin)), "fcl")
-
-
-def test_jumps_are_written_as_points_at_one_position():
-    box = Variable(
-        "quality", (0, 10), (replace(TIPPING.inputs[0].terms[0], shape=Shape(((2, 0), (2, 1), (4, 1), (4, 0)))),)
-    )
-    system = replace(TIPPING, inputs=(box, TIPPING.inputs[1]), rules=TIPPING.rules[:2])
-    assert reads(writes(system, "fcl"), "fcl") == system
 
 
 BLOCKS = """FUNCTION_BLOCK first

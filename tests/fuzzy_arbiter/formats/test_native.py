@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from fuzzy_arbiter import Arbiter, Output, System, Term, Variable, falling, prioritized, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.errors import EngineError, UnsupportedError
-from fuzzy_arbiter.formats import FORMATS, fold_normalization, reads, writes
+from fuzzy_arbiter.formats import fold_normalization
 from fuzzy_arbiter.formats.native import range_ends
 
 EPS = np.finfo(float).eps
@@ -73,13 +73,6 @@ def test_terms_too_close_for_floating_point_are_refused():
     near = Output("w", (0, 1), (Term("low", falling(0, 1e-200)), Term("high", falling(0, 2e-200))))
     with pytest.raises(UnsupportedError, match="too far apart, or too close"):
         fold_normalization(prioritized(weight=near))
-
-
-@pytest.mark.parametrize("format", FORMATS)
-def test_folded_normalization_round_trips_in_every_format(format):
-    system = fold_normalization(prioritized(form="minimal"))
-    assert reads(writes(system, format), format) == system
-    assert reads(writes(system, format), format) == replace(system, normalization="none")
 
 
 @pytest.mark.parametrize("defuzzifier", ["bisector", "average"])

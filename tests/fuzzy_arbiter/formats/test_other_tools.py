@@ -37,6 +37,7 @@ def test_committed_files_round_trip(format):
         text.replace("\n", "\r\n"),
         text.replace("\n", "  \n"),
         text.rstrip("\n"),
+        "\ufeff" + text,
     ):
         assert reads(foreign, format) == TIPPING
 

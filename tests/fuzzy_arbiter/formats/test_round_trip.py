@@ -144,12 +144,6 @@ def test_deepest_allowed_rule_round_trips(format):
         Not(condition)
 
 
-@pytest.mark.parametrize("format", FORMATS)
-def test_line_endings_and_byte_order_mark_are_ignored(format):
-    system = prioritized(points=33)
-    assert reads("\ufeff" + writes(system, format).replace("\n", "\r\n"), format) == system
-
-
 @pytest.mark.parametrize("format", ["fcl", "fis", "fll"])
 def test_numbers_are_not_rounded(format):
     x = 0.1 + 0.2
