@@ -282,7 +282,6 @@ def test_parameters_that_are_not_finite_are_omitted(tmp_path, imported, six_thru
             np.testing.assert_array_equal(run.record[column], dataflash.record[column])
 
 
-@pytest.mark.medium
 def test_rates_of_a_controller_that_rests_are_no_samples(contents):
     """In MANUAL an ArduSub writes RATE on and on with the stamp of its last control step; other clocks go on."""
     handlers = _Messages(contents)
@@ -292,6 +291,10 @@ def test_rates_of_a_controller_that_rests_are_no_samples(contents):
         handlers.add("RATE", {"TimeUS": min(at, 11_000_000), "R": 1.0, "P": 0.0, "Y": 0.0})
     assert not handlers.clock.jumps
     assert contents.sources["rates", "RATE"].count == 26 and contents.sources["attitude", "ATT"].count == 100
+    for source, expected in (("attitude", "ATT"), [math.cos(math.radians(0.5)), math.sin(math.radians(0.5)), 0.0, 0.0]), (
+        ("rates", "RATE"), [math.radians(1.0), 0.0, 0.0],
+    ):  # fmt: skip
+        assert next(contents.sources[source].blocks())[0, 2:] == pytest.approx(expected)
 
 
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
