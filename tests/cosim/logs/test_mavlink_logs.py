@@ -291,10 +291,10 @@ def test_rates_of_a_controller_that_rests_are_no_samples(contents):
         handlers.add("RATE", {"TimeUS": min(at, 11_000_000), "R": 1.0, "P": 0.0, "Y": 0.0})
     assert not handlers.clock.jumps
     assert contents.sources["rates", "RATE"].count == 26 and contents.sources["attitude", "ATT"].count == 100
-    for source, expected in (("attitude", "ATT"), [math.cos(math.radians(0.5)), math.sin(math.radians(0.5)), 0.0, 0.0]), (
-        ("rates", "RATE"), [math.radians(1.0), 0.0, 0.0],
-    ):  # fmt: skip
-        assert next(contents.sources[source].blocks())[0, 2:] == pytest.approx(expected)
+    half = math.radians(0.5)
+    expected = {("attitude", "ATT"): [math.cos(half), math.sin(half), 0, 0], ("rates", "RATE"): [2.0 * half, 0, 0]}
+    for source, values in expected.items():
+        assert next(contents.sources[source].blocks())[0, 2:] == pytest.approx(values)
 
 
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
