@@ -155,8 +155,7 @@ def test_an_ardusub_that_was_armed_here_dives_level_before_it_is_steered(tmp_pat
     assert link.column("sea bed.clearance").min() > 0.3
 
 
-@pytest.mark.medium
-@pytest.mark.parametrize("ends", [False, True])
+@pytest.mark.parametrize("ends", [pytest.param(False, marks=pytest.mark.medium), True])
 def test_dry_run_sends_no_setpoints_and_only_message_requests(tmp_path, link, ends):
     """Nor when something ends it."""
     events = [lambda: link.silent.add("LOCAL_POSITION_NED")] if ends else ()
