@@ -1,39 +1,122 @@
-"""Mutate signs one at a time, run the tests, and report surviving mutants."""
+"""Mutate signs one at a time, run the tests of the mutated source, and report the mutants that survive."""
 
 from __future__ import annotations
 
 import argparse
 import fnmatch
+import hashlib
+import json
+import os
+import queue
+import random
+import shutil
+import subprocess
 import sys
+import tempfile
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from tests.mutation.plan import all_mutants, equivalent
-from tests.mutation.report import report
-from tests.mutation.running import results_of, sample
+from tests.mutation.mutants import ROOT, Mutant, Part, all_mutants, equivalent_mutants, load_plan
+
+COPIED = ("controller", "plant_fmu", "fuzzy_arbiter", "cosim", "tests", "examples", "docs", "benchmarks")
+TEST_SECONDS, RUN_SECONDS = 60, 900
+
+
+def make_copy(folder: Path) -> Path:
+    """Copy what the tests need, with a ``cc`` that does not optimize."""
+    for name in COPIED:
+        shutil.copytree(ROOT / name, folder / name, ignore=shutil.ignore_patterns("__pycache__", "node_modules"))
+    for file in filter(Path.is_file, ROOT.iterdir()):
+        shutil.copy2(file, folder)
+    (folder / "bin").mkdir()
+    (folder / "bin" / "cc").write_text(f'#!/bin/sh\nexec {shutil.which("cc")} "$@" -O0\n', encoding="utf-8")
+    (folder / "bin" / "cc").chmod(0o755)
+    return folder
+
+
+def run_tests(copy: Path, part: Part) -> str:
+    """Run the tests of a part in a copy; return which failed first, "" if none did."""
+    variables = {
+        "SUBREACH_INTERPRETED": "1", "PYTHONDONTWRITEBYTECODE": "1", "PYTHONPATH": str(copy),
+        "PATH": f"{copy / 'bin'}{os.pathsep}{os.environ['PATH']}", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1",
+    }  # fmt: skip
+    # overflow and the like make NumPy warn, of which compiled code says nothing
+    options = ["-qx", "--medium", "--tb=no", "-pno:cacheprovider", "-pno:xdist", "-Wignore::RuntimeWarning"]
+    options += [f"--timeout={TEST_SECONDS}", "--timeout-method=thread"]
+    if part.without:
+        options += ["-k", f"not ({' or '.join(part.without)})"]
+    command = [sys.executable, "-m", "pytest", *options, *(f"tests/{file}" for file in part.tests)]
+    try:
+        done = subprocess.run(
+            command, cwd=copy, env=os.environ | variables, capture_output=True, text=True, timeout=RUN_SECONDS
+        )
+    except subprocess.TimeoutExpired:
+        return f"no end within {RUN_SECONDS} s"
+    failed = [line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return "" if done.returncode == 0 else (failed or [f"status {done.returncode}"])[0]
+
+
+def run_mutants(mutants: list[Mutant], jobs: int, results: Path | None) -> dict[str, str]:
+    """Run the tests of each mutant; return which test failed by key, "" for survivors; `results` is read and continued."""
+    sources = {m.path: (ROOT / m.path).read_text(encoding="utf-8") for m in mutants}
+    marks = {m.key: hashlib.sha256(sources[m.path].encode()).hexdigest()[:16] for m in mutants}
+    noticed: dict[str, str] = {}
+    if results and results.is_file():
+        for line in results.read_text(encoding="utf-8").splitlines():
+            key, mark, test = json.loads(line)
+            if marks.get(key) == mark:
+                noticed[key] = test
+    left = [m for m in mutants if m.key not in noticed]
+    random.Random(0).shuffle(left)  # so that what is done when it is stopped is a fair sample
+    todo: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
+    for mutant in left:
+        todo.put(mutant)
+
+    def work(copy: Path) -> None:
+        while True:
+            try:
+                mutant = todo.get_nowait()
+            except queue.Empty:
+                return
+            target = copy / mutant.path
+            target.write_text(mutant.apply(sources[mutant.path]), encoding="utf-8")
+            noticed[mutant.key] = run_tests(copy, load_plan()[mutant.path])
+            target.write_text(sources[mutant.path], encoding="utf-8")
+            if results:
+                results.parent.mkdir(parents=True, exist_ok=True)
+                with results.open("a", encoding="utf-8") as file:
+                    file.write(json.dumps([mutant.key, marks[mutant.key], noticed[mutant.key]]) + "\n")
+
+    with tempfile.TemporaryDirectory(prefix="mutation-") as scratch, ThreadPoolExecutor(jobs) as pool:
+        copies = [make_copy(Path(scratch, str(i))) for i in range(min(jobs, len(left)))]
+        for part in {id(load_plan()[m.path]): load_plan()[m.path] for m in left}.values():
+            if failed := run_tests(copies[0], part):
+                raise RuntimeError(f"fails without any mutant: {failed}")
+        list(pool.map(work, copies))
+    return noticed
 
 
 def main() -> int:
+    """Run the mutants that the command line names."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutation", description=__doc__)
     parser.add_argument("--sample", type=int, metavar="N", help="of all mutants only N, drawn at random")
     parser.add_argument("--seed", type=int, default=1, help="of what is drawn (1)")
     parser.add_argument("--only", metavar="PATTERN", default="*", help="only of sources like controller/regions/*")
     parser.add_argument("--jobs", type=int, default=2, help="processes at a time (2)")
     parser.add_argument("--results", type=Path, metavar="FILE", help="JSON lines: read if there, and continued")
-    parser.add_argument("--again", action="store_true", help="ask the tests again about what survived in FILE")
-    parser.add_argument("--list", action="store_true", help="only name the mutants")
     arguments = parser.parse_args()
-
-    listed = equivalent()
-    mutants = [mutant for mutant in all_mutants() if fnmatch.fnmatch(mutant.path, arguments.only)]
+    equivalent = equivalent_mutants()
+    mutants = [m for m in all_mutants() if fnmatch.fnmatch(m.path, arguments.only) and m.key not in equivalent]
     if arguments.sample is not None:
-        mutants = sample(mutants, arguments.sample, arguments.seed)
-    if arguments.list:
-        print("\n".join(mutant.key for mutant in mutants))
-        return 0
-    asked = [mutant for mutant in mutants if mutant.key not in listed]
-    results = results_of(asked, arguments.jobs, arguments.results, again=arguments.again)
-    print(report(mutants, listed, results))
-    return int(any(result.survived or result.doubtful for result in results.values()))
+        mutants = random.Random(arguments.seed).sample(mutants, min(arguments.sample, len(mutants)))
+    noticed = run_mutants(mutants, arguments.jobs, arguments.results)
+    scores = Counter((m.path.partition("/")[0], bool(noticed[m.key])) for m in mutants)
+    for m in sorted(mutants, key=lambda m: (m.path, m.line)):
+        print(f"{m.path}:{m.line}  {m.before}  {m.text[:70]}\n    {noticed[m.key] or 'SURVIVED'}")
+    for package in sorted({package for package, _ in scores}):
+        print(f"{package}: {scores[package, True]} of {scores[package, True] + scores[package, False]} noticed")
+    return int(not all(noticed[m.key] for m in mutants))
 
 
 if __name__ == "__main__":

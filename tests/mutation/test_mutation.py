@@ -2,25 +2,14 @@
 
 import ast
 import shutil
+from collections import Counter
 
 import pytest
 
-from tests.mutation.mutants import mutants_of
-from tests.mutation.plan import ROOT, all_mutants, equivalent, part_of, parts
-from tests.mutation.running import sample
+from tests.mutation.__main__ import run_mutants
+from tests.mutation.mutants import ROOT, all_mutants, equivalent_mutants, find_mutants, load_plan
 
 NO_MATHEMATICS = {"controller/errors.py", "controller/stack_array.py"}
-
-PYTHON = """
-x = "a - b" + f"{1 - 2}"  # a - b
-def f(a, b=-1):
-    return -a - (-b) if a else a[b - 1:] + 1e-3
-class C:
-    def g(self):
-        self.x += 1
-        self.x -= 2; λ = -self.x + 1
-        return {1} - {2}, not -self.x
-"""
 
 C = """
 #include <a-b.h>
@@ -34,40 +23,18 @@ static inline double f(const double *p, int n)
     s += -p->y;
     return -(s) - 0x1e;
 }
-int g(int h) { return h ? -h : +h; }
 """
 
 
-def signs(path, source):
-    return [(m.function, m.before, m.unary) for m in mutants_of(path, source)]
-
-
-def test_python_operators_are_found():
-    assert signs("a.py", PYTHON) == [
-        ("", "+", False), ("f", "-", True), ("f", "-", True), ("f", "-", False), ("f", "-", True), ("f", "-", False),
-        ("f", "+", False), ("C.g", "+=", False), ("C.g", "-=", False), ("C.g", "-", True), ("C.g", "+", False),
-        ("C.g", "-", False), ("C.g", "-", True),
+def test_c_operators_are_found_and_replaced_one_at_a_time():
+    mutants = find_mutants("a.c", C)
+    assert [(m.line, m.before) for m in mutants] == [
+        (3, "-"), (7, "-"), (8, "-"), (8, "+"), (8, "-"), (9, "-="), (10, "+="), (10, "-"), (11, "-"), (11, "-"),
     ]  # fmt: skip
-
-
-def test_c_operators_are_found():
-    assert signs("a.c", C) == [
-        ("", "-", True), ("f", "-", False), ("f", "-", True), ("f", "+", False), ("f", "-", False),
-        ("f", "-=", False), ("f", "+=", False), ("f", "-", True), ("f", "-", True), ("f", "-", False),
-        ("g", "-", True), ("g", "+", True),
-    ]  # fmt: skip
-
-
-@pytest.mark.parametrize(("path", "source"), [("a.py", PYTHON), ("a.c", C)])
-def test_mutants_differ_in_one_operator_and_have_unique_names(path, source):
-    found = mutants_of(path, source)
-    assert len({m.key for m in found}) == len(found)
-    for mutant in found:
-        text = mutant.applied(source)
-        different = [(a, b) for a, b in zip(source, text, strict=True) if a != b]
-        assert different == [(mutant.before[0], mutant.after[0])]
-        if path == "a.py":
-            ast.parse(text)
+    assert len({m.key for m in mutants}) == len(mutants)
+    for mutant in mutants:
+        changed = [(a, b) for a, b in zip(C, mutant.apply(C), strict=True) if a != b]
+        assert changed in ([("-", "+")], [("+", "-")])
 
 
 def nodes(tree):
@@ -80,51 +47,32 @@ def nodes(tree):
 
 @pytest.mark.medium
 def test_python_operators_match_the_syntax_tree():
-    """Counted once more by Python's own parser, over all sources."""
-    kinds = {}
-    for mutant in all_mutants():
-        if mutant.path.endswith(".py"):
-            kind = "unary" if mutant.unary else "binary"
-            kinds[mutant.path, kind] = kinds.get((mutant.path, kind), 0) + 1
-    expected = {}
-    for path in {path for path, _ in kinds}:
-        for node in nodes(ast.parse((ROOT / path).read_text(encoding="utf-8"))):
-            if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
-                expected[path, "unary"] = expected.get((path, "unary"), 0) + 1
-            elif isinstance(node, ast.BinOp | ast.AugAssign) and isinstance(node.op, ast.Add | ast.Sub):
-                expected[path, "binary"] = expected.get((path, "binary"), 0) + 1
-    assert kinds == expected
+    found = Counter(m.path for m in all_mutants() if m.path.endswith(".py"))
+    signs = ast.Add, ast.Sub, ast.UAdd, ast.USub
+    operations = ast.UnaryOp, ast.BinOp, ast.AugAssign
+    for path in found:
+        tree = nodes(ast.parse((ROOT / path).read_text(encoding="utf-8")))
+        assert found[path] == sum(isinstance(n, operations) and isinstance(n.op, signs) for n in tree), path
 
 
 def test_every_controller_and_plant_source_is_in_the_plan():
-    for path in [*(ROOT / "controller").rglob("*.py"), *(ROOT / "controller").rglob("*.c")]:
+    for path in [*(ROOT / "controller").rglob("*.py"), *(ROOT / "controller").rglob("*.c"),
+                 *(ROOT / "plant_fmu" / "csrc").glob("*.c")]:  # fmt: skip
         name = path.relative_to(ROOT).as_posix()
-        if name not in NO_MATHEMATICS and mutants_of(name, path.read_text(encoding="utf-8")):
-            assert part_of(name)
-    for path in (ROOT / "plant_fmu" / "csrc").glob("*.c"):
-        assert part_of(path.relative_to(ROOT).as_posix())
+        if name not in NO_MATHEMATICS and find_mutants(name, path.read_text(encoding="utf-8")):
+            assert name in load_plan()
 
 
 def test_planned_tests_exist_and_equivalent_mutants_have_reasons():
-    assert all((ROOT / test).is_file() for part in parts() for test in part.tests)
-    assert all(reason for reason in equivalent().values())
-
-
-@pytest.mark.medium
-def test_a_sample_repeats_and_has_both_languages():
-    mutants = all_mutants()
-    one, same, other = (sample(mutants, 40, seed) for seed in (1, 1, 2))
-    assert one == same != other and len(one) == 40
-    assert {m.path.rpartition(".")[2] for m in one} >= {"py", "c"}
+    assert all((ROOT / "tests" / test).is_file() for part in load_plan().values() for test in part.tests)
+    assert all(equivalent_mutants().values())
+    assert equivalent_mutants().keys() <= {m.key for m in all_mutants()}
 
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs cc")
 def test_tested_mutant_is_killed(tmp_path):
-    from tests.mutation import running
-
-    mutants = {m.key: m for m in all_mutants() if m.path == "controller/restoring.py"}
-    results = running.results_of(list(mutants.values())[:2], 1, tmp_path / "results.jsonl")
-    assert all(not r.survived and not r.doubtful and r.by for r in results.values())
-    again = running.results_of(list(mutants.values())[:2], 1, tmp_path / "results.jsonl")
-    assert again == results
+    mutants = find_mutants("controller/restoring.py", (ROOT / "controller/restoring.py").read_text())[:2]
+    noticed = run_mutants(mutants, 1, tmp_path / "results.jsonl")
+    assert len(noticed) == 2 and all(test.startswith("tests/controller/") for test in noticed.values())
+    assert run_mutants(mutants, 1, tmp_path / "results.jsonl") == noticed
