@@ -58,7 +58,7 @@ def run_tests(copy: Path, part: Part) -> str:
 
 
 def run_mutants(mutants: list[Mutant], jobs: int, results: Path | None) -> dict[str, str]:
-    """Run the tests of each mutant; return which test failed by key, "" for survivors; `results` is read and continued."""
+    """Run the tests of each mutant; return which failed, by key, "" for survivors. `results` is read and continued."""
     sources = {m.path: (ROOT / m.path).read_text(encoding="utf-8") for m in mutants}
     marks = {m.key: hashlib.sha256(sources[m.path].encode()).hexdigest()[:16] for m in mutants}
     noticed: dict[str, str] = {}
