@@ -10,10 +10,10 @@ Every fence of every page has a language. The blocks of a page run in order, in 
     to the digits shown, ``...`` for anything. ``f(x)  # 0.84`` and ``f(x)  # in the open: 0.84`` both show one.
 ``text``
     What the block before printed, compared; ``...`` stands for what varies. With a setup of its own, what that printed.
-``toml``, ``json``, ``xml``, ``c``
+``toml``, ``json``, ``c``
     Loaded by our loaders, parsed, compiled.
 
-Comments above a fence say what else there is to know: see `tests.docs.directives`. What no test runs says why there,
-and stands in ``not_run.txt``, which ``python -m tests.docs.ledger`` writes. Known ports are replaced by free ones. A
-page with a block marked slow runs with --slow alone; its commands are parsed in every run.
+Comments above a fence say what else there is to know, and why no test runs a block: see `tests.docs.directives`. Known
+ports are replaced by free ones. A page with a block marked slow runs with --slow alone; its commands are parsed in
+every run.
 """

@@ -70,18 +70,6 @@ def check_commands(block: Block) -> None:
         _check_unrun(block, command, "".join(reasons[:1]))
 
 
-def not_run(block: Block) -> list[tuple[str, str]]:
-    """Return reason and command of what a block of commands does not run."""
-    found = []
-    for command in commands(block):
-        reasons = of_command(block.directives.not_run, command.words)
-        if _checked_foreign(block.where, command.words):
-            reasons.append("changes the machine; its extras or targets are looked up")
-        if reasons:
-            found.append((reasons[0], " ".join(command.words)))
-    return found
-
-
 def _check_unrun(block: Block, command: Command, reason: str) -> None:
     where = f"{block.page}:{command.line}"
     if unknown := wrong_flags(command.words):

@@ -1,15 +1,9 @@
 """Blocks of data and of other languages: parsed, loaded by the real loaders, compiled."""
 
 import json
-import shlex
 import subprocess
-import tomllib
-from collections.abc import Callable, Mapping
-from importlib import resources
+from collections.abc import Callable
 from pathlib import Path
-from xml.etree import ElementTree
-
-import tomli_w
 
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.live.command_desk import CommandDesk
@@ -31,16 +25,8 @@ _LOADERS: dict[str, Callable[[str], object]] = {
 
 
 def whole(block: Block) -> str:
-    """Return the text that a block stands for: a fragment is merged onto the shipped file it belongs to."""
-    directives = block.directives
-    if not directives.onto:
-        return block.text
-    if directives.kind == "scenario":
-        return f'base = "{directives.onto}"\n{block.text}'
-    if directives.kind == "vehicle":
-        shipped = resources.files("plant_fmu") / "vehicles" / f"{directives.onto}.toml"
-        return tomli_w.dumps(_merged(tomllib.loads(shipped.read_text()), tomllib.loads(block.text)))
-    raise PageError(f"{block.where}: nothing to merge an arbiter onto")
+    """Return the text that a block stands for: a fragment has the shipped scenario that it belongs to as its base."""
+    return f'base = "{block.directives.onto}"\n{block.text}' if block.directives.onto else block.text
 
 
 def check_data(block: Block) -> None:
@@ -90,24 +76,10 @@ def _check_json(block: Block) -> None:
 
 
 def _check_c(block: Block) -> None:
-    flags = shlex.split(block.directives.compile_with)
-    command = [*find_compiler(), "-std=c11", "-Wall", "-Werror", "-fsyntax-only", *flags, "-x", "c", "-"]
+    command = [*find_compiler(), "-std=c11", "-Wall", "-Werror", "-fsyntax-only", "-x", "c", "-"]
     done = subprocess.run(command, input=block.text, capture_output=True, text=True, timeout=240, check=False)
     if done.returncode:
         raise PageError(f"{block.where}: {done.stderr}")
 
 
-def _merged(base: Mapping[str, object], over: Mapping[str, object]) -> dict[str, object]:
-    result = dict(base)
-    for key, value in over.items():
-        below = result.get(key)
-        result[key] = _merged(below, value) if isinstance(value, dict) and isinstance(below, dict) else value
-    return result
-
-
-_CHECKS: dict[str, Callable[[Block], object]] = {
-    "toml": _check_toml,
-    "json": _check_json,
-    "xml": lambda block: ElementTree.fromstring(block.text),
-    "c": _check_c,
-}
+_CHECKS: dict[str, Callable[[Block], object]] = {"toml": _check_toml, "json": _check_json, "c": _check_c}

@@ -10,11 +10,10 @@ The same for a page that is to be free of them stands in ``beside/PAGE.toml``, b
 ``given: PATH as NAME``                     a file of the repository is copied into the folder before
 ``file: NAME``                              the block is written into the folder
 ``setup sh`` or ``setup python``, lines     done before the block, or with a ``"PREFIX"`` before the first command so
-``scenario``, ``vehicle``, ``arbiter``      what a block of TOML is; with ``onto: NAME`` it is merged onto a shipped one
+``scenario``, ``vehicle``, ``arbiter``      what a block of TOML is; a scenario with ``onto: NAME`` has it as its base
 ``column map``                              likewise, of the columns of a log
 ``scenes``                                  of a block of JSON: each line is a scene of a campaign
 ``commands of: SCENARIO``                     of a block of JSON: each line is a command that a run of it takes
-``compile with: FLAGS``                     of a block of C
 ``alone``                                   the block of Python runs in a process of its own, with names of its own
 ``slow``                                    the page runs with --slow alone
 ==========================================  =======================================================================
@@ -28,13 +27,12 @@ from typing import Self
 REASONS = ("needs ", "takes ", "changes ", "formula", "drawing", "template ", "excerpt ")
 _PREFIXED = re.compile(r'(page run with|run with|not run|exits)(?: "([^"]+)")?: (\S.*)')
 _GIVEN = re.compile(r"given: (\S+) as (\S+)")
-_NAMED = re.compile(r"(file|compile with): (\S.*)")
+_NAMED = re.compile(r"(file|commands of): (\S.*)")
 _KIND = re.compile(r"(scenario|vehicle|arbiter|column map|scenes)(?: onto: (\S+))?")
-_COMMANDS = re.compile(r"commands of: (\S+)")
 _SETUP = re.compile(r'setup (sh|python)(?: "([^"]+)")?\n(.*)', re.S)
 _WORDS = re.compile(
     r"(page run|run with|not run|exits|given|file:|setup|scenario|vehicle|arbiter|column map|scenes|commands of"
-    r"|compile with|alone|slow)\b"
+    r"|alone|slow)\b"
 )
 
 
@@ -55,7 +53,6 @@ class Directives:
     onto: str = ""
     file: str = ""
     commands_of: str = ""
-    compile_with: str = ""
     alone: bool = False
     slow: bool = False
 
@@ -83,11 +80,9 @@ class Directives:
         elif match := _GIVEN.fullmatch(text):
             self.given.append((match[1], match[2]))
         elif match := _NAMED.fullmatch(text):
-            setattr(self, {"file": "file", "compile with": "compile_with"}[match[1]], match[2])
+            setattr(self, match[1].replace(" ", "_"), match[2])
         elif match := _KIND.fullmatch(text):
             self.kind, self.onto = match[1], match[2] or ""
-        elif match := _COMMANDS.fullmatch(text):
-            self.commands_of = match[1]
         elif match := _SETUP.fullmatch(text):
             self.setups.append((match[2] or "", match[1], match[3]))
         elif text in ("slow", "alone"):

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.ledger import LEDGER, entries
 from tests.docs.pages import all_pages, blocks, page_name
 from tests.docs.runner import check_unrun, run_blocks
 
@@ -30,11 +29,6 @@ def test_code_blocks_run_with_their_shown_output(page, tmp_path):
 def test_unrun_code_blocks_are_valid_and_give_a_reason(page):
     for block in blocks(page):
         check_unrun(block)
-
-
-def test_unrun_code_blocks_are_in_the_ledger():
-    found = [entry for page in PAGES for entry in entries(page)]
-    assert found == LEDGER.read_text(encoding="utf-8").splitlines(), "python -m tests.docs.ledger writes it anew"
 
 
 def test_every_code_block_is_found():

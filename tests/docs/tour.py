@@ -35,7 +35,7 @@ _NETWORK = ("PIP_", "SSL_", "REQUESTS_", "HTTP_", "HTTPS_", "NO_PROXY", "http_",
 
 
 def environment(cache: Path) -> dict[str, str]:
-    """Return the variables that a reader begins with: no Python environment is active, all caches but pip's are empty."""
+    """Return the variables that a reader begins with: no Python environment is active, caches are empty."""
     kept = {name: value for name, value in os.environ.items() if name in _KEPT or name.startswith(_NETWORK)}
     own = Path(sys.prefix).resolve()
     path = [folder for folder in os.environ["PATH"].split(os.pathsep) if not Path(folder).resolve().is_relative_to(own)]
@@ -100,9 +100,11 @@ def run_page(page: Path, source: str = str(ROOT)) -> int:
                 status, output = shell.run(text, seconds)
                 verdict = "ok" if status == expected else f"FAILED: expected {expected}"
                 failed += status != expected
-                print(f"{time.monotonic() - begun:8.1f} s {status:4d}  {page_name(page)}:{line}  {text}  [{verdict}]")
+                where = f"{page_name(page)}:{line}"
+                sys.stdout.write(f"{time.monotonic() - begun:8.1f} s {status:4d}  {where}  {text}  [{verdict}]\n")
                 if status != expected:
-                    print(*(f"    | {shown}\n" for shown in output.splitlines()[-25:]), sep="", flush=True)
+                    sys.stdout.writelines(f"    | {shown}\n" for shown in output.splitlines()[-25:])
+                sys.stdout.flush()
     return failed
 
 
