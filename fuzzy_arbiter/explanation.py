@@ -149,17 +149,15 @@ def _decided(
 def _ranking(names: Sequence[str], weights: Sequence[float]) -> tuple[str | None, str | None, float, tuple[str, ...]]:
     """Return the winner, the runner-up, the margin, and the outputs that tie."""
     known = [(name, weight) for name, weight in zip(names, weights, strict=True) if weight == weight]
-    if not known:
+    if all(abs(weight) <= TIE for _, weight in known):
         return None, None, 0.0, ()
-    names, weights = zip(*known, strict=True)
-    order = sorted(range(len(names)), key=lambda k: -weights[k])
-    greatest = weights[order[0]]
-    margin = greatest - weights[order[1]] if len(names) > 1 else greatest
-    if all(abs(weight) <= TIE for weight in weights):
-        return None, None, 0.0, ()
-    if len(names) > 1 and margin <= TIE:
-        return None, None, 0.0, tuple(n for n, weight in zip(names, weights, strict=True) if greatest - weight <= TIE)
-    return names[order[0]], names[order[1]] if len(names) > 1 else None, margin, ()
+    (winner, greatest), *others = sorted(known, key=lambda item: -item[1])
+    if not others:
+        return winner, None, greatest, ()
+    runner_up, second = others[0]
+    if greatest - second <= TIE:
+        return None, None, 0.0, tuple(name for name, weight in known if greatest - weight <= TIE)
+    return winner, runner_up, greatest - second, ()
 
 
 def _decision(output: OutputDecision) -> str:

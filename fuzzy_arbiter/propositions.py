@@ -44,9 +44,15 @@ class Proposition:
     def __bool__(self) -> bool:
         raise DefinitionError(f"{self}: a proposition is not true or false; combine with &, | and ~, not and, or, not")
 
+    @property
+    def inner(self) -> tuple[Proposition, ...]:
+        """Propositions that it combines or bends."""
+        return ()
+
     def terms(self) -> Iterator[Is]:
         """Yield every statement about a term, from left to right."""
-        raise NotImplementedError
+        for part in self.inner:
+            yield from part.terms()
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,29 +97,24 @@ class _Join(Proposition):
         object.__setattr__(self, "parts", tuple(flat))
         _set_nesting(self, max(part.nesting + isinstance(part, _Join) for part in flat))
 
-    def terms(self) -> Iterator[Is]:
-        """Yield the statements of all parts."""
-        for part in self.parts:
-            yield from part.terms()
+    @property
+    def inner(self) -> tuple[Proposition, ...]:
+        """All parts."""
+        return self.parts
 
-    def _joined(self, word: str) -> str:
-        return f" {word} ".join(f"({part})" if isinstance(part, _Join) else str(part) for part in self.parts)
+    def __str__(self) -> str:
+        word = f" {type(self).__name__.lower()} "
+        return word.join(f"({part})" if isinstance(part, _Join) else str(part) for part in self.parts)
 
 
 @dataclass(frozen=True, slots=True)
 class And(_Join):
     """All of the parts hold."""
 
-    def __str__(self) -> str:
-        return self._joined("and")
-
 
 @dataclass(frozen=True, slots=True)
 class Or(_Join):
     """Any of the parts holds."""
-
-    def __str__(self) -> str:
-        return self._joined("or")
 
 
 @dataclass(frozen=True, slots=True)
@@ -128,9 +129,10 @@ class Not(Proposition):
             raise DefinitionError(f"not: got {shown(self.part)}, expected such as variable['term']")
         _set_nesting(self, self.part.nesting + (1 if isinstance(self.part, Is) else 2))
 
-    def terms(self) -> Iterator[Is]:
-        """Yield the statements of the part."""
-        yield from self.part.terms()
+    @property
+    def inner(self) -> tuple[Proposition, ...]:
+        """The part."""
+        return (self.part,)
 
     def __str__(self) -> str:
         if not isinstance(self.part, Not) and _on_one(self.part):
@@ -148,10 +150,6 @@ class Anything(Proposition):
     def __post_init__(self) -> None:
         if not isinstance(self.variable, str):
             raise DefinitionError(f"{shown(self.variable)} is any: expected the name of an input")
-
-    def terms(self) -> Iterator[Is]:
-        """Yield nothing."""
-        yield from ()
 
     def __str__(self) -> str:
         return f"{quoted(self.variable)} is any"
@@ -172,9 +170,10 @@ class Hedged(Proposition):
             raise DefinitionError(f"{self.hedge}: got {shown(self.part)}, expected such as variable['term']")
         _set_nesting(self, self.part.nesting + (1 if _on_one(self.part) else 2))
 
-    def terms(self) -> Iterator[Is]:
-        """Yield the statement of the part."""
-        yield from self.part.terms()
+    @property
+    def inner(self) -> tuple[Proposition, ...]:
+        """The part."""
+        return (self.part,)
 
     def __str__(self) -> str:
         if not _on_one(self.part):
@@ -187,11 +186,8 @@ def anything(p: Proposition) -> Iterator[str]:
     """Yield the variables that a proposition accepts in any term."""
     if isinstance(p, Anything):
         yield p.variable
-    elif isinstance(p, Not | Hedged):
-        yield from anything(p.part)
-    elif isinstance(p, _Join):
-        for part in p.parts:
-            yield from anything(part)
+    for part in p.inner:
+        yield from anything(part)
 
 
 def _on_one(p: Proposition) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from fuzzy_arbiter.definition import System, Variable, variable_names
-from fuzzy_arbiter.propositions import And, Anything, Hedged, Not, Or, Proposition
+from fuzzy_arbiter.propositions import Anything, Hedged, Proposition
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.curves import Curve
 
@@ -49,8 +49,4 @@ def curved_term(variable: Variable) -> str:
 
 def bent(p: Proposition) -> bool:
     """Return True if a condition has hedges or the term *any*."""
-    if isinstance(p, Not):
-        return bent(p.part)
-    if isinstance(p, And | Or):
-        return any(map(bent, p.parts))
-    return isinstance(p, Hedged | Anything)
+    return isinstance(p, Hedged | Anything) or any(map(bent, p.inner))
