@@ -44,22 +44,17 @@ PLATFORMS = {
 
 # in an FMU for this machine alone, a library of 64-bit ARM is also in the folders of x86-64, where FMPy looks
 _NATIVE_FMI2 = {"linux": "linux64", "windows": "win64", "darwin": "darwin64"}
-_ARM_WINDOWS = Platform(
-    "aarch64-windows", ("aarch64-windows",), "aarch64-windows-gnu", ".dll"
-)  # built only on such a machine
+# built only on such a machine
+_ARM_WINDOWS = Platform("aarch64-windows", ("aarch64-windows",), "aarch64-windows-gnu", ".dll")
 
 
 def native_platform() -> Platform:
     """Return this machine's platform."""
-    machine = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}.get(
-        platform.machine().lower()
-    )
-    system = {"Linux": "linux", "Windows": "windows", "Darwin": "darwin"}.get(platform.system())
-    if system is None or machine is None:
-        machine_name = f"{platform.system()} on {platform.machine()}"
-        raise BuildError(
-            f"no FMU can be built here, {machine_name}: expected Linux, Windows or macOS on x86_64 or aarch64"
-        )
+    machine = platform.machine().lower()
+    machine, system = {"amd64": "x86_64", "arm64": "aarch64"}.get(machine, machine), platform.system().lower()
+    if system not in _NATIVE_FMI2 or machine not in ("x86_64", "aarch64"):
+        here = f"{platform.system()} on {platform.machine()}"
+        raise BuildError(f"no FMU can be built here, {here}: expected Linux, Windows or macOS on x86_64 or aarch64")
     native = PLATFORMS.get(f"{machine}-{system}", _ARM_WINDOWS)
     return replace(native, fmi2_names=tuple(dict.fromkeys((_NATIVE_FMI2[system], *native.fmi2_names))))
 

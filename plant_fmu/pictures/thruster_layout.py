@@ -91,12 +91,7 @@ def _draw_view(ax: Axes, view: _View, vehicle: Vehicle, lines: list[ThrusterLine
     ):
         ax.plot(*point[plane], marker, color=color, markersize=5, fillstyle="none", label=label)
     pushes = [
-        _Push(
-            np.array(position),
-            np.array(direction[:2]) * _ARROW * reach,
-            direction[2],
-            ", ".join(str(i + 1) for i in numbers),
-        )
+        _Push(np.array(position), np.array(direction[:2]) * _ARROW * reach, direction[2], numbers)
         for position, members in _group_by_position(lines, plane, reach).items()
         for direction, numbers in _group_by_direction(lines, members, view).items()
     ]
@@ -106,16 +101,8 @@ def _draw_view(ax: Axes, view: _View, vehicle: Vehicle, lines: list[ThrusterLine
     for push in pushes:
         width = _LETTER * reach * np.array([len(push.numbers) / 2.0, 0.0])
         position = _free_position(push, width, occupied, _TEXT_DISTANCE * reach)
-        ax.text(
-            float(position[0]),
-            float(position[1]),
-            push.numbers,
-            color=_PUSH,
-            ha="center",
-            va="center",
-            fontsize=10,
-            fontweight="bold",
-        )
+        font = {"ha": "center", "va": "center", "fontsize": 10, "fontweight": "bold"}
+        ax.text(float(position[0]), float(position[1]), push.numbers, color=_PUSH, **font)
         occupied = np.vstack([occupied, position, position - width, position + width])
     limit = _HALF_VIEW * reach
     ax.set(xlim=(-limit, limit), ylim=(limit, -limit) if view.down else (-limit, limit), aspect="equal")
@@ -143,14 +130,14 @@ def _group_by_position(
 
 def _group_by_direction(
     lines: list[ThrusterLine], members: list[int], view: _View
-) -> dict[tuple[float, float, float], list[int]]:
-    """Group thrusters by the direction of their force: (x, y, 0) in the view's plane, or (0, 0, ±1) across it."""
-    groups: dict[tuple[float, float, float], list[int]] = {}
+) -> dict[tuple[float, float, float], str]:
+    """Group the numbers of thrusters by the direction of their force: (x, y, 0) in the view, or (0, 0, ±1) across it."""
+    groups: dict[tuple[float, float, float], str] = {}
     for i in members:
         force = lines[i].force / np.linalg.norm(lines[i].force)
         x, y = (round(float(component), 3) for component in force[[view.across, view.vertical]])
         direction = (x, y, 0.0) if np.hypot(x, y) >= _FLAT else (0.0, 0.0, float(np.sign(force @ np.array(view.eye))))
-        groups.setdefault(direction, []).append(i)
+        groups[direction] = f"{groups[direction]}, {i + 1}" if direction in groups else f"{i + 1}"
     return groups
 
 

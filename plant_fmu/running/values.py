@@ -21,17 +21,26 @@ _INTEGERS = {  # number of bits of each type of whole numbers, and True if signe
 }
 
 
-def convert_value(variable: Any, value: object) -> Value:
+def convert_value(variable: Any, value: Any) -> Value:
     """Convert a value to its variable's type."""
     kind = variable.type
     if variable.dimensions:
         raise PlantError(f"{variable.name} is an array, expected a scalar: arrays cannot be set")
+    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     if kind in _REALS:
-        return _real(variable, value)
+        if is_number and not math.isnan(value):
+            return float(value)
+        raise _type_error(variable, float(value) if is_number else value, "a number")
     if kind in _INTEGERS:
-        return _integer(variable, value, *_INTEGERS[kind])
+        if not (is_number and math.isfinite(value) and value == int(value)):
+            raise _type_error(variable, value, "a whole number")
+        bits, signed = _INTEGERS[kind]
+        minimum, maximum = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
+        if not minimum <= value <= maximum:
+            raise _type_error(variable, int(value), f"a whole number from {minimum} to {maximum}")
+        return int(value)
     if kind == "Boolean":
-        if isinstance(value, (bool, np.bool_)) or (_is_number(value) and value in (0, 1)):
+        if isinstance(value, (bool, np.bool_)) or (is_number and value in (0, 1)):
             return bool(value)
         raise _type_error(variable, value, "true or false")
     if kind == "String":
@@ -50,29 +59,6 @@ def require_settable(variable: Any, initialized: bool) -> None:
         raise PlantError(f"{variable.name} cannot be set, expected a parameter, an input or a start value")
     if initialized and variable.variability != "tunable":
         raise PlantError(f"{variable.name} cannot be set any more: initialize() fixed it, until reset()")
-
-
-def _real(variable: Any, value: object) -> float:
-    if not _is_number(value):
-        raise _type_error(variable, value, "a number")
-    number = float(value)  # type: ignore[arg-type]
-    if math.isnan(number):
-        raise _type_error(variable, number, "a number")
-    return number
-
-
-def _integer(variable: Any, value: object, bits: int, signed: bool) -> int:
-    if not _is_number(value) or not math.isfinite(value) or value != int(value):  # type: ignore[arg-type, call-overload]
-        raise _type_error(variable, value, "a whole number")
-    number = int(value)  # type: ignore[call-overload]
-    minimum, maximum = (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1) if signed else (0, 2**bits - 1)
-    if not minimum <= number <= maximum:
-        raise _type_error(variable, number, f"a whole number from {minimum} to {maximum}")
-    return int(number)
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
 
 
 def _type_error(variable: Any, value: object, expected: str) -> PlantError:

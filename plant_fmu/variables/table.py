@@ -224,26 +224,18 @@ def _parameters(vehicle: Vehicle) -> Iterator[Variable]:
             description = f"{force} on the body per newton of thruster {j + 1}"
             yield _parameter(name, member, quantity, description, vehicle.thruster_matrix[i, j])
     for i in range(vehicle.n_thrusters):
-        for name, quantity, what, start in (
-            ("min", q.FORCE, "Most negative force of thruster {}", vehicle.thrust_min[i]),
-            ("max", q.FORCE, "Maximum force of thruster {}", vehicle.thrust_max[i]),
-            ("time_constant", q.TIME_CONSTANT, "Lag of thruster {}, 0 for none", vehicle.thrust_time_constant[i]),
-            ("rate_limit", q.FORCE_RATE, "Rate limit of thruster {}'s force, 0 for none", vehicle.thrust_rate_limit[i]),
-            (
-                "dead_band",
-                q.DEAD_BAND,
-                "Dead band of thruster {}, as a fraction of its range",
-                vehicle.thrust_dead_band[i],
-            ),
-            (
-                "curve",
-                q.FRACTION,
-                "Force of thruster {}: 0 linear in its command, 1 quadratic",
-                vehicle.thrust_curve[i],
-            ),
-            ("effectiveness", q.FRACTION, "Effectiveness of thruster {}: 1 full, 0 failed", 1.0),
+        for name, quantity, what in (
+            ("min", q.FORCE, "Most negative force of thruster {}"),
+            ("max", q.FORCE, "Maximum force of thruster {}"),
+            ("time_constant", q.TIME_CONSTANT, "Lag of thruster {}, 0 for none"),
+            ("rate_limit", q.FORCE_RATE, "Rate limit of thruster {}'s force, 0 for none"),
+            ("dead_band", q.DEAD_BAND, "Dead band of thruster {}, as a fraction of its range"),
+            ("curve", q.FRACTION, "Force of thruster {}: 0 linear in its command, 1 quadratic"),
+            ("effectiveness", q.FRACTION, "Effectiveness of thruster {}: 1 full, 0 failed"),
         ):
-            yield _parameter(f"thrust_{name}[{i + 1}]", f"thrust_{name}[{i}]", quantity, what.format(i + 1), start)
+            name = f"thrust_{name}"
+            start = getattr(vehicle, name)[i] if name != "thrust_effectiveness" else 1.0
+            yield _parameter(f"{name}[{i + 1}]", f"{name}[{i}]", quantity, what.format(i + 1), start)
 
     description = "Limit on the norm of the wrench input's force, which keeps its direction; the moment has none"
     yield _parameter("wrench_force_limit", "wrench_force_limit", q.FORCE_LIMIT, description, q.FORCE_LIMIT.maximum)
@@ -263,22 +255,15 @@ def _environment(vehicle: Vehicle) -> Iterator[Variable]:
     for name, quantity, description, start in (
         ("current_correlation_time", q.LONG_TIME, "Correlation time of the current's Gauss-Markov part", 60.0),
         ("current_variation_period", q.LONG_TIME, "Time between knots of that part, linear between them", 1.0),
-        (
-            "hull_radius",
-            q.RADIUS,
-            "Radius of the sphere that touches the surface (about r_B) and the bottom (about the origin)",
-            vehicle.hull_radius,
-        ),
+        ("hull_radius", q.RADIUS,
+         "Radius of the sphere that touches the surface (about r_B) and the bottom (about the origin)",
+         vehicle.hull_radius),
         ("bottom_depth", q.LENGTH, "Depth of the flat bottom; the maximum for none", q.LENGTH.maximum),
         ("bottom_friction", q.FRICTION, "Coulomb's friction coefficient of the bottom, viscous below 1 cm/s", 0.4),
-        (
-            "bottom_time_constant",
-            q.TIME_CONSTANT,
-            "Time constant of contact with the bottom, at least 4 substeps",
-            0.02,
-        ),
+        ("bottom_time_constant", q.TIME_CONSTANT, "Time constant of contact with the bottom, at least 4 substeps",
+         0.02),
         ("gravity", q.GRAVITY, "Gravity that the IMU senses", 9.81),
-    ):
+    ):  # fmt: skip
         yield _parameter(name, name, quantity, description, start)
 
 

@@ -66,6 +66,9 @@ class CoSimulationInstance:
                 loggingOn=logging_on,
             )
         self.time = 0.0
+        # FMPy has FMI 3.0's names for those of FMI 2.0 too
+        self.save, self.restore, self.free = self.fmu.getFMUState, self.fmu.setFMUState, self.fmu.freeFMUState
+        self.deserialize = self.fmu.deserializeFMUState
 
     def set(self, **values):
         self.set_values(values)
@@ -120,22 +123,8 @@ class CoSimulationInstance:
         self.fmu.doStep(self.time, h)
         self.time += h
 
-    # ---- FMU state ----
-
-    def save(self):
-        return self.fmu.getFMUState() if self.fmi == 3 else self.fmu.getFMUstate()
-
-    def restore(self, state):
-        (self.fmu.setFMUState if self.fmi == 3 else self.fmu.setFMUstate)(state)
-
-    def free(self, state):
-        (self.fmu.freeFMUState if self.fmi == 3 else self.fmu.freeFMUstate)(state)
-
     def serialize(self, state):
-        return bytes(self.fmu.serializeFMUState(state) if self.fmi == 3 else self.fmu.serializeFMUstate(state))
-
-    def deserialize(self, data):
-        return self.fmu.deserializeFMUState(data) if self.fmi == 3 else self.fmu.deSerializeFMUstate(data)
+        return bytes(self.fmu.serializeFMUState(state))
 
     # ---- model exchange ----
 

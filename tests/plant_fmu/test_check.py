@@ -1,13 +1,11 @@
 """`plant_fmu check`: invalid FMUs, and importers that fail, crash or hang."""
 
 import dataclasses
-import shutil
-import stat
 import zipfile
 
 import pytest
 
-from plant_fmu import Plant, PlantError, load_vehicle, unpacking
+from plant_fmu import Plant, PlantError, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.build import cached_fmu
 from plant_fmu.checking.check import IMPORTERS, check_fmu
@@ -22,20 +20,11 @@ from tests.plant_fmu import importers
 
 FMPY = next(importer for importer in IMPORTERS if importer.name == "FMPy")
 PLANT = next(importer for importer in IMPORTERS if importer.name.startswith("Plant"))
-DESCRIPTION = '<fmiModelDescription fmiVersion="3.0"><ModelVariables/></fmiModelDescription>'
 
 
 @pytest.fixture
 def odin():
     return cached_fmu(load_vehicle("odin"), 3)
-
-
-def write(path, **members):
-    """Write a zip of members whose names have __ for a slash."""
-    with zipfile.ZipFile(path, "w") as archive:
-        for name, text in members.items():
-            archive.writestr(name.replace("__", "/"), text)
-    return path
 
 
 def changed(source, target, change):
@@ -44,16 +33,6 @@ def changed(source, target, change):
         for name in old.namelist():
             new.writestr(name, change(name, old.read(name)))
     return target
-
-
-def refused(path, capsys, *words):
-    assert main(["check", str(path)]) == 2
-    captured = capsys.readouterr()
-    assert captured.out == ""
-    assert captured.err.startswith(f"plant_fmu: {path}: ")
-    assert captured.err.count("\n") == 1
-    for word in words:
-        assert word in captured.err
 
 
 @pytest.mark.medium
@@ -179,50 +158,19 @@ def test_check_does_not_apply_without_a_binary_for_this_platform(odin, tmp_path)
     assert statuses == {("", "ok"), ("CS", "does not apply")}
 
 
-def test_invalid_fmu_files_are_rejected(tmp_path, capsys):
-    refused(tmp_path / "none.fmu", capsys, "No such file")
-    refused(tmp_path, capsys, "directory")
+def test_files_that_are_no_fmu_are_named(tmp_path, capsys):
+    """In one line; tests/security has hostile ones."""
     (tmp_path / "text.fmu").write_text("no zip")
-    refused(tmp_path / "text.fmu", capsys, "zip")
-    refused(write(tmp_path / "empty.fmu"), capsys, "no modelDescription.xml")
-    refused(write(tmp_path / "bad.fmu", **{"modelDescription.xml": "<fmi"}), capsys, "no XML")
-    refused(write(tmp_path / "other.fmu", **{"modelDescription.xml": "<svg/>"}), capsys, "expected 2.0 or 3.0")
-    old = DESCRIPTION.replace("3.0", "1.0")
-    refused(write(tmp_path / "old.fmu", **{"modelDescription.xml": old}), capsys, "'1.0'", "expected 2.0 or 3.0")
-    strange = DESCRIPTION.replace("<ModelVariables/>", "<ModelVariables><Float64/></ModelVariables>")
-    refused(write(tmp_path / "strange.fmu", **{"modelDescription.xml": strange}), capsys, "name")
-
-
-@pytest.mark.parametrize("name", ["../out.txt", "a/../../out.txt", "/out.txt", "C:/out.txt", "a\\..\\out.txt"])
-def test_path_traversal_is_rejected(tmp_path, capsys, name):
-    path = write(tmp_path / "slip.fmu", **{"modelDescription.xml": DESCRIPTION, name: "x"})
-    refused(path, capsys, "leads out")
-
-
-def test_links_are_refused(tmp_path, capsys):
-    path = write(tmp_path / "link.fmu", **{"modelDescription.xml": DESCRIPTION})
-    with zipfile.ZipFile(path, "a") as archive:
-        link = zipfile.ZipInfo("resources/link")
-        link.external_attr = (stat.S_IFLNK | 0o777) << 16
-        archive.writestr(link, "/etc")
-    refused(path, capsys, "leads out")
-
-
-def test_oversized_members_are_rejected(tmp_path, capsys, monkeypatch):
-    path = write(tmp_path / "large.fmu", **{"modelDescription.xml": DESCRIPTION, "resources/zeros": "0" * 10_000})
-    monkeypatch.setattr(unpacking, "MAX_SIZE", 9_999)
-    refused(path, capsys, "refused", "expected at most 9999")
-    monkeypatch.setattr(unpacking, "MAX_FILES", 1)
-    refused(path, capsys, "holds 2 files")
-
-
-def test_damaged_files_are_refused(odin, tmp_path, capsys):
-    damaged = tmp_path / "damaged.fmu"
-    shutil.copy(odin, damaged)
-    data = bytearray(damaged.read_bytes())
-    data[len(data) // 3] ^= 0xFF
-    damaged.write_bytes(data)
-    refused(damaged, capsys)
+    with zipfile.ZipFile(tmp_path / "empty.fmu", "w"):
+        pass
+    for path, words in (
+        (tmp_path / "none.fmu", "No such file"), (tmp_path, "directory"), (tmp_path / "text.fmu", "zip"),
+        (tmp_path / "empty.fmu", "no modelDescription.xml"),
+    ):  # fmt: skip
+        assert main(["check", str(path)]) == 2
+        captured = capsys.readouterr()
+        assert captured.out == "" and captured.err.count("\n") == 1
+        assert captured.err.startswith(f"plant_fmu: {path}: ") and words in captured.err
 
 
 def test_invalid_tasks_are_rejected(odin):

@@ -110,7 +110,6 @@ def test_unreferenced_plant_is_freed(scratch):
 def test_failed_construction_leaves_no_files(tmp_path, scratch, monkeypatch):
     for edit, drop, words in (
         (lambda root: root.remove(root.find("CoSimulation")), (), "offers no co-simulation"),
-        (lambda root: root.set("fmiVersion", "1.0"), (), "FMI version is '1.0', expected 2.0 or 3.0"),
         (lambda root: root.set("instantiationToken", "{0}"), (), "token"),
         (lambda root: root.find("ModelVariables")[0].set("unit", "parsec"), (), "parsec"),
         (lambda root: None, ("binaries/",), "has no binary for this machine"),
@@ -118,14 +117,9 @@ def test_failed_construction_leaves_no_files(tmp_path, scratch, monkeypatch):
         with pytest.raises(PlantError, match=words) as caught:
             Plant(edited(tmp_path, edit, drop=drop))
         assert str(caught.value).startswith(str(tmp_path / "edited.fmu: ")) and "\n" not in str(caught.value)
-    for content in (b"", b"no zip"):
-        (tmp_path / "text.fmu").write_bytes(content)
-        with pytest.raises(PlantError, match="is no FMU: File is not a zip file"):
-            Plant(tmp_path / "text.fmu")
-    with zipfile.ZipFile(tmp_path / "empty.fmu", "w"):
-        pass
-    with pytest.raises(PlantError, match=r"there is no modelDescription.xml"):
-        Plant(tmp_path / "empty.fmu")
+    (tmp_path / "text.fmu").write_bytes(b"no zip")
+    with pytest.raises(PlantError, match="is no FMU: File is not a zip file"):
+        Plant(tmp_path / "text.fmu")
 
     def interrupted(instance, brief):
         raise KeyboardInterrupt

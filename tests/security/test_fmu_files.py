@@ -169,7 +169,11 @@ def test_oversized_member_list_is_rejected(tmp_path, read):
 
 def test_excessive_member_count_is_rejected(tmp_path, read, monkeypatch):
     monkeypatch.setattr(unpacking, "MAX_FILES", 5)
-    assert "holds 7 files" in read(archive(tmp_path / "it.fmu", [(f"resources/{i}", "") for i in range(6)]))
+    path = archive(tmp_path / "it.fmu", [(f"resources/{i}", "0" * 1000) for i in range(6)])
+    assert "holds 7 files" in read(path)
+    monkeypatch.setattr(unpacking, "MAX_FILES", 7)
+    monkeypatch.setattr(unpacking, "MAX_SIZE", 5_999)
+    assert "bytes when extracted, expected at most 5999" in read(path)
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no pipes by name")
@@ -240,6 +244,7 @@ VARIABLE = 'name="time" valueReference="0" causality="independent"/>'
         ("<ModelV", '<DefaultExperiment stopTime="INF"/><ModelV', "stopTime"),
         ("<ModelV", '<DefaultExperiment startTime="x"/><ModelV', "startTime"),
         ('fmiVersion="3.0"', 'fmiVersion="1.0"', "FMI version is '1.0', expected 2.0 or 3.0"),
+        (SOUND, "<svg/>", "FMI version is '', expected 2.0 or 3.0"),
         ('fmiVersion="3.0"', 'fmiVersion="3"', "FMI version is '3', expected 2.0 or 3.0"),
         ('fmiVersion="3.0"', 'fmiVersion="2.1"', "FMI version"), ('fmiVersion="3.0"', "", "FMI version is ''"),
         ('modelName="m"', 'modelName="m" numberOfEventIndicators="1000000000"', "numberOfEventIndicators"),
