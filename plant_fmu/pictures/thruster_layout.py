@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,7 +101,7 @@ def _draw_view(ax: Axes, view: _View, vehicle: Vehicle, lines: list[ThrusterLine
     for push in pushes:
         width = _LETTER * reach * np.array([len(push.numbers) / 2.0, 0.0])
         position = _free_position(push, width, occupied, _TEXT_DISTANCE * reach)
-        font = {"ha": "center", "va": "center", "fontsize": 10, "fontweight": "bold"}
+        font: dict[str, Any] = {"ha": "center", "va": "center", "fontsize": 10, "fontweight": "bold"}
         ax.text(float(position[0]), float(position[1]), push.numbers, color=_PUSH, **font)
         occupied = np.vstack([occupied, position, position - width, position + width])
     limit = _HALF_VIEW * reach
@@ -131,7 +131,7 @@ def _group_by_position(
 def _group_by_direction(
     lines: list[ThrusterLine], members: list[int], view: _View
 ) -> dict[tuple[float, float, float], str]:
-    """Group the numbers of thrusters by the direction of their force: (x, y, 0) in the view, or (0, 0, ±1) across it."""
+    """Group thrusters by the direction of their force: (x, y, 0) in the plane of a view, or (0, 0, ±1) across it."""
     groups: dict[tuple[float, float, float], str] = {}
     for i in members:
         force = lines[i].force / np.linalg.norm(lines[i].force)
