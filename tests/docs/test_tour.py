@@ -29,7 +29,7 @@ a = "$A"
 ```sh
 grep -F '"$A"' b.toml
 sleep 1000
-test ! -e there
+test -f given.txt
 cat nowhere.txt
 sh -c "trap 'exit 7' INT; sleep 1000"
 true for-ever
@@ -45,7 +45,7 @@ def test_commands_run_in_order_and_failures_are_counted(tmp_path, monkeypatch, c
     monkeypatch.setenv("PYTHONPATH", "/nowhere")
     monkeypatch.setattr(tour, "ENDLESS", (("sleep", "0.2"), ("sh -c", "0.2"), ("true for-ever", "5")))
     monkeypatch.setattr(tour, "STATUS", (("false", "1"),))
-    monkeypatch.setattr(tour, "FRESH", (("test !", ""),))
+    monkeypatch.setattr(tour, "FRESH", (("test -f given.txt", ""),))
     page = tmp_path / "page.md"
     page.write_text(PAGE)
     assert tour.run_page(page, str(tmp_path)) == 3
