@@ -88,7 +88,8 @@ def verdict(summary: dict[str, Any]) -> str:
     commands = summary.get("commands", 0)
     steering = f" It received {commands} command{'s' if commands > 1 else ''} on the way." if commands else ""
     laws = _above_surface(summary) + force + _law_reports(summary)
-    return goal + regions + laws + steering + ending + _goal_miss(summary)
+    miss = f" {summary['goal_miss']}" if summary["goal_miss"] else ""
+    return goal + regions + laws + steering + ending + miss
 
 
 def isolation_text(thruster: int, isolated: bool) -> str:
@@ -110,11 +111,6 @@ def _law_reports(summary: dict[str, Any]) -> str:
     if rejected >= _FEW_REJECTED:
         text += f" It rejected {rejected:.0%} of the position and velocity samples."
     return text
-
-
-def _goal_miss(summary: dict[str, Any]) -> str:
-    """Describe why the goal was missed."""
-    return f" {summary['goal_miss']}" if summary["goal_miss"] else ""
 
 
 def _above_surface(summary: dict[str, Any]) -> str:

@@ -10,11 +10,9 @@ import tomllib
 import pytest
 import tomli_w
 
-from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.errors import CosimError
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import _folder as scenarios
-from cosim.simulation.commands.sources import read_log
 from fuzzy_arbiter import formats as arbiters
 from plant_fmu import load_vehicle
 from plant_fmu.toml_tables import MAX_FILE
@@ -125,11 +123,3 @@ def test_vehicle_names_reject_special_characters(tmp_path, name):
     """They become names of files, and of functions in C."""
     table = tomllib.loads((vehicles() / "odin.toml").read_text(encoding="utf-8"))
     assert "name" in error_of(load_vehicle, tmp_path / "it.toml", tomli_w.dumps(table | {"name": name}))
-
-
-@pytest.mark.parametrize(
-    "line", [b"[" * 100_000, b'{"seed":' * 50_000, b"\xff", b"{}", b"1", b'{"seed":1' + b"0" * 5000]
-)
-def test_invalid_scenes_and_commands_are_rejected(tmp_path, line):
-    assert error_of(lambda path: decode_scene(path.read_bytes()), tmp_path / "scene", line)
-    assert error_of(read_log, tmp_path / "log", line + b"\n")
