@@ -68,10 +68,11 @@ def ran(tmp_path, capsys):
         ("", {"duration": 0.4}, "m from the goal, had 0.4 s."),
         ("", {"duration": 6.0, "goal": 6.0}, "The time was too short: the vehicle, "),
         ("", {"duration": 14.0, "goal": 3.0}, "The time was too short: the vehicle was in the goal for the last "),
-        ("", {"current": -1.6}, "The thrust was not enough: "),
+        ("", {"current": -1.3}, "The thrust was not enough: "),
+        ("", {"current": -1.6}, "The vehicle was adrift: "),
         ("[sensing]\ndead_from = 1.0\ndead_for = 99.0\n", {"goal": 9.0}, "the law had no measurement for the last 19."),
     ],
-    ids=["covered", "wall", "shortest", "short", "late", "current", "blind"],
+    ids=["covered", "wall", "shortest", "short", "late", "current", "strong current", "blind"],
 )
 def test_missed_goal_has_its_cause_in_console_summary_and_events(ran, text, changes, words):
     run, printed = ran(text, **changes)
@@ -84,12 +85,12 @@ def test_missed_goal_has_its_cause_in_console_summary_and_events(ran, text, chan
 
 @pytest.mark.medium
 def test_isolated_thruster_is_reported_once_in_the_same_words(ran):
-    run, printed = ran(SENSING + "[[failures]]\nthruster = 3\ntime = 4.0\n", duration=28.0, goal=12.0)
+    run, printed = ran(SENSING + "[[failures]]\nthruster = 5\ntime = 4.0\n", duration=28.0, goal=12.0)
     (isolation,) = run.summary["isolations"]
-    assert isolation["thruster"] == 3 and 4.0 < isolation["time"] < 18.0 and run.summary["goal_miss"] is None
-    assert f"It isolated thruster 3 at {isolation['time']:.2f} s." in printed
+    assert isolation["thruster"] == 5 and 4.0 < isolation["time"] < 18.0 and run.summary["goal_miss"] is None
+    assert f"It isolated thruster 5 at {isolation['time']:.2f} s." in printed
     texts = {event.text: event.time for event in events_of(run, [])}
-    assert texts["The law isolates thruster 3"] == isolation["time"]
+    assert texts["The law isolates thruster 5"] == isolation["time"]
 
 
 @pytest.mark.medium
