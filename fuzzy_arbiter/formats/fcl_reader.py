@@ -73,9 +73,6 @@ def read(text: str, block: str | None = None) -> System:
             inputs.append(Variable(section.name, _universe(section, places), terms))
     names = [v.name for v in inputs]
     outputs = [_output(section, names, usual) for section in _declared(sections, "VAR_OUTPUT", "DEFUZZIFY")]
-    for v in outputs:
-        if v.name in names:
-            refuse(begin.line, f"{v.name!r} is declared twice")
     any_is_term = {term for v in inputs for term in v.term_names if term.lower() == "any"}
     norms, rules = join_rule_blocks([_rules(section, any_is_term) for section in rule_blocks])
     if not fuzzylite:

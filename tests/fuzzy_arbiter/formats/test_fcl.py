@@ -159,6 +159,14 @@ def test_numbers_are_those_of_the_standard():
         ("END_FUNCTION_BLOCK\n", "", r"line 34: got the end of the file after 'END_RULEBLOCK', expected VAR_INPUT"),
         ("END_FUNCTION_BLOCK\n", "END_FUNCTION_BLOCK FUNCTION_BLOCK", r"line 34: got another FUNCTION_BLOCK"),
         ("TRIAN 0 5 10;", "TRIAN 40 45 50; RANGE := (0 .. 30);", r"line 19: .*term 'cheap' has no area"),
+        ("food : real;", "food, service : REAL;", r"line 7: 'service' is declared twice"),
+        ("VAR_OUTPUT tip", "VAR_OUTPUT food : REAL; tip", r"line 9: 'food' has no DEFUZZIFY"),
+        ("FUZZIFY food", "FUZZIFY service", r"line 15: FUZZIFY 'service' appears twice"),
+        ("TERM poor :=", "TERM range :=", r"line 11: TERM 'range', expected a term's name"),
+        ("DEFAULT := 0;", "RANGE := (0, 30);", r"line 24: RANGE of 'tip' is \( 0 , 30 \), expected"),
+        ("DEFAULT := 0;", "LOCK : PREVIOUS, RANGE;", r"line 24: LOCK is PREVIOUS , RANGE, expected PREVIOUS, RANGE"),
+        ("DEFAULT := 0;\n", "DEFAULT := 0\n", r"line 25: got 'END_DEFUZZIFY' after '0', expected ;"),
+        ("END_FUNCTION_BLOCK\n", "END_FUNCTION_BLOCK ;", r"line 34: got ';' after 'END_FUNCTION_BLOCK', expected the"),
     ],
 )  # fmt: skip
 def test_unknown_constructs_are_rejected_with_their_line(old, new, fault):
@@ -246,3 +254,13 @@ def test_duplicate_term_names_are_rejected():
     for head in ("", "(* generated with fuzzylite *)"):
         with pytest.raises(DefinitionError, match="two terms are named 'low', expected each name once"):
             reads(head + BLOCKS.replace("small", "low"), "fcl")
+
+
+def test_words_of_the_standard_and_of_fuzzylite():
+    """LM and RM are the left and the right most maximum of IEC 61131-7; NMIN is fuzzylite's."""
+    for word, name in (("COA", "bisector"), ("MM", "mom"), ("LM", "som"), ("RM", "lom")):
+        assert reads(OTHERS.replace("METHOD : COG", f"METHOD : {word}"), "fcl").outputs[0].defuzzifier == name
+    for word, name in (("NMIN", "nilpotent_minimum"), ("DPROD", "drastic_product"), ("HPROD", "hamacher_product")):
+        assert reads(OTHERS.replace("AND : MIN", f"AND : {word}"), "fcl").conjunction == name
+    locked = reads(OTHERS.replace("DEFAULT := 0;", "LOCK : PREVIOUS;"), "fcl").outputs[0]
+    assert (locked.lock_previous, locked.lock_range) == (True, False)
