@@ -154,6 +154,9 @@ def test_normalizations_match_their_formulas():
     assert Arbiter()(inputs) == pytest.approx([1 / 2, 5 / 32, 1 / 2])
     assert Arbiter(normalization="sum")(inputs) == pytest.approx([16 / 37, 5 / 37, 16 / 37])
     assert Arbiter(normalization="max")(inputs) == pytest.approx([1, 5 / 16, 1])
+    for normalization in ("sum", "max"):  # where all are 0, they stay 0
+        resting = Arbiter(normalization=normalization)
+        assert resting([0, 0, 0]) == tuple(resting.batch([[0, 0, 0]])[0]) == (0, 0, 0)
     for normalization in ("sum", "max"):
         for engine in ENGINES:
             assert Arbiter(normalization=normalization, engine=engine)([0, 0, 0]) == (0, 0, 0)  # not 0/0
