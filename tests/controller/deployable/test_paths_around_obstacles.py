@@ -518,7 +518,7 @@ def test_path_is_updated_and_replaced_by_a_sufficiently_cheaper_one():
         blocked = plan.cost[1] > 0.3 * np.linalg.norm(np.diff([start, *way], axis=0), axis=1).sum()
         dear = plan.cost[2] > 0.3 * np.linalg.norm(np.diff([start, *way], axis=0), axis=1).sum()
         looks_again = plan.blocked[1] > 0  # for other paths, after a long search
-        assert blocked or dear or looks_again or plan.search.room[0] == 3.0
+        assert blocked or dear or looks_again or plan.search.sampling_margin[0] == 3.0
         grown += plan.search.of_goal.size[0] != nodes
         if phase == way_round._BEGIN and plan.phase[0] == way_round._CANDIDATE:  # the path, in one call
             np.testing.assert_allclose(way, before, rtol=1e-12)
