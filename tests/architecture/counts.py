@@ -10,7 +10,7 @@ from collections import Counter
 from dataclasses import astuple, dataclass
 from pathlib import Path
 
-from tests.architecture import banned, public
+from tests.architecture import public
 from tests.architecture.modules import FILES, PACKAGES, ROOT, tree_of
 from tests.architecture.rooms import room_of
 
@@ -151,7 +151,6 @@ def table() -> list[tuple[str, str]]:
             "  generated besides",
             f"{all_words - sum(by_hand.values())}: {', '.join(GENERATED)}; tables of figures and keys",
         ),
-        ("banned words found", str(len(list(banned.find_all())))),
     ]
 
 
