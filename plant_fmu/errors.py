@@ -26,8 +26,8 @@ class TableError(PlantFmuError):
     """Raised for a TOML file that cannot be read, or has a key that is missing, unknown or of the wrong type."""
 
 
-class VehicleError(PlantFmuError):
-    """Raised for an unknown vehicle, or for numbers that contradict physics."""
+class VehicleError(TableError):
+    """Raised for an unknown vehicle, or for a vehicle file with an invalid key or numbers that contradict physics."""
 
 
 class BuildError(PlantFmuError):

@@ -189,9 +189,8 @@ def load_vehicle(name_or_file: str | Path) -> Vehicle:
     Raises
     ------
     VehicleError
-        If there is no such vehicle, or its numbers contradict each other.
-    TableError
-        If the file has a missing, unknown or mistyped key, or a number out of range.
+        If there is no such vehicle, a key of its file is missing, unknown or invalid, or its numbers contradict each
+        other. It is a `TableError`.
 
     Examples
     --------
@@ -219,9 +218,7 @@ def _shipped(name: str) -> Vehicle:
 def _decode(path: Path, where: str) -> Vehicle:
     try:
         return _make_vehicle(decode(read_toml(path), _File))
-    except TableError as error:
-        raise TableError(f"{where}: {error}") from error
-    except ValueError as error:
+    except (TableError, ValueError) as error:
         raise VehicleError(f"{where}: {error}") from error
 
 

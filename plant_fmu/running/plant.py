@@ -44,7 +44,7 @@ class Plant(CoSimulationInstance):
     ------
     PlantError
         If the FMU cannot be loaded, or there is no such FMI version.
-    VehicleError, TableError, BuildError
+    VehicleError, BuildError
         If there is no such vehicle, or no FMU of it can be made.
 
     Notes
