@@ -53,7 +53,7 @@ def test_planner_receives_law_inputs_at_10_hz_and_its_forces_are_held_between_pl
     assert len(planner.given) == 20 and len(nmpc.NmpcLaw.function.times) == 20
     assert [given["again"] for given in planner.given] == [True] + [False] * 19
     first, last = planner.given[0], planner.given[-1]
-    assert first["goal"] == pytest.approx(scene.goal.center)
+    assert first["goal"] == pytest.approx(scene.goal.centre)
     shallowest, deepest = scene.depth_band
     assert first["hard"] == [
         [pytest.approx([0.0, 0.0, 1.0, shallowest])] * 12,
@@ -63,7 +63,7 @@ def test_planner_receives_law_inputs_at_10_hz_and_its_forces_are_held_between_pl
     assert not any("vehicle" in given for given in planner.given[1:])
     for given, time in ((first, 0.0), (last, 1.9)):
         for ball, obstacle in zip(given["spheres"], scene.obstacles, strict=True):
-            assert ball[:3] == pytest.approx(np.array(obstacle.center) + time * np.array(obstacle.velocity))
+            assert ball[:3] == pytest.approx(np.array(obstacle.centre) + time * np.array(obstacle.velocity))
             assert ball[3:] == pytest.approx([obstacle.radius, *obstacle.velocity])
     assert first["position"] == pytest.approx(scene.start, abs=0.1)
     assert not {"weight_minus_buoyancy", "current", "failed_thruster"} & set(first)

@@ -74,7 +74,17 @@ def _body_in_c(name: str) -> str:
 
 
 def _expression_in_c(node: ast.expr) -> str:
-    if isinstance(node, ast.IfExp):
-        test = ast.unparse(node.test).replace(" and ", " && ")
-        return f"{test} ? {ast.unparse(node.body)} : {_expression_in_c(node.orelse)}"
-    return ast.unparse(node)
+    """Format an expression of conditions, sums and products in C."""
+    match node:
+        case ast.IfExp(test, body, orelse):
+            return " ".join((_expression_in_c(test), "?", _expression_in_c(body), ":", _expression_in_c(orelse)))
+        case ast.BoolOp(ast.And(), parts):
+            return " && ".join(map(_expression_in_c, parts))
+    return ast.unparse(_Conditions().visit(node))
+
+
+class _Conditions(ast.NodeTransformer):
+    """Replaces the conditions within an expression by their text in C."""
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.Name:
+        return ast.Name(f"({_expression_in_c(node)})")
