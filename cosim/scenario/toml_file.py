@@ -202,10 +202,8 @@ def _index(items: list[Any], part: str, key: str) -> int:
         return names.index(part)
     if part.isdecimal() and len(part) < 10 and int(part) < len(items):
         return int(part)
-    raise ScenarioError(
-        f"--set {_short(key)}: {_short(part)!r} is not one of {', '.join(map(str, names))}, "
-        f"nor a number below {len(items)}"
-    )
+    known = f"one of {', '.join(map(str, names))}, nor " if names else ""
+    raise ScenarioError(f"--set {_short(key)}: {_short(part)!r} is not {known}a number below {len(items)}")
 
 
 def flatten(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
