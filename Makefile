@@ -56,7 +56,7 @@ MAVLINK := $(call csv,$(addprefix cosim/mavlink/,wire/encode.py wire/framing.py 
 coverage: $(VENV)/extras
 	mkdir -p build
 	$(call cover,98,fuzzy_arbiter/*,tests/fuzzy_arbiter)
-	$(call cover,88,plant_fmu/*,tests/plant_fmu)
+	$(call cover,88,plant_fmu/*,tests/plant_fmu tests/security/test_fmu_files.py)
 	SUBREACH_INTERPRETED=1 $(call cover,97,$(MATHEMATICS),$(MATHEMATICS_TESTS) -W ignore::RuntimeWarning)
 	$(call cover,93,$(MAVLINK),tests/cosim/mavlink/test_*.py)
 
