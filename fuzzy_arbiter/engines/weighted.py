@@ -50,12 +50,12 @@ def _function(shape: Any, inputs: Sequence[str], outputs: Sequence[str]) -> Call
     if isinstance(shape, Constant):
         return lambda cut, columns: shape.value
     if isinstance(shape, Value):
-        of = shape.function(inputs, outputs)
-        return lambda cut, columns: of(columns)
+        function = shape.function(inputs, outputs)
+        return lambda cut, columns: function(columns)
 
-    def place(cut: Any, columns: Any) -> Any:
+    def position(cut: Any, columns: Any) -> Any:
         if isinstance(cut, np.ndarray):  # a strength of 0 has no weight, so that its place does not matter
             return np.array([place_of(shape, w) if w > 0.0 else 0.0 for w in cut.tolist()])
         return place_of(shape, cut)
 
-    return place
+    return position

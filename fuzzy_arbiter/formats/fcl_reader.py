@@ -133,13 +133,13 @@ def _universe(section: Block, places: Sequence[float], weighted: bool = False) -
     if text:
         limits = _RANGE.fullmatch(text)
         if not limits:
-            refuse(line, f"RANGE of {section.name!r} is {text}, expected (least .. greatest)")
+            refuse(line, f"RANGE of {section.name!r} is {text}, expected (minimum .. maximum)")
         low, high = limits.groups()
-        return read_number(low, line, "the least value"), read_number(high, line, "the greatest value")
+        return read_number(low, line, "the minimum"), read_number(high, line, "the maximum")
     universe = universe_of(places)
     if universe is None and weighted:  # values do not depend on the universe
         return min(places, default=0.0) - 1.0, max(places, default=0.0) + 1.0
-    expected = "expected RANGE := (least .. greatest);"
+    expected = "expected RANGE := (minimum .. maximum);"
     return universe or refuse(section.line, f"{section.name!r} has no range, and its points make none; {expected}")
 
 

@@ -185,8 +185,8 @@ def side_by_side(one: str, results: Results, other: str, others: Results, column
         ):
             if not mask.any():
                 continue
-            at = some[mask[some]]
-            axes.plot(x[at], y[at], mark, color=color, markersize=3.5, alpha=0.7, label=f"{what} ({mask.sum()})")
+            rows = some[mask[some]]
+            axes.plot(x[rows], y[rows], mark, color=color, markersize=3.5, alpha=0.7, label=f"{what} ({mask.sum()})")
         axes.plot([low, high], [low, high], color=BLACK, linewidth=0.8)
         axes.set(xlabel=f"{label}, {one}", ylabel=f"{label}, {other}")
     legend_above(figure, panels[0])

@@ -38,8 +38,8 @@ def write_sweep_page(folder: Path, replays: int) -> Path:
             raise RunError(f"{folder / SUMMARY}: holds no sweep")
         results = complete_results(folder, schema_of(tuple(summary["vary"])))
         worst = worst_table(results, folder, max(LISTED, replays))
-        most = set(_by_weight(summary)[:_SHOWN])
-        ranked = [key for key in summary["vary"] if key in most]
+        shown = set(_by_weight(summary)[:_SHOWN])
+        ranked = [key for key in summary["vary"] if key in shown]
         rates = {fact: summary[fact] for fact in FACTS}
         values = {
             "worst": worst, "min_rho": _MIN_RHO, "max_values": _VALUES,

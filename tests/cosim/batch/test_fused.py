@@ -103,7 +103,7 @@ def test_outcome_equals_the_summary_of_a_recorded_run(name, tmp_path):
         recorder = Recorder(tmp_path, master.signals.columns)
         master.run([recorder])
         recorder.close()
-    said = summarize(scenario, load_record(tmp_path), "completed", None)
+    summary = summarize(scenario, load_record(tmp_path), "completed", None)
     with FusedFlyer(Variation(scenario, [])) as flyer:
         outcome, _ = flyer.fly_one(scenario)
 
@@ -112,15 +112,15 @@ def test_outcome_equals_the_summary_of_a_recorded_run(name, tmp_path):
         assert outcome[field] == pytest.approx(expected, rel=1e-9, abs=1e-12, nan_ok=True), field
 
     for field in ("reached", "reach_time", "settled", "settle_time", "closest_to_goal", "effort", "max_force"):
-        same(field, said[field])
-    same("max_speed", said["max_speed"])
-    hard = [said["min_clearance"][r] for r in said["hard"] if said["clearance_unit"][r] == "m"]
+        same(field, summary[field])
+    same("max_speed", summary["max_speed"])
+    hard = [summary["min_clearance"][r] for r in summary["hard"] if summary["clearance_unit"][r] == "m"]
     same("min_clearance", min(hard, default=np.inf))
-    assert outcome["violated"] == bool(said["hard_violated"])
+    assert outcome["violated"] == bool(summary["hard_violated"])
     for i, axis in enumerate("xyz"):
-        same(f"final_{axis}", said["final_position"][i])
+        same(f"final_{axis}", summary["final_position"][i])
     for i in range(4):
-        same(f"phi{i + 1}", said["estimate_final"][i])
+        same(f"phi{i + 1}", summary["estimate_final"][i])
     assert np.isnan(outcome["stopped_at"])
 
 

@@ -15,9 +15,9 @@ def fly(vehicle, start, names, inputs, step, outputs=STATES):
     with Plant(vehicle) as plant:
         plant.set(start)
         plant.initialize()
-        found = [[plant[name] for name in outputs]]
+        rows = [[plant[name] for name in outputs]]
         for row in inputs:
-            plant.set(dict(zip(names, row(np.array(found[-1])) if callable(row) else row, strict=True)))
+            plant.set(dict(zip(names, row(np.array(rows[-1])) if callable(row) else row, strict=True)))
             plant.step(step)
-            found.append([plant[name] for name in outputs])
-    return np.array(found)
+            rows.append([plant[name] for name in outputs])
+    return np.array(rows)

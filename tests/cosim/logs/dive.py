@@ -27,6 +27,6 @@ def assert_flown(record, dive, bound, known=0.99):
         (["attitude.roll", "attitude.pitch", "attitude.yaw"], np.column_stack([dive.roll, dive.pitch, dive.yaw])),
         ([f"thrust[{i}]" for i in range(1, 9)], dive.thrust),
     ):
-        found = record.stack(names)
-        rows = np.isfinite(found).all(axis=1)
-        assert rows.mean() >= known and np.abs(found - expected)[rows].max() < bound, names
+        signals = record.stack(names)
+        rows = np.isfinite(signals).all(axis=1)
+        assert rows.mean() >= known and np.abs(signals - expected)[rows].max() < bound, names

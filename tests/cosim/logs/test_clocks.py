@@ -41,12 +41,12 @@ def test_messages_without_stamp_use_the_log_time():
 
 @pytest.mark.parametrize("sizes", [[-5000.0], [-2.0], [86400.0], [1.7e9], [1e5, -1e5 - 30.0]])
 def test_clock_jumps_become_one_second_pauses_in_any_blocks(sizes):
-    said, jumps = np.arange(0.0, 20.0, 0.1), [120, 130][: len(sizes)]
+    stamps, jumps = np.arange(0.0, 20.0, 0.1), [120, 130][: len(sizes)]
     for k, size in zip(jumps, sizes, strict=True):
-        said[k:] += size
+        stamps[k:] += size
     one, many = Clock(), Clock()
-    singly = np.array([one.time(t) for t in said.tolist()])
-    together = np.concatenate([many.times(part) for part in np.split(said, [50, 121])])
+    singly = np.array([one.time(t) for t in stamps.tolist()])
+    together = np.concatenate([many.times(part) for part in np.split(stamps, [50, 121])])
     np.testing.assert_allclose(singly, together)
     steps = np.diff(together)
     np.testing.assert_allclose(steps, np.where(np.isin(np.arange(199), np.array(jumps) - 1), 1.0, 0.1), atol=1e-6)
@@ -55,7 +55,7 @@ def test_clock_jumps_become_one_second_pauses_in_any_blocks(sizes):
 
 
 def test_pauses_and_unordered_messages_are_no_jumps():
-    said = np.array([0.0, 1.0, 0.4, 2.0, 3000.0, 3000.1])
+    stamps = np.array([0.0, 1.0, 0.4, 2.0, 3000.0, 3000.1])
     clock = Clock()
-    assert clock.times(said).tolist() == said.tolist()
+    assert clock.times(stamps).tolist() == stamps.tolist()
     assert clock.jumps == []

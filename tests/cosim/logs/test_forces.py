@@ -56,9 +56,9 @@ SURGE = [0.5 * 4.0 * 40.0 * np.sqrt(0.5), 0, 0, 0, 0, 0]
     ],
 )  # fmt: skip
 def test_efforts_and_sticks_use_the_thruster_limits(quantity, values, forces, through):
-    found, by = forces_of(quantity, values)
-    np.testing.assert_allclose(found[0], forces, atol=1e-9)
-    assert by == through
+    received, means = forces_of(quantity, values)
+    np.testing.assert_allclose(received[0], forces, atol=1e-9)
+    assert means == through
 
 
 @pytest.mark.parametrize(

@@ -102,9 +102,9 @@ def test_depth_and_its_times_are_those_of_the_pressure_as_in_the_autopilot(tlog,
     parameters = {m.param_id: m.param_value for m in sent["PARAM_VALUE"]}
     (pressures,) = 100.0 * fields_of(sent["SCALED_PRESSURE2"], "press_abs")
     deep = (pressures - parameters["BARO2_GND_PRESS"]) / (9800.0 * parameters["BARO_SPEC_GRAV"])
-    found, stamps = (tlog.record[name] for name in ("measured.depth", "measured.time.depth_sensor"))
+    depths, stamps = (tlog.record[name] for name in ("measured.depth", "measured.time.depth_sensor"))
     known = np.isfinite(stamps)
-    assert np.isclose(found[known][:, None], deep[None], atol=1e-9).any(axis=1).all()
+    assert np.isclose(depths[known][:, None], deep[None], atol=1e-9).any(axis=1).all()
     age = (tlog.record["time"] - stamps)[known]
     assert age.min() >= -1e-9 and age.max() < 1.6
     assert len(np.unique(stamps[known])) >= 520  # of 635, of which some come twice within a row
@@ -134,11 +134,11 @@ def test_dataflash_import_matches_pymavlink(dataflash):
     for name, kind, field in (
         ("position.z", "XKF1", "PD"), ("velocity.r", "RATE", "Y"), ("quaternion.e3", "XKQ", "Q4"),
     ):  # fmt: skip
-        at, said = fields_of(read[kind], "TimeUS", field)
-        at = 1e-6 * at - facts.start
+        times, values = fields_of(read[kind], "TimeUS", field)
+        times = 1e-6 * times - facts.start
         if kind == "RATE":
-            said, at = np.radians(said), at - np.sqrt(0.5) / (np.pi * cutoff)
-        expected = np.interp(record["time"], at, said)
+            values, times = np.radians(values), times - np.sqrt(0.5) / (np.pi * cutoff)
+        expected = np.interp(record["time"], times, values)
         known = np.isfinite(record[name])
         assert known.mean() > 0.98
         np.testing.assert_allclose(np.abs(record[name])[known], np.abs(expected)[known], atol=2e-5)
@@ -355,7 +355,7 @@ def test_run_round_trips_through_telemetry(tmp_path, imported):
     for name, bound in (("position.x", 1e-5), ("velocity.u", 1e-6), ("attitude.yaw", 1e-7), ("velocity.r", 1e-7)):
         expected = np.interp(back["time"], before["time"], before[name])
         np.testing.assert_allclose(back[name], expected, atol=bound, err_msg=name)
-    said = back["thrust[1]"]
+    force = back["thrust[1]"]
     every = np.interp(np.round(back["time"] / 0.2) * 0.2, before["time"], before["thrust[1]"])
-    known = np.isfinite(said) & np.isclose(back["time"] % 0.2, 0.0, atol=1e-3)
-    assert np.median(np.abs(said - every)[known]) < 0.5  # N: pulses are whole microseconds
+    known = np.isfinite(force) & np.isclose(back["time"] % 0.2, 0.0, atol=1e-3)
+    assert np.median(np.abs(force - every)[known]) < 0.5  # N: pulses are whole microseconds

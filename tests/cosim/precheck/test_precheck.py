@@ -24,15 +24,19 @@ CLOSED = "arbiter.engine=closed"
 MENDED = ("law.gains.sigma_p=0.0004", "law.gains.k_p1=0.05")
 
 
-def named(found):
-    return {finding.name: finding for finding in found}
+def named(findings):
+    return {finding.name: finding for finding in findings}
 
 
 def of_law(*overrides):
     scenario = load_scenario("paper", [CLOSED, *overrides])
     weights = start_weights(scenario)
-    found = [*vehicle_findings(scenario), *gain_findings(scenario, weights), initial_force_finding(scenario, weights)]
-    return named(found)
+    findings = [
+        *vehicle_findings(scenario),
+        *gain_findings(scenario, weights),
+        initial_force_finding(scenario, weights),
+    ]
+    return named(findings)
 
 
 def of_regions(*overrides):

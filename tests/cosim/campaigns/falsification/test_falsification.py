@@ -81,8 +81,8 @@ def test_page_shows_search_random_and_worst_replays(found):
 def test_page_says_when_every_flight_was_refused(tmp_path, fakes, monkeypatch):
     monkeypatch.setattr(Choosy, "refused_above", -9.0)
     fakes(Choosy)
-    found = run_falsification(varied(), tmp_path / "out")
-    assert found.summary["refused"] == len(found.results) and found.summary["worst"] == []
+    campaign = run_falsification(varied(), tmp_path / "out")
+    assert campaign.summary["refused"] == len(campaign.results) and campaign.summary["worst"] == []
     page = write_falsification_page(tmp_path / "out", 1)
     assert check(page).asked == [] and "30 could not be flown" in page.read_text()
 
@@ -98,8 +98,8 @@ def test_falsification_rows_are_reproducible(found, tmp_path):
 
 @pytest.mark.medium
 def test_scenario_rows_are_reproducible_with_the_found_values(tmp_path):
-    found = run_falsification(varied(), tmp_path / "out")
-    first, last = found.results.table.to_pylist()[0], found.results.table.to_pylist()[-1]
+    campaign = run_falsification(varied(), tmp_path / "out")
+    first, last = campaign.results.table.to_pylist()[0], campaign.results.table.to_pylist()[-1]
     assert -2.0 <= last["initial.position.1"] <= 2.0 and last["limit.force"] in (400.0, 800.0)
     assert first["initial.position.1"] != last["initial.position.1"]
     again = rerun(tmp_path / "out", 29, tmp_path / "run")
@@ -108,10 +108,10 @@ def test_scenario_rows_are_reproducible_with_the_found_values(tmp_path):
 
 
 @pytest.mark.slow
-def test_conflicts_are_searched_for_the_greatest_violation_weighted_by_priority(tmp_path):
-    found = run_falsification(search(20, family="conflict", objective="violation"), tmp_path / "out")
-    weighted = found.results["weighted_violation"]
-    assert weighted.max() > 0.0 and -found.summary["worst"][0]["cost"] == weighted.max()
+def test_conflicts_are_searched_for_the_maximum_violation_weighted_by_priority(tmp_path):
+    campaign = run_falsification(search(20, family="conflict", objective="violation"), tmp_path / "out")
+    weighted = campaign.results["weighted_violation"]
+    assert weighted.max() > 0.0 and -campaign.summary["worst"][0]["cost"] == weighted.max()
     assert check(write_falsification_page(tmp_path / "out", 0)).asked == []
 
 
@@ -139,12 +139,12 @@ def test_rows_are_the_same_for_any_number_of_workers(tmp_path):
 
 @pytest.mark.slow
 def test_failure_rate_is_estimated_by_multilevel_splitting(tmp_path):
-    found = run_falsification(search(200, Conditions(duration=8.0), rare_event=True), tmp_path / "out")
-    estimate = found.summary["estimate"]
-    assert 100 < found.flown == len(found.results) <= 200
+    campaign = run_falsification(search(200, Conditions(duration=8.0), rare_event=True), tmp_path / "out")
+    estimate = campaign.summary["estimate"]
+    assert 100 < campaign.flown == len(campaign.results) <= 200
     # so few flights may leave copies of one alone, which bound nothing from above
     assert 0.0 <= estimate["low"] <= estimate["probability"] < estimate["high"] <= 1.0
-    assert found.summary["random"] is None and not (tmp_path / "out" / "random").exists()
+    assert campaign.summary["random"] is None and not (tmp_path / "out" / "random").exists()
     page = check(write_falsification_page(tmp_path / "out", 0))
     assert sum(row[1].count("e-") == 1 for row in page.rows if len(row) == 2) >= len(estimate["levels"]) - 1
     assert run_falsification(search(200, Conditions(duration=8.0), rare_event=True), tmp_path / "out").flown == 0
