@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import logging
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -116,6 +117,11 @@ class Record(Rows):
     """
 
     def __init__(self, file: Path) -> None:
+        if isinstance(file, list | tuple):  # its former argument
+            warnings.warn("Record takes a file, no list of files", DeprecationWarning, stacklevel=2)
+            if len(file) != 1:
+                raise RunError(f"a record is one file, got {len(file)}")
+            file = file[0]
         self.file = file
         with _opened(file) as source:
             self._count = sum(source.group_rows)

@@ -6,6 +6,8 @@ anything. Matplotlib is needed only when one is called.
 Imports: terms, engines.
 """
 
+import warnings
+
 from fuzzy_arbiter.pictures.fields import decisions, surface
 from fuzzy_arbiter.pictures.firing import rules
 from fuzzy_arbiter.pictures.lines import normalizations, profile, terms
@@ -20,3 +22,10 @@ __all__ = [
     "surface",
     "terms",
 ]
+
+
+def __getattr__(name: str) -> object:
+    if name != "COLOURS":  # its former spelling
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn("COLOURS is now COLORS", DeprecationWarning, stacklevel=2)
+    return COLORS

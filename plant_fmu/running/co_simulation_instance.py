@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
@@ -20,6 +21,9 @@ from plant_fmu.running.values import Value, convert_value, require_settable
 
 _MAX_STEP = 1e9  # s, bound of a step
 _AT_ZERO = Clock(0.0, 0, math.nan)
+_FORMER_NAMES = {
+    "initialise": "initialize", "initialised": "initialized", "serialise": "serialize", "deserialise": "deserialize",
+}  # fmt: skip
 
 
 class CoSimulationInstance:
@@ -38,6 +42,12 @@ class CoSimulationInstance:
         self._calls = (*bound.set_inputs, *bound.do_step, *bound.get_outputs)
         self._now, self._ended = bound.now, bound.ended
         self._set_clock(_AT_ZERO, initialized=False)
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in _FORMER_NAMES:
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}", name=name, obj=self)
+        warnings.warn(f"{name} is now {_FORMER_NAMES[name]}", DeprecationWarning, stacklevel=2)
+        return getattr(self, _FORMER_NAMES[name])
 
     def _set_clock(self, clock: Clock, *, initialized: bool) -> None:
         """Set the clock. The next step calls `_change_step`, whatever its length, since NaN equals no number."""

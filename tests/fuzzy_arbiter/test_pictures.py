@@ -318,3 +318,12 @@ def test_curves_are_drawn_and_values_are_refused():
         pictures.rules(arbiter, [5.0, 5.0], "tip")
     with pytest.raises(UnsupportedError, match=r"rules of 'mood': .* joined by probor, are not drawn"):
         pictures.rules(arbiter, [5.0, 5.0], "mood")
+
+
+def test_former_spellings_warn_and_work():
+    import fuzzy_arbiter
+
+    with pytest.warns(DeprecationWarning, match="COLOURS is now COLORS"):
+        assert fuzzy_arbiter.pictures.COLOURS is fuzzy_arbiter.pictures.COLORS
+    with pytest.warns(DeprecationWarning, match="prioritised is now prioritized"):
+        assert fuzzy_arbiter.prioritised is fuzzy_arbiter.prioritized

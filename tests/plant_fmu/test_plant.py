@@ -251,3 +251,17 @@ def test_failed_initialization_error_names_the_remedy():
         plant.reset()
         plant.set({"dvl.velocity_noise": 0.1, "dvl.rate": 5.0})
         plant.initialize()
+
+
+def test_former_names_warn_and_work():
+    with Plant("odin") as plant:
+        with pytest.warns(DeprecationWarning, match="initialise is now initialize"):
+            plant.initialise()
+        with pytest.warns(DeprecationWarning, match="serialise is now serialize"):
+            data = plant.serialise(plant.save())
+        with pytest.warns(DeprecationWarning, match="deserialise is now deserialize"):
+            assert plant.deserialise(data).time == 0.0
+        with pytest.warns(DeprecationWarning, match="initialised is now initialized"):
+            assert plant.initialised
+        with pytest.raises(AttributeError, match="no attribute 'finish'"):
+            plant.finish  # noqa: B018
