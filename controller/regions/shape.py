@@ -60,13 +60,14 @@ class Shape(Protocol):
 
 
 def with_former_spelling(shape: type[S]) -> type[S]:
-    """Accept `centre`, the former name of a shape's center, as an argument and as an attribute."""
+    """Accept `centre`, the former name of a shape's center, as an argument of its class and as an attribute."""
     initialize = shape.__init__
 
     @functools.wraps(initialize)
     def __init__(self: S, *args: Any, **values: Any) -> None:  # noqa: N807
         if "centre" in values:
-            require("center" not in values, shape.__name__.lower(), "centre", "given beside center", "one of the two")
+            if "center" in values:
+                raise RegionError("pass either center or centre; dataclasses.replace takes center")
             warnings.warn("centre is now center", DeprecationWarning, stacklevel=2)
             values["center"] = values.pop("centre")
         initialize(self, *args, **values)

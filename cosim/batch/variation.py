@@ -10,7 +10,7 @@ from controller import ControllerError
 from cosim.errors import ScenarioError
 from cosim.scenario.changes import join_keys, value_at, with_values
 from cosim.scenario.scenario import Scenario, validate_scenario
-from cosim.scenario.toml_file import plain_key
+from cosim.scenario.toml_file import current_key, plain_key
 from plant_fmu.errors import PlantFmuError
 
 _SEEDS = ("sensing.seed", "plant.parameters.seed")  # keys that get the seed of a row
@@ -21,8 +21,9 @@ class Variation:
 
     def __init__(self, scenario: Scenario, keys: Sequence[str]) -> None:
         self.base, self.keys = scenario, tuple(map(plain_key, keys))
+        current_keys = [current_key(scenario.table, key) for key in self.keys]
         for i, key in enumerate(self.keys):
-            if key in self.keys[:i]:
+            if current_keys[i] in current_keys[:i]:
                 raise ScenarioError(f"key {key!r} comes twice, expected each once")
             number = self.number(key)
             if isinstance(number, bool) or not isinstance(number, int | float):
@@ -40,7 +41,8 @@ class Variation:
         }
         changes |= dict.fromkeys(self._seeds, int(seed))
         table = with_values(self.base.table, changes)
-        table["changed"] = join_keys(table["changed"], (k for k, x in changes.items() if x != self.number(k)))
+        changed = (current_key(table, key) for key, value in changes.items() if value != self.number(key))
+        table["changed"] = join_keys(table["changed"], changed)
         try:
             return validate_scenario(table, self.base.name, self.base.vehicle)
         except (PlantFmuError, ControllerError) as error:

@@ -33,6 +33,7 @@ from cosim.results.run_result import SCENARIO, Run
 from cosim.results.spans import spans
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario, load_scenario
+from cosim.scenario.toml_file import rename_former_keys
 from plant_fmu import PlantError, PlantFmuError
 from plant_fmu.toml_tables import decode
 
@@ -101,7 +102,10 @@ def require_complete(folder: Path) -> None:
 
 def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
     work = SweepWork(load_scenario(folder / SCENARIO), design_of(plan))
-    scenarios = ({"scenario": plan["scenario"]}, {"scenario": json.loads(json.dumps(work.plan["scenario"]))})
+    scenarios = (
+        {"scenario": rename_former_keys(plan["scenario"])},
+        {"scenario": json.loads(json.dumps(work.plan["scenario"]))},
+    )
     if differences := difference(*scenarios):
         raise RunError(f"{folder / SCENARIO}: is not that of the campaign ({differences})")
     if plan["vehicle_sha256"] != work.plan["vehicle_sha256"]:

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from cosim.scenario.criteria import QUANTITIES
 from cosim.scenario.keys import KEYS, unit_of_gain, unit_of_shape
+from cosim.scenario.toml_file import current_key
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
 
@@ -57,6 +58,7 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
         name = key.removeprefix(PARAMETERS)
         units = (v.quantity.unit for v in variables(vehicle) if v.name == name)
         return KeyName(f"{name} of the plant", next(units, "").replace(".", " "))
+    key = current_key(table, key)
     if key.startswith("law.gains."):
         gain = key.removeprefix("law.gains.")
         return KeyName(f"gain {gain}", unit_of_gain(table["law"]["name"], gain))

@@ -123,12 +123,12 @@ class RegionEntry(Table, frozen=True):
     hard: Annotated[
         bool,
         key(
-            "a hard region is kept, a soft one only pushes",
+            "true: the vehicle must not violate it; false: it only pushes",
             more="; the paper's law and laws of plain potentials do not use it",
         ),
     ] = True
     deviation: Annotated[
-        float | tuple[float, float, float],  # a range beside a tuple makes msgspec read memory that is not its own
+        float | tuple[float, float, float],  # with a range msgspec would read foreign memory
         key(
             "standard deviation of its position, or three: north, east, down", "m",
             ": margins of the deployable law grow",

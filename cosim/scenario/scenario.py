@@ -289,7 +289,7 @@ def validate_scenario(table: dict[str, Any], name: str, vehicle: Vehicle | None 
 
 def read_tables(table: dict[str, Any], name: str) -> File:
     """Check each table of a scenario's file, and fill in the defaults."""
-    rename_former_keys(table)
+    table = rename_former_keys(table)
     plant = table.get("plant")
     if isinstance(plant, dict) and isinstance(plant.get("parameters"), dict):
         table = table | {"plant": plant | {"parameters": flatten(plant["parameters"])}}

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import copy
+import functools
 import logging
 import re
 import tomllib
+from collections.abc import Iterator
 from importlib import resources
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -15,6 +17,7 @@ from plant_fmu.errors import TableError, printable
 
 _LOG = logging.getLogger(__name__)
 _RENAMED = {"centre": "center", "colour": "color"}  # former names of keys
+_OTHER_SPELLING = _RENAMED | {new: old for old, new in _RENAMED.items()}
 _SHOWN = 80  # maximum number of characters quoted in a message
 
 # a key: parts with dots between them, and TOML's quotes around those that have blanks; and a key with a value
@@ -75,7 +78,6 @@ def read_table(name_or_file: str, seen: tuple[str, ...] = (), beside: Path | Non
             table, name, folder = read_toml(shipped), name_or_file, Path()
     else:
         raise ScenarioError(f"base {name_or_file!r} is unknown; {hint(name_or_file, list_scenarios())}")
-    rename_former_keys(table)
     if name_or_file in seen:
         raise ScenarioError(f"{name}: is its own base")
     if "base" in table:
@@ -116,6 +118,8 @@ def _name_rules(table: dict[str, Any]) -> None:
 def _merge(base: dict[str, Any], over: dict[str, Any]) -> dict[str, Any]:
     result = copy.deepcopy(base)
     for key, value in over.items():
+        if (other := _OTHER_SPELLING.get(key, "")) not in over:
+            result.pop(other, None)
         both = isinstance(value, dict) and isinstance(result.get(key), dict)
         result[key] = _merge(result[key], value) if both else value
     return result
@@ -186,7 +190,8 @@ def set_key(table: dict[str, Any], key: str, value: Any) -> None:
     if isinstance(node, list):
         node[_index(node, last, key)] = value
     elif isinstance(node, dict):
-        node[current_name(node, last)] = value
+        node.pop(_OTHER_SPELLING.get(last, ""), None)
+        node[last] = value
     else:
         raise ScenarioError(f"--set {_short(key)}: there is no table at {_short('.'.join(path))!r}")
 
@@ -241,39 +246,72 @@ def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
     raise AssertionError("unreachable")
 
 
-def current_name(table: dict[str, Any], name: str) -> str:
-    """Return the name of a key that a table has by its new name alone."""
+@functools.cache  # one line, however many tables have the key
+def _log_former_name(name: str) -> None:
+    _LOG.warning("key %s is now %s", name, _RENAMED[name])
+
+
+def current_name(table: Any, name: str) -> str:
+    """Return the present name of a key that a table has by that name alone."""
     new = _RENAMED.get(name, name)
-    return new if new in table and name not in table else name
+    if new == name or not isinstance(table, dict) or new not in table or name in table:
+        return name
+    _log_former_name(name)
+    return new
 
 
-def rename_former_keys(table: dict[str, Any]) -> None:
-    """Rename former keys of a scenario's goal, shapes and criteria in place."""
-    regions, criteria = (
-        [item for item in _list(table.get(key)) if isinstance(item, dict)] for key in ("regions", "criteria")
-    )
-    for shape in (table.get("goal"), *(region.get("shape") for region in regions)):
-        if isinstance(shape, dict) and "centre" in shape and not _has_own_centre(shape.get("type")):
-            _rename(shape, "centre")
-    for criterion in criteria:
-        _rename(criterion, "colour")
+def current_key(table: dict[str, Any], key: str) -> str:
+    """Return a key with the present names of its parts."""
+    container: Any = table
+    parts: list[str] = []
+    for part in key.split("."):
+        parts.append(current_name(container, part))
+        if isinstance(container, list | tuple):
+            named = {item.get("name"): item for item in container if isinstance(item, dict)}
+            by_index = container[int(part)] if part.isdecimal() and int(part) < len(container) else None
+            container = named.get(part, by_index)
+        else:
+            container = container.get(parts[-1]) if isinstance(container, dict) else None
+    return ".".join(parts)
 
 
-def _list(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else []
+def rename_former_keys(table: dict[str, Any]) -> dict[str, Any]:
+    """Return a scenario's table with the present names of its keys: itself if it has no former one."""
+    former = [*_former_keys(table)]
+    changed = table.get("changed")
+    keys = [key for key in changed if isinstance(key, str)] if isinstance(changed, list | tuple) else []
+    if not former and not any(old in key for old in _RENAMED for key in keys):
+        return table
+    table = copy.deepcopy(table)
+    for where, old, holder in _former_keys(table):
+        new = _RENAMED[old]
+        if new in holder:
+            raise ScenarioError(f"{where}: pass either {new} or {old}, its former name")
+        holder[new] = holder.pop(old)
+        _log_former_name(old)
+    if keys:
+        table["changed"] = [current_key(table, key) if isinstance(key, str) else key for key in table["changed"]]
+    return table
 
 
-def _has_own_centre(kind: object) -> bool:
-    """Return True for a user's own shape that calls a key by the former name."""
+def _former_keys(table: dict[str, Any]) -> Iterator[tuple[str, str, dict[str, Any]]]:
+    """Yield each former key of a scenario's goal, shapes and criteria: where it is, its name, and what holds it."""
+    shapes = {f"regions[{i}].shape": item.get("shape") for i, item in enumerate(_tables(table, "regions"))}
+    for where, shape in ({"goal": table.get("goal")} | shapes).items():
+        if isinstance(shape, dict) and "centre" in shape and _has_center(shape.get("type")):
+            yield where, "centre", shape
+    for i, criterion in enumerate(_tables(table, "criteria")):
+        if "colour" in criterion:
+            yield f"criteria[{i}]", "colour", criterion
+
+
+def _tables(table: dict[str, Any], key: str) -> list[dict[str, Any]]:
+    items = table.get(key)
+    return [item if isinstance(item, dict) else {} for item in items] if isinstance(items, list | tuple) else []
+
+
+def _has_center(kind: object) -> bool:
+    """Return True for a shape with the key `center`, which a user's own shape may call `centre`."""
     from controller.regions.shapes import ENTRIES  # imports NumPy
 
-    return isinstance(kind, str) and kind in ENTRIES and "centre" in ENTRIES[kind].units
-
-
-def _rename(table: dict[str, Any], old: str) -> None:
-    if old in table:
-        new = _RENAMED[old]
-        if new in table:
-            raise ScenarioError(f"pass either {new} or {old}, its former name")
-        table[new] = table.pop(old)
-        _LOG.warning("key %s is now %s", old, new)
+    return isinstance(kind, str) and kind in ENTRIES and "center" in ENTRIES[kind].units

@@ -12,6 +12,7 @@ from controller.regions import Region
 from controller.regions.shape import Shape
 from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
+from cosim.scenario.toml_file import current_name
 from plant_fmu.variables import variables
 
 _GREATEST_RAMP = 1e3  # m, maximum value of ``arbiter.ramp``
@@ -148,6 +149,7 @@ class LiveSettings:
             if not key.startswith(where):
                 continue
             field, _, rest = key.removeprefix(where).partition(".")
+            field = current_name(dict.fromkeys(_fields(shape)), field)
             value = getattr(shape, field, None) if field in _fields(shape) else None
             if isinstance(value, float) and not rest:
                 return name, field, None
