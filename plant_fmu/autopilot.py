@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable
 from typing import Annotated, Literal
 
-from msgspec import Meta
 from msgspec.structs import replace
 
 from plant_fmu.toml_tables import Table, key, require
@@ -15,21 +14,17 @@ MAX_CHANNELS = 32  # maximum number of channels, those of MAVLink's longer servo
 MIN_PULSE, MAX_PULSE = 800, 2200  # us, minimum and maximum length of a pulse that a speed controller accepts
 
 Curve = Callable[[float], float]  # from a servo output [us] to a fraction of the maximum force, -1 to 1; or the inverse
-Sign = Literal[1, -1]
 
 
 class Autopilot(Table, frozen=True):
     """The table ``autopilot`` of a vehicle's file."""
 
-    # the autopilot's name for the arrangement of the thrusters, such as vectored_6dof
-    frame: Annotated[str, key("Frame", pattern=r"^[^\x00-\x1f\x7f-\xa0]+$", expected="a name")]
-    # servo output of each thruster, from 1; 0 for none. Default: 1, 2, 3 ...
-    channels: tuple[Annotated[int, Meta(ge=0, le=MAX_CHANNELS)], ...] = ()
-    signs: Sign | tuple[Sign, ...] = 1  # -1 where a pulse above neutral makes a thruster's force negative
+    frame: str  # the autopilot's name for the arrangement of the thrusters, such as vectored_6dof
+    channels: tuple[int, ...] = ()  # servo output of each thruster, from 1; 0 for none. Default: 1, 2, 3 ...
+    signs: int | tuple[int, ...] = 1  # -1 where a pulse above neutral makes a thruster's force negative
     pwm_neutral: int = 1500  # us, pulse without force
-    pwm_span: Annotated[int, key("Span", "us", gt=0)] = 400  # us, distance from neutral to full force
-    # us, distance to either side of neutral within which there is no force
-    pwm_dead_band: Annotated[int, key("Dead band", "us", ge=0)] = 25
+    pwm_span: Annotated[int, key("distance from neutral to full force", "us", gt=0)] = 400
+    pwm_dead_band: Annotated[int, key("distance from neutral without force", "us", ge=0)] = 25
     curve: Literal["linear", "quadratic"] = "quadratic"  # force over the part of the span
 
     def __post_init__(self) -> None:
@@ -48,9 +43,13 @@ class Autopilot(Table, frozen=True):
 
     def for_thrusters(self, n_thrusters: int) -> Autopilot:
         """Return the table with a channel and a sign for each of n thrusters."""
+        require(self.frame.isprintable() and self.frame != "", "autopilot.frame", repr(self.frame), "a name")
         lists = {"channels": self.channels or tuple(range(1, n_thrusters + 1)), "signs": self.sign_of_each(n_thrusters)}
         for name, values in lists.items():
             require(len(values) == n_thrusters, f"autopilot.{name}", f"{len(values)} numbers", f"{n_thrusters}")
+        require(all(abs(sign) == 1 for sign in lists["signs"]), "autopilot.signs", lists["signs"], "1 or -1")
+        ok = all(0 <= channel <= MAX_CHANNELS for channel in lists["channels"])
+        require(ok, "autopilot.channels", lists["channels"], f"1 to {MAX_CHANNELS}, or 0 for none")
         return replace(self, **lists)
 
 

@@ -229,7 +229,9 @@ def _range(metas: list[msgspec.Meta], unit: str, is_finite: bool, is_float: bool
     if low is None or low == -_FINITE:
         return "a finite number" if high in (None, _FINITE) else f"at most {high:.12g}{unit}"
     if high is not None and high < _FINITE:
-        return f"{above}{low:.12g} to {high:.12g}{unit}" if is_float else f"{low} to {high}{unit}"
+        if above:
+            return f"above {low:.12g}{unit}, at most {high:.12g}{unit}"
+        return f"{low:.12g} to {high:.12g}{unit}" if is_float else f"{low} to {high}{unit}"
     bound = f"above {low:.12g}{unit}" if above else f"{low:.12g}{unit} or above"
     if high is None and is_float:
         return f"{bound}, or inf"

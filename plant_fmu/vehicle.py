@@ -61,16 +61,16 @@ _ORDERS = {"inertia": 3, "added_mass": 6}  # symmetric matrices
 class RigidBody(Table, frozen=True):
     """Mass, inertia about the body origin, center of gravity and weight."""
 
-    mass: Annotated[float, key("Mass", "kg", gt=0.0, le=MAX_NUMBER)]
+    mass: Annotated[float, key("mass", "kg", gt=0.0, le=MAX_NUMBER)]
     inertia: Matrix  # kg m2, 3 by 3 about the body origin, or its diagonal
     center_of_gravity: Vector3  # m, body frame
-    weight: Annotated[float, key("Weight", "N", ge=0.0, le=MAX_NUMBER)]
+    weight: Annotated[float, key("weight in air", "N", ge=0.0, le=MAX_NUMBER)]
 
 
 class Hydrostatics(Table, frozen=True):
     """Buoyancy and its center."""
 
-    buoyancy: Annotated[float, key("Buoyancy", "N", ge=0.0, le=MAX_NUMBER)]
+    buoyancy: Annotated[float, key("buoyancy of the submerged vehicle", "N", ge=0.0, le=MAX_NUMBER)]
     center_of_buoyancy: Vector3  # m, body frame
 
 
@@ -84,6 +84,8 @@ class Hydrodynamics(Table, frozen=True):
 
 class Thrusters(Table, frozen=True):
     """Wrench, limits and dynamics of each thruster."""
+
+    # lists stay of any length: beside one of a fixed length a number with a range makes msgspec read foreign memory
 
     matrix: Rows  # 6 rows (X Y Z K M N), a column for each thruster: wrench of one newton
     force_min: Number | tuple[Number, ...]  # N, most negative force
@@ -102,7 +104,14 @@ class Hull(Table, frozen=True):
 
 
 class _File(Table, frozen=True):
-    name: Annotated[str, key("Name", pattern=f"^(?!({_RESERVED})$)[A-Za-z_][A-Za-z0-9_-]{{0,63}}\\Z", expected=_NAME)]
+    name: Annotated[
+        str,
+        key(
+            "name of files and C functions",
+            pattern=f"^(?!({_RESERVED})$)[A-Za-z_][A-Za-z0-9_-]{{0,63}}\\Z",
+            expected=_NAME,
+        ),
+    ]
     title: str
     source: str
     rigid_body: RigidBody
@@ -231,7 +240,7 @@ def _make_vehicle(file: _File) -> Vehicle:
     source = " ".join(file.source.split())
     for field, text in (("title", file.title), ("source", source)):
         unprintable = next((c for c in text if not c.isprintable()), "")
-        require(not unprintable, field, f"text with {unprintable!r}", "one line of printable characters")
+        require(not unprintable, field, f"text with {unprintable!r}", "printable characters")
     matrix = file.thrusters.matrix
     widths = {len(row) for row in matrix}
     require(
