@@ -43,6 +43,10 @@ class HilServer(LockstepServer):
     kind = socket.SOCK_STREAM
     speedup: float | None = None  # simulated seconds per second of the wall clock; None: as fast as possible
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self._mavlink = dialect()  # imported before PX4 waits for it
+
     def _serve(self) -> str:
         while True:
             try:
@@ -74,7 +78,7 @@ class HilServer(LockstepServer):
 
     def _fly(self, flight: Flight, connection: socket.socket) -> None:
         """Fly with one connection until the scenario's end."""
-        codec = dialect().MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=COMPONENT_ID)
+        codec = self._mavlink.MAVLink(None, srcSystem=SYSTEM_ID, srcComponent=COMPONENT_ID)
         codec.robust_parsing = True
         motion = at_rest(flight.motion())
         frame = 0  # number of frames on PX4's clock, which is never reset
@@ -102,7 +106,7 @@ class HilServer(LockstepServer):
                 self.counts.waited += 1
 
     def _send(self, connection: socket.socket, codec: Any, motion: Motion, frame: int) -> None:
-        m = dialect()
+        m = self._mavlink
         time_us = (frame + 1) * 1_000_000 // RATE
         messages = hil_messages(m, motion, time_us, ORIGIN, frame % _GPS_EVERY == 0)
         if frame % _HEARTBEAT_EVERY == 0:

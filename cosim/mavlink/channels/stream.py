@@ -42,17 +42,19 @@ class Stream:
         return data or None
 
     def put(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
-        """Queue a frame, or `frame_v1` if the other side sends MAVLink 1; return False if the queue was full."""
+        """Queue a frame, or `frame_v1` for MAVLink 1; return False if the queue was full or the stream has broken."""
         queued = frame_v1 if self.version == 1 else frame
         if queued is None:
             return True
         if len(self._queue) > _WRITE_THRESHOLD and self._stalled_at is None:
             self._write_available()
+        if not self.is_open:
+            return False
         if len(self._queue) + len(queued) > self._limit:
             self.dropped += 1
             return False
         self._queue += queued
-        return self.is_open
+        return True
 
     def flush(self, now: float) -> bool:
         """Write as much of the queue as possible; return False after 5 s without progress."""

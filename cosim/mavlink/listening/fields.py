@@ -34,9 +34,8 @@ _MAIN_FIELDS = {
     "COMMAND_ACK": "command result",
     "MISSION_CURRENT": "seq",
     "DISTANCE_SENSOR": "current_distance",
-    "STATUSTEXT": "text",
 }
-# shown unit, factor and digits of a unit of the dialect
+# shown unit, factor and digits of a main field, by the unit of the dialect
 _UNITS = {
     "rad": ("deg", 180.0 / math.pi, 1), "rad/s": ("deg/s", 180.0 / math.pi, 1), "degE7": ("deg", 1e-7, 6),
     "cdeg": ("deg", 1e-2, 1), "mm": ("m", 1e-3, 2), "cm": ("m", 1e-2, 2), "cm/s": ("m/s", 1e-2, 2),
@@ -47,32 +46,34 @@ _CLOCKS = ("time_boot_ms", "time_usec", "time_unix_usec")
 
 def format_values(message: Any) -> str:
     """Format the main values of a message, those of one unit together."""
+    if message.get_type() == "STATUSTEXT":
+        return printable(message.text)
     units: dict[str, str] = message.fieldunits_by_name
     main = _MAIN_FIELDS.get(message.get_type(), "").split()
     names = main or [name for name in message.get_fieldnames() if name not in _CLOCKS][:_MAX_FIELDS]
     groups = []
     for unit, members in groupby(names, lambda name: units.get(name, "")):
         named = list(members)
-        shown, factor, digits = _UNITS.get(unit, (unit, 1, 2))
-        values = [_format(message, name, factor, digits if unit else None) for name in named]
+        shown, factor, digits = _UNITS.get(unit, (unit, 1, 2 if unit else 4))
+        form = f"z.{digits}f" if main or unit == "degE7" else "z.6g"
+        values = [_format(message, name, factor, form) for name in named]
         if len(named) == 1 or not main:
             values = [f"{name} {value}" for name, value in zip(named, values, strict=True)]
         groups.append(f"{' '.join(values)} {shown}".rstrip())
     return printable("  ".join(groups))
 
 
-def _format(message: Any, name: str, factor: float, digits: int | None) -> str:
-    value = getattr(message, name)
-    if value == UNKNOWN.get((message.get_type(), name)):
-        return "-"
-    if isinstance(value, list | tuple):
-        more = " ..." if len(value) > _MAX_NUMBERS else ""
-        return f"[{' '.join(_format_number(x, factor, digits) for x in value[:_MAX_NUMBERS])}{more}]"
-    return _format_number(value, factor, digits)
+def _format(message: Any, name: str, factor: float, form: str) -> str:
+    """Format a field: a number, a text, or the first numbers of an array; "-" for each that is not known."""
+    value, unknown = getattr(message, name), UNKNOWN.get((message.get_type(), name))
 
+    def format_one(x: Any) -> str:
+        if x == unknown:
+            return "-"
+        scaled = x if isinstance(x, str) else x * factor
+        return f"{scaled:{form}}" if isinstance(scaled, float) else str(scaled)
 
-def _format_number(value: Any, factor: float, digits: int | None) -> str:
-    value = value if isinstance(value, str) else value * factor
-    if isinstance(value, float):
-        return f"{value:z.4g}" if digits is None else f"{value:z.{digits}f}"
-    return str(value)
+    if not isinstance(value, list | tuple):
+        return format_one(value)
+    more = " ..." if len(value) > _MAX_NUMBERS else ""
+    return f"[{' '.join(map(format_one, value[:_MAX_NUMBERS]))}{more}]"

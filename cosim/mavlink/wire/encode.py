@@ -18,6 +18,9 @@ UNKNOWN: dict[tuple[str, str], int] = {
     ("SYS_STATUS", "current_battery"): -1,
     ("SYS_STATUS", "battery_remaining"): -1,
     ("BATTERY_STATUS", "temperature"): 0x7FFF,
+    ("BATTERY_STATUS", "voltages"): 0xFFFF,
+    ("BATTERY_STATUS", "current_battery"): -1,
+    ("BATTERY_STATUS", "battery_remaining"): -1,
     ("DISTANCE_SENSOR", "current_distance"): 0xFFFF,
     ("OBSTACLE_DISTANCE", "distances"): 0xFFFF,
 }

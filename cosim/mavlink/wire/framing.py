@@ -1,4 +1,4 @@
-"""Decode bytes to frames and messages: cheap checks first; no input raises. Frames of MAVLink 1."""
+"""Frames: decode bytes with cheap checks first, so that no input raises; make those of MAVLink 1."""
 
 from __future__ import annotations
 

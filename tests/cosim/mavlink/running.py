@@ -65,7 +65,7 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> I
 
 
 class GroundStation:
-    """A link of pymavlink, with QGroundControl's order, timers and retries."""
+    """A link of pymavlink that connects in QGroundControl's order; pymavlink repeats requests of files by itself."""
 
     def __init__(self) -> None:
         self.link = mavutil.mavlink_connection(

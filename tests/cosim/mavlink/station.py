@@ -84,7 +84,10 @@ class Wire:
         return self.room
 
     def send(self, message: Any) -> bool:
-        self.got += self._decoder.parse_buffer(message.pack(self._coder))
+        messages = self._decoder.parse_buffer(message.pack(self._coder))
+        for text in (m for m in messages if m.get_type() == "STATUSTEXT"):
+            assert text.text.isascii() and text.text.isprintable() and text.severity <= 7
+        self.got += messages
         return True
 
     def of(self, name: str) -> list[Any]:

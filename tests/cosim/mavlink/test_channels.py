@@ -222,6 +222,15 @@ def test_disconnected_client_is_removed(resets):
     assert link.send(heartbeat())
 
 
+def test_a_broken_stream_is_no_slow_one():
+    def broken(data):
+        raise ConnectionResetError
+
+    stream = Stream(lambda n: b"", broken, lambda: None)
+    assert [stream.put(bytes(5000)) for _ in range(30)] == [True] + [False] * 29
+    assert not stream.is_open and stream.dropped == 0
+
+
 def test_excess_clients_are_rejected():
     link = link_of(TcpIn(HERE, 0))
     clients = connected(link.channel, tcp.MAX_CLIENTS)

@@ -209,7 +209,7 @@ def test_global_origin_and_home_can_be_set():
 
 
 def ecef(latitude, longitude, altitude):
-    """WGS84 in earth-centerd coordinates, from the ellipsoid's axes."""
+    """WGS84 in earth-centered coordinates, from the ellipsoid's axes."""
     a, b = 6378137.0, 6356752.314245
     lat, lon = math.radians(latitude), math.radians(longitude)
     n = a * a / math.hypot(a * math.cos(lat), b * math.sin(lat))

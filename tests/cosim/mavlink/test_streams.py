@@ -118,6 +118,13 @@ def test_stream_all_request_of_mavproxy_sets_every_group(station):
     assert run(station, 2.0)["ATTITUDE"] == 0
 
 
+def test_seventeen_messages_at_50_hertz_are_accepted(station):
+    ids = (1, 2, 24, 29, 30, 31, 32, 33, 36, 62, 74, 85, 137, 147, 242, 245, 178)
+    assert [station.command(SET, i, 20_000) for i in ids] == [ACCEPTED] * 17
+    counts = run(station, 2.0)
+    assert all(counts[mavlink.mavlink_map[i].msgname] == 100 for i in ids)
+
+
 def test_version_and_banner_are_sent_on_request(station):
     assert station.command(520, 1.0) == ACCEPTED and station.command(42428) == ACCEPTED
     (version,) = station.wire.of("AUTOPILOT_VERSION")

@@ -4,6 +4,7 @@ import random
 import struct
 import time
 from contextlib import closing
+from importlib import resources
 
 import numpy as np
 import pytest
@@ -187,6 +188,33 @@ def test_restart_starts_a_new_run_from_the_initial_state(serve):
     assert (one.summary["status"], two.summary["status"]) == (RESTARTED, "completed")
     assert two.folder.name == f"{one.folder.name}-2"
     assert (len(load_record(one.folder)["time"]), len(load_record(two.folder)["time"])) == (50, 121)
+
+
+def test_thirty_two_channels_are_accepted(serve, tmp_path):
+    path = tmp_path / "mine.toml"
+    text = (resources.files("plant_fmu") / "vehicles" / "bluerov2_heavy.toml").read_text()
+    path.write_text(text.replace("signs = -1", "signs = -1\nchannels = [25, 26, 27, 28, 29, 30, 31, 32]"))
+    served = serve("time.duration=0.1", vehicle=str(path))
+    answer = fly(served, 120, (*[1900] * 24, *heave(0.5)), channels=32)[-1]
+    (run,) = served.outcome().runs
+    assert answer["velocity"][2] > 0.05 and abs(answer["velocity"][0]) < 1e-3
+    assert set(load_record(run.folder)["law.pwm32"]) == {1700.0}
+
+
+@pytest.mark.medium
+def test_record_does_not_depend_on_wall_clock_timing(serve):
+    draw = random.Random(3)
+
+    def late_pulses(k):
+        time.sleep(draw.random() * 0.005 if draw.random() < 0.05 else 0.0)
+        return pulses(k)
+
+    records, noise = [], ("plant.parameters.imu.rate=100", "plant.parameters.imu.acceleration_noise=0.1")
+    for pwm in (pulses, late_pulses):
+        served = serve("time.duration=0.3", *noise)
+        fly(served, 360, pwm)
+        records.append(rows(served.outcome().runs[0]))
+    assert np.array_equal(*records)
 
 
 def test_garbage_is_counted_and_ignored(serve):
