@@ -56,8 +56,8 @@ class Task:
     """Definition of a flight."""
 
     scenario: str  # name of a shipped scenario, or random-SEED
-    steer_by: str = "sticks"  # output of the companion, one of `STEER_BY`
-    sticks_by: str = "manual-control"  # message that carries the sticks, one of `STICKS_BY`
+    steer_by: str = "sticks"  # output of the companion, one of `SteerBy`
+    sticks_by: str = "manual-control"  # message that carries the sticks, one of `SticksBy`
     fault: str = ""  # one of `FAULTS`, or empty
     level_dive: float = CompanionOptions.level_dive  # m, depth of the dive after arming
     parameters: tuple[str, ...] = ()  # NAME=VALUE of ArduSub, in addition to `PARAMETERS`

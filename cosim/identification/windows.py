@@ -19,12 +19,12 @@ MARGINS = (0.1, 0.2)  # s, times without samples at start and end of a window, i
 
 _MIN_LENGTH = 0.6  # fraction of a full window, below which the rest of a run is dropped
 _SETTLED = 1.0  # s, from a run's first command to its first window: the commands then determine lagged forces
-_REST_FRACTION = 0.01  # of a thruster's greatest command, up to which it rests: its neutral pulse may be a little off
+_REST_FRACTION = 0.01  # of a thruster's maximum command, up to which it rests: its neutral pulse may be a little off
 _IDLE = "no thruster works before or after it: the vehicle may be held"
 _MAX_GAP, _MAX_PAUSE = 1.0, 1.5  # s, longest gap in the commands; in samples of velocity, position and attitude
-_MAX_RATE = 3.0  # rad/s, greatest angular velocity about a body axis
-_MAX_PITCH = math.radians(80.0)  # rad, greatest pitch
-_MAX_SATURATED = 0.1  # greatest fraction of a window in which a thruster is commanded beyond its limits
+_MAX_RATE = 3.0  # rad/s, maximum angular velocity about a body axis
+_MAX_PITCH = math.radians(80.0)  # rad, maximum pitch
+_MAX_SATURATED = 0.1  # maximum fraction of a window in which a thruster is commanded beyond its limits
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ class History:
     def add(self, row: Array) -> None:
         """Add the next row, shape (columns,)."""
         self.count += 1
-        self._rows.append(row.copy())  # a view would keep the whole block that it is of
+        self._rows.append(row.copy())  # a view would keep its whole block in memory
         self._numbers.append(self.count)
         oldest_new = len(self._rows) - _MAX_NEW
         if oldest_new > 0 and (self._numbers[oldest_new - 1] - 1) % self._stride:

@@ -19,7 +19,7 @@ from plant_fmu.errors import TableError
 from plant_fmu.toml_tables import Table, decode, read_toml
 
 _ORDER = re.compile(r"[XYZ]{3}|[xyz]{3}")
-_MAX_ODD = 0.1  # greatest fraction of quaternions of a length other than 1, which are treated as missing
+_MAX_ODD = 0.1  # maximum fraction of quaternions of a length other than 1, which are treated as missing
 World = Literal["NED", "ENU", "NWU"]
 Body = Literal["FRD", "FLU", "RFU"]
 
@@ -47,7 +47,7 @@ class MappedQuantity(Table, frozen=True):
 
 
 class ColumnMap(Table, frozen=True):
-    """A column map: default time and frames, and in the type of a file a `MappedQuantity` for each quantity."""
+    """A column map: default time and frames; `_FileMap` adds a `MappedQuantity` for each quantity."""
 
     time: TimeColumn | None = None
     world: World = "NED"
@@ -86,8 +86,8 @@ class ColumnMap(Table, frozen=True):
 
 
 MAPPED = tuple(name for name in QUANTITIES if name != "pressure")  # quantities that a map may have
-_MAP = msgspec.defstruct(
-    "_MAP", [(name, MappedQuantity | None, None) for name in MAPPED], bases=(ColumnMap,), frozen=True,
+_FileMap = msgspec.defstruct(
+    "_FileMap", [(name, MappedQuantity | None, None) for name in MAPPED], bases=(ColumnMap,), frozen=True,
     forbid_unknown_fields=True,
 )  # fmt: skip
 
@@ -142,7 +142,7 @@ def _require_angles(mapped: MappedQuantity, angles: Array) -> None:
 def read_map(path: Path) -> ColumnMap:
     """Read a column map."""
     try:
-        columns: ColumnMap = decode(read_toml(path), _MAP)
+        columns: ColumnMap = decode(read_toml(path), _FileMap)
         for name, mapped in columns.quantities.items():
             _check(name, mapped)
         if columns.messages:

@@ -10,7 +10,7 @@ from cosim.errors import ImportLogError
 
 MAX_PART = 1 << 27  # bytes, maximum size of a chunk or message
 _MIN_TOTAL = 1 << 24  # bytes that the parts of any bag may have in total
-_MAX_RATIO = 100  # greatest total size of the parts beyond that, in sizes of the file
+_MAX_RATIO = 100  # maximum total size of the parts beyond that, in sizes of the file
 
 
 class Decompressor:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from cosim.simulation.signals import Array
 
-Components = Callable[[Callable[[str], Any]], Sequence[float]]  # from a function that returns a message's field
+ReadComponents = Callable[[Callable[[str], Any]], Sequence[float]]  # from a function that returns a message's field
 
 WORLDS = {  # matrix from the named world frame to NED
     "NED": np.eye(3),
@@ -77,7 +77,9 @@ def unit_quaternion(components: Sequence[float]) -> list[float]:
 
 
 def quaternion_of_angles(roll: float, pitch: float, yaw: float) -> Sequence[float]:
-    """Return the unit quaternion of roll, pitch and yaw [rad], scalar first, for one sample."""
+    """Return the unit quaternion of roll, pitch and yaw [rad], scalar first, for one sample; NaN if one is infinite."""
+    if math.inf in (abs(roll), abs(pitch), abs(yaw)):
+        return (math.nan,) * 4
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)
     cp, sp = math.cos(0.5 * pitch), math.sin(0.5 * pitch)
     cy, sy = math.cos(0.5 * yaw), math.sin(0.5 * yaw)
@@ -89,19 +91,19 @@ def quaternion_of_angles(roll: float, pitch: float, yaw: float) -> Sequence[floa
     )
 
 
-def scaled(fields: str, factor: float = 1.0) -> Components:
-    """Return a function from a message's fields to them, times a factor."""
+def scale_fields(fields: str, factor: float = 1.0) -> ReadComponents:
+    """Make a function that reads these fields of a message and multiplies them by a factor."""
     names = fields.split()
     return lambda field: [factor * field(name) for name in names]
 
 
-def attitude_of_angles(fields: str, factor: float = 1.0) -> Components:
+def attitude_of_angles(fields: str, factor: float = 1.0) -> ReadComponents:
     """Return a function from roll, pitch and yaw of a message, times a factor [rad], to the unit quaternion."""
-    angles = scaled(fields, factor)
+    angles = scale_fields(fields, factor)
     return lambda field: quaternion_of_angles(*angles(field))
 
 
-def attitude_of_quaternion(fields: str) -> Components:
+def attitude_of_quaternion(fields: str) -> ReadComponents:
     """Return a function from the components of a quaternion, or a list of them, to the unit quaternion."""
     names = fields.split()
     return lambda field: unit_quaternion(field(fields) if len(names) == 1 else [field(name) for name in names])

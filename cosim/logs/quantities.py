@@ -1,4 +1,4 @@
-"""Quantities of a log: components, units and greatest plausible values."""
+"""Quantities of a log: components, units and maximum plausible values."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Quantity:
     unit: str  # unit of each component
     # ``state``: interpolated between samples; ``command``, ``sensor`` or ``voltage``: held until the next sample
     kind: Kind
-    max: float  # greatest plausible magnitude of a component; a greater one indicates wrong units
+    max: float  # maximum plausible magnitude of a component; a greater one indicates wrong units
     frame: str  # ``world``, ``body`` or empty: frame that a column map converts
     what: str  # description in words
 

@@ -23,7 +23,7 @@ _GAP_PERIODS, _MIN_GAP = 3.0, 0.3  # periods, s: a pause longer than both is a g
 _MAX_LISTED = 100  # maximum number of listed gaps
 _RUNS, _REGULAR = 10, 0.6  # held values have at least so many runs of equal ones, and this fraction of similar lengths
 _LONGEST_RUN = 1000  # samples, length from which on runs count as equally long
-_QUICK, _BURSTING = 0.2, 0.3  # bursts: maximum distance of samples in mean periods; least fraction of such samples
+_QUICK, _BURSTING = 0.2, 0.3  # bursts: maximum distance of samples in mean periods; minimum fraction of such samples
 
 
 @dataclass

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from cosim.logs.frames import Components, attitude_of_angles, attitude_of_quaternion, scaled
+from cosim.logs.frames import ReadComponents, attitude_of_angles, attitude_of_quaternion, scale_fields
 from cosim.logs.spool import LogContents
 from cosim.mavlink.wire.dialect import dialect
 
@@ -19,21 +19,24 @@ _FROM_OTHERS = ("MANUAL_CONTROL", "VISION_POSITION_DELTA")  # messages of the pi
 _ARDUPILOT, _PX4 = 3, 12  # MAV_AUTOPILOT
 _RESTS_IN_THE_MIDDLE = (_ARDUPILOT, _PX4)  # autopilots whose vertical stick rests at 500
 _FRAME = "Frame: "  # prefix of ArduSub's text with its arrangement of thrusters
-_RATES = ("rates", scaled("rollspeed pitchspeed yawspeed"))
-_IMU = (("acceleration", scaled("xacc yacc zacc", 1e-3 * 9.80665)), ("gyro", scaled("xgyro ygyro zgyro", 1e-3)))
-_SAMPLES: dict[str, tuple[tuple[str, Components], ...]] = {  # message: quantities in SI units, by its fields
+_RATES = ("rates", scale_fields("rollspeed pitchspeed yawspeed"))
+_IMU = (
+    ("acceleration", scale_fields("xacc yacc zacc", 1e-3 * 9.80665)),
+    ("gyro", scale_fields("xgyro ygyro zgyro", 1e-3)),
+)
+_SAMPLES: dict[str, tuple[tuple[str, ReadComponents], ...]] = {  # message: quantities in SI units, by its fields
     "ATTITUDE": (("attitude", attitude_of_angles("roll pitch yaw")), _RATES),
     "ATTITUDE_QUATERNION": (("attitude", attitude_of_quaternion("q1 q2 q3 q4")), _RATES),
-    "LOCAL_POSITION_NED": (("position", scaled("x y z")), ("velocity_world", scaled("vx vy vz"))),
+    "LOCAL_POSITION_NED": (("position", scale_fields("x y z")), ("velocity_world", scale_fields("vx vy vz"))),
     "ODOMETRY": (
-        ("attitude", attitude_of_quaternion("q")), ("position", scaled("x y z")), ("velocity", scaled("vx vy vz")),
-        _RATES,
+        ("attitude", attitude_of_quaternion("q")), ("position", scale_fields("x y z")),
+        ("velocity", scale_fields("vx vy vz")), _RATES,
     ),
-    "SCALED_PRESSURE2": (("pressure", scaled("press_abs", 100.0)),),
+    "SCALED_PRESSURE2": (("pressure", scale_fields("press_abs", 100.0)),),
     "SCALED_IMU2": _IMU,
     "RAW_IMU": _IMU,
-    "DISTANCE_SENSOR": (("altitude", scaled("current_distance", 0.01)),),
-    "SERVO_OUTPUT_RAW": (("pulses", scaled(" ".join(f"servo{i}_raw" for i in range(1, 17)))),),
+    "DISTANCE_SENSOR": (("altitude", scale_fields("current_distance", 0.01)),),
+    "SERVO_OUTPUT_RAW": (("pulses", scale_fields(" ".join(f"servo{i}_raw" for i in range(1, 17)))),),
 }  # fmt: skip
 # these and the ones that `VehicleMessages.add` converts by hand
 MESSAGES = _SAMPLES.keys() | {"MANUAL_CONTROL", "SYS_STATUS", "VISION_POSITION_DELTA", "PARAM_VALUE", "STATUSTEXT"}

@@ -16,7 +16,7 @@ from cosim.errors import ImportLogError
 from cosim.logs.chunked_file import ChunkedFile, OnProgress
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import ColumnMap
-from cosim.logs.frames import Components, attitude_of_angles, attitude_of_quaternion, scaled
+from cosim.logs.frames import ReadComponents, attitude_of_angles, attitude_of_quaternion, scale_fields
 from cosim.logs.spool import LogContents
 from cosim.logs.vehicle_messages import DOWNWARD
 
@@ -28,15 +28,15 @@ _FRAMES = (  # names of ArduSub's FRAME_CONFIG, from 0
 )  # fmt: skip
 _OTHERS = ("ArduCopter", "ArduPlane", "ArduRover", "AntennaTracker", "Blimp")  # firmware of other vehicles
 _ABOUT_LOG = {"FMT", "FMTU", "UNIT", "MULT", "PARM", "MSG", "VER"}  # messages that are not counted as unread
-_SAMPLES: dict[str, tuple[tuple[str, Components], ...]] = {  # message: quantities in SI units, by its fields
+_SAMPLES: dict[str, tuple[tuple[str, ReadComponents], ...]] = {  # message: quantities in SI units, by its fields
     "ATT": (("attitude", attitude_of_angles("Roll Pitch Yaw", math.pi / 180.0)),),
     "XKQ": (("attitude", attitude_of_quaternion("Q1 Q2 Q3 Q4")),),
-    "XKF1": (("position", scaled("PN PE PD")), ("velocity_world", scaled("VN VE VD"))),
-    "RATE": (("rates", scaled("R P Y", math.pi / 180.0)),),
-    "IMU": (("gyro", scaled("GyrX GyrY GyrZ")), ("acceleration", scaled("AccX AccY AccZ"))),
-    "BARO": (("depth", scaled("Alt", -1.0)),),
-    "RFND": (("altitude", scaled("Dist")),),
-    "BAT": (("voltage", scaled("Volt")),),
+    "XKF1": (("position", scale_fields("PN PE PD")), ("velocity_world", scale_fields("VN VE VD"))),
+    "RATE": (("rates", scale_fields("R P Y", math.pi / 180.0)),),
+    "IMU": (("gyro", scale_fields("GyrX GyrY GyrZ")), ("acceleration", scale_fields("AccX AccY AccZ"))),
+    "BARO": (("depth", scale_fields("Alt", -1.0)),),
+    "RFND": (("altitude", scale_fields("Dist")),),
+    "BAT": (("voltage", scale_fields("Volt")),),
 }
 # these and the ones that `_Messages` converts by hand
 _READ = frozenset(_SAMPLES.keys() | {"PARM", "MSG", "VISO", "RCOU"})
@@ -95,7 +95,7 @@ class _Messages:
             self._add(name, m)
         except KeyError as error:
             raise ImportLogError(f"message {name} has no field {error}, expected it as ArduPilot has it") from error
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError) as error:  # arithmetic with a text; ValueError by float() of PARM's value
             raise ImportLogError(f"message {name} has a text, expected numbers as ArduPilot has them") from error
 
     def _add(self, name: str, m: Fields) -> None:

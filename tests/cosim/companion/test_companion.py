@@ -121,6 +121,26 @@ def test_goal_is_reached_and_regions_satisfied_by_the_true_state(tmp_path, profi
     assert told == pytest.approx(true, abs=0.03)
 
 
+@pytest.mark.slow
+def test_docking_by_wrench_keeps_walls_and_heading_by_the_true_state(tmp_path):
+    """At full pilot gain, where the law asks for all that the thrusters have."""
+    link = StandIn("docking", "ardusub", SHIFT, overrides=["commands.pilot_gain=1.0"])
+    options = CompanionOptions("ardusub", "wrench", origin=GLOBE, pilot_gain=1.0, timeout=10.0)
+    companion, begun = Companion(load_scenario("docking", ["time.duration=40"]), link, options), len(link.rows)
+    assert companion.run(tmp_path / "run", report=False).summary["status"] == "completed"
+    assert link.now("goal.clearance") > 0.0
+    for region in (secondary.region.name for secondary in companion.scenario.regions):
+        assert link.column(f"{region}.clearance")[begun:].min() > 0.0
+
+
+@pytest.mark.medium
+def test_wrong_surveyed_origin_misses_the_goal(tmp_path):
+    """A surveyed origin is believed, so that a wrong one leads elsewhere."""
+    flight = Flight(tmp_path, 20.0, origin=SceneOrigin(surveyed=(0.0, 0.0, 0.0)))
+    true = np.array([flight.link.now(f"position.{axis}") for axis in "xyz"])
+    assert np.linalg.norm(true - flight.target()) > 1.0
+
+
 @pytest.mark.medium
 def test_no_setpoints_are_sent_before_frame_alignment(tmp_path):
     with pytest.raises(RunError, match="waiting for the scene's origin"):

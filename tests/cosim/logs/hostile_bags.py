@@ -309,11 +309,18 @@ BAGS = {".mcap": mcap_bag, ".db3": sqlite_bag, ".bag": ros1_bag}
 
 
 def write_hostile_bag(seed: int, folder: Path) -> Path:
-    """Write a hostile bag; return its path. Damaged bytes are those of tests/security/fuzzing."""
+    """Write a hostile bag, of which some are cut or have damaged bytes; return its path."""
     rng = random.Random(seed)
     suffix = list(BAGS)[seed % 3]
     path = folder / f"bag{suffix}"
     BAGS[suffix](rng, path)
+    data = bytearray(path.read_bytes())
+    damage = rng.choice(("",) * 7 + ("cut", "bytes"))
+    if damage == "cut":
+        del data[rng.randrange(len(data)) :]
+    for _ in range(rng.choice((1, 20, 500)) if damage == "bytes" else 0):
+        data[rng.randrange(len(data))] = rng.choice((0, 1, 0x7F, 0xFF, rng.randrange(256)))
+    path.write_bytes(data)
     (folder / "map.toml").write_text(rng.choice((MAP,) * 9 + (STAMPED,)))
     return path
 

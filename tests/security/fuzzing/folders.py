@@ -202,17 +202,19 @@ class _AnyFigure(dict[str, InlineFigure]):
         return InlineFigure("", "")
 
 
-def _page_of(name: str, write_page: Callable[[Path, int], Path], of: Callable[[Seeds], Path], seeds: Seeds) -> Case:
+def _page_of(
+    name: str, write_page: Callable[[Path, int], Path], of: Callable[[Seeds], Path], folder: bool, seeds: Seeds
+) -> Case:
     seeds.patch.setattr("cosim.campaigns.pages.replays.write_figures", lambda folder, _: _AnyFigure())
-    return seeds.file(name, lambda path: write_page(path.parent, 0), of=of(seeds), folder=True)
+    return seeds.file(name, lambda path: write_page(path.parent, 0), of=of(seeds), folder=folder)
 
 
-for _name, _file, _write_page, _of in (
-    ("summary of a campaign", SUMMARY, write_campaign_page, lambda seeds: seeds.comparison / "ismail_dunnigan"),
-    ("summary of a sweep", SUMMARY, write_sweep_page, lambda seeds: seeds.sweep),
-    ("comparison", NUMBERS, write_comparison_page, lambda seeds: seeds.comparison),
+for _name, _file, _write_page, _of, _folder in (
+    ("summary of a campaign", SUMMARY, write_campaign_page, lambda seeds: seeds.comparison / "ismail_dunnigan", False),
+    ("summary of a sweep", SUMMARY, write_sweep_page, lambda seeds: seeds.sweep, True),
+    ("comparison", NUMBERS, write_comparison_page, lambda seeds: seeds.comparison, True),
 ):
-    reader(_name, "json", "cosim.io.strict_json:read_json")(partial(_page_of, _file, _write_page, _of))
+    reader(_name, "json", "cosim.io.strict_json:read_json")(partial(_page_of, _file, _write_page, _of, _folder))
 
 
 @reader("remarks on a replay", "json", "cosim.io.strict_json:read_json")
