@@ -297,6 +297,28 @@ def test_rates_of_a_controller_that_rests_are_no_samples(contents):
         assert next(contents.sources[source].blocks())[0, 2:] == pytest.approx(values)
 
 
+@pytest.mark.parametrize(
+    ("name", "fields", "samples"),
+    [
+        ("IMU", {"I": 1, "GyrX": 1, "GyrY": 2, "GyrZ": 3, "AccX": 4, "AccY": 5, "AccZ": 6},
+         {("gyro", "IMU[1]"): [1, 2, 3], ("acceleration", "IMU[1]"): [4, 5, 6]}),
+        ("BARO", {"I": 0, "Alt": -2.5}, {("depth", "BARO[0]"): [2.5]}),
+        ("RFND", {"Dist": 1.5, "Orient": 25}, {("altitude", "RFND"): [1.5]}),
+        ("BAT", {"Inst": 0, "Volt": 15.8}, {("voltage", "BAT"): [15.8]}),
+        ("XKF1", {"C": 0, "PN": 1, "PE": 2, "PD": 3, "VN": 4, "VE": 5, "VD": 6},
+         {("position", "XKF1[0]"): [1, 2, 3], ("velocity_world", "XKF1[0]"): [4, 5, 6]}),
+        ("ATT", {"Roll": math.inf, "Pitch": 0.0, "Yaw": 0.0}, {("attitude", "ATT"): []}),  # omitted
+    ],
+)  # fmt: skip
+def test_dataflash_messages_are_samples_in_si_units(contents, name, fields, samples):
+    _Messages(contents).add(name, {"TimeUS": 10_000_000} | fields)
+    assert contents.sources.keys() == samples.keys()
+    for source, values in samples.items():
+        assert [row[2:].tolist() for block in contents.sources[source].blocks() for row in block] == [values][
+            : len(values)
+        ]
+
+
 @pytest.mark.parametrize("autopilot", ["ardupilot", "px4"])
 def test_rates_are_stamped_where_the_gyro_filter_had_them(contents, tmp_path, autopilot):
     """A slow rotation through the Butterworth filter of SciPy comes as late as the stamps are moved back.
