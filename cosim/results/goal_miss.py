@@ -53,7 +53,8 @@ class _End:
         rows = self.rows = record.take(picked.tolist(), names)
         self.duration = float(rows["time"][-1] - rows["time"][0])
         self.distance = -rows["goal.clearance"]  # m
-        self.closing = float(self.distance[0] - self.distance[-1]) / max(self.duration, 1e-9)  # m/s
+        with np.errstate(invalid="ignore"):
+            self.closing = float(self.distance[0] - self.distance[-1]) / max(self.duration, 1e-9)  # m/s
         self.speed = float(np.linalg.norm(rows.stack(_SPEED), axis=1).mean())  # m/s
         limited = np.logical_or.reduce([rows[name] > 0.0 for name in flags])
         for j, name in enumerate(thrusts):

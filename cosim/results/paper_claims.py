@@ -36,7 +36,7 @@ def paper_claims(scenario: Scenario, summary: dict[str, Any]) -> list[Claim]:
 
 def _reaching(summary: dict[str, Any]) -> Claim:
     if summary["settled"]:
-        measured = f"In at {summary['reach_time']:.2f} s, in for good at {summary['settle_time']:.2f} s."
+        measured = f"In at {summary['reach_time']:.2f} s, inside from {summary['settle_time']:.2f} s."
         why = "Agrees that the region is reached; the paper gives no time."
     elif summary["reached"]:
         measured = f"In at {summary['reach_time']:.2f} s, but not inside for the last 10 s."

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from cosim.errors import RunError
 from cosim.io.format_number import require_format
 from cosim.simulation.signals import Array, Column
+from plant_fmu.archive import atomic_file
 
 log = logging.getLogger(__name__)
 
@@ -123,7 +124,7 @@ class Record(Rows):
                 raise RunError(f"a record is one file, got {len(file)}")
             file = file[0]
         self.file = file
-        with _opened(file) as source:
+        with _opened(file, warn=True) as source:
             self._count = sum(source.group_rows)
             _require_numbers(file, source.schema, self._count)
             if (format_number := _format_of(source.schema)) is not None:
@@ -191,15 +192,28 @@ def load_record(folder: Path) -> Record:
     require_utf8(folder)
     files = (folder / name for name in (RECORD, STREAM))
     file = next((file for file in files if file.exists() and file.stat().st_size), None)
-    if file is None and (folder / _FORMER).exists():
-        join = f"import pyarrow.parquet as pq; pq.write_table(pq.read_table('{_FORMER}'), '{RECORD}')"
-        raise RunError(f'{folder}: holds {_FORMER} of an earlier version; join it there by: python -c "{join}"')
+    if file is None and (parts := sorted((folder / _FORMER).glob("*.parquet"))):
+        file = _join(parts, folder / RECORD)
     if file is None:
         raise RunError(f"{folder}: holds no record of a run")
     record = Record(file)
     if not len(record):
         raise RunError(f"{folder}: the record of the run is empty")
     return record
+
+
+def _join(parts: Sequence[Path], path: Path) -> Path:
+    """Write the rows of a killed run of an earlier version, which left them in several files, to its record."""
+    try:
+        schema = pq.read_schema(parts[0])
+        with atomic_file(path) as file, pq.ParquetWriter(file.name, schema, compression="zstd") as writer:
+            for part in parts:
+                for batch in pq.ParquetFile(part).iter_batches():
+                    writer.write_batch(batch)
+    except (OSError, pa.ArrowException, ValueError) as error:
+        raise RunError(f"{path.parent / _FORMER}: cannot be joined to {path.name}: {error}") from error
+    log.warning("%s: its %s of an earlier version is now %s", path.parent, _FORMER, path.name)
+    return path
 
 
 def _column_of(field: pa.Field) -> Column:
@@ -226,21 +240,26 @@ class _Source:
             raise TypeError(f"{rows} rows are there, expected {expected_rows}")
 
 
-def _complete_batches(file: Path, stream: Any) -> Iterator[pa.RecordBatch]:
+def _complete_batches(file: Path, stream: Any, warn: bool) -> Iterator[pa.RecordBatch]:
     """Yield the batches of a stream up to the first that a kill, a full disk or damage has made unreadable."""
     try:
         for batch in stream:
             batch.validate()  # a damaged length would be read beyond the file's end
             yield batch
     except (pa.ArrowInvalid, OSError) as error:
-        log.warning("%s: its end cannot be read (%s); the rows before it are kept", file, error)
+        log.log(
+            logging.WARNING if warn else logging.DEBUG,
+            "%s: its end cannot be read (%s); the rows before it are kept",
+            file,
+            error,
+        )
 
 
 @contextlib.contextmanager
-def stream_batches(file: Path) -> Iterator[tuple[pa.Schema, Iterator[pa.RecordBatch]]]:
+def stream_batches(file: Path, warn: bool = False) -> Iterator[tuple[pa.Schema, Iterator[pa.RecordBatch]]]:
     """Open an Arrow stream to read its schema and complete batches, whose memory is the file's."""
     with pa.memory_map(str(file)) as memory, pa.ipc.open_stream(memory) as stream:
-        yield stream.schema, _complete_batches(file, stream)
+        yield stream.schema, _complete_batches(file, stream, warn)
 
 
 def _numbers(column: pa.Array) -> Array:
@@ -252,12 +271,12 @@ def _numbers(column: pa.Array) -> Array:
 
 
 @contextlib.contextmanager
-def _opened(file: Path) -> Iterator[_Source]:
+def _opened(file: Path, warn: bool = False) -> Iterator[_Source]:
     """Open the file of a record; convert all errors of reading it to a RunError."""
     require_utf8(file)
     try:
         if file.suffix == Path(STREAM).suffix:
-            with stream_batches(file) as (schema, complete):
+            with stream_batches(file, warn) as (schema, complete):
                 batches = list(complete)
                 yield _Source(schema, list(map(len, batches)), lambda groups, _: [batches[i] for i in groups])
         else:

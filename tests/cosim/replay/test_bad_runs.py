@@ -72,9 +72,6 @@ def _rewritten(change):
 
 
 SPOILT = {
-    "holds record.parts of an earlier version": lambda folder: (folder / "record.parquet").rename(
-        folder / "record.parts"
-    ),
     "holds no record of a run": lambda folder: (folder / "record.parquet").unlink(),
     "the record of the run is empty": _rewritten(lambda table: table.slice(0, 0)),
     "record.parquet: cannot be read": lambda folder: os.truncate(folder / "record.parquet", 5000),
