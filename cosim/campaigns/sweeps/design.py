@@ -178,7 +178,7 @@ class Design:
         elif self.kind == "paired":
             columns = [np.array(vary.values)[rows] for vary in self.vary]
         else:
-            fractions = self._fractions[rows]
+            fractions = self._fractions(rows)
             columns = [vary.at(fractions[:, i]) for i, vary in enumerate(self.vary)]
         return np.column_stack(columns)
 
@@ -188,19 +188,32 @@ class Design:
         odd = int(factor) | 1
         return (rows * odd + int(offset)) % _SEEDS
 
-    @cached_property
-    def _fractions(self) -> NDArray[np.float64]:
-        """Values as fractions of their ranges, from 0 to 1, shape (rows, keys)."""
-        keys, rng = len(self.vary), np.random.default_rng(self.seed)
-        fractions: NDArray[np.float64]
+    def _fractions(self, rows: Rows) -> NDArray[np.float64]:
+        """Return the values of some rows as fractions of their ranges, from 0 to 1, shape (n, keys)."""
+        if self.kind == "lhs":
+            return self._hypercube[rows]
+        first, n, keys = int(rows[0]), int(rows[-1] - rows[0]) + 1, len(self.vary)
         if self.kind == "random":
-            return rng.random((self.rows, keys))
-        from scipy.stats import qmc  # imported here, since workers do not need it
+            bits = np.random.PCG64(self.seed)
+            bits.advance(first * keys)
+            fractions = np.random.Generator(bits).random((n, keys))
+        else:
+            from scipy.stats import qmc  # imported here, since workers do not need it
 
-        with warnings.catch_warnings():  # for numbers of rows that are not powers of two
-            warnings.simplefilter("ignore", UserWarning)
-            sampler = qmc.LatinHypercube(keys, seed=rng) if self.kind == "lhs" else qmc.Sobol(keys, seed=rng)
-            fractions = sampler.random(self.rows)
+            sobol = qmc.Sobol(keys, scramble=True, seed=np.random.default_rng(self.seed))
+            with warnings.catch_warnings():  # for numbers of rows that are not powers of two
+                warnings.simplefilter("ignore", UserWarning)
+                if first:
+                    sobol.fast_forward(first)
+                fractions = sobol.random(n)
+        return fractions[rows - first]
+
+    @cached_property
+    def _hypercube(self) -> NDArray[np.float64]:
+        from scipy.stats import qmc
+
+        hypercube = qmc.LatinHypercube(len(self.vary), seed=np.random.default_rng(self.seed))
+        fractions: NDArray[np.float64] = hypercube.random(self.rows)
         return fractions
 
     def table(self) -> dict[str, Any]:
