@@ -10,7 +10,7 @@
 # make lowest     tests with the lowest versions of all that is needed, on Python 3.11
 # make portable   the fast tests with other kernels, processors and Pythons: an hour, or make portable PORTABLE='--only zen'
 # make bench  what things cost, against peers in an environment of their own
-# make mutation         whether the tests notice every changed sign of controller and plant; half an hour
+# make mutation         whether the tests notice every changed sign of controller and plant; some hours
 # make mutation-sample  the same of 40 signs, drawn with a fixed seed
 PYTHON ?= python3
 VENV ?= .venv
@@ -58,7 +58,7 @@ coverage: $(VENV)/extras
 	$(call cover,98,fuzzy_arbiter/*,tests/fuzzy_arbiter)
 	$(call cover,88,plant_fmu/*,tests/plant_fmu tests/security/test_fmu_files.py)
 	SUBREACH_INTERPRETED=1 $(call cover,97,$(MATHEMATICS),$(MATHEMATICS_TESTS) -W ignore::RuntimeWarning)
-	$(call cover,93,$(MAVLINK),tests/cosim/mavlink/test_*.py)
+	$(call cover,96,$(MAVLINK),tests/cosim/mavlink/test_*.py)
 
 mutation: $(VENV)/extras
 	$(BIN)/python -m tests.mutation --results build/mutation.jsonl

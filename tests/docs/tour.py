@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -23,8 +24,11 @@ from tests.docs.pages import ROOT, Block, blocks, page_name
 
 PAGES = (ROOT / "README.md", ROOT / "docs" / "tutorial.md")
 FRESH = (("make run", ""), ("python3 -m venv .venv", ""))  # these set up an environment, each in a clone of its own
-# seconds until Ctrl-C, after which they end with INTERRUPTED
-ENDLESS = (("cosim run harbour", "90"), ("cosim mavlink listen", "30"), ("cosim sitl", "60"))
+# seconds until Ctrl-C, after which they end with INTERRUPTED; and what they have printed by then
+ENDLESS = (
+    ("cosim run harbour", "90 runs/harbour"), ("cosim mavlink listen", "30 no vehicle found"),
+    ("cosim sitl", "60 waiting for ArduPilot"),
+)  # fmt: skip
 INTERRUPTED = 130  # docs/reference/command-line.md
 # what the page says ends with another status than 0
 STATUS = (("cosim check paper", "1"), ("cosim check mine.toml --set goal.center=[3.0,0.2,3.0]", "1"))
@@ -64,14 +68,16 @@ class Shell:
                 ["sh", script], stdin=subprocess.DEVNULL, stdout=sink, stderr=subprocess.STDOUT,
                 env={}, start_new_session=True,
             )  # fmt: skip
-        with contextlib.suppress(subprocess.TimeoutExpired):
-            process.wait(seconds or LIMIT)
-        if seconds and process.poll() is None:
-            os.killpg(process.pid, signal.SIGINT)
+        try:
             with contextlib.suppress(subprocess.TimeoutExpired):
-                process.wait(PATIENCE)
-        with contextlib.suppress(ProcessLookupError):
-            os.killpg(process.pid, signal.SIGKILL)
+                process.wait(seconds or LIMIT)
+            if seconds and process.poll() is None:
+                os.killpg(process.pid, signal.SIGINT)
+                with contextlib.suppress(subprocess.TimeoutExpired):
+                    process.wait(PATIENCE)
+        finally:
+            with contextlib.suppress(ProcessLookupError):
+                os.killpg(process.pid, signal.SIGKILL)
         return process.wait(), output.read_text(encoding="utf-8", errors="replace")
 
 
@@ -93,16 +99,20 @@ def run_page(page: Path, source: str = str(ROOT)) -> int:
         for block in blocks(page):
             for line, text, words in steps(block):
                 if shell is None or of_command(FRESH, words):
+                    for former in Path(folder).iterdir():
+                        shutil.rmtree(former, ignore_errors=True)
                     shell = Shell(Path(tempfile.mkdtemp(dir=folder)), source)
-                seconds = next(map(float, of_command(ENDLESS, words)), None)
+                limit, _, sign = next(iter(of_command(ENDLESS, words)), "").partition(" ")
+                seconds = float(limit) if limit else None
                 expected = INTERRUPTED if seconds else next(map(int, of_command(STATUS, words)), 0)
                 begun = time.monotonic()
                 status, output = shell.run(text, seconds)
-                verdict = "ok" if status == expected else f"FAILED: expected {expected}"
-                failed += status != expected
+                ok = status == expected and sign in output
+                verdict = "ok" if ok else f"FAILED: expected {expected}" + f" and {sign!r}" * (status == expected)
+                failed += not ok
                 where = f"{page_name(page)}:{line}"
                 sys.stdout.write(f"{time.monotonic() - begun:8.1f} s {status:4d}  {where}  {text}  [{verdict}]\n")
-                if status != expected:
+                if not ok:
                     sys.stdout.writelines(f"    | {shown}\n" for shown in output.splitlines()[-25:])
                 sys.stdout.flush()
     return failed

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import fnmatch
 import hashlib
 import json
@@ -10,6 +11,7 @@ import os
 import queue
 import random
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -47,27 +49,31 @@ def run_tests(copy: Path, part: Part) -> str:
     if part.without:
         options += ["-k", f"not ({' or '.join(part.without)})"]
     command = [sys.executable, "-m", "pytest", *options, *(f"tests/{file}" for file in part.tests)]
+    process = subprocess.Popen(
+        command, cwd=copy, env=os.environ | variables, stdout=subprocess.PIPE, text=True, start_new_session=True
+    )
     try:
-        done = subprocess.run(
-            command, cwd=copy, env=os.environ | variables, capture_output=True, text=True, timeout=RUN_SECONDS
-        )
+        output, _ = process.communicate(timeout=RUN_SECONDS)
     except subprocess.TimeoutExpired:
         return f"no end within {RUN_SECONDS} s"
-    failed = [line.split()[1] for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
-    return "" if done.returncode == 0 else (failed or [f"status {done.returncode}"])[0]
+    finally:
+        with contextlib.suppress(ProcessLookupError):  # with all that the tests have started
+            os.killpg(process.pid, signal.SIGKILL)
+    failed = [line.split()[1] for line in output.splitlines() if line.startswith(("FAILED", "ERROR"))]
+    return "" if process.returncode == 0 else (failed or [f"status {process.returncode}"])[0]
 
 
 def run_mutants(mutants: list[Mutant], jobs: int, results: Path | None) -> dict[str, str]:
     """Run the tests of each mutant; return which failed, by key, "" for survivors. `results` is read and continued."""
     sources = {m.path: (ROOT / m.path).read_text(encoding="utf-8") for m in mutants}
     marks = {m.key: hashlib.sha256(sources[m.path].encode()).hexdigest()[:16] for m in mutants}
-    noticed: dict[str, str] = {}
+    failed_tests: dict[str, str] = {}
     if results and results.is_file():
         for line in results.read_text(encoding="utf-8").splitlines():
-            key, mark, test = json.loads(line)
-            if marks.get(key) == mark:
-                noticed[key] = test
-    left = [m for m in mutants if m.key not in noticed]
+            entry = json.loads(line)
+            if len(entry) == 3 and marks.get(entry[0]) == entry[1]:
+                failed_tests[entry[0]] = entry[2]
+    left = [m for m in mutants if m.key not in failed_tests]
     random.Random(0).shuffle(left)  # so that what is done when it is stopped is a fair sample
     todo: queue.SimpleQueue[Mutant] = queue.SimpleQueue()
     for mutant in left:
@@ -81,20 +87,25 @@ def run_mutants(mutants: list[Mutant], jobs: int, results: Path | None) -> dict[
                 return
             target = copy / mutant.path
             target.write_text(mutant.apply(sources[mutant.path]), encoding="utf-8")
-            noticed[mutant.key] = run_tests(copy, load_plan()[mutant.path])
+            failed_tests[mutant.key] = run_tests(copy, load_plan()[mutant.path])
             target.write_text(sources[mutant.path], encoding="utf-8")
             if results:
                 results.parent.mkdir(parents=True, exist_ok=True)
                 with results.open("a", encoding="utf-8") as file:
-                    file.write(json.dumps([mutant.key, marks[mutant.key], noticed[mutant.key]]) + "\n")
+                    file.write(json.dumps([mutant.key, marks[mutant.key], failed_tests[mutant.key]]) + "\n")
 
     with tempfile.TemporaryDirectory(prefix="mutation-") as scratch, ThreadPoolExecutor(jobs) as pool:
         copies = [make_copy(Path(scratch, str(i))) for i in range(min(jobs, len(left)))]
         for part in {id(load_plan()[m.path]): load_plan()[m.path] for m in left}.values():
             if failed := run_tests(copies[0], part):
                 raise RuntimeError(f"fails without any mutant: {failed}")
-        list(pool.map(work, copies))
-    return noticed
+        try:
+            list(pool.map(work, copies))
+        finally:
+            with contextlib.suppress(queue.Empty):  # after Ctrl-C
+                while True:
+                    todo.get_nowait()
+    return failed_tests
 
 
 def main() -> int:
@@ -110,13 +121,13 @@ def main() -> int:
     mutants = [m for m in all_mutants() if fnmatch.fnmatch(m.path, arguments.only) and m.key not in equivalent]
     if arguments.sample is not None:
         mutants = random.Random(arguments.seed).sample(mutants, min(arguments.sample, len(mutants)))
-    noticed = run_mutants(mutants, arguments.jobs, arguments.results)
-    scores = Counter((m.path.partition("/")[0], bool(noticed[m.key])) for m in mutants)
+    failed_tests = run_mutants(mutants, arguments.jobs, arguments.results)
+    scores = Counter((m.path.partition("/")[0], bool(failed_tests[m.key])) for m in mutants)
     for m in sorted(mutants, key=lambda m: (m.path, m.line)):
-        print(f"{m.path}:{m.line}  {m.before}  {m.text[:70]}\n    {noticed[m.key] or 'SURVIVED'}")
+        print(f"{m.path}:{m.line}  {m.before}  {m.text[:70]}\n    {failed_tests[m.key] or 'SURVIVED'}")
     for package in sorted({package for package, _ in scores}):
         print(f"{package}: {scores[package, True]} of {scores[package, True] + scores[package, False]} noticed")
-    return int(not all(noticed[m.key] for m in mutants))
+    return int(not all(failed_tests[m.key] for m in mutants))
 
 
 if __name__ == "__main__":
