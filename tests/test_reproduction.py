@@ -65,7 +65,7 @@ def test_documented_goal_region_times_match_the_runs(records):
         inside = np.linalg.norm(position(record) - CENTER, axis=1) <= RADIUS
         switches[name] = record["time"][1:][np.diff(inside.astype(int)) != 0]
     first, out, last = switches["paper"]
-    assert f"in at {first:.2f} s, out again at {out:.2f} s, in for good from {last:.2f} s; never in 120 s" in said
+    assert f"in at {first:.2f} s, out again at {out:.2f} s, back inside from {last:.2f} s; never in 120 s" in said
     assert not switches["paper-limited"].size
     assert switches["paper-calibrated"].size == 8 and "in and out four times" in said
     away = position(records["paper-calibrated"])[records["paper-calibrated"]["time"] >= switches["paper-calibrated"][0]]
@@ -144,7 +144,7 @@ def test_documented_deployable_run_matches_the_run(shipped_run):
     run = shipped_run("paper-deployable", "arbiter.engine=closed")
     summary, record = run.summary, load_record(run.folder)
     clear = " and ".join(f"{summary['min_clearance'][name]:.3f}" for name in ("SR1", "SR2"))
-    assert f"in for good at {summary['settle_time']:.2f} s, {clear} m clear of SR1 and SR2" in TEXT
+    assert f"inside from {summary['settle_time']:.2f} s, {clear} m clear of SR1 and SR2" in TEXT
     assert f"at most {summary['max_force']:.1f} N on the body and {summary['max_speed']:.2f} m/s" in TEXT
     assert f"the attitude within {turned(record).max():.1f}°" in TEXT
     assert f"φ̂1 at {summary['estimate_final'][0]:.2f} N".replace("-", "−") in TEXT

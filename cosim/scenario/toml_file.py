@@ -268,8 +268,8 @@ def current_key(table: dict[str, Any], key: str) -> str:
         parts.append(current_name(container, part))
         if isinstance(container, list | tuple):
             named = {item.get("name"): item for item in container if isinstance(item, dict)}
-            by_index = container[int(part)] if part.isdecimal() and int(part) < len(container) else None
-            container = named.get(part, by_index)
+            index = int(part) if part.isdecimal() and len(part) < 10 else len(container)
+            container = named.get(part, container[index] if index < len(container) else None)
         else:
             container = container.get(parts[-1]) if isinstance(container, dict) else None
     return ".".join(parts)

@@ -22,7 +22,7 @@ _CHECK_PERIOD = 5.0  # s between checks of the pool while no batch finishes
 _MAX_CRASHES = 30  # maximum number of crashes without a finished batch in between: with more, the cause is not a row
 FIRST = 1  # number of rows of the first batch, before the time of a row is known
 TARGET = 1.0  # s, desired time of a batch; one process submits and writes all batches, for any number of workers
-MIN_TIME = 0.05  # s, least time of a batch; the last ones are small, so that all workers end together
+MIN_TIME = 0.05  # s, minimum time of a batch; the last ones are small, so that all workers end together
 GROWTH = 4  # maximum ratio of a batch's size to the one before: the time of first batches includes compiling
 MAX_ROWS = 65536  # maximum number of rows of a batch
 

@@ -77,6 +77,11 @@ class ParameterProtocol(Service):
         """Reset the values to the vehicle's settings."""
         self.setting_values = {setting.key: setting.value for setting in self.context.settings}
 
+    def _current_name(self, name: str) -> str:
+        """Return the present name of a parameter, for one by its former spelling."""
+        current = name.replace("CENTRE", "CENTER")
+        return current if current in self._index else name
+
     # ---- for other services ----
 
     def value(self, name: str) -> float:
@@ -152,7 +157,7 @@ class ParameterProtocol(Service):
     # ---- single parameters ----
 
     def _receive_param_request_read(self, sender: Sender, message: Any) -> None:
-        m, index, name = self.context.mavlink, message.param_index, message.param_id
+        m, index, name = self.context.mavlink, message.param_index, self._current_name(message.param_id)
         if index >= 0:
             name = self.names[index] if index < len(self.names) else ""
         elif name == _HASH and self.context.profile.has_parameter_hash:
@@ -167,7 +172,7 @@ class ParameterProtocol(Service):
         sender.link.send(self.context.make("PARAM_ERROR", *sender.address, name, index, error))
 
     def _receive_param_set(self, sender: Sender, message: Any) -> None:
-        m, name, value = self.context.mavlink, message.param_id, message.param_value
+        m, name, value = self.context.mavlink, self._current_name(message.param_id), message.param_value
         if name == _HASH:  # the station has the list already
             self._bursts.pop(sender.link, None)
             return

@@ -40,7 +40,7 @@ def rests_from(record: Rows) -> float | None:
 
 
 def break_time(axes: Sequence[Axes], rest_start: float, end: float) -> None:
-    """Shorten the time from `rest` to `end` [s], on gray, in axes of a whole run that share their time."""
+    """Shorten the time from `rest_start` to `end` [s], on gray, in axes of a whole run that share their time."""
     slope = _TAIL / (1.0 - _TAIL) * rest_start / (end - rest_start)
 
     def forward(t: Array) -> Array:

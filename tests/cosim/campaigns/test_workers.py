@@ -83,6 +83,13 @@ def test_user_errors_are_one_line(tmp_path, capsys, words, said):
     assert not (tmp_path / "out").exists()
 
 
+def test_folder_that_cannot_be_made_is_one_line(tmp_path, capsys):
+    scenes = write(tmp_path / "s.jsonl", HARD)
+    (tmp_path / "file").write_text("")
+    words = ["campaign", str(scenes), "--law", "ismail_dunnigan", "--out", str(tmp_path / "file" / "out")]
+    assert main(words) == 2 and capsys.readouterr().err.endswith("file/out: Not a directory\n")
+
+
 @pytest.mark.parametrize("workers", ["0", "-1", "two", "1e3", "9999"])
 def test_invalid_worker_counts_are_rejected(capsys, workers):
     with pytest.raises(SystemExit) as left:
