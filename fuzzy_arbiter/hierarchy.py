@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
-from fuzzy_arbiter.checks import all_of, require_name, shown
+from fuzzy_arbiter.checks import all_of, require_choice, require_name, shown
 from fuzzy_arbiter.definition import Normalization, Output, Outside, System, Variable
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import And, Is, Or, Proposition
@@ -130,8 +130,7 @@ def prioritized(
     criteria = all_of(Criterion, criteria, "criteria", "a sequence of Criterion")
     if not criteria:
         raise DefinitionError("criteria: got none, expected at least one")
-    if not isinstance(form, str) or form not in FORMS:
-        raise DefinitionError(f"form is {form!r}, expected one of {', '.join(FORMS)}")
+    require_choice(form, FORMS, "form")
     if not isinstance(weight, Output):
         raise DefinitionError(f"weight is {shown(weight)}, expected an Output")
     if len(weight.terms) != 2:

@@ -66,6 +66,11 @@ class HysteresisArbiter:
     [0.0, 1.0, 1.0, 0.0]
     """
 
+    __slots__ = (
+        "_dwell", "_enter", "_graded", "_names", "_off_places", "_on", "_on_places", "_release", "_shapes", "_since",
+        "_time", "arbiter",
+    )  # fmt: skip
+
     def __init__(
         self,
         arbiter: Arbiter,

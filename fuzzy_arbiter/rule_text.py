@@ -107,7 +107,8 @@ class _Parser:
         """Read hedges, which stand before tokens of some kinds, and *not*."""
         words: list[str] = []
         while self.accept("not") or self.accept_hedge(*before):
-            words.append(self.tokens[self.at - 1][1].lower())
+            kind, text = self.tokens[self.at - 1][:2]
+            words.append("not" if kind == "not" else text.lower())  # which may be written ~
         return tuple(words)
 
     def accept_hedge(self, *before: str) -> bool:

@@ -21,7 +21,7 @@ _EACH_BY_ITSELF = ("range", "none")  # normalizations that use one output at a t
 
 
 class Defuzzifier:
-    """Value of one output from the cuts of its slots; each kind has one of both functions, or both for speed."""
+    """Computes the value of an output from the cuts of its slots. Subclasses define `value`, `values` or both."""
 
     method: str  # how the value is computed, with its error bound
 
@@ -131,7 +131,8 @@ class Engine:
                 return low, high
             reason = f"its terms have one centroid, {low:g}"
         raise EngineError(
-            f"output {output.name!r}: {reason}, which leaves no range to normalize; expected normalization 'none'"
+            f"output {output.name!r}: {reason}, which leaves no range to normalize; "
+            "expected another term, or normalization none"
         )
 
 

@@ -138,7 +138,7 @@ class Firing:
     def cuts(self, strengths: Sequence[Any]) -> list[Any]:
         """Return the strength of each slot of each output: lists of numbers, or arrays (slots, n)."""
         many = isinstance(strengths[0], np.ndarray)
-        none = 0.0 * strengths[0]
+        none: Any = np.zeros_like(strengths[0]) if many else 0.0
         result: list[Any] = [
             [functools.reduce(join, [strengths[i] for i in slot.rules]) if slot.rules else none for slot in slots]
             for slots, join in zip(self.slots, self._joins[many], strict=True)

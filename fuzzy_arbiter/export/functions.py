@@ -59,12 +59,13 @@ def in_python(name: str) -> str:
             f'def {name}(a, b):\n    """Return 1 if {comparison}, else 0."""\n    return 1.0 if {comparison} else 0.0'
         )
     operator = _OPERATORS[name]
-    return f'def {name}({operator.arguments}):\n    """Return the degree."""\n    return {operator.formula}'
+    return f'def {name}({operator.arguments}):\n    """Return {operator.formula}."""\n    return {operator.formula}'
 
 
 def in_c(name: str) -> str:
     """Return a function as a definition in C; empty for one of ``math.h``."""
-    arguments = "double a" if name in HEDGES else "double a, double b"
+    operator = _OPERATORS.get(name)
+    arguments = ", ".join(f"double {x}" for x in (operator.arguments if operator else "a, b").split(", "))
     body = _body_in_c(name) if name in _OPERATORS else f"a {_COMPARED[name]} b" if name in _COMPARED else _C.get(name)
     return f"static inline double {name}({arguments}) {{ return {body}; }}" if body else ""
 

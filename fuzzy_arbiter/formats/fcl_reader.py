@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -66,13 +66,15 @@ def read(text: str, block: str | None = None) -> System:
         weighted: next(iter(accumulations), "sum" if weighted and fuzzylite else "max") for weighted in (False, True)
     }
     input_blocks = _declared(sections, "VAR_INPUT", "FUZZIFY")
+    input_names = {section.name for section in input_blocks}
     inputs = []
     for section in input_blocks:
         terms, places = _terms(section, None)
         with located(f"line {section.line}"):
             inputs.append(Variable(section.name, _universe(section, places), terms))
     names = [v.name for v in inputs]
-    outputs = [_output(section, names, usual) for section in _declared(sections, "VAR_OUTPUT", "DEFUZZIFY")]
+    output_blocks = _declared(sections, "VAR_OUTPUT", "DEFUZZIFY", taken=input_names)
+    outputs = [_output(section, names, usual) for section in output_blocks]
     any_is_term = {term for v in inputs for term in v.term_names if term.lower() == "any"}
     norms, rules = join_rule_blocks([_rules(section, any_is_term) for section in rule_blocks])
     if not fuzzylite:
@@ -81,7 +83,7 @@ def read(text: str, block: str | None = None) -> System:
     return assembled(begin.line, inputs, outputs, rules, name=begin.name or "arbiter", **norms, **settings)
 
 
-def _declared(sections: Sequence[Block], declaration: str, kind: str) -> list[Block]:
+def _declared(sections: Sequence[Block], declaration: str, kind: str, taken: Collection[str] = ()) -> list[Block]:
     """Return the sections of the declared variables in their order, with the ranges of the declarations."""
     declared: dict[str, tuple[int, str]] = {}  # line and range by name
     for section in sections:
@@ -93,8 +95,13 @@ def _declared(sections: Sequence[Block], declaration: str, kind: str) -> list[Bl
             elif not names or not text.upper().startswith("RANGE "):
                 refuse(line, f"{text!r}, expected a variable's name, a colon and REAL")
             for name in names:
-                if match and (name in declared or name.lower() in RESERVED):
-                    refuse(line, f"{name!r} is {'declared twice' if name in declared else 'a word of the language'}")
+                if match and (name in declared or name in taken or name.lower() in RESERVED):
+                    refuse(
+                        line,
+                        f"{name!r} is {'a word of the language' if name.lower() in RESERVED else 'declared twice'}",
+                    )
+                if not match and declared[name][1]:
+                    refuse(line, f"RANGE of {name!r} appears twice")
                 declared[name] = (line, "" if match else text[6:].removeprefix(":= "))
     blocks: dict[str, Block] = {}
     for section in sections:
@@ -158,8 +165,8 @@ def _output(section: Block, inputs: Sequence[str], aggregations: dict[bool, str]
     # fuzzylite adds NC where the previous value is kept
     line, text = section.entry("DEFAULT", "NC")
     value, _, other = text.partition(" | ")
-    default = None if value in ("NC", "NAN") else read_number(value, line, "the default, or NC,")
-    if other not in ("", "NC"):
+    default = None if value.upper() in ("NC", "NAN") else read_number(value, line, "the default, or NC,")
+    if other.upper() not in ("", "NC"):
         refuse(line, f"DEFAULT of {section.name!r} is {text}, expected NC after |")
     with located(f"line {section.line}"):
         universe, keeps = _universe(section, places, weighted), "PREVIOUS" in locks or bool(other)

@@ -26,9 +26,13 @@ SECTIONS: dict[str, tuple[tuple[str, ...], str]] = {
     "RULEBLOCK": (("AND", "OR", "ACT", "ACCU", "RULE", "ENABLED"), "END_RULEBLOCK"),
 }
 _END = "END_FUNCTION_BLOCK"
+_LIMITS = {*SECTIONS, _END, *(end for _, end in SECTIONS.values())}  # words that stand in no statement
 _MANY = ("TERM", "RULE")
 # some texts of the standard leave out the sign of a range
-_STATEMENT = re.compile(r"(?P<key>\w+)(?: (?P<label>\w\S*))?? (?::=? |(?<=RANGE )(?=\())(?P<value>.*)", re.IGNORECASE)
+_STATEMENT = re.compile(
+    r"(?P<key>\w+)(?: (?P<label>[\w+.-]\S*))?? (?:(?P<sign>:=?) |(?<=RANGE )(?=\())(?P<value>.*)", re.IGNORECASE
+)
+_ASSIGNED = ("TERM", "DEFAULT", "RANGE")  # keys before :=, others before :
 
 _TOKEN = re.compile(
     r"""(?P<space>\s+) | (?P<comment>\(\*.*?\*\) | /\*.*?\*/ | //[^\n]*) | (?P<open>\(\*|/\*)
@@ -85,6 +89,8 @@ def sections_of(tokens: list[Token]) -> tuple[list[Block], bool]:
     sections = [Block("FUNCTION_BLOCK", block_name(tokens[1:]), tokens[0].line)]
     i, by_line = 1, False
     while sections[0].name and tokens[i].line == tokens[0].line and tokens[i].text.upper() not in (*SECTIONS, _END):
+        if tokens[i].kind == "end":
+            break
         i += 1
     while tokens[i].text.upper() != _END:
         i, without_sign = _read_section(tokens, i, sections)
@@ -109,8 +115,16 @@ def _read_section(tokens: Sequence[Token], i: int, sections: list[Block]) -> tup
     while tokens[i].text.upper() != end:
         start = i
         while tokens[i].text != ";" and not _ends_rule(tokens, start, i):
-            if tokens[i].kind == "end" or tokens[i].text.upper() == end:
-                _unexpected(tokens, i, ";" if i > start else end)
+            word = tokens[i].text.upper()
+            if tokens[i].kind == "end" or word in _LIMITS:
+                _unexpected(tokens, i, ";" if i > start and word == end else end)
+            if (
+                i > start + 1
+                and tokens[start].text.upper() != "RULE"
+                and word in keys
+                and tokens[i + 1].text in (":", ":=")
+            ):
+                _unexpected(tokens, i, ";")
             i += 1
         _add(section, tokens[start:i])
         by_line |= tokens[i].text != ";"
@@ -140,11 +154,21 @@ def _add(section: Block, statement: Sequence[Token]) -> None:
     match = _STATEMENT.fullmatch(text)
     if not keys:
         section.many.append((line, text))
-    elif not match or (match["label"] and match["key"].upper() not in _MANY):
+    elif (
+        not match
+        or (match["label"] and match["key"].upper() not in _MANY)
+        or match["sign"] == (":" if match["key"].upper() in _ASSIGNED else ":=")
+    ):
         refuse(line, f"{text!r}, expected a key, a colon and its value; known keys are {', '.join(keys)}")
     else:
         key, value = match["key"].upper(), match["value"]
-        value = f"{match['label'] or ''} {value}" if key == "TERM" else value if key == "RULE" else value.upper()
+        value = (
+            f"{match['label'] or ''} {value}"
+            if key == "TERM"
+            else value
+            if key in ("RULE", "DEFAULT")
+            else value.upper()
+        )
         section.add(line, key, value, keys, _MANY)
 
 

@@ -52,6 +52,8 @@ def read_function(function: str, text: str, line: int, term: str, inputs: int | 
         return _crossed(*numbers)
     if function in ("zmf", "smf") and len(numbers) == 2 and numbers[0] > numbers[1]:
         numbers = [sum(numbers) / 2] * 2  # where MATLAB lets it jump
+    if order and len(numbers) not in (count, count + 1):
+        refuse(line, f"{function} has the numbers {text!r}, expected {count}, and perhaps a height")
     sorted_numbers = [number for _, number in sorted(zip(order, numbers, strict=False))]
     return shape_of(kind, [*sorted_numbers, *numbers[count:]], line, inputs, function)
 

@@ -52,7 +52,7 @@ class Operator:
     @property
     def arguments(self) -> str:
         """Arguments of the function: ``a, b`` for a norm, ``a`` for a hedge."""
-        return "a, b" if self.fcl else "a"
+        return "a, b" if any(isinstance(node, ast.Name) and node.id == "b" for node in ast.walk(self.tree)) else "a"
 
     @property
     def tree(self) -> ast.expr:

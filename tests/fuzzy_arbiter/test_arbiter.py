@@ -170,6 +170,13 @@ def test_missing_scikit_fuzzy_is_reported(monkeypatch):
     assert Arbiter(engine="grid").engine_reason == "requested"
 
 
+def test_arbiter_reports_its_engine_and_the_reason():
+    assert (Arbiter().engine, Arbiter(form="complete").engine) == ("closed", "exact")
+    assert "closed form" in Arbiter().engine_reason
+    assert "there is no closed form" in Arbiter(form="complete").engine_reason
+    assert Arbiter(engine="grid").engine_reason == "requested"
+
+
 def test_arbiter_is_immutable_and_copyable(arbiter):
     with pytest.raises(AttributeError):
         arbiter.system = prioritized()

@@ -88,7 +88,7 @@ def test_strongest_rules_for_two_terms_decide(rules, light, strengths, decisions
         assert (e.winner, e.runner_up, e.margin) == (
             ("lamp_1", None, e.weights[0]) if e.weights[0] else (None, None, 0.0)
         )
-        assert "winner" not in str(e)
+        assert "winner" not in str(e) and (" alone" in str(e)) == (decisions[0][1] is None)
 
 
 def test_used_default_is_reported():

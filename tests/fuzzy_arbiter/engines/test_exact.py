@@ -22,6 +22,7 @@ from fuzzy_arbiter import (
 from fuzzy_arbiter.engines.clipped_centroid import centroid, outline
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.terms.values import Formula
 from tests.examples import examples
 from tests.fuzzy_arbiter import reference
 from tests.fuzzy_arbiter.systems import shapes, systems
@@ -138,3 +139,15 @@ def test_terms_that_overlap_in_too_many_places_are_integrated_by_quadrature():
         [np.minimum(c, t.shape.of_many(x)) for c, t in zip(cuts, made.outputs[0].terms, strict=True)], axis=0
     )
     assert engine.centroids([0.3])[0] == pytest.approx((x * height).sum() / height.sum(), abs=1e-8)
+
+
+@pytest.mark.parametrize("engine", ["exact", "grid"])
+def test_a_rule_without_value_leaves_other_outputs_alone(engine):
+    """Of a term of `y` that no rule concludes, too."""
+    gap = Formula("0.5 + 0 * (1 / (x - 0.125))")
+    x = Variable("x", (0, 1), (Term("odd", gap), Term("on", triangle(0, 0.5, 1))))
+    y = Output("y", (0, 1), (Term("a", triangle(0, 0.5, 1)), Term("b", triangle(0, 0.9, 1))))
+    rules = ("if x is odd then z is a", "if x is ~odd then z is a", "if x is on then y is a")
+    system = System((x,), (Output("z", (0, 1), y.terms[:1]), y), rules, normalization="none")
+    assert str(system.rules[1]) == "if x is not odd then z is a"
+    assert Arbiter(system=system, engine=engine).batch([[0.125]])[0, 1] == pytest.approx(0.5)

@@ -175,3 +175,8 @@ def test_file_with_two_engines_is_rejected():
 def test_unsupported_features_are_rejected_by_name(change, fault):
     with pytest.raises(UnsupportedError, match=f"^fll cannot say {fault}"):
         writes(replace(TIPPING, **change), "fll")
+
+
+def test_engine_names_may_be_any_text():
+    system = replace(TIPPING, name="a: b, 'c'")
+    assert reads(writes(system, "fll"), "fll") == system
