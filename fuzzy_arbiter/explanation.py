@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from operator import attrgetter
 from typing import Any
 
 from fuzzy_arbiter.definition import System
@@ -113,7 +112,7 @@ def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
         for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
     )
     outputs = tuple(
-        _decided(system, rules, k, firing.term_cuts(k, strengths), centroid, weight)
+        _decided(system, rules, k, centroid, weight)
         for k, (centroid, weight) in enumerate(zip(centroids, weights, strict=True))
     )
     degrees = tuple(
@@ -123,25 +122,24 @@ def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
     return Explanation(degrees, rules, outputs, *_ranking(system.result_names, weights))
 
 
-def _decided(
-    system: System, rules: Sequence[FiredRule], k: int, cuts: Sequence[float], centroid: float, weight: float
-) -> OutputDecision:
+def _decided(system: System, rules: Sequence[FiredRule], k: int, centroid: float, weight: float) -> OutputDecision:
     output = system.outputs[k]
-    on = [rule for rule in rules if rule.fired and output.name in rule.conclusions]
-    first = max(on, key=attrgetter("strength"), default=None)  # the first of equally strong ones
-    others = [
-        rule for rule in on if first is not None and rule.conclusions[output.name] != first.conclusions[output.name]
-    ]
-    second = max(others, key=attrgetter("strength"), default=None)
+    cuts = dict.fromkeys(output.term_names, 0.0)
+    concluding = [(rule.conclusions[output.name], rule) for rule in rules if output.name in rule.conclusions]
+    for term, rule in concluding:
+        cuts[term] = max(cuts[term], rule.strength)
+    fired = sorted((pair for pair in concluding if pair[1].fired), key=lambda pair: -pair[1].strength)  # stable
+    top, first = fired[0] if fired else ("", None)
+    second = next((rule for term, rule in fired if term != top), None)
     return OutputDecision(
         system.result_names[k],
         output.name,
-        dict(zip(output.term_names, cuts, strict=True)),
+        cuts,
         centroid,
         weight,
-        first.label if first is not None else None,
-        second.label if second is not None else None,
-        (first.strength if first is not None else 0.0) - (second.strength if second is not None else 0.0),
+        first.label if first else None,
+        second.label if second else None,
+        (first.strength if first else 0.0) - (second.strength if second else 0.0),
         first is None,
     )
 

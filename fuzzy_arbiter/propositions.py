@@ -49,10 +49,15 @@ class Proposition:
         """Propositions that it combines or bends."""
         return ()
 
+    def parts_within(self) -> Iterator[Proposition]:
+        """Yield the proposition and all that it combines or bends, at any depth, from left to right."""
+        yield self
+        for part in self.inner:
+            yield from part.parts_within()
+
     def terms(self) -> Iterator[Is]:
         """Yield every statement about a term, from left to right."""
-        for part in self.inner:
-            yield from part.terms()
+        return (part for part in self.parts_within() if isinstance(part, Is))
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,10 +77,6 @@ class Is(Proposition):
         if self.shape is None:
             raise DefinitionError(f"{self}: made of names alone, expected such as variable['term'], to be called")
         return self.shape(value)
-
-    def terms(self) -> Iterator[Is]:
-        """Yield this statement."""
-        yield self
 
     def __str__(self) -> str:
         return f"{quoted(self.variable)} is {quoted(self.term)}"
@@ -180,14 +181,6 @@ class Hedged(Proposition):
             return f"{self.hedge} ({self.part})"
         variable, words = _said(self)
         return f"{quoted(variable)} is {words}"
-
-
-def anything(p: Proposition) -> Iterator[str]:
-    """Yield the variables that a proposition accepts in any term."""
-    if isinstance(p, Anything):
-        yield p.variable
-    for part in p.inner:
-        yield from anything(part)
 
 
 def _on_one(p: Proposition) -> bool:

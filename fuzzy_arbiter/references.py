@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.propositions import Is, anything
+from fuzzy_arbiter.propositions import Anything, Is
 from fuzzy_arbiter.terms.values import Linear, Value
 
 if TYPE_CHECKING:
@@ -36,9 +36,9 @@ def _require_rule(rule: Rule, inputs: _Terms, outputs: _Terms, before: set[str])
         _require_known(statement, outputs, "output")
         if statement.variable not in before:
             raise DefinitionError(f"asks for output {statement.variable!r}, on which no rule before concludes")
-    for name in anything(rule.condition):
-        if name not in inputs:
-            raise DefinitionError(f"no input {name!r}, expected one of {', '.join(inputs)}")
+    for part in rule.condition.parts_within():
+        if isinstance(part, Anything) and part.variable not in inputs:
+            raise DefinitionError(f"no input {part.variable!r}, expected one of {', '.join(inputs)}")
     for statement in rule.conclusions:
         _require_known(statement, outputs, "output")
     if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):

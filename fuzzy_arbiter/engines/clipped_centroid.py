@@ -111,21 +111,15 @@ def _meeting(starts: Numbers, ends: Numbers, t: int, u: int) -> Any:
     return before / (before - after) if before * after < 0 else None
 
 
-def _between(starts: Numbers, ends: Numbers, share: Any) -> list[Any]:
+def _between(starts: Numbers, ends: Numbers, fraction: Any) -> list[Any]:
     """Return the heights of lines within a piece."""
-    if share == 0:
+    if fraction == 0:
         return list(starts)
-    return [b if share == 1 else a + share * (b - a) for a, b in zip(starts, ends, strict=True)]
+    return [b if fraction == 1 else a + fraction * (b - a) for a, b in zip(starts, ends, strict=True)]
 
 
 def clipped(
-    cuts: Numbers,
-    breakpoints: Numbers,
-    first: Sequence[int],
-    term: Sequence[int],
-    left: Numbers,
-    right: Numbers,
-    order: Sequence[int],
+    cuts: Numbers, breakpoints: Numbers, first: Numbers, term: Numbers, left: Numbers, right: Numbers, order: Numbers
 ) -> tuple[Any, Any]:
     """Return the area under the envelope of clipped terms, and its moment."""
     zero = cuts[0] * 0
@@ -158,7 +152,7 @@ def clipped(
 
 
 def scaled(
-    cuts: Numbers, breakpoints: Numbers, first: Sequence[int], term: Sequence[int], left: Numbers, right: Numbers
+    cuts: Numbers, breakpoints: Numbers, first: Numbers, term: Numbers, left: Numbers, right: Numbers, order: Numbers
 ) -> tuple[Any, Any]:
     """Return the area under the envelope of scaled terms, and its moment."""
     zero = cuts[0] * 0
@@ -194,29 +188,19 @@ def scaled(
 
 
 def centroid(
-    cuts: Numbers,
-    breakpoints: Numbers,
-    first: Sequence[int],
-    term: Sequence[int],
-    left: Numbers,
-    right: Numbers,
-    order: Sequence[int],
-    scales: bool,
-) -> Any:
+    cuts: Numbers, breakpoints: Numbers, first: Numbers, term: Numbers,
+    left: Numbers, right: Numbers, order: Numbers, scales: bool,
+) -> Any:  # fmt: skip
     """Return the centroid of clipped (or scaled) terms, joined by their maximum."""
+    tables = breakpoints, first, term, left, right, order
     largest = cuts[0]
     for cut in cuts:
         largest = max(largest, cut)
     if largest < TINY:
         larger = [cut * LARGER for cut in cuts]
-        if scales:
-            area, moment = scaled(larger, breakpoints, first, term, left, right)
-        else:
-            area, moment = clipped(larger, breakpoints, first, term, left, right, order)
-    elif scales:
-        area, moment = scaled(cuts, breakpoints, first, term, left, right)
+        area, moment = scaled(larger, *tables) if scales else clipped(larger, *tables)
     else:
-        area, moment = clipped(cuts, breakpoints, first, term, left, right, order)
+        area, moment = scaled(cuts, *tables) if scales else clipped(cuts, *tables)
     return breakpoints[0] + moment / area
 
 

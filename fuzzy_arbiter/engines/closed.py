@@ -23,22 +23,13 @@ import numpy as np
 from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.engine import Defuzzifier, Engine, Shortcut
 from fuzzy_arbiter.engines.firing import Array
-from fuzzy_arbiter.engines.normal_form import Clause, Literal, high_clauses, ladder
+from fuzzy_arbiter.engines.normal_form import Literal, NoClosedFormError, high_clauses, ladder
 from fuzzy_arbiter.engines.rational_pieces import Piece, evaluate, pieces
 from fuzzy_arbiter.engines.supported import unsupported_reason
-from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.hierarchy import DEGREE
 
 SMOOTHSTEP = (3.0, -2.0)  # coefficients of 3 h^2 - 2 h^3, which stays within [0, 1]
 _BLOCK = 8192  # number of samples evaluated at a time; longer arrays leave the caches and are allocated anew each time
-
-
-class NoClosedFormError(EngineError):
-    """Raised for a system that this engine cannot evaluate."""
-
-    def __init__(self, reason: str) -> None:
-        super().__init__(f"engine 'closed': {reason}")
-        self.reason = reason
 
 
 class _ClosedForm(Defuzzifier):
@@ -60,11 +51,9 @@ class ClosedEngine(Engine):
     name: ClassVar[str] = "closed"
 
     def __init__(self, system: System) -> None:
-        clauses = _proved(system)
-        if isinstance(clauses, str):
-            raise NoClosedFormError(clauses)
-        self.clauses = clauses
-        self.ladder = ladder(system, clauses)
+        _require_closed(system)
+        self.clauses = high_clauses(system)
+        self.ladder = ladder(system, self.clauses)
         self.raw, scaled = _pieces(system.outputs)
         self.scaled = self.raw if system.normalization == "none" else scaled
         super().__init__(system, [_ClosedForm(forms) for forms in self.raw])
@@ -145,20 +134,20 @@ class ClosedEngine(Engine):
         return x if literal[2] else 1.0 - x
 
 
-def _proved(system: System) -> tuple[tuple[Clause, ...], ...] | str:
-    """Return the clauses of each output's h, or the reason why there is no h."""
-    if reason := unsupported_reason(system, curved_inputs=True):
-        return reason
-    if (system.conjunction, system.disjunction, system.implication) != ("min", "max", "min"):
-        return f"norms are {system.conjunction}, {system.disjunction}, {system.implication}, expected min, max, min"
+def _require_closed(system: System) -> None:
+    """Require outputs of two terms under min and max, and rules of weight 1."""
+    reason = unsupported_reason(system, curved_inputs=True)
+    norms = system.conjunction, system.disjunction, system.implication
+    if not reason and norms != ("min", "max", "min"):
+        reason = f"norms are {', '.join(norms)}, expected min, max, min"
     for i, rule in enumerate(system.rules):
-        if rule.weight != 1.0:
-            return f"R{i + 1} has the weight {rule.weight!r}, expected 1"
+        if not reason and rule.weight != 1.0:
+            reason = f"R{i + 1} has the weight {rule.weight!r}, expected 1"
     for output in system.outputs:
-        if len(output.terms) != 2:
-            return f"output {output.name!r} has the terms {', '.join(output.term_names)}, expected two"
-    clauses = high_clauses(system)
-    return clauses if isinstance(clauses, str) else tuple(clauses)
+        if not reason and len(output.terms) != 2:
+            reason = f"output {output.name!r} has the terms {', '.join(output.term_names)}, expected two"
+    if reason:
+        raise NoClosedFormError(reason)
 
 
 def _pieces(outputs: Sequence[Output]) -> tuple[tuple[tuple[Piece, ...], ...], tuple[tuple[Piece, ...], ...]]:

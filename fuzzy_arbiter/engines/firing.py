@@ -30,21 +30,21 @@ class Logic(Generic[D]):
     hedge: Callable[[str, D], D] | None = None
     certain: D | None = None  # degree of *any*
 
-    def degree(self, proposition: Proposition, of: Callable[[Is], D]) -> D:
+    def degree(self, proposition: Proposition, degree_of: Callable[[Is], D]) -> D:
         """Return the degree to which a proposition holds."""
         if isinstance(proposition, Is):
-            return of(proposition)
+            return degree_of(proposition)
         if isinstance(proposition, Not):
-            return self.negation(self.degree(proposition.part, of))
+            return self.negation(self.degree(proposition.part, degree_of))
         if isinstance(proposition, Hedged):
             assert self.hedge is not None
-            return self.hedge(proposition.hedge, self.degree(proposition.part, of))
+            return self.hedge(proposition.hedge, self.degree(proposition.part, degree_of))
         if isinstance(proposition, Anything):
             assert self.certain is not None
             return self.certain
         assert isinstance(proposition, And | Or)
         join = self.conjunction if isinstance(proposition, And) else self.disjunction
-        return functools.reduce(join, (self.degree(part, of) for part in proposition.parts))
+        return functools.reduce(join, (self.degree(part, degree_of) for part in proposition.parts))
 
 
 def logic_of(operators: System | Operators, many: bool = False) -> Logic[Any]:
@@ -52,13 +52,8 @@ def logic_of(operators: System | Operators, many: bool = False) -> Logic[Any]:
     word = "array" if many else "number"
     conjunction, disjunction = T_NORMS[operators.conjunction], S_NORMS[operators.disjunction]
     hedges: dict[str, Callable[[Any], Any]] = {name: getattr(hedge, word) for name, hedge in HEDGES.items()}
-    return Logic(
-        getattr(conjunction, word),
-        getattr(disjunction, word),
-        lambda a: 1.0 - a,
-        lambda name, a: hedges[name](a),
-        1.0,
-    )
+    joins = getattr(conjunction, word), getattr(disjunction, word)
+    return Logic(*joins, lambda a: 1.0 - a, lambda name, a: hedges[name](a), 1.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +96,7 @@ class Firing:
         many = {name: shape.of_many for name, shape in shapes.items()}
         self._degrees: tuple[Degrees, Degrees] = degrees or shapes, degrees or many
         operators = {rule.operators: rule.operators or system for rule in system.rules}
-        self._logics = [{key: logic_of(of, many) for key, of in operators.items()} for many in (False, True)]
+        self._logics = [{key: logic_of(norms, many) for key, norms in operators.items()} for many in (False, True)]
         joins = [AGGREGATIONS[output.aggregation] for output in system.outputs]
         self._joins: tuple[list[Callable[..., Any]], ...] = [j.number for j in joins], [j.array for j in joins]
 
@@ -112,7 +107,7 @@ class Firing:
         known: dict[tuple[str, str], Any] = {}
         result: list[Any] = []
 
-        def of(statement: Is) -> Any:
+        def degree_of(statement: Is) -> Any:
             key = statement.variable, statement.term
             degree = known.get(key)
             if degree is not None:
@@ -123,7 +118,7 @@ class Firing:
             return degree
 
         for rule in self.system.rules:
-            strength = logics[rule.operators].degree(rule.condition, of) * rule.weight
+            strength = logics[rule.operators].degree(rule.condition, degree_of) * rule.weight
             result.append(np.broadcast_to(strength, len(inputs)) if many else strength)
         return result
 
@@ -144,10 +139,3 @@ class Firing:
             for slots, join in zip(self.slots, self._joins[many], strict=True)
         ]
         return [np.array(cuts).reshape(len(cuts), len(none)) for cuts in result] if many else result
-
-    def term_cuts(self, k: int, strengths: Sequence[float]) -> list[float]:
-        """Return the greatest strength with which each term of an output is concluded."""
-        result = [0.0] * len(self.system.outputs[k].terms)
-        for slot in self.slots[k]:
-            result[slot.term] = max([result[slot.term], *(strengths[i] for i in slot.rules)])
-        return result

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from fuzzy_arbiter.definition import Output, System, Variable
+from fuzzy_arbiter.definition import System, Variable
+from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Not, Or, Proposition
 from fuzzy_arbiter.shapes import Shape
 
@@ -34,27 +35,33 @@ def ladder(system: System, clauses: Sequence[Sequence[Clause]]) -> tuple[Literal
     return tuple(steps)
 
 
-def high_clauses(system: System) -> list[tuple[Clause, ...]] | str:
+class NoClosedFormError(EngineError):
+    """Raised for a system that the closed form does not cover."""
+
+    def __init__(self, reason: str) -> None:
+        super().__init__(f"engine 'closed': {reason}")
+        self.reason = reason
+
+
+def high_clauses(system: System) -> list[tuple[Clause, ...]]:
     """Return, for each output, the clauses of the condition under which its second term is concluded."""
     complements = _complements(system)
     result = []
     for output in system.outputs:
-        low, high = (_conditions(system, output, name) for name in output.term_names)
+        statements = (Is(output.name, name) for name in output.term_names)
+        low, high = ([rule.condition for rule in system.rules if s in rule.conclusions] for s in statements)
         if not low or not high:
-            return f"output {output.name!r} has a term that no rule concludes"
+            raise NoClosedFormError(f"output {output.name!r} has a term that no rule concludes")
         high_form = _joined((_clauses(p, True, complements) for p in high), any_of=True)
         low_negated = _joined((_clauses(p, False, complements) for p in low), any_of=False)
         if high_form is None or low_negated is None:
-            return f"output {output.name!r} has conditions of more than {MAX_CLAUSES} clauses"
+            raise NoClosedFormError(f"output {output.name!r} has conditions of more than {MAX_CLAUSES} clauses")
         if high_form != low_negated:
             first, second = map(repr, output.term_names)
-            return f"output {output.name!r}: the cut of {first} is not 1 minus that of {second} for all inputs"
+            what = f"output {output.name!r}: the cut of {first} is not 1 minus that of {second} for all inputs"
+            raise NoClosedFormError(what)
         result.append(tuple(sorted(high_form, key=sorted)))
     return result
-
-
-def _conditions(system: System, output: Output, term: str) -> list[Proposition]:
-    return [rule.condition for rule in system.rules if Is(output.name, term) in rule.conclusions]
 
 
 def _complements(system: System) -> dict[str, tuple[str, str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from operator import itemgetter
 from typing import NamedTuple
 
 import numpy as np
@@ -43,15 +44,7 @@ class Panels(NamedTuple):
 
     def chosen(self, which: Mask | Indices) -> Panels:
         """Return some of the panels."""
-        return Panels(
-            self.rows[which],
-            self.starts[which],
-            self.ends[which],
-            self.heights[which],
-            self.flat[which],
-            self.areas[which],
-            self.moments[which],
-        )
+        return Panels(*map(itemgetter(which), self))
 
 
 def points_of(starts: Array, ends: Array, at: Array = POINTS) -> Array:

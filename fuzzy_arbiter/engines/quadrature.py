@@ -95,7 +95,7 @@ class Quadrature(Defuzzifier):
             for shape in self._shapes
         ]
         self._drastic = output.aggregation == "drastic_sum" or any(s.implication == "drastic_product" for s in slots)
-        self._table = [self._degrees(t, positions.ravel()).reshape(positions.shape) for t in range(len(self._shapes))]
+        self._table = self._all_degrees(positions)
         # slot and True for its cut, False for 1 less its cut: levels of its term's degree at which its height bends
         words = [slot.implication for slot in slots]
         self._levels = [
@@ -109,22 +109,14 @@ class Quadrature(Defuzzifier):
         self.method = self._method(words)
 
     def _method(self, words: Sequence[str]) -> str:
-        defuzzifier = self.output.defuzzifier
         if any(isinstance(shape, Formula) for shape in self._shapes):
             return "adaptive quadrature, without a bound, as nothing is known of a formula between its points"
-        if defuzzifier == "bisector":
-            return (
-                f"adaptive quadrature, halves of the area within {BOUND:g} of it, and to the rounding of the position"
-            )
-        if defuzzifier != "centroid":
-            return (
-                "search for the greatest height, without a bound: a small error of the height may move its position far"
-            )
-        if (
-            all(shape.polynomial for shape in self._shapes)
-            and set(words) <= {"min", "prod"}
-            and self.output.aggregation in ("max", "probor", "sum", "bounded_sum")
-        ):
+        if self.output.defuzzifier == "bisector":
+            return f"adaptive quadrature, halves of the area within {BOUND:g} of it, and to rounding of the position"
+        if self.output.defuzzifier != "centroid":
+            return "search for the maximum height, without a bound: a small error of it may move the position far"
+        polynomial = all(shape.polynomial for shape in self._shapes) and set(words) <= {"min", "prod"}
+        if polynomial and self.output.aggregation in ("max", "probor", "sum", "bounded_sum"):
             return "integrals of polynomials, to rounding"
         bound = max(BOUND, 4 * self.precision / self.width)  # positions far from 0 are rounded more
         return f"adaptive quadrature, within {bound:g} of the universe's width"
@@ -139,7 +131,8 @@ class Quadrature(Defuzzifier):
 
     def joined(self, degrees: list[Array], cuts: Array) -> Joined:
         """Return heights of the slots and of their join, for degrees of the terms and cuts of the slots."""
-        implied = [of(cut, degrees[t]) for of, cut, t in zip(self._implications, cuts, self._term, strict=True)]
+        slots = zip(self._implications, cuts, self._term, strict=True)
+        implied = [implication(cut, degrees[t]) for implication, cut, t in slots]
         height, before = np.zeros(degrees[0].shape), []
         for one in implied:
             before += [height] if self._sums else []
@@ -148,9 +141,10 @@ class Quadrature(Defuzzifier):
 
     def heights(self, positions: Array, cuts: Array) -> Joined:
         """Return heights at positions, an array of any shape, for cuts of the same shape."""
-        return self.joined(
-            [self._degrees(t, positions.ravel()).reshape(positions.shape) for t in range(len(self._shapes))], cuts
-        )
+        return self.joined(self._all_degrees(positions), cuts)
+
+    def _all_degrees(self, positions: Array) -> list[Array]:
+        return [self._degrees(t, positions.ravel()).reshape(positions.shape) for t in range(len(self._shapes))]
 
     def _degrees(self, t: int, positions: Array) -> Array:
         """Return degrees of a term; where operators jump at 0 and 1, those that only round to these are within them."""
@@ -272,88 +266,65 @@ class Samples:
         """Return panels, where in them the joined terms bend, and the highest slot in each panel's middle."""
         quad, cuts = self.quad, self.cuts[:, rows][..., None]
         wide = ends - starts > NARROWEST * 10 * quad.width
+        fires = wide & (cuts[..., 0] > 0.0)  # of each slot
         events: list[Events] = []
         minima: list[tuple[Indices, Array]] = []
+
+        def add_changes(above: Mask, slot: int, kind: int, one: int, within: Mask | bool = True) -> Mask:
+            """Add the points after which a margin has another sign; return the wide panels without one."""
+            change = (above[:, 1:] != above[:, :-1]) & fires[slot][:, None] & within
+            items, first = np.nonzero(change)
+            events.append(Events(items, first, *(np.full(len(items), x) for x in (kind, one, 0))))
+            return np.asarray(wide & ~change.any(axis=1))
+
+        def add_minima(values: Array, chosen: Mask, scale: Array) -> None:
+            """Add the positions at which values may come to 0 between two points."""
+            items = np.flatnonzero(chosen & (values.min(axis=1) < _CLOSE * scale))
+            with np.errstate(divide="ignore", invalid="ignore"):
+                near, offset = lowest_between(values[items] / scale[items][:, None])
+            items, offset = items[near], offset[near]
+            minima.append((items, (starts[items] + ends[items]) / 2 + offset * (ends[items] - starts[items]) / 2))
+
+        unit = np.ones(len(rows))
         top_slots = np.zeros(joined.height.shape, dtype=np.intp)
         if quad._max:
             top = np.zeros(joined.height.shape)
             for i, height in enumerate(joined.implied):
                 np.copyto(top_slots, i, where=height > top)
                 np.maximum(top, height, out=top)
-            self._passes(joined, top_slots, wide, events)
+            events.append(_passes(joined, top_slots, wide))
         for event, (i, clips) in enumerate(quad._levels):
             margin = joined.degrees[quad._term[i]] - quad.level(event, cuts)
-            above = margin > 0.0  # not where it rounds to its cut, as a curve at its top does
-            change = (above[:, 1:] != above[:, :-1]) & (wide & (cuts[i, :, 0] > 0.0))[:, None]
+            within: Mask | bool = True
             if quad._max:
                 mine = top_slots == i
                 # below a level other than its cut a slot is 0, so that none is the greatest
-                change &= mine[:, 1:] & mine[:, :-1] if clips and not quad._jumps else mine[:, 1:] | mine[:, :-1]
-            self._add(events, change, _LEVEL, event)
+                within = mine[:, 1:] & mine[:, :-1] if clips and not quad._jumps else mine[:, 1:] | mine[:, :-1]
+            # above: not where it rounds to its cut, as a curve at its top does
+            others = add_changes(margin > 0.0, i, _LEVEL, event, within)
             if quad._turning[event]:
-                minima.append(self._nearing(np.abs(margin), wide & ~change.any(axis=1), 1.0))
+                add_minima(np.abs(margin), others, unit)
         for i in range(1, len(joined.before)):
             before, one = joined.before[i], joined.implied[i]
-            for kind, margin in ((_FULL, before + one - 1.0), (_PASSED, one - before)):
-                if kind == _FULL or quad.output.aggregation == "nilpotent_maximum":
-                    above = margin >= 0.0
-                    change = (above[:, 1:] != above[:, :-1]) & (wide & (cuts[i, :, 0] > 0.0))[:, None]
-                    self._add(events, change, kind, i)
-                    minima.append(self._nearing(np.abs(margin), wide & ~change.any(axis=1), 1.0))
+            add_minima(np.abs(before + one - 1.0), add_changes(before + one - 1.0 >= 0.0, i, _FULL, i), unit)
+            if quad.output.aggregation == "nilpotent_maximum":
+                add_minima(np.abs(one - before), add_changes(one - before >= 0.0, i, _PASSED, i), unit)
         if quad._max and len(joined.implied) > 1:
             scale = joined.height.max(axis=1)
             for i, height in enumerate(joined.implied):
                 below = joined.height - height
-                apart = (
-                    wide & (top_slots != i).all(axis=1) & (below.min(axis=1) < _CLOSE * scale) & (cuts[i, :, 0] > 0.0)
-                )
-                minima.append(self._nearing(below, apart, scale))
+                add_minima(below, fires[i] & (top_slots != i).all(axis=1), scale)
         items, breaks = self._located(events, rows, positions)
         inside = (breaks > starts[items]) & (breaks < ends[items])
-        items, breaks = items[inside], breaks[inside]
-        for panels, offset in minima:
-            items = np.concatenate([items, panels])
-            breaks = np.concatenate(
-                [breaks, (starts[panels] + ends[panels]) / 2 + offset * (ends[panels] - starts[panels]) / 2]
-            )
+        found = [(items[inside], breaks[inside]), *minima]
+        items, breaks = (np.concatenate(column) for column in zip(*found, strict=True))
         return items, breaks, top_slots[:, 4]
 
-    def _passes(self, joined: Joined, top_slots: Indices, wide: Mask, events: list[Events]) -> None:
-        """Find the points after which another slot is the greatest."""
-        items, first = np.nonzero((top_slots[:, 1:] != top_slots[:, :-1]) & wide[:, None])
-        if len(items) == 0:
-            return
-        a, b = top_slots[items, first], top_slots[items, first + 1]
-        implied = np.array([height[items] for height in joined.implied])
-        order = np.arange(len(items))
-        p = implied[a, order, first], implied[b, order, first]
-        q = implied[a, order, first + 1], implied[b, order, first + 1]
-        apart = (p[1] < p[0] * (1.0 - _TIED)) & (q[0] < q[1] * (1.0 - _TIED))
-        items, first, a, b = items[apart], first[apart], a[apart], b[apart]
-        events.append(Events(items, first, np.full(len(items), _PAIR), a, b))
-
-    @staticmethod
-    def _add(events: list[Events], change: Mask, kind: int, one: int) -> None:
-        items, first = np.nonzero(change)
-        if len(items):
-            events.append(Events(items, first, *(np.full(len(items), x) for x in (kind, one, 0))))
-
-    @staticmethod
-    def _nearing(values: Array, chosen: Mask, scale: Array | float) -> tuple[Indices, Array]:
-        """Return the panels, of some, where values may come to 0 between two points, and where, from -1 to 1."""
-        chosen = chosen & (values.min(axis=1) < _CLOSE * scale)
-        items = np.flatnonzero(chosen)
-        if len(items) == 0:
-            return items, np.zeros(0)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            near, offset = lowest_between(values[items] / np.broadcast_to(scale, len(values))[items][:, None])
-        return items[near], offset[near]
-
-    def _located(self, found: Sequence[Events], rows: Indices, positions: Array) -> tuple[Indices, Array]:
+    def _located(self, parts: Sequence[Events], rows: Indices, positions: Array) -> tuple[Indices, Array]:
         """Locate events by their roots; return their panels and positions."""
-        if not found:
+        if not sum(len(part.items) for part in parts):
             return np.zeros(0, dtype=np.intp), np.zeros(0)
-        events = Events(*map(np.concatenate, zip(*found, strict=True)))
+        events = Events(*map(np.concatenate, zip(*parts, strict=True)))
 
         def margin(x: Array, which: Indices) -> Array:
             cuts = self.cuts[:, rows[events.items[which]]]
@@ -363,3 +334,13 @@ class Samples:
         x0, x1 = positions[events.items, events.first], positions[events.items, events.first + 1]
         positions, ok = roots(margin, x0, x1, self.quad.precision)
         return events.items[ok], positions[ok]
+
+
+def _passes(joined: Joined, top_slots: Indices, wide: Mask) -> Events:
+    """Return the points after which another slot is the greatest."""
+    items, first = np.nonzero((top_slots[:, 1:] != top_slots[:, :-1]) & wide[:, None])
+    a, b = top_slots[items, first], top_slots[items, first + 1]
+    implied, order = np.array([height[items] for height in joined.implied]), np.arange(len(items))
+    before = implied[b, order, first] < implied[a, order, first] * (1.0 - _TIED)
+    after = implied[a, order, first + 1] < implied[b, order, first + 1] * (1.0 - _TIED)
+    return Events(*(column[before & after] for column in (items, first, np.full(len(items), _PAIR), a, b)))

@@ -49,4 +49,4 @@ def curved_term(variable: Variable) -> str:
 
 def bent(p: Proposition) -> bool:
     """Return True if a condition has hedges or the term *any*."""
-    return isinstance(p, Hedged | Anything) or any(map(bent, p.inner))
+    return any(isinstance(part, Hedged | Anything) for part in p.parts_within())

@@ -32,7 +32,7 @@ _PYTHON_OF_ONE = {
 }
 _COMPARED = {"lt": "<", "le": "<=", "gt": ">", "ge": ">=", "eq": "==", "neq": "!="}
 _C = {"quotient": "a / b", "power": "pow(a, b)"}
-_OPERATORS = {one.name: one for one in (*T_NORMS.values(), *AGGREGATIONS.values(), *HEDGES.values())}
+_OPERATORS = {one.function: one for one in (*T_NORMS.values(), *AGGREGATIONS.values(), *HEDGES.values())}
 # functions of C's math.h
 _C_MATH = frozenset((*_PYTHON_OF_ONE, "fmod"))
 _CALL = re.compile(r"\b([a-z_][a-z_0-9]*)\(")

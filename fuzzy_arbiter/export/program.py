@@ -27,7 +27,7 @@ from fuzzy_arbiter.terms.expressions import code
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.terms.values import Formula, Value
 
-_JOINS = {name: f"{norm.name}({{}}, {{}})" for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
+_JOINS = {name: f"{norm.function}({{}}, {{}})" for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
 _JOINS |= {"prod": "({} * {})", "sum": "({} + {})"}
 _DEEPEST = 20  # maximum number of nested parentheses; parsers accept some hundred
 TABLES = tuple(map(str.upper, Outline._fields))  # names of an outline's tables in code

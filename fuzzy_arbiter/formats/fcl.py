@@ -10,7 +10,7 @@ from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.formats.fcl_reader import read
 from fuzzy_arbiter.formats.fcl_terms import format_shape, universe_of
 from fuzzy_arbiter.formats.fcl_tokens import RESERVED
-from fuzzy_arbiter.formats.notation import blocks, format_number, require_word, require_words, unsupported_rule
+from fuzzy_arbiter.formats.notation import format_number, group_rules, require_word, require_words, unsupported_rule
 from fuzzy_arbiter.formats.settings import format_settings
 from fuzzy_arbiter.formats.vocabulary import operator_words, word_of
 from fuzzy_arbiter.rule import Rule
@@ -41,7 +41,7 @@ def write(system: System) -> str:
         lines += _format_output(v, system) if isinstance(v, Output) else []
         lines += [f"END_{section}", ""]
     accumulations = {word_of("fcl", "aggregation", o.aggregation) for o in system.outputs}
-    for k, (operators, rules) in enumerate(blocks(system)):
+    for k, (operators, rules) in enumerate(group_rules(system)):
         lines.append(f"RULEBLOCK rules{k + 1 if k else ''}")
         words = zip(("AND", "OR", "ACT"), operator_words("fcl", operators), strict=True)
         lines += [f"  {key} : {word};" for key, word in words]

@@ -13,9 +13,8 @@ from fuzzy_arbiter.formats.fcl_tokens import RESERVED, chosen_block, cut, sectio
 from fuzzy_arbiter.formats.fll_terms import TYPES
 from fuzzy_arbiter.formats.notation import (
     Block,
-    NumberedRule,
+    RuleBlock,
     assembled,
-    join_rule_blocks,
     located,
     read_number,
     refuse,
@@ -65,22 +64,18 @@ def read(text: str, block: str | None = None) -> System:
     usual = {
         weighted: next(iter(accumulations), "sum" if weighted and fuzzylite else "max") for weighted in (False, True)
     }
-    input_blocks = _declared(sections, "VAR_INPUT", "FUZZIFY")
-    input_names = {section.name for section in input_blocks}
-    inputs = []
-    for section in input_blocks:
-        terms, places = _terms(section, None)
-        with located(f"line {section.line}"):
-            inputs.append(Variable(section.name, _universe(section, places), terms))
+    inputs = [_input(section) for section in _declared(sections, "VAR_INPUT", "FUZZIFY")]
     names = [v.name for v in inputs]
-    output_blocks = _declared(sections, "VAR_OUTPUT", "DEFUZZIFY", taken=input_names)
-    outputs = [_output(section, names, usual) for section in output_blocks]
+    outputs = [
+        _output(section, names, usual) for section in _declared(sections, "VAR_OUTPUT", "DEFUZZIFY", taken=names)
+    ]
     any_is_term = {term for v in inputs for term in v.term_names if term.lower() == "any"}
-    norms, rules = join_rule_blocks([_rules(section, any_is_term) for section in rule_blocks])
+    blocks = [_rules(section, any_is_term) for section in rule_blocks]
     if not fuzzylite:
-        rules = [(line, _on_first_of_value(rule, outputs)) for line, rule in rules]
-    settings = read_settings(comments)
-    return assembled(begin.line, inputs, outputs, rules, name=begin.name or "arbiter", **norms, **settings)
+        blocks = [
+            (norms, [(line, _on_first_of_value(rule, outputs)) for line, rule in rules]) for norms, rules in blocks
+        ]
+    return assembled(begin.line, inputs, outputs, blocks, name=begin.name or "arbiter", **read_settings(comments))
 
 
 def _declared(sections: Sequence[Block], declaration: str, kind: str, taken: Collection[str] = ()) -> list[Block]:
@@ -96,10 +91,8 @@ def _declared(sections: Sequence[Block], declaration: str, kind: str, taken: Col
                 refuse(line, f"{text!r}, expected a variable's name, a colon and REAL")
             for name in names:
                 if match and (name in declared or name in taken or name.lower() in RESERVED):
-                    refuse(
-                        line,
-                        f"{name!r} is {'a word of the language' if name.lower() in RESERVED else 'declared twice'}",
-                    )
+                    fault = "a word of the language" if name.lower() in RESERVED else "declared twice"
+                    refuse(line, f"{name!r} is {fault}")
                 if not match and declared[name][1]:
                     refuse(line, f"RANGE of {name!r} appears twice")
                 declared[name] = (line, "" if match else text[6:].removeprefix(":= "))
@@ -135,12 +128,17 @@ def _terms(section: Block, inputs: Sequence[str] | None) -> tuple[tuple[Term, ..
     return tuple(terms), places
 
 
+def _input(section: Block) -> Variable:
+    terms, places = _terms(section, None)
+    return section.build(Variable, section.name, _universe(section, places), terms)
+
+
 def _universe(section: Block, places: Sequence[float], weighted: bool = False) -> tuple[float, float]:
     line, text = section.entry("RANGE")
     if text:
         limits = _RANGE.fullmatch(text)
         if not limits:
-            refuse(line, f"RANGE of {section.name!r} is {text}, expected (minimum .. maximum)")
+            refuse(line, f"RANGE of {section.title} is {text}, expected (minimum .. maximum)")
         low, high = limits.groups()
         return read_number(low, line, "the minimum"), read_number(high, line, "the maximum")
     universe = universe_of(places)
@@ -167,23 +165,21 @@ def _output(section: Block, inputs: Sequence[str], aggregations: dict[bool, str]
     value, _, other = text.partition(" | ")
     default = None if value.upper() in ("NC", "NAN") else read_number(value, line, "the default, or NC,")
     if other.upper() not in ("", "NC"):
-        refuse(line, f"DEFAULT of {section.name!r} is {text}, expected NC after |")
-    with located(f"line {section.line}"):
-        universe, keeps = _universe(section, places, weighted), "PREVIOUS" in locks or bool(other)
-        return Output(section.name, universe, terms, default, method, own, "RANGE" in locks, keeps)
+        refuse(line, f"DEFAULT of {section.title} is {text}, expected NC after |")
+    universe, keeps = _universe(section, places, weighted), "PREVIOUS" in locks or bool(other)
+    return section.build(Output, section.name, universe, terms, default, method, own, "RANGE" in locks, keeps)
 
 
-def _rules(section: Block, any_is_term: set[str]) -> tuple[Operators, list[NumberedRule]]:
+def _rules(section: Block, any_is_term: set[str]) -> RuleBlock:
     """Return the operators of a rule block, of which AND and OR imply each other, and its rules."""
     norms = {key: section.word(key, _WORDS[kind] | {"": ""}) for key, kind in _KEYS.items()}
     conjunction = norms["AND"] or next((a for a, b in _PAIRS.items() if b == norms["OR"]), "min")
-    rules: list[NumberedRule] = []
-    for line, text in section.many:
-        with located(f"line {line}"):
-            # fuzzylite has a term *any* of every input, unless one has that name
-            words = [quoted(word) if word in any_is_term else word for word in text.split(" ")]
-            rules += [(line, rule) for rule in parse_rules(" ".join(words))]
-    return Operators(conjunction, norms["OR"] or _PAIRS[conjunction], norms["ACT"] or "min"), rules
+
+    def parse(_: int, text: str) -> list[Rule]:
+        # fuzzylite has a term *any* of every input, unless one has that name
+        return parse_rules(" ".join(quoted(word) if word in any_is_term else word for word in text.split(" ")))
+
+    return Operators(conjunction, norms["OR"] or _PAIRS[conjunction], norms["ACT"] or "min"), section.rules(parse)
 
 
 def _on_first_of_value(rule: Rule, outputs: list[Output]) -> Rule:

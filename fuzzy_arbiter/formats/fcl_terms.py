@@ -31,7 +31,7 @@ def read_shape(text: str, line: int, inputs: Sequence[str] | None) -> tuple[Memb
         shape = read_typed(word, rest, line, None if inputs is None else len(inputs))
         return shape, [shape.value] if isinstance(shape, Constant) else []
     if word.upper() in _COUNTS:
-        numbers = [read_number(part, line, "a parameter") for part in rest.split()]
+        numbers = [_number(part, line, "a parameter") for part in rest.split()]
         count = _COUNTS[word.upper()]
         if len(numbers) != count:
             refuse(line, f"{word} has the numbers {rest!r}, expected {count}")
@@ -42,8 +42,14 @@ def read_shape(text: str, line: int, inputs: Sequence[str] | None) -> tuple[Memb
     if not text or _POINT.sub("", text):
         expected = f"points such as (0, 0) (5, 1), a number, or one of {', '.join(('FUNCTION', *_COUNTS, *TYPES))}"
         refuse(line, f"{text!r} is no membership function, expected {expected}")
-    points = [(read_number(x, line, "a place"), read_number(y, line, "a degree")) for x, y in _POINT.findall(text)]
+    points = [(_number(x, line, "a place"), _number(y, line, "a degree")) for x, y in _POINT.findall(text)]
     return Shape(tuple(points)), [x for x, _ in points]
+
+
+def _number(text: str, line: int, what: str) -> float:
+    if text.isidentifier():
+        refuse(line, f"{what} is the variable {text!r}, which jFuzzyLogic allows; expected a number")
+    return read_number(text, line, what)
 
 
 def _curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[float]]:

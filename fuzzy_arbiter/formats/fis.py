@@ -12,7 +12,6 @@ from fuzzy_arbiter.formats.notation import format_number, format_numbers, unsupp
 from fuzzy_arbiter.formats.settings import format_settings
 from fuzzy_arbiter.formats.vocabulary import operator_words, word_of
 from fuzzy_arbiter.propositions import And, Is, Not, Or
-from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.shapes import Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.kinds import KINDS
@@ -32,11 +31,12 @@ def write(system: System) -> str:
         if any(sign in name for sign in _SIGNS):
             raise UnsupportedError(f"fis cannot say the name {name!r}: expected none of {' '.join(_SIGNS)}")
     type_word, method, aggregation = _method(system)
-    operators = operator_words("fis", Operators(system.conjunction, system.disjunction, system.implication))
     lines = [f"% {text}" for text in format_settings(system)]
     lines += ["[System]", f"Name='{system.name}'", f"Type='{type_word}'", "Version=2.0"]
     lines += [f"NumInputs={len(system.inputs)}", f"NumOutputs={len(system.outputs)}", f"NumRules={len(system.rules)}"]
-    lines += [f"{key}Method='{word}'" for key, word in zip(("And", "Or", "Imp"), operators, strict=True)]
+    lines += [
+        f"{key}Method='{word}'" for key, word in zip(("And", "Or", "Imp"), operator_words("fis", system), strict=True)
+    ]
     lines += [f"AggMethod='{aggregation}'", f"DefuzzMethod='{method}'", ""]
     for kind, variables in (("Input", system.inputs), ("Output", system.outputs)):
         for k, v in enumerate(variables):

@@ -12,7 +12,7 @@ from fuzzy_arbiter.formats.fis_terms import numbers_of, read_function, with_uniq
 from fuzzy_arbiter.formats.notation import Block, assembled, located, refuse
 from fuzzy_arbiter.formats.settings import read_settings
 from fuzzy_arbiter.formats.vocabulary import WORDS
-from fuzzy_arbiter.rule import Rule
+from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.term import Term
 from fuzzy_arbiter.terms.values import Formula
@@ -58,23 +58,16 @@ def read(text: str) -> System:
     fuzzylite = "generated with fuzzylite" in words or any(
         key in _FUZZYLITE_KEYS for section in sections.values() for key in section.entries
     )
-    inputs = []
-    for section in _numbered(sections, "Input"):
-        parts = _parts(section, None)
-        with located(f"line {section.line}"):
-            inputs.append(Variable(*parts))
+    inputs = [section.build(Variable, *_parts(section, None)) for section in _numbered(sections, "Input")]
     joins = {False: aggregation, True: aggregation if "fuzzy-logic-toolkit" in words else "sum"}
     outputs = [_output(section, len(inputs), system, joins) for section in _numbered(sections, "Output")]
-    rows = sections["Rules"].many
-    for key, count in (("NumInputs", len(inputs)), ("NumOutputs", len(outputs)), ("NumRules", len(rows))):
+    table = sections["Rules"]
+    for key, count in (("NumInputs", len(inputs)), ("NumOutputs", len(outputs)), ("NumRules", len(table.many))):
         _require_count(system, key, count)
-    rules: list[tuple[int, Rule]] = []
-    for line, row in rows:
-        with located(f"line {line}: {row!r}"):
-            rules += [(line, rule) for rule in read_rules(line, row, inputs, outputs, fuzzylite)]
+    rules = table.rules(lambda line, row: read_rules(line, row, inputs, outputs, fuzzylite))
     outputs = [with_complements(output, rules) for output in outputs]
-    name = system.entry("Name")[1] or "arbiter"
-    return assembled(system.line, inputs, outputs, rules, name=name, **norms, **settings)
+    block = Operators(**norms), rules
+    return assembled(system.line, inputs, outputs, [block], name=system.name or "arbiter", **settings)
 
 
 def _sections(text: str) -> tuple[dict[str, Block], list[tuple[int, str]]]:
@@ -85,37 +78,39 @@ def _sections(text: str) -> tuple[dict[str, Block], list[tuple[int, str]]]:
         content = raw.strip()
         if content.startswith(("%", "#")):
             comments.append((line, content[1:]))
-            continue
-        if not content:
-            continue
-        head = _SECTION.fullmatch(content)
-        if head:
-            name = head[1] + (head[2] or "")
+        elif head := _SECTION.fullmatch(content):
+            kind = head[1] + (head[2] or "")
             if (head[1] in ("Input", "Output")) != bool(head[2]):
                 refuse(line, f"section {content!r}, expected [System], [Input1], [Output1], [Rules] and so on")
-            if name in sections:
+            if kind in sections:
                 refuse(line, f"section {content!r} appears twice")
-            section = sections[name] = Block(head[1], name, line)
-        elif section is None or content.startswith("["):
+            section = sections[kind] = Block(kind, "", line)
+        elif content and (section is None or content.startswith("[")):
             refuse(line, f"{content!r}, expected a section such as [System], [Input1], [Output1] or [Rules]")
-        elif section.kind == "Rules":
+        elif content and section and section.kind == "Rules":
             section.many.append((line, content))
-        else:
-            entry = _ENTRY.fullmatch(content)
-            if not entry:
-                refuse(line, f"{content!r}, expected a key, = and its value")
-            key, value = entry.groups()
-            if key in _TEXTS:
-                quoted = _QUOTED.fullmatch(value)
-                value = quoted[1] if quoted else refuse(line, f"{key} is {value}, expected text in single quotes")
-            section.add(line, key, value, _SYSTEM_KEYS if section.kind == "System" else ())
+        elif content and section:
+            _add_entry(section, line, content)
     return sections, comments
+
+
+def _add_entry(section: Block, line: int, content: str) -> None:
+    entry = _ENTRY.fullmatch(content)
+    if not entry:
+        refuse(line, f"{content!r}, expected a key, = and its value")
+    key, value = entry.groups()
+    if key in _TEXTS:
+        quoted = _QUOTED.fullmatch(value)
+        value = quoted[1] if quoted else refuse(line, f"{key} is {value}, expected text in single quotes")
+    section.add(line, key, value, _SYSTEM_KEYS if section.kind == "System" else ())
+    if key == "Name":
+        section.name = value
 
 
 def _require_count(section: Block, key: str, count: int) -> None:
     line, value = section.entry(key)
     if value != str(count):
-        refuse(line, f"{key} is {value or 'missing'}, expected {count}, since there are {count}")
+        refuse(line, f"{key} of {section.title} is {value or 'missing'}, expected {count}, since there are {count}")
 
 
 def _defuzzifier(system: Block) -> Any:
@@ -132,11 +127,12 @@ def _defuzzifier(system: Block) -> Any:
 
 def _numbered(sections: dict[str, Block], kind: str) -> list[Block]:
     """Return the sections of one kind in the order of their numbers."""
-    alike = [section for section in sections.values() if section.kind == kind]
-    for k in range(1, len(alike) + 1):
-        if f"{kind}{k}" not in sections:
-            refuse(alike[-1].line, f"got [{alike[-1].name}] without [{kind}{k}]; expected them numbered from 1")
-    return [sections[f"{kind}{k}"] for k in range(1, len(alike) + 1)]
+    alike = [section for section in sections.values() if section.kind.startswith(kind)]
+    expected = [f"{kind}{k}" for k in range(1, len(alike) + 1)]
+    for key in expected:
+        if key not in sections:
+            refuse(alike[-1].line, f"got [{alike[-1].kind}] without [{key}]; expected them numbered from 1")
+    return [sections[key] for key in expected]
 
 
 def _output(section: Block, inputs: int, system: Block, joins: dict[bool, str]) -> Output:
@@ -146,21 +142,20 @@ def _output(section: Block, inputs: int, system: Block, joins: dict[bool, str]) 
     if values and defuzzifier not in WEIGHTED and system.entry("Type")[1] == "hybrid":
         defuzzifier = "average"
     locks = section.word("LockRange", _FLAGS, "0"), section.word("LockPrevious", _FLAGS, "0")
-    with located(f"line {section.line}"):
-        return Output(*parts, section.number("Default"), defuzzifier, joins[defuzzifier in WEIGHTED], *locks)
+    options = section.number("Default"), defuzzifier, joins[defuzzifier in WEIGHTED], *locks
+    return section.build(Output, *parts, *options)
 
 
 def _parts(section: Block, inputs: int | None) -> _Parts:
     """Return the name, the universe and the terms of a variable."""
     for key in ("Name", "Range"):
         if key not in section.entries:
-            refuse(section.line, f"[{section.name}] without {key}")
-    name = section.entry("Name")[1]
+            refuse(section.line, f"{section.title} has no {key}")
     line, value = section.entry("Range")
     match = _LIST.fullmatch(value)
-    bounds = numbers_of(match[1], line, "Range") if match else []
+    bounds = numbers_of(match[1], line, f"Range of {section.title}") if match else []
     if len(bounds) != 2:
-        refuse(line, f"Range is {value}, expected two numbers in brackets")
+        refuse(line, f"Range of {section.title} is {value}, expected two numbers in brackets")
     section.word("Enabled", {"1": True}, "1")
     known = ("Name", "Range", "NumMFs", *(_FUZZYLITE_KEYS if inputs is not None else _FUZZYLITE_KEYS[:1]))
     functions = {key: entry for key, entry in section.entries.items() if key not in known}
@@ -168,11 +163,11 @@ def _parts(section: Block, inputs: int | None) -> _Parts:
     terms: list[Term] = []
     for j, (key, (line, value)) in enumerate(functions.items(), 1):
         if key != f"MF{j}":
-            refuse(line, f"got {key} in [{section.name}], expected MF{j}")
+            refuse(line, f"got {key} in {section.title}, expected MF{j}")
         match = _FUNCTION.fullmatch(value)
         if not match:
             refuse(line, f"{value}, expected a membership function such as 'low':'trimf',[-1 0 1]")
         term, function, places = match.groups()
         with located(f"line {line}: term {term!r}"):
             terms.append(Term(term, read_function(function, places, line, term, inputs)))
-    return name, (bounds[0], bounds[1]), with_unique_names(terms)
+    return section.name, (bounds[0], bounds[1]), with_unique_names(terms)

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.propositions import is_identifier
 from fuzzy_arbiter.rule import Operators, Rule
+
+T = TypeVar("T")
 
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?", re.ASCII)
 
@@ -40,12 +42,7 @@ def read_number(text: str, line: int, what: str) -> float:
 
 def refuse(line: int, what: str) -> NoReturn:
     """Raise the error of a line."""
-    raise FormatError(f"line {line}: {shortened(what)}")
-
-
-def shortened(text: str) -> str:
-    """Cut the middle out of a long text."""
-    return text if len(text) <= 400 else f"{text[:250]} ... {text[-140:]}"
+    raise FormatError(f"line {line}: {what}")
 
 
 @contextmanager
@@ -54,7 +51,11 @@ def located(where: str) -> Iterator[None]:
     try:
         yield
     except DefinitionError as error:
-        raise type(error)(f"{shortened(where)}: {shortened(str(error))}") from None
+        raise type(error)(f"{where}: {error}") from None
+
+
+NumberedRule = tuple[int, Rule]  # line in the file, and rule
+RuleBlock = tuple[Operators, list[NumberedRule]]
 
 
 @dataclass
@@ -67,6 +68,11 @@ class Block:
     entries: dict[str, tuple[int, str]] = field(default_factory=dict)  # line and value by key
     many: list[tuple[int, str]] = field(default_factory=list)  # line and value of terms or rules
 
+    @property
+    def title(self) -> str:
+        """Kind and name, for messages."""
+        return f"{self.kind} {self.name!r}" if self.name else self.kind
+
     def add(self, line: int, key: str, value: str, known: Sequence[str] = (), many: Sequence[str] = ()) -> None:
         """Add an entry; refuse a key that is not known, or that appears twice without being one of many."""
         if known and key not in known:
@@ -74,7 +80,7 @@ class Block:
         if key in many:
             self.many.append((line, value))
         elif key in self.entries:
-            refuse(line, f"{key} appears twice in {self.kind} {self.name!r}")
+            refuse(line, f"{key} appears twice in {self.title}")
         else:
             self.entries[key] = line, value
 
@@ -87,41 +93,42 @@ class Block:
         line, value = self.entry(key, missing)
         if value not in known:
             expected = " or ".join(word for word in known if word)
-            refuse(line, f"{key} of {self.name!r} is {value or 'missing'}, expected {expected}")
+            refuse(line, f"{key} of {self.title} is {value or 'missing'}, expected {expected}")
         return known[value]
 
     def number(self, key: str) -> float | None:
         """Parse the number of a key; None for `nan`, and where it is missing."""
         line, value = self.entry(key, "nan")
-        return None if value == "nan" else read_number(value, line, f"{key} of {self.name!r}")
+        return None if value == "nan" else read_number(value, line, f"{key} of {self.title}")
 
+    def build(self, make: Callable[..., T], *arguments: Any) -> T:
+        """Make the variable that the block defines."""
+        with located(f"line {self.line}"):
+            return make(*arguments)
 
-NumberedRule = tuple[int, Rule]  # line in the file, and rule
-
-
-def join_rule_blocks(
-    rule_blocks: Sequence[tuple[Operators, Sequence[NumberedRule]]],
-) -> tuple[dict[str, str], list[NumberedRule]]:
-    """Return the operators of the first block as the system's, and the rules; those of another block keep their own."""
-    first = rule_blocks[0][0] if rule_blocks else Operators()
-    rules = [
-        (line, rule if operators == first else replace(rule, operators=operators))
-        for operators, numbered in rule_blocks
-        for line, rule in numbered
-    ]
-    return asdict(first), rules
+    def rules(self, parse: Callable[[int, str], Iterable[Rule]]) -> list[NumberedRule]:
+        """Parse the block's rules."""
+        rules: list[NumberedRule] = []
+        for line, text in self.many:
+            with located(f"line {line}"):
+                rules += [(line, rule) for rule in parse(line, text)]
+        return rules
 
 
 def assembled(
-    line: int, inputs: Sequence[Variable], outputs: Sequence[Output], rules: Sequence[NumberedRule], **options: Any
+    line: int, inputs: Iterable[Variable], outputs: Iterable[Output], blocks: Sequence[RuleBlock], **options: Any
 ) -> System:
-    """Build the system of a file."""
+    """Build the system of a file, with the operators of its first block of rules; other blocks keep their own."""
+    first = blocks[0][0] if blocks else Operators()
+    lines, rules = [], []
+    for operators, numbered in blocks:
+        lines += [number for number, _ in numbered]
+        rules += [rule if operators == first else replace(rule, operators=operators) for _, rule in numbered]
     try:
-        return System(tuple(inputs), tuple(outputs), tuple(rule for _, rule in rules), **options)
+        return System(tuple(inputs), tuple(outputs), tuple(rules), **asdict(first), **options)
     except DefinitionError as error:
         fault = re.match(r"R(\d+) ", str(error))
-        where = rules[int(fault[1]) - 1][0] if fault else line
-        raise type(error)(f"line {where}: {shortened(str(error))}") from None
+        raise type(error)(f"line {lines[int(fault[1]) - 1] if fault else line}: {error}") from None
 
 
 def require_words(system: System, format: str, reserved: frozenset[str]) -> None:
@@ -141,13 +148,13 @@ def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
 
 def unsupported_rule(format: str, i: int, rule: Rule, expected: str, what: str = "condition") -> UnsupportedError:
     """Return the error for a rule that a format cannot represent."""
-    return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {shortened(str(rule))!r}: expected {expected}")
+    return UnsupportedError(f"{format} cannot say the {what} of R{i + 1} {str(rule)!r}: expected {expected}")
 
 
-def blocks(system: System) -> list[tuple[Operators, list[tuple[int, Rule]]]]:
-    """Group a system's rules into blocks with the same operators."""
+def group_rules(system: System) -> list[RuleBlock]:
+    """Group a system's rules, each with its index, into blocks with the same operators."""
     own = Operators(system.conjunction, system.disjunction, system.implication)
-    result: list[tuple[Operators, list[tuple[int, Rule]]]] = []
+    result: list[RuleBlock] = []
     for i, rule in enumerate(system.rules):
         operators = rule.operators or own
         if not result or result[-1][0] != operators:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
@@ -34,7 +35,7 @@ _OTHER_DEFUZZIFIERS = {"fll": {}, "fis": {"centroid_integral": "centroid"}, "fcl
 WORDS: dict[str, dict[str, dict[str, str]]] = {
     format: {
         **{
-            kind: {getattr(norm, format): name for name, norm in norms.items()}
+            kind: {name if format == "fis" else getattr(norm, format): name for name, norm in norms.items()}
             | (_T_WORDS if norms is T_NORMS else _S_WORDS)[format]
             for kind, norms in _NORMS.items()
         },
@@ -52,9 +53,7 @@ def word_of(format: str, kind: str, name: str) -> str:
     return words[name]
 
 
-def operator_words(format: str, operators: Operators) -> tuple[str, str, str]:
+def operator_words(format: str, operators: Operators | System) -> list[str]:
     """Return a format's words for the conjunction, the disjunction and the implication of a block of rules."""
-    conjunction, disjunction, implication = (
-        word_of(format, kind, getattr(operators, kind)) for kind in ("conjunction", "disjunction", "implication")
-    )
-    return conjunction, disjunction, implication
+    kinds = ("conjunction", "disjunction", "implication")
+    return [word_of(format, kind, getattr(operators, kind)) for kind in kinds]

@@ -42,8 +42,9 @@ def _compared(holds: Callable[[Any, Any], Any]) -> Function:
     return Function(2, lambda a, b: float(holds(a, b)), lambda a, b: np.asarray(holds(a, b), dtype=np.float64))
 
 
-def _log(a: float) -> float:
-    return -math.inf if a == 0.0 else math.log(a)
+def _with_pole(name: str, pole: float) -> Function:
+    function = getattr(math, name)
+    return Function(1, _guarded(lambda a: -math.inf if a == pole else function(a)), getattr(np, name))
 
 
 def _power(a: float, b: float) -> float:
@@ -51,35 +52,24 @@ def _power(a: float, b: float) -> float:
 
 
 FUNCTIONS: dict[str, Function] = {
+    **{
+        name: Function(1, _guarded(getattr(math, name)), getattr(np, name))
+        for name in ("ceil", "cos", "cosh", "exp", "floor", "sin", "sinh", "sqrt", "tan", "tanh")
+    },
+    **{
+        name: Function(1, _guarded(getattr(math, name)), getattr(np, f"arc{name[1:]}"))
+        for name in ("acos", "asin", "atan")
+    },
+    **{name: _with_pole(name, pole) for name, pole in (("log", 0.0), ("log10", 0.0), ("log1p", -1.0))},
+    **{name: _compared(getattr(operator, name)) for name in ("eq", "ge", "gt", "le", "lt")},
+    "neq": _compared(operator.ne),
     "abs": Function(1, abs, np.abs),
-    "acos": Function(1, _guarded(math.acos), np.arccos),
-    "asin": Function(1, _guarded(math.asin), np.arcsin),
-    "atan": Function(1, math.atan, np.arctan),
     "atan2": Function(2, math.atan2, np.arctan2),
-    "ceil": Function(1, _guarded(math.ceil), np.ceil),
-    "cos": Function(1, _guarded(math.cos), np.cos),
-    "cosh": Function(1, _guarded(math.cosh), np.cosh),
-    "eq": _compared(operator.eq),
-    "exp": Function(1, _guarded(math.exp), np.exp),
-    "floor": Function(1, _guarded(math.floor), np.floor),
     "fmod": Function(2, _guarded(math.fmod), np.fmod),
-    "ge": _compared(operator.ge),
-    "gt": _compared(operator.gt),
-    "le": _compared(operator.le),
-    "log": Function(1, _guarded(_log), np.log),
-    "log10": Function(1, _guarded(lambda a: -math.inf if a == 0.0 else math.log10(a)), np.log10),
-    "log1p": Function(1, _guarded(lambda a: -math.inf if a == -1.0 else math.log1p(a)), np.log1p),
-    "lt": _compared(operator.lt),
     "max": Function(2, max, np.maximum),
     "min": Function(2, min, np.minimum),
-    "neq": _compared(operator.ne),
     "pow": Function(2, _guarded(_power), np.power),
     "round": Function(1, _guarded(round), np.round),
-    "sin": Function(1, _guarded(math.sin), np.sin),
-    "sinh": Function(1, _guarded(math.sinh), np.sinh),
-    "sqrt": Function(1, _guarded(math.sqrt), np.sqrt),
-    "tan": Function(1, _guarded(math.tan), np.tan),
-    "tanh": Function(1, math.tanh, np.tanh),
 }
 # words of other tools for the same functions
 SAME = {"fabs": "abs", "ln": "log"}

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 Pieces = list[tuple[float, str]]  # end of each piece, the last at infinity, and its expression
 Word = tuple[str, tuple[int, ...]]  # a format's word, and the indices of its parameters in the format's order
 
+Valid = tuple[Callable[..., bool], str]
+
 _END = math.inf
 
 
@@ -23,7 +25,7 @@ class CurveKind:
     fis: Word  # word of MATLAB or fuzzylite; empty if there is none
     fcl: Word | None = None  # word of jFuzzyLogic; None if there is none
     # predicate on the parameters, and its words
-    valid: tuple[Callable[..., bool], str] = (lambda *parameters: True, "finite numbers")
+    valid: Valid = (lambda *parameters: True, "finite numbers")
     polynomial: bool = False  # true if the pieces are polynomials
     # function for a kind that only rises or only falls: from the parameters to pieces over the degree ``w``, which
     # give the place
@@ -57,11 +59,7 @@ def _s(start: float, end: float, names: tuple[str, str] = ("start", "end")) -> P
 
 
 def _z(start: float, end: float, names: tuple[str, str] = ("start", "end")) -> Pieces:
-    return [(place, text if text in ("0", "1") else f"1 - ({text})") for place, text in _flipped(_s(start, end, names))]
-
-
-def _flipped(pieces: Pieces) -> Pieces:
-    return [(end, {"0": "1", "1": "0"}.get(text, text)) for end, text in pieces]
+    return [(place, {"0": "1", "1": "0"}.get(text, f"1 - ({text})")) for place, text in _s(start, end, names)]
 
 
 def _gaussian(mean: str, deviation: str) -> str:
@@ -97,9 +95,17 @@ def _ellipse(start: float, end: float) -> Pieces:
     return [(min(start, end), "0"), (max(start, end), curve), (_END, "0")]
 
 
-def _peaked(center: float, text: str) -> Pieces:
-    """Return one expression in two pieces, which meet at a center where it bends."""
-    return [(center, text), (_END, text)]
+def _whole(text: str) -> Callable[..., Pieces]:
+    return lambda *parameters: [(_END, text)]
+
+
+def _peaked(text: str) -> Callable[..., Pieces]:
+    """Return one expression in two pieces, which meet at the first parameter, where it bends."""
+    return lambda center, *others: [(center, text), (_END, text)]
+
+
+def _nonzero(words: str, *indices: int) -> Valid:
+    return lambda *parameters: all(parameters[i] != 0.0 for i in indices), f"{words} other than 0"
 
 
 def _around(center: float, scale: float) -> list[float]:
@@ -122,15 +128,14 @@ def _product_of_gaussians(mean1: float, deviation1: float, mean2: float, deviati
     return [*_around(mean1, deviation1), *_around(mean2, deviation2), top]
 
 
+_ORDERED: Valid = (lambda start, end: start <= end, "a start that is not above the end")
+_DISTINCT: Valid = (lambda start, end: start != end, "two places")
+
 KINDS: dict[str, CurveKind] = {
     "gaussian": CurveKind(
-        ("mean", "deviation"),
-        lambda mean, deviation: [(_END, _gaussian("mean", "deviation"))],
-        fll="Gaussian",
-        valid=(lambda mean, deviation: deviation != 0.0, "a deviation other than 0"),
-        fis=("gaussmf", (1, 0)),
-        fcl=("GAUSS", (0, 1)),
-        features=_around,
+        ("mean", "deviation"), _whole(_gaussian("mean", "deviation")),
+        fll="Gaussian", fis=("gaussmf", (1, 0)), fcl=("GAUSS", (0, 1)),
+        valid=_nonzero("a deviation", 1), features=_around,
     ),
     "gaussian2": CurveKind(
         ("mean1", "deviation1", "mean2", "deviation2"),
@@ -138,22 +143,12 @@ KINDS: dict[str, CurveKind] = {
             [(mean1, _gaussian("mean1", "deviation1")), (_END, "1")],
             [(mean2, "1"), (_END, _gaussian("mean2", "deviation2"))],
         ),
-        fll="GaussianProduct",
-        valid=(
-            lambda mean1, deviation1, mean2, deviation2: deviation1 != 0.0 and deviation2 != 0.0,
-            "deviations other than 0",
-        ),
-        fis=("gauss2mf", (1, 0, 3, 2)),
-        fcl=("GAUSS2", (0, 1, 2, 3)),
-        features=_product_of_gaussians,
+        fll="GaussianProduct", fis=("gauss2mf", (1, 0, 3, 2)), fcl=("GAUSS2", (0, 1, 2, 3)),
+        valid=_nonzero("deviations", 1, 3), features=_product_of_gaussians,
     ),
     "bell": CurveKind(
-        ("center", "width", "slope"),
-        lambda center, width, slope: _peaked(center, "1 / (1 + abs((x - center) / width) ^ (2 * slope))"),
-        fll="Bell",
-        valid=(lambda center, width, slope: width != 0.0, "a width other than 0"),
-        fis=("gbellmf", (1, 2, 0)),
-        fcl=("GBELL", (1, 2, 0)),
+        ("center", "width", "slope"), _peaked("1 / (1 + abs((x - center) / width) ^ (2 * slope))"),
+        fll="Bell", fis=("gbellmf", (1, 2, 0)), fcl=("GBELL", (1, 2, 0)), valid=_nonzero("a width", 1),
         features=lambda center, width, slope: [
             center,
             *_around(center - width, width / (4.0 * max(abs(slope), 1.0))),
@@ -161,55 +156,30 @@ KINDS: dict[str, CurveKind] = {
         ],
     ),
     "sigmoid": CurveKind(
-        ("inflection", "slope"),
-        lambda inflection, slope: [(_END, _sigmoid("inflection", "slope"))],
-        fll="Sigmoid",
-        fis=("sigmf", (1, 0)),
-        fcl=("SIGM", (1, 0)),
-        inverse=lambda inflection, slope: [(_END, "inflection - log(1 / w - 1) / slope")],
-        features=_inflection,
+        ("inflection", "slope"), _whole(_sigmoid("inflection", "slope")),
+        fll="Sigmoid", fis=("sigmf", (1, 0)), fcl=("SIGM", (1, 0)),
+        inverse=_whole("inflection - log(1 / w - 1) / slope"), features=_inflection,
     ),
     "sigmoid_difference": CurveKind(
-        ("left", "rising", "falling", "right"),
-        _difference,
-        fll="SigmoidDifference",
-        fis=("dsigmf", (1, 0, 2, 3)),
-        fcl=("DSIGM", (1, 0, 2, 3)),
-        features=_two_inflections,
-        monotonic=False,
+        ("left", "rising", "falling", "right"), _difference,
+        fll="SigmoidDifference", fis=("dsigmf", (1, 0, 2, 3)), fcl=("DSIGM", (1, 0, 2, 3)),
+        features=_two_inflections, monotonic=False,
     ),
     "sigmoid_product": CurveKind(
         ("left", "rising", "falling", "right"),
-        lambda left, rising, falling, right: [
-            (_END, f"({_sigmoid('left', 'rising')}) * ({_sigmoid('right', 'falling')})")
-        ],
-        fll="SigmoidProduct",
-        fis=("psigmf", (1, 0, 2, 3)),
-        features=_two_inflections,
-        monotonic=False,
+        _whole(f"({_sigmoid('left', 'rising')}) * ({_sigmoid('right', 'falling')})"),
+        fll="SigmoidProduct", fis=("psigmf", (1, 0, 2, 3)), features=_two_inflections, monotonic=False,
     ),
     "z_shape": CurveKind(
-        ("start", "end"),
-        _z,
-        fll="ZShape",
-        valid=(lambda start, end: start <= end, "a start that is not above the end"),
-        fis=("zmf", (0, 1)),
-        polynomial=True,
+        ("start", "end"), _z, fll="ZShape", fis=("zmf", (0, 1)), valid=_ORDERED, polynomial=True,
         inverse=lambda start, end: [
-            (0.5, "end - (end - start) * sqrt(w / 2)"),
-            (_END, "start + (end - start) * sqrt((1 - w) / 2)"),
+            (0.5, "end - (end - start) * sqrt(w / 2)"), (_END, "start + (end - start) * sqrt((1 - w) / 2)"),
         ],
     ),
     "s_shape": CurveKind(
-        ("start", "end"),
-        _s,
-        fll="SShape",
-        valid=(lambda start, end: start <= end, "a start that is not above the end"),
-        fis=("smf", (0, 1)),
-        polynomial=True,
+        ("start", "end"), _s, fll="SShape", fis=("smf", (0, 1)), valid=_ORDERED, polynomial=True,
         inverse=lambda start, end: [
-            (0.5, "start + (end - start) * sqrt(w / 2)"),
-            (_END, "end - (end - start) * sqrt((1 - w) / 2)"),
+            (0.5, "start + (end - start) * sqrt(w / 2)"), (_END, "end - (end - start) * sqrt((1 - w) / 2)"),
         ],
     ),
     "pi_shape": CurveKind(
@@ -217,14 +187,11 @@ KINDS: dict[str, CurveKind] = {
         lambda foot1, top1, top2, foot2: _multiplied(
             _s(foot1, top1, ("foot1", "top1")), _z(top2, foot2, ("top2", "foot2"))
         ),
-        fll="PiShape",
+        fll="PiShape", fis=("pimf", (0, 1, 2, 3)), polynomial=True, monotonic=False,  # where its tops overlap
         valid=(
             lambda foot1, top1, top2, foot2: foot1 <= top1 and top2 <= foot2,
             "each foot on the outer side of its top",
         ),
-        fis=("pimf", (0, 1, 2, 3)),
-        polynomial=True,
-        monotonic=False,  # where its tops overlap
     ),
     "cosine": CurveKind(
         ("center", "width"),
@@ -233,50 +200,30 @@ KINDS: dict[str, CurveKind] = {
             (center + width / 2, "0.5 * (1 + cos(2 / width * pi * (x - center)))"),
             (_END, "0"),
         ],
-        fll="Cosine",
+        fll="Cosine", fis=("cosinemf", (0, 1)), features=lambda center, width: [center],
         valid=(lambda center, width: width > 0.0, "a width above 0"),
-        fis=("cosinemf", (0, 1)),
-        features=lambda center, width: [center],
     ),
     "spike": CurveKind(
-        ("center", "width"),
-        lambda center, width: _peaked(center, "exp(-abs(10 / width * (x - center)))"),
-        fll="Spike",
-        valid=(lambda center, width: width != 0.0, "a width other than 0"),
-        fis=("spikemf", (0, 1)),
+        ("center", "width"), _peaked("exp(-abs(10 / width * (x - center)))"),
+        fll="Spike", fis=("spikemf", (0, 1)), valid=_nonzero("a width", 1),
         features=lambda center, width: _around(center, width / 10.0),
     ),
     "concave": CurveKind(
-        ("inflection", "end"),
-        _concave,
-        fll="Concave",
-        fis=("concavemf", (0, 1)),
-        inverse=lambda inflection, end: [(_END, "(inflection - end) / w + 2 * end - inflection")],
-        features=lambda inflection, end: [end],
+        ("inflection", "end"), _concave, fll="Concave", fis=("concavemf", (0, 1)),
+        inverse=_whole("(inflection - end) / w + 2 * end - inflection"), features=lambda inflection, end: [end],
     ),
     "arc": CurveKind(
-        ("start", "end"),
-        _arc,
-        fll="Arc",
-        valid=(lambda start, end: start != end, "two places"),
-        fis=("arcmf", (0, 1)),
+        ("start", "end"), _arc, fll="Arc", fis=("arcmf", (0, 1)), valid=_DISTINCT,
         inverse=lambda start, end: [
             (_END, f"end {'-' if start < end else '+'} sqrt((end - start) ^ 2 * (1 - w ^ 2))"),
         ],
     ),
     "singleton": CurveKind(
-        ("place",),
-        lambda place: [(place, "eq(x, place)"), (_END, "0")],
-        fll="",
-        fis=("", (0,)),
+        ("place",), lambda place: [(place, "eq(x, place)"), (_END, "0")], fll="", fis=("", (0,))
     ),
     "semi_ellipse": CurveKind(
-        ("start", "end"),
-        _ellipse,
-        fll="SemiEllipse",
-        valid=(lambda start, end: start != end, "two places"),
-        fis=("semiellipsemf", (0, 1)),
+        ("start", "end"), _ellipse, fll="SemiEllipse", fis=("semiellipsemf", (0, 1)), valid=_DISTINCT,
         features=lambda start, end: [(start + end) / 2.0],
     ),
-}
+}  # fmt: skip
 """All kinds, by name."""

@@ -19,20 +19,14 @@ _ARRAY_FUNCTIONS: dict[Any, Any] = {
     "sqrt": np.sqrt, "pow": np.power,
 }  # fmt: skip
 # functions in exported code, where the words of the norms are functions of Python or of another meaning
-_NAMES = {
-    "min": "least",
-    "max": "greatest",
-    "prod": "product",
-    "probor": "probabilistic_sum",
-    "sum": "unbounded_sum",
-}
+_FUNCTION_NAMES = {"min": "least", "max": "greatest", "probor": "probabilistic_sum"}
 
 
 @dataclass(frozen=True, slots=True)
 class Operator:
     """An operator on degrees ``a`` and, for a norm, ``b``, with its words in files; empty where a format has none."""
 
-    fis: str  # its own word, which is also Octave's, and MATLAB's where it has one
+    name: str  # which is also Octave's word for it, and MATLAB's where it has one
     formula: str  # Python expression, from which all else follows
     fll: str = ""
     fcl: str = ""
@@ -45,9 +39,9 @@ class Operator:
         object.__setattr__(self, "_arrays", _vectorized(self.tree))
 
     @property
-    def name(self) -> str:
+    def function(self) -> str:
         """Name of the function in exported code."""
-        return _NAMES.get(self.fis, self.fis)
+        return _FUNCTION_NAMES.get(self.name, self.name)
 
     @property
     def arguments(self) -> str:
@@ -92,7 +86,7 @@ def _vectorized(node: ast.expr) -> Callable[[dict[str, Any]], Any]:
 
 
 def _by_name(*operators: Operator) -> dict[str, Operator]:
-    return {operator.fis: operator for operator in operators}
+    return {operator.name: operator for operator in operators}
 
 
 T_NORMS = _by_name(

@@ -132,19 +132,13 @@ class Questions:
 
 def reach(system: System, conditions: Sequence[Proposition]) -> Reach:
     """Return the strength of a proof by ranks at 1/2 for a system's *and* and *or*."""
-    parts = [part for condition in conditions for part in _parts(condition)]
+    parts = [part for condition in conditions for part in condition.parts_within()]
     if system.disjunction != "max" and any(isinstance(part, Or) for part in parts):
         return "samples"
     if system.conjunction == "min" or not any(isinstance(part, And) for part in parts):
         return "exact"
     negated = [part.part for part in parts if isinstance(part, Not)]
     return "bound" if all(isinstance(part, Is) for part in negated) else "samples"
-
-
-def _parts(proposition: Proposition) -> list[Proposition]:
-    parts = proposition.parts if isinstance(proposition, And | Or) else ()
-    parts = (proposition.part,) if isinstance(proposition, Not) else parts
-    return [proposition, *(inner for part in parts for inner in _parts(part))]
 
 
 def sampled(system: System, questions: Questions, statements: Sequence[Is]) -> dict[str, float | str] | None:

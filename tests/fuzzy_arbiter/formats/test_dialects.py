@@ -258,7 +258,7 @@ def test_fuzzylite_5_adds_keys_to_outputs(keys, expected):
     output = system.outputs[0]
     assert (output.default, output.lock_range, output.lock_previous) == expected
     assert str(system.rules[0]) == "if x is extremely a and z is any then y is mf1"  # as fuzzylite has hedges
-    with pytest.raises(FormatError, match=r"line \d+: Enabled of 'Input2' is 0, expected 1"):
+    with pytest.raises(FormatError, match=r"line \d+: Enabled of Input2 'z' is 0, expected 1"):
         reads(text.replace("[Input2]", "[Input2]\nEnabled=0"), "fis")
 
 
