@@ -9,11 +9,12 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from controller import paper_law
+from controller.force_limits import max_forces
 from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error_parts, rotation_rows
 from cosim.precheck.finding import Finding, status
 from cosim.precheck.region_intersection import evaluate_regions
-from cosim.precheck.thrust_margin import Margin, ThrustMargin, greatest_force, held_wrench, least_margin, thrust_margin
+from cosim.precheck.thrust_margin import Margin, ThrustMargin, held_wrench, least_margins, thrust_margin
 from cosim.results.wording import format_force
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
@@ -71,7 +72,7 @@ def _mend_current(scenario: Scenario) -> str:
 
     def reach(fraction: float) -> float:
         hold = held_wrench(vehicle, phi, quaternion, fraction * current)
-        left = least_margin(vehicle, quaternion, hold, np.ones(vehicle.n_thrusters, dtype=bool))
+        (left,) = least_margins(vehicle, quaternion, hold, np.ones((1, vehicle.n_thrusters)))
         return left.force - _ROUNDING if left else -1.0
 
     if reach(0.0) <= 0.0:
@@ -97,8 +98,8 @@ def initial_force_finding(scenario: Scenario, weights: Array) -> Finding:
     if not required > 0.0:
         text = "The law asks for no force at the start."
         return Finding("thrust", "initial force", "holds", text, numbers={"asked": 0.0})
-    alive = np.ones(vehicle.n_thrusters, dtype=bool)
-    available = greatest_force(vehicle, force / required, np.zeros(6), alive) or 0.0
+    along = force[None] / required
+    (available,) = np.nan_to_num(max_forces(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max, along))
     text = (
         f"The law asks for {format_force(required)} at the start; "
         f"the thrusters give at most {format_force(available)} that way."
@@ -113,5 +114,5 @@ def initial_force_finding(scenario: Scenario, weights: Array) -> Finding:
         advice = f"Lower law.gains.k_p1 to about {k_p1:.2g}, start nearer, or take a law with a bounded attraction."
     return Finding(
         "thrust", "initial force", status(required <= available), text, advice,
-        {"asked": required, "given": available},
+        {"asked": required, "given": float(available)},
     )  # fmt: skip

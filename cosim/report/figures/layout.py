@@ -24,7 +24,9 @@ _MAX_LETTERS = 34  # maximum number of letters of a name in a legend
 _LETTERS, _MARK = 104, 7  # widths in letters of a legend: width of the figure; width of a line with its gap
 
 # names are given by users: their $ and _ are not mathematics
-FIGURE_STYLE: Any = STYLE | {"text.parse_math": False, "xtick.labelsize": 8, "ytick.labelsize": 8}
+FIGURE_STYLE: Any = (
+    STYLE | {"text.parse_math": False} | dict.fromkeys(("axes.labelsize", "xtick.labelsize", "ytick.labelsize"), 8)
+)
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
@@ -34,11 +36,8 @@ def new_figure(height: float) -> Figure:
     return Figure(figsize=(WIDTH, height))
 
 
-def panels(
-    heights: Sequence[float],
-    widths: Sequence[float] = (1.0,),
-    labels: Sequence[str] = (),
-    titles: float = 0.0,
+def panel_grid(
+    heights: Sequence[float], widths: Sequence[float], labels: Sequence[str], titles: float
 ) -> tuple[Figure, Any]:
     """Create a figure and its axes; axes of a column share their x axis, and those of a row their y axis."""
     # with heights [inch], titles [inch]

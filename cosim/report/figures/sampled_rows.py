@@ -7,9 +7,9 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from cosim.report.figures.forces import norms_of, thrusts_of
+from cosim.report.figures.panels import overlap_columns, zoom_columns
 from cosim.report.figures.style import POINTS, FigureData
-from cosim.report.figures.time_series import enlarged, error_of
+from cosim.report.figures.time_series import error_of, norms_of, thrusts_of
 from cosim.report.figures.trajectory import POSITION
 from cosim.results.extremes import even_edges, extreme_rows, rows_at
 from cosim.results.record import Rows
@@ -44,10 +44,10 @@ def make_figure_data(run: Run) -> FigureData:
 def _rows(data: FigureData, names: list[str]) -> NDArray[np.intp]:
     """Return the selected rows of a long record."""
     scenario, record = data.scenario, data.record
-    n, spans = len(record), enlarged(data)
-    bounds = rows_at(record, [time for span in spans for time in span]).clip(0, n - 1)
+    n, enlarged = len(record), [*overlap_columns(data), *zoom_columns(data)[:1]]
+    bounds = rows_at(record, [time for span in enlarged for time in (span.start, span.end)]).clip(0, n - 1)
     signals = len(_signals_with_extremes(scenario, record.take([0], names)))
-    parts = max(1, _MOST // (2 * signals * (1 + len(spans))))
+    parts = max(1, _MOST // (2 * signals * (1 + len(enlarged))))
     edges = [even_edges(n, parts)]
     edges += [first + even_edges(end - first, parts) for first, end in bounds.reshape(-1, 2)]
     blocks = (_signals_with_extremes(scenario, block) for block in record.blocks(names))

@@ -1,34 +1,18 @@
-"""Figures over time: errors, attitude, velocities, weights, clearances, control modes, and V."""
+"""The figures over time of a run: errors, motion, weights, clearances, forces, estimates, and V."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import cycle
-from typing import Any
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import MaxNLocator
 
 from controller.regions import Sphere
 from controller.regions.region_set import of_attitude
-from cosim.report.figures.broken_time import break_time, rests_from
-from cosim.report.figures.layout import legend, limits_of, panels, symlog_axis
-from cosim.report.figures.style import (
-    BLACK,
-    BLUE,
-    CYCLE,
-    GREEN,
-    ORANGE,
-    RED,
-    FigureData,
-    regions_of,
-    shifts_of,
-    thin,
-)
+from cosim.report.figures.layout import limits_of, log_axis
+from cosim.report.figures.panels import DASHES, Line, Panel, draw_panels, fit, fit_spikes, percentile
+from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, FigureData, regions_of, shifts_of
 from cosim.results.record import Rows
 from cosim.results.spans import spans
 from cosim.scenario.colors import GOAL_COLOR
@@ -39,72 +23,14 @@ from cosim.simulation.signals import Array
 _AWAY = 1e4  # m; regions further away are free obstacle slots
 _NAMED = 8  # maximum number of regions that a legend names one by one
 _NEAREST = 5  # regions named beside the goal if there are more
-DASHES = ("-", "--", "-.", ":")
-_WINDOWS = 3  # maximum number of windows that are shown
-_WIDER = 1.6  # end of the enlarged span, relative to the end of the first overlap
-_TIME = "time [s]"
+_FLOOR = 1e-2  # N, minimum value on a logarithmic axis
+_ESTIMATES = ("W − B", "x_G W − x_B B", "y_G W − y_B B", "z_G W − z_B B")
 
 
-def zooms(data: FigureData) -> bool:
-    """Return True if the first overlap is so early that figures over the whole run would not show it."""
-    windows = data.summary["intersection_windows"]
-    return bool(windows) and 0.0 < _WIDER * windows[0][1] <= 0.4 * data.summary["simulated_time"]
-
-
-def enlarged(data: FigureData) -> list[tuple[float, float]]:
-    """Return the spans of time [s] that figures show enlarged, besides the whole run."""
-    windows = data.summary["intersection_windows"]
-    spans = [_around(data, start, end) for start, end in windows[:_WINDOWS]]
-    return [*spans, (0.0, _WIDER * windows[0][1])] if zooms(data) else spans
-
-
-def _around(data: FigureData, start: float, end: float) -> tuple[float, float]:
-    """Return the span [s] that is shown around a window of overlap."""
-    room = max(0.5 * (end - start), 5 * data.scenario.time.step)
-    return start - room, end + room
-
-
-def _zoomed(data: FigureData, heights: Sequence[float], labels: Sequence[str]) -> tuple[Figure, Any]:
-    """Create axes for the whole run, shape (rows, 1), or (rows, 2) with the time of the overlap on the left."""
-    if not zooms(data):
-        figure, axes = over_time(data, heights, labels)
-        return figure, axes[:, None]
-    figure, axes = panels(heights, (2.0, 3.0), labels)
-    start, end = data.summary["intersection_windows"][0]
-    for ax in axes[:, 0]:
-        ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
-    axes[0, 0].set_xlim(0.0, _WIDER * end)
-    axes[0, 0].xaxis.set_major_locator(MaxNLocator(4, steps=[1, 2, 5, 10]))
-    axes[0, 1].set_xlim(0.0, data.summary["simulated_time"])
-    for ax in axes[-1]:
-        ax.set_xlabel(_TIME)
-    return figure, axes
-
-
-def over_time(data: FigureData, heights: Sequence[float], labels: Sequence[str]) -> tuple[Figure, Any]:
-    """Create axes over the whole run, shape (rows,); a break in time shortens an early rest."""
-    figure, axes = panels(heights, labels=labels)
-    end = data.summary["simulated_time"]
-    axes[0, 0].set_xlim(0.0, end or data.scenario.time.step)
-    rest = rests_from(data.record)
-    if rest is not None:
-        break_time(axes[:, 0], rest, end)
-    axes[-1, 0].set_xlabel(_TIME)
-    return figure, axes[:, 0]
-
-
-def curve(axes: Any, data: FigureData, signal: Array, **style: Any) -> Line2D:
-    """Draw a signal into one axes, or into several with different spans of time; return one of its lines."""
-    time = data.record["time"]
-    marker = "o" if len(time) == 1 else ""
-    for ax in np.atleast_1d(axes):
-        seen = slice(0, int(np.searchsorted(time, ax.get_xlim()[1], side="right")) + 1)
-        lines: list[Line2D] = ax.plot(*thin(time[seen], signal[seen]), marker=marker, markersize=4, **style)
-    return lines[0]
-
-
-def _zero_line(ax: Axes) -> None:
-    ax.axhline(0.0, color=BLACK, linewidth=0.8)
+def _lines(labels: Sequence[str], signals: Sequence[Array], colors: Sequence[str] = (BLUE, RED, GREEN)) -> list[Line]:
+    """Return lines of different colors and dashes."""
+    styles = [{"color": color, "linestyle": dashes} for color, dashes in zip(colors, cycle(DASHES), strict=False)]
+    return [Line(*line) for line in zip(labels, signals, styles, strict=True)]
 
 
 def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
@@ -118,171 +44,189 @@ def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
     return "RMS error", np.linalg.norm(path - center, axis=1) / np.sqrt(3.0)
 
 
-def position_error(data: FigureData) -> Figure:
-    """Draw the RMS error to the goal's center, or the distance to a goal without one."""
+def position_error(data: FigureData) -> list[Panel]:
+    """Show the RMS error to the goal's center, or the distance to a goal without one."""
     what, error = error_of(data.scenario, data.record)
-    sphere = data.scenario.goal if isinstance(data.scenario.goal, Sphere) else None
-    labels = [what, "tolerance r_v/√3"] if sphere else [what]
-    figure, (ax,) = over_time(data, [2.0], labels)
-    lines = [curve(ax, data, error)]
-    ax.set_ylabel(f"{what} [m]")
-    if sphere:
-        lines.append(ax.axhline(sphere.radius / np.sqrt(3.0), color=GOAL_COLOR, linestyle="--"))
-    ax.set_ylim(0.0, limits_of([error, np.array([sphere.radius if sphere else 0.0])])[1])
-    legend(figure, dict(zip(labels, lines, strict=True)))
-    return figure
+    lines, radius = [Line(what, error, {})], 0.0
+    if isinstance(data.scenario.goal, Sphere):
+        radius = data.scenario.goal.radius
+        lines.append(Line("tolerance r_v/√3", radius / 3.0**0.5, {"color": GOAL_COLOR, "linestyle": "--"}))
+    top = limits_of([error, np.array([radius])])[1]
+    return [Panel(f"{what} [m]", 2.0, lines, lambda ax: ax.set_ylim(0.0, top))]
 
 
-def attitude(data: FigureData) -> Figure:
-    """Draw roll, pitch and yaw."""
-    angles = {name: np.rad2deg(data.record[f"attitude.{name}"]) for name in ("roll", "pitch", "yaw")}
-    figure, (ax,) = over_time(data, [2.0], list(angles))
-    styles = zip(angles.items(), (BLUE, RED, GREEN), DASHES, strict=False)
-    legend(figure, {n: curve(ax, data, angle, color=c, linestyle=s) for (n, angle), c, s in styles})
-    ax.set_ylim(*limits_of(list(angles.values()), least=2.0))
-    ax.set_ylabel("Euler angles, NED to body [°]", fontsize=8)
-    return figure
+def attitude(data: FigureData) -> list[Panel]:
+    """Show roll, pitch and yaw."""
+    names = ("roll", "pitch", "yaw")
+    angles = [np.rad2deg(data.record[f"attitude.{name}"]) for name in names]
+    return [Panel("Euler angles, NED to body [°]", 2.0, _lines(names, angles), fit(angles, 2.0))]
 
 
-def velocities(data: FigureData) -> Figure:
-    """Draw linear and angular velocity."""
-    groups = (("uvw", "velocity [m/s]", 0.1), ("pqr", "angular velocity [rad/s]", 0.05))
-    figure, axes = over_time(data, [1.7, 1.7], list("uvwpqr"))
-    entries: dict[str, Artist] = {}
-    for ax, (names, label, least) in zip(axes, groups, strict=True):
-        signals = {name: data.record[f"velocity.{name}"] for name in names}
-        for (name, signal), color, dashes in zip(signals.items(), (BLUE, RED, GREEN), DASHES, strict=False):
-            entries[name] = curve(ax, data, signal, color=color, linestyle=dashes)
-        ax.set_ylim(*limits_of(list(signals.values()), least=least))
-        ax.set_ylabel(label)
-    legend(figure, entries)
-    return figure
+def velocities(data: FigureData) -> list[Panel]:
+    """Show linear and angular velocity."""
+    panels = []
+    for names, label, least in (("uvw", "velocity [m/s]", 0.1), ("pqr", "angular velocity [rad/s]", 0.05)):
+        signals = [data.record[f"velocity.{name}"] for name in names]
+        panels.append(Panel(label, 1.7, _lines(names, signals), fit(signals, least)))
+    return panels
 
 
-def weights_overlap(data: FigureData) -> Figure:
-    """Draw the weights around each window in which the regions overlap, at most the first three."""
-    windows = data.summary["intersection_windows"][:_WINDOWS]
+def weights_together(data: FigureData) -> list[Panel]:
+    """Show the weights of all criteria in one panel."""
     criteria = data.scenario.criteria
-    labels = [f"α{i + 1} {criterion.name}" for i, criterion in enumerate(criteria)]
-    figure, axes = panels([2.0], [1.0] * len(windows), [*labels, "overlap"], titles=0.2)
-    time = data.record["time"]
-    for ax, (start, end) in zip(axes[0], windows, strict=True):
-        first, last = _around(data, start, end)
-        shown = (time >= first) & (time <= last)
-        entries: dict[str, Artist] = {}
-        for label, criterion, dashes in zip(labels, criteria, cycle(DASHES), strict=False):
-            curve = thin(time[shown], data.record[f"weight.{criterion.name}"][shown])
-            (entries[label],) = ax.plot(*curve, color=criterion.color, linestyle=dashes)
-        entries["overlap"] = ax.axvspan(start, end, color=BLACK, alpha=0.08, linewidth=0)
-        ax.set_title(f"{start:.3f} s to {end:.3f} s", fontsize=8, pad=3)
-        ax.set_xlim(float(time[shown][0]), float(time[shown][-1]) + 1e-9)
-        ax.xaxis.set_major_locator(MaxNLocator(8 // len(windows), steps=[1, 2, 5, 10]))
-        ax.set_xlabel(_TIME)
-    axes[0, 0].set_ylabel("normalized weight [–]")
-    axes[0, 0].set_ylim(-0.05, 1.05)
-    legend(figure, entries)
-    return figure
+    labels = [f"α{i} {criterion.name}" for i, criterion in enumerate(criteria, 1)]
+    signals = [data.record[f"weight.{criterion.name}"] for criterion in criteria]
+    lines = _lines(labels, signals, [criterion.color for criterion in criteria])
+    return [Panel("normalized weight [–]", 2.0, lines, lambda ax: ax.set_ylim(-0.05, 1.05))]
 
 
-def weights(data: FigureData) -> Figure:
-    """Draw memberships and weights of each criterion."""
-    labels = ["weight, in its criterion's color", "membership"]
-    criteria = data.scenario.criteria
-    figure, axes = _zoomed(data, [0.95] * len(criteria), labels)
-    for i, (row, criterion) in enumerate(zip(axes, criteria, strict=True)):
-        name = criterion.name
+def weights(data: FigureData) -> list[Panel]:
+    """Show memberships and weights of each criterion."""
+    panels = []
+    for i, criterion in enumerate(data.scenario.criteria, 1):
+        weight, membership = (data.record[f"{what}.{criterion.name}"] for what in ("weight", "membership"))
         lines = [
-            curve(row, data, data.record[f"weight.{name}"], color=criterion.color, linewidth=1.8),
-            curve(row, data, data.record[f"membership.{name}"], color=BLACK, linestyle=":", linewidth=1.0),
+            Line("weight, in its criterion's color", weight, {"color": criterion.color, "linewidth": 1.8}),
+            Line("membership", membership, {"color": BLACK, "linestyle": ":", "linewidth": 1.0}),
         ]
-        row[0].set(ylim=(-0.06, 1.06), yticks=(0.0, 0.5, 1.0))
-        row[0].set_ylabel(f"α{i + 1} {name} [–]", fontsize=7.5)
-    legend(figure, dict(zip(labels, lines, strict=True)))
-    return figure
+        label = f"α{i} {criterion.name} [–]"
+        panels.append(Panel(label, 0.95, lines, lambda ax: ax.set(ylim=(-0.06, 1.06), yticks=(0.0, 0.5, 1.0))))
+    return panels
 
 
-def clearance(data: FigureData) -> Figure:
-    """Draw the clearance to each region and to the goal: distances, and angles of attitude regions below."""
+def clearance(data: FigureData) -> list[Panel]:
+    """Show the clearance to each region and to the goal: distances, and angles of attitude regions below."""
     regions = list(regions_of(data.scenario))
-    of_places = [entry for entry in regions if not of_attitude(entry[0].shape)]
-    of_angles = [entry for entry in regions if of_attitude(entry[0].shape)]
     named = _named(data, [region.name for region, _ in regions])
-    others = len(regions) - len(named)
-    labels = [region.name for region, _ in (*of_places, *of_angles) if region.name in named]
-    other_labels = [f"{others} others"] if others else []
-    figure, axes = _zoomed(data, [2.5, 1.5] if of_angles else [2.5], [*labels, *other_labels])
-    entries: dict[str, Artist] = {}
-    command = [region.name for region, _ in regions if region.name in named]
-    for row, group, unit in zip(axes, (of_places, of_angles), ("m", "°"), strict=False):
-        signals = []
-        for region, color in sorted(group, key=lambda entry: entry[0].name in named):  # the others behind
+    panels = []
+    for unit, height in (("m", 2.5), ("°", 1.5)):
+        lines, others = [], []
+        for region, color in regions:
+            if of_attitude(region.shape) != (unit == "°"):
+                continue
             signal = data.record[f"{region.name}.clearance"]
             signal = np.rad2deg(signal) if unit == "°" else np.where(np.abs(signal) < _AWAY, signal, np.nan)
-            signals.append(signal)
             if region.name in named:
-                i = command.index(region.name)
-                dashes, width = DASHES[i % len(DASHES)], 1.3 if i < len(DASHES) else 0.8
-                entries[region.name] = curve(row, data, signal, color=color, linestyle=dashes, linewidth=width)
+                i = named.index(region.name)
+                style = {"linestyle": DASHES[i % len(DASHES)], "linewidth": 1.3 if i < len(DASHES) else 0.8}
+                lines.append(Line(region.name, signal, {"color": color, **style}))
             else:
-                entries[other_labels[0]] = curve(row, data, signal, color=color, alpha=0.3, linewidth=0.6)
-        low, high = limits_of(signals)
-        low = min(low, -0.08 * (high - min(low, 0.0)))  # always shows some of the range below 0
-        row[0].set_ylim(low, max(high, -0.2 * low))
-        for ax in row:
-            ax.axhspan(low, 0.0, color=RED, alpha=0.06, linewidth=0)
-            _zero_line(ax)
-        row[0].set_ylabel(f"clearance [{unit}]")
-    legend(figure, {label: entries[label] for label in (*labels, *other_labels)})
-    return figure
+                label = f"{len(regions) - len(named)} others"
+                others.append(Line(label, signal, {"color": color, "alpha": 0.3, "linewidth": 0.6, "zorder": 1.9}))
+        if lines or others:
+            low, high = limits_of([np.asarray(line.signal) for line in (*lines, *others)])
+            low = min(low, -0.08 * (high - min(low, 0.0)))  # always shows some of the range below 0
+            limits = low, max(high, -0.2 * low)
+            scale = lambda ax, limits=limits: ax.set_ylim(limits)  # noqa: E731
+            panels.append(Panel(f"clearance [{unit}]", height, [*lines, *others], scale, violated=-1.0))
+    return panels
 
 
-def _named(data: FigureData, names: list[str]) -> set[str]:
+def _named(data: FigureData, names: list[str]) -> list[str]:
     """Return the names for the legend: all, or of many regions the goal and the nearest ones."""
     if len(names) <= _NAMED:
-        return set(names)
+        return names
     least = data.summary["min_clearance"]
-    return {names[0], *sorted(names[1:], key=lambda name: np.nan_to_num(least[name], nan=np.inf))[:_NEAREST]}
+    nearest = sorted(names[1:], key=lambda name: np.nan_to_num(least[name], nan=np.inf))[:_NEAREST]
+    return [name for name in names if name in (names[0], *nearest)]
+
+
+def norms_of(record: Rows) -> dict[str, Array]:
+    """Return the norms of the acting and the commanded body force, each of shape (rows,) [N]."""
+    of = {"acting": "actuation", "asked for": "command"}
+    forces = {words: record.stack([f"{name}.{axis}" for axis in "XYZ"]) for words, name in of.items()}
+    return {words: np.maximum(np.linalg.norm(force, axis=1), _FLOOR) for words, force in forces.items()}
+
+
+def forces(data: FigureData) -> list[Panel]:
+    """Show the norm of the body force on a logarithmic axis, and its components."""
+    norms, acting = norms_of(data.record), [data.record[f"actuation.{a}"] for a in "XYZ"]
+    sizes = list(norms.values())
+    parts = _lines([f"{axis}, acting" for axis in "XYZ"], acting)
+    scale = fit_spikes(acting, percentile(norms["acting"], 90), least=1.0)
+    return [
+        Panel("force, norm [N]", 1.7, _lines([f"norm, {which}" for which in norms], sizes, (BLACK, RED)),
+              lambda ax: log_axis(ax, sizes)),
+        Panel("force, body frame [N]", 1.7, parts, scale),
+    ]  # fmt: skip
+
+
+def thruster_caption(scenario: Scenario) -> str:
+    """Return the caption of the figure of thrusters."""
+    if scenario.actuation.through == "thrusters":
+        return "Force of each thruster, and the minimum and maximum of all (dashed black)."
+    return (
+        "What the acting body wrench would ask of each thruster (pseudo-inverse), and what a thruster gives (dashed "
+        "black): in this scenario the wrench acts on the body directly, not through the thrusters."
+    )
+
+
+def thrusts_of(scenario: Scenario, record: Rows) -> Array:
+    """Return the force of each thruster, or the one that the wrench would require, shape (rows, thrusters) [N]."""
+    vehicle = scenario.vehicle
+    if scenario.actuation.through == "thrusters":
+        return record.stack([f"thruster_force[{i + 1}]" for i in range(vehicle.n_thrusters)])
+    wrench = record.stack([f"actuation.{a}" for a in "XYZKMN"])
+    force: Array = wrench @ np.linalg.pinv(vehicle.thruster_matrix).T
+    return force
+
+
+def thrusters(data: FigureData) -> list[Panel]:
+    """Show the force of each thruster, or the one that the wrench would require."""
+    vehicle = data.scenario.vehicle
+    lines = [
+        Line(f"thruster {i + 1}", force,
+             {"color": CYCLE[i % len(CYCLE)], "linestyle": "-" if i < len(CYCLE) // 2 else "--", "linewidth": 1.0})
+        for i, force in enumerate(thrusts_of(data.scenario, data.record).T)
+    ]  # fmt: skip
+    bounds = np.array([vehicle.thrust_min.min(), vehicle.thrust_max.max()])
+    levels = [Line("", bound, {"color": BLACK, "linestyle": "--", "linewidth": 0.8}) for bound in bounds.tolist()]
+    scale = fit_spikes([*(np.asarray(line.signal) for line in lines), bounds], float(np.abs(bounds).max()), 5.0)
+    return [Panel("thrust [N]", 2.3, [*lines, *levels], scale)]
+
+
+def estimates(data: FigureData) -> list[Panel]:
+    """Show the estimates against the truth."""
+    truth = data.scenario.true_restoring_parameters
+    colors = (BLUE, *CYCLE[1:4])
+    lines = _lines(_ESTIMATES, [data.record[f"estimate.phi{i}"] for i in range(1, 5)], colors)
+    levels = [
+        Line("truth", value, {"color": color, "linestyle": (0, (1, 3)), "linewidth": 1.2})
+        for value, color in zip(truth.tolist(), colors, strict=True)
+    ]
+    panels = []
+    for label, which in (("estimate [N]", slice(0, 1)), ("estimates [N m]", slice(1, 4))):
+        shown = [*(np.asarray(line.signal) for line in lines[which]), truth[which]]
+        panels.append(Panel(label, 1.6, [*lines[which], *levels[which]], fit(shown, 0.1)))
+    return panels
+
+
+def lyapunov(data: FigureData) -> list[Panel]:
+    """Show V in its three forms, and its rate."""
+    printed, normalized, primary, rate = (
+        data.record[f"lyapunov.{name}"] for name in ("printed", "normalized", "primary", "rate")
+    )
+    labels = ("V as printed", "V, potential of the force", "V, primary region alone")
+    forms = _lines(labels, (printed, normalized, primary), (ORANGE, BLUE, BLACK))
+    zero = np.zeros(1)
+    scales = [fit_spikes([signal, zero], percentile(signal, 50)) for signal in (normalized, rate)]
+    return [
+        Panel("V [N m]", 1.8, forms, scales[0], violated=-1.0),
+        Panel("dV/dt = −W [W]", 1.8, [Line("", rate, {"color": BLUE})], scales[1], violated=1.0),
+    ]
 
 
 def control_mode(data: FigureData) -> Figure:
     """Draw the control mode, and the times at which the vehicle is disarmed."""
-    figure, (ax,) = over_time(data, [1.3], [])
+    figure = draw_panels(data, [Panel("mode [–]", 1.3, [], lambda ax: ax.set_ylim(len(MODES) - 0.4, -0.6))])
+    (ax,) = figure.axes
     time, mode = data.record["time"], data.record["commands.mode"]
-    armed = data.record["commands.armed"] > 0.0
     changes = [0, *(np.flatnonzero(np.diff(mode) != 0.0) + 1).tolist(), len(time) - 1]
     for first, last in zip(changes, changes[1:], strict=False):
         if np.isfinite(mode[first]):
             row = int(mode[first])
             ax.broken_barh([(time[first], time[last] - time[first])], (row - 0.4, 0.8), color=CYCLE[row])
-    for start, end in spans(~armed, time):
+    for start, end in spans(data.record["commands.armed"] <= 0.0, time):
         ax.axvspan(start, end, color=BLACK, alpha=0.2, linewidth=0)
-    ax.set(ylim=(len(MODES) - 0.4, -0.6), ylabel="mode [–]")
     ax.set_yticks(range(len(MODES)), labels=MODES)
-    return figure
-
-
-def lyapunov(data: FigureData) -> Figure:
-    """Draw V in its three forms, and its rate."""
-    forms = {form: data.record[f"lyapunov.{form}"] for form in ("printed", "normalized", "primary")}
-    labels = ("V as printed", "V, potential of the force", "V, primary region alone")
-    figure, axes = _zoomed(data, [1.8, 1.8], labels)
-    styles = zip(forms.values(), (ORANGE, BLUE, BLACK), DASHES, strict=False)
-    lines = [curve(axes[0], data, V, color=color, linestyle=style) for V, color, style in styles]
-    rate = data.record["lyapunov.rate"]
-    curve(axes[1], data, rate, color=BLUE)
-    for row, signal, bad_sign in ((axes[0], forms["normalized"], -1.0), (axes[1], rate, 1.0)):
-        size = np.abs(signal[np.isfinite(signal)])
-        largest, typical = (float(size.max()), float(np.percentile(size, 50))) if size.size else (0.0, 0.0)
-        if largest > 20.0 * max(typical, 1.0):  # on a linear axis the beginning would hide the rest
-            symlog_axis(row[0], largest, max(typical, 1e-3 * largest))
-        else:
-            row[0].set_ylim(*limits_of([signal, np.zeros(1)]))
-        limits = row[0].get_ylim()
-        for ax in row:
-            ax.axhspan(0.0, limits[0] if bad_sign < 0.0 else limits[1], color=RED, alpha=0.06, linewidth=0)
-            _zero_line(ax)
-        row[0].set_ylim(limits)
-    axes[0, 0].set_ylabel("V [N m]")
-    axes[1, 0].set_ylabel("dV/dt = −W [W]")
-    legend(figure, dict(zip(labels, lines, strict=True)))
     return figure

@@ -24,7 +24,6 @@ METHODS = {
 }  # fmt: skip
 ITS_OWN = {  # what parses nothing that comes from outside: why
     "cosim.mavlink.wire.framing:encode_v1": "a frame that pymavlink has just encoded",
-    "controller.laws.deployable.braking:_least_forces": "an array in memory",
     "cosim.companion.failsafes:Failsafes.receive": "the four bytes of a number of a message",
     "cosim.campaigns.rerun:_of_sweep": "a copy of the plan, which was read",
     "cosim.campaigns.store.folder:CampaignFolder.__init__": "a copy of its own plan",
