@@ -21,11 +21,12 @@ def least_forces(vehicle: VehicleModel) -> Array:
     # the force with none lost is returned instead.
     B, lower, upper = vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max
     works = ~np.eye(B.shape[1] + 1, B.shape[1], dtype=bool)
-    forces = np.nan_to_num(max_forces(B, lower * works, upper * works, DIRECTIONS).min(axis=1))
+    forces: Array = np.nan_to_num(max_forces(B, lower * works, upper * works, DIRECTIONS).min(axis=1))
     negligible = _NEGLIGIBLE * np.abs(np.r_[lower, upper]).max()
     if not forces[-1] > negligible:
         raise LawError(
             f"{B.shape[1]} thrusters push {abs(forces[-1]):.3g} N in the worst direction without a moment, "
             "expected more than 0: the law needs forces in every direction to keep out of regions"
         )
-    return np.where(forces > negligible, forces, forces[-1])
+    result: Array = np.where(forces > negligible, forces, forces[-1])
+    return result

@@ -84,8 +84,9 @@ def draw_panels(data: FigureData, panels: Sequence[Panel], columns: Sequence[Col
         )
         below[0].set_title(column.title, fontsize=8, pad=3)
         below[-1].set_xlabel("time [s]")
-        for ax in below if column.overlap else ():
-            entries["overlap"] = ax.axvspan(*column.overlap, color=BLACK, alpha=0.08, linewidth=0)
+        for ax in below:
+            if column.overlap:
+                entries["overlap"] = ax.axvspan(*column.overlap, color=BLACK, alpha=0.08, linewidth=0)
     if columns == [whole] and (rest := rests_from(data.record)) is not None:
         break_time(axes[:, 0], rest, columns[0].end)
     for row, panel in zip(axes, panels, strict=True):
