@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from controller.compiling.library import library_of
+from controller.stack_array import ordered
 from controller.translator.arguments import words_of
 from controller.translator.program import Program
-from controller.translator.types import Type, type_of
+from controller.translator.types import Type, check_shapes, type_of
 
 INTERPRETED = "SUBREACH_INTERPRETED"  # environment variable: if set, Python runs all functions, without a compiler
 Described = dict[int, tuple[Any, Type, list[int]]]  # arguments with their types and words, by their ids
@@ -59,6 +60,7 @@ class BoundCall:
     def __init__(self, function: Any, arguments: tuple[Any, ...], known: Described | None = None) -> None:
         self._raised: BaseException | None = None
         if isinstance(function, FunctionType) and not os.environ.get(INTERPRETED):
+            check_shapes(function, arguments)
             described = [_described(argument, {} if known is None else known) for argument in arguments]
             self._entry = _entry(function, tuple(kind for _, kind, _ in described))
             self._words = np.array([word for _, _, words in described for word in words], dtype=np.uint64)
@@ -67,6 +69,7 @@ class BoundCall:
             call.kept = self._words, arguments  # so that `call` works without this object
             self.call: Callable[[], None] = call
         else:
+            arguments = ordered(arguments) if isinstance(function, FunctionType) else arguments
             self.words, self.call = 0, functools.partial(_call_without_warnings, function, arguments)
             self._entry = _CALLBACK(self._called_back)
         self.address: int = ctypes.cast(self._entry, ctypes.c_void_p).value or 0

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from controller.stack_array import zeros
+from controller.stack_array import array, zeros
 from controller.translator.foreign import POINTER, call_c
 from controller.translator.operands import Known, Operand, Value, bracketed
 from controller.translator.subscripts import Subscripts
@@ -24,12 +24,15 @@ _MATH = {
 _TESTS = {"isnan": "isnan", "isfinite": "isfinite", "isinf": "isinf"}
 _CAST = {float: DOUBLE, int: INT, bool: BOOL, np.uint64: UINT, np.int64: INT, np.float64: DOUBLE}
 _MODULES = (math, np)
+_REDUCED = {np.sum: "sum", np.min: "min", np.max: "max", np.any: "any", np.all: "all"}
 
 
 class Calls(Subscripts):
     """Translates calls."""
 
     def _call(self, node: ast.Call) -> Operand:
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "copy":
+            return self.materialized(self.expression(node.func.value), node)
         called = self.expression(node.func)
         if not isinstance(called, Known):
             self.fail(node, "a call of what is no function")
@@ -40,18 +43,18 @@ class Calls(Subscripts):
         name = getattr(function, "__name__", "")
         if function is call_c:
             return self._foreign(operands, node)
-        if function is zeros:
-            shape = [operand.value for operand in operands if isinstance(operand, Known)]
-            if len(shape) != len(operands):
-                self.fail(node, "zeros of a shape that is not written as numbers")
-            return self.make_zeros(tuple(shape))
+        made = self._of_arrays(function, operands, node)
+        if made is not None:
+            return made
         if hasattr(function, "_fields"):
-            return self.make_record(function, [self.value(operand, node) for operand in operands])
+            return self.make_record(function, [self.value(operand, node) for operand in operands], node)
         if function in (min, max):
             return self._extreme(function, operands, node)
-        if function is abs:
-            value = self.scalar(operands[0], node)
-            return Value(value.type, f"{'fabs' if value.type == DOUBLE else 'llabs'}({value.code})")
+        if function in (abs, np.abs):
+            if self.is_array(operands[0]):
+                grid = self.grid(operands[0], node)
+                return self.elementwise(lambda x: self._absolute(x[0]), [grid], grid.item, node)
+            return self._absolute(self.scalar(operands[0], node))
         if function in _CAST:
             value = self.scalar(operands[0], node)
             kind = _CAST[function]
@@ -64,23 +67,61 @@ class Calls(Subscripts):
             return self.call_translated(function, operands, node)
         return self.fail(node, f"a call of {name or function!r}")
 
+    def _of_arrays(self, function: Any, operands: Sequence[Operand], node: ast.AST) -> Operand | None:
+        """Return what a function makes of, or from, whole arrays; None if it is none of these."""
+        if function is zeros:
+            shape = [operand.value for operand in operands if isinstance(operand, Known)]
+            if len(shape) != len(operands):
+                self.fail(node, "zeros of a shape that is not written as numbers")
+            return self.make_zeros(tuple(shape), node)
+        if function is array:
+            return self.array_of(operands, node)
+        if function is np.concatenate:
+            return self.concatenated(self.items_of(operands[0], node), node)
+        if function in _REDUCED and self.is_array(operands[0]) and len(operands) == 1:
+            return self.reduced(_REDUCED[function], operands[0], node)
+        return None
+
     def _foreign(self, operands: Sequence[Operand], node: ast.AST) -> Value:
         address, listed, *arguments = operands
         kinds = [kind.value for kind in self.items_of(listed, node) if isinstance(kind, Known)]
         if len(kinds) != len(arguments):
             self.fail(node, "a call of C whose kinds are no constants, one for each argument")
         values = [self.value(operand, node) for operand in arguments]
+        self.n_writes += 1
+        self.writes_arguments = True
         codes = [_as_kind(value, kind) for value, kind in zip(values, kinds, strict=True)]
         function = f"(int (*)({', '.join(kinds)}))(intptr_t)"
         return self.temporary(INT, f"({function}{self.scalar(address, node).code})({', '.join(codes)})")
 
-    def _of_math(self, name: str, operands: Sequence[Operand], node: ast.AST) -> Value:
+    def _absolute(self, value: Value) -> Value:
+        return Value(value.type, f"{'fabs' if value.type == DOUBLE else 'llabs'}({value.code})")
+
+    def _of_math(self, name: str, operands: Sequence[Operand], node: ast.AST) -> Operand:
+        if name == "where" and len(operands) == 3:
+            return self._where(operands, node)
+        if any(map(self.is_array, operands)):
+            item = BOOL if name in _TESTS else DOUBLE
+            return self.elementwise(lambda x: self._of_math(name, x, node), operands, item, node)
         codes = [self.converted(self.scalar(operand, node), DOUBLE) for operand in operands]
         if name in _TESTS:
             return Value(BOOL, f"{_TESTS[name]}({', '.join(codes)}) != 0")
         if name in _MATH:
             return Value(DOUBLE, f"{_MATH[name]}({', '.join(codes)})")
+        if name in ("minimum", "maximum"):
+            return Value(DOUBLE, f"{name}_f64({', '.join(codes)})")
+        if name == "clip":
+            return Value(DOUBLE, f"minimum_f64(maximum_f64({codes[0]}, {codes[1]}), {codes[2]})")
         return self.fail(node, f"{name} has no C here")
+
+    def _where(self, operands: Sequence[Operand], node: ast.AST) -> Operand:
+        a, b = self.grid(operands[1], node), self.grid(operands[2], node)
+        kind = unified(a.item, b.item)
+
+        def choose(x: list[Value]) -> Value:
+            return Value(kind, f"{bracketed(x[0])} ? {bracketed(x[1], kind)} : {bracketed(x[2], kind)}")
+
+        return self.elementwise(choose, [operands[0], a, b], kind, node)
 
     def _extreme(self, function: Any, operands: Sequence[Operand], node: ast.AST) -> Value:
         values = [self.scalar(operand, node) for operand in operands]

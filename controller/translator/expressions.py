@@ -5,7 +5,8 @@ from __future__ import annotations
 import ast
 from typing import Any
 
-from controller.translator.operands import Items, Known, Operand, Operands, Value, bracketed
+from controller.translator.array_expressions import ArrayExpressions
+from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed
 from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Record, name_of, unified
 
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
@@ -14,7 +15,7 @@ _COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==
 _LARGEST_POWER = 8  # greatest exponent that is multiplied out
 
 
-class Expressions(Operands):
+class Expressions(ArrayExpressions):
     """Translate names, numbers, operators and choices."""
 
     def expression(self, node: ast.expr) -> Operand:
@@ -30,7 +31,7 @@ class Expressions(Operands):
 
     def _name(self, node: ast.Name) -> Operand:
         if node.id in self.names:
-            return Value(self.names[node.id], self.variable(node.id), True)
+            return self.held(self.names[node.id], self.variable(node.id), True, self.roots.get(node.id, frozenset()))
         if node.id in self.globals:
             return Known(self.globals[node.id])
         builtins: Any = self.globals["__builtins__"]
@@ -44,14 +45,18 @@ class Expressions(Operands):
         match owner:
             case Known(value):
                 return Known(getattr(value, node.attr))
-            case Value(Record() as kind, code) if node.attr in kind.fields:
+            case Value(Record() as kind) if node.attr in kind.fields:
                 item = kind.items[kind.fields.index(node.attr)]
                 inside = f"{bracketed(owner)}->{node.attr}"
-                return Value(item, f"(&{inside})" if isinstance(item, Record) else inside, True)
-            case Value(Array() as kind, code) if node.attr == "size":
-                return Value(INT, " * ".join(f"{code}.n{i}" for i in range(kind.ndim)), kind.ndim == 1)
-            case Value(Array() as kind, code) if node.attr == "shape":
-                return Items(tuple(Value(INT, f"{code}.n{i}", True) for i in range(kind.ndim)))
+                paths = [f"{root}.{node.attr}" for root in owner.roots]
+                roots = frozenset().union(*(self.made.get(path, {path}) for path in paths))
+                return self.held(item, f"(&{inside})" if isinstance(item, Record) else inside, True, roots)
+            case View() if node.attr == "size":
+                return _length(self.product(owner.sizes))
+            case View() if node.attr == "shape":
+                return Items(tuple(map(_length, owner.sizes)))
+        if node.attr == "T" and self.is_array(owner):
+            return self.transposed(owner, node)
         return self.fail(node, f"attribute {node.attr}")
 
     def _tuple(self, node: ast.Tuple) -> Operand:
@@ -61,6 +66,9 @@ class Expressions(Operands):
         operand = self.expression(node.operand)
         if isinstance(operand, Known) and not isinstance(node.op, ast.Not):
             return Known(-operand.value if isinstance(node.op, ast.USub) else operand.value)
+        if self.is_array(operand) and isinstance(node.op, ast.USub):
+            grid = self.grid(operand, node)
+            return self.elementwise(lambda x: Value(grid.item, f"-{bracketed(x[0])}"), [grid], grid.item, node)
         value = self.scalar(operand, node)
         match node.op:
             case ast.USub():
@@ -76,7 +84,9 @@ class Expressions(Operands):
         return self.arithmetic(node.op, left, right, node)
 
     def arithmetic(self, op: ast.operator, left: Operand, right: Operand, node: ast.AST) -> Operand:
-        """Return the C expression of an operator on two numbers."""
+        """Return the result of an operator on two numbers or arrays."""
+        if self.is_array(left) or self.is_array(right):
+            return self.operated(op, left, right, node)
         if isinstance(op, ast.Pow):
             return self._power(left, right, node)
         a, b = self.scalar(left, node), self.scalar(right, node)
@@ -117,7 +127,11 @@ class Expressions(Operands):
             equalities = [f"{value.code} == {self.scalar(x, node).code}" for x in self.items_of(operands[1], node)]
             code = " || ".join(equalities) if equalities else "false"
             return Value(BOOL, f"!({code})" if isinstance(node.ops[0], ast.NotIn) else code)
-        values = [self.scalar(operand, node) for operand in operands]
+        if len(operands) == 2 and any(map(self.is_array, operands)):
+            return self.elementwise(lambda x: self._compared(node, x), operands, BOOL, node)
+        return self._compared(node, [self.scalar(operand, node) for operand in operands])
+
+    def _compared(self, node: ast.Compare, values: list[Value]) -> Value:
         for i in range(1, len(values) - 1):
             values[i] = values[i] if values[i].simple else self.temporary(values[i].type, values[i].code)
         parts = []
@@ -155,6 +169,7 @@ class Expressions(Operands):
         for branch in (node.body, node.orelse):
             mark = len(self.lines)
             operand = self.expression(branch)
+            operand = self.materialized(operand, branch) if isinstance(operand, Grid) else operand
             needed, self.lines[mark:] = self.lines[mark:], []
             branches.append((needed, operand))
         (first, a), (second, b) = branches
@@ -168,7 +183,7 @@ class Expressions(Operands):
         result = self.temporary(kind, "")
         self.lines += [f"if ({condition.code}) {{", *first, f"{result.code} = {self.converted(x, kind)};", "} else {"]
         self.lines += [*second, f"{result.code} = {self.converted(y, kind)};", "}"]
-        return result
+        return self.held(kind, result.code, True, x.roots | y.roots)
 
     def _chosen(self, condition: Value, a: Operand, b: Operand, node: ast.AST) -> Value:
         x, y = self.value(a, node), self.value(b, node)
@@ -176,4 +191,13 @@ class Expressions(Operands):
             kind = unified(x.type, y.type)
         except TypeError as error:
             self.fail(node, str(error))
-        return Value(kind, f"{bracketed(condition)} ? {bracketed(x, kind)} : {bracketed(y, kind)}")
+        if isinstance(kind, Array):
+            codes = [self.converted(v, kind) for v in (x, y)]
+            chosen = self.temporary(kind, f"{bracketed(condition)} ? {codes[0]} : {codes[1]}")
+            return self.held(kind, chosen.code, True, x.roots | y.roots)
+        roots = x.roots | y.roots
+        return Value(kind, f"{bracketed(condition)} ? {bracketed(x, kind)} : {bracketed(y, kind)}", False, roots)
+
+
+def _length(code: str) -> Operand:
+    return Known(int(code)) if code.isdigit() else Value(INT, code, "*" not in code)

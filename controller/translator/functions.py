@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import ast
 import inspect
+import itertools
+import math
+import re
 import textwrap
 from collections.abc import Callable, Sequence
 from types import FunctionType
 from typing import Any, NoReturn, Protocol
 
 from controller.errors import TranslationError
+from controller.translator.array_expressions import ANY
 from controller.translator.operands import Known, Operand, Value
 from controller.translator.statements import Statements
-from controller.translator.types import BOOL, Array, Nothing, Record, Scalar, Tuple, Type
+from controller.translator.types import BOOL, DOUBLE, Array, Nothing, Record, Scalar, Tuple, Type, shaped
 
 # words of C, and names that its headers define
 _RESERVED = {
@@ -25,11 +29,14 @@ _RESERVED = {
 _MAX_PASSES = 6  # maximum number of passes until the types of variables are fixed
 
 
+Aliases = frozenset[frozenset[str]]  # pairs of parameters that may overlap
+
+
 class Functions(Protocol):
     """The program's interface for a function that is translated."""
 
-    def instance(self, function: FunctionType, arguments: tuple[Type, ...]) -> tuple[str, Type]:
-        """Return the C name of a function for some arguments, and the type of what it returns."""
+    def instance(self, function: FunctionType, arguments: tuple[Type, ...], aliases: Aliases) -> tuple[str, Type, bool]:
+        """Return the C name of a function for some arguments, the type of what it returns, and if it writes arrays."""
         ...
 
     def name(self, kind: Type) -> str:
@@ -40,7 +47,9 @@ class Functions(Protocol):
 class Function(Statements):
     """One function for arguments of some types."""
 
-    def __init__(self, program: Functions, function: FunctionType, arguments: tuple[Type, ...]) -> None:
+    def __init__(
+        self, program: Functions, function: FunctionType, arguments: tuple[Type, ...], aliases: Aliases
+    ) -> None:
         self._program, self._function = program, function
         self.globals = function.__globals__ | _captured(function)
         text = getattr(function, "source", None)
@@ -54,8 +63,11 @@ class Function(Statements):
         if len(self.parameters) != len(arguments):
             self.fail(tree, f"{tree.name} is given {len(arguments)} arguments, expected {len(self.parameters)}")
         self.names = dict(zip(self.parameters, arguments, strict=True))
-        self._arguments = arguments
-        self.result: Type = Nothing()
+        self._arguments, self.aliases = arguments, aliases
+        self.roots = {name: frozenset([name]) for name in self.parameters}
+        self.made: dict[str, frozenset[str]] = {}
+        self.made_at: dict[str, ast.AST] = {}
+        self.writes_arguments, self.result = False, Nothing()
 
     def fail(self, node: ast.AST, what: str) -> NoReturn:
         """Refuse a construct, with its file and line."""
@@ -65,13 +77,14 @@ class Function(Statements):
     def translate(self, name: str) -> str:
         """Return the function in C, under a name; afterwards the type of its result is known."""
         for _ in range(_MAX_PASSES):
-            known, result = dict(self.names), self.result
+            known = dict(self.names), dict(self.roots), dict(self.made), self.result
             self.lines: list[str] = []
             self.declared: dict[str, str] = {}
-            self._count = 0
-            for statement in self._tree.body:
-                self.statement(statement)
-            if known == self.names and result == self.result:
+            self.loops, self.later = [], []
+            self._count = self.n_writes = 0
+            self._sites: dict[str, int] = {}
+            self._block(self._tree.body)
+            if known == (self.names, self.roots, self.made, self.result):
                 break
         else:
             self.fail(self._tree, "types that do not settle")
@@ -81,9 +94,9 @@ class Function(Statements):
             if variable not in self.parameters
         ]
         head = f"{self.signature(name)}\n{{\n"
-        used = {inner.id for inner in ast.walk(self._tree) if isinstance(inner, ast.Name)}
-        unused = [f"(void){self.variable(name)};" for name in self.parameters if name not in used]
-        body = [*unused, *variables, *self.declared.values(), *self.lines]
+        used = set(re.findall(r"\w+", " ".join(re.sub(r"^\w+ = ", "", line) for line in self.lines)))
+        unused = [f"(void){code};" for code in map(self.variable, self.names) if code not in used]
+        body = [*variables, *unused, *self.declared.values(), *self.lines]
         return head + _indented(body) + "}\n"
 
     def signature(self, name: str) -> str:
@@ -92,7 +105,7 @@ class Function(Statements):
             self._declaration(kind, self.variable(parameter))
             for parameter, kind in zip(self.parameters, self._arguments, strict=True)
         )
-        return f"static {self._program.name(self.result)} {name}({parameters or 'void'})"
+        return f"static {self.c(self.returned(self.result))} {name}({parameters or 'void'})"
 
     def _declaration(self, kind: Type, name: str) -> str:
         return f"const {self.c(kind)} *{name}" if isinstance(kind, Record) else f"{self.c(kind)} {name}"
@@ -111,43 +124,99 @@ class Function(Statements):
         self.declared[name] = f"{self._declaration(kind, name)}{_zero(kind)};"
         if code:
             self.lines.append(f"{name} = {code};")
-        return Value(kind, name, True)
+        return self.held(kind, name, True, frozenset([ANY]))
+
+    def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str]) -> Value:
+        """Return what a C variable or member holds."""
+        return self.view_of(kind, code, roots) if isinstance(kind, Array) else Value(kind, code, simple, roots)
+
+    def storage(self, stem: str, node: ast.AST, item: Scalar, size: int) -> str:
+        """Declare storage on the stack, one for each place in the text, and return its name."""
+        name = self._site(stem, node)
+        self.declared[name] = f"{item.c} {name}[{max(size, 1)}];"
+        return name
+
+    def _site(self, stem: str, node: ast.AST) -> str:
+        """Return a name that is the same in each pass."""
+        name = f"{stem}_{getattr(node, 'lineno', 0)}_{getattr(node, 'col_offset', 0)}_"
+        self._sites[name] = self._sites.get(name, 0) + 1
+        name += f"{self._sites[name]}_" if self._sites[name] > 1 else ""
+        self.made_at[name] = node
+        return name
 
     def new_name(self, stem: str) -> str:
         """Return a name that no variable has."""
         self._count += 1
         return f"{stem}{self._count}_"
 
-    def make_zeros(self, shape: tuple[int, ...]) -> Value:
+    def make_zeros(self, shape: tuple[int, ...], node: ast.AST) -> Value:
         """Return a new array of zeros on the stack."""
-        kind = Array(Scalar("double"), len(shape))
-        room, size = self.new_name("room"), 1
-        for n in shape:
-            size *= n
-        self.declared[room] = f"double {room}[{size}];"
-        self.lines.append(f"memset({room}, 0, sizeof {room});")
-        return Value(kind, f"({self.c(kind)}){{{room}, {', '.join(map(str, shape))}}}")
+        name = self.storage("zeros", node, DOUBLE, math.prod(shape))
+        self.lines.append(f"memset({name}, 0, sizeof {name});")
+        return self.stored(name, DOUBLE, shape)
 
-    def make_record(self, kind: type, items: Sequence[Value]) -> Value:
+    def make_record(self, kind: type, items: Sequence[Value], node: ast.AST) -> Value:
         """Return a new named tuple on the stack."""
-        record = Record(kind, tuple(item.type for item in items))
-        name = self.new_name("record")
+        fields: tuple[str, ...] = kind._fields  # type: ignore[attr-defined]
+        try:
+            types = tuple(shaped(kind, field, item.type) for field, item in zip(fields, items, strict=True))
+        except TypeError as error:
+            self.fail(node, str(error))
+        record, name = Record(kind, types), self._site("record", node)
         self.declared[name] = f"{self.c(record)} {name};"
-        for field, item in zip(record.fields, items, strict=True):
-            self.lines.append(f"{name}.{field} = {'*' if isinstance(item.type, Record) else ''}{item.code};")
-        return Value(record, f"(&{name})")
+        for field, item, of in zip(fields, items, types, strict=True):
+            code = f"*{item.code}" if isinstance(of, Record) else self.converted(item, of)
+            self.lines.append(f"{name}.{field} = {code};")
+            self.made[f"{name}.{field}"] = item.roots
+        return Value(record, f"(&{name})", False, frozenset([name]))
 
     def call_translated(self, function: Callable[..., Any], arguments: Sequence[Operand], node: ast.AST) -> Operand:
         """Call a function of Python that is translated too."""
         if not isinstance(function, FunctionType):
             self.fail(node, f"a call of {function!r}")
         values = [self.value(argument, node) for argument in arguments]
-        name, result = self._program.instance(function, tuple(value.type for value in values))
-        code = f"{name}({', '.join(value.code for value in values)})"
+        names = function.__code__.co_varnames
+        try:
+            kinds = tuple(shaped(function, name, value.type) for name, value in zip(names, values, strict=False))
+        except TypeError as error:
+            self.fail(node, str(error))
+        roots = [self._all_roots(value) for value in values]
+        aliases = frozenset(
+            frozenset([names[i], names[k]])
+            for i, k in itertools.combinations(range(min(len(values), len(names))), 2)
+            if any(one.startswith(f"{other}.") or other.startswith(f"{one}.") for one in roots[i] for other in roots[k])
+            or self.may_overlap(roots[i], roots[k])
+        )
+        aliases |= {frozenset([name]) for name, value in zip(names, values, strict=False) if self._is_aliased(value)}
+        name, result, writes = self._program.instance(function, kinds, aliases)
+        code = f"{name}({', '.join(self.converted(v, k) for v, k in zip(values, kinds, strict=True))})"
+        if writes:
+            self.n_writes += 1
+            self.writes_arguments = self.writes_arguments or not all(map(self.is_local, roots))
         if isinstance(result, Nothing):
             self.lines.append(f"{code};")
             return Known(None)
-        return self.temporary(result, code)
+        if not isinstance(result, Array):
+            return self.temporary(result, code)
+        name = self._site("r", node)
+        self.declared[name] = f"{self.c(self.returned(result))} {name};"
+        self.lines.append(f"{name} = {code};")
+        return self.stored(f"{name}.f", DOUBLE, [n or 0 for n in result.shape])
+
+    def _is_aliased(self, record: Value) -> bool:
+        """Return True if arrays of one record may overlap."""
+        fields = [self.made[path] for path in self.made for root in record.roots if path.startswith(f"{root}.")]
+        owners = {root.partition(".")[0] for root in record.roots.union(*fields)}
+        return any(frozenset([owner]) in self.aliases for owner in owners) or any(
+            self.may_overlap(one, other) for one, other in itertools.combinations(fields, 2)
+        )
+
+    def _all_roots(self, value: Value) -> frozenset[str]:
+        """Return the roots of all arrays of a value."""
+        if not isinstance(value.type, Record):
+            return value.roots
+        own = [self.made[path] for path in self.made for root in value.roots if path.startswith(f"{root}.")]
+        return value.roots.union(*own)
 
 
 def _captured(function: FunctionType) -> dict[str, Any]:

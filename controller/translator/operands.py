@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from controller.translator.types import BOOL, DOUBLE, INT, UINT, Scalar, Tuple, Type, name_of
+from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Scalar, Tuple, Type, name_of
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Value:
     type: Type
     code: str
     simple: bool = False  # a name or a number: it may be written twice, and no later statement changes it
+    roots: frozenset[str] = frozenset()  # of arrays and records: two may overlap only if they have one in common
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,29 @@ class Items:
     items: tuple[Operand, ...]
 
 
-Operand = Value | Known | Items
+@dataclass(frozen=True)
+class View(Value):
+    """An array: its element at an index is data[offset + sum of index times stride]."""
+
+    data: str = ""  # C pointer
+    offset: str = "0"
+    sizes: tuple[str, ...] = ()  # C expressions; those that are known at translation are numbers
+    strides: tuple[str, ...] = ()
+    fresh: bool = False  # True if it was just made, and has no name yet
+
+
+@dataclass(frozen=True)
+class Grid:
+    """An array expression, whose elements are computed where they are stored or added up."""
+
+    item: Scalar
+    sizes: tuple[str, ...]
+    at: Callable[[tuple[str, ...]], Value]  # an element by its index
+    reads: tuple[tuple[frozenset[str], View | None], ...]  # roots of what it reads; the array, if at the same index
+    adds: bool = False  # True if an element is a sum
+
+
+Operand = Value | Known | Items | Grid
 
 
 class Operands:
@@ -45,6 +68,7 @@ class Operands:
     names: dict[str, Type]  # types of variables by name, as far as they are known
     globals: dict[str, Any]
     lines: list[str]
+    n_writes: int  # number of calls so far that write into arrays
 
     def fail(self, node: ast.AST, what: str) -> NoReturn:
         """Refuse a construct, with its file and line."""
@@ -58,11 +82,15 @@ class Operands:
         """Call a function of Python that is translated too."""
         raise NotImplementedError
 
-    def make_zeros(self, shape: tuple[int, ...]) -> Value:
+    def materialized(self, operand: Operand, node: ast.AST, stem: str = "a") -> View:
+        """Compute an array expression into storage on the stack."""
+        raise NotImplementedError
+
+    def make_zeros(self, shape: tuple[int, ...], node: ast.AST) -> Value:
         """Return a new array of zeros on the stack."""
         raise NotImplementedError
 
-    def make_record(self, kind: type, items: Sequence[Value]) -> Value:
+    def make_record(self, kind: type, items: Sequence[Value], node: ast.AST) -> Value:
         """Return a new named tuple on the stack."""
         raise NotImplementedError
 
@@ -78,18 +106,21 @@ class Operands:
         """Return operands, each evaluated before the statements that the next ones need."""
         operands: list[Operand] = []
         for node in nodes:
-            mark = len(self.lines)
+            mark, n_writes = len(self.lines), self.n_writes
             operand = self.expression(node)
             if len(self.lines) > mark:
                 later, self.lines[mark:] = self.lines[mark:], []
-                operands = [self._kept(operand) for operand in operands]
+                operands = [self.kept(operand, node, self.n_writes > n_writes) for operand in operands]
                 self.lines += later
             operands.append(operand)
         return operands
 
-    def _kept(self, operand: Operand) -> Operand:
+    def kept(self, operand: Operand, node: ast.AST, written: bool = True) -> Operand:
+        """Return an operand as it is now: an array expression is computed only if arrays are written later."""
         if isinstance(operand, Items):
-            return Items(tuple(map(self._kept, operand.items)))
+            return Items(tuple(self.kept(item, node, written) for item in operand.items))
+        if isinstance(operand, Grid) and written:
+            return self.materialized(operand, node)
         if isinstance(operand, Value) and not operand.simple and isinstance(operand.type, Scalar):
             return self.temporary(operand.type, operand.code)
         return operand
@@ -98,6 +129,8 @@ class Operands:
         """Return an operand as a C value."""
         if isinstance(operand, Value):
             return operand
+        if isinstance(operand, Grid):
+            return self.materialized(operand, node)
         known = operand.value if isinstance(operand, Known) else None
         if isinstance(known, bool | np.bool_):
             return Value(BOOL, "true" if known else "false", True)
@@ -109,8 +142,8 @@ class Operands:
             return Value(DOUBLE, number(known), True)
         if isinstance(operand, Items) or isinstance(known, tuple):
             values = [self.value(item, node) for item in self.items_of(operand, node)]
-            kind = Tuple(tuple(value.type for value in values))
-            return Value(kind, self.compound(kind, [value.code for value in values]))
+            kind, roots = Tuple(tuple(value.type for value in values)), [value.roots for value in values]
+            return Value(kind, self.compound(kind, [v.code for v in values]), False, frozenset().union(*roots))
         return self.fail(node, "not a value")
 
     def compound(self, kind: Type, codes: Sequence[str]) -> str:
@@ -123,6 +156,14 @@ class Operands:
         """Return the C name of a type."""
         raise NotImplementedError
 
+    def literal(self, view: View, kind: Array) -> str:
+        """Return the C expression of an array's struct, of a type that holds it."""
+        raise NotImplementedError
+
+    def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str]) -> Value:
+        """Return what a C variable or member holds."""
+        raise NotImplementedError
+
     def scalar(self, operand: Operand, node: ast.AST) -> Value:
         """Return an operand as a number; refuse another type."""
         value = self.value(operand, node)
@@ -132,6 +173,8 @@ class Operands:
 
     def converted(self, value: Value, kind: Type) -> str:
         """Return the C expression of a number, converted to another type of number."""
+        if isinstance(value, View) and isinstance(kind, Array):
+            return self.literal(value, kind)
         if value.type == kind or not isinstance(kind, Scalar):
             return value.code
         return f"({kind.c}){bracketed(value)}"
@@ -144,7 +187,8 @@ class Operands:
             case Known(tuple(items)):
                 return [Known(item) for item in items]
             case Value(Tuple() as kind, code):
-                return [Value(item, f"{code}.{kind.item(i)}", operand.simple) for i, item in enumerate(kind.items)]
+                codes = [f"{code}.{kind.item(i)}" for i in range(len(kind.items))]
+                return [self.held(k, c, operand.simple, operand.roots) for k, c in zip(kind.items, codes, strict=True)]
         return self.fail(node, "expected a tuple")
 
 

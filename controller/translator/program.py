@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from types import FunctionType
 
 from controller.errors import TranslationError
-from controller.translator.functions import Function
-from controller.translator.types import Array, Nothing, Record, Scalar, Tuple, Type
+from controller.translator.functions import Aliases, Function
+from controller.translator.types import Array, Nothing, Record, Scalar, Tuple, Type, shaped
 
 _HEAD = """\
 /* Translated from Python: change that text, not this one. No heap; compile with -ffp-contract=off. */
@@ -19,12 +20,17 @@ _HEAD = """\
 #include <string.h>
 """
 
-# helpers by name, in the order in which one may call another; among equal or NaN arguments Python takes the first
+# helpers by name, in the order in which one may call another; among equal or NaN arguments Python's
+# min and max take the first; those of NumPy give NaN
 _HELPERS = {
     "min_f64": "static inline double min_f64(double a, double b) { return b < a ? b : a; }\n",
     "max_f64": "static inline double max_f64(double a, double b) { return b > a ? b : a; }\n",
     "min_i64": "static inline int64_t min_i64(int64_t a, int64_t b) { return b < a ? b : a; }\n",
     "max_i64": "static inline int64_t max_i64(int64_t a, int64_t b) { return b > a ? b : a; }\n",
+    "minimum_f64": "static inline double minimum_f64(double a, double b) { return b < a || isnan(b) ? b : a; }\n",
+    "maximum_f64": "static inline double maximum_f64(double a, double b) { return b > a || isnan(b) ? b : a; }\n",
+    "clipped": "static inline int64_t clipped(int64_t i, int64_t n)\n"
+    "{\n    return i < 0 ? max_i64(i + n, 0) : min_i64(i, n);\n}\n",
     "floor_div": "static inline int64_t floor_div(int64_t a, int64_t b)\n"
     "{\n    return a / b - (a % b != 0 && (a < 0) != (b < 0));\n}\n",
     "floor_mod": "static inline int64_t floor_mod(int64_t a, int64_t b) { return a - b * floor_div(a, b); }\n",
@@ -35,12 +41,12 @@ class Program:
     """Functions in C, each for the argument types of its calls."""
 
     def __init__(self) -> None:
-        self._instances: dict[tuple[FunctionType, tuple[Type, ...]], tuple[str, Type]] = {}
+        self._instances: dict[tuple[FunctionType, tuple[Type, ...], Aliases], tuple[str, Type, bool]] = {}
         self._under_way: set[FunctionType] = set()
         self._reserved: set[str] = set()
         self._functions: list[str] = []
         self._types: dict[Type, str] = {}
-        self._definitions: list[tuple[str, str]] = []  # helpers by their names; types by none
+        self._definitions: list[str] = []  # of types
         self._exports: list[str] = []
 
     def export(self, name: str, function: Callable[..., None], arguments: tuple[Type, ...]) -> None:
@@ -48,7 +54,9 @@ class Program:
         self._reserved.add(name)
         if not isinstance(function, FunctionType):
             raise TranslationError(f"{function!r} is no plain function, which is not translated to C")
-        called, _ = self.instance(function, arguments)
+        names = function.__code__.co_varnames
+        arguments = tuple(shaped(function, name, kind) for name, kind in zip(names, arguments, strict=False))
+        called, _, _ = self.instance(function, arguments, frozenset())
         fields = "".join(f"    {self.name(kind)} a{i};\n" for i, kind in enumerate(arguments))
         arguments_text = ", ".join(
             f"{'&' if isinstance(kind, Record) else ''}w->a{i}" for i, kind in enumerate(arguments)
@@ -62,25 +70,26 @@ class Program:
     def text(self) -> str:
         """Return the file."""
         code = [*self._functions, *self._exports]
-        for name, text in reversed([*_HELPERS.items(), *self._definitions]):
-            if not name or any(f"{name}(" in part for part in code):  # a type, or a helper that is called
+        code = [*self._definitions, *code]
+        for name, text in reversed(_HELPERS.items()):
+            if any(f"{name}(" in part for part in code):
                 code.insert(0, text)
         return "\n".join([_HEAD, *code])
 
-    def instance(self, function: FunctionType, arguments: tuple[Type, ...]) -> tuple[str, Type]:
-        """Return the C name of a function for some arguments, and the type of what it returns."""
-        key = (function, arguments)
+    def instance(self, function: FunctionType, arguments: tuple[Type, ...], aliases: Aliases) -> tuple[str, Type, bool]:
+        """Return the C name of a function for some arguments, the type of what it returns, and if it writes arrays."""
+        key = (function, arguments, aliases)
         if key not in self._instances:
             if function in self._under_way:
                 raise TranslationError(f"{function.__qualname__} calls itself, which is not translated to C")
             self._under_way.add(function)
             stem = f"{function.__module__.rpartition('.')[2]}_{function.__name__.strip('_')}"
-            names = self._reserved.union(name for name, _ in self._instances.values())
-            name = next(n for n in _numbered(stem) if n not in names)
-            translation = Function(self, function, arguments)
+            name = next(n for n in _numbered(stem) if n not in self._reserved)
+            self._reserved.add(name)
+            translation = Function(self, function, arguments, aliases)
             code = translation.translate(name)
             self._under_way.discard(function)
-            self._instances[key] = (name, translation.result)
+            self._instances[key] = (name, translation.result, translation.writes_arguments)
             self._functions.append(code)
         return self._instances[key]
 
@@ -91,10 +100,12 @@ class Program:
                 return kind.c
             case Nothing():
                 return "void"
+            case Array():
+                kind = replace(kind, shape=())
         if kind not in self._types:
             name, text = self._defined(kind)
             self._types[kind] = name
-            self._definitions += [("", text), *(_helpers_of(kind) if isinstance(kind, Array) else ())]
+            self._definitions.append(text)
         return self._types[kind]
 
     def _defined(self, kind: Type) -> tuple[str, str]:
@@ -129,23 +140,3 @@ def _array(kind: Array) -> str:
     sizes = "".join(f"    int64_t n{i};\n" for i in range(kind.ndim))
     strides = "" if kind.contiguous else "".join(f"    int64_t s{i};\n" for i in range(kind.ndim))
     return f"typedef struct {{\n    {kind.item.c} *data;\n{sizes}{strides}}} {kind.c};\n"
-
-
-def _helpers_of(kind: Array) -> Iterator[tuple[str, str]]:
-    """Yield the functions that slice, fill and copy contiguous views of a type, by name."""
-    if not kind.contiguous:
-        return
-    name, item = kind.c, kind.item.c
-    row = "".join(f" * a.n{i}" for i in range(1, kind.ndim))
-    rest = "".join(f", a.n{i}" for i in range(1, kind.ndim))
-    yield (
-        f"{name}_slice",
-        f"static inline {name} {name}_slice({name} a, int64_t from, int64_t to)\n{{\n"
-        "    from = from < 0 ? max_i64(from + a.n0, 0) : min_i64(from, a.n0);\n"
-        "    to = to < 0 ? max_i64(to + a.n0, 0) : min_i64(to, a.n0);\n"
-        f"    return ({name}){{a.data + from{row}, max_i64(to - from, 0){rest}}};\n}}\n",
-    )
-    total = " * ".join(f"a.n{i}" for i in range(kind.ndim))
-    loop = f"    const int64_t n = {total};\n    for (int64_t i = 0; i < n; i++)\n        a.data[i] = "
-    yield f"{name}_fill", f"static inline void {name}_fill({name} a, {item} x)\n{{\n{loop}x;\n}}\n"
-    yield f"{name}_copy", f"static inline void {name}_copy({name} a, {name} b)\n{{\n{loop}b.data[i];\n}}\n"

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Sequence
 
+from controller.translator.array_expressions import known_shape
 from controller.translator.calls import Calls
-from controller.translator.operands import Items, Known, Operand, Value
-from controller.translator.types import BOOL, INT, Array, Nothing, Record, Scalar, Tuple, Type, name_of, unified
+from controller.translator.operands import Grid, Items, Known, Operand, Value, View
+from controller.translator.types import BOOL, DOUBLE, INT, Array, Nothing, Record, Scalar, Tuple, Type, name_of, unified
 
 
 class Statements(Calls):
@@ -16,6 +18,9 @@ class Statements(Calls):
     parameters: list[str]
     declared: dict[str, str]  # declarations of variables that Python does not have
     result: Type
+    loops: list[ast.stmt]  # that the statement is in
+    later: list[Sequence[ast.stmt]]  # statements that follow in each of the blocks that the statement is in
+    made_at: dict[str, ast.AST]  # place in the text of each storage on the stack
 
     def new_name(self, stem: str) -> str:
         """Return a name that no variable has."""
@@ -29,8 +34,23 @@ class Statements(Calls):
         method(node)
 
     def _block(self, nodes: Sequence[ast.stmt]) -> None:
-        for node in nodes:
+        for i, node in enumerate(nodes):
+            self.later.append(nodes[i + 1 :])
             self.statement(node)
+            self.later.pop()
+
+    def check_alias(self, name: str, value: View, node: ast.AST) -> None:
+        """Refuse a second name of storage that the next iteration of a loop overwrites, if it is read there again."""
+        # Python makes a new array each time. The name must be read only after it was assigned in the same iteration.
+        after = {id(inner) for statement in self.later[-1] for inner in ast.walk(statement)}
+        for loop in self.loops:
+            inside = set(map(id, ast.walk(loop)))
+            places = {id(self.made_at[root]) for root in value.roots if root in self.made_at}
+            reads = [
+                n for n in ast.walk(loop) if isinstance(n, ast.Name) and n.id == name and isinstance(n.ctx, ast.Load)
+            ]
+            if places & inside and (places & after or any(id(read) not in after for read in reads)):
+                self.fail(node, f"{name}, an alias of an array that the loop makes anew")
 
     def _do_expr(self, node: ast.Expr) -> None:
         if isinstance(node.value, ast.Constant):  # a docstring
@@ -56,11 +76,33 @@ class Statements(Calls):
         if node.value is None:
             self.lines.append("return;")
             return
-        value = self.value(self.expression(node.value), node)
-        if isinstance(value.type, Array | Record):
+        operand = self.expression(node.value)
+        if self.is_array(operand):
+            self._return_array(self.grid(operand, node), node)
+            return
+        value = self.value(operand, node)
+        if isinstance(value.type, Record) or (isinstance(value.type, Tuple) and _holds_array(value.type)):
             self.fail(node, f"{name_of(value.type)} that is returned")
         self.result = value.type if isinstance(self.result, Nothing) else self._unified(self.result, value.type, node)
         self.lines.append(f"return {self._as(value, self.result, node)};")
+
+    def _return_array(self, grid: Grid, node: ast.Return) -> None:
+        """Return an array by value, as a tuple of its numbers."""
+        shape = known_shape(grid.sizes)
+        if shape is None or grid.item != DOUBLE:
+            self.fail(node, "an array that is returned, of a length that is known only at run time")
+        kind = Array(DOUBLE, len(shape), True, shape)
+        self.result = kind if isinstance(self.result, Nothing) else self._unified(self.result, kind, node)
+        if self.result != kind:
+            self.fail(node, "arrays of two shapes that are returned")
+        name = self.new_name("result")
+        self.declared[name] = f"{self.c(self.returned(kind))} {name};"
+        self.store(self.stored(f"{name}.f", DOUBLE, shape), grid, node)
+        self.lines.append(f"return {name};")
+
+    def returned(self, kind: Type) -> Type:
+        """Return the type by which C returns a value: for an array, a tuple of its numbers."""
+        return Tuple((kind.item,) * math.prod(n or 0 for n in kind.shape)) if isinstance(kind, Array) else kind
 
     def _unified(self, one: Type, other: Type, node: ast.AST) -> Type:
         try:
@@ -81,8 +123,10 @@ class Statements(Calls):
 
     def _do_assign(self, node: ast.Assign) -> None:
         value = self.expression(node.value)
-        if len(node.targets) > 1 and isinstance(value, Value) and not value.simple:
-            value = self.temporary(value.type, value.code)
+        if len(node.targets) > 1 and isinstance(value, Grid):
+            value = self.materialized(value, node)
+        elif len(node.targets) > 1 and isinstance(value, Value) and not value.simple:
+            value = self.held(value.type, self.temporary(value.type, value.code).code, True, value.roots)
         for target in node.targets:
             self._assign(target, value, node)
 
@@ -92,7 +136,7 @@ class Statements(Calls):
             if len(items) != len(target.elts):
                 self.fail(node, f"{len(items)} items for {len(target.elts)} names")
             if isinstance(operand, Items):  # all are computed before any is written
-                items = [self._fixed(item) for item in items]
+                items = [self._fixed(item, element) for item, element in zip(items, target.elts, strict=True)]
             for element, item in zip(target.elts, items, strict=True):
                 self._assign(element, item, node)
         elif isinstance(target, ast.Name):
@@ -102,64 +146,72 @@ class Statements(Calls):
         else:
             self.fail(node, f"a value for {type(target).__name__}")
 
-    def _fixed(self, operand: Operand) -> Operand:
+    def _fixed(self, operand: Operand, target: ast.expr) -> Operand:
         if isinstance(operand, Items):
-            return Items(tuple(map(self._fixed, operand.items)))
-        if isinstance(operand, Value) and isinstance(operand.type, Scalar):
-            return self.temporary(operand.type, operand.code)
+            return Items(tuple(self._fixed(item, target) for item in operand.items))
+        if isinstance(operand, Grid):
+            return self.materialized(operand, target)
+        if isinstance(operand, Value) and isinstance(operand.type, Scalar | Array | Record):
+            return self.held(operand.type, self.temporary(operand.type, operand.code).code, True, operand.roots)
         return operand
 
     def _name_it(self, name: str, operand: Operand, node: ast.AST) -> None:
         if name == "_":
             return
-        value = self.value(operand, node)
+        value = self.materialized(operand, node, name) if isinstance(operand, Grid) else self.value(operand, node)
         kind = self._unified(self.names[name], value.type, node) if name in self.names else value.type
         if name in self.parameters and kind != self.names[name]:
             self.fail(node, f"another type for the parameter {name}")
         self.names[name] = kind
+        self.roots[name] = self.roots.get(name, frozenset()) | value.roots
+        if isinstance(value, View) and not value.fresh:
+            self.check_alias(name, value, node)
         self.lines.append(f"{self.variable(name)} = {self._as(value, kind, node)};")
 
     def _place(self, target: ast.Subscript) -> Value:
-        array = self.value(self.expression(target.value), target)
-        if not isinstance(array.type, Array):
+        array = self.expression(target.value)
+        if isinstance(array, Value) and not isinstance(array, View):
             self.fail(target, f"an item of {name_of(array.type)} that is written")
+        if not isinstance(array, View):
+            self.fail(target, "an item of what is no array")
+        self.writes_arguments = self.writes_arguments or not self.is_local(array.roots)
         places = list(target.slice.elts) if isinstance(target.slice, ast.Tuple) else [target.slice]
         return self.element(array, places, target)
 
     def _write(self, target: ast.Subscript, operand: Operand, node: ast.AST) -> None:
-        value = self.value(operand, node)
-        mark = len(self.lines)
+        value = operand if self.is_array(operand) else self.value(operand, node)
+        mark, n_writes = len(self.lines), self.n_writes
         lvalue = self._place(target)
-        if len(self.lines) > mark and not value.simple:  # the value is computed before the index
+        if len(self.lines) > mark and not (isinstance(value, Value) and value.simple):  # the value is computed first
             later, self.lines[mark:] = self.lines[mark:], []
-            value = self.temporary(value.type, value.code)
+            value = self.kept(value, node, self.n_writes > n_writes)
             self.lines += later
-        if isinstance(lvalue.type, Scalar):
-            self.lines.append(f"{lvalue.code} = {self.converted(value, lvalue.type)};")
-            return
-        assert isinstance(lvalue.type, Array)
-        if isinstance(value.type, Array):
-            self.lines.append(f"{self.c(lvalue.type)}_copy({lvalue.code}, {value.code});")
+        if isinstance(lvalue, View):
+            self.store(lvalue, value, node)
         else:
-            self.lines.append(f"{self.c(lvalue.type)}_fill({lvalue.code}, {self.converted(value, lvalue.type.item)});")
+            self.lines.append(f"{lvalue.code} = {self.converted(self.scalar(value, node), lvalue.type)};")
 
     def _do_augassign(self, node: ast.AugAssign) -> None:
         if isinstance(node.target, ast.Name):
             old = self.expression(ast.copy_location(ast.Name(node.target.id, ast.Load()), node))
             mark = len(self.lines)
             other = self.expression(node.value)
-            if len(self.lines) > mark:
+            if len(self.lines) > mark and not isinstance(old, View):
                 later, self.lines[mark:] = self.lines[mark:], []
                 kept = self.value(old, node)
                 old = self.temporary(kept.type, kept.code)
                 self.lines += later
-            self._name_it(node.target.id, self.arithmetic(node.op, old, other, node), node)
+            if isinstance(old, View):
+                self.store(old, other, node, node.op)
+            else:
+                self._name_it(node.target.id, self.arithmetic(node.op, old, other, node), node)
             return
         if not isinstance(node.target, ast.Subscript):
             self.fail(node, "an operation on what is no name and no item")
         lvalue = self._place(node.target)
-        if not isinstance(lvalue.type, Scalar):
-            self.fail(node, "an operation on a whole array")
+        if isinstance(lvalue, View):
+            self.store(lvalue, self.expression(node.value), node, node.op)
+            return
         mark = len(self.lines)
         other = self.expression(node.value)
         before: Value = lvalue
@@ -196,12 +248,19 @@ class Statements(Calls):
         else:
             needed, self.lines[mark:] = self.lines[mark:], []
             self.lines += ["for (;;) {", *needed, f"if (!({condition})) {{", "break;", "}"]
+        self.loops.append(node)
         self._block(node.body)
+        self.loops.pop()
         self.lines.append("}")
 
     def _do_for(self, node: ast.For) -> None:
         if node.orelse:
             self.fail(node, "else of a loop")
+        self.loops.append(node)
+        self._repeat(node)
+        self.loops.pop()
+
+    def _repeat(self, node: ast.For) -> None:
         called = node.iter.func if isinstance(node.iter, ast.Call) else None
         if isinstance(called, ast.Name) and called.id == "range":
             self._count_up(node, node.iter.args)  # type: ignore[attr-defined]
@@ -245,6 +304,10 @@ class Statements(Calls):
 
     def _end(self, last: Value) -> str:
         return self.temporary(INT, last.code).code
+
+
+def _holds_array(kind: Tuple) -> bool:
+    return any(isinstance(k, Array | Record) or (isinstance(k, Tuple) and _holds_array(k)) for k in kind.items)
 
 
 def _is_written(name: str, body: Sequence[ast.stmt]) -> bool:

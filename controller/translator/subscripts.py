@@ -5,8 +5,9 @@ from __future__ import annotations
 import ast
 from collections.abc import Sequence
 
+from controller.translator.array_expressions import plus, times
 from controller.translator.expressions import Expressions
-from controller.translator.operands import Items, Known, Operand, Value, bracketed
+from controller.translator.operands import Grid, Items, Known, Operand, Value, View
 from controller.translator.types import BOOL, INT, Array, Tuple, name_of
 
 
@@ -16,7 +17,8 @@ class Subscripts(Expressions):
     def _subscript(self, node: ast.Subscript) -> Operand:
         owner = self.expression(node.value)
         places = list(node.slice.elts) if isinstance(node.slice, ast.Tuple) else [node.slice]
-        if isinstance(owner, Value) and isinstance(owner.type, Array):
+        owner = self.materialized(owner, node) if isinstance(owner, Grid) else owner
+        if isinstance(owner, View):
             return self.element(owner, places, node)
         items = self.items_of(owner, node)
         if not isinstance(node.slice, ast.Slice):
@@ -43,64 +45,77 @@ class Subscripts(Expressions):
             return operand.value
         return self.fail(node, "a place in a tuple has to be a constant")
 
-    def element(self, array: Value, places: Sequence[ast.expr], node: ast.AST) -> Value:
+    def element(self, array: View, places: Sequence[ast.expr], node: ast.AST) -> Value:
         """Return an element of an array, or a view of it."""
-        kind = array.type
-        assert isinstance(kind, Array)
-        if len(places) > kind.ndim:
-            self.fail(node, f"{len(places)} indices of {name_of(kind)}")
-        if isinstance(places[0], ast.Slice) and len(places) == 1 and (kind.contiguous or kind.ndim == 1):
-            return self._sliced(array, places[0])
-        if all(isinstance(place, ast.Slice) for place in places) and all(map(_is_whole, places)):
+        assert isinstance(array.type, Array)
+        if len(places) > array.type.ndim:
+            self.fail(node, f"{len(places)} indices of {name_of(array.type)}")
+        if all(map(_is_whole, places)):
             return array
-        indices = [None if isinstance(place, ast.Slice) else place for place in places]
-        indices += [None] * (kind.ndim - len(indices))
-        if any(isinstance(place, ast.Slice) and not _is_whole(place) for place in places):
-            self.fail(node, "a slice of one of several dimensions")
-        offsets = [None if n is None else self.index(array, axis, n) for axis, n in enumerate(indices)]
-        strides = [self._stride(array, axis) for axis in range(kind.ndim)]
-        offset = " + ".join(_product(n, stride) for n, stride in zip(offsets, strides, strict=True) if n is not None)
-        free_axes = [axis for axis, n in enumerate(offsets) if n is None]
-        if not free_axes:
-            return Value(kind.item, f"{array.code}.data[{offset}]")
-        contiguous = kind.contiguous and free_axes == list(range(kind.ndim - len(free_axes), kind.ndim))
-        view = Array(kind.item, len(free_axes), contiguous)
-        sizes = [f"{array.code}.n{axis}" for axis in free_axes] + (
-            [] if contiguous else [strides[axis] for axis in free_axes]
-        )
-        return Value(view, f"({self.c(view)}){{{array.code}.data + {offset}, {', '.join(sizes)}}}")
+        terms, sizes, strides = [array.offset], [], []
+        for axis, stride in enumerate(array.strides):
+            place = places[axis] if axis < len(places) else ast.Slice()
+            if isinstance(place, ast.Slice):
+                begin, size = self._bounds(array.sizes[axis], place)
+                sizes.append(size)
+                strides.append(stride)
+            else:
+                begin = self.index(array.sizes[axis], place)
+            terms.append(times(begin, stride))
+        if not sizes:
+            return Value(array.type.item, f"{array.data}[{plus(terms)}]")
+        return self.view(array.type.item, array.data, plus(terms), tuple(sizes), tuple(strides), array.roots)
 
-    def index(self, array: Value, axis: int, node: ast.expr) -> str:
-        """Return an index of an array; one that is a negative constant counts from the end."""
+    def index(self, size: str, node: ast.expr) -> str:
+        """Return an index of an axis; one that is a negative constant counts from the end."""
         operand = self.expression(node)
-        if isinstance(operand, Known) and isinstance(operand.value, int) and operand.value < 0:
-            return f"({array.code}.n{axis} - {-operand.value})"
+        if isinstance(operand, Known) and isinstance(operand.value, int):
+            n = operand.value
+            if size.isdigit() and not -int(size) <= n < int(size):
+                self.fail(node, f"index {n} of an axis of length {size}")
+            return str(n) if n >= 0 else str(int(size) + n) if size.isdigit() else f"({size} - {-n})"
+        return self._integer(operand, node)
+
+    def _integer(self, operand: Operand, node: ast.AST) -> str:
         value = self.scalar(operand, node)
         if value.type not in (INT, BOOL):
             self.fail(node, f"an index of type {name_of(value.type)}")
-        return bracketed(value)
+        return self.temporary(INT, value.code).code if "[" in value.code else value.code
 
-    def _stride(self, array: Value, axis: int) -> str:
-        kind = array.type
-        assert isinstance(kind, Array)
-        if not kind.contiguous:
-            return f"{array.code}.s{axis}"
-        return " * ".join(f"{array.code}.n{k}" for k in range(axis + 1, kind.ndim)) or "1"
-
-    def _sliced(self, array: Value, node: ast.Slice) -> Value:
+    def _bounds(self, size: str, node: ast.Slice) -> tuple[str, str]:
+        """Return the beginning and the length of a slice of an axis."""
+        # Python clips bounds to the axis. So does C, but for a slice of constant length whose axis has an unknown one:
+        # there Python's result has another shape if it does not fit.
         if node.step is not None:
             self.fail(node, "a slice with a step")
+        if node.lower is None and node.upper is None:
+            return "0", size
+        low, high = (Known(None) if bound is None else self.expression(bound) for bound in (node.lower, node.upper))
+        if isinstance(low, Known) and isinstance(high, Known):
+            if size.isdigit():
+                first, end, _ = slice(low.value, high.value).indices(int(size))
+                return str(first), str(max(end - first, 0))
+            first, end = low.value or 0, high.value
+            if first >= 0 and end is not None and end >= 0:
+                return str(first), str(max(end - first, 0))
+        length = self._length_of(node)
+        if length is not None:
+            begin = str(low.value) if isinstance(low, Known) else self._integer(low, node)
+            return begin, str(length.value) if isinstance(length, Known) else self._integer(length, node)
         bounds = []
-        for bound, default in ((node.lower, "0"), (node.upper, f"{array.code}.n0")):
-            bounds.append(default if bound is None else self.index(array, 0, bound))
-        if bounds == ["0", f"{array.code}.n0"]:
-            return array
-        assert isinstance(array.type, Array)
-        return Value(array.type, f"{array.type.c}_slice({array.code}, {bounds[0]}, {bounds[1]})")
+        for bound, default in ((low, "0"), (high, size)):
+            if isinstance(bound, Known) and bound.value is None:
+                bounds.append(default)
+            else:
+                bounds.append(self.temporary(INT, f"clipped({self._integer(bound, node)}, {size})").code)
+        return bounds[0], self.temporary(INT, f"max_i64({bounds[1]} - {bounds[0]}, 0)").code
 
-
-def _product(index: str, stride: str) -> str:
-    return index if stride == "1" else f"{index} * ({stride})" if " " in stride else f"{index} * {stride}"
+    def _length_of(self, node: ast.Slice) -> Operand | None:
+        """Return n of a slice [i : i + n], else None."""
+        low, high = node.lower, node.upper
+        if low is None or not isinstance(high, ast.BinOp) or not isinstance(high.op, ast.Add):
+            return None
+        return self.expression(high.right) if ast.dump(high.left) == ast.dump(low) else None
 
 
 def _is_whole(node: ast.expr) -> bool:

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import functools
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+
+from controller.stack_array import Shape
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,12 @@ class Array:
     item: Scalar
     ndim: int
     contiguous: bool = True
+    shape: tuple[int | None, ...] = ()  # lengths that are known at translation; () if none is
+
+    @property
+    def lengths(self) -> tuple[int | None, ...]:
+        """Length of each axis, or None."""
+        return self.shape or (None,) * self.ndim
 
     @property
     def c(self) -> str:
@@ -73,6 +84,49 @@ class Nothing:
 Type = Scalar | Array | Tuple | Record | Nothing
 
 
+@functools.cache
+def annotated_shapes(owner: Any) -> dict[str, tuple[int | None, ...]]:
+    """Return the shapes that annotations of a function's parameters, or of a named tuple's fields, state."""
+    shapes: dict[str, tuple[int | None, ...]] = {}
+    names = getattr(owner, "__globals__", None) or vars(sys.modules[owner.__module__])
+    for name, annotation in owner.__annotations__.items():
+        kind = names.get(annotation) if isinstance(annotation, str) else annotation
+        for extra in getattr(kind, "__metadata__", ()):
+            if isinstance(extra, Shape):
+                shapes[name] = extra.lengths
+    return shapes
+
+
+def shaped(owner: Any, name: str, kind: Type) -> Type:
+    """Return the type of a parameter or field for a value: with the shape of the annotation, which it has to have."""
+    if not isinstance(kind, Array):
+        return kind
+    expected = annotated_shapes(owner).get(name, ())
+    if expected:
+        fits = len(expected) == kind.ndim and all(
+            None in pair or pair[0] == pair[1] for pair in zip(expected, kind.lengths, strict=True)
+        )
+        if not fits:
+            raise TypeError(f"{owner.__name__}: {name} has shape {described(kind)}, expected {_lengths(expected)}")
+    return replace(kind, shape=expected)
+
+
+def check_shapes(function: Any, arguments: Sequence[Any]) -> None:
+    """Check the shapes of arguments against the annotations of a function."""
+    for name, argument in zip(function.__code__.co_varnames, arguments, strict=False):
+        if isinstance(argument, np.ndarray):
+            shaped(function, name, Array(DOUBLE, argument.ndim, True, argument.shape))
+
+
+def described(kind: Array) -> str:
+    """Describe the shape of an array."""
+    return _lengths(kind.lengths)
+
+
+def _lengths(lengths: Sequence[int | None]) -> str:
+    return f"({', '.join('any' if n is None else str(n) for n in lengths)}{',' if len(lengths) == 1 else ''})"
+
+
 def type_of(value: Any) -> Type:
     """Return the type of an argument."""
     if isinstance(value, np.ndarray):
@@ -80,14 +134,20 @@ def type_of(value: Any) -> Type:
         if item is not None and value.flags.c_contiguous:
             return Array(item, value.ndim)
     elif isinstance(value, tuple):
-        items = tuple(map(type_of, value))
-        return Record(type(value), items) if hasattr(value, "_fields") else Tuple(items)
+        if not hasattr(value, "_fields"):
+            return Tuple(tuple(map(type_of, value)))
+        kinds = []
+        for name, item in zip(value._fields, value, strict=True):
+            kind = type_of(item)
+            kind = replace(kind, shape=item.shape) if isinstance(kind, Array) else kind
+            kinds.append(shaped(type(value), name, kind))
+        return Record(type(value), tuple(kinds))
     elif isinstance(value, float):
         return DOUBLE
     elif isinstance(value, int | np.int64):  # truth values too: each takes a word
         return INT
-    kind = f"an array of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
-    raise TypeError(f"argument is {kind}, expected a number, a contiguous array of numbers, or a tuple of such")
+    given = f"an array of {value.dtype}" if isinstance(value, np.ndarray) else type(value).__name__
+    raise TypeError(f"argument is {given}, expected a number, a contiguous array of numbers, or a tuple of such")
 
 
 def unified(one: Type, other: Type) -> Type:
@@ -100,7 +160,9 @@ def unified(one: Type, other: Type) -> Type:
     if isinstance(one, Tuple) and isinstance(other, Tuple) and len(one.items) == len(other.items):
         return Tuple(tuple(map(unified, one.items, other.items)))
     if isinstance(one, Array) and isinstance(other, Array) and (one.item, one.ndim) == (other.item, other.ndim):
-        return Array(one.item, one.ndim, False)
+        lengths = tuple(a if a == b else None for a, b in zip(one.lengths, other.lengths, strict=True))
+        known = lengths if any(n is not None for n in lengths) else ()
+        return Array(one.item, one.ndim, one.contiguous and other.contiguous, known)
     raise TypeError(f"{name_of(one)} and {name_of(other)} in the same place")
 
 

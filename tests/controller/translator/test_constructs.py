@@ -104,7 +104,7 @@ def views(x, n, out):
         out[i] += grid[0, i] * 10.0 + grid[1, i]
     tail[0], tail[-1] = tail.size, grid.shape[1]
     out[5] = row[2] + column[1] + grid[:, 0].size
-    part = x[n[0] : n[0] + 50]
+    part = x[n[0] : 50 + n[0]]
     out[6] = part.size
     tail[4:] = 2.0
     cube = zeros(2, 2, 2)

@@ -1,0 +1,364 @@
+"""Translate expressions of arrays: computed element by element where they are stored or added up, in written order."""
+
+# An array is a view: its elements are data[offset + sum of index times stride]. Two arrays overlap only if they have a
+# root in common: a root is a parameter, with a field of it, or storage of this function. Parameters share a root where
+# a call passes them arrays that do. Where an expression reads what its target overlaps, other than at the same
+# indices, it is computed in storage on the stack first; that needs a shape that is known at translation.
+
+from __future__ import annotations
+
+import ast
+import itertools
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+
+from controller.translator.operands import Grid, Items, Known, Operand, Operands, Value, View, bracketed
+from controller.translator.types import BOOL, DOUBLE, INT, Array, Scalar, Type, unified
+
+ANY = "*"  # root of an array of which nothing is known
+_UNROLLED = 9  # maximum number of elements that are written out
+
+Index = tuple[str, ...]
+
+
+def times(a: str, b: str) -> str:
+    """Return the C product of two indices."""
+    if a.isdigit() and b.isdigit():
+        return str(int(a) * int(b))
+    if "0" in (a, b):
+        return "0"
+    return b if a == "1" else a if b == "1" else f"{_factor(a)} * {_factor(b)}"
+
+
+def plus(terms: Iterable[str]) -> str:
+    """Return the C sum of indices."""
+    known, codes = 0, []
+    for term in terms:
+        if term.isdigit():
+            known += int(term)
+        else:
+            codes.append(term)
+    return " + ".join([*codes, *([str(known)] if known or not codes else [])])
+
+
+def _factor(code: str) -> str:
+    return code if code.replace("_", "").replace(".", "").replace("->", "").isalnum() else f"({code})"
+
+
+def known_shape(sizes: Sequence[str]) -> tuple[int, ...] | None:
+    """Return the shape if all lengths are known at translation."""
+    return tuple(map(int, sizes)) if all(n.isdigit() for n in sizes) else None
+
+
+class ArrayExpressions(Operands):
+    """Translate array expressions of one function."""
+
+    aliases: frozenset[frozenset[str]]  # pairs of parameters that may overlap
+    roots: dict[str, frozenset[str]]  # roots of the arrays and records of each name
+    made: dict[str, frozenset[str]]  # roots of the fields of records that the function made, by path
+    writes_arguments: bool  # if the function writes into an array that it did not make
+    declared: dict[str, str]  # declarations of variables that Python does not have
+
+    def storage(self, stem: str, node: ast.AST, item: Scalar, size: int) -> str:
+        """Declare storage on the stack, one for each place in the text, and return its name."""
+        raise NotImplementedError
+
+    def new_name(self, stem: str) -> str:
+        """Return a name that no variable has."""
+        raise NotImplementedError
+
+    def arithmetic(self, op: ast.operator, left: Operand, right: Operand, node: ast.AST) -> Operand:
+        """Return the result of an operator."""
+        raise NotImplementedError
+
+    def view(
+        self, item: Scalar, data: str, offset: str, sizes: Index, strides: Index, roots: frozenset[str], code: str = ""
+    ) -> View:
+        """Return an array by the place of its elements; code is that of a variable which holds it."""
+        whole = [self.product(sizes[k + 1 :]) for k in range(len(sizes))]
+        shape = tuple(int(n) if n.isdigit() else None for n in sizes)
+        kind = Array(item, len(sizes), list(strides) == whole, shape if any(n is not None for n in shape) else ())
+        view = View(kind, code, True, roots, data, offset, sizes, strides)
+        return view if code else replace(view, code=self.literal(view, kind), simple=False)
+
+    def literal(self, view: View, kind: Array) -> str:
+        """Return the C expression of an array's struct, of a type that holds it."""
+        assert isinstance(view.type, Array)
+        if view.code and view.type.c == kind.c:
+            return view.code
+        place = view.data if view.offset == "0" else f"{view.data} + {view.offset}"
+        return f"({self.c(kind)}){{{', '.join([place, *view.sizes, *(() if kind.contiguous else view.strides)])}}}"
+
+    def view_of(self, kind: Array, code: str, roots: frozenset[str]) -> View:
+        """Return the array of a variable, or of a field."""
+        sizes = tuple(f"{code}.n{i}" if n is None else str(n) for i, n in enumerate(kind.lengths))
+        if kind.contiguous:
+            strides = tuple(self.product(sizes[k + 1 :]) for k in range(kind.ndim))
+        else:
+            strides = tuple(f"{code}.s{i}" for i in range(kind.ndim))
+        return View(kind, code, True, roots, f"{code}.data", "0", sizes, strides)
+
+    def product(self, sizes: Iterable[str]) -> str:
+        """Return the C product of lengths."""
+        result = "1"
+        for n in sizes:
+            result = times(result, n)
+        return result
+
+    def stored(self, data: str, item: Scalar, shape: Sequence[int]) -> View:
+        """Return the array in storage on the stack."""
+        sizes = tuple(map(str, shape))
+        strides = tuple(self.product(sizes[k + 1 :]) for k in range(len(sizes)))
+        return replace(self.view(item, data, "0", sizes, strides, frozenset([data.partition(".")[0]])), fresh=True)
+
+    def element_of(self, view: View, index: Sequence[str]) -> Value:
+        """Return an element of an array."""
+        assert isinstance(view.type, Array)
+        place = plus([view.offset, *map(times, index, view.strides)])
+        return Value(view.type.item, f"{view.data}[{place}]")
+
+    def is_array(self, operand: Operand) -> bool:
+        """Return True for an array or an expression of arrays."""
+        return isinstance(operand, View | Grid)
+
+    def grid(self, operand: Operand, node: ast.AST) -> Grid:
+        """Return an operand as an array expression: a number as one without axes."""
+        if isinstance(operand, Grid):
+            return operand
+        if isinstance(operand, View):
+            assert isinstance(operand.type, Array)
+            reads = ((operand.roots, operand),)
+            return Grid(operand.type.item, operand.sizes, lambda index: self.element_of(operand, index), reads)
+        value = self.scalar(operand, node)
+        held = value if value.simple else self.temporary(value.type, value.code)
+        assert isinstance(held.type, Scalar)
+        return Grid(held.type, (), lambda _: held, ())
+
+    def common(self, one: Index, other: Index, node: ast.AST) -> Index:
+        """Return the lengths of two shapes that belong together, broadcast by their last axes."""
+        if len(one) < len(other):
+            one, other = other, one
+        sizes = list(one)
+        for k, n in enumerate(other, len(one) - len(other)):
+            if n.isdigit() and sizes[k].isdigit() and n != sizes[k]:
+                self.fail(node, f"shapes ({', '.join(one)}) and ({', '.join(other)}) in one expression")
+            sizes[k] = n if n.isdigit() else sizes[k]
+        return tuple(sizes)
+
+    def elementwise(
+        self, function: Callable[[list[Value]], Operand], operands: Sequence[Operand], item: Type, node: ast.AST
+    ) -> Grid:
+        """Return a function of numbers, applied to each element."""
+        grids = [self.grid(operand, node) for operand in operands]
+        sizes: Index = ()
+        for grid in grids:
+            sizes = self.common(sizes, grid.sizes, node)
+        reads = [read for grid in grids for read in grid.reads]
+
+        def at(index: Index) -> Value:
+            return self.scalar(function([grid.at(index[len(index) - len(grid.sizes) :]) for grid in grids]), node)
+
+        assert isinstance(item, Scalar)
+        return Grid(item, sizes, at, tuple(reads), any(grid.adds for grid in grids))
+
+    def operated(self, op: ast.operator, left: Operand, right: Operand, node: ast.AST) -> Operand:
+        """Return the result of an operator with an array."""
+        if isinstance(op, ast.MatMult):
+            return self._multiplied(left, right, node)
+        if isinstance(op, ast.Pow) and not (isinstance(right, Known) and right.value == 2):
+            self.fail(node, "a power of an array other than 2")
+        a, b = self.grid(left, node), self.grid(right, node)
+        item = DOUBLE if isinstance(op, ast.Div) else unified(unified(a.item, b.item), INT)
+        if isinstance(op, ast.Pow):
+            return self.elementwise(lambda x: self.arithmetic(op, x[0], right, node), [a], item, node)
+        return self.elementwise(lambda x: self.arithmetic(op, x[0], x[1], node), [a, b], item, node)
+
+    def _multiplied(self, left: Operand, right: Operand, node: ast.AST) -> Operand:
+        """Return the product of matrices or vectors."""
+        a, b = self.grid(left, node), self.grid(right, node)
+        if not (1 <= len(a.sizes) <= 2 and 1 <= len(b.sizes) <= 2):
+            self.fail(node, "a product @ of what are no vectors or matrices")
+        length = self.common(a.sizes[-1:], b.sizes[:1], node)[0]
+        if len(b.sizes) == 2:  # each element of `a` is read again and again
+            a = self._for_reuse(left, a, node)
+        if len(a.sizes) == 2:
+            b = self._for_reuse(right, b, node)
+        rows = len(a.sizes) - 1
+
+        def at(index: Index) -> Value:
+            def term(k: str) -> Value:
+                factors = a.at((*index[:rows], k)), b.at((k, *index[rows:]))
+                return self.scalar(self.arithmetic(ast.Mult(), *factors, node), node)
+
+            return self._added(length, term, node)
+
+        if not rows and len(b.sizes) == 1:
+            value = at(())
+            return self.temporary(value.type, value.code)
+        return Grid(DOUBLE, (*a.sizes[:rows], *b.sizes[1:]), at, (*_elsewhere(a), *_elsewhere(b)), True)
+
+    def _for_reuse(self, operand: Operand, grid: Grid, node: ast.AST) -> Grid:
+        if isinstance(operand, Grid) and known_shape(grid.sizes):
+            return self.grid(self.materialized(operand, node), node)
+        if grid.adds:
+            self.fail(node, "a product of a length that is known only at run time within a product")
+        return grid
+
+    def _added(self, length: str, term: Callable[[str], Value], node: ast.AST) -> Value:
+        """Return the sum of terms, added to 0 one after the other."""
+        if length.isdigit() and int(length) <= _UNROLLED:
+            codes = [bracketed(term(str(k)), DOUBLE) for k in range(int(length))]
+            return Value(DOUBLE, " + ".join(["0.0", *codes]))
+        total = self.temporary(DOUBLE, "0.0")
+        self._loop(length, lambda k: self.lines.append(f"{total.code} += {self.converted(term(k), DOUBLE)};"))
+        return total
+
+    def reduced(self, name: str, operand: Operand, node: ast.AST) -> Value:
+        """Return the sum, minimum, maximum of all elements, or if any or all are true."""
+        grid = self.grid(operand, node)
+        if name in ("sum", "any", "all"):
+            kind, start = (BOOL, "true" if name == "all" else "false") if name != "sum" else (DOUBLE, "0.0")
+        else:
+            kind, start = grid.item, grid.at(("0",) * len(grid.sizes)).code
+        if name == "sum" and grid.item == BOOL:
+            kind, start = INT, "0"
+        total = self.temporary(kind, start)
+        codes = {"sum": "{0} + {1}", "any": "{0} || {1}", "all": "{0} && {1}"}
+        template = codes.get(name, f"{name}imum_f64({{0}}, {{1}})")
+
+        def add(index: Index) -> None:
+            value = grid.at(index)
+            code = bracketed(value, kind) if name in codes else self.converted(value, kind)
+            self.lines.append(f"{total.code} = {template.format(total.code, code)};")
+
+        self.each(grid.sizes, add)
+        return total
+
+    def _loop(self, length: str, body: Callable[[str], None]) -> None:
+        k = self.new_name("i")
+        self.lines.append(f"for (int64_t {k} = 0; {k} < {length}; {k}++) {{")
+        body(k)
+        self.lines.append("}")
+
+    def each(self, sizes: Index, body: Callable[[Index], None], index: Index = ()) -> None:
+        """Call `body` for each index: written out if these are few, else within loops."""
+        shape = known_shape(sizes)
+        if shape is not None and math.prod(shape) <= _UNROLLED:
+            for rest in itertools.product(*map(range, shape)):
+                body((*index, *map(str, rest)))
+        else:
+            self._loop(sizes[0], lambda k: self.each(sizes[1:], body, (*index, k)))
+
+    def store(self, target: View, operand: Operand, node: ast.AST, op: ast.operator | None = None) -> None:
+        """Store an array, or a number, in all elements of an array; with an operator, add to it or the like."""
+        grid = self.grid(operand, node)
+        if len(grid.sizes) > len(target.sizes):
+            self.fail(node, f"{len(grid.sizes)} axes stored in {len(target.sizes)}")
+        sizes = self.common(target.sizes, grid.sizes, node)
+        if self._overlaps(target, grid):
+            grid = self.grid(self.materialized(grid, node), node)
+        if not self.is_local(target.roots):
+            self.writes_arguments = True
+
+        def write(index: Index) -> None:
+            element = self.element_of(target, index)
+            value = grid.at(index[len(index) - len(grid.sizes) :])
+            if op is not None:
+                value = self.scalar(self.arithmetic(op, element, value, node), node)
+            assert isinstance(target.type, Array)
+            self.lines.append(f"{element.code} = {self.converted(value, target.type.item)};")
+
+        self.each(sizes, write)
+
+    def is_local(self, roots: frozenset[str]) -> bool:
+        """Return True if an array is storage of this function."""
+        return all(root in self.declared for root in roots)
+
+    def _overlaps(self, target: View, grid: Grid) -> bool:
+        """Return True if an element may be read after it was written."""
+        for roots, view in grid.reads:
+            same = view is not None and (view.data, view.offset, view.sizes, view.strides) == (
+                target.data, target.offset, target.sizes, target.strides,
+            )  # fmt: skip
+            if not same and self.may_overlap(roots, target.roots):
+                return True
+        return False
+
+    def may_overlap(self, some: frozenset[str], others: frozenset[str]) -> bool:
+        """Return True unless two arrays are known to have no element in common."""
+        for one, other in itertools.product(some, others):
+            if one == other or ANY in (one, other):
+                return True
+            owners = frozenset([one.partition(".")[0], other.partition(".")[0]])
+            if owners in self.aliases:
+                return True
+        return False
+
+    def materialized(self, operand: Operand, node: ast.AST, stem: str = "a") -> View:
+        """Compute an array expression into storage on the stack."""
+        grid = self.grid(operand, node)
+        shape = known_shape(grid.sizes)
+        if shape is None:
+            self.fail(node, "an array of a length that is known only at run time, and no target")
+        view = self.stored(self.storage(stem, node, grid.item, math.prod(shape)), grid.item, shape)
+        self.store(view, grid, node)
+        return view
+
+    def array_of(self, items: Sequence[Operand], node: ast.AST) -> View:
+        """Return a new array of numbers or rows."""
+        if any(isinstance(item, Items) for item in items):
+            items = [self.array_of(self.items_of(item, node), node) for item in items]
+        shapes = {known_shape(item.sizes if isinstance(item, View | Grid) else ()) for item in items}
+        shape = shapes.pop() if len(shapes) == 1 else None
+        if shape is None:
+            self.fail(node, "an array of rows whose lengths are unknown or unequal")
+        target = self.stored(
+            self.storage("a", node, DOUBLE, len(items) * math.prod(shape)), DOUBLE, (len(items), *shape)
+        )
+        for i, item in enumerate(self._apart(items, target, node)):
+            if shape:
+                self.store(self.part(target, str(i)), item, node)
+            else:
+                self.lines.append(f"{target.data}[{i}] = {self.converted(self.scalar(item, node), DOUBLE)};")
+        return target
+
+    def concatenated(self, parts: Sequence[Operand], node: ast.AST) -> View:
+        """Return a new vector of vectors, one after the other."""
+        lengths = [known_shape(self.grid(part, node).sizes) for part in parts]
+        if any(shape is None or len(shape) != 1 for shape in lengths):
+            self.fail(node, "arrays of unknown length, or of several dimensions, in one")
+        ends = list(itertools.accumulate([shape[0] for shape in lengths if shape], initial=0))
+        target = self.stored(self.storage("a", node, DOUBLE, ends[-1]), DOUBLE, (ends[-1],))
+        for part, begin, end in zip(self._apart(parts, target, node), ends, ends[1:], strict=False):
+            piece = self.view(DOUBLE, target.data, str(begin), (str(end - begin),), ("1",), target.roots)
+            self.store(piece, part, node)
+        return target
+
+    def _apart(self, items: Sequence[Operand], target: View, node: ast.AST) -> list[Operand]:
+        """Return items that do not change while others are stored in a target."""
+        apart: list[Operand] = []
+        for item in items:
+            if self.is_array(item):
+                overlaps = any(self.may_overlap(roots, target.roots) for roots, _ in self.grid(item, node).reads)
+                apart.append(self.materialized(item, node) if overlaps else item)
+            else:
+                value = self.scalar(item, node)
+                apart.append(value if value.simple else self.temporary(value.type, value.code))
+        return apart
+
+    def part(self, view: View, index: str) -> View:
+        """Return the part of an array at an index of its first axis."""
+        assert isinstance(view.type, Array)
+        offset = plus([view.offset, times(index, view.strides[0])])
+        return self.view(view.type.item, view.data, offset, view.sizes[1:], view.strides[1:], view.roots)
+
+    def transposed(self, operand: Operand, node: ast.AST) -> View:
+        """Return an array with its axes reversed."""
+        view = operand if isinstance(operand, View) else self.materialized(operand, node)
+        assert isinstance(view.type, Array)
+        return self.view(view.type.item, view.data, view.offset, view.sizes[::-1], view.strides[::-1], view.roots)
+
+
+def _elsewhere(grid: Grid) -> Iterable[tuple[frozenset[str], None]]:
+    return [(roots, None) for roots, _ in grid.reads]
