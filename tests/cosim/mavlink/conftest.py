@@ -24,12 +24,22 @@ def links_end(monkeypatch):
             opened.pop().close()
 
 
-@pytest.fixture
-def station():
-    """An autopilot as an ArduSub, whose station has seen one snapshot."""
+def station_of(profile):
     from tests.cosim.mavlink.station import Station
 
-    station = Station("ardusub")
+    station = Station(profile)
     station.look(0.0)
     station.wire.clear()
     return station
+
+
+@pytest.fixture
+def station():
+    """An autopilot as an ArduSub, whose station has seen one snapshot."""
+    return station_of("ardusub")
+
+
+@pytest.fixture(params=["ardusub", "px4", "generic"])
+def each_station(request):
+    """An autopilot of each profile, whose station has seen one snapshot."""
+    return station_of(request.param)

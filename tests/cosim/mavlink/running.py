@@ -33,14 +33,11 @@ _COMPONENT_METADATA = 397  # missing in all dialects of pymavlink
 _GROUPS_OF_ARDUPILOT = ((1, 2), (2, 2), (3, 2), (6, 3), (10, 20), (11, 10), (12, 3))  # group, Hz
 
 
-class _FirstStep:
-    """Observer that sets an event at the first step."""
-
-    def __init__(self) -> None:
-        self.event = threading.Event()
+class _FirstStep(threading.Event):
+    """Observer that is set by the first step."""
 
     def observe(self, k: int, row: Array) -> None:
-        self.event.set()
+        self.set()
 
 
 @contextlib.contextmanager
@@ -54,7 +51,7 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> I
         stepper = threading.Thread(target=lambda: master.run([begun, links], 1.0, commands), daemon=True)
         stepper.start()
         try:
-            if not begun.event.wait(_STARTING):
+            if not begun.wait(_STARTING):
                 raise TelemetryError(f"the vehicle did not begin to move within {_STARTING:g} s")
             links.start()
             yield links
@@ -65,14 +62,13 @@ def running_vehicle(endpoints: Sequence[Endpoint], options: MavlinkOptions) -> I
 
 
 class GroundStation:
-    """A link of pymavlink that connects in QGroundControl's order; pymavlink repeats requests of files by itself."""
+    """A link of pymavlink that connects in QGroundControl's order."""
 
     def __init__(self) -> None:
-        self.link = mavutil.mavlink_connection(
-            "udpin:127.0.0.1:0", source_system=255, source_component=190, dialect="all"
-        )
+        self.link = mavutil.mavlink_connection("udpin:127.0.0.1:0", 0, 255, 190, dialect="all")
         self.endpoint = Endpoint("udpout", "station", "127.0.0.1", self.link.port.getsockname()[1])
-        self.retries, self.log = 0, bytearray()  # the log is a .tlog of all received messages
+        self.retries = 0  # requests that were sent again, also those of files
+        self.log = bytearray()  # a .tlog of all received messages
         self.link.message_hooks.append(
             lambda link, m: self.log.extend(struct.pack(">Q", time.time_ns() // 1000) + m.get_msgbuf())
         )
@@ -104,9 +100,11 @@ class GroundStation:
     def command(self, number: int, *numbers: float) -> Any:
         """Send a COMMAND_LONG, and return its ack."""
         request = mavlink.MAVLink_command_long_message(1, 1, number, 0, *numbers, *[0.0] * (7 - len(numbers)))
-        return self.ask(
-            request, lambda m: m.get_type() == "COMMAND_ACK" and m.command == number, _ACK_TIMEOUT, _ACK_TRIES
-        )
+
+        def is_ack(message: Any) -> bool:
+            return message.get_type() == "COMMAND_ACK" and message.command == number
+
+        return self.ask(request, is_ack, _ACK_TIMEOUT, _ACK_TRIES)
 
     def request(self, message_id: int, index: float = 0.0) -> Any:
         """Request a message, and return it, or None; an ack must arrive."""
@@ -152,6 +150,7 @@ class GroundStation:
         client = mavftp.MAVFTP(self.link, 1, 1)
         client.cmd_get([_FILE], callback=lambda file: files.append(file and file.read()))
         client.process_ftp_reply("OpenFileRO", timeout=30.0)
+        self.retries += client.open_retries + client.read_retries
         assert mavftp.MAVFTP.ftp_param_decode(files[0]).params
 
     def parameters(self) -> dict[str, float]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -15,37 +16,27 @@ from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario, load_scenario
+from cosim.simulation.columns import column_names
 from cosim.simulation.commands import CommandQueue
 from cosim.simulation.signals import Column
+from tests.cosim.mavlink.stubs import message
 
 NAN = math.nan
-
-COLUMNS = tuple(
-    Column(name, "", "")
-    for name in (
-        "time", *(f"position.{a}" for a in "xyz"), *(f"quaternion.e{i}" for i in range(4)),
-        *(f"velocity.{v}" for v in "uvwpqr"), "attitude.roll", "attitude.pitch", "attitude.yaw", "altitude",
-        "measured.depth", "measured.altitude", *(f"measured.acceleration.{a}" for a in "xyz"),
-        *(f"measured.angular_velocity.{v}" for v in "pqr"), *(f"thruster_force[{i}]" for i in range(1, 9)),
-        *(f"thrust_saturated[{i}]" for i in range(1, 9)), "wrench_saturated", "bottom_contact",
-        *(f"{name}.value" for name in ("goal", "SR1", "SR2", "SR3", "seen 1", "seen 2")),
-        *(f"{name}.clearance" for name in ("goal", "SR1", "SR2", "SR3", "seen 1", "seen 2")),
-        *(f"membership.{c}" for c in ("obstacle", "shape", "depth")),
-        *(f"weight.{c}" for c in ("obstacle", "shape", "depth")), *(f"estimate.phi{i}" for i in range(1, 5)),
-        *(f"command.{f}" for f in "XYZKMN"), "allocation_saturated", *(f"thrust[{i}]" for i in range(1, 9)),
-        *(f"{name}.shift.{a}" for name in ("goal", "SR1", "seen 1", "seen 2") for a in "xyz"), "commands.armed",
-        "commands.mode", "commands.item", "target.x", "target.y", "target.z", "law.constraint_slack",
-    )
-)  # fmt: skip
-AT = {column.name: i for i, column in enumerate(COLUMNS)}
+ACCEPTED, REJECTED, DENIED, UNSUPPORTED, FAILED = range(5)  # MAV_RESULT
+HEARTBEAT = message("HEARTBEAT", type=6, autopilot=8, system_status=4, mavlink_version=3)  # of a ground station
 
 
+@cache
 def scenario(*overrides: str, name: str = "paper-deployable") -> Scenario:
     return load_scenario(name, ["commands.enabled=true", "commands.obstacles=2", *overrides])
 
 
+COLUMNS = tuple(Column(name, "", "") for name in column_names(scenario()))
+AT = {column.name: i for i, column in enumerate(COLUMNS)}
+
+
 def row(**values: Any) -> np.ndarray:
-    """Return a row of an armed vehicle that reaches for its target; names have `_` for dots, or are whole groups."""
+    """Return a row of an armed vehicle that reaches for its target; values may be those of columns that follow."""
     new = np.zeros(len(COLUMNS))
     defaults = {
         "position.x": (1.0, 2.0, 5.0), "quaternion.e0": 1.0,
@@ -53,10 +44,19 @@ def row(**values: Any) -> np.ndarray:
         "target.x": (8.0, 0.0, 5.0), "goal.clearance": (-3.0, 2.0, 2.0, 2.0, 1e5, 1e5), "measured.depth": 5.0,
         "altitude": 1e6, "measured.altitude": 1e6,
     }  # fmt: skip
-    for name, value in {**defaults, **{key.replace("__", "."): v for key, v in values.items()}}.items():
+    for name, value in (defaults | values).items():
         numbers = np.atleast_1d(value)
         new[AT[name] : AT[name] + numbers.size] = numbers
     return new
+
+
+def long(number: int, *numbers: float, fill: float = NAN) -> Any:
+    """Return a COMMAND_LONG to the vehicle."""
+    return mavlink.MAVLink_command_long_message(1, 1, number, 0, *numbers, *[fill] * (7 - len(numbers)))
+
+
+def set_parameter(name: str, value: float, kind: int = mavlink.MAV_PARAM_TYPE_REAL32) -> Any:
+    return mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind)
 
 
 def close_to(commands: list[Any], expected: list[Any], tolerance: float = 1e-6) -> bool:
@@ -73,9 +73,7 @@ class Wire:
     """A link that encodes and decodes what is sent."""
 
     def __init__(self, name: str = "wire") -> None:
-        self.name = name
-        self.got: list[Any] = []
-        self.room = True
+        self.name, self.room, self.got = name, True, []
         self._coder = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._decoder = mavlink.MAVLink(None)
         self._decoder.robust_parsing = False
@@ -95,7 +93,11 @@ class Wire:
 
     @property
     def texts(self) -> list[str]:
-        return [message.text for message in self.of("STATUSTEXT")]
+        """The texts, each whole."""
+        whole: list[str] = []
+        for text in self.of("STATUSTEXT"):
+            whole[-1 if text.chunk_seq else len(whole) :] = [(whole[-1] if text.chunk_seq else "") + text.text]
+        return whole
 
     def counts(self) -> Counter[str]:
         return Counter(message.get_type() for message in self.got)
@@ -111,16 +113,15 @@ class Station:
         self, profile: str = "ardusub", commands: bool = True, of: Scenario | None = None, **options: Any
     ) -> None:
         self.commands, self.profile = CommandQueue(), PROFILES[profile]
-        self.autopilot = Autopilot(
-            of or scenario(), COLUMNS, MavlinkOptions(profile=profile, commands=commands, **options), self.commands
-        )  # type: ignore[arg-type]
-        self.wire = Wire()
-        self.now = 100.0
+        options = MavlinkOptions(profile=profile, commands=commands, **options)  # type: ignore[arg-type]
+        self.autopilot = Autopilot(of or scenario(), COLUMNS, options, self.commands)  # type: ignore[arg-type]
+        self.wire, self.now, self.time, self.heard = Wire(), 100.0, 0.0, 0
         self.autopilot.attach(self.wire)
         self.autopilot.tick(self.now)
         self.wire.clear()
 
     def look(self, time: float = 1.0, **values: Any) -> None:
+        self.time = time
         self.autopilot.observe(row(time=time, **values))
 
     def wait(self, seconds: float, every: float = 0.02) -> None:
@@ -137,21 +138,45 @@ class Station:
         self.autopilot.receive(wire, decoded, self.now)
         return wire.got[before:]
 
-    def command(self, number: int, *numbers: float, fill: float = NAN, **who: Any) -> Any:
-        """Send COMMAND_LONG, and return its one acknowledgement."""
-        filled = [*numbers, *[fill] * (7 - len(numbers))]
-        return self._acknowledged(mavlink.MAVLink_command_long_message(1, 1, number, 0, *filled), **who)
-
-    def command_int(self, number: int, frame: int, numbers: tuple[float, ...], x: int, y: int, z: float) -> Any:
-        """Send COMMAND_INT, and return its one acknowledgement."""
-        return self._acknowledged(mavlink.MAVLink_command_int_message(1, 1, frame, number, 0, 0, *numbers, x, y, z))
-
-    def _acknowledged(self, message: Any, **who: Any) -> Any:
-        replies = self.send(message, **who)
-        (ack,) = [reply for reply in replies if reply.get_type() == "COMMAND_ACK"]
+    def acknowledged(self, message: Any, **who: Any) -> int:
+        """Send a command, and return the result of its one acknowledgement."""
+        (ack,) = [reply for reply in self.send(message, **who) if reply.get_type() == "COMMAND_ACK"]
         assert (ack.command, ack.target_system, ack.target_component) == (message.command, who.get("system", 255), 190)
-        return ack.result
+        return int(ack.result)
+
+    def command(self, number: int, *numbers: float, **who: Any) -> int:
+        return self.acknowledged(long(number, *numbers), **who)
+
+    def request(self, message_id: int, *numbers: float) -> list[Any]:
+        """Request a message, and return what comes of that kind."""
+        self.wire.clear()
+        self.command(mavlink.MAV_CMD_REQUEST_MESSAGE, message_id, *numbers)
+        return self.wire.of(mavlink.mavlink_map[message_id].msgname)
 
     def commanded(self) -> list[Any]:
         """Take the commands that were given."""
         return list(self.commands.take(0))
+
+    def play(self, *steps: Any, tolerance: float = 1e-6) -> None:
+        """Play an exchange.
+
+        A message is sent, with a number after it in a tuple as a command that this is the MAV_RESULT of; a float [s]
+        is waited for; values of columns are shown by a row; a list holds the commands since the last one; a text is
+        part of one of the texts since the last one, None says that there is none.
+        """
+        for step in steps:
+            match step:
+                case float():
+                    self.wait(step)
+                case dict():
+                    self.look(self.time + 0.1, **step)
+                case list():
+                    commands = self.commanded()
+                    assert close_to(commands, step, tolerance), commands
+                case str() | None:
+                    texts, self.heard = self.wire.texts[self.heard :], len(self.wire.texts)
+                    assert texts == [] if step is None else any(step in text for text in texts), (step, texts)
+                case (message, result):
+                    assert self.acknowledged(message) == result, message
+                case _:
+                    self.send(step)

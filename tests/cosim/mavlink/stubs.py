@@ -12,8 +12,30 @@ from cosim.mavlink.channels.udp import UdpOut
 from cosim.mavlink.wire.framing import FrameFilter, RxStats
 from cosim.mavlink.wire.link import Link
 
-SOURCE = (1, 1)
-KEY = bytes(range(32))
+HERE, SOURCE, KEY = "127.0.0.1", (1, 1), bytes(range(32))
+
+
+def message(name, every=0, /, **values):
+    """Return a message of the dialect, with one number in every field that has no value here."""
+    kind = mavlink.mavlink_map[getattr(mavlink, f"MAVLINK_MSG_ID_{name}")]
+    sizes, fields = dict(zip(kind.ordered_fieldnames, kind.array_lengths, strict=True)), []
+    for field, form in zip(kind.fieldnames, kind.fieldtypes, strict=True):
+        array = bytes([40 * every]) * max(sizes[field], 1) if form == "char" else [every] * sizes[field]
+        fields.append(values.pop(field, array or every))
+    assert not values
+    return kind(*fields)
+
+
+def heartbeat(**values):
+    return message("HEARTBEAT", **{"type": 12, "system_status": 4, "mavlink_version": 3} | values)
+
+
+def attitude(boot_ms):
+    return message("ATTITUDE", 0.5, time_boot_ms=boot_ms)
+
+
+def odometry(boot_us=1):
+    return message("ODOMETRY", 1, time_usec=boot_us)
 
 
 class StubVehicle:
@@ -43,25 +65,7 @@ class StubVehicle:
             link.send(heartbeat())
 
 
-def heartbeat():
-    return mavlink.MAVLink_heartbeat_message(12, 0, 0, 0, 4, 3)
-
-
-def attitude(boot_ms):
-    return mavlink.MAVLink_attitude_message(boot_ms, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
-
-
-def odometry(boot_us=1):
-    return mavlink.MAVLink_odometry_message(
-        boot_us, 1, 12, 1.5, 2.5, 3.5, [1.0, 0.1, 0.2, 0.3], *[0.5] * 6, [0.25] * 21, [0.75] * 21, 0, 8, 100
-    )
-
-
-def request_list(target=1):
-    return mavlink.MAVLink_param_request_list_message(target, 1)
-
-
-class Station:
+class Codec:
     """Packs messages as a ground station does, and reads what the vehicle sends, all by pymavlink."""
 
     def __init__(self, system=255, component=190, key=None, link=7, stamp=None):
@@ -93,34 +97,27 @@ def closed_later(thing):
     return thing
 
 
-def link_of(channel, **options):
-    return Link("test", closed_later(channel), open_filter(), SOURCE, **options)
+def link_of(channel, frame_filter=None, **options):
+    return Link("test", closed_later(channel), frame_filter or open_filter(), SOURCE, **options)
 
 
 def udp_socket(port=0):
     """Return a socket on a port of loopback; it is closed after the test."""
     made = closed_later(socket.socket(socket.AF_INET, socket.SOCK_DGRAM))
-    made.bind(("127.0.0.1", port))
+    made.bind((HERE, port))
     made.settimeout(60.0)
     return made
 
 
 def udp_link(port, **options):
-    return link_of(UdpOut("127.0.0.1", port), **options)
-
-
-def send_now(link, message):
-    """Send a message at once; return whether there was room for it."""
-    sent = link.send(message)
-    link.channel.poll(time.monotonic())
-    return sent
+    return link_of(UdpOut(HERE, port), **options)
 
 
 def read_log(path):
     """Return the messages of a .tlog as pymavlink reads them."""
     reader, messages = mavutil.mavlink_connection(str(path), dialect="all"), []
-    while (message := reader.recv_msg()) is not None:
-        messages.append(message)
+    while (received := reader.recv_msg()) is not None:
+        messages.append(received)
     reader.close()
     return messages
 
@@ -128,7 +125,7 @@ def read_log(path):
 def free_port():
     """Return a UDP port that nobody listens on."""
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
+        probe.bind((HERE, 0))
         return probe.getsockname()[1]
 
 

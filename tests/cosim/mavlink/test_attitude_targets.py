@@ -7,97 +7,59 @@ from pymavlink.dialects.v20 import all as mavlink
 from cosim.companion.set_points import make_attitude_message
 from cosim.simulation.commands.commands import SetAttitude, SetTarget
 from tests.cosim.mavlink.station import NAN, Station
+from tests.cosim.mavlink.stubs import message
 
 RATES, THRUST_BODY, NO_THRUST, NO_ATTITUDE = 0b111, 1 << 5, 1 << 6, 1 << 7
 TURNED = (0.8, 0.0, 0.0, 0.6)
-REACH, DEPTH_HOLD = {"commands.mode": 2.0}, {"commands.mode": 6.0}
+HOLD, REACH, DEPTH_HOLD = ({"commands.mode": mode} for mode in (1.0, 2.0, 6.0))
+STAYS = SetTarget((1.0, 2.0, 5.0), 0.3)
 
 
 def target(mask=RATES, thrust=0.5, attitude=TURNED):
-    return mavlink.MAVLink_set_attitude_target_message(0, 1, 1, mask, list(attitude), 0.0, 0.0, 0.0, thrust)
+    fields = {"target_system": 1, "target_component": 1, "type_mask": mask, "q": list(attitude), "thrust": thrust}
+    return message("SET_ATTITUDE_TARGET", **fields)
 
 
-def station(profile, mode):
-    made = Station(profile)
-    made.look(1.0, **mode)
-    return made
+def with_force(*force):
+    return make_attitude_message(mavlink, 1, np.array(TURNED), np.array(force) if force else None)
 
 
-def commands_of(made):
-    return [
-        (tuple(round(x, 6) for x in command.quaternion), command.force, command.rate_down)
-        for command in made.commanded()
-    ]
+def climb(rate_down):
+    return SetAttitude(TURNED, (0.0, 0.0, 0.0), rate_down)
 
 
-@pytest.mark.parametrize(("thrust", "rate"), [(0.5, 0.0), (1.0, -0.3), (0.25, 0.15), (0.0, 0.3)])
-def test_thrust_is_a_climb_rate_in_ardusub_guided(thrust, rate):
-    made = station("ardusub", REACH)
-    for _ in range(5):  # it is streamed
-        made.send(target(thrust=thrust))
-    ((attitude, force, rate_down),) = commands_of(made)
-    assert attitude == TURNED and force == (0.0, 0.0, 0.0) and rate_down == pytest.approx(rate)
+def waiting(mask):
+    early = [target(mask), 0.05] * 50
+    return [HOLD, "Mode: Position hold", *early, None, *early, "Attitude set-points wait", []]
 
 
-def test_attitude_target_without_thrust_leaves_force_to_sticks_in_alt_hold():
-    made = station("ardusub", DEPTH_HOLD)
-    made.send(make_attitude_message(mavlink, 1, np.array(TURNED), None))
-    assert commands_of(made) == [(TURNED, None, None)]
-
-
-@pytest.mark.parametrize("profile", ["px4", "generic"])
-def test_three_axis_thrust_acts_in_px4_offboard(profile):
-    made = station(profile, REACH)
-    made.send(make_attitude_message(mavlink, 1, np.array(TURNED), np.array([0.25, -0.5, 0.0])))
-    made.send(target(thrust=0.125))  # which an underwater vehicle's PX4 takes for one ahead
-    assert [force for _, force, _ in commands_of(made)] == [(0.25, -0.5, 0.0), (0.125, 0.0, 0.0)]
-
-
-@pytest.mark.parametrize(
-    ("profile", "mode", "after", "ends"),
-    [
-        ("generic", REACH, 3.0, SetTarget((1.0, 2.0, 5.0), 0.3)),
-        ("ardusub", REACH, 3.0, SetTarget((1.0, 2.0, 5.0), 0.3)),
-        ("ardusub", DEPTH_HOLD, 5.0, SetAttitude(None)),
-    ],
-)
-def test_stale_attitude_target_expires(profile, mode, after, ends):
-    made = station(profile, mode)
-    made.send(target(RATES | (NO_THRUST if mode == DEPTH_HOLD else 0)))
-    made.commanded()
-    made.wait(after - 0.1)
-    assert made.commanded() == []
-    made.wait(0.2)
-    assert made.commanded() == [ends]
-    assert any(text.startswith(f"No attitude for {after:g} s") for text in made.wire.texts)
-
-
-@pytest.mark.parametrize(
-    ("profile", "message", "words"),
-    [
+SCRIPTS = {  # an ArduSub's in GUIDED, each set-point streamed; in ALT_HOLD; a PX4's in OFFBOARD
+    **{f"thrust {thrust} as a climb rate": ("ardusub", [REACH, *[target(thrust=thrust)] * 5, [climb(rate)]])
+       for thrust, rate in ((0.5, 0.0), (1.0, -0.3), (0.25, 0.15), (0.0, 0.3))},
+    "no thrust, and sticks that push": ("ardusub", [DEPTH_HOLD, with_force(), [SetAttitude(TURNED)]]),
+    **{f"thrust of three axes, or ahead, in {profile}": (
+        profile, [REACH, with_force(0.25, -0.5, 0.0), target(thrust=0.125),
+                  [SetAttitude(TURNED, force) for force in ((0.25, -0.5, 0.0), (0.125, 0.0, 0.0))]])
+       for profile in ("px4", "generic")},
+    **{f"a stale one in {profile}": (
+        profile, [REACH, target(), [command], 2.9, [], 0.2, [STAYS], "No attitude for 3 s"])
+       for profile, command in (("generic", SetAttitude(TURNED, (0.5, 0.0, 0.0))), ("ardusub", climb(0.0)))},
+    "a stale one in ALT_HOLD": ("ardusub", [DEPTH_HOLD, target(RATES | NO_THRUST), [SetAttitude(TURNED)], 4.9, [], 0.2,
+                                            [SetAttitude(None)], "No attitude for 5 s"]),
+    "early ones": ("ardusub", waiting(RATES)), "early ones for PX4": ("px4", waiting(RATES)),
+    "early ones without thrust": ("ardusub", waiting(RATES | NO_THRUST)),
+    **{f"refused: {words} ({k})": (profile, [REACH, sent, [], words]) for k, (profile, sent, words) in enumerate((
         ("generic", target(NO_ATTITUDE), "rates alone are not followed"),
         ("generic", target(RATES | NO_THRUST), "a thrust is needed"),
-        ("generic", target(thrust=1.5), "beyond -1 to 1"),
-        ("generic", target(thrust=NAN), "beyond -1 to 1"),
+        ("generic", target(thrust=1.5), "beyond -1 to 1"), ("generic", target(thrust=NAN), "beyond -1 to 1"),
         ("generic", target(attitude=(2.0, 0.0, 0.0, 0.0)), "not of length 1"),
         ("generic", target(attitude=(NAN, 0.0, 0.0, 0.0)), "not of length 1"),
-        ("ardusub", target(RATES | THRUST_BODY), "a rate of climb is"),
-    ],
-)
-def test_invalid_attitude_targets_are_rejected_by_name(profile, message, words):
-    made = station(profile, REACH)
-    made.send(message)
-    assert made.commanded() == [] and words in "".join(made.wire.texts)
+        ("ardusub", target(RATES | THRUST_BODY), "a rate of climb is")))},
+}  # fmt: skip
 
 
-@pytest.mark.parametrize(("profile", "mask"), [("ardusub", RATES), ("ardusub", RATES | NO_THRUST), ("px4", RATES)])
-def test_setpoints_before_their_mode_are_announced_after_three_seconds(profile, mask):
-    made = station(profile, {"commands.mode": 1.0})
-    for _ in range(50):
-        made.send(target(mask))
-        made.wait(0.05)
-    assert made.commanded() == [] and not any("wait" in text for text in made.wire.texts)
-    for _ in range(50):
-        made.send(target(mask))
-        made.wait(0.05)
-    assert "".join(made.wire.texts).count("Attitude set-points wait") == 1
+@pytest.mark.parametrize(("profile", "steps"), SCRIPTS.values(), ids=SCRIPTS)
+def test_attitude_targets_become_commands_or_texts(profile, steps):
+    station = Station(profile)
+    station.play({}, *steps)
+    assert sum("wait" in text for text in station.wire.texts) == (HOLD in steps)

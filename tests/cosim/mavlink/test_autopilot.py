@@ -12,26 +12,21 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.messages.message_table import message_specs
 from cosim.mavlink.wire.options import PROFILES
-from tests.cosim.mavlink.station import AT, COLUMNS, Station, Wire, row
+from tests.cosim.mavlink.station import ACCEPTED, COLUMNS, REJECTED, Station, Wire, long, row, set_parameter
+from tests.cosim.mavlink.stubs import message
 from tests.examples import examples
 
-KINDS = sorted(mavlink.mavlink_map)
-RANGES = {"int8_t": 8, "int16_t": 16, "int32_t": 32, "int64_t": 64}
+COMMANDS = [
+    16, 17, 20, 21, 22, 115, 176, 178, 179, 192, 193, 224, 246, 252, 262, 300, 400, 410, 510, 511, 512, 519, 520,
+]  # fmt: skip
+ARM = long(400, 1, fill=0.0)
 
 
-def fields(kind, draw):
-    """Draw a value for each field of a message."""
-    for field, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True):
-        length = kind.array_lengths[kind.ordered_fieldnames.index(field)]
-        if field == "target_system":
-            yield draw(st.sampled_from([0, 1, 1, 1, 7]))
-        elif field == "target_component":
-            yield draw(st.sampled_from([0, 1]))
-        elif type_name == "char":
-            yield draw(st.binary(max_size=length))
-        else:
-            one = number(type_name)
-            yield draw(st.lists(one, min_size=length, max_size=length)) if length else draw(one)
+@cache
+def any_station(**options):
+    station = Station(**options)
+    station.look()
+    return station
 
 
 def number(type_name):
@@ -39,17 +34,33 @@ def number(type_name):
         return st.sampled_from([0.0, 1.0, -1.0, math.nan, math.inf, -math.inf, 3.4e38, 1e-40]) | st.floats(width=32)
     if type_name == "double":
         return st.floats()
-    unsigned = type_name.startswith("u")
-    bits = RANGES[type_name.removeprefix("u")]
-    least, greatest = (0, 2**bits - 1) if unsigned else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-    return st.sampled_from([least, greatest, 0, 1, 2, 3]) | st.integers(least, greatest)
+    bits = int(type_name.removeprefix("u").removeprefix("int").removesuffix("_t"))
+    low, high = (0, 2**bits - 1) if type_name.startswith("u") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    return st.sampled_from([low, high, 0, 1, 2, 3]) | st.integers(low, high)
+
+
+def fields(kind):
+    """Return a strategy for each field of a message."""
+    for field, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True):
+        length = kind.array_lengths[kind.ordered_fieldnames.index(field)]
+        one = st.binary(max_size=length) if type_name == "char" else number(type_name)
+        several = st.lists(one, min_size=length, max_size=length) if length and type_name != "char" else one
+        yield {"target_system": st.sampled_from([0, 1, 1, 1, 7]), "target_component": st.sampled_from([0, 1])}.get(
+            field, several
+        )
 
 
 @st.composite
 def messages(draw):
-    handled = st.sampled_from([i for i in KINDS if mavlink.mavlink_map[i].msgname in any_station().autopilot._handlers])
-    kind = mavlink.mavlink_map[draw(handled | st.sampled_from(KINDS))]
-    return kind(*fields(kind, draw))
+    kinds, handled = mavlink.mavlink_map, any_station().autopilot._handlers
+    known = st.sampled_from([i for i in sorted(kinds) if kinds[i].msgname in handled])
+    kind = kinds[draw(known | st.sampled_from(sorted(kinds)))]
+    sent = kind(*map(draw, fields(kind)))
+    try:
+        sent.pack(mavlink.MAVLink(None))
+    except (struct.error, OverflowError, TypeError):
+        return message("HEARTBEAT")  # it was no message at all
+    return sent
 
 
 @st.composite
@@ -63,49 +74,20 @@ def commands(draw):
     return mavlink.MAVLink_command_int_message(1, 1, frame, number_of, 0, 0, *numbers[:4], x, y, numbers[4])
 
 
-@cache
-def any_station(**options):
-    return Station(**options)
-
-
-COMMANDS = [
-    16, 17, 20, 21, 22, 115, 176, 178, 179, 192, 193, 224, 246, 252, 262, 300, 400, 410, 510, 511, 512, 519, 520,
-]  # fmt: skip
-
-
 @pytest.fixture(scope="module")
 def stations():
-    made = [Station(profile) for profile in PROFILES]
-    for station in made:
-        station.look()
-    return made
+    return [any_station(profile=profile) for profile in PROFILES]
 
 
 @settings(max_examples=examples(100), deadline=None)
-@given(st.lists(messages(), min_size=1, max_size=4))
-def test_no_message_raises_an_exception(stations, sent):
+@given(st.lists(messages(), min_size=1, max_size=4), commands())
+def test_no_message_raises_an_exception_and_a_command_is_acknowledged_once(stations, sent, command):
     for station in stations:
-        for message in sent:
-            try:
-                message.pack(mavlink.MAVLink(None))
-            except (struct.error, OverflowError, TypeError):
-                continue  # no message at all
-            station.send(message, system=250)
+        for one in sent:
+            station.send(one, system=250)
+        station.acknowledged(command)
         station.wait(0.04)
         station.commanded()
-        station.wire.clear()
-
-
-@settings(max_examples=examples(100), deadline=None)
-@given(commands())
-def test_a_command_is_acknowledged_once(stations, message):
-    for station in stations:
-        station.commanded()
-        before = len(station.wire.got)
-        station.send(message)
-        acks = [m for m in station.wire.got[before:] if m.get_type() == "COMMAND_ACK"]
-        assert [(a.command, a.target_system, a.target_component) for a in acks] == [(message.command, 255, 190)]
-        station.wait(0.02)
         station.wire.clear()
 
 
@@ -119,11 +101,11 @@ def test_no_row_value_raises_an_exception(stations, bits, spoiled, often):
         for given_row in (whole, some):
             station.autopilot.observe(given_row)
             for message_id in message_specs():
-                station.send(mavlink.MAVLink_command_long_message(1, 1, 512, 0, message_id, 0, 0, 0, 0, 0, 0))
+                station.send(long(512, message_id, fill=0.0))
         station.wire.clear()
 
 
-def test_documented_messages_are_streamed_at_their_rates():
+def test_documented_messages_are_streamed_at_their_rates(station):
     promised = {
         "HEARTBEAT": 1.0, "SYS_STATUS": 2.0, "SYSTEM_TIME": 1.0, "ATTITUDE": 10.0, "ATTITUDE_QUATERNION": 10.0,
         "LOCAL_POSITION_NED": 10.0, "GLOBAL_POSITION_INT": 5.0, "VFR_HUD": 5.0, "NAV_CONTROLLER_OUTPUT": 2.0,
@@ -132,9 +114,6 @@ def test_documented_messages_are_streamed_at_their_rates():
         "CURRENT_MODE": 0.5, "AVAILABLE_MODES_MONITOR": 0.2, "AHRS2": 10.0, "EKF_STATUS_REPORT": 2.0,
         "OBSTACLE_DISTANCE": 1.0,
     }  # fmt: skip
-    station = Station("ardusub")
-    station.look(0.0)
-    station.wire.clear()
     for k in range(1, 2001):
         station.look(0.01 * k)
     counts = station.wire.counts()
@@ -143,9 +122,7 @@ def test_documented_messages_are_streamed_at_their_rates():
     assert times == list(range(100, 20_001, 100))
 
 
-def test_heartbeat_is_sent_every_wall_clock_second():
-    station = Station()
-    station.look(0.0)
+def test_heartbeat_is_sent_every_wall_clock_second(station):
     station.autopilot.tick(station.now)
     station.wire.clear()
     for _ in range(10):  # a step a second: far slower than the wall clock
@@ -171,67 +148,46 @@ def test_only_heartbeats_are_sent_before_the_first_snapshot():
     assert [m.time_boot_ms for m in station.wire.of("ATTITUDE")] == [0, 100]
 
 
-@pytest.mark.parametrize("profile", PROFILES)
-def test_heartbeats_are_not_starved_by_other_messages(profile):
+def test_heartbeats_are_not_starved_by_other_messages(each_station):
     # Mission Planner gives up when 200 packets go by without one
-    station = Station(profile)
     for k in range(500):
-        station.look(0.01 * k, **{"goal.clearance": (-3.0, 2.0, 2.0, 2.0, 3.0, 3.0)})
-    at = [i for i, m in enumerate(station.wire.got) if m.get_type() == "HEARTBEAT"]
+        each_station.look(0.01 * k, **{"goal.clearance": (-3.0, 2.0, 2.0, 2.0, 3.0, 3.0)})
+    at = [i for i, m in enumerate(each_station.wire.got) if m.get_type() == "HEARTBEAT"]
     assert max(np.diff(at)) <= 150
 
 
-@pytest.mark.parametrize(
-    ("profile", "autopilot", "number"), [("ardusub", 3, 4), ("px4", 12, 6 << 16), ("generic", 0, 6 << 16)]
-)
-def test_heartbeat_identifies_the_emulated_autopilot(profile, autopilot, number):
-    station = Station(profile)
-    station.look()
-    station.command(512, 0)
-    beat = station.wire.of("HEARTBEAT")[-1]
-    assert (beat.type, beat.autopilot, beat.custom_mode, beat.mavlink_version) == (12, autopilot, number, 3)
+def test_heartbeat_identifies_the_emulated_autopilot(each_station):
+    beat = each_station.request(0)[-1]
+    kind = {"ardusub": (3, 4), "px4": (12, 6 << 16), "generic": (0, 6 << 16)}[each_station.profile.name]
+    assert (beat.type, beat.autopilot, beat.custom_mode, beat.mavlink_version) == (12, *kind, 3)
     assert beat.base_mode & 1 and beat.base_mode & 128 and beat.system_status == mavlink.MAV_STATE_ACTIVE
     assert (beat.get_srcSystem(), beat.get_srcComponent()) == (1, 1)
 
 
-def test_last_message_is_a_standby_heartbeat():
-    station = Station()
-    station.look()
+def test_last_message_is_a_standby_heartbeat(station):
     station.autopilot.close(station.now)
     assert station.wire.got[-1].system_status == mavlink.MAV_STATE_STANDBY
     assert station.wire.texts[-1] == "The run has ended"
 
 
-def test_messages_for_other_systems_are_ignored():
-    station = Station()
-    station.look()
-    long = mavlink.MAVLink_command_long_message
-    assert station.send(long(2, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)) == []
-    assert station.send(long(1, 100, 400, 0, 1, 0, 0, 0, 0, 0, 0)) == []
-    assert station.send(long(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0), system=1, component=1) == []
-    assert station.commanded() == []
-    assert len(station.send(long(0, 0, 400, 0, 1, 0, 0, 0, 0, 0, 0))) == 1
+def test_messages_for_other_systems_are_ignored(station):
+    for target, sender, replies in (((2, 1), 255, 0), ((1, 100), 255, 0), ((1, 1), 1, 0), ((0, 0), 255, 1)):
+        arm = message("COMMAND_LONG", command=400, param1=1, target_system=target[0], target_component=target[1])
+        component = 1 if sender == 1 else 190  # as if it were we
+        assert len(station.send(arm, system=sender, component=component)) == replies == len(station.commanded())
 
 
 def test_only_allowed_systems_are_accepted():
     station = Station(allowed_systems=frozenset({250}))
     station.look()
-    arm = mavlink.MAVLink_command_long_message(1, 1, 400, 0, 1, 0, 0, 0, 0, 0, 0)
-    assert station.send(arm, system=255) == [] and len(station.send(arm, system=250)) == 1
+    assert station.send(ARM, system=255) == [] and len(station.send(ARM, system=250)) == 1
 
 
 @settings(max_examples=examples(150), deadline=None)
 @given(st.one_of(messages(), commands()))
-def test_read_only_vehicle_applies_no_command(message):
-    try:
-        message.pack(mavlink.MAVLink(None))
-    except (struct.error, OverflowError, TypeError):
-        return
+def test_read_only_vehicle_applies_no_command(sent):
     station = any_station(commands=False)
-    station.look()
-    station.send(message)
-    station.wait(0.02)
-    assert station.commanded() == []
+    station.play(sent, 0.02, [])
     station.wire.clear()
 
 
@@ -254,24 +210,20 @@ def test_run_restart_is_announced():
     for k in range(1, 101):
         station.look(0.01 * k)
     assert station.wire.counts()["ATTITUDE"] == 10
-    assert AT["time"] == 0
 
 
 @pytest.mark.parametrize("last", [5.0, 0.0])
 def test_commands_between_runs_are_rejected(last):
     """What is accepted is followed by the run that the station sees, not by the one after it."""
-    station, accepted, rejected = Station(), 0, 1
+    station, radius = Station(), set_parameter("SR1_RADIUS", 0.75)
     station.look(last)
-    radius = mavlink.MAVLink_param_set_message(1, 1, b"SR1_RADIUS", 0.75, 9)
-    assert station.command(400, 1.0) == accepted
-    (before,) = station.send(mavlink.MAVLink_param_request_read_message(1, 1, b"SR1_RADIUS", -1))
+    assert station.acknowledged(ARM) == ACCEPTED
+    (before,) = station.send(message("PARAM_REQUEST_READ", 1, param_id=b"SR1_RADIUS", param_index=-1))
     station.commands.end_run()
-    assert station.command(400, 1.0) == rejected
-    assert "Refused: the run is over" in station.wire.texts
+    station.play((ARM, REJECTED), "Refused: the run is over")
     assert station.send(radius)[-1].param_value == before.param_value
-    assert station.commanded() == []
+    station.play([])
     station.look(0.0)
-    assert "The run has restarted" in station.wire.texts
-    assert station.command(400, 1.0) == accepted
+    station.play("The run has restarted", (ARM, ACCEPTED))
     assert station.send(radius)[-1].param_value == 0.75
     assert len(station.commanded()) == 2

@@ -7,39 +7,34 @@ from hypothesis import strategies as st
 from cosim.errors import TelemetryError
 from cosim.mavlink.wire.endpoint import Endpoint, parse_endpoint
 
-NETWORK = {
-    "udpout:127.0.0.1:14550": ("udpout", "127.0.0.1", 14550), "udpout:localhost:1": ("udpout", "127.0.0.1", 1),
-    "udpin:127.0.0.2:65535": ("udpin", "127.0.0.2", 65535), "tcpin:127.0.0.1:5760": ("tcpin", "127.0.0.1", 5760),
-    "tcp:127.0.0.1:5760": ("tcp", "127.0.0.1", 5760), "udpin://127.0.0.1:14550": ("udpin", "127.0.0.1", 14550),
-    "udpout://127.0.0.1:14550": ("udpout", "127.0.0.1", 14550), "tcpout://127.0.0.1:5760": ("tcp", "127.0.0.1", 5760),
-    "tcpin://localhost:5760": ("tcpin", "127.0.0.1", 5760),
-}  # fmt: skip
-SERIAL = {
-    "serial:/dev/ttyUSB0": ("/dev/ttyUSB0", 57600), "serial:/dev/ttyUSB0:115200": ("/dev/ttyUSB0", 115200),
-    "serial:///dev/ttyACM0:921600": ("/dev/ttyACM0", 921600), "serial:COM7:57600": ("COM7", 57600),
+PARSED = {
+    **{text: {"kind": kind, "host": host, "port": port} for text, kind, host, port in (
+        ("udpout:127.0.0.1:14550", "udpout", "127.0.0.1", 14550), ("udpout:localhost:1", "udpout", "127.0.0.1", 1),
+        ("udpin:127.0.0.2:65535", "udpin", "127.0.0.2", 65535), ("tcpin:127.0.0.1:5760", "tcpin", "127.0.0.1", 5760),
+        ("tcp:127.0.0.1:5760", "tcp", "127.0.0.1", 5760), ("udpin://127.0.0.1:14550", "udpin", "127.0.0.1", 14550),
+        ("udpout://127.0.0.1:14550", "udpout", "127.0.0.1", 14550),
+        ("tcpout://127.0.0.1:5760", "tcp", "127.0.0.1", 5760), ("tcpin://localhost:5760", "tcpin", "127.0.0.1", 5760))},
+    **{text: {"kind": "serial", "path": path, "baud": baud} for text, path, baud in (
+        ("serial:/dev/ttyUSB0", "/dev/ttyUSB0", 57600), ("serial:/dev/ttyUSB0:115200", "/dev/ttyUSB0", 115200),
+        ("serial:///dev/ttyACM0:921600", "/dev/ttyACM0", 921600), ("serial:COM7:57600", "COM7", 57600))},
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("text", [*NETWORK, *SERIAL])
+@pytest.mark.parametrize("text", PARSED)
 def test_endpoints_of_this_machine_are_parsed(text):
-    if text in NETWORK:
-        kind, host, port = NETWORK[text]
-        assert parse_endpoint(text) == Endpoint(kind, text, host=host, port=port)
-    else:
-        path, baud = SERIAL[text]
-        assert parse_endpoint(text) == Endpoint("serial", text, path=path, baud=baud)
+    assert parse_endpoint(text) == Endpoint(text=text, **PARSED[text])
 
 
 def test_log_endpoint_requires_a_new_file(tmp_path):
     path = tmp_path / "dive.tlog"
     assert parse_endpoint(str(path)) == Endpoint("tlog", str(path), path=str(path))
     path.touch()
-    with pytest.raises(TelemetryError, match="the file exists"):
-        parse_endpoint(str(path))
-    with pytest.raises(TelemetryError, match="there is no folder"):
-        parse_endpoint(str(tmp_path / "none" / "dive.tlog"))
-    with pytest.raises(TelemetryError, match=r"endpoint 'x+ \.\.\. x+\.tlog': .*too long"):
-        parse_endpoint("x" * 300 + ".tlog")
+    for text, words in (
+        (str(path), "the file exists"), (str(tmp_path / "none" / "dive.tlog"), "there is no folder"),
+        ("x" * 300 + ".tlog", r"endpoint 'x+ \.\.\. x+\.tlog': .*too long"),
+    ):  # fmt: skip
+        with pytest.raises(TelemetryError, match=words):
+            parse_endpoint(text)
 
 
 def test_remote_endpoints_require_allow_remote():
@@ -49,30 +44,19 @@ def test_remote_endpoints_require_allow_remote():
         assert parse_endpoint(text, allow_remote=True).text == text
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
-        ("", "udpout:, udpin:, tcpin: or tcp:HOST:PORT, serial:"),
-        ("127.0.0.1:14550", "udpout:, udpin:"),
-        ("udp:127.0.0.1:14550", "udpout:, udpin:"),
-        ("http://127.0.0.1:14550", "udpout:, udpin:"),
-        ("udpout:127.0.0.1", "expected udpout:HOST:PORT, such as udpout:127.0.0.1:14550"),
-        ("udpin::14550", "expected udpin:HOST:PORT"),
-        ("udpin://:14550", "expected udpin:HOST:PORT"),
-        ("tcpin:127.0.0.1:0", "expected tcpin:HOST:PORT"),
-        ("tcpin:127.0.0.1:99999", "expected tcpin:HOST:PORT"),
-        ("tcpin:127.0.0.1:65536", "expected tcpin:HOST:PORT"),
-        ("udpout:127.0.0.1:١٢٣", "expected udpout:HOST:PORT"),
-        ("udpout:127.0.0.1:" + "1" * 5000, "expected udpout:HOST:PORT"),
-        ("udpout:a..b:14550", "a..b"),
-        (f"udpout:{'a' * 70}:14550", "aaa"),
-        ("udpout:::1:14550", "is not known"),
-        ("serial:", "expected serial:DEVICE"),
-        ("serial:/dev/ttyUSB0:", "expected serial:DEVICE"),
-        ("serial:/dev/ttyUSB0:fast", "expected serial:DEVICE"),
-        ("serial::57600", "expected serial:DEVICE"),
-    ],
-)
+INVALID = {
+    "udpout:, udpin:, tcpin: or tcp:HOST:PORT, serial:": [
+        "", "127.0.0.1:14550", "udp:127.0.0.1:14550", "http://127.0.0.1:14550"],
+    "expected udpout:HOST:PORT, such as udpout:127.0.0.1:14550": [
+        "udpout:127.0.0.1", "udpout:127.0.0.1:١٢٣", "udpout:127.0.0.1:" + "1" * 5000],
+    "expected udpin:HOST:PORT": ["udpin::14550", "udpin://:14550"],
+    "expected tcpin:HOST:PORT": ["tcpin:127.0.0.1:0", "tcpin:127.0.0.1:99999", "tcpin:127.0.0.1:65536"],
+    "is not known": ["udpout:a..b:14550", f"udpout:{'a' * 70}:14550", "udpout:::1:14550"],
+    "expected serial:DEVICE": ["serial:", "serial:/dev/ttyUSB0:", "serial:/dev/ttyUSB0:fast", "serial::57600"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("text", "words"), [(text, words) for words, texts in INVALID.items() for text in texts])
 def test_invalid_endpoints_are_rejected(text, words):
     with pytest.raises(TelemetryError, match=words) as caught:
         parse_endpoint(text)

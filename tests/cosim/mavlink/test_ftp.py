@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink import mavftp
-from pymavlink.dialects.v20 import all as mavlink
 from pymavlink.mavftp_op import FTP_OP
 
-from tests.cosim.mavlink.station import Station
-from tests.cosim.mavlink.test_parameters import LIST, crc_by_bits
+from tests.cosim.mavlink.station import Station, set_parameter
+from tests.cosim.mavlink.stubs import message
+from tests.cosim.mavlink.test_parameters import crc_by_bits, listed
 from tests.examples import examples
 
 TERMINATE, RESET, LISTING, OPEN, READ, CREATE, WRITE, CRC, BURST = 1, 2, 3, 4, 5, 6, 7, 14, 15
@@ -25,27 +25,35 @@ class Client:
         self.station, self.seq = station, 0
 
     def request(self, opcode, data=b"", session=0, size=None, offset=0, **who):
+        """Return all replies to a request."""
         self.seq += 2
-        packet = FTP_OP(
-            self.seq, session, opcode, len(data) if size is None else size, 0, 0, offset, bytearray(data)
-        ).pack()
-        return self.send(packet, **who)
+        length = len(data) if size is None else size
+        return self.send(FTP_OP(self.seq, session, opcode, length, 0, 0, offset, bytearray(data)).pack(), **who)
 
     def send(self, packet, **who):
-        payload = bytearray(packet).ljust(251, b"\0")
-        replies = self.station.send(mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, payload), **who)
-        return [self.parse(reply) for reply in replies if reply.get_type() == "FILE_TRANSFER_PROTOCOL"]
+        sent = message("FILE_TRANSFER_PROTOCOL", 1, target_network=0, payload=bytearray(packet).ljust(251, b"\0"))
+        replies = [reply for reply in self.station.send(sent, **who) if reply.get_type() == "FILE_TRANSFER_PROTOCOL"]
+        return [self.parse(bytes(reply.payload)) for reply in replies]
+
+    def one(self, opcode, data=b"", **request):
+        """Return the one reply to a request."""
+        (reply,) = self.request(opcode, data, **request)
+        return reply
 
     @staticmethod
-    def parse(message):
-        raw = bytes(message.payload)
+    def parse(raw):
         fields = struct.unpack_from("<HBBBBBBI", raw)
         return FTP_OP(*fields[:6], fields[7], raw[12 : 12 + fields[3]])
 
+    def error(self, opcode, data=b"", **request):
+        """Return the error of a refused request."""
+        reply = self.one(opcode, data, **request)
+        assert (reply.opcode, reply.req_opcode, len(reply.payload)) == (NAK, opcode, 1)
+        return reply.payload[0]
+
     def whole(self, path=FILE):
-        (opened,) = self.request(OPEN, path)
+        opened, content = self.one(OPEN, path), b""
         (length,) = struct.unpack("<I", opened.payload)
-        content = b""
         while len(content) < length:
             burst = self.request(BURST, session=opened.session, size=239, offset=len(content))
             assert [b.burst_complete for b in burst] == [0] * (len(burst) - 1) + [1]
@@ -53,52 +61,38 @@ class Client:
             for part in burst:
                 assert part.offset == len(content)
                 content += part.payload
-        assert self.request(BURST, session=opened.session, size=239, offset=length)[0].payload[0] == EOF
+        assert self.error(BURST, session=opened.session, size=239, offset=length) == EOF
         return content
+
+    def parameters(self, query=b""):
+        return [(name.decode(), x) for name, x, _ in mavftp.MAVFTP.ftp_param_decode(self.whole(FILE + query)).params]
 
 
 @pytest.fixture
-def client():
-    station = Station("ardusub")
-    station.look()
+def client(station):
     return Client(station)
 
 
-def test_parameter_file_equals_the_parameter_list(client):
-    decoded = mavftp.MAVFTP.ftp_param_decode(client.whole())
-    client.station.send(LIST)
-    client.station.wait(0.1)
-    values = client.station.wire.of("PARAM_VALUE")
-    assert [(name.decode(), value) for name, value, _ in decoded.params] == [
-        (v.param_id, v.param_value) for v in values
-    ]
-
-
-def test_parameter_file_can_be_read_in_part(client):
-    decoded = mavftp.MAVFTP.ftp_param_decode(client.whole(FILE + b"?start=3&count=4&withdefaults=1"))
-    whole = mavftp.MAVFTP.ftp_param_decode(client.whole())
-    assert [p[:2] for p in decoded.params] == [p[:2] for p in whole.params][3:7]
+def test_parameter_file_equals_the_parameter_list_and_can_be_read_in_part(client):
+    whole = client.parameters()
+    assert whole == [(value.param_id, value.param_value) for value in listed(client.station)]
+    assert client.parameters(b"?start=3&count=4&withdefaults=1") == whole[3:7]
 
 
 def test_single_reads_return_data_until_end_of_file(client):
-    content = client.whole()
-    (opened,) = client.request(OPEN, FILE)
-    (part,) = client.request(READ, session=opened.session, size=80, offset=40)
+    content, session = client.whole(), client.one(OPEN, FILE).session
+    part = client.one(READ, session=session, size=80, offset=40)
     assert (part.opcode, part.payload) == (ACK, content[40:120])
-    for size, offset, error in ((80, len(content), EOF), (240, 0, INVALID_SIZE)):
-        (end,) = client.request(READ, session=opened.session, size=size, offset=offset)
-        assert (end.opcode, end.payload) == (NAK, bytes([error]))
+    assert client.error(READ, session=session, size=80, offset=len(content)) == EOF
+    assert client.error(READ, session=session, size=240) == INVALID_SIZE
 
 
-def test_file_crc_is_correct(client):
-    (reply,) = client.request(CRC, FILE)
-    assert struct.unpack("<I", reply.payload)[0] == crc_by_bits(client.whole())
-
-
-def test_folders_are_listed(client):
-    assert client.request(LISTING, b"/")[0].payload == b"D@PARAM\0"
-    assert client.request(LISTING, b"@PARAM")[0].payload == f"Fparam.pck\t{len(client.whole())}\0".encode()
-    assert client.request(LISTING, b"@PARAM", offset=1)[0].payload[0] == EOF
+def test_file_crc_is_correct_and_folders_are_listed(client):
+    content = client.whole()
+    assert client.one(CRC, FILE).payload == struct.pack("<I", crc_by_bits(content))
+    assert client.one(LISTING, b"/").payload == b"D@PARAM\0"
+    assert client.one(LISTING, b"@PARAM").payload == f"Fparam.pck\t{len(content)}\0".encode()
+    assert client.error(LISTING, b"@PARAM", offset=1) == EOF
 
 
 ELSEWHERE = (b"", b"/etc/passwd", b"../../etc/passwd", b"@PARAM/../etc/passwd", b"@SYS/threads.txt", b"@PARAM",
@@ -107,27 +101,22 @@ REFUSED = [*((OPEN, path, NOT_FOUND) for path in ELSEWHERE), *((op, FILE, PROTEC
            (99, FILE, UNKNOWN)]  # fmt: skip
 
 
-@pytest.mark.parametrize(("opcode", "path", "error"), REFUSED)
-def test_other_paths_and_write_operations_are_refused(client, opcode, path, error):
-    (reply,) = client.request(opcode, path)
-    assert (reply.opcode, reply.payload[0], reply.req_opcode) == (NAK, error, opcode)
+def test_other_paths_and_write_operations_are_refused(client):
+    assert [client.error(opcode, path) for opcode, path, _ in REFUSED] == [error for *_, error in REFUSED]
 
 
 def test_terminated_session_is_invalid(client):
-    (opened,) = client.request(OPEN, FILE)
-    assert client.request(READ, session=opened.session + 1, size=10)[0].payload[0] == INVALID_SESSION
+    assert client.error(READ, session=client.one(OPEN, FILE).session + 1, size=10) == INVALID_SESSION
     for end in (TERMINATE, RESET):
-        (opened,) = client.request(OPEN, FILE)
-        assert client.request(end, session=opened.session)[0].opcode == ACK
-        assert client.request(READ, session=opened.session, size=10)[0].payload[0] == INVALID_SESSION
+        session = client.one(OPEN, FILE).session
+        assert client.one(end, session=session).opcode == ACK
+        assert client.error(READ, session=session, size=10) == INVALID_SESSION
 
 
 def test_a_file_that_is_open_does_not_change(client):
-    before = client.whole()
-    (opened,) = client.request(OPEN, FILE)
-    client.station.send(mavlink.MAVLink_param_set_message(1, 1, b"GOAL_RADIUS", 0.9, 9))
-    (part,) = client.request(READ, session=opened.session, size=200)
-    assert part.payload == before[:200]
+    before, session = client.whole(), client.one(OPEN, FILE).session
+    client.station.send(set_parameter("GOAL_RADIUS", 0.9))
+    assert client.one(READ, session=session, size=200).payload == before[:200]
     assert client.whole() != before
 
 
@@ -146,17 +135,16 @@ def test_replies_echo_the_session_that_the_station_chose(client, session):
 
 def test_stations_do_not_share_a_session(client):
     for system in range(240, 248):  # all choose the same number
-        assert client.request(OPEN, FILE + b"?start=%d" % (system - 240), system=system)[0].session == 0
-    heads = [client.request(READ, size=40, system=system)[0].payload for system in range(240, 248)]
-    assert len(set(heads)) == 8
+        assert client.one(OPEN, FILE + b"?start=%d" % (system - 240), system=system).session == 0
+    assert len({client.one(READ, size=40, system=system).payload for system in range(240, 248)}) == 8
     for system in range(2, 200):  # many more: the oldest go
-        assert client.request(OPEN, FILE, system=system)[0].opcode == ACK
+        assert client.one(OPEN, FILE, system=system).opcode == ACK
+
+
+any_station = cache(Station)
 
 
 @settings(max_examples=examples(200), deadline=None)
 @given(st.binary(max_size=251))
 def test_any_payload_is_answered_at_most_with_a_burst(payload):
     assert len(Client(any_station()).send(payload)) <= 16
-
-
-any_station = cache(Station)

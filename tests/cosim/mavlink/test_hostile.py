@@ -13,21 +13,8 @@ from cosim.mavlink import thread
 from cosim.mavlink.channels.udp import MAX_PEERS, PEER_TIMEOUT, UdpIn
 from cosim.mavlink.thread import LinkThread
 from cosim.mavlink.wire.framing import StreamReader
-from cosim.mavlink.wire.link import Link
 from cosim.mavlink.wire.signing import SigningClock, Verifier
-from tests.cosim.mavlink.stubs import (
-    KEY,
-    SOURCE,
-    Station,
-    StubVehicle,
-    attitude,
-    link_of,
-    open_filter,
-    udp_socket,
-    until,
-)
-
-HERE = "127.0.0.1"
+from tests.cosim.mavlink.stubs import HERE, KEY, Codec, StubVehicle, attitude, link_of, open_filter, udp_socket, until
 
 
 class Script:
@@ -53,20 +40,23 @@ class Script:
     def close(self): ...
 
 
-def interspersed(count, every, station):
+def times_of(messages):
+    return [m.time_boot_ms for _, m in messages if m.get_type() == "ATTITUDE"]
+
+
+def interspersed(count, every, codec):
     for i, data in enumerate(hostile_datagrams(count, seed=1)):
         yield data
         if i % every == 0:
-            yield station.pack(attitude(i))
+            yield codec.pack(attitude(i))
 
 
-def attack(count, verifier=None, station=None):
-    rx, station = open_filter(verifier), station or Station()
-    link = Link("test", Script(interspersed(count, 100, station)), rx, SOURCE)
-    good = [m.time_boot_ms for _, m in link.receive(time.perf_counter() + 600) if m.get_type() == "ATTITUDE"]
-    assert good == list(range(0, count, 100))
+def attack(count, verifier=None, key=None):
+    """Receive hostile datagrams and a valid one after every hundredth; return the counts."""
+    link = link_of(Script(interspersed(count, 100, Codec(key=key))), open_filter(verifier))
+    assert times_of(link.receive(time.perf_counter() + 600)) == list(range(0, count, 100))
     assert link.channel.looked == count + count // 100
-    return rx.stats
+    return link.stats
 
 
 def test_all_valid_datagrams_among_hostile_ones_are_accepted():
@@ -76,17 +66,16 @@ def test_all_valid_datagrams_among_hostile_ones_are_accepted():
 
 
 def test_with_a_key_only_signed_datagrams_are_accepted():
-    counts = attack(5000, Verifier(KEY, SigningClock()), Station(key=KEY))
+    counts = attack(5000, Verifier(KEY, SigningClock()), KEY)
     assert counts.accepted == 50 and counts.unsigned > 900
 
 
 def test_all_valid_frames_in_a_hostile_stream_are_accepted():
     """Also frames after half a frame, which may be taken for its other half until the checksum fails."""
-    station = Station()
-    data = b"".join(interspersed(5000, 20, station)) + bytes(300)
+    data = b"".join(interspersed(5000, 20, Codec())) + bytes(300)
     reader = StreamReader(open_filter())
-    found = [m for i in range(0, len(data), 512) for _, m in reader.read(data[i : i + 512])]
-    assert [m.time_boot_ms for m in found if m.get_type() == "ATTITUDE"] == list(range(0, 5000, 20))
+    found = [m for i in range(0, len(data), 512) for m in reader.read(data[i : i + 512])]
+    assert times_of(found) == list(range(0, 5000, 20))
 
 
 @pytest.mark.slow
@@ -94,7 +83,7 @@ def test_hostile_datagrams_leak_no_memory():
     rx = open_filter()
 
     def receive(count):
-        link = Link("test", Script(hostile_datagrams(count, seed=count)), rx, SOURCE)
+        link = link_of(Script(hostile_datagrams(count, seed=count)), rx)
         for _ in link.receive(time.perf_counter() + 600):
             pass
         assert link.channel.looked == count
@@ -141,11 +130,10 @@ class Answering(StubVehicle):
 def test_flood_consumes_a_bounded_share_of_each_cycle(monkeypatch):
     """However much is waiting, a turn ends; the thread then rests for a multiple of what it took."""
     clock = Clock()
-    monkeypatch.setattr("cosim.mavlink.thread.time", clock)
-    monkeypatch.setattr("cosim.mavlink.wire.link.time", clock)
-    channel, vehicle = Script(hostile_datagrams(10**9, seed=3)), Answering(clock)
-    links = LinkThread(vehicle, [Link("test", channel, open_filter(), SOURCE)], step=0.01)
-    slice_ = thread._RECEIVING
+    for module in ("thread", "wire.link"):
+        monkeypatch.setattr(f"cosim.mavlink.{module}.time", clock)
+    channel, vehicle, slice_ = Script(hostile_datagrams(10**9, seed=3)), Answering(clock), thread._RECEIVING
+    links = LinkThread(vehicle, [link_of(channel)], step=0.01)
     for _ in range(500):
         began, before = clock.now, channel.looked
         rest = links._run_slice()
@@ -157,17 +145,15 @@ def test_flood_consumes_a_bounded_share_of_each_cycle(monkeypatch):
 
 
 def test_a_flooded_port_neither_starves_the_stream_nor_another_link():
-    flooded, quiet = UdpIn(HERE, 0), UdpIn(HERE, 0)
-    vehicle = StubVehicle()
+    flooded, quiet, vehicle, bad = UdpIn(HERE, 0), UdpIn(HERE, 0), StubVehicle(), udp_socket()
     links = LinkThread(vehicle, [link_of(flooded), link_of(quiet)], step=0.01)
     links.start()
-    bad, good = udp_socket(), udp_socket()
     for i, data in enumerate(hostile_datagrams(20_000, seed=4)):
         bad.sendto(data, (HERE, flooded.port))
         if i % 100 == 0:
             links.observe(i // 100, np.array([i * 1e-4]))
-    good.sendto(Station().pack(attitude(77)), (HERE, quiet.port))
-    assert until(lambda: any(m.get_type() == "ATTITUDE" and m.time_boot_ms == 77 for m in vehicle.received))
+    udp_socket().sendto(Codec().pack(attitude(77)), (HERE, quiet.port))
+    assert until(lambda: 77 in times_of((None, m) for m in vehicle.received))
     assert until(lambda: len(vehicle.rows) == 200)
     links.close()
     assert not links.failures
@@ -179,28 +165,22 @@ def test_a_flooded_port_neither_starves_the_stream_nor_another_link():
 def test_flood_of_new_addresses_does_not_displace_a_station_that_was_heard(before, silence, monkeypatch):
     """The station speaks for a minute, is silent, and speaks again, while thousands of ports send valid frames."""
     clock = SimpleNamespace(now=100.0, monotonic=lambda: clock.now)
-    channel = UdpIn(HERE, 0)
+    channel, rng = link_of(UdpIn(HERE, 0)).channel, random.Random(5)
     monkeypatch.setattr("cosim.mavlink.channels.udp.time", clock)
-    ports = iter(range(20_000, 60_000))
-    station, rng = (HERE, 14550), random.Random(5)
+    station, ports = (HERE, 14550), iter(range(20_000, 60_000))
 
-    def passes(seconds, speaks=False, floods=False):
+    def passes(seconds, speaks):
         for _ in range(max(1, round(seconds))):
             clock.now += 1.0
-            if speaks:
-                channel.record_version(station, 2)
-            for _ in range(rng.randrange(8) if floods else 0):
-                channel.record_version((HERE, next(ports)), 2)
+            for peer in [station] * speaks + [(HERE, next(ports)) for _ in range(rng.randrange(8))]:
+                channel.record_version(peer, 2)
             channel.poll(clock.now)
             assert len(channel._peers) <= MAX_PEERS
+        return station in channel.peers
 
     for _ in range(before):
         channel.record_version((HERE, next(ports)), 2)
         clock.now += 0.5 * PEER_TIMEOUT
-    passes(60.0, speaks=True, floods=True)
-    assert station in channel.peers
-    passes(silence, floods=True)
-    assert (station in channel.peers) == (silence < PEER_TIMEOUT)
-    passes(1.0, speaks=True, floods=True)
-    assert station in channel.peers
-    channel.close()
+    assert passes(60.0, speaks=True)
+    assert passes(silence, speaks=False) == (silence < PEER_TIMEOUT)
+    assert passes(1.0, speaks=True)

@@ -16,11 +16,13 @@ from cosim.mavlink.vehicle.view import View
 from cosim.mavlink.wire.encode import Encoder
 from cosim.simulation.columns import column_names
 from cosim.simulation.signals import Column
-from tests.cosim.mavlink.station import Station, scenario
+from tests.cosim.mavlink.station import ACCEPTED, DENIED, Station, long, scenario
 
 TURN = from_axis_angle(np.array([0.0, 0.0, 1.0]), 2.0)
 EULER = (0.0, 0.0, 2.0)
 OWN = Version(metadata.version("subreach")).release
+NORTH, EAST, DOWN = rotation_matrix(TURN) @ np.array([0.5, -0.2, 0.1])
+SURFACE = 1013.25  # hPa
 
 
 @pytest.fixture
@@ -37,47 +39,39 @@ def station():
     return station
 
 
-def request(station, message_id):
-    station.wire.clear()
-    station.command(512, message_id)
-    return [m for m in station.wire.got if m.get_type() != "COMMAND_ACK"]
+FIELDS = {
+    "ATTITUDE": {"time_boot_ms": 12_500, "yaw": 2.0, "yawspeed": 0.03},
+    "ATTITUDE_QUATERNION": {"q1": math.cos(1.0), "q2": 0.0, "q4": math.sin(1.0)},
+    "LOCAL_POSITION_NED": {"x": 1.0, "y": 2.0, "z": 5.0, "vx": NORTH, "vy": EAST, "vz": DOWN},
+    "GLOBAL_POSITION_INT": {
+        "relative_alt": -5000, "alt": -5000, "hdg": round(math.degrees(2.0) * 100), "vx": round(NORTH * 100),
+        "vy": round(EAST * 100), "vz": round(DOWN * 100)},
+    "VFR_HUD": {"alt": -5.0, "climb": -DOWN, "heading": 115, "throttle": 100},
+    "ODOMETRY": {"frame_id": 1, "child_frame_id": 12, "estimator_type": 8, "vx": 0.5, "pose_covariance": math.nan},
+    "SCALED_PRESSURE2": {"press_abs": SURFACE + 1000.0 * 9.80665 * 5.0 / 100.0},
+    "SCALED_PRESSURE": {"press_abs": SURFACE},
+    "ACTUATOR_OUTPUT_STATUS": {"actuator": [0.5, -1.0, 0.0, 1.0, *[0.0] * 28], "active": 0xFF},
+    "POSITION_TARGET_LOCAL_NED": {"coordinate_frame": 1, "x": 8.0, "y": 0.0, "z": 5.0},
+    "NAV_CONTROLLER_OUTPUT": {
+        "wp_dist": round(math.hypot(7.0, 2.0)), "target_bearing": round(math.degrees(math.atan2(-2, 7)))},
+    "EXTENDED_SYS_STATE": {"landed_state": mavlink.MAV_LANDED_STATE_IN_AIR},
+}  # fmt: skip
 
 
-def test_pose_messages_match_the_snapshot(station):
-    (attitude,) = request(station, 30)
-    assert (attitude.time_boot_ms, attitude.yaw, attitude.yawspeed) == (12_500, 2.0, pytest.approx(0.03))
-    (quaternion,) = request(station, 31)
-    assert (quaternion.q1, quaternion.q4) == (pytest.approx(math.cos(1.0)), pytest.approx(math.sin(1.0)))
-    (local,) = request(station, 32)
-    north, east, down = rotation_matrix(TURN) @ np.array([0.5, -0.2, 0.1])
-    assert (local.x, local.y, local.z) == (1.0, 2.0, 5.0)
-    assert (local.vx, local.vy, local.vz) == pytest.approx((north, east, down), rel=1e-6)
-    (globe,) = request(station, 33)
-    assert (globe.relative_alt, globe.alt, globe.hdg) == (-5000, -5000, round(math.degrees(2.0) * 100))
-    assert (globe.vx, globe.vy, globe.vz) == (round(north * 100), round(east * 100), round(down * 100))
-    (hud,) = request(station, 74)
-    assert (hud.alt, hud.climb, hud.heading, hud.throttle) == (-5.0, pytest.approx(-down), 115, 100)
-    (odometry,) = request(station, 331)
-    assert (odometry.frame_id, odometry.child_frame_id, odometry.estimator_type) == (1, 12, 8)
-    assert math.isnan(odometry.pose_covariance[0]) and odometry.vx == 0.5
-
-
-def test_depth_is_reported_as_pressure(station):
-    (outside,), (inside,) = request(station, 137), request(station, 29)
-    assert outside.press_abs == pytest.approx(1013.25 + 1000.0 * 9.80665 * 5.0 / 100.0)
-    assert inside.press_abs == pytest.approx(1013.25)
-
-
-def test_actuator_outputs_are_normalized_forces(station):
-    (actuators,) = request(station, 375)
-    assert actuators.actuator[:4] == [0.5, -1.0, 0.0, 1.0] and actuators.active == 0xFF
+@pytest.mark.parametrize("name", FIELDS)
+def test_messages_match_the_snapshot(station, name):
+    (sent,) = station.request(getattr(mavlink, f"MAVLINK_MSG_ID_{name}"))
+    for field, expected in FIELDS[name].items():
+        value = getattr(sent, field)
+        value = value[0] if isinstance(value, list) and not isinstance(expected, list) else value
+        assert value == pytest.approx(expected, rel=1e-6, nan_ok=True), field
 
 
 def servos(of, profile="ardusub", **row):
     station = Station(profile, of=of)
     station.look(1.0, **row)
-    (message,) = request(station, 36)
-    return [getattr(message, f"servo{i}_raw") for i in range(1, 10)]
+    (sent,) = station.request(36)
+    return [getattr(sent, f"servo{i}_raw") for i in range(1, 10)]
 
 
 def test_servo_pulses_follow_the_vehicle_table():
@@ -86,54 +80,36 @@ def test_servo_pulses_follow_the_vehicle_table():
     heavy = scenario("vehicle='bluerov2_heavy'", "actuation.through='thrusters'")
     assert servos(heavy, **forward) == [1300, 1300, 1700, 1700, 1500, 1500, 1500, 1500, 0]
     assert servos(heavy, "px4", **forward) == [1600, 1600, 1400, 1400, 1500, 1500, 1500, 1500, 0]  # linear, unsigned
+    # without a table linear in order
+    assert servos(scenario(), **{"thrust[1]": (13.5, -27.0, 0.0, 54.0)})[:4] == [1700, 1100, 1500, 1900]
 
 
-def test_vehicle_without_a_table_has_linear_pulses_in_order():
-    forces = (13.5, -27.0, 0.0, 54.0)
-    assert servos(scenario(), **{"thrust[1]": forces})[:4] == [1700, 1100, 1500, 1900]
-
-
-def test_time_of_servos_wraps():
-    station = Station()
+def test_times_wrap(station):
     station.look(5000.0)
-    (servo,) = request(station, 36)
-    assert servo.time_usec == 5_000_000_000 % 2**32
+    assert station.request(36)[0].time_usec == 5_000_000_000 % 2**32
     station.look(5e6)
-    (attitude,) = request(station, 30)
-    assert attitude.time_boot_ms == 5_000_000_000 % 2**32
+    assert station.request(30)[0].time_boot_ms == 5_000_000_000 % 2**32
 
 
 def test_sensors_checked_by_mavsdk_are_healthy(station):
-    (status,) = request(station, 1)
-    for bit in (1, 2, 4, 32, mavlink.MAV_SYS_STATUS_PREARM_CHECK):
-        assert status.onboard_control_sensors_present & status.onboard_control_sensors_enabled & bit
-        assert status.onboard_control_sensors_health & bit
+    (status,) = station.request(1)
+    bits = 1 | 2 | 4 | 32 | mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    for field in ("present", "enabled", "health"):
+        assert getattr(status, f"onboard_control_sensors_{field}") & bits == bits
     assert status.onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_GEOFENCE
 
 
-def test_target_messages_match_the_goal(station):
-    (target,) = request(station, 85)
-    assert (target.coordinate_frame, target.x, target.y, target.z) == (1, 8.0, 0.0, 5.0)
-    (nav,) = request(station, 62)
-    assert nav.wp_dist == round(math.hypot(7.0, 2.0)) and nav.target_bearing == round(math.degrees(math.atan2(-2, 7)))
-
-
 def test_weights_and_estimates_are_sent_as_named_values(station):
-    values = {m.name: m.value for m in request(station, 251)}
-    assert values["w_obstacle"] == pytest.approx(0.7) and values["phi4"] == 4.0 and values["goal_clear"] == -3.0
-    assert values["qp_slack"] == 0.25 and values["clearance"] == 2.0 and values["thrust"] == 1.0
+    values = {m.name: m.value for m in station.request(251)}
     assert all(len(name) <= 10 for name in values)
+    expected = {"w_obstacle": 0.7, "phi4": 4.0, "goal_clear": -3.0, "qp_slack": 0.25, "clearance": 2.0, "thrust": 1.0}
+    assert {name: values[name] for name in expected} == pytest.approx(expected)
 
 
 def test_debug_arrays_hold_weights_clearances_and_thrusts(station):
-    arrays = {m.array_id: m for m in request(station, 350)}
-    assert {i: m.name for i, m in arrays.items()} == {
-        1: "weights",
-        2: "values",
-        3: "clearances",
-        4: "thrusts",
-        5: "law",
-    }
+    arrays = {m.array_id: m for m in station.request(350)}
+    names = {1: "weights", 2: "values", 3: "clearances", 4: "thrusts", 5: "law"}
+    assert {i: m.name for i, m in arrays.items()} == names
     assert arrays[1].data[3:6] == pytest.approx([0.7, 0.2, 0.1])
     assert arrays[3].data[:4] == [-3.0, 2.0, 2.0, 2.0] and arrays[4].data[:2] == [13.5, -27.0]
 
@@ -141,34 +117,30 @@ def test_debug_arrays_hold_weights_clearances_and_thrusts(station):
 def test_obstacle_distances_are_relative_to_the_vehicle():
     station = Station()
     # SR1 of the scenario: a sphere of 0.5 m about (2, 0, 1.8); a seen one about (5, 2, 5) of 1 m
-    there = np.array([5.0, 2.0, 5.0]) - [0.0, 0.0, -1e5]
-    distance = math.dist((1.0, 2.0, 5.0), (2.0, 0.0, 1.8)) - 0.5
+    there, distance = np.array([5.0, 2.0, 5.0]) - [0.0, 0.0, -1e5], math.dist((1.0, 2.0, 5.0), (2.0, 0.0, 1.8)) - 0.5
     station.look(1.0, **{
         "quaternion.e0": tuple(TURN), "attitude.roll": EULER, "seen 1.shift.x": tuple(there),
         "goal.clearance": (-3.0, distance, 2.0, 2.0, 3.0, 1e5),
     })  # fmt: skip
-    found = {m.obstacle_id: (m.x, m.y, m.z) for m in request(station, 11037)}
+    found = {m.obstacle_id: (m.x, m.y, m.z) for m in station.request(11037)}
     assert set(found) == {1, 4}
-    here, back = np.array([1.0, 2.0, 5.0]), rotation_matrix(TURN).T
-    towards = np.array([2.0, 0.0, 1.8]) - here
+    back = rotation_matrix(TURN).T
+    towards = np.array([2.0, 0.0, 1.8]) - [1.0, 2.0, 5.0]
     assert found[1] == pytest.approx(back @ (towards * distance / np.linalg.norm(towards)), abs=1e-5)
     assert found[4] == pytest.approx(back @ np.array([3.0, 0.0, 0.0]), abs=1e-5)
 
 
 def test_rangefinder_is_reported_only_above_a_bottom(station):
-    for message_id in (132, 173, 11038):
-        assert request(station, message_id) == []
+    assert [station.request(number) for number in (132, 173, 11038)] == [[]] * 3
     station.look(13.0, **{"altitude": 2.5, "measured.altitude": 2.5})
-    assert request(station, 132)[0].current_distance == 250 and request(station, 132)[0].orientation == 25
-    assert request(station, 173)[0].distance == 2.5 and request(station, 11038)[0].distance == 2.5
+    sensor, finder, depth = (station.request(number)[0] for number in (132, 173, 11038))
+    assert (sensor.current_distance, sensor.orientation, finder.distance, depth.distance) == (250, 25, 2.5, 2.5)
 
 
 def test_armed_vehicle_is_in_air_even_on_the_bottom(station):
-    assert request(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
-    station.look(13.0, bottom_contact=1.0)
-    assert request(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_IN_AIR
-    station.look(14.0, **{"commands.armed": 0.0})
-    assert request(station, 245)[0].landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
+    for values, landed in (({"bottom_contact": 1.0}, "IN_AIR"), ({"commands.armed": 0.0}, "ON_GROUND")):
+        station.play(values)
+        assert station.request(245)[0].landed_state == getattr(mavlink, f"MAV_LANDED_STATE_{landed}")
 
 
 @pytest.mark.parametrize(
@@ -180,32 +152,31 @@ def test_armed_vehicle_is_in_air_even_on_the_bottom(station):
     ],
 )
 def test_version_matches_the_emulated_autopilot(profile, flight, custom):
-    (version,) = request(Station(profile), 148)
+    (version,) = Station(profile).request(148)
     assert version.flight_sw_version == flight  # ends in 255 if official, which QGroundControl compares with the newest
     assert version.middleware_sw_version == OWN[0] << 24 | OWN[1] << 16 | OWN[2] << 8 | 255
     assert bytes(version.flight_custom_version) == custom
 
 
 def test_initial_position_is_reported_before_the_first_step():
-    station = Station(of=scenario("initial.position=[1.0, 2.0, 3.0]"))
-    (local,) = request(station, 32)
+    (local,) = Station(of=scenario("initial.position=[1.0, 2.0, 3.0]")).request(32)
     assert (local.x, local.y, local.z) == (1.0, 2.0, 3.0)
 
 
 def test_global_origin_and_home_can_be_set():
-    station = Station()
+    station, place = Station(), (470_000_000, 80_000_000, 12_000)
     station.look()
-    replies = station.send(mavlink.MAVLink_set_gps_global_origin_message(1, 470_000_000, 80_000_000, 12_000))
-    assert replies[0].get_type() == "GPS_GLOBAL_ORIGIN"
-    assert (replies[0].latitude, replies[0].longitude, replies[0].altitude) == (470_000_000, 80_000_000, 12_000)
-    (globe,) = request(station, 33)
+    (origin, _) = station.send(mavlink.MAVLink_set_gps_global_origin_message(1, *place))
+    assert origin.get_type() == "GPS_GLOBAL_ORIGIN"
+    assert (origin.latitude, origin.longitude, origin.altitude) == place
+    (globe,) = station.request(33)
     assert globe.lat == pytest.approx(470_000_000, abs=200) and (globe.alt, globe.relative_alt) == (7000, -5000)
-    assert station.command(179, 1.0) == mavlink.MAV_RESULT_ACCEPTED  # here
-    (home,) = request(station, 242)
+    station.play((long(179, 1.0), ACCEPTED))  # here
+    (home,) = station.request(242)
     assert (home.latitude, home.longitude, home.altitude, home.z) == (globe.lat, globe.lon, 12_000, 0.0)
-    assert station.command(179, 0.0) == mavlink.MAV_RESULT_DENIED  # nowhere
+    station.play((long(179, 0.0), DENIED))  # nowhere
     station.send(mavlink.MAVLink_set_gps_global_origin_message(1, 2**31 - 1, 0, 0))
-    assert request(station, 49)[0].latitude == 470_000_000
+    assert station.request(49)[0].latitude == 470_000_000
 
 
 def ecef(latitude, longitude, altitude):
@@ -223,7 +194,6 @@ def ecef(latitude, longitude, altitude):
 @pytest.mark.parametrize("offset", [(100.0, 0.0, 0.0), (0.0, 100.0, 5.0), (-70.0, 70.0, 30.0)])
 def test_local_frame_matches_the_ellipsoid(latitude, offset):
     frame = LocalFrame(latitude, 179.9999)
-    north, east, down = offset
     here, there = ecef(latitude, 179.9999, 0.0), ecef(*frame.to_global(offset))
     lat, lon = math.radians(latitude), math.radians(179.9999)
     axes = np.array([
@@ -232,7 +202,7 @@ def test_local_frame_matches_the_ellipsoid(latitude, offset):
         [-math.cos(lat) * math.cos(lon), -math.cos(lat) * math.sin(lon), -math.sin(lat)],
     ])  # fmt: skip
     # the plane leaves the ellipsoid by s^2 / 2 R, 0.8 mm at 100 m; meridians draw together a little more near the poles
-    assert axes @ (there - here) == pytest.approx((north, east, down), abs=0.01)
+    assert axes @ (there - here) == pytest.approx(offset, abs=0.01)
     assert frame.to_local(*frame.to_global(offset)) == pytest.approx(offset, abs=1e-6)
 
 
@@ -244,23 +214,22 @@ def test_the_local_frame_stays_finite_at_the_pole():
 
 
 def test_out_of_range_values_are_clamped_to_the_field():
-    make = Encoder(mavlink)
-    coder = mavlink.MAVLink(None)
-    message = make("GLOBAL_POSITION_INT", -1, math.inf, -math.inf, 1e300, math.nan, 1e9, -1e9, 0.6, math.nan)
-    message.pack(coder)
-    assert (message.time_boot_ms, message.lat, message.lon, message.alt) == (0, 2**31 - 1, -(2**31), 2**31 - 1)
-    assert (message.relative_alt, message.vx, message.vy, message.vz, message.hdg) == (0, 32767, -32768, 1, 65535)
-    make("ATTITUDE", 0, math.inf, 1e300, math.nan, 0, 0, 0).pack(coder)
-    make("BATTERY_STATUS", 0, 0, 0, 0, [1] * 20, 0, 0, 0, 0).pack(coder)
-    make("STATUSTEXT", 6, "größer" * 20, 0, 0).pack(coder)
-    make("ACTUATOR_OUTPUT_STATUS", 0, 0, [1.0]).pack(coder)
+    make, coder = Encoder(mavlink), mavlink.MAVLink(None)
+    sent = make("GLOBAL_POSITION_INT", -1, math.inf, -math.inf, 1e300, math.nan, 1e9, -1e9, 0.6, math.nan)
+    assert sent.pack(coder)
+    assert (sent.time_boot_ms, sent.lat, sent.lon, sent.alt) == (0, 2**31 - 1, -(2**31), 2**31 - 1)
+    assert (sent.relative_alt, sent.vx, sent.vy, sent.vz, sent.hdg) == (0, 32767, -32768, 1, 65535)
+    for name, *values in (
+        ("ATTITUDE", 0, math.inf, 1e300, math.nan, 0, 0, 0), ("BATTERY_STATUS", 0, 0, 0, 0, [1] * 20, 0, 0, 0, 0),
+        ("STATUSTEXT", 6, "größer" * 20, 0, 0), ("ACTUATOR_OUTPUT_STATUS", 0, 0, [1.0]),
+    ):  # fmt: skip
+        assert make(name, *values).pack(coder)
 
 
 def test_euler_angles_are_those_of_the_plant():
-    for roll, pitch, yaw in ((0.1, 0.2, 0.3), (-2.0, -1.5, 3.0), (0.0, 0.0, -3.1)):
-        parts = [from_axis_angle(np.eye(3)[i], angle) for i, angle in enumerate((roll, pitch, yaw))]
-        whole_turn = multiply(parts[2], multiply(parts[1], parts[0]))
-        assert quaternion_to_euler(whole_turn.tolist()) == pytest.approx((roll, pitch, yaw), abs=1e-9)
+    for angles in ((0.1, 0.2, 0.3), (-2.0, -1.5, 3.0), (0.0, 0.0, -3.1)):
+        roll, pitch, yaw = (from_axis_angle(axis, angle) for axis, angle in zip(np.eye(3), angles, strict=True))
+        assert quaternion_to_euler(multiply(yaw, multiply(pitch, roll)).tolist()) == pytest.approx(angles, abs=1e-9)
 
 
 def test_weight_names_of_custom_criteria_are_unique():
@@ -270,12 +239,11 @@ def test_weight_names_of_custom_criteria_are_unique():
 
 def test_the_weights_and_memberships_of_four_criteria_are_sent():
     four = scenario(name="inspection-visibility")
-    columns = [Column(name, "", "") for name in column_names(four)]
-    weights, memberships = (0.5, 0.25, 0.125, 0.75), (1.0, 0.0, 0.5, 0.25)
-    row = np.zeros(len(columns))
-    for of, values in (("weight", weights), ("membership", memberships)):
-        at = [column.name for column in columns].index(f"{of}.obstacle")
-        row[at : at + 4] = values
-    view = View(RowLayout(four, columns), row)
-    assert (view.weights, view.memberships) == (list(weights), list(memberships))
+    names = column_names(four)
+    row, values = np.zeros(len(names)), {"weight": [0.5, 0.25, 0.125, 0.75], "membership": [1.0, 0.0, 0.5, 0.25]}
+    for of, numbers in values.items():
+        first = names.index(f"{of}.obstacle")
+        row[first : first + 4] = numbers
+    view = View(RowLayout(four, [Column(name, "", "") for name in names]), row)
+    assert {"weight": view.weights, "membership": view.memberships} == values
     assert dict(zip(weight_names(view.criteria), view.weights, strict=True))["w_visibili"] == 0.75

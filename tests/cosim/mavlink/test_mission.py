@@ -5,7 +5,7 @@ import math
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.simulation.commands.commands import (  # fmt: skip
+from cosim.simulation.commands.commands import (
     ChangeSetting,
     MissionItem,
     SetCurrentItem,
@@ -13,19 +13,20 @@ from cosim.simulation.commands.commands import (  # fmt: skip
     SetMission,
     SetMode,
 )
-from tests.cosim.mavlink.station import NAN, Station, scenario
+from tests.cosim.mavlink.station import ACCEPTED, DENIED, FAILED, NAN, Station, long, scenario, set_parameter
+from tests.cosim.mavlink.stubs import message
 
 LOCAL, GLOBAL, RELATIVE, GLOBAL_INT, RELATIVE_INT, TERRAIN = 1, 0, 3, 5, 6, 10
 LATITUDE, LONGITUDE = 559_097_000, -33_203_000  # of the origin
 WAYPOINT, FOREVER, FOR_TIME, HOME, LAND = 16, 17, 19, 20, 21
 SPLINE, DELAY, WAIT, YAW, JUMP, SPEED = 82, 93, 112, 115, 177, 178
+COUNT, LIST = mavlink.MAVLink_mission_count_message, mavlink.MAVLink_mission_request_list_message
+OK = mavlink.MAV_MISSION_ACCEPTED
 
 
-@pytest.fixture(params=["ardusub", "px4", "generic"])
-def station(request):
-    station = Station(request.param)
-    station.look()
-    return station
+@pytest.fixture
+def station(each_station):
+    return each_station
 
 
 def first(station):
@@ -38,16 +39,30 @@ def item(seq, frame=LOCAL, command=WAYPOINT, numbers=(0.0, 0.0, 0.0, NAN), place
 
 def upload(station, *items, **who):
     """Upload as stations do, with home first where that is the way, until it is accepted or refused; return which."""
-    items = [{}, *items] if first(station) else list(items)
-    replies = station.send(mavlink.MAVLink_mission_count_message(1, 1, len(items), 0), **who)
+    items = [{}] * first(station) + list(items)
+    replies = station.send(COUNT(1, 1, len(items), 0), **who)
     for seq, fields in enumerate(items):
         if replies and replies[-1].get_type() == "MISSION_ACK":
             break
-        (asked,) = [r for r in replies if r.get_type() == "MISSION_REQUEST_INT"]
-        assert (asked.seq, asked.target_system, asked.target_component) == (seq, who.get("system", 255), 190)
+        (request,) = [r for r in replies if r.get_type() == "MISSION_REQUEST_INT"]
+        assert (request.seq, request.target_system, request.target_component) == (seq, who.get("system", 255), 190)
         replies = station.send(item(seq, **fields), **who)
+    return result(replies)
+
+
+def result(replies):
+    """Return the type of the one MISSION_ACK."""
     (ack,) = [r for r in replies if r.get_type() == "MISSION_ACK"]
     return ack.type
+
+
+def count(station, kind=0):
+    (reply,) = station.send(LIST(1, 1, kind))
+    assert reply.mission_type == kind
+    return reply.count
+
+
+GLOBE = {"place": (LATITUDE, LONGITUDE, -2.0)}
 
 
 def test_mission_round_trips(station):
@@ -56,22 +71,19 @@ def test_mission_round_trips(station):
         {"command": FOR_TIME, "numbers": (9.0, 0.0, 0.0, NAN), "frame": RELATIVE_INT, **GLOBE},
         {"command": FOREVER, "frame": GLOBAL, "place": (LATITUDE + 100, LONGITUDE - 100, -2.0)},
     ]
-    assert upload(station, *items) == mavlink.MAV_MISSION_ACCEPTED
-    (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
-    assert (count.count, count.mission_type) == (3 + first(station), 0)
-    for i, fields in enumerate(items):
-        (back,) = station.send(mavlink.MAVLink_mission_request_int_message(1, 1, i + first(station), 0))
-        sent = item(i + first(station), **fields)
-        for name in ("seq", "frame", "command", "autocontinue", "param1", "param2", "param3", "x", "y", "z"):
-            assert getattr(back, name) == getattr(sent, name)
-        assert back.param4 == sent.param4 or (math.isnan(back.param4) and math.isnan(sent.param4))
-        (old,) = station.send(mavlink.MAVLink_mission_request_message(1, 1, i + first(station), 0))
+    assert upload(station, *items) == OK and count(station) == 3 + first(station)
+    for seq, fields in enumerate(items, first(station)):
+        (back,) = station.send(message("MISSION_REQUEST_INT", 1, seq=seq, mission_type=0))
+        sent = item(seq, **fields)
+        names = ("seq", "frame", "command", "autocontinue", *(f"param{i}" for i in range(1, 5)), "x", "y", "z")
+        expected = [getattr(sent, name) for name in names]
+        assert [getattr(back, name) for name in names] == pytest.approx(expected, rel=0.0, abs=0.0, nan_ok=True)
+        (old,) = station.send(message("MISSION_REQUEST", 1, seq=seq, mission_type=0))
         scale = 1e4 if back.frame == LOCAL else 1e7
         assert old.get_type() == "MISSION_ITEM" and old.x * scale == pytest.approx(back.x, rel=1e-6, abs=100)
 
 
 MISSION = {"frame": 2, "place": (0, 0, 0.0)}  # MAV_FRAME_MISSION
-GLOBE = {"place": (LATITUDE, LONGITUDE, -2.0)}
 # an item as it is sent, and what it means; the jumps go to the item with the number 2
 MEANINGS = [
     ({"numbers": (5.0, 1.5, 0.0, NAN)}, MissionItem((1.0, 2.0, 3.0), 1.5, 5.0)),
@@ -103,9 +115,9 @@ def test_mission_items_are_decoded(station):
     for fields in sent:
         if fields.get("command") == JUMP:
             fields["numbers"] = (2.0 + first(station), *fields["numbers"][1:])
-    assert upload(station, *sent) == mavlink.MAV_MISSION_ACCEPTED
+    assert upload(station, *sent) == OK
     assert station.commanded() == [SetMission(tuple(meaning for _, meaning in MEANINGS))]
-    (back,) = station.send(mavlink.MAVLink_mission_request_message(1, 1, 13 + first(station), 0))
+    (back,) = station.send(message("MISSION_REQUEST", 1, seq=13 + first(station), mission_type=0))
     assert (back.command, back.frame, back.param1, back.x) == (JUMP, 2, 2.0 + first(station), 0.0)
 
 
@@ -116,68 +128,56 @@ def test_speed_item_is_rejected_for_a_law_without_speed():
 
 
 def test_invalid_item_is_rejected_on_receipt_by_name(station):
-    items = [{}, {"command": 201}, {}, {}]  # QGroundControl names the item that it sent last
-    station.send(mavlink.MAVLink_mission_count_message(1, 1, 4 + first(station), 0))
+    station.send(COUNT(1, 1, 4 + first(station), 0))
     for seq in range(1 + first(station)):
         station.send(item(seq))
-    *texts, ack = station.send(item(1 + first(station), **items[1]))
-    assert ack.type == mavlink.MAV_MISSION_UNSUPPORTED
-    text = "".join(part.text for part in texts)
-    assert text == f"Refused: mission item {1 + first(station)}: command 201 DO_SET_ROI is not known in a mission"
-    assert station.send(item(2 + first(station)))[-1].type == mavlink.MAV_MISSION_ERROR  # it is over
+    seq = 1 + first(station)  # QGroundControl names the item that it sent last
+    assert result(station.send(item(seq, command=201))) == mavlink.MAV_MISSION_UNSUPPORTED
+    assert station.wire.texts == [f"Refused: mission item {seq}: command 201 DO_SET_ROI is not known in a mission"]
+    assert result(station.send(item(seq + 1))) == mavlink.MAV_MISSION_ERROR  # it is over
 
 
 def test_mission_speed_updates_the_parameter(station):
     upload(station, {}, {"command": SPEED, "numbers": (1, 0.25, -1, 0)}, {})
-    for item in (0.0, 2.0):  # the step of item 1 was not seen
-        station.look(1.0 + item, **{"commands.mode": 3.0, "commands.item": item})
-    (value,) = station.send(mavlink.MAVLink_param_request_read_message(1, 1, b"LAW_SPEED", -1))
+    for now in (0.0, 2.0):  # the step of item 1 was not seen
+        station.play({"commands.mode": 3.0, "commands.item": now})
+    (value,) = station.send(message("PARAM_REQUEST_READ", 1, param_id=b"LAW_SPEED", param_index=-1))
     assert value.param_value == 0.25
     assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [first(station)]  # nor is it reported
     station.commanded()
-    station.send(mavlink.MAVLink_param_set_message(1, 1, b"LAW_SPEED", 1.0, 9))
-    assert station.commanded() == [ChangeSetting("law.gains.speed", 1.0)]
+    station.play(set_parameter("LAW_SPEED", 1.0), [ChangeSetting("law.gains.speed", 1.0)])
 
 
-@pytest.mark.medium(fast=11)
-@pytest.mark.parametrize(
-    ("fields", "result"),
-    [
-        ({"command": 22}, mavlink.MAV_MISSION_UNSUPPORTED),
-        ({"frame": TERRAIN}, mavlink.MAV_MISSION_UNSUPPORTED_FRAME),
-        ({"numbers": (-1.0, 0, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
-        ({"numbers": (0, -1.0, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM2),
-        ({"numbers": (math.inf, 0, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
-        ({"frame": RELATIVE_INT, "place": (0, LONGITUDE, -4.0)}, mavlink.MAV_MISSION_INVALID_PARAM5_X),
-        ({"frame": RELATIVE_INT, "place": (LATITUDE, 0, -4.0)}, mavlink.MAV_MISSION_INVALID_PARAM6_Y),
-        ({"place": (0, 0, 1e6)}, mavlink.MAV_MISSION_INVALID_PARAM7),
-        ({"place": (0, 0, NAN)}, mavlink.MAV_MISSION_INVALID_PARAM7),
-        ({"command": SPEED, "numbers": (1, NAN, -1, 0)}, mavlink.MAV_MISSION_INVALID_PARAM2),
-        ({"command": SPEED, "numbers": (1, 0.0, -1, 0)}, mavlink.MAV_MISSION_INVALID_PARAM2),
-        ({"command": YAW, "numbers": (90, 0, 1, 1)}, mavlink.MAV_MISSION_INVALID_PARAM4),
-        ({"command": YAW, "numbers": (NAN, 0, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
-        ({"command": DELAY, "numbers": (-1, 0, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
-        ({"command": JUMP, "numbers": (9, 1, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
-        ({"command": JUMP, "numbers": (-1, 1, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
-        ({"command": JUMP, "numbers": (1, NAN, 0, 0)}, mavlink.MAV_MISSION_INVALID_PARAM2),
-    ],
-)
-def test_invalid_mission_is_rejected_and_the_old_one_kept(station, fields, result):
+INVALID = {
+    "UNSUPPORTED": [{"command": 22}],
+    "UNSUPPORTED_FRAME": [{"frame": TERRAIN}],
+    "INVALID_PARAM1": [
+        {"numbers": (-1.0, 0, 0, 0)}, {"numbers": (math.inf, 0, 0, 0)}, {"command": YAW, "numbers": (NAN, 0, 0, 0)},
+        {"command": DELAY, "numbers": (-1, 0, 0, 0)}, {"command": JUMP, "numbers": (9, 1, 0, 0)},
+        {"command": JUMP, "numbers": (-1, 1, 0, 0)}],
+    "INVALID_PARAM2": [
+        {"numbers": (0, -1.0, 0, 0)}, {"command": SPEED, "numbers": (1, NAN, -1, 0)},
+        {"command": SPEED, "numbers": (1, 0.0, -1, 0)}, {"command": JUMP, "numbers": (1, NAN, 0, 0)}],
+    "INVALID_PARAM4": [{"command": YAW, "numbers": (90, 0, 1, 1)}],
+    "INVALID_PARAM5_X": [{"frame": RELATIVE_INT, "place": (0, LONGITUDE, -4.0)}],
+    "INVALID_PARAM6_Y": [{"frame": RELATIVE_INT, "place": (LATITUDE, 0, -4.0)}],
+    "INVALID_PARAM7": [{"place": (0, 0, 1e6)}, {"place": (0, 0, NAN)}],
+}  # fmt: skip
+
+
+def test_invalid_mission_is_rejected_and_the_old_one_kept(station):
     upload(station, {})
     station.commanded()
-    assert upload(station, {}, fields) == result
-    assert station.commanded() == []
-    (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
-    assert count.count == 1 + first(station)  # the mission before is still there
+    for name, fields in ((name, fields) for name, several in INVALID.items() for fields in several):
+        assert upload(station, {}, fields) == getattr(mavlink, f"MAV_MISSION_{name}"), fields
+        assert station.commanded() == [] and count(station) == 1 + first(station)
 
 
 def test_deprecated_float_mission_items_are_accepted():
     station = Station("generic")
-    station.look()
-    station.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0))
+    station.play({}, COUNT(1, 1, 1, 0))
     old = mavlink.MAVLink_mission_item_message(1, 1, 0, LOCAL, WAYPOINT, 0, 1, 0, 2.0, 0, 0, 1.5, -2.5, 4.0, 0)
-    (ack,) = station.send(old)
-    assert ack.type == mavlink.MAV_MISSION_ACCEPTED
+    assert result(station.send(old)) == OK
     assert station.commanded() == [SetMission((MissionItem((1.5, -2.5, 4.0), 2.0, 0.0),))]
 
 
@@ -185,100 +185,81 @@ def test_home_is_the_first_item_for_ardupilot():
     station = Station("ardusub")
     station.look()
     upload(station, {})
-    (home,) = station.send(mavlink.MAVLink_mission_request_int_message(1, 1, 0, 0))
+    (home,) = station.send(message("MISSION_REQUEST_INT", 1, seq=0, mission_type=0))
     assert (home.command, home.x, home.y, home.z) == (WAYPOINT, LATITUDE, LONGITUDE, 0.0)
 
 
 def test_fences_and_rally_points_are_empty(station):
+    clear = mavlink.MAVLink_mission_clear_all_message
     for kind in (1, 2):
-        (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, kind))
-        assert (count.count, count.mission_type) == (0, kind)
-        (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 2, kind))
+        assert count(station, kind) == 0
+        (ack,) = station.send(COUNT(1, 1, 2, kind))
         assert (ack.type, ack.mission_type) == (mavlink.MAV_MISSION_UNSUPPORTED, kind)
-        (ack,) = station.send(mavlink.MAVLink_mission_clear_all_message(1, 1, kind))
-        assert ack.type == mavlink.MAV_MISSION_ACCEPTED
-    (ack,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 9))
-    assert ack.type == mavlink.MAV_MISSION_UNSUPPORTED
+        assert result(station.send(clear(1, 1, kind))) == OK
+    assert result(station.send(LIST(1, 1, 9))) == mavlink.MAV_MISSION_UNSUPPORTED
     assert station.commanded() == []
 
 
 def test_missing_item_is_requested_again_until_timeout(station):
-    station.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
+    station.send(COUNT(1, 1, 3, 0))
     station.wire.clear()
     station.wait(4.5, 0.5)
     assert {r.seq for r in station.wire.of("MISSION_REQUEST_INT")} == {0}
-    station.send(item(0))
-    station.send(item(0))  # twice: once is enough
+    station.play(item(0), item(0))  # twice: once is enough
     station.wire.clear()
     station.wait(10.0, 0.5)
     assert [r.seq for r in station.wire.of("MISSION_REQUEST_INT")] == [1] * 5
-    assert [a.type for a in station.wire.of("MISSION_ACK")] == [mavlink.MAV_MISSION_OPERATION_CANCELLED]
-    assert upload(station, {}) == mavlink.MAV_MISSION_ACCEPTED
+    assert result(station.wire.got) == mavlink.MAV_MISSION_OPERATION_CANCELLED
+    assert upload(station, {}) == OK
 
 
 def test_upload_can_be_canceled(station):
-    station.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
-    station.send(mavlink.MAVLink_mission_ack_message(1, 1, mavlink.MAV_MISSION_OPERATION_CANCELLED, 0))
+    station.play(COUNT(1, 1, 3, 0), message("MISSION_ACK", 1, type=mavlink.MAV_MISSION_OPERATION_CANCELLED))
     station.wire.clear()
     station.wait(3.0, 0.5)
     assert station.wire.of("MISSION_REQUEST_INT") == []
 
 
 def test_too_long_and_concurrent_uploads_are_rejected(station):
-    (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 501, 0))
-    assert ack.type == mavlink.MAV_MISSION_NO_SPACE
-    station.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
-    (ack,) = station.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0), system=250)
+    assert result(station.send(COUNT(1, 1, 501, 0))) == mavlink.MAV_MISSION_NO_SPACE
+    station.send(COUNT(1, 1, 3, 0))
+    (ack,) = station.send(COUNT(1, 1, 1, 0), system=250)
     assert (ack.type, ack.target_system) == (mavlink.MAV_MISSION_DENIED, 250)
 
 
 def test_mission_can_be_cleared(station):
     upload(station, {})
-    (ack,) = station.send(mavlink.MAVLink_mission_clear_all_message(1, 1, 255))
-    assert ack.type == mavlink.MAV_MISSION_ACCEPTED
-    assert station.commanded()[-1] == SetMission(())
-    (count,) = station.send(mavlink.MAVLink_mission_request_list_message(1, 1, 0))
-    assert count.count == 0
+    assert result(station.send(mavlink.MAVLink_mission_clear_all_message(1, 1, 255))) == OK
+    assert station.commanded()[-1] == SetMission(()) and count(station) == 0
 
 
 def test_mission_start_and_set_current_are_applied(station):
-    assert station.command(300, 0.0) == mavlink.MAV_RESULT_FAILED  # there is no mission yet
+    station.play((long(300, 0.0), FAILED))  # there is no mission yet
     upload(station, {}, {}, {})
     station.commanded()
-    assert station.command(300, 0.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
-    assert station.command(224, 2.0 + first(station)) == mavlink.MAV_RESULT_ACCEPTED
-    station.send(mavlink.MAVLink_mission_set_current_message(1, 1, 1 + first(station)))
-    assert station.commanded() == [SetCurrentItem(0), SetMode("mission"), SetCurrentItem(2), SetCurrentItem(1)]
-    assert station.command(224, 3.0 + first(station)) == mavlink.MAV_RESULT_DENIED
-    assert station.command(224, NAN) == mavlink.MAV_RESULT_DENIED
+    station.play(
+        (long(300, 0.0, 0.0), ACCEPTED), (long(224, 2.0 + first(station)), ACCEPTED),
+        message("MISSION_SET_CURRENT", 1, seq=1 + first(station)),
+        [SetCurrentItem(0), SetMode("mission"), SetCurrentItem(2), SetCurrentItem(1)],
+        (long(224, 3.0 + first(station)), DENIED), (long(224, NAN), DENIED),
+    )  # fmt: skip
 
 
 def test_mission_progress_is_reported(station):
     upload(station, {}, {})
     seq = first(station)
-
-    def current():
-        return station.wire.of("MISSION_CURRENT")[-1]
-
-    station.command(512, 42)
-    assert (current().seq, current().total, current().mission_state) == (0, 2, mavlink.MISSION_STATE_NOT_STARTED)
-    station.look(1.1, **{"commands.mode": 3.0, "commands.item": 0.0})
-    station.command(512, 42)
-    assert (current().seq, current().mission_state) == (seq, mavlink.MISSION_STATE_ACTIVE)
-    station.look(1.2, **{"commands.mode": 3.0, "commands.item": 1.0})
-    assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [seq]
-    station.look(1.3, **{"commands.mode": 3.0, "commands.item": 1.0, "goal.clearance": 0.1})
-    station.command(512, 42)
-    assert current().mission_state == mavlink.MISSION_STATE_COMPLETE
-    assert [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")] == [seq, seq + 1]
-    station.look(1.4, **{"commands.mode": 1.0, "commands.item": 1.0})
-    station.command(512, 42)
-    assert current().mission_state == mavlink.MISSION_STATE_PAUSED
+    for mode, now, clearance, state, at, passed in (
+        (2.0, -1.0, -3.0, "NOT_STARTED", 0, []), (3.0, 0.0, -3.0, "ACTIVE", seq, []),
+        (3.0, 1.0, -3.0, "ACTIVE", seq + 1, [seq]), (3.0, 1.0, 0.1, "COMPLETE", seq + 1, [seq + 1]),
+        (1.0, 1.0, 0.1, "PAUSED", seq + 1, []),
+    ):  # fmt: skip
+        station.wire.clear()
+        station.play({"commands.mode": mode, "commands.item": now, "goal.clearance": clearance})
+        reached = [m.seq for m in station.wire.of("MISSION_ITEM_REACHED")]
+        (current,) = station.request(42)
+        expected = (getattr(mavlink, f"MISSION_STATE_{state}"), at, 2, passed)
+        assert (current.mission_state, current.seq, current.total, reached) == expected
 
 
 def test_read_only_rejects_missions():
-    station = Station(commands=False)
-    (ack,) = [
-        r for r in station.send(mavlink.MAVLink_mission_count_message(1, 1, 1, 0)) if r.get_type() == "MISSION_ACK"
-    ]
-    assert ack.type == mavlink.MAV_MISSION_DENIED
+    assert result(Station(commands=False).send(COUNT(1, 1, 1, 0))) == mavlink.MAV_MISSION_DENIED

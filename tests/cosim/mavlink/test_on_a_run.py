@@ -9,18 +9,21 @@ from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import CommandQueue
 from cosim.simulation.master import Master
-from tests.cosim.mavlink.station import NAN, Station, Wire
+from tests.cosim.mavlink.station import ACCEPTED, Station, Wire, set_parameter
+from tests.cosim.mavlink.test_mission import upload
+from tests.cosim.mavlink.test_parameters import LIST
 from tests.cosim.mavlink.test_targets import local, obstacle, sticks, velocity
 
 
 class Flight(Station):
-    """A station, and a run whose every tenth row the autopilot gets."""
+    """A station, and a run whose every row the autopilot gets."""
 
-    def __init__(self, master, **options):
+    def __init__(self, master, commands=True):
         self.master, self.k = master, 0
         self.commands, self.wire, self.now = CommandQueue(), Wire(), 0.0
-        options = MavlinkOptions(**{"profile": "ardusub", "commands": True, **options})
+        options = MavlinkOptions(profile="ardusub", commands=commands)
         self.autopilot = Autopilot(master.scenario, master.signals.columns, options, self.commands)
+        self.profile, self.context = self.autopilot._context.profile, self.autopilot._context
         self.autopilot.attach(self.wire)
 
     def fly(self, seconds):
@@ -33,6 +36,10 @@ class Flight(Station):
 
     def last(self, name):
         return self.wire.of(name)[-1]
+
+    def settings_agree(self):
+        shown, flown = self.context.settings, self.master.command_handler.settings
+        return [(s.key, s.value) for s in flown] == [(s.key, s.value) for s in shown]
 
 
 @pytest.fixture
@@ -50,8 +57,8 @@ def test_commands_take_effect_in_the_run(flight):
     flight.fly(0.5)
     assert not flight.last("HEARTBEAT").base_mode & 128 and not master.signals.view("thrust[1]", 8).any()
     flight.command(400, 1.0)
-    for name, value in ((b"LAW_SPEED", 0.7), (b"SR1_RADIUS", 0.4), (b"THR_MAX_1", 20.0), (b"GOAL_RADIUS", 0.8)):
-        flight.send(mavlink.MAVLink_param_set_message(1, 1, name, value, 9))
+    for name, value in (("LAW_SPEED", 0.7), ("SR1_RADIUS", 0.4), ("THR_MAX_1", 20.0), ("GOAL_RADIUS", 0.8)):
+        flight.send(set_parameter(name, value))
     flight.send(obstacle(place=(4.0, 0.0, 3.0)))
     flight.send(local(place=(1.5, 0.5, 1.0)))
     flight.fly(0.1)
@@ -60,8 +67,8 @@ def test_commands_take_effect_in_the_run(flight):
     settings = master.command_handler.settings
     assert (master.law.gains.speed, settings.shapes["SR1"].radius) == (0.7, 0.4)
     assert settings["plant.parameters.thrust_max[1]"] == 20.0 and master.environment.target.tolist() == [1.5, 0.5, 1.0]
-    assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._context.settings]
-    view = flight.autopilot._context.view
+    assert flight.settings_agree()
+    view = flight.context.view
     assert view.clearances[4] == pytest.approx(np.linalg.norm(np.array(view.position_ned) - [4.0, 0.0, 3.0]) - 0.5)
     flight.fly(15.0)
     assert "Target reached" in flight.wire.texts
@@ -78,13 +85,12 @@ def test_commands_take_effect_in_the_run(flight):
 def test_velocity_setpoint_is_tracked_and_expires(flight):
     """MAVSDK's set_velocity_ned, streamed at 10 Hz."""
     flight.fly(0.1)
-    x = flight.master.signals.view("position.x", 3)
-    for k in range(60):
+    x, places = flight.master.signals.view("position.x", 3), []
+    for _ in range(60):
+        places.append(x.copy())
         flight.send(velocity((0.0, 0.2, 0.0)))
         flight.fly(0.1)
-        if k == 29:
-            halfway = x.copy()
-    assert (x - halfway)[1] / 3.0 == pytest.approx(0.2, rel=0.2)
+    assert (x - places[30])[1] / 3.0 == pytest.approx(0.2, rel=0.2)
     flight.fly(6.0)
     rest = x.copy()
     flight.fly(1.0)
@@ -94,13 +100,9 @@ def test_velocity_setpoint_is_tracked_and_expires(flight):
 @pytest.mark.medium
 def test_uploaded_mission_is_completed(flight):
     flight.fly(0.1)
-    places = [(0.6, 0.0, 1.0), (1.2, 0.4, 1.2)]
-    flight.send(mavlink.MAVLink_mission_count_message(1, 1, 3, 0))
-    for seq, (north, east, down) in enumerate([(0.0, 0.0, 0.0), *places]):
-        place = round(north * 1e4), round(east * 1e4), down
-        flight.send(mavlink.MAVLink_mission_item_int_message(1, 1, seq, 1, 16, 0, 1, 0.5, 0.3, 0, NAN, *place, 0))
-    assert flight.last("MISSION_ACK").type == mavlink.MAV_MISSION_ACCEPTED
-    assert flight.command(300, 0.0) == mavlink.MAV_RESULT_ACCEPTED
+    places = [(6000, 0, 1.0), (12_000, 4000, 1.2)]
+    assert upload(flight, *({"numbers": (0.5, 0.3, 0, 0), "place": place} for place in places)) == 0
+    assert flight.command(300, 0.0) == ACCEPTED
     flight.fly(25.0)
     assert [m.seq for m in flight.wire.of("MISSION_ITEM_REACHED")] == [1, 2]
     assert flight.last("MISSION_CURRENT").mission_state == mavlink.MISSION_STATE_COMPLETE
@@ -112,31 +114,29 @@ def test_telemetry_does_not_change_the_run():
     for listening in (False, True):
         with Master(load_scenario("paper-deployable", ["time.duration=2.0"])) as master:
             flight = Flight(master, commands=False)
-            for _ in range(60):
+            for k in range(60):
                 if listening:
                     flight.fly(0.01)
                     flight.command(400, 0.0)
                     flight.send(local())
                 else:
-                    master.step(flight.k)
-                    flight.k += 1
-            rows.append(master.signals.row.copy())
-    assert rows[0].tobytes() == rows[1].tobytes()
+                    master.step(k)
+            rows.append(master.signals.row.tobytes())
+    assert rows[0] == rows[1]
 
 
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("value", [0.0, 1e-30, 1e9, -1e9])
 def test_no_parameter_change_aborts_the_run(flight, value):
-    flight.send(mavlink.MAVLink_param_request_list_message(1, 1))
+    flight.send(LIST)
     flight.wait(0.1)
     values = {message.param_id: message.param_value for message in flight.wire.of("PARAM_VALUE")}
     for name, before in values.items():
         flight.command(176, 1, 16)
-        flight.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, 9))
+        flight.send(set_parameter(name, value))
         flight.send(obstacle(place=(4.0, 5.0, 6.0)))
         flight.fly(0.02)
-        flight.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), before, 9))
+        flight.send(set_parameter(name, before))
         flight.wire.clear()
     flight.fly(0.02)
-    settings = flight.master.command_handler.settings
-    assert [(s.key, s.value) for s in settings] == [(s.key, s.value) for s in flight.autopilot._context.settings]
+    assert flight.settings_agree()

@@ -7,18 +7,19 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.mavlink.messages.message_table import message_specs
 from cosim.mavlink.messages.streams import MAX_LOAD
-from tests.cosim.mavlink.station import NAN
+from tests.cosim.mavlink.station import ACCEPTED, DENIED, FAILED, NAN, long
+from tests.cosim.mavlink.stubs import message
 
-ACCEPTED, _, DENIED, _, FAILED = range(5)
 SET, GET, ONCE = 511, 510, 512
 ATTITUDE = 30
 
 
-def run(station, seconds, step=0.01, **values):
+def run(station, seconds, step=0.01):
+    """Count the messages of some simulated time."""
     start = station.autopilot._context.view.boot_us / 1e6
     station.wire.clear()
     for k in range(1, round(seconds / step) + 1):
-        station.look(start + step * k, **values)
+        station.look(start + step * k)
     return station.wire.counts()
 
 
@@ -47,21 +48,19 @@ def test_missed_steps_send_no_burst(station):
 
 
 def test_interval_returns_to_default(station):
-    station.command(SET, ATTITUDE, 500_000)
-    assert station.command(SET, ATTITUDE, 0) == ACCEPTED
+    station.play((long(SET, ATTITUDE, 500_000), ACCEPTED), (long(SET, ATTITUDE, 0), ACCEPTED))
     assert run(station, 5.0)["ATTITUDE"] == 50
 
 
 def test_message_interval_is_reported(station):
     station.command(SET, ATTITUDE, 50_000)
-    for command in ((GET, ATTITUDE), (ONCE, 244, ATTITUDE)):
-        assert station.command(*command) == ACCEPTED
+    for number, result, interval in (
+        ((GET, ATTITUDE), ACCEPTED, 50_000), ((ONCE, 244, ATTITUDE), ACCEPTED, 50_000), ((GET, 331), ACCEPTED, -1),
+        ((GET, 9999), FAILED, 0),
+    ):  # fmt: skip
+        assert station.command(*number) == result
         told = station.wire.of("MESSAGE_INTERVAL")[-1]
-        assert (told.message_id, told.interval_us) == (ATTITUDE, 50_000)
-    assert station.command(GET, 331) == ACCEPTED
-    assert station.wire.of("MESSAGE_INTERVAL")[-1].interval_us == -1
-    assert station.command(GET, 9999) == FAILED
-    assert station.wire.of("MESSAGE_INTERVAL")[-1].interval_us == 0
+        assert (told.message_id, told.interval_us) == (number[-1], interval)
 
 
 @pytest.mark.parametrize(
@@ -80,32 +79,25 @@ def test_stream_load_per_link_is_bounded(station):
     assert sum(12 + len(m.get_payload()) for m in station.wire.got) <= MAX_LOAD
 
 
-@pytest.mark.medium(fast=9)
-@pytest.mark.parametrize("message_id", message_specs())
-def test_every_listed_message_can_be_requested(station, message_id):
-    station.look(1.0, altitude=3.0, measured__altitude=3.0, **{"goal.clearance": (-3.0, 2.0, 2.0, 2.0, 3.0, 3.0)})
-    station.wire.clear()
-    assert station.command(ONCE, message_id) == ACCEPTED
-    names = {m.get_type() for m in station.wire.got} - {"COMMAND_ACK"}
-    assert names == {mavlink.mavlink_map[message_id].msgname}
-
-
-@pytest.mark.parametrize("message_id", [140, 300, 395, 396, 397, 410, 9999, -5, NAN])
-def test_request_of_an_unknown_message_fails(station, message_id):
-    assert station.command(ONCE, message_id) == FAILED
+def test_every_listed_message_can_be_requested_and_no_other(station):
+    near = {"altitude": 3.0, "measured.altitude": 3.0, "goal.clearance": (-3.0, 2.0, 2.0, 2.0, 3.0, 3.0)}
+    station.look(1.0, **near)
+    for message_id in message_specs():
+        station.wire.clear()
+        assert station.command(ONCE, message_id) == ACCEPTED
+        assert set(station.wire.counts()) == {"COMMAND_ACK", mavlink.mavlink_map[message_id].msgname}
+    station.play(*((long(ONCE, number), FAILED) for number in (140, 300, 395, 396, 397, 410, 9999, -5, NAN)))
 
 
 def group(number, rate, start=1):
-    return mavlink.MAVLink_request_data_stream_message(1, 1, number, rate, start)
+    return message("REQUEST_DATA_STREAM", 1, req_stream_id=number, req_message_rate=rate, start_stop=start)
 
 
 def test_stream_groups_set_their_messages(station):
-    station.send(group(10, 25))
-    counts = run(station, 4.0)
-    assert counts["ATTITUDE"] == counts["AHRS2"] == 100 and counts["ATTITUDE_QUATERNION"] == 40
-    station.send(group(10, 25, start=0))
-    counts = run(station, 4.0)
-    assert counts["ATTITUDE"] == 0 and counts["ATTITUDE_QUATERNION"] == 40
+    for start, rate in ((1, 100), (0, 0)):
+        station.send(group(10, 25, start))
+        counts = run(station, 4.0)
+        assert counts["ATTITUDE"] == counts["AHRS2"] == rate and counts["ATTITUDE_QUATERNION"] == 40
 
 
 def test_stream_all_request_of_mavproxy_sets_every_group(station):
@@ -120,16 +112,15 @@ def test_stream_all_request_of_mavproxy_sets_every_group(station):
 
 def test_seventeen_messages_at_50_hertz_are_accepted(station):
     ids = (1, 2, 24, 29, 30, 31, 32, 33, 36, 62, 74, 85, 137, 147, 242, 245, 178)
-    assert [station.command(SET, i, 20_000) for i in ids] == [ACCEPTED] * 17
+    station.play(*((long(SET, i, 20_000), ACCEPTED) for i in ids))
     counts = run(station, 2.0)
     assert all(counts[mavlink.mavlink_map[i].msgname] == 100 for i in ids)
 
 
 def test_version_and_banner_are_sent_on_request(station):
-    assert station.command(520, 1.0) == ACCEPTED and station.command(42428) == ACCEPTED
-    (version,) = station.wire.of("AUTOPILOT_VERSION")
-    assert version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_INT
-    assert version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_FTP
-    assert not version.capabilities & mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
+    station.play((long(520, 1.0), ACCEPTED), (long(42428), ACCEPTED))
+    (version,), able = station.wire.of("AUTOPILOT_VERSION"), "MAV_PROTOCOL_CAPABILITY_"
+    for name, has in (("MISSION_INT", True), ("FTP", True), ("MISSION_FENCE", False)):
+        assert bool(version.capabilities & getattr(mavlink, able + name)) == has
     assert (version.vendor_id, version.product_id) == (0, 0) and version.uid
     assert station.wire.texts[0].startswith("subreach co-simulation")

@@ -21,54 +21,25 @@ HERE = Path(__file__).parent
 
 
 @pytest.fixture(scope="session")
-def environment(request):
-    """Return a function that gives the folder of a virtual environment with some packages, or skips."""
+def made_once(request):
+    """Return a function that makes a folder once, of several processes in one, by commands, or skips."""
 
-    def make(name, *requirements):
+    def made_once(name, *commands):
         folder = request.config.cache.mkdir("mavlink-clients") / name
-        with _locked(folder):
+        with folder.with_suffix(".lock").open("w") as lock:
+            fcntl.flock(lock, fcntl.LOCK_EX)
             if not (folder / "made").exists():
                 shutil.rmtree(folder, ignore_errors=True)
-                _install([sys.executable, "-m", "venv", "--without-pip", str(folder)])
-                pip = [sys.executable, "-m", "pip", "--python", str(folder / "bin" / "python")]
-                _install([*pip, "install", "-q", "--no-compile", *requirements])
+                folder.mkdir()
+                for command in commands:
+                    _install([part.format(folder=folder) for part in command], folder)
                 (folder / "made").touch()
         return folder
 
-    return make
+    return made_once
 
 
-@pytest.fixture(scope="session")
-def ardupilots_tools(environment):
-    """Return the Python of an environment with MAVProxy and pymavlink's own tools."""
-    return environment("ardupilot-tools", *REQUIREMENTS) / "bin" / "python"
-
-
-@pytest.fixture(scope="session")
-def node_mavlink(request):
-    """Return a folder in which node finds node-mavlink, or skip."""
-    if not (shutil.which("node") and shutil.which("npm")):
-        pytest.skip("node or npm is not here")
-    folder = request.config.cache.mkdir("mavlink-clients") / "node"
-    with _locked(folder):
-        if not (folder / "made").exists():
-            shutil.rmtree(folder, ignore_errors=True)
-            folder.mkdir()
-            (folder / "package.json").write_text("{}")
-            _install(["npm", "install", "--no-audit", "--no-fund", "node-mavlink@2"], folder)
-            (folder / "made").touch()
-    return folder
-
-
-@contextlib.contextmanager
-def _locked(folder):
-    """Let one process at a time make an environment."""
-    with folder.with_suffix(".lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        yield
-
-
-def _install(command, folder=None):
+def _install(command, folder):
     try:
         subprocess.run(command, check=True, capture_output=True, text=True, timeout=INSTALLING, cwd=folder)
     except subprocess.TimeoutExpired:
@@ -76,6 +47,33 @@ def _install(command, folder=None):
     except subprocess.CalledProcessError as error:
         last = (error.stderr.strip().splitlines() or ["no word of why"])[-1]
         pytest.skip(f"cannot be installed: {last}")
+
+
+@pytest.fixture(scope="session")
+def environment(made_once):
+    """Return a function that gives the Python of a virtual environment with some packages, or skips."""
+
+    def make(name, *requirements):
+        python = ("{folder}/bin/python", "install", "-q", "--no-compile", *requirements)
+        venv, pip = (sys.executable, "-m", "venv", "--without-pip", "."), (sys.executable, "-m", "pip", "--python")
+        return made_once(name, venv, (*pip, *python)) / "bin" / "python"
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def ardupilots_tools(environment):
+    """Return the Python of an environment with MAVProxy and pymavlink's own tools."""
+    return environment("ardupilot-tools", *REQUIREMENTS)
+
+
+@pytest.fixture(scope="session")
+def node_mavlink(made_once):
+    """Return a folder in which node finds node-mavlink, or skip."""
+    if not (shutil.which("node") and shutil.which("npm")):
+        pytest.skip("node or npm is not here")
+    init, install = ("npm", "init", "-y"), ("npm", "install", "--no-audit", "--no-fund", "node-mavlink@2")
+    return made_once("node", init, install)
 
 
 @contextlib.contextmanager
@@ -99,11 +97,3 @@ def cosim_run(folder, profile, *endpoints):
 def commands_of(folder):
     """Return the names of the commands that a run took, in their order."""
     return [json.loads(line)["command"]["command"] for line in (folder / "commands.jsonl").read_text().splitlines()]
-
-
-@pytest.fixture(scope="session")
-def udp_port():
-    """Return a function that gives a port of loopback that is free now."""
-    from tests.cosim.mavlink.stubs import free_port
-
-    return free_port

@@ -10,7 +10,6 @@ import math
 import os
 import socket
 import sys
-import time
 
 try:  # MAVSDK 4: in this process
     from mavsdk.asyncio import ComponentType, Configuration, Mavsdk
@@ -97,9 +96,11 @@ async def steps(vehicle, address):  # noqa: C901 - one step after the other
         found = await vehicle.param.get_all_params()
         return {p.name: p.value for p in [*found.float_params, *found.int_params]}
 
+    async def gain():
+        return next(p for p in (await vehicle.param.get_all_params()).float_params if p.name.startswith("LAW_"))
+
     async def change_param():
-        found = await vehicle.param.get_all_params()
-        before = next(p for p in found.float_params if p.name.startswith("LAW_"))
+        before = await gain()
         await vehicle.param.set_param_float(before.name, before.value * 1.25)
         after = await vehicle.param.get_param_float(before.name)
         await vehicle.param.set_param_float(before.name, before.value)
@@ -107,8 +108,7 @@ async def steps(vehicle, address):  # noqa: C901 - one step after the other
 
     async def refused_param():
         """Ask for what is out of range."""
-        found = await vehicle.param.get_all_params()
-        before = next(p for p in found.float_params if p.name.startswith("LAW_"))
+        before = await gain()
         try:
             await vehicle.param.set_param_float(before.name, -1e30)
         except ParamError as error:
@@ -184,13 +184,10 @@ async def main(address):
     """Do all steps; a step that fails does not hinder the next ones."""
     done = {}
     async for name, work in steps(Vehicle(), address):
-        began = time.monotonic()
         try:
-            value = await asyncio.wait_for(work, PATIENCE)
-            done[name] = {"value": value, "seconds": round(time.monotonic() - began, 3)}
+            done[name] = await asyncio.wait_for(work, PATIENCE)
         except Exception as error:  # noqa: BLE001  any error is reported, and the next step is tried
-            text = f"{type(error).__name__}: {error}"
-            done[name] = {"error": text, "seconds": round(time.monotonic() - began, 3)}
+            done[name] = {"error": f"{type(error).__name__}: {error}"}
             if name == "connect":
                 break
     return done

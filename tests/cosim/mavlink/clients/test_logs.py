@@ -19,10 +19,6 @@ READING = 120.0  # s
 LISTENING = 8.0  # s
 SENT = {"HEARTBEAT", "ATTITUDE", "NAMED_VALUE_FLOAT", "DEBUG_FLOAT_ARRAY", "STATUSTEXT", "PARAM_VALUE", "COMMAND_ACK",
         "AUTOPILOT_VERSION", "AVAILABLE_MODES", "MISSION_COUNT"}  # fmt: skip
-LOGS = [
-    pytest.param(0, SENT | {"COMMAND_LONG", "PARAM_REQUEST_LIST"}, id="log of the vehicle"),
-    pytest.param(1, SENT, id="log of the station"),
-]
 
 
 @pytest.fixture(scope="module", params=PROFILES)
@@ -38,47 +34,40 @@ def met(request, tmp_path_factory):
             station.wait(lambda message: False, LISTENING)
         received.write_bytes(station.log)
         assert station.retries == station.link.mav_loss == 0
-    return log, received
+    return {"vehicle": (log, SENT | {"COMMAND_LONG", "PARAM_REQUEST_LIST"}), "station": (received, SENT)}
+
+
+@pytest.fixture(params=["vehicle", "station"])
+def log(request, met):
+    """Return a log, and the messages that are in it."""
+    return met[request.param]
+
+
+def run(*command, **options):
+    done = subprocess.run(command, capture_output=True, text=True, timeout=READING, **options)
+    assert done.returncode == 0, done.stderr
+    assert "traceback" not in (done.stdout + done.stderr).lower()
+    return done.stdout
 
 
 def test_qgroundcontrol_connects_without_a_retry_by_mavlink_2(met):
-    messages = read_log(met[1])
+    messages = read_log(met["station"][0])
     assert len(messages) > 500 and {message.get_msgbuf()[0] for message in messages} == {0xFD}
 
 
-@pytest.mark.parametrize(("which", "some"), LOGS)
-def test_mavlogdump_reads_every_frame(met, which, some, ardupilots_tools):
-    python = ardupilots_tools
-    done = subprocess.run(
-        [python, python.parent / "mavlogdump.py", "--dialect", "all", "--show-source", "--show-types", met[which]],
-        capture_output=True, text=True, timeout=READING,
-    )  # fmt: skip
-    kinds = set(re.findall(r"^([A-Z][A-Z0-9_]+)$", done.stdout, re.MULTILINE))
-    assert done.returncode == 0, done.stderr
-    assert some <= kinds
-    assert not {kind for kind in kinds if kind.startswith(("UNKNOWN", "BAD_DATA"))}
-    assert "traceback" not in (done.stdout + done.stderr).lower()
+def test_mavlogdump_reads_every_frame_and_mavloss_reports_none_lost(log, ardupilots_tools):
+    path, some = log
+    dump, loss = (ardupilots_tools.parent / f"{name}.py" for name in ("mavlogdump", "mavloss"))
+    text = run(ardupilots_tools, dump, "--dialect", "all", "--show-source", "--show-types", path)
+    kinds = set(re.findall(r"^([A-Z][A-Z0-9_]+)$", text, re.MULTILINE))
+    assert some <= kinds and not {kind for kind in kinds if kind.startswith(("UNKNOWN", "BAD_DATA"))}
+    (row,) = re.findall(r"^ +1 +1 +(\d+) +(\d+)", run(ardupilots_tools, loss, "--dialect", "all", path), re.MULTILINE)
+    assert int(row[0]) > 500 and int(row[1]) == 0
 
 
-@pytest.mark.parametrize(("which", "some"), LOGS)
-def test_mavloss_reports_no_lost_frames(met, which, some, ardupilots_tools):
-    python = ardupilots_tools
-    done = subprocess.run(
-        [python, python.parent / "mavloss.py", "--dialect", "all", met[which]], capture_output=True, text=True,
-        timeout=READING,
-    )  # fmt: skip
-    (row,) = re.findall(r"^ +1 +1 +(\d+) +(\d+)", done.stdout, re.MULTILINE)
-    assert int(row[0]) > 500 and int(row[1]) == 0, done.stdout
-
-
-@pytest.mark.parametrize(("which", "some"), LOGS)
-def test_independent_decoder_decodes_every_frame(met, which, some, node_mavlink):
-    done = subprocess.run(
-        [shutil.which("node"), HERE / "decode.mjs", met[which]], capture_output=True, text=True, timeout=READING,
-        cwd=node_mavlink,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    read = json.loads(done.stdout)
+def test_independent_decoder_decodes_every_frame(log, node_mavlink):
+    path, some = log
+    read = json.loads(run(shutil.which("node"), HERE / "decode.mjs", path, cwd=node_mavlink))
     assert read["frames"] == read["valid"] == read["decoded"] > 500
     assert read["invalid"] == read["unknown"] == 0
     assert set(read["counts"]) >= some

@@ -10,6 +10,7 @@ import time
 import pytest
 
 from tests.cosim.mavlink.clients.conftest import commands_of, cosim_run
+from tests.cosim.mavlink.stubs import free_port
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
@@ -35,13 +36,9 @@ class MavProxy:
         for line in self.process.stdout:
             self.text += line
 
-    def type(self, line):
-        self.process.stdin.write(f"{line}\n")
-        self.process.stdin.flush()
-
-    def see(self, pattern, since=0, patience=PATIENCE):
+    def see(self, pattern, since=0):
         """Return the match of what is to be printed."""
-        end = time.monotonic() + patience
+        end = time.monotonic() + PATIENCE
         while time.monotonic() < end:
             found = re.search(pattern, self.text[since:])
             if found:
@@ -60,7 +57,8 @@ class MavProxy:
     def do(self, line, *patterns):
         """Type a line and return the matches of what is to be printed after it."""
         since = len(self.text)
-        self.type(line)
+        self.process.stdin.write(f"{line}\n")
+        self.process.stdin.flush()
         return [self.see(pattern, since) for pattern in patterns]
 
     def __enter__(self):
@@ -76,17 +74,15 @@ class MavProxy:
         self.process.stdout.close()
 
 
-def test_mavproxy_connects_arms_changes_modes_and_lists_parameters(ardupilots_tools, udp_port, tmp_path):
-    python, port, folder = ardupilots_tools, udp_port(), tmp_path / "run"
+def test_mavproxy_connects_arms_changes_modes_and_lists_parameters(ardupilots_tools, tmp_path):
+    python, port, folder = ardupilots_tools, free_port(), tmp_path / "run"
     with cosim_run(folder, "ardusub", f"udpout:127.0.0.1:{port}"), MavProxy(python, tmp_path, port) as mavproxy:
         mavproxy.see(r"Detected vehicle 1:1")
         received = int(mavproxy.see(r"Received (\d+) parameters").group(1))
         assert received > 10
         for attempt in range(3):  # it gives up asking for what a busy machine has lost
-            since = len(mavproxy.text)
-            mavproxy.type("param fetch")
             with contextlib.suppress(AssertionError) if attempt < 2 else contextlib.nullcontext():
-                mavproxy.see(rf"Received {received} parameters", since, patience=30.0)
+                mavproxy.do("param fetch", rf"Received {received} parameters")
                 break
         parameters = mavproxy.parameters(received)
 
