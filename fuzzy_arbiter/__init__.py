@@ -18,9 +18,8 @@ if TYPE_CHECKING:
     from fuzzy_arbiter.result import Result
     from fuzzy_arbiter.rule import Operators, Rule
     from fuzzy_arbiter.shapes import Shape, falling, rising, trapezoid, triangle
-    from fuzzy_arbiter.terms.automatic import auto_terms
     from fuzzy_arbiter.terms.curves import Curve, curve
-    from fuzzy_arbiter.terms.term import Term
+    from fuzzy_arbiter.terms.term import Term, auto_terms
     from fuzzy_arbiter.terms.values import Constant, Formula, Linear
 
 __all__ = [
@@ -51,31 +50,21 @@ __all__ = [
     "triangle",
 ]
 
-# imported on first use, so that the command can report a dependency that is not installed
-_HOMES = {
-    "arbiter": {"Arbiter"},
-    "terms.automatic": {"auto_terms"},
-    "definition": {"Output", "System", "Variable"},
-    "errors": {"ArbiterError"},
-    "hierarchy": {"SECTION_VI", "Criterion", "prioritized"},
-    "hysteresis": {"HysteresisArbiter"},
-    "membership": {"ramp"},
-    "result": {"Result"},
-    "rule": {"Operators", "Rule"},
-    "shapes": {"Shape", "falling", "rising", "trapezoid", "triangle"},
-    "terms.curves": {"Curve", "curve"},
-    "terms.term": {"Term"},
-    "terms.values": {"Constant", "Formula", "Linear"},
-}
+# modules of these names, imported on first use, so that the command can report a dependency that is not installed
+_MODULES = (
+    *("arbiter", "definition", "errors", "hierarchy", "membership", "result", "rule", "shapes"),
+    *("terms.curves", "terms.term", "terms.values", "hysteresis"),
+)
 
 
 def __getattr__(name: str) -> object:
     if name == "prioritised":  # its former spelling
         warnings.warn("fuzzy_arbiter.prioritised is now prioritized", DeprecationWarning, stacklevel=2)
         name = "prioritized"
-    for home, names in _HOMES.items():
-        if name in names:
-            return getattr(importlib.import_module(f"{__name__}.{home}"), name)
+    for path in _MODULES if name in __all__ else ():
+        module = importlib.import_module(f"{__name__}.{path}")
+        if hasattr(module, name):
+            return getattr(module, name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -8,17 +8,16 @@ import json
 import os
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NoReturn
 
 try:
     from fuzzy_arbiter.arbiter import Arbiter
-    from fuzzy_arbiter.command_line.definitions import BUILT_IN, convert, described, load_system
+    from fuzzy_arbiter.command_line.definitions import BUILT_IN, convert, described, load_system, require_suffix
     from fuzzy_arbiter.command_line.drawing import IMAGES, PICTURES, draw, image, middles
-    from fuzzy_arbiter.command_line.files import read_text, require_suffix
     from fuzzy_arbiter.command_line.values import evaluated, evaluated_table, sample
     from fuzzy_arbiter.engines import ENGINES
     from fuzzy_arbiter.errors import ArbiterError, InputError, one_line
+    from fuzzy_arbiter.explanation import Explanation
     from fuzzy_arbiter.files import write_atomic
 except ModuleNotFoundError as error:  # in a checkout that is not installed
     print(f"fuzzy_arbiter: {error.name} is not installed, expected what pyproject.toml requires", file=sys.stderr)
@@ -76,69 +75,44 @@ def _parser() -> argparse.ArgumentParser:
     parser.add_argument("--version", action=_Version, nargs=0, help="show program's version number and exit")
     verbs = parser.add_subparsers(dest="verb", required=True)
 
-    def verb(name: str, what: str, engine: bool = True) -> argparse.ArgumentParser:
+    def verb(name: str, what: str, *, engine: bool = True, values: bool = False, as_json: bool = False) -> Any:
         added = verbs.add_parser(name, help=what, description=f"{what[0].upper()}{what[1:]}.")
         added.add_argument("file", metavar="FILE", help=f"a definition, or {BUILT_IN}")
         added.add_argument("--block", metavar="NAME", help="which FUNCTION_BLOCK of a FCL file that has several")
         if engine:
-            added.add_argument(
-                "--engine",
-                choices=ENGINES,
-                default="auto",
-                metavar="NAME",
-                help=f"{', '.join(ENGINES)} (default: %(default)s)",
-            )
+            known = f"{', '.join(ENGINES)} (default: %(default)s)"
+            added.add_argument("--engine", choices=ENGINES, default="auto", metavar="NAME", help=known)
+        if values:
+            help = "name=value for each input, or values in their order"
+            added.add_argument("values", nargs="*", metavar="VALUE", help=help)
+        if as_json:
+            added.add_argument("--json", action="store_true", help="JSON in the place of text")
         return added
 
     verb("show", "variables, terms, rules, norms, and which engine evaluates them")
+    what = "weights for one sample, or for each row of a table"
+    add = verb("eval", what, values=True, as_json=True).add_argument
+    table = "table whose first line names the inputs, - for standard input; others are ignored"
+    add("--csv", metavar="FILE", help=table)
+    add("--out", metavar="FILE", help="file to write (default: standard output)")
+    verb("explain", "which rules fire for a sample, how strongly, and which decide", values=True, as_json=True)
+    what = "whether the rules are complete and consistent; exit status 1 if not"
+    verb("verify", what, engine=False, as_json=True)
 
-    values = "name=value for each input, or values in their order"
-    evaluate = verb("eval", "weights for one sample, or for each row of a table")
-    evaluate.add_argument("values", nargs="*", metavar="VALUE", help=values)
-    evaluate.add_argument(
-        "--csv",
-        metavar="FILE",
-        help="table whose first line names the inputs, - for standard input; others are ignored",
-    )
-    evaluate.add_argument("--out", metavar="FILE", help="file to write (default: standard output)")
+    add = verb("convert", "write a definition in another format, or as source code", engine=False).add_argument
+    add("out", metavar="OUT", help=".json, .toml, .fcl, .fis, .fll, or .c, .py for code that evaluates it")
+    add("--native", action="store_true", help="make the centroids the weights, for tools that do not normalize")
 
-    explain = verb("explain", "which rules fire for a sample, how strongly, and which decide")
-    explain.add_argument("values", nargs="*", metavar="VALUE", help=values)
-
-    verify = verb("verify", "whether the rules are complete and consistent; exit status 1 if not", engine=False)
-    for with_json in (evaluate, explain, verify):
-        with_json.add_argument("--json", action="store_true", help="JSON in the place of text")
-
-    other = verb("convert", "write a definition in another format, or as source code", engine=False)
-    other.add_argument(
-        "out", metavar="OUT", help=".json, .toml, .fcl, .fis, .fll, or .c, .py for code that evaluates it"
-    )
-    other.add_argument(
-        "--native", action="store_true", help="make the centroids the weights, for tools that do not normalize"
-    )
-
-    plot = verb("plot", "draw terms, rules at a sample, weights over inputs, or which output is the greatest where")
-    plot.add_argument("kind", choices=PICTURES, metavar="PICTURE", help=", ".join(PICTURES))
-    plot.add_argument(
-        "--input",
-        action="append",
-        default=[],
-        metavar="NAME",
-        help="along which; given twice for surface and decisions (default: the first; for terms all)",
-    )
-    plot.add_argument(
-        "--output", action="append", default=[], metavar="NAME", help="of which (default: the first; for terms all)"
-    )
-    plot.add_argument(
-        "--at",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="NAME=VALUE",
-        help="the sample of rules, places in terms, else the other inputs (default: the middle of each)",
-    )
-    plot.add_argument("--relief", action="store_true", help="surface in three dimensions")
-    plot.add_argument("--out", required=True, metavar="FILE", help=".png, .svg or .pdf")
+    what = "draw terms, rules at a sample, weights over inputs, or which output is the greatest where"
+    add = verb("plot", what).add_argument
+    add("kind", choices=PICTURES, metavar="PICTURE", help=", ".join(PICTURES))
+    along = "along which; given twice for surface and decisions (default: the first; for terms all)"
+    add("--input", action="append", default=[], metavar="NAME", help=along)
+    add("--output", action="append", default=[], metavar="NAME", help="of which (default: the first; for terms all)")
+    at = "the sample of rules, places in terms, else the other inputs (default: the middle of each)"
+    add("--at", nargs="+", action="extend", default=[], metavar="NAME=VALUE", help=at)
+    add("--relief", action="store_true", help="surface in three dimensions")
+    add("--out", required=True, metavar="FILE", help=".png, .svg or .pdf")
 
     verb("bench", "time every engine on this definition, in a few seconds", engine=False)
     return parser
@@ -210,28 +184,25 @@ def _run(options: argparse.Namespace) -> int:
         convert(options.file, options.out, options.native, options.block)
         print(options.out)
         return 0
-    if options.verb == "plot":
-        require_suffix(options.out, IMAGES)
+    suffix = require_suffix(options.out, IMAGES) if options.verb == "plot" else ""
     system = load_system(options.file, options.block)
     if options.verb == "bench":
-        from fuzzy_arbiter.command_line.bench import bench, table
+        from fuzzy_arbiter.command_line.bench import bench
 
-        print(table(bench(system)))
+        print(bench(system))
         return 0
-    if options.verb == "verify":
-        found = Arbiter(system=system).verify()
-        print(json.dumps(found.as_dict(), indent=2, ensure_ascii=False) if options.json else found)
-        return 0 if found.ok else FINDINGS
-    arbiter = Arbiter(system=system, engine=options.engine)
+    arbiter = Arbiter(system=system, engine=getattr(options, "engine", "auto"))
+    if options.verb in ("verify", "explain"):
+        explains = options.verb == "explain"
+        result = arbiter.explain(sample(options.values, system)) if explains else arbiter.verify()
+        print(json.dumps(result.as_dict(), indent=2, ensure_ascii=False) if options.json else result)
+        return 0 if isinstance(result, Explanation) or result.ok else FINDINGS
     if options.verb == "show":
         print(described(arbiter))
-    elif options.verb == "explain":
-        explanation = arbiter.explain(sample(options.values, system))
-        print(json.dumps(explanation.as_dict(), indent=2, ensure_ascii=False) if options.json else explanation)
     elif options.verb == "plot":
         assumed = middles(options.at, system) if options.kind == "rules" else []
         figure = draw(arbiter, options.kind, options.input, options.output, [*options.at, *assumed], options.relief)
-        write_atomic(options.out, image(figure, Path(options.out).suffix[1:].lower()))
+        write_atomic(options.out, image(figure, suffix))
         if assumed:
             _report(f"drawn at the middle of each input that --at leaves out: {' '.join(assumed)}")
         print(options.out)
@@ -241,13 +212,12 @@ def _run(options: argparse.Namespace) -> int:
 
 
 def _evaluate(arbiter: Arbiter, options: argparse.Namespace) -> None:
+    if options.csv is not None and options.values:
+        raise InputError(f"got {options.values[0]!r} with --csv, expected one of the two")
     if options.csv is None:
         text = evaluated(arbiter, sample(options.values, arbiter.system), options.json)
-    elif options.values:
-        raise InputError(f"got {options.values[0]!r} with --csv, expected one of the two")
     else:
-        table, where = read_text(options.csv, sys.stdin)
-        text = evaluated_table(arbiter, table, where, options.json)
+        text = evaluated_table(arbiter, options.csv, sys.stdin, options.json)
     if options.out is None:
         print(text)
     else:

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 
 from fuzzy_arbiter.definition import Normalization, Output, Outside, System, variable_names
 from fuzzy_arbiter.engines import choose
-from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.hierarchy import SECTION_VI, WEIGHT, Criterion, Form, prioritized
 from fuzzy_arbiter.result import Result, result_class
 from fuzzy_arbiter.samples import Columns, Sample, Samples
+from fuzzy_arbiter.shapes import Array
 
 if TYPE_CHECKING:
     from fuzzy_arbiter.explanation import Explanation
@@ -102,14 +102,12 @@ class Arbiter:
     def __call__(self, inputs: Sample | None = None, /, **named: float) -> Result[float]:
         """Return the value of each output for one sample; inputs (inputs,)."""
         if named:
-            inputs = named if inputs is None else _one_of(inputs, named)
+            inputs = _one_of(inputs, named)
         if self._shortcut is not None:
             kind = type(inputs)
             plain = inputs if kind is list or kind is tuple else self._samples.plain(inputs)
-            if plain is not None:
-                weights = self._shortcut(plain)  # type: ignore[arg-type]  # the function checks it
-                if weights is not None:
-                    return tuple.__new__(self._result, weights)
+            if plain is not None and (weights := self._shortcut(plain)) is not None:  # type: ignore[arg-type]  # which checks it
+                return tuple.__new__(self._result, weights)
         return tuple.__new__(self._result, self._engine.weights(self._samples.one(inputs)))  # type: ignore[arg-type]
 
     @overload
@@ -224,7 +222,7 @@ class Arbiter:
         It fills an array of float64 with what a call gives, and returns 0; or -i if the i-th input is not in its
         universe, or k if no rule fires for the k-th output and that has no default; the outputs are then as they were.
         """
-        from fuzzy_arbiter.export.compiled import compiled
+        from fuzzy_arbiter.export.python import compiled
 
         return compiled(self._system)
 

@@ -10,20 +10,15 @@ from typing import Literal, get_args
 
 from fuzzy_arbiter.checks import all_of, finite, require_choice, require_distinct, require_name, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.propositions import Is
-from fuzzy_arbiter.references import require_rules, require_values
-from fuzzy_arbiter.rule import Rule
-from fuzzy_arbiter.rule_text import parse_rule
+from fuzzy_arbiter.propositions import Anything, Is
+from fuzzy_arbiter.rule import Rule, parse_rule
 from fuzzy_arbiter.shapes import Membership
-from fuzzy_arbiter.terms.automatic import AutomaticTerms
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
-from fuzzy_arbiter.terms.term import Term
-from fuzzy_arbiter.terms.values import Formula, Value, invertible
+from fuzzy_arbiter.terms.term import AutomaticTerms, Term
+from fuzzy_arbiter.terms.values import Formula, Linear, Value, invertible
 
-Conjunction = str  # name of one of norms.T_NORMS, which are also those for implication
-Disjunction = str  # name of one of norms.S_NORMS
-Implication = str
+_Terms = dict[str, frozenset[str]]  # names of each variable's terms
 Defuzzifier = Literal["centroid", "bisector", "mom", "som", "lom", "average", "sum"]
 WEIGHTED = ("average", "sum")  # defuzzifiers that take each term's value times its strength
 Normalization = Literal["none", "range", "sum", "max"]
@@ -260,9 +255,9 @@ class System:
     outputs: tuple[Output, ...]
     rules: tuple[Rule, ...]
     name: str = "arbiter"
-    conjunction: Conjunction = "min"
-    disjunction: Disjunction = "max"
-    implication: Implication = "min"
+    conjunction: str = "min"
+    disjunction: str = "max"
+    implication: str = "min"
     normalization: Normalization = "none"
     outside: Outside = "refuse"
     points: int = 101
@@ -282,15 +277,6 @@ class System:
                 f"points is {shown(self.points)}, expected a whole number, 3 or more, to {MAX_POINTS}"
             )
         object.__setattr__(self, "points", int(self.points))
-        self._require_names_of_weights()
-        for key in ("inputs", "outputs", "rules"):
-            if not getattr(self, key):
-                raise DefinitionError(f"{key}: got none, expected at least one")
-        require_distinct((v.name for v in (*self.inputs, *self.outputs)), "variables: two")
-        require_rules(self)
-        require_values(self)
-
-    def _require_names_of_weights(self) -> None:
         names = all_of(str, self.weights_of, "weights_of", "names of criteria")
         for name in names:
             require_name(name, "weights_of")
@@ -299,6 +285,12 @@ class System:
                 f"weights_of is {shown(names)}, expected a name for each of the {len(self.outputs)} outputs, each once"
             )
         object.__setattr__(self, "weights_of", names)
+        for key in ("inputs", "outputs", "rules"):
+            if not getattr(self, key):
+                raise DefinitionError(f"{key}: got none, expected at least one")
+        require_distinct((v.name for v in (*self.inputs, *self.outputs)), "variables: two")
+        _require_rules(self)
+        _require_values(self)
 
     @property
     def result_names(self) -> tuple[str, ...]:
@@ -342,3 +334,58 @@ def _span(variable: Variable) -> str:
 def variable_names(variables: Sequence[Variable]) -> tuple[str, ...]:
     """Return the variables' names in their order."""
     return tuple(variable.name for variable in variables)
+
+
+def _require_rules(system: System) -> None:
+    """Require that the rules refer only to variables and terms of the system."""
+    inputs = {v.name: frozenset(v.term_names) for v in system.inputs}
+    outputs = {v.name: frozenset(v.term_names) for v in system.outputs}
+    before: set[str] = set()
+    for i, rule in enumerate(system.rules):
+        try:
+            _require_rule(rule, inputs, outputs, before)
+        except DefinitionError as error:
+            raise DefinitionError(f"R{i + 1} {str(rule)!r}: {error}") from None
+        before |= {c.variable for c in rule.conclusions}
+
+
+def _require_rule(rule: Rule, inputs: _Terms, outputs: _Terms, before: set[str]) -> None:
+    for statement in rule.condition.terms():
+        if statement.variable not in outputs:
+            _require_known(statement, inputs, "input")
+            continue
+        _require_known(statement, outputs, "output")
+        if statement.variable not in before:
+            raise DefinitionError(f"asks for output {statement.variable!r}, on which no rule before concludes")
+    for part in rule.condition.parts_within():
+        if isinstance(part, Anything) and part.variable not in inputs:
+            raise DefinitionError(f"no input {part.variable!r}, expected one of {', '.join(inputs)}")
+    for statement in rule.conclusions:
+        _require_known(statement, outputs, "output")
+    if len({statement.variable for statement in rule.conclusions}) < len(rule.conclusions):
+        raise DefinitionError("two conclusions on one output, expected each output once")
+
+
+def _require_values(system: System) -> None:
+    """Require that values refer only to existing variables, and that every input is used."""
+    inputs, outputs = ([v.name for v in variables] for variables in (system.inputs, system.outputs))
+    used: set[str] = set()
+    for k, output in enumerate(system.outputs):
+        for term in output.terms if output.weighted else ():
+            if isinstance(term.shape, Value):
+                try:
+                    whole = term.shape.expression(inputs, outputs[:k])
+                except DefinitionError as error:
+                    raise DefinitionError(f"output {output.name!r}: term {term.name!r}: {error}") from None
+                used |= whole.names | (set(inputs) if isinstance(term.shape, Linear) else set())
+    for variable in system.inputs:
+        if not variable.terms and variable.name not in used:
+            raise DefinitionError(f"variable {variable.name!r}: no terms, expected at least one")
+
+
+def _require_known(statement: Is, known: _Terms, kind: str) -> None:
+    if statement.variable not in known:
+        raise DefinitionError(f"no {kind} {statement.variable!r}, expected one of {', '.join(known)}")
+    if statement.term not in known[statement.variable]:
+        expected = ", ".join(sorted(known[statement.variable]))
+        raise DefinitionError(f"{statement.variable!r} has no term {statement.term!r}, expected one of {expected}")

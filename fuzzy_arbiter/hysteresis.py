@@ -12,12 +12,11 @@ from numpy.typing import ArrayLike
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import System, Variable, variable_names
-from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError, InputError
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.result import Result
 from fuzzy_arbiter.samples import Sample
-from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.shapes import Array, Shape
 from fuzzy_arbiter.verification.cells import stretches
 from fuzzy_arbiter.verification.questions import Effort, Questions, greatest_term
 from fuzzy_arbiter.verification.search import Goal

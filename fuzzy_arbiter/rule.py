@@ -1,13 +1,17 @@
-"""A rule: a condition, its conclusions, and its weight."""
+"""A rule: a condition, its conclusions, and its weight; and rules as text."""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
 
 from fuzzy_arbiter.checks import all_of, finite, require_choice, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.propositions import Is, Proposition
-from fuzzy_arbiter.terms.norms import S_NORMS, T_NORMS
+from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Anything, Hedged, Is, Not, Or, Proposition
+from fuzzy_arbiter.terms.norms import HEDGES, S_NORMS, T_NORMS
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +101,6 @@ class Rule:
 
         A text that is not a rule raises `DefinitionError`; only a system checks that its variables and terms exist.
         """
-        from fuzzy_arbiter.rule_text import parse_rule
-
         return replace(parse_rule(text), operators=operators)
 
     def __repr__(self) -> str:
@@ -109,3 +111,180 @@ class Rule:
         conclusions = " and ".join(map(str, self.conclusions))
         weight = "" if self.weight == 1.0 else f" with {self.weight!r}"
         return f"if {self.condition} then {conclusions}{weight}"
+
+
+_TOKEN = re.compile(
+    r"""\s*(?: (?P<quoted>"[^"]*") | (?P<number>[0-9.]+(?:[eE][+-]?[0-9]+)?(?![A-Za-z_]))
+        | (?P<word>[^\W\d]\w*) | (?P<sign>[()&|~,]) | (?P<other>\S) )""",
+    re.VERBOSE,
+)
+_SIGNS = {"&": "and", "|": "or", "~": "not", ",": ","}
+
+
+def parse_rules(text: str) -> list[Rule]:
+    """Parse a text whose conclusions may have hedges as rules, in the way of fuzzylite."""
+    # A hedge in a conclusion bends the strength of that conclusion and of those after it, as one on the whole condition
+    # does. So conclusions with other hedges become a rule of their own.
+    parser = _Parser(text)
+    condition, conclusions, weight = parser.parts(hedges=True)
+    if weight != 1.0 and any(hedges for hedges, _ in conclusions):
+        raise parser.fault("a hedge in a conclusion of a rule with a weight, expected the weight 1")
+    return bent_rules(condition, conclusions, weight)
+
+
+def parse_rule(text: str) -> Rule:
+    """Parse a text as a rule."""
+    # Words of rules may be in any case. The hedges very, somewhat, extremely, seldom, cubed and cube_root are written
+    # before a term. `&`, `|`, `~` are *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are
+    # no identifiers stand in double quotes.
+    condition, conclusions, weight = _Parser(text).parts(hedges=False)
+    return Rule(condition, tuple(conclusion for _, conclusion in conclusions), weight)
+
+
+class _Parser:
+    """Parse one text by recursive descent."""
+
+    def __init__(self, text: str) -> None:
+        if not isinstance(text, str):
+            raise DefinitionError(f"rule: got {shown(text)}, expected text")
+        self.text = text
+        self.tokens: list[tuple[str, str]] = []  # kind (keyword or sign itself, "name", "number", "end") and text
+        for match in _TOKEN.finditer(text):
+            kind, token = str(match.lastgroup), match.group(match.lastgroup or 0)
+            if kind == "quoted":
+                self.tokens.append(("name", token[1:-1]))
+            elif kind == "word":
+                self.tokens.append((token.lower() if token.lower() in KEYWORDS else "name", token))
+            elif kind == "sign":
+                self.tokens.append((_SIGNS.get(token, token), token))
+            elif kind == "number":
+                self.tokens.append(("number", token))
+            else:
+                raise self.fault(f"{token!r} cannot stand in a rule")
+        self.tokens.append(("end", "the end"))
+        self.at = 0
+        self.depth = 0
+
+    def fault(self, what: str) -> DefinitionError:
+        text = self.text.strip()
+        return DefinitionError(f"rule {text if len(text) <= 200 else text[:200] + '...'!r}: {what}")
+
+    def accept(self, kind: str) -> bool:
+        if self.tokens[self.at][0] != kind:
+            return False
+        self.at += 1
+        return True
+
+    def take(self, kind: str, what: str) -> str:
+        found, token = self.tokens[self.at]
+        if found != kind:
+            before = f" after {self.tokens[self.at - 1][1]!r}" if self.at else ""
+            raise self.fault(f"got {token if found == 'end' else repr(token)}{before}, expected {what}")
+        self.at += 1
+        return token
+
+    def parts(self, hedges: bool) -> tuple[Proposition, list[tuple[tuple[str, ...], Is]], float]:
+        """Read the condition, the conclusions, each with its hedges, and the weight."""
+        self.take("if", "'if'")
+        condition = self.joined(Or)
+        self.take("then", "'then', 'and' or 'or'")
+        conclusions = [self.conclusion(hedges)]
+        while self.accept("and") or self.accept(","):
+            conclusions.append(self.conclusion(hedges))
+        weight = self.number() if self.accept("with") else 1.0
+        self.take("end", "'and', 'with' or the end")
+        return condition, conclusions, weight
+
+    def conclusion(self, hedges: bool) -> tuple[tuple[str, ...], Is]:
+        variable = self.take("name", "an output's name")
+        self.take("is", "'is'")
+        words = self.hedges("name", "not") if hedges else ()
+        if not hedges and self.accept("any"):  # which in a conclusion is a name like others
+            return words, Is(variable, self.tokens[self.at - 1][1])
+        return words, Is(variable, self.take("name", "a term's name"))
+
+    def hedges(self, *before: str) -> tuple[str, ...]:
+        """Read hedges, which stand before tokens of some kinds, and *not*."""
+        words: list[str] = []
+        while self.accept("not") or self.accept_hedge(*before):
+            kind, text = self.tokens[self.at - 1][:2]
+            words.append("not" if kind == "not" else text.lower())  # which may be written ~
+        return tuple(words)
+
+    def accept_hedge(self, *before: str) -> bool:
+        is_hedge = self.tokens[self.at][1].lower() in HEDGES and self.tokens[self.at + 1][0] in before
+        self.at += is_hedge
+        return is_hedge
+
+    def number(self) -> float:
+        token = self.take("number", "the rule's weight")
+        try:
+            return float(token)
+        except ValueError:
+            raise self.fault(f"{token!r} is not a number") from None
+
+    def joined(self, kind: type[Or | And]) -> Proposition:
+        """Read a disjunction, or a conjunction."""
+        word = "or" if kind is Or else "and"
+        part: Callable[[], Proposition] = partial(self.joined, And) if kind is Or else self.statement
+        parts = [part()]
+        while self.accept(word):
+            parts.append(part())
+        return self.made(kind, tuple(parts)) if len(parts) > 1 else parts[0]
+
+    def made(self, kind: Callable[[Any], Proposition], parts: Any) -> Proposition:
+        try:
+            return kind(parts)
+        except DefinitionError as error:
+            raise self.fault(str(error)) from None
+
+    def inner(self, parse: Callable[[], Proposition]) -> Proposition:
+        """Parse what is nested in parentheses, or follows *not* or a hedge."""
+        self.depth += 1
+        if self.depth > MAX_NESTING:
+            raise self.fault(f"nested deeper than {MAX_NESTING} parentheses and negations")
+        proposition = parse()
+        self.depth -= 1
+        return proposition
+
+    def statement(self) -> Proposition:
+        if self.accept("not"):
+            return self.made(Not, self.inner(self.statement))
+        if self.accept_hedge("("):
+            word = self.tokens[self.at - 1][1].lower()
+            return self.made(partial(Hedged, word), self.inner(self.statement))
+        if self.accept("("):
+            inner = self.inner(lambda: self.joined(Or))
+            self.take(")", "')', 'and' or 'or'")
+            return inner
+        variable = self.take("name", "an input's name, 'not' or '('")
+        self.take("is", "'is'")
+        words = self.hedges("name", "not", "any")
+        if self.accept("any"):
+            return self.bent(words, Anything(variable))
+        return self.bent(words, Is(variable, self.take("name", "a term's name")))
+
+    def bent(self, words: Sequence[str], statement: Proposition) -> Proposition:
+        for word in reversed(words):
+            statement = self.made(Not if word == "not" else partial(Hedged, word), statement)
+        return statement
+
+
+def bent_rules(
+    condition: Proposition, conclusions: Sequence[tuple[tuple[str, ...], Is]], weight: float, carry: bool = True
+) -> list[Rule]:
+    """Return a rule whose conclusions have hedges as rules whose conclusions have none."""
+    rows: dict[tuple[tuple[str, ...], int], list[Is]] = {}
+    carried: tuple[str, ...] = ()
+    for k, (hedges, conclusion) in enumerate(conclusions):
+        carried = hedges + carried if carry else hedges
+        # a second conclusion on one output is another rule, too
+        before = sum(c.variable == conclusion.variable for _, c in conclusions[:k])
+        rows.setdefault((carried, before), []).append(conclusion)
+    rules = []
+    for (row, _), concluded in rows.items():
+        bent = condition
+        for word in reversed(row):
+            bent = Not(bent) if word == "not" else Hedged(word, bent)
+        rules.append(Rule(bent, tuple(concluded), weight))
+    return rules

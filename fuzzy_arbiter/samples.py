@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import System, variable_names
-from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import InputError
+from fuzzy_arbiter.shapes import Array
 
 _NUMBER: Any = (Real, np.bool_)
 
@@ -133,11 +133,8 @@ class Samples:
             known = set(inputs.keys())  # of a row of a data frame other columns are passed over
             self._require_names(inputs if isinstance(inputs, Mapping) else [n for n in self._names if n in known])
             return [inputs[name] for name in self._names]
-        if isinstance(inputs, np.ndarray) and inputs.ndim:
-            values: list[Any] = inputs.tolist()
-            return values
-        if isinstance(inputs, Sequence):
-            return list(inputs)
+        if isinstance(inputs, Sequence) or (isinstance(inputs, np.ndarray) and inputs.ndim):
+            return inputs.tolist() if isinstance(inputs, np.ndarray) else list(inputs)
         raise InputError(f"inputs are {inputs!r}, expected {len(self._names)} numbers")
 
     def _require_names(self, inputs: Collection[str]) -> None:

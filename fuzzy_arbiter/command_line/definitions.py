@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.command_line.files import require_suffix
 from fuzzy_arbiter.definition import Output, System, Variable
+from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.files import write_atomic
 from fuzzy_arbiter.hierarchy import prioritized
 from fuzzy_arbiter.shapes import Shape
@@ -26,19 +27,24 @@ def load_system(file: str, block: str | None = None) -> System:
     return load(file, block)
 
 
+def require_suffix(out: str, expected: Sequence[str]) -> str:
+    """Return a file's suffix; require that it is one of the known ones."""
+    suffix = Path(out).suffix[1:].lower()
+    if suffix not in expected:
+        raise FormatError(f"{out}: suffix is {Path(out).suffix!r}, expected .{', .'.join(expected)}")
+    return suffix
+
+
 def described(arbiter: Arbiter) -> str:
     """Return a system in words: variables, terms, rules, norms, engine."""
     system = arbiter.system
     lines = [system.name, ""]
     for heading, variables in (("inputs", system.inputs), ("outputs", system.outputs)):
-        lines.append(heading)
-        for variable in variables:
-            lines += _described(variable)
+        lines += [heading, *(line for variable in variables for line in _described(variable))]
     lines += ["", "rules", *(f"  {line}" for line in str(system).splitlines()), ""]
     norms = ("conjunction", "disjunction", "implication", "normalization", "outside", "points")
     lines += [f"{name:14} {getattr(system, name)}" for name in norms]
-    lines += [f"{'engine':14} {arbiter.engine}: {arbiter.engine_reason}"]
-    return "\n".join(lines)
+    return "\n".join([*lines, f"{'engine':14} {arbiter.engine}: {arbiter.engine_reason}"])
 
 
 def _described(variable: Variable) -> list[str]:
@@ -68,14 +74,13 @@ def convert(file: str, out: str, native: bool, block: str | None = None) -> None
     """Write a system in another format, or as source code."""
     from fuzzy_arbiter.formats import FORMATS, fold_normalization, save
 
-    suffix = Path(out).suffix[1:].lower()
-    require_suffix(out, (*FORMATS, *EXPORTS))
+    suffix = require_suffix(out, (*FORMATS, *EXPORTS))
     system = load_system(file, block)
     if native:
         system = fold_normalization(system)
-    if suffix in EXPORTS:
-        from fuzzy_arbiter.export import to_c, to_python
-
-        write_atomic(out, (to_c if suffix == "c" else to_python)(system).encode())
-    else:
+    if suffix not in EXPORTS:
         save(system, out)
+        return
+    from fuzzy_arbiter.export import to_c, to_python
+
+    write_atomic(out, (to_c if suffix == "c" else to_python)(system).encode())

@@ -26,12 +26,7 @@ IMAGES = ("png", "svg", "pdf")
 
 
 def draw(
-    arbiter: Arbiter,
-    kind: str,
-    inputs: Sequence[str],
-    outputs: Sequence[str],
-    at: Sequence[str],
-    relief: bool,
+    arbiter: Arbiter, kind: str, inputs: Sequence[str], outputs: Sequence[str], at: Sequence[str], relief: bool
 ) -> Figure:
     """Draw a picture."""
     from fuzzy_arbiter import pictures
@@ -43,27 +38,33 @@ def draw(
         if value and option not in PICTURES[kind]:
             raise InputError(f"{kind}: got {option}, expected none but {', '.join(PICTURES[kind])}")
     system = arbiter.system
-    input_names, output_names = variable_names(system.inputs), variable_names(system.outputs)
-    if kind == "rules":
-        output = _names(kind, "--output", outputs, output_names, 1)[0]
-        return _figure(pictures.rules(arbiter, sample(at, system), output))
-    values: Any = sample(at, system) if at else {}
-    if not isinstance(values, dict):
+    known = {"--input": variable_names(system.inputs), "--output": variable_names(system.outputs)}
+    values: Any = sample(at, system) if at or kind == "rules" else {}
+    if kind != "rules" and not isinstance(values, dict):
         raise InputError(f"--at {at[0]}: expected name=value")
     if kind == "terms":
-        names = [*inputs, *outputs] or [*input_names, *output_names]
-        for name in values:
-            if name not in names:
-                raise InputError(f"--at {name}: its terms are not drawn, expected one of {', '.join(names)}")
-        return _terms(arbiter, names, values)
-    if kind == "profile":
-        return _figure(pictures.profile(arbiter, _names(kind, "--input", inputs, input_names, 1)[0], values))
-    first, second = _names(kind, "--input", inputs, input_names, 2)
-    if kind == "decisions":
-        return _figure(pictures.decisions(arbiter, (first, second), values))
-    output = _names(kind, "--output", outputs, output_names, 1)[0]
-    ax = new_axes(6.4, 5.2, projection="3d") if relief else None
-    return _figure(pictures.surface(arbiter, output, (first, second), values, ax=ax))
+        return _terms(arbiter, [*inputs, *outputs] or [*known["--input"], *known["--output"]], values)
+
+    def names(option: str, received: Sequence[str], n: int) -> Any:
+        chosen = received or known[option][:n]
+        if len(chosen) != n:
+            raise InputError(f"{kind}: {len(chosen)} of {option}, expected {n} of {', '.join(known[option])}")
+        return chosen
+
+    if kind == "rules":
+        ax = pictures.rules(arbiter, values, *names("--output", outputs, 1))
+    elif kind == "profile":
+        ax = pictures.profile(arbiter, names("--input", inputs, 1)[0], values)
+    else:
+        first, second = names("--input", inputs, 2)
+        if kind == "decisions":
+            ax = pictures.decisions(arbiter, (first, second), values)
+        else:
+            (output,) = names("--output", outputs, 1)
+            axes = new_axes(6.4, 5.2, projection="3d") if relief else None
+            ax = pictures.surface(arbiter, output, (first, second), values, ax=axes)
+    figure: Any = ax.figure
+    return figure  # type: ignore[no-any-return]
 
 
 def middles(at: Sequence[str], system: System) -> list[str]:
@@ -74,28 +75,19 @@ def middles(at: Sequence[str], system: System) -> list[str]:
     return [f"{v.name}={(v.universe[0] + v.universe[1]) / 2.0!r}" for v in system.inputs if v.name not in named]
 
 
-def _names(kind: str, option: str, received: Sequence[str], known: Sequence[str], n: int) -> Sequence[str]:
-    chosen = received or known[:n]
-    if len(chosen) != n:
-        raise InputError(f"{kind}: {len(chosen)} of {option}, expected {n} of {', '.join(known)}")
-    return chosen
-
-
 def _terms(arbiter: Arbiter, names: Sequence[str], at: Mapping[str, float]) -> Figure:
     from matplotlib.figure import Figure
 
     from fuzzy_arbiter import pictures
 
+    for name in at:
+        if name not in names:
+            raise InputError(f"--at {name}: its terms are not drawn, expected one of {', '.join(names)}")
     columns = 1 if len(names) <= 2 else 2
     rows = -(-len(names) // columns)
     figure = Figure(figsize=(5.6 * columns, 2.6 * rows), layout="constrained")
     for i, name in enumerate(names):
         pictures.terms(arbiter, name, at.get(name), ax=figure.add_subplot(rows, columns, i + 1))
-    return figure
-
-
-def _figure(ax: Any) -> Figure:
-    figure: Figure = ax.figure
     return figure
 
 

@@ -6,8 +6,8 @@ import csv
 import io
 import json
 from collections.abc import Mapping, Sequence
-
-import numpy as np
+from pathlib import Path
+from typing import TextIO
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import System, variable_names
@@ -44,27 +44,26 @@ def evaluated(arbiter: Arbiter, inputs: Sequence[float] | Mapping[str, float], a
     """Return the weights for one sample."""
     weights = arbiter(inputs)._asdict()
     if as_json:
-        return json.dumps({name: _or_null(weight) for name, weight in weights.items()}, ensure_ascii=False)
+        return json.dumps(_json_ready(weights), ensure_ascii=False)
     return "\n".join(f"{name} = {weight!r}" for name, weight in weights.items())
 
 
-def evaluated_table(arbiter: Arbiter, text: str, where: str, as_json: bool) -> str:
-    """Return the weights for the rows of a CSV table."""
-    lines, rows = _rows(text, where, variable_names(arbiter.system.inputs))
+def evaluated_table(arbiter: Arbiter, path: str, stdin: TextIO | None, as_json: bool) -> str:
+    """Return the weights for the rows of a CSV table, of a file or, for ``-``, of standard input."""
+    where = "standard input" if path == "-" else path
+    lines, rows = _rows(_text(path, where, stdin), where, variable_names(arbiter.system.inputs))
     names = arbiter.system.result_names
-    weights: list[list[float]] = []
-    if rows:
-        try:
-            weights = arbiter.batch(np.array(rows)).tolist()
-        except ArbiterError:
-            for line, row in zip(lines, rows, strict=True):
-                try:
-                    arbiter(row)
-                except ArbiterError as error:
-                    raise type(error)(f"{where}: line {line}: {error}") from None
-            raise
+    try:
+        weights = arbiter.batch(rows).tolist() if rows else []
+    except ArbiterError:
+        for line, row in zip(lines, rows, strict=True):
+            try:
+                arbiter(row)
+            except ArbiterError as error:
+                raise type(error)(f"{where}: line {line}: {error}") from None
+        raise
     if as_json:
-        table = [dict(zip(names, map(_or_null, row), strict=True)) for row in weights]
+        table = [_json_ready(dict(zip(names, row, strict=True))) for row in weights]
         return json.dumps(table, ensure_ascii=False)
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\n")
@@ -73,30 +72,44 @@ def evaluated_table(arbiter: Arbiter, text: str, where: str, as_json: bool) -> s
     return out.getvalue().removesuffix("\n")
 
 
-def _or_null(weight: float) -> float | None:
-    return weight if weight == weight else None
+def _json_ready(weights: dict[str, float]) -> dict[str, float | None]:
+    """Replace NaN, which JSON has not, by None."""
+    return {name: weight if weight == weight else None for name, weight in weights.items()}
+
+
+def _text(path: str, where: str, stdin: TextIO | None) -> str:
+    try:
+        if path != "-":
+            return Path(path).read_bytes().decode()
+        if stdin is None:
+            raise InputError(f"{where}: is closed")
+        return stdin.read()
+    except UnicodeDecodeError:
+        raise InputError(f"{where}: not UTF-8 text") from None
+    except OSError as error:
+        raise InputError(f"{where}: {error.strerror or error}") from None
 
 
 def _rows(text: str, where: str, names: Sequence[str]) -> tuple[list[int], list[list[float]]]:
     """Return line numbers and values of a table, in the order of the inputs."""
     reader = csv.reader(io.StringIO(text.removeprefix("\ufeff"), newline=""), skipinitialspace=True)
+    lines, rows = [], []
     try:
         header = [name.strip() for name in next(reader, [])]
         for name in names:
             if header.count(name) != 1:
                 fault = "stands twice" if name in header else "is missing"
-                received = ", ".join(map(repr, header))
+                received = ", ".join(map(repr, header)) or "none"
                 received = received if len(received) <= 200 else f"{received[:200]} ..."
-                raise InputError(f"{where}: column {name!r} {fault} in the first line, which has {received or 'none'}")
-        columns = [header.index(name) for name in names]
-        lines, rows = [], []
+                raise InputError(f"{where}: column {name!r} {fault} in the first line, which has {received}")
+        columns = {name: header.index(name) for name in names}
         for cells in reader:
             if not any(cell.strip() for cell in cells):
                 continue
             line = f"{where}: line {reader.line_num}"
             if len(cells) != len(header):
                 raise InputError(f"{line}: {len(cells)} cells, expected {len(header)}")
-            rows.append([number(cells[i], f"{line}: {name}") for i, name in zip(columns, names, strict=True)])
+            rows.append([number(cells[i], f"{line}: {name}") for name, i in columns.items()])
             lines.append(reader.line_num)
     except csv.Error as error:
         raise InputError(f"{where}: line {reader.line_num}: {error}") from None

@@ -22,11 +22,11 @@ import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.engine import Defuzzifier, Engine, Shortcut
-from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.engines.normal_form import Literal, NoClosedFormError, high_clauses, ladder
 from fuzzy_arbiter.engines.rational_pieces import Piece, evaluate, pieces
 from fuzzy_arbiter.engines.supported import unsupported_reason
 from fuzzy_arbiter.hierarchy import DEGREE
+from fuzzy_arbiter.shapes import Array
 
 SMOOTHSTEP = (3.0, -2.0)  # coefficients of 3 h^2 - 2 h^3, which stays within [0, 1]
 _BLOCK = 8192  # number of samples evaluated at a time; longer arrays leave the caches and are allocated anew each time

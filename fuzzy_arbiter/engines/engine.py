@@ -11,8 +11,9 @@ from typing import Any, ClassVar
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
-from fuzzy_arbiter.engines.firing import Array, Degrees, Firing
+from fuzzy_arbiter.engines.firing import Degrees, Firing
 from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.shapes import Array
 from fuzzy_arbiter.terms.values import Constant, Value
 
 Shortcut = Callable[[Sequence[float]], list[float] | None]

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+# Sugeno's terms are values that may depend on the inputs. Tsukamoto's only rise or only fall, and their value is the
+# place where they have the rule's strength.
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
 from fuzzy_arbiter.engines.engine import Defuzzifier, Engine
-from fuzzy_arbiter.engines.firing import Array, slots_of
+from fuzzy_arbiter.engines.firing import slots_of
 from fuzzy_arbiter.engines.quadrature import Quadrature
 from fuzzy_arbiter.engines.supported import curved_term
-from fuzzy_arbiter.engines.weighted import Weighted
 from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.shapes import Array
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
+from fuzzy_arbiter.terms.values import Constant, Value, place_of
 
 _BLOCK = 2**20  # number of heights that are computed at a time
 _EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
@@ -113,3 +117,48 @@ def sampled(output: Output, points: int) -> tuple[Array, Array]:
                 f"output {output.name!r}: term {term.name!r} is 0 at all {points} points; expected more points"
             )
     return positions, samples
+
+
+class Weighted(Defuzzifier):
+    """The value of one output whose terms are values."""
+
+    method = "weighted values, to rounding"
+
+    def __init__(self, output: Output, inputs: Sequence[str], outputs: Sequence[str]) -> None:
+        self._mean = output.defuzzifier == "average"
+        self._values = [_function(term.shape, inputs, outputs) for term in output.terms]
+
+    def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
+        """Return the output's value for one sample."""
+        total = weight = 0.0
+        for cut, value in zip(cuts, self._values, strict=True):
+            if cut > 0.0:
+                total += cut * value(cut, inputs)
+                weight += cut
+        return total / weight if self._mean else total
+
+    def values(self, cuts: Array, inputs: Array) -> Array:
+        """Return the output's values for many samples."""
+        total, weight = np.zeros((2, cuts.shape[1]))
+        for cut, value in zip(cuts, self._values, strict=True):
+            fires = cut > 0.0
+            with np.errstate(all="ignore"):
+                total += np.where(fires, cut * np.where(fires, value(cut, inputs.T), 0.0), 0.0)
+            weight += cut
+        return total / weight if self._mean else total
+
+
+def _function(shape: Any, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Any, Any], Any]:
+    """Return a function from the strengths and the inputs to the values: numbers, or arrays for many samples."""
+    if isinstance(shape, Constant):
+        return lambda cut, columns: shape.value
+    if isinstance(shape, Value):
+        function = shape.function(inputs, outputs)
+        return lambda cut, columns: function(columns)
+
+    def position(cut: Any, columns: Any) -> Any:
+        if isinstance(cut, np.ndarray):  # a strength of 0 has no weight, so that its place does not matter
+            return np.array([place_of(shape, w) if w > 0.0 else 0.0 for w in cut.tolist()])
+        return place_of(shape, cut)
+
+    return position

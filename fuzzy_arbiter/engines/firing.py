@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import Any, Generic, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
 from fuzzy_arbiter.rule import Operators
+from fuzzy_arbiter.shapes import Array
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, HEDGES, S_NORMS, T_NORMS
 
-Array = NDArray[np.float64]
 Degrees = Mapping[tuple[str, str], Callable[[Any], Any]]  # of each input's terms, by the names of both
 D = TypeVar("D")
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from importlib.resources import files
 
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.export.functions import in_c
-from fuzzy_arbiter.export.program import TABLES, Assign, Choose, Program, Return, Statement, Sweep, program
+from fuzzy_arbiter.export.program import TABLES, Assign, Program, Return, Statement, Sweep, formatted, program
 
 
 def to_c(system: System) -> str:
@@ -51,7 +51,8 @@ def _file(code: Program) -> Iterator[str]:
     n, m = len(system.inputs), len(system.outputs)
     signature = f"int {function}(const double inputs[{n}], double outputs[{m}])"
     yield f"{signature};"
-    text = "\n".join(_block(code.statements, system, "    "))
+    known = {f"x{i}" for i in range(1, n + 1)}
+    text = "\n".join(formatted(code.statements, lambda statement: _simple(statement, known), _branch, "}"))
     yield ""
     yield from (["#include <math.h>", ""] if code.mathematical else [])
     yield from filter(None, map(in_c, code.functions))
@@ -94,35 +95,21 @@ def _safe(words: str) -> str:
     return re.sub(r"\*(?=/)|/(?=\*)|\?(?=\?)", r"\g<0> ", words)
 
 
-def _block(
-    statements: Sequence[Statement], system: System, indent: str, known: set[str] | None = None
-) -> Iterator[str]:
-    known = {f"x{i}" for i in range(1, len(system.inputs) + 1)} if known is None else known
-    for statement in statements:
-        match statement:
-            case Assign(name, expression, words):
-                kind = "" if name in known else "double "
-                known.add(name)
-                yield f"{indent}{kind}{name} = {expression};" + (f" /* {_safe(words)} */" if words else "")
-            case Sweep(name, k, cuts, scales):
-                pieces = f"sizeof BREAKPOINTS_{k} / sizeof *BREAKPOINTS_{k} - 1"
-                tables = f"{pieces}, {', '.join(f'{table}_{k}' for table in TABLES)}"
-                yield f"{indent}const double cuts_{k}[] = {{{', '.join(cuts)}}};"
-                function = f"centroid_of_{'scaled' if scales else 'clipped'}"
-                yield f"{indent}{name} = {function}(cuts_{k}, {len(cuts)}, {tables});"
-            case Return(status):
-                yield f"{indent}return {status};"
-            case Choose(branches):
-                yield from _choice(branches, system, indent, known)
+def _simple(statement: Statement, known: set[str]) -> Iterator[str]:
+    match statement:
+        case Assign(name, expression, words):
+            kind = "" if name in known else "double "
+            known.add(name)
+            yield f"{kind}{name} = {expression};" + (f" /* {_safe(words)} */" if words else "")
+        case Sweep(name, k, cuts, scales):
+            pieces = f"sizeof BREAKPOINTS_{k} / sizeof *BREAKPOINTS_{k} - 1"
+            tables = f"{pieces}, {', '.join(f'{table}_{k}' for table in TABLES)}"
+            yield f"const double cuts_{k}[] = {{{', '.join(cuts)}}};"
+            yield f"{name} = centroid_of_{'scaled' if scales else 'clipped'}(cuts_{k}, {len(cuts)}, {tables});"
+        case Return(status):
+            yield f"return {status};"
 
 
-def _choice(
-    branches: Sequence[tuple[str, Sequence[Statement]]], system: System, indent: str, known: set[str]
-) -> Iterator[str]:
-    word = f"{indent}if"
-    for condition, statements in branches:
-        condition = condition.replace("not (", "!(").replace(" and ", " && ").replace(" or ", " || ")
-        yield f"{word} ({condition}) {{" if condition else f"{word.removesuffix(' if')} {{"
-        yield from _block(statements, system, indent + "    ", known)
-        word = f"{indent}}} else if"
-    yield f"{indent}}}"
+def _branch(i: int, condition: str) -> str:
+    condition = condition.replace("not (", "!(").replace(" and ", " && ").replace(" or ", " || ")
+    return f"{'} else ' if i else ''}{f'if ({condition}) ' if condition else ''}{{"

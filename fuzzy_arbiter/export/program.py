@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial, reduce
 from itertools import accumulate
@@ -68,6 +68,25 @@ class Return:
 
 
 Statement = Assign | Choose | Sweep | Return
+
+
+def formatted(
+    statements: Iterable[Statement],
+    simple: Callable[[Statement], Iterable[str]],
+    branch: Callable[[int, str], str],
+    end: str,
+    indent: str = "    ",
+) -> Iterator[str]:
+    """Format statements: `simple` one without branches, `branch` the head of the i-th branch, `end` those of all."""
+    for statement in statements:
+        if isinstance(statement, Choose):
+            for i, (condition, inner) in enumerate(statement.branches):
+                yield indent + branch(i, condition)
+                yield from formatted(inner, simple, branch, end, indent + "    ")
+            if end:
+                yield indent + end
+        else:
+            yield from (indent + line for line in simple(statement))
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from types import FunctionType
+from typing import Any
 
 from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.engines import clipped_centroid
+from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.export.functions import in_python
-from fuzzy_arbiter.export.program import TABLES, Assign, Choose, Program, Return, Statement, Sweep, program
+from fuzzy_arbiter.export.program import TABLES, Assign, Program, Return, Statement, Sweep, formatted, program
 
 _MATH = """
 import math
@@ -82,29 +85,37 @@ def _module(code: Program) -> Iterator[str]:
     yield "\n\ndef evaluate(inputs, outputs):"
     yield '    """Fill the outputs; return 0, or -i if the i-th input is bad, or k if the k-th output is undefined."""'
     yield from (f"    x{i} = inputs[{i - 1}]  # {v.name}" for i, v in enumerate(system.inputs, 1))
-    yield from _block(code.statements, system, "    ")
+    yield from formatted(code.statements, _simple, _branch, "")
     yield from (f"    outputs[{k - 1}] = y{k}" for k in range(1, len(system.outputs) + 1))
     yield "    return 0"
     yield _TAIL.rstrip().format(inputs=variable_names(system.inputs), outputs=variable_names(system.outputs))
 
 
-def _block(statements: Sequence[Statement], system: System, indent: str) -> Iterator[str]:
-    for statement in statements:
-        match statement:
-            case Assign(name, expression, words):
-                yield f"{indent}{name} = {expression}" + (f"  # {words}" if words else "")
-            case Sweep(name, k, cuts, scales):
-                tables = f"{', '.join(f'{table}_{k}' for table in TABLES)}, {scales}"
-                yield f"{indent}{name} = centroid(({', '.join(cuts)},), {tables})"
-            case Return(status):
-                yield f"{indent}return {status}"
-            case Choose(branches):
-                yield from _choice(branches, system, indent)
+def _simple(statement: Statement) -> Iterator[str]:
+    match statement:
+        case Assign(name, expression, words):
+            yield f"{name} = {expression}" + (f"  # {words}" if words else "")
+        case Sweep(name, k, cuts, scales):
+            yield f"{name} = centroid(({', '.join(cuts)},), {', '.join(f'{table}_{k}' for table in TABLES)}, {scales})"
+        case Return(status):
+            yield f"return {status}"
 
 
-def _choice(branches: Sequence[tuple[str, Sequence[Statement]]], system: System, indent: str) -> Iterator[str]:
-    word = "if"
-    for condition, statements in branches:
-        yield f"{indent}{word} {condition}:" if condition else f"{indent}else:"
-        yield from _block(statements, system, indent + "    ")
-        word = "elif"
+def _branch(i: int, condition: str) -> str:
+    return f"{'elif' if i else 'if'} {condition}:" if condition else "else:"
+
+
+def compiled(system: System) -> Any:
+    """Return a compiled function ``evaluate(inputs, outputs) -> int``."""
+    try:
+        import numba
+    except ImportError:
+        raise EngineError("compiled: Numba is not installed, expected the extra fuzzy-arbiter[numba]") from None
+    namespace: dict[str, Any] = {}
+
+    exec(compile(to_python(system), f"<{system.name}>", "exec"), namespace)  # noqa: S102
+    # each function finds those it calls in the same namespace
+    for name, function in list(namespace.items()):
+        if isinstance(function, FunctionType) and name != "weights":
+            namespace[name] = numba.njit(function)
+    return namespace["evaluate"]

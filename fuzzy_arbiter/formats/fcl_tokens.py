@@ -72,26 +72,20 @@ def cut(text: str) -> tuple[list[Token], list[tuple[int, str]]]:
     return tokens, comments
 
 
-def block_name(tokens: Sequence[Token]) -> str:
-    """Return the name that begins a function block: all tokens of its line, up to a word of the language."""
-    words: list[str] = []
-    for token in tokens:
-        if token.line != tokens[0].line or token.text.upper() in (*SECTIONS, _END) or token.kind == "end":
-            break
-        words += [" "] * (token.spaced and bool(words)) + [token.text]
-    return "".join(words)
+def _head(tokens: Sequence[Token], start: int) -> tuple[str, int]:
+    """Return the name of the function block at an index, all tokens of its line, and the index after it."""
+    i = start + 1
+    while tokens[i].line == tokens[start].line and tokens[i].text.upper() not in _LIMITS and tokens[i].kind != "end":
+        i += 1
+    return "".join(" " * token.spaced + token.text for token in tokens[start + 1 : i]).strip(), i
 
 
 def sections_of(tokens: list[Token]) -> tuple[list[Block], bool]:
     """Split a function block into its head and its sections; tell if a rule ends with its line, as in fuzzylite."""
     if tokens[0].text.upper() != "FUNCTION_BLOCK":
         _unexpected(tokens, 0, "FUNCTION_BLOCK")
-    sections = [Block("FUNCTION_BLOCK", block_name(tokens[1:]), tokens[0].line)]
-    i, by_line = 1, False
-    while sections[0].name and tokens[i].line == tokens[0].line and tokens[i].text.upper() not in (*SECTIONS, _END):
-        if tokens[i].kind == "end":
-            break
-        i += 1
+    name, i = _head(tokens, 0)
+    sections, by_line = [Block("FUNCTION_BLOCK", name, tokens[0].line)], False
     while tokens[i].text.upper() != _END:
         i, without_sign = _read_section(tokens, i, sections)
         by_line |= without_sign
@@ -113,17 +107,12 @@ def _read_section(tokens: Sequence[Token], i: int, sections: list[Block]) -> tup
         section.name, section.line = tokens[i].text, tokens[i].line
         i += 1
     while tokens[i].text.upper() != end:
-        start = i
-        while tokens[i].text != ";" and not _ends_rule(tokens, start, i):
+        start, is_rule = i, tokens[i].text.upper() == "RULE"
+        while tokens[i].text != ";" and not (is_rule and i > start and _ends_rule(tokens, i)):
             word = tokens[i].text.upper()
             if tokens[i].kind == "end" or word in _LIMITS:
                 _unexpected(tokens, i, ";" if i > start and word == end else end)
-            if (
-                i > start + 1
-                and tokens[start].text.upper() != "RULE"
-                and word in keys
-                and tokens[i + 1].text in (":", ":=")
-            ):
+            if i > start + 1 and not is_rule and word in keys and tokens[i + 1].text in (":", ":="):
                 _unexpected(tokens, i, ";")
             i += 1
         _add(section, tokens[start:i])
@@ -132,18 +121,17 @@ def _read_section(tokens: Sequence[Token], i: int, sections: list[Block]) -> tup
     return i + 1, by_line
 
 
+def _ends_rule(tokens: Sequence[Token], i: int) -> bool:
+    """Return True if a rule ends before an index, at the end of its line."""
+    word = tokens[i].text.upper()
+    begins_another = word == "RULE" and tokens[i + 1].kind in ("name", "number", "sign")
+    return tokens[i].line != tokens[i - 1].line and (word == "END_RULEBLOCK" or begins_another)
+
+
 def _unexpected(tokens: Sequence[Token], i: int, expected: str) -> NoReturn:
     text = tokens[i].text if tokens[i].kind == "end" else repr(tokens[i].text)
     before = f" after {tokens[i - 1].text!r}" if i else ""
     refuse(tokens[i].line, f"got {text}{before}, expected {expected}")
-
-
-def _ends_rule(tokens: Sequence[Token], start: int, i: int) -> bool:
-    """Return True if a rule from one index ends before another, at the end of its line."""
-    if i == start or tokens[start].text.upper() != "RULE" or tokens[i].line == tokens[i - 1].line:
-        return False
-    word = tokens[i].text.upper()
-    return word == "END_RULEBLOCK" or (word == "RULE" and tokens[i + 1].kind in ("name", "number", "sign"))
 
 
 def _add(section: Block, statement: Sequence[Token]) -> None:
@@ -154,22 +142,13 @@ def _add(section: Block, statement: Sequence[Token]) -> None:
     match = _STATEMENT.fullmatch(text)
     if not keys:
         section.many.append((line, text))
-    elif (
-        not match
-        or (match["label"] and match["key"].upper() not in _MANY)
-        or match["sign"] == (":" if match["key"].upper() in _ASSIGNED else ":=")
-    ):
+        return
+    key, label = (match["key"].upper(), match["label"] or "") if match else ("", "")
+    misplaced = (label and key not in _MANY) or (match and match["sign"] == (":" if key in _ASSIGNED else ":="))
+    if not match or misplaced:
         refuse(line, f"{text!r}, expected a key, a colon and its value; known keys are {', '.join(keys)}")
-    else:
-        key, value = match["key"].upper(), match["value"]
-        value = (
-            f"{match['label'] or ''} {value}"
-            if key == "TERM"
-            else value
-            if key in ("RULE", "DEFAULT")
-            else value.upper()
-        )
-        section.add(line, key, value, keys, _MANY)
+    value = match["value"] if key in ("RULE", "DEFAULT", "TERM") else match["value"].upper()
+    section.add(line, key, f"{label} {value}" if key == "TERM" else value, keys, _MANY)
 
 
 def chosen_block(tokens: list[Token], name: str | None) -> list[Token]:
@@ -178,7 +157,7 @@ def chosen_block(tokens: list[Token], name: str | None) -> list[Token]:
     if name is None and len(starts) < 2:
         return tokens
     ends = [*starts[1:], len(tokens) - 1]
-    names = [block_name(tokens[start + 1 :]) for start in starts]
+    names = [_head(tokens, start)[0] for start in starts]
     chosen = [i for i, own in enumerate(names) if own == name]
     if len(chosen) == 1:
         return [*tokens[starts[chosen[0]] : ends[chosen[0]]], tokens[-1]]

@@ -3,22 +3,188 @@
 from __future__ import annotations
 
 import math
+import re
+from typing import Any
 
 from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable, variable_names
-from fuzzy_arbiter.errors import UnsupportedError
-from fuzzy_arbiter.formats.fis_reader import read
+from fuzzy_arbiter.errors import FormatError, UnsupportedError
+from fuzzy_arbiter.formats.fis_rules import read_rules, with_complements
+from fuzzy_arbiter.formats.fis_terms import numbers_of, read_function, with_unique_names
 from fuzzy_arbiter.formats.fll_terms import parts_of
-from fuzzy_arbiter.formats.notation import format_number, format_numbers, unsupported_rule
-from fuzzy_arbiter.formats.settings import format_settings
-from fuzzy_arbiter.formats.vocabulary import operator_words, word_of
+from fuzzy_arbiter.formats.notation import (
+    Block,
+    assembled,
+    format_number,
+    format_numbers,
+    located,
+    refuse,
+    unsupported_rule,
+)
+from fuzzy_arbiter.formats.settings import format_settings, read_settings
+from fuzzy_arbiter.formats.vocabulary import WORDS, operator_words, word_of
 from fuzzy_arbiter.propositions import And, Is, Not, Or
-from fuzzy_arbiter.shapes import Shape
+from fuzzy_arbiter.rule import Operators
+from fuzzy_arbiter.shapes import Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.kinds import KINDS
 from fuzzy_arbiter.terms.term import Term
-from fuzzy_arbiter.terms.values import Value
+from fuzzy_arbiter.terms.values import Formula, Value
 
-__all__ = ["read", "write"]
+_SECTION = re.compile(r"\[\s*(System|Input|Output|Rules)\s*([1-9][0-9]{0,8})?\s*\]", re.ASCII)
+_ENTRY = re.compile(r"(\w+)\s*=\s*(.*)", re.ASCII)
+_QUOTED = re.compile(r"'([^']*)'")
+_LIST = re.compile(r"\[([^][]*)\]")
+_FUNCTION = re.compile(r"'([^']*)'\s*:\s*'([^']*)'\s*,\s*\[([^][]*)\]")
+_METHODS = {
+    "AndMethod": "conjunction",
+    "OrMethod": "disjunction",
+    "ImpMethod": "implication",
+    "AggMethod": "aggregation",
+}
+_TEXTS = ("Name", "Type", *_METHODS, "DefuzzMethod")
+_SYSTEM_KEYS = (*_TEXTS, "Version", "NumInputs", "NumOutputs", "NumRules")
+# types, and whether their outputs are values; the last two are fuzzylite's
+_TYPES = {"mamdani": False, "sugeno": True, "tsukamoto": True, "hybrid": None}
+# keys of a variable that fuzzylite's versions 3 to 5 add
+_FUZZYLITE_KEYS = ("Enabled", "Default", "LockRange", "LockPrevious")
+_FLAGS = {"1": True, "0": False}
+
+_Parts = tuple[str, tuple[float, float], tuple[Term, ...]]
+
+
+def read(text: str) -> System:
+    """Parse MATLAB's text as a system."""
+    # Terms of one name are numbered, as rules speak of them by their place. Where a rule concludes that an output is
+    # not in a term, its complement becomes a term of its own. The strengths of rules that conclude one value are added,
+    # whatever AggMethod says, as MATLAB does it; where a comment names the fuzzy-logic-toolkit, they are joined as
+    # AggMethod defines, as in Octave.
+    sections, comments = _sections(text)
+    settings = read_settings(comments)
+    if "System" not in sections or "Rules" not in sections:
+        raise FormatError("expected the sections [System] and [Rules] of a FIS file, among others")
+    system = sections["System"]
+    norms = {kind: system.word(key, WORDS["fis"][kind]) for key, kind in _METHODS.items()}
+    if not system.entry("AndMethod")[1] and norms["disjunction"] == "probor":
+        norms["conjunction"] = "prod"
+    aggregation = norms.pop("aggregation")
+    words = " ".join(text for _, text in comments)
+    fuzzylite = "generated with fuzzylite" in words or any(
+        key in _FUZZYLITE_KEYS for section in sections.values() for key in section.entries
+    )
+    inputs = [section.build(Variable, *_parts(section, None)) for section in _numbered(sections, "Input")]
+    joins = {False: aggregation, True: aggregation if "fuzzy-logic-toolkit" in words else "sum"}
+    outputs = [_output(section, len(inputs), system, joins) for section in _numbered(sections, "Output")]
+    table = sections["Rules"]
+    for key, count in (("NumInputs", len(inputs)), ("NumOutputs", len(outputs)), ("NumRules", len(table.many))):
+        _require_count(system, key, count)
+    rules = table.rules(lambda line, row: read_rules(line, row, inputs, outputs, fuzzylite))
+    outputs = [with_complements(output, rules) for output in outputs]
+    block = Operators(**norms), rules
+    return assembled(system.line, inputs, outputs, [block], name=system.name or "arbiter", **settings)
+
+
+def _sections(text: str) -> tuple[dict[str, Block], list[tuple[int, str]]]:
+    sections: dict[str, Block] = {}
+    comments: list[tuple[int, str]] = []
+    section: Block | None = None
+    for line, raw in enumerate(text.split("\n"), 1):
+        content = raw.strip()
+        if content.startswith(("%", "#")):
+            comments.append((line, content[1:]))
+        elif head := _SECTION.fullmatch(content):
+            kind = head[1] + (head[2] or "")
+            if (head[1] in ("Input", "Output")) != bool(head[2]):
+                refuse(line, f"section {content!r}, expected [System], [Input1], [Output1], [Rules] and so on")
+            if kind in sections:
+                refuse(line, f"section {content!r} appears twice")
+            section = sections[kind] = Block(kind, "", line)
+        elif content and (section is None or content.startswith("[")):
+            refuse(line, f"{content!r}, expected a section such as [System], [Input1], [Output1] or [Rules]")
+        elif content and section and section.kind == "Rules":
+            section.many.append((line, content))
+        elif content and section:
+            _add_entry(section, line, content)
+    return sections, comments
+
+
+def _add_entry(section: Block, line: int, content: str) -> None:
+    entry = _ENTRY.fullmatch(content)
+    if not entry:
+        refuse(line, f"{content!r}, expected a key, = and its value")
+    key, value = entry.groups()
+    if key in _TEXTS:
+        quoted = _QUOTED.fullmatch(value)
+        value = quoted[1] if quoted else refuse(line, f"{key} is {value}, expected text in single quotes")
+    section.add(line, key, value, _SYSTEM_KEYS if section.kind == "System" else ())
+    if key == "Name":
+        section.name = value
+
+
+def _require_count(section: Block, key: str, count: int) -> None:
+    line, value = section.entry(key)
+    if value != str(count):
+        refuse(line, f"{key} of {section.title} is {value or 'missing'}, expected {count}, since there are {count}")
+
+
+def _defuzzifier(system: Block) -> Any:
+    """Return the defuzzifier of all outputs; in a hybrid file those of values take the weighted mean."""
+    kind = system.entry("Type")[1] or "mamdani"
+    weighted = system.word("Type", {**_TYPES, "": False})
+    line, word = system.entry("DefuzzMethod")
+    word = word or ("centroid" if kind == "mamdani" else "wtaver")
+    known = {key: name for key, name in WORDS["fis"]["defuzzifier"].items() if weighted in (None, name in WEIGHTED)}
+    if word not in known:
+        refuse(line, f"DefuzzMethod is {word!r} in a file of the type {kind!r}, expected {' or '.join(known)}")
+    return known[word]
+
+
+def _numbered(sections: dict[str, Block], kind: str) -> list[Block]:
+    """Return the sections of one kind in the order of their numbers."""
+    alike = [section for section in sections.values() if section.kind.startswith(kind)]
+    expected = [f"{kind}{k}" for k in range(1, len(alike) + 1)]
+    for key in expected:
+        if key not in sections:
+            refuse(alike[-1].line, f"got [{alike[-1].kind}] without [{key}]; expected them numbered from 1")
+    return [sections[key] for key in expected]
+
+
+def _output(section: Block, inputs: int, system: Block, joins: dict[bool, str]) -> Output:
+    """Return an output, whose values or sets are joined by these aggregations."""
+    parts, defuzzifier = _parts(section, inputs), _defuzzifier(system)
+    values = any(not isinstance(term.shape, Membership) or isinstance(term.shape, Formula) for term in parts[2])
+    if values and defuzzifier not in WEIGHTED and system.entry("Type")[1] == "hybrid":
+        defuzzifier = "average"
+    locks = section.word("LockRange", _FLAGS, "0"), section.word("LockPrevious", _FLAGS, "0")
+    options = section.number("Default"), defuzzifier, joins[defuzzifier in WEIGHTED], *locks
+    return section.build(Output, *parts, *options)
+
+
+def _parts(section: Block, inputs: int | None) -> _Parts:
+    """Return the name, the universe and the terms of a variable."""
+    for key in ("Name", "Range"):
+        if key not in section.entries:
+            refuse(section.line, f"{section.title} has no {key}")
+    line, value = section.entry("Range")
+    match = _LIST.fullmatch(value)
+    bounds = numbers_of(match[1], line, f"Range of {section.title}") if match else []
+    if len(bounds) != 2:
+        refuse(line, f"Range of {section.title} is {value}, expected two numbers in brackets")
+    section.word("Enabled", {"1": True}, "1")
+    known = ("Name", "Range", "NumMFs", *(_FUZZYLITE_KEYS if inputs is not None else _FUZZYLITE_KEYS[:1]))
+    functions = {key: entry for key, entry in section.entries.items() if key not in known}
+    _require_count(section, "NumMFs", len(functions))
+    terms: list[Term] = []
+    for j, (key, (line, value)) in enumerate(functions.items(), 1):
+        if key != f"MF{j}":
+            refuse(line, f"got {key} in {section.title}, expected MF{j}")
+        match = _FUNCTION.fullmatch(value)
+        if not match:
+            refuse(line, f"{value}, expected a membership function such as 'low':'trimf',[-1 0 1]")
+        term, function, places = match.groups()
+        with located(f"line {line}: term {term!r}"):
+            terms.append(Term(term, read_function(function, places, line, term, inputs)))
+    return section.name, (bounds[0], bounds[1]), with_unique_names(terms)
+
 
 _SIGNS = "'=:,"  # characters at which MATLAB's reader splits lines
 MATLAB = ("gaussmf", "gauss2mf", "gbellmf", "sigmf", "dsigmf", "psigmf", "zmf", "smf", "pimf")  # not fuzzylite's alone

@@ -10,8 +10,7 @@ from fuzzy_arbiter.definition import Output, Variable
 from fuzzy_arbiter.formats.fis_terms import complement
 from fuzzy_arbiter.formats.notation import located, read_number, refuse
 from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
-from fuzzy_arbiter.rule import Rule
-from fuzzy_arbiter.rule_text import bent_rules
+from fuzzy_arbiter.rule import Rule, bent_rules
 from fuzzy_arbiter.terms.term import Term
 
 # digits after the point of a term's number: fuzzylite's, Octave's in conditions, of which ten times is the power, and

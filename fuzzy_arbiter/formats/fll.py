@@ -24,8 +24,7 @@ from fuzzy_arbiter.formats.notation import (
 from fuzzy_arbiter.formats.settings import format_settings, read_settings, settings_of
 from fuzzy_arbiter.formats.vocabulary import WORDS, operator_words, word_of
 from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
-from fuzzy_arbiter.rule import Operators, Rule
-from fuzzy_arbiter.rule_text import parse_rules
+from fuzzy_arbiter.rule import Operators, Rule, parse_rules
 from fuzzy_arbiter.terms.norms import HEDGES
 from fuzzy_arbiter.terms.term import Term
 

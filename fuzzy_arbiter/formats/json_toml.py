@@ -6,10 +6,10 @@ import json
 import re
 import tomllib
 from collections.abc import Callable, Iterator
-from dataclasses import fields
+from dataclasses import asdict, fields
 from typing import Any, NoReturn
 
-from fuzzy_arbiter.definition import Output, System, Variable
+from fuzzy_arbiter.definition import CHOICES, Output, System, Variable
 from fuzzy_arbiter.errors import FormatError
 from fuzzy_arbiter.formats.fll_terms import parts_of
 from fuzzy_arbiter.formats.schema import system_of
@@ -17,9 +17,6 @@ from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.shapes import Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.values import Value
-
-_OPERATORS = ("conjunction", "disjunction", "implication")
-_SETTINGS = ("name", "conjunction", "disjunction", "implication", "normalization", "outside", "points")
 
 
 def read_json(text: str) -> System:
@@ -66,7 +63,7 @@ def write_json(system: System) -> str:
 
 def _settings(system: System) -> list[tuple[str, Any]]:
     names = [("weights_of", list(system.weights_of))] if system.weights_of else []
-    return [*((key, getattr(system, key)) for key in _SETTINGS), *names]
+    return [("name", system.name), *((key, getattr(system, key)) for key in (*CHOICES, "points")), *names]
 
 
 def _json_variable(v: Variable) -> str:
@@ -96,20 +93,18 @@ def _key(name: str) -> str:
 
 def _options(v: Variable) -> Iterator[tuple[str, Any]]:
     """Yield the options of an output that differ from their defaults."""
-    if isinstance(v, Output):
-        for key in ("default", "defuzzifier", "aggregation", "lock_range", "lock_previous"):
-            plain = next(field.default for field in fields(Output) if field.name == key)
-            if getattr(v, key) != (v.usual_aggregation if key == "aggregation" else plain):
-                yield key, getattr(v, key)
+    usual = {"aggregation": v.usual_aggregation} if isinstance(v, Output) else {}
+    for key in fields(Output)[3:] if isinstance(v, Output) else ():
+        if getattr(v, key.name) != usual.get(key.name, key.default):
+            yield key.name, getattr(v, key.name)
 
 
 def _rule(rule: Rule, sign: str, key: Callable[[str], str]) -> str:
     """Format a rule: its text, or a table where it has operators of its own."""
-    text = _text(str(rule))
     if rule.operators is None:
-        return text
-    operators = [f"{key(name)}{sign}{_text(getattr(rule.operators, name))}" for name in _OPERATORS]
-    return "{" + ", ".join([f"{key('rule')}{sign}{text}", *operators]) + "}"
+        return _text(str(rule))
+    pairs = {"rule": str(rule), **asdict(rule.operators)}
+    return "{" + ", ".join(f"{key(name)}{sign}{_text(value)}" for name, value in pairs.items()) + "}"
 
 
 def _shape(shape: Membership | Value, sign: str, key: Callable[[str], str]) -> str:

@@ -46,17 +46,16 @@ def format_settings(system: System, keys: Sequence[str] = tuple(PLAIN)) -> list[
 def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str] = tuple(PLAIN)) -> dict[str, Any]:
     """Parse the settings in the comments of a file."""
     settings = {**{key: PLAIN[key] for key in keys}, _NAMES: ()}
-    first: int | None = None
+    first, seen = 0, set[str]()
     for line, text in comments:
         if not text.strip().startswith(MARK):
             word = re.match(r"\s*([\w-]*)", text)
             if word and difflib.SequenceMatcher(None, word[1].lower(), MARK[:-1]).ratio() > 0.8:
                 refuse(line, f"{text.strip()!r} is almost such a comment, expected {MARK!r} or another first word")
             continue
-        if first is not None:
+        if first:
             refuse(line, f"{text.strip()!r} is the second such comment after line {first}, expected one")
         first = line
-        seen: set[str] = set()
         for part in _PART.findall(text.strip().removeprefix(MARK)) or [""]:
             key, equals, value = (s.strip() for s in part.partition("="))
             if key not in settings or not equals or key in seen:

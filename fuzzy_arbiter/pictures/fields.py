@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.pictures.places import fixed_inputs, format_values, index_of, output_index, weights_at
 from fuzzy_arbiter.pictures.style import INK, color, hatch, new_axes, require_matplotlib, room, wrapped
+from fuzzy_arbiter.shapes import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,13 +9,14 @@ import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import Output, variable_names
-from fuzzy_arbiter.engines.firing import Array, Firing
+from fuzzy_arbiter.engines.firing import Firing
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.pictures.lines import corners
 from fuzzy_arbiter.pictures.places import format_values, output_index, points_along
 from fuzzy_arbiter.pictures.style import FAINT, INK, color, hatch, new_axes, wrapped
 from fuzzy_arbiter.rule import Rule
 from fuzzy_arbiter.samples import Sample
+from fuzzy_arbiter.shapes import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,8 +8,8 @@ import numpy as np
 
 from fuzzy_arbiter.arbiter import Arbiter
 from fuzzy_arbiter.definition import System, Variable, variable_names
-from fuzzy_arbiter.engines.firing import Array
 from fuzzy_arbiter.errors import DefinitionError
+from fuzzy_arbiter.shapes import Array
 
 
 def index_of(variables: Sequence[Variable], name: str, kind: str) -> int:

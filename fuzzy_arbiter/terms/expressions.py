@@ -16,6 +16,12 @@ from fuzzy_arbiter.terms.parser import Node, parsed
 
 _BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "%": 2, "~": 3, "^": 4}  # precedence of the operators
 
+# functions in exported code, where the word has another meaning
+EXPORTED = {
+    "/": "quotient", "%": "fmod", "^": "power", "pow": "power", "abs": "fabs", "min": "least", "max": "greatest",
+    "round": "rint",
+}  # fmt: skip
+
 
 @dataclass(frozen=True, slots=True)
 class Expression:
@@ -138,5 +144,4 @@ def code(node: Node, names: Mapping[str, str]) -> str:
         return f"(-{texts[0]})"
     if word in ("+", "-", "*"):
         return f"({texts[0]} {word} {texts[1]})"
-    called = {"/": "quotient", "%": "fmod", "^": "power", "pow": "power", "abs": "fabs", "min": "least"}
-    return f"{called.get(word, 'greatest' if word == 'max' else word)}({', '.join(texts)})"
+    return f"{EXPORTED.get(word, word)}({', '.join(texts)})"

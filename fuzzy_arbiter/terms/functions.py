@@ -1,9 +1,9 @@
-"""Functions and operators of expressions by IEEE 754: on numbers, where Python raises, and on arrays."""
+"""Functions and operators of expressions by IEEE 754: on numbers, where Python raises, on arrays, and as text."""
 
 from __future__ import annotations
 
 import math
-import operator
+import re
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -16,71 +16,85 @@ class Function(NamedTuple):
     arguments: int
     number: Callable[..., float]
     array: Callable[..., Any]
+    formula: str  # Python expression of ``a`` and ``b``, which exported code has, too
 
 
-def _guarded(function: Callable[..., float]) -> Callable[..., float]:
-    """Return a function with the results of IEEE 754 and NumPy, where Python's own raises."""
+def arguments_of(formula: str) -> str:
+    """Return the arguments of a formula: ``a, b``, or ``a`` alone."""
+    return "a, b" if re.search(r"\bb\b", formula) else "a"
 
-    def value(*arguments: float) -> float:
+
+def compute(formula: str) -> Callable[..., float]:
+    """Return the function that a formula of this package's tables defines."""
+    function: Callable[..., float] = eval(f"lambda {arguments_of(formula)}: {formula}", {"math": math})  # noqa: S307
+    return function
+
+
+def _function(formula: str, array: Callable[..., Any]) -> Function:
+    unguarded = compute(formula)
+
+    def number(*values: float) -> float:
         try:
-            return function(*arguments)
+            return unguarded(*values)
         except OverflowError:
             return math.inf
-        except (ValueError, ZeroDivisionError):
-            return math.nan
 
-    return value
+    return Function(len(arguments_of(formula).split()), number, array, formula)
 
 
-def _divided(a: float, b: float) -> float:
-    if b:
-        return a / b
-    return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a) * math.copysign(1.0, b)
-
-
-def _compared(holds: Callable[[Any, Any], Any]) -> Function:
-    return Function(2, lambda a, b: float(holds(a, b)), lambda a, b: np.asarray(holds(a, b), dtype=np.float64))
-
-
-def _with_pole(name: str, pole: float) -> Function:
-    function = getattr(math, name)
-    return Function(1, _guarded(lambda a: -math.inf if a == pole else function(a)), getattr(np, name))
-
-
-def _power(a: float, b: float) -> float:
-    return math.inf if a == 0.0 and b < 0.0 else math.pow(a, b)
-
-
+_COMPARED = {
+    "eq": ("==", np.equal), "ge": (">=", np.greater_equal), "gt": (">", np.greater), "le": ("<=", np.less_equal),
+    "lt": ("<", np.less), "neq": ("!=", np.not_equal),
+}  # fmt: skip
 FUNCTIONS: dict[str, Function] = {
     **{
-        name: Function(1, _guarded(getattr(math, name)), getattr(np, name))
-        for name in ("ceil", "cos", "cosh", "exp", "floor", "sin", "sinh", "sqrt", "tan", "tanh")
+        name: _function(f"1.0 if a {sign} b else 0.0", lambda a, b, compare=compare: compare(a, b) * 1.0)
+        for name, (sign, compare) in _COMPARED.items()
     },
     **{
-        name: Function(1, _guarded(getattr(math, name)), getattr(np, f"arc{name[1:]}"))
-        for name in ("acos", "asin", "atan")
+        name: _function(f"math.{name}(a) if abs(a) < math.inf else math.nan", getattr(np, name))
+        for name in ("cos", "sin", "tan")
     },
-    **{name: _with_pole(name, pole) for name, pole in (("log", 0.0), ("log10", 0.0), ("log1p", -1.0))},
-    **{name: _compared(getattr(operator, name)) for name in ("eq", "ge", "gt", "le", "lt")},
-    "neq": _compared(operator.ne),
-    "abs": Function(1, abs, np.abs),
-    "atan2": Function(2, math.atan2, np.arctan2),
-    "fmod": Function(2, _guarded(math.fmod), np.fmod),
-    "max": Function(2, max, np.maximum),
-    "min": Function(2, min, np.minimum),
-    "pow": Function(2, _guarded(_power), np.power),
-    "round": Function(1, _guarded(round), np.round),
+    **{
+        name: _function(f"float({function}(a)) if abs(a) < math.inf else a", getattr(np, name))
+        for name, function in (("ceil", "math.ceil"), ("floor", "math.floor"), ("round", "round"))
+    },
+    **{
+        name: _function(f"math.{name}(a) if a > {pole} else -math.inf if a == {pole} else math.nan", getattr(np, name))
+        for name, pole in (("log", 0.0), ("log10", 0.0), ("log1p", -1.0))
+    },
+    "abs": _function("abs(a)", np.abs),
+    "acos": _function("math.acos(a) if abs(a) <= 1.0 else math.nan", np.arccos),
+    "asin": _function("math.asin(a) if abs(a) <= 1.0 else math.nan", np.arcsin),
+    "atan": _function("math.atan(a)", np.arctan),
+    "atan2": _function("math.atan2(a, b)", np.arctan2),
+    "cosh": _function("math.cosh(a) if abs(a) < 710.4 else abs(a) * math.inf", np.cosh),
+    "exp": _function("math.inf if a >= 709.78 else math.exp(a)", np.exp),
+    "fmod": _function("math.copysign(abs(a) % abs(b), a) if b != 0.0 and abs(a) < math.inf else math.nan", np.fmod),
+    "max": Function(2, max, np.maximum, "a if a > b else b"),
+    "min": Function(2, min, np.minimum, "a if a < b else b"),
+    "pow": _function(
+        "math.inf if a == 0.0 and b < 0.0 else"
+        " math.nan if a < 0.0 and abs(b) < math.inf and b != math.floor(b) else math.pow(a, b)",
+        np.power,
+    ),
+    "sinh": _function("math.sinh(a) if abs(a) < 710.4 else a * math.inf", np.sinh),
+    "sqrt": _function("math.sqrt(a) if a >= 0.0 else math.nan", np.sqrt),
+    "tanh": _function("math.tanh(a)", np.tanh),
 }
 # words of other tools for the same functions
 SAME = {"fabs": "abs", "ln": "log"}
 OPERATORS: dict[str, Function] = {
-    "+": Function(2, lambda a, b: a + b, np.add),
-    "-": Function(2, lambda a, b: a - b, np.subtract),
-    "*": Function(2, lambda a, b: a * b, np.multiply),
-    "/": Function(2, _divided, np.divide),
+    "+": Function(2, lambda a, b: a + b, np.add, "a + b"),
+    "-": Function(2, lambda a, b: a - b, np.subtract, "a - b"),
+    "*": Function(2, lambda a, b: a * b, np.multiply, "a * b"),
+    "/": _function(
+        "a / b if b != 0.0 else math.nan if a == 0.0 or a != a else math.copysign(math.inf, a) * math.copysign(1.0, b)",
+        np.divide,
+    ),
     "%": FUNCTIONS["fmod"],
     "^": FUNCTIONS["pow"],
-    "~": Function(1, lambda a: -a, np.negative),  # unary minus
+    "~": Function(1, lambda a: -a, np.negative, "-a"),  # unary minus
 }
 ALL = {**FUNCTIONS, **OPERATORS}
 WORDS = frozenset((*FUNCTIONS, *SAME, "pi"))

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import ast
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fuzzy_arbiter.shapes import Array
+from fuzzy_arbiter.terms.functions import compute
 
 _ARRAY_FUNCTIONS: dict[Any, Any] = {
     ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.divide,
@@ -34,24 +33,13 @@ class Operator:
     _arrays: Callable[[dict[str, Any]], Any] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        number = eval(f"lambda {self.arguments}: {self.formula}", {"math": math})  # noqa: S307  # of the tables below
-        object.__setattr__(self, "number", number)
-        object.__setattr__(self, "_arrays", _vectorized(self.tree))
+        object.__setattr__(self, "number", compute(self.formula))
+        object.__setattr__(self, "_arrays", _vectorized(ast.parse(self.formula, mode="eval").body))
 
     @property
     def function(self) -> str:
         """Name of the function in exported code."""
         return _FUNCTION_NAMES.get(self.name, self.name)
-
-    @property
-    def arguments(self) -> str:
-        """Arguments of the function: ``a, b`` for a norm, ``a`` for a hedge."""
-        return "a, b" if any(isinstance(node, ast.Name) and node.id == "b" for node in ast.walk(self.tree)) else "a"
-
-    @property
-    def tree(self) -> ast.expr:
-        """The formula as a syntax tree."""
-        return ast.parse(self.formula, mode="eval").body
 
     def array(self, *degrees: Any) -> Array:
         """Return the result for arrays, or an array and a number, of each as `number` gives it."""

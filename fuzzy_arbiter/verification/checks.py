@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -26,8 +26,7 @@ from fuzzy_arbiter.verification.questions import (
     rules_on,
     sampled,
 )
-from fuzzy_arbiter.verification.reasons import reasons, row_strengths
-from fuzzy_arbiter.verification.report import Check, Finding, Row, Severity, Verification
+from fuzzy_arbiter.verification.report import Check, Finding, Place, Row, Severity, Verification
 from fuzzy_arbiter.verification.rules import labels, redundant, unused
 from fuzzy_arbiter.verification.search import Answer, Goal
 
@@ -35,7 +34,7 @@ EFFORT = 4_000_000_000  # maximum number of statements, some seconds; forty prio
 MAX_ROWS = 256
 MAX_TERMS = 200  # maximum number of terms of a variable, as the time grows with its square
 NAMED_ROWS = 8
-_ALL = "for all real inputs"
+_ROWS, _ALL = "on every crisp row", "for all real inputs"
 _WORST_FIRST = {"fault": 0, "warning": 1, "note": 2}
 
 
@@ -103,38 +102,35 @@ class _Checks:
         self._effort = Effort(effort, 8)
         self._terms = {v.name: tuple(Is(v.name, term) for term in v.term_names) for v in system.outputs}
         self._high = tuple(Is(v.name, greatest_term(v)) for v in system.outputs)
+        self._highs = " or ".join(dict.fromkeys(term.term for term in self._high))
 
     def rows(self) -> None:
         """Check the rules on crisp rows."""
         ask = Questions.of_rows(self.system, self._effort)
-        self._complete("complete", ask, "on every crisp row")
-        goals = [Goal(tuple(map(ask.fully, terms)), 2, ANY) for terms in self._terms.values()]
-        answers = ask.ask(goals)
-        for output, answer in zip(self._terms, answers, strict=True):
+
+        def add_findings(severity: Severity, name: str, answer: Answer, text: str, terms: Sequence[Is]) -> None:
             for place in map(ask.places, answer.boxes):
-                causes = reasons(self.system, row_strengths(self.system, place), self._terms[output], 1.0)
-                text = f"output {output!r}: rules contradict each other where {_format_place(place)}: {causes}"
-                self._add_finding("fault", "consistent", text, place)
-        self._decided("consistent", answers, "on every crisp row")
+                strengths = _row_strengths(self.system, place)
+                causes = _causes(self.system, strengths, terms, 1.0 if name == "consistent" else 0.5)
+                self._add(severity, name, f"{text} where {_format_place(place)}: {causes}", place)
+
+        self._complete("complete", ask, _ROWS)
+        answers = ask.ask([Goal(tuple(map(ask.fully, terms)), 2, ANY) for terms in self._terms.values()])
+        for (output, terms), answer in zip(self._terms.items(), answers, strict=True):
+            add_findings("fault", "consistent", answer, f"output {output!r}: rules contradict each other", terms)
+        self._decided("consistent", answers, _ROWS)
         high = tuple(map(ask.above_half, self._high))
         (answer,) = ask.ask([Goal(high, 2, ANY)])
-        for place in map(ask.places, answer.boxes):
-            causes = reasons(self.system, row_strengths(self.system, place), self._high, 0.5)
-            self._add_finding(
-                "warning", "exclusive", f"two outputs are {self._highs()} where {_format_place(place)}: {causes}", place
-            )
-        self._decided("exclusive", [answer], "on every crisp row")
-        exclusive = answer.all_found and not answer.boxes
+        add_findings("warning", "exclusive", answer, f"two outputs are {self._highs}", self._high)
+        self._decided("exclusive", [answer], _ROWS)
         if len(high) == 1:
             return
+        more = ": at most one is, not exactly one" if answer.all_found and not answer.boxes else ""
         (answer,) = ask.ask([Goal(high, 0, 0)], NAMED_ROWS)
         for place in map(ask.places, answer.boxes):
-            text = f"no output is {self._highs()} where {_format_place(place)}"
-            self._add_finding(
-                "note", "exclusive", text + (": at most one is, not exactly one" if exclusive else ""), place
-            )
+            self._add("note", "exclusive", f"no output is {self._highs} where {_format_place(place)}{more}", place)
         if not answer.all_found:
-            self._add_finding("note", "exclusive", "there may be more rows like that, which were not looked for")
+            self._add("note", "exclusive", "there may be more rows like that, which were not looked for")
 
     def support(self) -> None:
         """Check that rules fire at all for graded inputs."""
@@ -144,44 +140,35 @@ class _Checks:
         answers = ask.ask([Goal((((condition, FIRES),),), 1, ANY) for condition in conditions])
         for (condition, label), answer in zip(conditions.items(), answers, strict=True):
             if answer.all_found and not answer.boxes:
-                self._add_finding(
-                    "warning", "rules", f"{label}: never fires, as '{condition}' holds for no real inputs"
-                )
+                self._add("warning", "rules", f"{label}: never fires, as '{condition}' holds for no real inputs")
 
     def halves(self) -> None:
         """Check that conclusions for graded inputs are not both above 1/2."""
         ask = Questions.of_halves(self.system, self._effort)
         for name, sets, text in (
             ("graded_consistent", self._terms, "output {!r}: rules put it into two terms, both above 1/2,"),
-            ("graded_exclusive", {"": self._high}, f"two outputs are {self._highs()}, both above 1/2,"),
+            ("graded_exclusive", {"": self._high}, f"two outputs are {self._highs}, both above 1/2,"),
         ):
             answers = ask.ask([Goal(tuple(map(ask.above_half, terms)), 2, ANY) for terms in sets.values()])
-            verdicts, hows = set(), set()
+            verdicts, methods = set(), set()
             for (output, terms), answer in zip(sets.items(), answers, strict=True):
                 verdict, method, place = self._both_above_half(ask, terms, answer)
                 verdicts.add(verdict)
-                hows.add(method)
+                methods.add(method)
                 if place is not None:
                     inputs = [float(place.get(v.name, v.universe[0])) for v in self.system.inputs]
-                    causes = reasons(self.system, Firing(self.system).strengths(inputs), terms, 0.5)
-                    self._add_finding(
-                        "warning", name, f"{text.format(output)} where {_format_place(place)}: {causes}", place
-                    )
+                    causes = _causes(self.system, Firing(self.system).strengths(inputs), terms, 0.5)
+                    self._add("warning", name, f"{text.format(output)} where {_format_place(place)}: {causes}", place)
             holds = False if False in verdicts else None if None in verdicts else True
-            method = "by an example" if holds is False else "; ".join(sorted(hows))
-            self.checks.append(Check(name, holds, method))
-            if holds is None:
-                self._add_finding("warning", name, f"{name.replace('_', ' ')}: not decided, {method}")
+            self._conclude(name, holds, "by an example" if holds is False else "; ".join(sorted(methods)))
 
     def _both_above_half(
         self, ask: Questions, terms: Sequence[Is], answer: Answer
-    ) -> tuple[bool | None, str, dict[str, float | str] | None]:
+    ) -> tuple[bool | None, str, Place | None]:
         """Decide if no two of some terms are above 1/2 at once; return verdict, method, and counterexample."""
         reaches = reach(self.system, [rule.condition for term in terms for rule in rules_on(self.system, term)])
-        if answer.all_found and not answer.boxes and reaches == "exact":
-            return True, _ALL, None
-        if answer.all_found and not answer.boxes and reaches == "bound":
-            return True, f"{_ALL}, as for 'min', which 'prod' is never above", None
+        if answer.all_found and not answer.boxes and reaches != "samples":
+            return True, _ALL + (", as for 'min', which 'prod' is never above" if reaches == "bound" else ""), None
         if answer.boxes and reaches == "exact":
             return False, "", ask.places(answer.boxes[0])
         place = sampled(self.system, ask, terms)
@@ -192,41 +179,59 @@ class _Checks:
     def _complete(self, name: str, ask: Questions, where: str) -> None:
         answers = ask.ask([Goal(tuple(map(ask.firing, terms)), 0, 0) for terms in self._terms.values()])
         for output, answer in zip(self.system.outputs, answers, strict=True):
+            default = "no default" if output.default is None else f"its default {output.default:g} there"
             for place in map(ask.places, answer.boxes):
-                said = f"output {output.name!r}: no rule fires where {_format_place(place)}"
-                if output.default is None:
-                    self._add_finding("fault", name, f"{said}; it has no default", place)
-                else:
-                    self._add_finding("warning", name, f"{said}; it has its default {output.default:g} there", place)
+                text = f"output {output.name!r}: no rule fires where {_format_place(place)}; it has {default}"
+                self._add("fault" if output.default is None else "warning", name, text, place)
         self._decided(name, answers, where)
 
     def _decided(self, name: str, answers: Sequence[Answer], where: str) -> None:
+        open_ones = [answer.combinations for answer in answers if not answer.all_found]
         if any(answer.boxes for answer in answers):
-            self.checks.append(Check(name, False, "by an example"))
-            return
-        open_ones = [answer for answer in answers if not answer.all_found]
-        if not open_ones:
-            self.checks.append(Check(name, True, where))
-            return
-        most = max(answer.combinations for answer in open_ones)
-        how = f"{_count(most)} combinations are more than an effort of {self._effort.limit:g} statements settles"
-        self.checks.append(Check(name, None, how))
-        self._add_finding("warning", name, f"{name.replace('_', ' ')}: not decided, {how}")
+            self._conclude(name, False, "by an example")
+        elif open_ones:
+            limit = f"more than an effort of {self._effort.limit:g} statements settles"
+            self._conclude(name, None, f"{_count(max(open_ones))} combinations are {limit}")
+        else:
+            self._conclude(name, True, where)
 
-    def _add_finding(
-        self, severity: Severity, about: str, text: str, place: dict[str, float | str] | None = None
-    ) -> None:
+    def _conclude(self, name: str, holds: bool | None, how: str) -> None:
+        self.checks.append(Check(name, holds, how))
+        if holds is None:
+            self._add("warning", name, f"{name.replace('_', ' ')}: not decided, {how}")
+
+    def _add(self, severity: Severity, about: str, text: str, place: Place | None = None) -> None:
         self.findings.append(Finding(severity, about, text, place))
 
-    def _highs(self) -> str:
-        return " or ".join(dict.fromkeys(term.term for term in self._high))
+
+def _row_strengths(system: System, place: Mapping[str, float | str]) -> list[float]:
+    """Return the firing strength of each rule in a crisp row."""
+    row = {v.name: place.get(v.name, v.term_names[-1]) for v in system.inputs}
+    logic = logic_of(system)
+    return [
+        rule.weight * logic.degree(rule.condition, lambda s: float(row[s.variable] == s.term)) for rule in system.rules
+    ]
+
+
+def _causes(system: System, strengths: Sequence[float], statements: Sequence[Is], above: float) -> str:
+    """Name the rules that conclude statements above a strength, which is 1 at most."""
+    parts = []
+    for statement in dict.fromkeys(statements):
+        rules = [
+            f"R{i + 1}"
+            for i, (rule, strength) in enumerate(zip(system.rules, strengths, strict=True))
+            if statement in rule.conclusions and (strength > above or strength == above == 1.0)
+        ]
+        if rules:
+            parts.append(f"{statement} by {' '.join(rules)}")
+    return ", ".join(parts)
 
 
 def _count(n: int) -> str:
     return str(n) if n < 10**6 else f"about 10^{len(str(n)) - 1}"
 
 
-def _format_place(place: dict[str, float | str]) -> str:
+def _format_place(place: Place) -> str:
     if not place:
         return "the inputs are anything"
     parts = (f"{name} is {x}" if isinstance(x, str) else f"{name} = {x:.6g}" for name, x in place.items())

@@ -8,6 +8,7 @@ from typing import Any, Literal
 from fuzzy_arbiter.table import aligned
 from fuzzy_arbiter.verification.cells import Stretch
 
+Place = dict[str, float | str]
 Severity = Literal["fault", "warning", "note"]
 SHOWN_ROWS = 32  # maximum number of crisp rows in the text
 
@@ -20,7 +21,7 @@ class Finding:
     about: str  # name of the check, or ``terms`` or ``rules``
     text: str  # description, with rule, term and place
     # inputs at which it occurs: numbers, or for crisp rows terms. An input that is not in it can have any value
-    place: dict[str, float | str] | None = None
+    place: Place | None = None
 
 
 @dataclass(frozen=True, slots=True)

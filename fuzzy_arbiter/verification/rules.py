@@ -17,20 +17,15 @@ def unused(system: System) -> Iterator[Finding]:
     """Yield the inputs and terms that no rule uses."""
     stated = {s for rule in system.rules for s in rule.condition.terms()}
     concluded = {s for rule in system.rules for s in rule.conclusions}
-    for variable in system.inputs:
-        if variable.name not in {s.variable for s in stated}:
-            yield Finding("warning", "terms", f"input {variable.name!r}: no rule asks for it")
+    inputs = [(f"input {v.name!r}: no rule asks for", "", v, stated) for v in system.inputs]
+    outputs = [(f"output {v.name!r}: no rule concludes", "on ", v, concluded) for v in system.outputs]
+    for text, on, variable, used in [*inputs, *outputs]:
+        if variable.name not in {s.variable for s in used}:
+            yield Finding("warning", "terms", f"{text} {on}it")
             continue
         for term in variable.term_names:
-            if Is(variable.name, term) not in stated:
-                yield Finding("note", "terms", f"input {variable.name!r}: no rule asks for its term {term!r}")
-    for output in system.outputs:
-        if output.name not in {s.variable for s in concluded}:
-            yield Finding("warning", "terms", f"output {output.name!r}: no rule concludes on it")
-            continue
-        for term in output.term_names:
-            if Is(output.name, term) not in concluded:
-                yield Finding("note", "terms", f"output {output.name!r}: no rule concludes its term {term!r}")
+            if Is(variable.name, term) not in used:
+                yield Finding("note", "terms", f"{text} its term {term!r}")
 
 
 def redundant(system: System) -> Iterator[Finding]:
@@ -43,10 +38,8 @@ def redundant(system: System) -> Iterator[Finding]:
             by_conclusion[conclusion].append((i, rule))
     many = [str(conclusion) for conclusion, rules in by_conclusion.items() if len(rules) > MAX_COMPARED]
     if many:
-        names = ", ".join(many)
-        yield Finding(
-            "note", "rules", f"not compared with each other, being more than {MAX_COMPARED}: rules on {names}"
-        )
+        what = f"not compared with each other, being more than {MAX_COMPARED}: rules on {', '.join(many)}"
+        yield Finding("note", "rules", what)
     for conclusion, rules in by_conclusion.items():
         if len(rules) > MAX_COMPARED:
             continue
@@ -57,9 +50,8 @@ def redundant(system: System) -> Iterator[Finding]:
                 same = other.weight <= rule.weight and _below(other.condition, rule.condition, lattice)
                 if not same or j < i:
                     what = "says the same as" if same else "adds nothing to"
-                    yield Finding(
-                        "warning", "rules", f"R{i + 1} '{rule}': on {conclusion} it {what} R{j + 1} '{other}'"
-                    )
+                    text = f"R{i + 1} '{rule}': on {conclusion} it {what} R{j + 1} '{other}'"
+                    yield Finding("warning", "rules", text)
                     break
 
 
@@ -84,8 +76,7 @@ def _below(p: Proposition, q: Proposition, lattice: bool) -> bool:
 
 def labels(system: System) -> dict[Proposition, str]:
     """Return the labels of the rules with each condition."""
-    result: dict[Proposition, str] = {}
+    result: dict[Proposition, list[str]] = defaultdict(list)
     for i, rule in enumerate(system.rules):
-        label = f"R{i + 1}"
-        result[rule.condition] = f"{result[rule.condition]}, {label}" if rule.condition in result else label
-    return result
+        result[rule.condition].append(f"R{i + 1}")
+    return {condition: ", ".join(names) for condition, names in result.items()}

@@ -9,9 +9,9 @@ from tests.architecture.modules import FILES, ROOT, tree_of
 MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib", "yaml", "telnetlib", "ftplib", "xmlrpc"}
 CALLS = {"eval", "exec", "compile", "__import__", "input"}
 MAY = {
-    ("eval", "fuzzy_arbiter/terms/norms.py"),  # formulas of its own tables
-    ("exec", "fuzzy_arbiter/export/compiled.py"),  # text of our own making
-    ("compile", "fuzzy_arbiter/export/compiled.py"),
+    ("eval", "fuzzy_arbiter/terms/functions.py"),  # formulas of its own tables
+    ("exec", "fuzzy_arbiter/export/python.py"),  # text of our own making
+    ("compile", "fuzzy_arbiter/export/python.py"),
     ("exec", "controller/translator/generated.py"),  # likewise
     ("compile", "controller/translator/generated.py"),
 }

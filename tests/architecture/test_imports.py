@@ -33,7 +33,7 @@ ONE_PLACE = {
     "google": {"cosim.export.foxglove_scene", "cosim.export.protobuf_table"},
     "mcap": {"cosim.export.mcap_writer", "cosim.logs.bag_storage"},
     "mcap_protobuf": {"cosim.export.mcap_writer"},
-    "numba": {"fuzzy_arbiter.export.compiled"},
+    "numba": {"fuzzy_arbiter.export.python"},
     "pandas": {"cosim.results.run_result"},
     "pymavlink": {"cosim.mavlink.wire.dialect", "cosim.logs.formats.dataflash"},
     "rerun": {"cosim.export.rrd_writer"},

@@ -312,7 +312,7 @@ def test_bench_times_every_engine_or_says_why_not(run, monkeypatch, gap):
     from fuzzy_arbiter.command_line import bench
 
     monkeypatch.setattr(bench, "_SECONDS", 1e-3)
-    monkeypatch.setattr(bench, "_MOST_ROWS", 50)
+    monkeypatch.setattr(bench, "_MAX_COUNT", 50)
     status, out, _ = run("bench", "section-vi")
     heading, *rows = out.splitlines()
     assert status == 0 and heading.split()[0] == "engine"

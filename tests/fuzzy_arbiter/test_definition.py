@@ -11,7 +11,7 @@ from fuzzy_arbiter import Criterion, Output, Rule, Shape, System, Term, Variable
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.propositions import Is, Not, Or
-from fuzzy_arbiter.rule_text import parse_rule
+from fuzzy_arbiter.rule import parse_rule
 
 TERMS = (Term("calm", falling(2, 6)), Term("strong", rising(4, 12)))
 wind = Variable("wind", (0, 20), TERMS)

@@ -292,7 +292,6 @@ def values(first, second):
         ({"terms": (Term("u", curve("gaussian", 0, 1)), Term("w", rising(0, 1)))}, "output 'z' is integrated by quad"),
         (values(falling(0, 1), rising(0, 1)), "output 'z': term 'u' is piecewise linear, expected a value"),
         (values(Formula("y"), Constant(1)), "output 'z': term 'u' asks for another output, expected inputs alone"),
-        (values(Formula("atan2(a, 1)"), Constant(1)), "the function 'atan2' of a formula is not exported"),
     ],
 )  # fmt: skip
 def test_unsupported_features_are_rejected_by_name(change, fault):

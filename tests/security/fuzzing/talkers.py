@@ -32,7 +32,7 @@ from cosim.sitl import json_protocol
 from cosim.sitl.hil_server import HilServer
 from cosim.sitl.law import make_control_law, make_pwm_law
 from cosim.sitl.sitl_session import FrameCounts as HilCounts
-from fuzzy_arbiter.rule_text import parse_rule
+from fuzzy_arbiter.rule import parse_rule
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station
 from tests.security.conftest import COMMANDS_LOG
@@ -234,4 +234,4 @@ WORDS: list[tuple[str, str, Callable[[str], object], tuple[str, ...]]] = [
 ]  # fmt: skip
 for _name, _parser, _read, _sound in WORDS:
     reader(_name, "text", f"cosim.{_parser}")(partial(_argument, _read, _sound))
-reader("rule", "text", "fuzzy_arbiter.rule_text:parse_rule")(partial(_argument, parse_rule, _RULE))
+reader("rule", "text", "fuzzy_arbiter.rule:parse_rule")(partial(_argument, parse_rule, _RULE))
