@@ -236,34 +236,6 @@ def test_worst_rows_carry_their_rerun_command(tmp_path, fakes):
 # ---- the command ----
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--vary", "law.gains.k_p9=1:2", "--samples", "3"], "did you mean 'k_p"),
-        (["--vary", "law.name=1:2", "--samples", "3"], "law.name"),
-        (["--vary", "law.gains.k_p1=2:1", "--samples", "3"], "the lower end first"),
-        (["--vary", "law.gains.k_p1=1:2", "--design", "grid"], "how many points"),
-        (["--vary", "law.gains.k_p1=1:2"], "samples is missing"),
-        (["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--set", "law.gains.k_p1=3"], "k_p1 is set and varies"),
-        (["--vary", "sensing.seed=1:9", "--samples", "3"], "sensing.seed=A,B,C"),
-        (["--vary", "sensing.seed=1,2.5", "--samples", "3"], "sensing.seed is a whole number"),
-        (["--vary", "sensing.seed=1:9:4", "--design", "grid"], "sensing.seed is a whole number"),
-        (["--vary", "law.gains.k_p1=nan:2", "--samples", "3"], "no finite number"),
-        (["--vary", "law.gains.k_p1=1:2", "--samples", "10000001"], "expected up to 10000000"),
-        (["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--design", "sobl"], "expected one of grid"),
-        (
-            ["--vary", "law.gains.k_p1=1:2", "--samples", "3", "--scheduler", "x", "--workers", "2"],
-            "expected none with",
-        ),
-    ],
-)
-def test_user_errors_are_one_line(tmp_path, capsys, words, said):
-    assert main(["sweep", "paper", "--out", str(tmp_path / "out"), *words]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("cosim: ") and said in line
-    assert not (tmp_path / "out").exists()
-
-
 @pytest.mark.slow
 def test_command_prints_the_sweep_result(tmp_path, fakes, capsys):
     out = tmp_path / "out"

@@ -65,24 +65,6 @@ def test_ctrl_c_or_closed_terminal_keeps_completed_rows(tmp_path, command, worke
     assert not list(interrupted.temporary.iterdir())
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (["--law", "ismail_duningan"], "law 'ismail_duningan' is unknown; did you mean 'ismail_dunnigan'"),
-        (["--law", "ismail_dunnigan", "--set", "k_p1=big"], "'big' is no number"),
-        (["--law", "ismail_dunnigan", "--set", "k_p1=-1"], "law.gains.k_p1 is -1.0"),
-        (["--law", "ismail_dunnigan", "--set", "k_p1"], "expected key=value"),
-        (["--law", "ismail_dunnigan", "--set", "kp1=3"], "no such gain; did you mean 'k_p1'"),
-    ],
-)
-def test_user_errors_are_one_line(tmp_path, capsys, words, said):
-    scenes = write(tmp_path / "s.jsonl", HARD)
-    assert main(["campaign", str(scenes), "--out", str(tmp_path / "out"), *words]) == 2
-    (line,) = capsys.readouterr().err.splitlines()
-    assert line.startswith("cosim: ") and said in line
-    assert not (tmp_path / "out").exists()
-
-
 def test_folder_that_cannot_be_made_is_one_line(tmp_path, capsys):
     scenes = write(tmp_path / "s.jsonl", HARD)
     (tmp_path / "file").write_text("")

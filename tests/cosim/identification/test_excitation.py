@@ -97,22 +97,6 @@ def test_segment_is_made_smaller_until_other_vehicles_stay_inside():
     assert (reduced.sticks[:, 3:] == full.sticks[:, 3:]).all()
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--time", "10"], "--time 10: is too short, expected 22 s or more"),
-        (["--depth", "1"], "--depth 1: the box of 4 m leaves the water"),
-        (["--current", "0.3"], "--current 0.3: carries the vehicle out of the box within a segment of 20 s"),
-    ],
-)
-def test_invalid_limits_are_rejected_by_name(arguments, said, tmp_path, capsys):
-    assert (
-        main(["identify", "--excite", "--vehicle", "bluerov2_heavy", "--out", str(tmp_path / "pool"), *arguments]) == 2
-    )
-    assert said in capsys.readouterr().err
-    assert not (tmp_path / "pool").exists()
-
-
 def test_nonempty_folder_is_rejected(tmp_path, capsys):
     (tmp_path / "mine").write_text("")
     assert main(["identify", "--excite", "--vehicle", "bluerov2_heavy", "--out", str(tmp_path)]) == 2

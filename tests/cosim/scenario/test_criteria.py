@@ -102,41 +102,6 @@ def test_keys_of_the_default_can_be_set():
     assert scenario.criteria[0].reasons[0].ramp == 0.5
 
 
-@pytest.mark.parametrize(
-    ("change", "words"),
-    [
-        ("criteria=[]", "criteria: got 0, expected 1 to 16"),
-        ("criteria.visibility.order=2", "criteria[3].order is 2, as that of shape"),
-        ("criteria.visibility.order=1.5", "criteria[3].order: expected a whole number"),
-        ("criteria.visibility.name=shape", "criteria[3].name is 'shape', used twice"),
-        ('criteria.visibility.name="a b"', "criteria[3].name is 'a b', expected a letter"),
-        ("criteria.visibility.name=then", "no word of rules"),
-        ("criteria.visibility.color=red", "criteria[3].color is 'red', expected #RRGGBB"),
-        ("criteria.visibility.membership={clarance={falling=[0,1]}}", "clarance: unknown key; did you mean 'clear"),
-        ("criteria.visibility.membership={clearance={faling=[0,1]}}", "membership.clearance.faling: unknown key"),
-        ("criteria.visibility.membership={clearance={falling=[1,0]}}", "criteria[3].membership.clearance: shape"),
-        ("criteria.visibility.membership={clearance=[[0,1],[0,0]]}", "expected a change without jumps"),
-        ("criteria.visibility.membership={clearance=[[0,nan],[1,0]]}", "criteria[3].membership.clearance: NaN"),
-        ("criteria.visibility.membership={clearance=3}", "criteria[3].membership.clearance: got 3"),
-        ("criteria.visibility.membership={ramp=-0.1}", "criteria[3].membership.ramp is -0.1, expected a width"),
-        ("criteria.visibility.membership={ramp=true}", "criteria[3].membership.ramp is True, expected a width"),
-        (
-            "criteria.visibility.membership={angle={falling=[0,1]}}",
-            "membership has no clearance, expected one, or ramp or approach_time, for region 'view', whose",
-        ),
-        ("regions.view.criterion=visability", "regions[3].criterion is 'visability', which is none of criteria; did"),
-        ("arbiter.inputs.x=3", "arbiter.inputs.x is given, expected none without arbiter.file"),
-        ("arbiter.text=abc", "arbiter.text is given, expected none without arbiter.file"),
-        ("arbiter.file=mine.txt", "arbiter.file is 'mine.txt', expected a suffix of .json, .toml, .fcl, .fis, .fll"),
-        ("arbiter.file=nowhere.fcl", "arbiter.file: nowhere.fcl: No such file"),
-    ],
-)  # fmt: skip
-def test_invalid_criteria_give_one_line_error_with_the_key(change, words):
-    with pytest.raises(ScenarioError) as caught:
-        load_scenario(FOUR, [change])
-    assert words in str(caught.value) and "\n" not in str(caught.value)
-
-
 def test_dynamic_obstacles_require_the_obstacle_criterion():
     criteria = 'criteria=[{name="depth"}]'
     with pytest.raises(

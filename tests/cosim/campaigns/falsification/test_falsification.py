@@ -187,36 +187,6 @@ def test_similar_rows_are_listed_once(found):
     assert len(module._worst(found.folder, found.results, np.full(60, module._REFUSED), points)) == 0
 
 
-@pytest.mark.medium(fast=13)
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        ("plain --law pd --budget 0", "budget is 0, expected 1 to 1000000 flights"),
-        ("plain --law pd --budget 99 --rare-event", "budget is 99, expected 100 to 1000000 flights"),
-        ("plain --law pd --seed -1", "seed is -1, expected a whole number from 0"),
-        ("plain --law pd --objective near", "objective 'near' is unknown; "),
-        ("trial --law pd", "trial"),
-        ("plain --law pd --objective arrival --rare-event", "objective is arrival, expected clearance"),
-        ("plain", "--law is missing"),
-        ("plain --law pdd", "law 'pdd' is unknown; did you mean 'pd'"),
-        ("plain --law pd --set k=1", "--set k: the law pd has no such gain"),
-        ("plain --law pd --vary limit.force=1:2", "--vary: expected none with the family plain"),
-        ("plian --law pd", "plian"),
-        ("scenes.jsonl --law pd", "is a file of scenes, expected a family (plain, hard, conflict, tour) or a scenario"),
-        ("docking", "nothing varies, expected at least one key"),
-        ("docking --vary initial.positon.1=1:2", "initial.positon"),
-        ("docking --vary initial.position.1=2:1", "expected the lower end first"),
-        ("docking --vary initial.position.1=1:2 --set initial.position.1=1", "is set and varies, expected either"),
-        ("docking --vary sensing.seed=1:5", "sensing.seed is a whole number"),
-    ],
-)
-def test_unsupported_search_gives_one_line_error(words, message, tmp_path, capsys):
-    assert main(["falsify", *words.split(), "--out", str(tmp_path / "out")]) == 2
-    said = capsys.readouterr()
-    assert message in said.err and said.err.count("\n") == 1 and said.out == ""
-    assert not (tmp_path / "out").exists()
-
-
 def test_without_cma_no_run_starts(tmp_path, capsys, monkeypatch):
     monkeypatch.setitem(sys.modules, "cma", None)
     assert main(["falsify", "plain", "--law", "pd", "--out", str(tmp_path / "out")]) == 2
