@@ -298,6 +298,17 @@ def clearances_at(points: Array, region: Region) -> Array:
     return clearances
 
 
+def evaluate_at_pose(
+    regions: Sequence[Region], position: Sequence[float] | Array, quaternion: Sequence[float]
+) -> tuple[Array, Array, Array]:
+    """Return values, gradients and clearances of regions at a pose, as they are at time 0; position [m, NED]."""
+    n = len(regions)
+    values, gradients, turning, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
+    pose = np.array(position, dtype=float), np.array(quaternion, dtype=float)
+    pack(regions).evaluate(*pose, values, gradients, turning, clearances)
+    return values, gradients, clearances
+
+
 def write_clearances(regions: PackedRegions, points: Array, scratch: Array, clearances: Array) -> None:
     """Write `clearance_at` of the first of the `regions` at each of the points; `scratch` has shape (3,)."""
     for i in range(points.shape[0]):

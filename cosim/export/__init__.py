@@ -1,8 +1,8 @@
 """A run in the formats of other tools.
 
-A format is a module of `formats`, which imports its dependencies at its first use. Public: `export_run`.
+`formats` lists them with their writers, which are imported at their first use. Public: `export_run`.
 
-Imports: controller, io, plant_fmu, replay, results, scenario, simulation.
+Imports: controller, io, mavlink, mavlink.wire, plant_fmu, replay, results, scenario, simulation.
 """
 
 from cosim.export.exporting import export_run

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from importlib import import_module
 from pathlib import Path
 
 from cosim.errors import ExportError, RunError
@@ -89,7 +90,7 @@ def export_run(
     try:
         try:
             with temporary_folder(f".{path.name}-", path.parent) as scratch:
-                for made in form.write(excerpt, scratch / path.name):
+                for made in import_module(form.writer).write(excerpt, scratch / path.name):
                     made.replace(path.parent / made.name)
         except BaseException:
             for file in new:  # so that the same command does not meet the first of two

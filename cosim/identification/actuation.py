@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from cosim.errors import IdentificationError
 from cosim.identification.command_errors import BIN, Impulses, open_impulses
 from cosim.identification.log import Log
+from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 _MIN_LAG = 1e-4  # s; a shorter one is none
 _TAIL = 3.0  # time constants, after which an impulse has passed the lag

@@ -7,15 +7,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification.log import Log
 from cosim.identification.parameters import NUISANCES, RANDOM_FORCE, free_parameters, nuisances
 from cosim.identification.residuals import Residuals
+from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from cosim.simulation.signals import Array
 
 BIN = 0.05  # s; errors of shorter periods are taken together
 _SHIFTED = 0.25, 0.5  # part of an error that goes from the first half to the second: of one period, of several

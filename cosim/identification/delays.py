@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cosim.identification.actuation import CommandedForces
 from cosim.identification.log import TOPICS, Log, Topic
 from cosim.identification.parameters import Parameter
 from cosim.identification.windows import MARGINS
+from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 _SPAN = 0.3  # s, time between the two samples of a change of velocity
 _GRID = np.arange(-0.1, 0.601, 0.02)  # s, candidate delays

@@ -21,10 +21,10 @@ from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.commands import Command, ManualControl, SetMode
 from cosim.simulation.commands.sources import ScheduledCommands
 from cosim.simulation.master import Master
+from cosim.simulation.signals import Array
 from cosim.simulation.stepped_plant import SteppedPlant
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
-Array = NDArray[np.float64]
 Box = tuple[float, float, float]  # m, sizes: north, east, down
 StickMode = Literal["manual", "stabilize", "depth_hold"]
 Progress = Callable[[float], None]  # receives the completed fraction

@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from threadpoolctl import threadpool_limits
 
@@ -21,9 +20,8 @@ from cosim.identification.log import Log, command_spans
 from cosim.identification.parameters import Parameter
 from cosim.identification.residuals import Reduced, Residuals
 from cosim.identification.windows import MARGINS, Window, cut_windows
+from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 MAX_STEP, MIN_STEP = 0.03, 0.015  # s, bounds of the integration step
 STAGES = (4.0, 20.0)  # s, lengths of windows: short ones converge from distant starts, long ones separate the numbers

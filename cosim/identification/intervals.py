@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from cosim.identification.parameters import Parameter
 from cosim.identification.residuals import Reduced
 from cosim.identification.windows import Window
-
-Array = NDArray[np.float64]
+from cosim.simulation.signals import Array
 
 DISAGREES = 1.2  # chi2 per degree of freedom, above which the model is called wrong
 MAX_PRIOR_PART = 0.5  # ratio of nominal to prior deviation, above which a number rests on its prior

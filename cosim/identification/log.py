@@ -7,16 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.results.log_facts import COMMAND_TIME, IMPORT, TopicFacts, load_log_facts
 from cosim.results.record import Record, load_record
 from cosim.results.run_result import SCENARIO
+from cosim.simulation.signals import Array
 from plant_fmu.toml_tables import read_toml
 from plant_fmu.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 TOPICS = ("velocity", "angular_velocity", "depth", "attitude", "position")
 UNITS = {"velocity": "m/s", "angular_velocity": "rad/s", "depth": "m", "attitude": "rad", "position": "m"}

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cosim.identification.log import STATES, Topic
-
-Array = NDArray[np.float64]
+from cosim.simulation.signals import Array
 
 _LINEAR, _ANGULAR = STATES["velocity"], STATES["angular_velocity"]
 

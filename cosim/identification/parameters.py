@@ -9,15 +9,14 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification.actuation import CHANGES, Actuation, CommandedForces
 from cosim.identification.log import TOPICS, Log
 from cosim.identification.measurements import Errors
+from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
 
-Array = NDArray[np.float64]
 Kind = Literal["plant", "lag", "thrust", "current", "force", "delay", "lever", "bias", "scale", "asymmetry", "phase"]
 
 # what is freed unless the user says otherwise: mass, weight, center of gravity and inertia are known better by scales

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from cosim.errors import IdentificationError
 from cosim.identification import measurements
@@ -22,9 +21,8 @@ from cosim.identification.measurements import half_turns
 from cosim.identification.parameters import Parameter, Setting, setting_of
 from cosim.identification.shooting import STATE_SIZE, Directions, Motion, Shooter
 from cosim.identification.windows import Window
+from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 _START_DEVIATIONS = (10.0, 10.0, 10.0, 1.0, 1.0, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0)  # m, rad, m/s, rad/s
 _FORCES = range(12, 15)  # indices of a window's force behind those of its state

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from controller.compiling.library import is_whole, keep
 from cosim.errors import IdentificationError
+from cosim.simulation.signals import Array
 from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import FLAGS, compile_library, find_compiler
 from plant_fmu.compiling.platforms import native_platform
@@ -27,8 +28,6 @@ from plant_fmu.errors import BuildError
 from plant_fmu.variables import variables
 from plant_fmu.vehicle import Vehicle
 from plant_fmu.vehicle_component import make_vehicle_component
-
-Array = NDArray[np.float64]
 
 STATE_SIZE = 13  # position 3, quaternion 4, velocity 6
 _TOKEN = "shooting"  # noqa: S105 -- no secret: instantiation token, which no model description needs to match

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from cosim.errors import IdentificationError
@@ -15,9 +14,8 @@ from cosim.identification.measurements import NO_ERRORS, residual
 from cosim.identification.parameters import Parameter
 from cosim.identification.residuals import Residuals
 from cosim.identification.windows import cut_windows
+from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 HORIZONS = (2.0, 5.0)  # s, lengths of the predictions
 

@@ -11,9 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.identification.log import STATES, Log, Topic
+from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 MARGINS = (0.1, 0.2)  # s, times without samples at start and end of a window, if delays are estimated
 

@@ -6,19 +6,17 @@ import itertools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.path_planning.search import line_margin
 from controller.regions import Region
-from controller.regions.region_set import of_attitude
+from controller.regions.region_set import evaluate_at_pose, of_attitude
 from cosim.precheck.finding import Finding, status
 from cosim.precheck.path_search import SearchedPath, find_path, path_limits
-from cosim.precheck.region_intersection import Overlap, box_about, box_within, evaluate_regions, search
+from cosim.precheck.region_intersection import Overlap, box_about, box_within, search
 from cosim.results.water_surface import heights_above_surface, is_submerged_model
 from cosim.scenario.scenario import Scenario
-
-Array = NDArray[np.float64]
+from cosim.simulation.signals import Array
 
 _MARGIN = 3.0  # m, margin around start and regions of the box that is searched
 _MAX_MARGIN = 1e5  # m, maximum margin that is tried
@@ -74,12 +72,12 @@ def _box(goal: Region, regions: Sequence[Region], start: tuple[float, float, flo
 
 
 def _clearance(region: Region, scenario: Scenario) -> float:
-    return float(evaluate_regions([region], scenario.initial.position, scenario.initial.quaternion)[2][0])
+    return float(evaluate_at_pose([region], scenario.initial.position, scenario.initial.quaternion)[2][0])
 
 
 def _start(region: Region, scenario: Scenario) -> Finding:
     start = scenario.initial.position
-    _, (gradient,), (clearance,) = evaluate_regions([region], start, scenario.initial.quaternion)
+    _, (gradient,), (clearance,) = evaluate_at_pose([region], start, scenario.initial.quaternion)
     turned = of_attitude(region.shape)
     text = f"The start violates {region.name} by {-clearance:.3f} {'rad' if turned else 'm'}."
     name, numbers = f"start, {region.name}", {"clearance": float(clearance)}

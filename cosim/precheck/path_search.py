@@ -8,7 +8,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.compiling.function import BoundCall
 from controller.laws.deployable.gains import DeployableGains
@@ -16,8 +15,7 @@ from controller.laws.deployable.path_planning.planner import empty_plan, search_
 from controller.laws.deployable.path_planning.search import PathLimits
 from controller.regions import Region, pack
 from cosim.precheck.region_intersection import Vector3, common_depth
-
-Array = NDArray[np.float64]
+from cosim.simulation.signals import Array
 
 SEARCH_TIME = 120.0  # s of flight time, maximum duration of the search
 PERIOD = 0.02  # s, control period of the law, in which the search takes a step

@@ -10,13 +10,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from controller.regions import Region, pack
+from controller.regions import Region
 from controller.regions.region_set import clearances_at
+from cosim.simulation.signals import Array
 
-Array = NDArray[np.float64]
 Vector3 = tuple[float, float, float]
 
 TOLERANCE = 0.01  # m, accuracy of the common depth
@@ -98,14 +97,3 @@ def box_within(region: Region, low: Array, high: Array) -> tuple[Array, Array]:
     """Return the intersection of a box and the bounds of a region, which must overlap."""
     lowest, highest = np.array(region.shape.bounds())
     return np.maximum(low, np.minimum(lowest, high)), np.minimum(high, np.maximum(highest, low))
-
-
-def evaluate_regions(
-    regions: Sequence[Region], position: Sequence[float] | Array, quaternion: Sequence[float]
-) -> tuple[Array, Array, Array]:
-    """Evaluate regions at a pose, at their positions at time 0; position [m, NED], returns (n,) [m]."""
-    n = len(regions)
-    values, gradients, rotation_gradients, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
-    pose = np.array(position, dtype=float), np.array(quaternion, dtype=float)
-    pack(regions).evaluate(*pose, values, gradients, rotation_gradients, clearances)
-    return values, gradients, clearances

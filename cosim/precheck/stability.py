@@ -7,12 +7,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from controller import VehicleState
 from controller.paper_law import Gains, primary_error
 from controller.regions import Region, Sphere, pack
+from controller.regions.region_set import evaluate_at_pose
 from controller.theory import (
     Fit,
     Model,
@@ -27,13 +27,11 @@ from controller.theory import (
 from controller.theory.conditions import least_of_potential_test
 from controller.theory.model import asymmetry, damping, least_inertia, restoring_defect, skew_defect
 from cosim.precheck.finding import Finding, status
-from cosim.precheck.region_intersection import evaluate_regions
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_model, true_vehicle
 from cosim.simulation.arbitration import Arbitration
+from cosim.simulation.signals import Array
 from fuzzy_arbiter import Arbiter
-
-Array = NDArray[np.float64]
 
 _ROUNDING = 1e-9  # tolerance of defects, as a part of the greatest element
 _SAMPLES = 50  # velocities and attitudes at which a property is checked
@@ -92,7 +90,7 @@ def start_weights(scenario: Scenario) -> Array:
     """Return the weight of each secondary region in the master's first step, shape (n,)."""
     initial = scenario.initial
     secondary = [r.region for r in scenario.regions]
-    clearances = evaluate_regions(secondary, initial.position, initial.quaternion)[2]
+    clearances = evaluate_at_pose(secondary, initial.position, initial.quaternion)[2]
     position, quaternion, velocity = map(np.array, (initial.position, initial.quaternion, initial.velocity))
     state = VehicleState(position, quaternion, velocity, np.ones(scenario.vehicle.n_thrusters))
     arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
@@ -187,7 +185,7 @@ def _lower_sigma(start: _Start) -> str:
 def _secondary(start: _Start, weights: Array) -> Finding:
     scenario, gains, mass = start.scenario, start.gains, start.model.mass
     regions = [secondary.region for secondary in scenario.regions]
-    values, gradients, _ = evaluate_regions(regions, scenario.initial.position, scenario.initial.quaternion)
+    values, gradients, _ = evaluate_at_pose(regions, scenario.initial.position, scenario.initial.quaternion)
     alphas = np.array([region.gain for region in regions]) * weights
     active = (values > 0.0) & (alphas > 0.0)
     fit = secondary_fit(mass, np.linalg.norm(gradients[active], axis=1), alphas[active] / gains.k_q, gains)
@@ -240,7 +238,7 @@ def _damped(start: _Start) -> Finding:
 
 
 def _value_and_gradient(goal: Region, position: Array) -> tuple[float, Array]:
-    (value,), (gradient,), _ = evaluate_regions([goal], position, _LEVEL)
+    (value,), (gradient,), _ = evaluate_at_pose([goal], position, _LEVEL)
     return float(value), gradient
 
 

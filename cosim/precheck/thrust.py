@@ -5,21 +5,19 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from controller import paper_law
 from controller.force_limits import max_forces
 from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error_parts, rotation_rows
+from controller.regions.region_set import evaluate_at_pose
 from cosim.precheck.finding import Finding, status
-from cosim.precheck.region_intersection import evaluate_regions
 from cosim.precheck.thrust_margin import Margin, ThrustMargin, held_wrench, least_margins, thrust_margin
 from cosim.results.wording import format_force
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
-
-Array = NDArray[np.float64]
+from cosim.simulation.signals import Array
 
 _ROUNDING = 1e-6  # N, tolerance of the linear programs
 
@@ -84,9 +82,9 @@ def _mend_current(scenario: Scenario) -> str:
 def initial_force_finding(scenario: Scenario, weights: Array) -> Finding:
     """Compare the first force of the paper's law with the maximum force of the thrusters in that direction."""
     gains, initial, vehicle = scenario.law.gains, scenario.initial, true_vehicle(scenario)
-    (f,), (slope,), _ = evaluate_regions([scenario.goal_region], initial.position, initial.quaternion)
+    (f,), (slope,), _ = evaluate_at_pose([scenario.goal_region], initial.position, initial.quaternion)
     regions = [secondary.region for secondary in scenario.regions]
-    values, gradients, _ = evaluate_regions(regions, initial.position, initial.quaternion)
+    values, gradients, _ = evaluate_at_pose(regions, initial.position, initial.quaternion)
     betas = np.array([region.gain for region in regions]) * weights / gains.k_q
     quaternion, desired = np.array(initial.quaternion), np.array(scenario.law.desired_quaternion)
     R, turned = rotation_rows(quaternion), error_parts(desired, quaternion)

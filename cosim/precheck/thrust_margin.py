@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.force_limits import DIRECTIONS, max_forces
 from controller.quaternion import rotation_matrix
 from controller.restoring import regressor
 from controller.theory import coriolis, damping
+from cosim.simulation.signals import Array
 from plant_fmu.vehicle import Vehicle
-
-Array = NDArray[np.float64]
 
 _WORDS = (("south", "", "north"), ("west", "", "east"), ("up", "", "down"))
 NAMES = [

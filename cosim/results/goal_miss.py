@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from controller.regions import Region
-from controller.regions.region_set import clearances_at, of_attitude, pack
+from controller.regions.region_set import clearances_at, evaluate_at_pose, of_attitude
 from cosim.results.record import Rows
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
@@ -110,14 +110,12 @@ def _cause(scenario: Scenario, end: _End, summary: dict[str, Any]) -> str:
 def _regions_between(scenario: Scenario, end: _End, distance: float) -> Iterator[tuple[str, bool]]:
     """Yield the regions that the line into the goal violates, and if they are hard; hard ones first."""
     position = end.rows.stack(_POSITION)[-1]
-    goal = pack([Region("goal", scenario.goal, "in")])
-    goal.shifts[0] = end.shift("goal")
-    value, gradient, turning, clearance = np.zeros(1), np.zeros((1, 3)), np.zeros((1, 3)), np.zeros(1)
-    goal.evaluate(position, np.array([1.0, 0.0, 0.0, 0.0]), value, gradient, turning, clearance)
-    slope = float(np.linalg.norm(gradient[0]))
+    goal = Region("goal", scenario.goal, "in")
+    _, (gradient,), _ = evaluate_at_pose([goal], position - end.shift("goal"), [1.0, 0.0, 0.0, 0.0])
+    slope = float(np.linalg.norm(gradient))
     if not slope > 0.0:
         return
-    line = np.linspace(0.0, distance + _WITHIN, _POINTS)[:, None] * (-gradient[0] / slope)
+    line = np.linspace(0.0, distance + _WITHIN, _POINTS)[:, None] * (-gradient / slope)
     for is_hard in (True, False):
         for region in (r.region for r in scenario.regions if r.region.hard == is_hard):
             if of_attitude(region.shape):

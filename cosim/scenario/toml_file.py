@@ -202,13 +202,27 @@ def _short(text: str) -> str:
 
 def _index(items: list[Any], part: str, key: str) -> int:
     """Return the index of an item of a list, given its name or index as text."""
-    names = [item.get("name") for item in items if isinstance(item, dict)]
-    if part in names:
-        return names.index(part)
-    if part.isdecimal() and len(part) < 10 and int(part) < len(items):
-        return int(part)
-    known = f"one of {', '.join(map(str, names))}, nor " if names else ""
+    if (index := _place(items, part)) is not None:
+        return int(index)
+    known = f"one of {', '.join(map(str, names))}, nor " if (names := _names(items)) else ""
     raise ScenarioError(f"--set {_short(key)}: {_short(part)!r} is not {known}a number below {len(items)}")
+
+
+def _names(items: Any) -> list[Any]:
+    """Return the names of the items of a list, None of those without one."""
+    return [item.get("name") for item in items if isinstance(item, dict)]
+
+
+def _place(container: Any, part: str) -> Any:
+    """Return the key of an item in a table, or its index in a list, given its name or index as text; else None."""
+    if isinstance(container, dict):
+        name = current_name(container, part)
+        return name if name in container else None
+    if not isinstance(container, list | tuple):
+        return None
+    if part in (names := _names(container)):
+        return names.index(part)
+    return int(part) if part.isdecimal() and len(part) < 10 and int(part) < len(container) else None
 
 
 def flatten(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
@@ -221,29 +235,21 @@ def flatten(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
 
 def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
     """Return the table or list that holds a key, and the name or index in it."""
-    *path, last = key.split(".")
-    container: Any = table
-    for depth, part in enumerate([*path, last]):
-        if isinstance(container, list | tuple):
-            names = [item.get("name") for item in container if isinstance(item, dict)]
-            inside = part.isdecimal() and len(part) < 10 and int(part) < len(container)
-            index: Any = names.index(part) if part in names else int(part) if inside else None
-            known = names or list(map(str, range(len(container))))
-        else:
-            known = list(container) if isinstance(container, dict) else []
-            name = current_name(container, part) if known else part
-            index = name if name in known else None
+    inner: Any = table
+    for depth, part in enumerate(parts := key.split(".")):
+        container, index = inner, _place(inner, part)
         if index is None:
             from plant_fmu.toml_tables import hint
 
-            where = ".".join(key.split(".")[:depth])
-            expected = hint(part, map(str, known)) if known else f"{where} holds no others"
+            is_list = isinstance(container, list | tuple)
+            known = _names(container) or range(len(container)) if is_list else container
+            expected = f"{'.'.join(parts[:depth])} holds no others"
+            if isinstance(container, dict | list | tuple) and container:
+                expected = hint(part, map(str, known))
             what = "is unknown" if part == key else f"is unknown: {part!r}"
             raise ScenarioError(f"key {key!r} {what}; {expected}")
-        if depth == len(path):
-            return container, index
-        container = container[index]
-    raise AssertionError("unreachable")
+        inner = container[index]
+    return container, index
 
 
 @functools.cache  # one line, however many tables have the key
@@ -266,12 +272,8 @@ def current_key(table: dict[str, Any], key: str) -> str:
     parts: list[str] = []
     for part in key.split("."):
         parts.append(current_name(container, part))
-        if isinstance(container, list | tuple):
-            named = {item.get("name"): item for item in container if isinstance(item, dict)}
-            index = int(part) if part.isdecimal() and len(part) < 10 else len(container)
-            container = named.get(part, container[index] if index < len(container) else None)
-        else:
-            container = container.get(parts[-1]) if isinstance(container, dict) else None
+        place = _place(container, part)
+        container = None if place is None else container[place]
     return ".".join(parts)
 
 

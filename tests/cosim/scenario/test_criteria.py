@@ -100,15 +100,8 @@ def test_keys_of_the_default_can_be_set():
     scenario = load_scenario("paper", ["criteria.depth.order=0", "criteria.depth.membership.ramp=0.5"])
     assert scenario.criterion_names == ("depth", "obstacle", "shape")
     assert scenario.criteria[0].reasons[0].ramp == 0.5
-
-
-def test_dynamic_obstacles_require_the_obstacle_criterion():
-    criteria = 'criteria=[{name="depth"}]'
-    with pytest.raises(
-        ScenarioError, match=r"commands.obstacles is above 0, expected 0 without a criterion 'obstacle'"
-    ):
-        load_scenario("sitl", [criteria, "regions=[]", "commands.enabled=true"])
-    load_scenario("sitl", [criteria, "regions=[]", "commands.enabled=true", "commands.obstacles=0"])
+    no_obstacles = ['criteria=[{name="depth"}]', "regions=[]", "commands.enabled=true", "commands.obstacles=0"]
+    assert load_scenario("sitl", no_obstacles).criterion_names == ("depth",)
 
 
 def test_arbiter_file_is_saved_with_the_scenario(own, tmp_path):

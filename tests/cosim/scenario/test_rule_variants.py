@@ -83,18 +83,12 @@ FUZZIFY below TERM near := (0, 1) (1, 0); TERM far := (0, 0) (1, 1); RANGE := (0
     for name in ("obstacle", "shape", "depth", "visibility"):
         text += f"DEFUZZIFY {name} TERM low := (0, 1) (1, 0); TERM high := (0, 0) (1, 1); METHOD : COG; DEFAULT := 0; "
         text += "RANGE := (0 .. 1); END_DEFUZZIFY\n"
-    text += """RULEBLOCK all AND : MIN; ACT : MIN; ACCU : MAX;
-RULE 1 : IF risers IS near THEN shape IS high;
-RULE 2 : IF risers IS far THEN shape IS low;
-RULE 3 : IF below IS near THEN depth IS low;
-RULE 4 : IF below IS far THEN depth IS low;
-RULE 5 : IF below IS far THEN visibility IS low;
-RULE 6 : IF below IS near THEN visibility IS low;
-RULE 7 : IF below IS far THEN obstacle IS low;
-RULE 8 : IF below IS near THEN obstacle IS low;
-END_RULEBLOCK
-END_FUNCTION_BLOCK
-"""
+    text += "RULEBLOCK all AND : MIN; ACT : MIN; ACCU : MAX;\n"
+    said = ["risers IS near THEN shape IS high", "risers IS far THEN shape IS low"]
+    for name in ("depth", "visibility", "obstacle"):
+        said += [f"below IS near THEN {name} IS low", f"below IS far THEN {name} IS low"]
+    text += "".join(f"RULE {i} : IF {rule};\n" for i, rule in enumerate(said, 1))
+    text += "END_RULEBLOCK\nEND_FUNCTION_BLOCK\n"
     (tmp_path / "mine.fcl").write_text(text)
     scenario = load_scenario(
         "inspection-visibility",

@@ -3,8 +3,6 @@
 import errno
 import hashlib
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -81,13 +79,3 @@ def test_unwritable_file_gives_one_line_error_and_no_file(tmp_path, capsys, monk
     assert said.out == "" and len(lines) == 3 and "No space left on device" in lines[2]
     assert all(line.startswith(f"cosim: {tmp_path}") for line in lines)
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.medium
-def test_scene_generation_imports_no_heavy_library():
-    code = (
-        "import sys; from cosim.command_line.cli import main; main(['scenes', '--count', '1']); "
-        "print(*sys.modules, sep=chr(10))"
-    )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert not {"numba", "scipy", "pyarrow", "fmpy", "matplotlib", "benchmarks"} & set(done.stdout.splitlines())

@@ -6,7 +6,6 @@ import csv
 from pathlib import Path
 
 from cosim.export.excerpt import Excerpt
-from cosim.export.format import Format
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
@@ -24,6 +23,3 @@ def write(excerpt: Excerpt, path: Path) -> list[Path]:
         table.writerow(("name", "unit", "description"))
         table.writerows((column.name, column.unit, column.description) for column in excerpt.columns)
     return [path, units]
-
-
-FORMAT = Format(write, beside=".units.csv")

@@ -6,19 +6,14 @@ from pathlib import Path
 
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
-from cosim.export.format import Format
+from cosim.mavlink.replay import replay
+from cosim.mavlink.wire.endpoint import Endpoint
+from cosim.mavlink.wire.options import MavlinkOptions
 
 
 def write(excerpt: Excerpt, path: Path) -> list[Path]:
     """Write the file."""
-    from cosim.mavlink.replay import replay
-    from cosim.mavlink.wire.endpoint import Endpoint
-    from cosim.mavlink.wire.options import MavlinkOptions
-
     done = replay(excerpt.run.folder, [Endpoint("tlog", path.name, path=str(path))], MavlinkOptions(), rate=None)
     if done.loss_reports:
         raise ExportError(f"--to tlog: not all was written: {'; '.join(done.loss_reports)}")
     return [path]
-
-
-FORMAT = Format(write, whole=True)
