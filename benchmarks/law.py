@@ -15,8 +15,8 @@ from controller.compiling.function import BoundCall
 from controller.regions import DepthBand, Region, Sphere, pack
 from controller.regions.region_set import PackedRegions
 from controller.translator.foreign import POINTER, call_c
-from cosim.batch.c_calls import Clock, seconds
 from cosim.scenario.vehicle_model import vehicle_model
+from cosim.step.plant_calls import Clock, seconds
 from plant_fmu.vehicle import load_vehicle
 
 STEPS = 2_000

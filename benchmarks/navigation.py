@@ -42,8 +42,7 @@ def error_of(master: Master, constants: Array) -> Array:
 
     They are position [m], velocity [m/s] and rotation [rad], all NED, and the constant errors of the sensors.
     """
-    assert master.navigator is not None
-    memory, true_state = master.navigator.memory, master.true_state
+    memory, true_state = master.data.navigation, master.true_state
     R = rotation_matrix(true_state.quaternion)
     E = R @ rotation_matrix(memory.quaternion).T
     turn = 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
@@ -59,17 +58,16 @@ def flight(seed: int, duration: float) -> tuple[Array, Array]:
     parameters, errors = scenario_sensors(scenario), np.full(len(TIMES), np.nan)
     constants = np.array([parameters[name] for name in _CONSTANT])
     with Master(scenario) as master:
-        assert master.navigator is not None
-        before = master.navigator.memory.innovations.copy()
+        before = master.data.navigation.innovations.copy()
         for k in range(scenario.steps):
             if k == round(_FROM / scenario.time.step):
-                before = master.navigator.memory.innovations.copy()
+                before = master.data.navigation.innovations.copy()
             master.step(k)
             for i, time in enumerate(TIMES):
-                if abs(k * scenario.time.step - time) < 0.5 * scenario.time.step and master.navigator.memory.started[0]:
+                if abs(k * scenario.time.step - time) < 0.5 * scenario.time.step and master.data.navigation.started[0]:
                     error = error_of(master, constants)
-                    errors[i] = error @ np.linalg.solve(master.navigator.memory.covariance, error) / error.size
-        return errors, master.navigator.memory.innovations - before
+                    errors[i] = error @ np.linalg.solve(master.data.navigation.covariance, error) / error.size
+        return errors, master.data.navigation.innovations - before
 
 
 def rows(count: int, seed: int, duration: float) -> Iterator[dict[str, float | str]]:

@@ -11,10 +11,13 @@ import numpy as np
 
 from benchmarks.table import Row, compared
 from benchmarks.timing import Timing, time_calls
+from controller.compiling.function import BoundCall
 from cosim.results.recorder import Recorder
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from cosim.simulation.signals import Array
+from cosim.step.decision import arbitrate, control
+from cosim.step.one_step import locate
 
 STEPS = 20_000
 RATIO = "how many times as long as the plant's step"
@@ -45,10 +48,11 @@ def measure(steps: int, repeats: int) -> list[Row]:
         add_calls(fmu, lambda: master.plant.step(1e-3))
         flags, law = f"FMU: {len(master.plant.flags)} flags", "law alone, ismail_dunnigan"
         add_calls(flags, master.plant.read_flags)
-        add_calls("regions: 4 evaluated", master._evaluate_regions)
-        add_calls("arbiter, closed form, inputs as before", master._arbitrate)
+        stages = {stage: BoundCall(stage, (master.model, master.data)).call for stage in (locate, arbitrate, control)}
+        add_calls("regions: 4 evaluated", stages[locate])
+        add_calls("arbiter, closed form", stages[arbitrate])
         add_calls(law, _law_alone(master))
-        add_calls("controller: law, what it reports, inputs", master._control)
+        add_calls("controller: law, what it reports, inputs", stages[control])
         with tempfile.TemporaryDirectory() as folder:
             recorder = Recorder(Path(folder), master.signals.columns)
             add_calls("record", lambda: recorder.observe(0, master.signals.row))
@@ -57,7 +61,8 @@ def measure(steps: int, repeats: int) -> list[Row]:
         def new_inputs() -> None:
             master.arbiter(rng.random(3).tolist())
 
-        add_calls("arbiter, scikit-fuzzy, inputs as before", master._arbitrate)
+        again = BoundCall(arbitrate, (master.model, master.data)).call
+        add_calls("arbiter, scikit-fuzzy, inputs as before", again)
         add_calls("arbiter, scikit-fuzzy, new inputs", new_inputs, max(1, steps // _SLOWER))
     alone = sum(timing.least for timing in (timings[fmu], timings[flags], timings[law]))
     for record in (False, True):
@@ -70,9 +75,9 @@ def measure(steps: int, repeats: int) -> list[Row]:
 
 
 def _law_alone(master: Master) -> Callable[[], None]:
-    state, around, forces = master.state, master.environment, master.actuators.command
+    data, forces = master.data, master.data.command
     weights: Array = np.zeros(len(master.scenario.regions))
-    return lambda: master.law.step(state, around.goal, around.regions, weights, forces)
+    return lambda: master.law.step(data.state, data.goal, data.regions, weights, forces)
 
 
 def _whole(engine: str, steps: int, repeats: int, *, record: bool) -> Timing:

@@ -12,10 +12,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller import LAWS
-from cosim.batch.fused import FusedFlyer
+from cosim.batch.fused import FusedFlyer, Trace
 from cosim.batch.variation import Variation
 from cosim.scenario.scenario import validate_scenario
 from cosim.scenario.tables import Failure
@@ -28,9 +26,7 @@ DIFFERENCES = ("weak", "uneven", "dead band", "gusts", "half drag", "other set")
 CASES = ("healthy", "worn", "rolled", "lost", "two lost", "part lost", "stuck", *DIFFERENCES)
 _OTHER_SET = {"bluerov2_heavy": "bluerov2_heavy_wu", "bluerov2_heavy_wu": "bluerov2_heavy"}
 _FAILURES = {"lost": 1, "part lost": 1, "stuck": 1, "two lost": 2}  # number of failures in each case
-_INPUTS = 20  # index of the first thruster's command in a row of the trace
 _WINDOW = 25  # control steps of the average: half a second
-_FAILED = 14  # index of `law.failed_thruster` among the law's diagnostics
 
 
 def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: float, tilt: float) -> dict[str, Any]:
@@ -119,10 +115,9 @@ def through_sensors(table: dict[str, Any], lost: list[str], slow: bool) -> dict[
     }
 
 
-def since_it_matters(trace: NDArray[np.float64], failure: Failure, limit: float) -> float:
+def since_it_matters(trace: Trace, failure: Failure, limit: float) -> float:
     """Return the time [s] from which a thruster lacks a tenth of its limit [N], averaged over 0.5 s; inf if never."""
-    j = failure.thruster - 1
-    times, commands = trace[:, 0], trace[:, _INPUTS + j]
+    times, commands = trace["time"], trace[f"thrust[{failure.thruster}]"]
     after = times >= failure.time
     given = failure.effectiveness * commands
     if failure.stuck:
@@ -159,8 +154,8 @@ def main() -> None:
         scenario = validate_scenario(json.loads(json.dumps(table)), f"{given.case} {seed}")
         with FusedFlyer(Variation(scenario, ())) as flyer:
             outcome, trace = flyer.fly_one(scenario, trace=True)
-        reports = trace[:, trace.shape[1] - len(LAWS[scenario.law.name].diagnostics) + _FAILED]
-        isolated = {int(j): float(trace[np.argmax(reports == j), 0]) for j in np.unique(reports) if j}
+        reports, times = trace["law.failed_thruster"], trace["time"]
+        isolated = {int(j): float(times[np.argmax(reports == j)]) for j in np.unique(reports) if j}
         failed = {failure.thruster: failure.time for failure in scenario.failures}
         failures += len(failed)
         delays += [isolated[j] - time for j, time in failed.items() if isolated.get(j, -1.0) >= time]

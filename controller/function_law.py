@@ -85,6 +85,7 @@ class FunctionLaw:
         self.output: Output = output
         self.name = qualified_name(function)
         self._function = function
+        self._goal, self._regions = _Evaluator(), _Evaluator()
 
     @property
     def estimate(self) -> Array:
@@ -114,9 +115,8 @@ class FunctionLaw:
             If the function returns anything but finite numbers of the right shape.
         """
         state_copy = VehicleState(*(part.copy() for part in state))
-        received = self._function(
-            state_copy, _evaluate(goal, state_copy), _evaluate(regions, state_copy), weights.copy()
-        )
+        goal_seen, regions_seen = self._goal.evaluate(goal, state), self._regions.evaluate(regions, state)
+        received = self._function(state_copy, goal_seen, regions_seen, weights.copy())
         numbers = _real_numbers(received)
         if numbers.shape != forces.shape or not np.isfinite(numbers).all():
             unit = "N and N m" if self.output == "wrench" else "N"
@@ -149,16 +149,19 @@ def qualified_name(law: object) -> str:
     return f"{Path(script).name if script else module}:{name}"
 
 
-def _evaluate(regions: PackedRegions, state: VehicleState) -> RegionsSeen:
-    n = regions.kinds.size
-    values, gradients, rotation_gradients, clearances = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
-    regions.evaluate(state.position, state.quaternion, values, gradients, rotation_gradients, clearances)
-    return RegionsSeen(
-        values,
-        gradients,
-        rotation_gradients,
-        clearances,
-        regions.velocities.copy(),
-        regions.gains.copy(),
-        regions.hard.copy(),
-    )
+class _Evaluator:
+    """Evaluates regions into arrays of its own, the same ones each time: C is bound to arrays."""
+
+    def __init__(self) -> None:
+        self._position, self._quaternion = np.zeros(3), np.zeros(4)
+        self._out: tuple[Array, ...] = ()
+
+    def evaluate(self, regions: PackedRegions, state: VehicleState) -> RegionsSeen:
+        n = regions.kinds.size
+        if not self._out or len(self._out[0]) != n:
+            self._out = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
+        self._position[:], self._quaternion[:] = state.position, state.quaternion
+        regions.evaluate(self._position, self._quaternion, *self._out)
+        g, gradients, rotation_gradients, clearances = (part.copy() for part in self._out)
+        velocities, gains, hard = regions.velocities.copy(), regions.gains.copy(), regions.hard.copy()
+        return RegionsSeen(g, gradients, rotation_gradients, clearances, velocities, gains, hard)

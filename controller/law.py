@@ -215,7 +215,13 @@ class CompiledLaw:
         LawError
             If the quaternion is not of length 1.
         """
-        self.memory.desired_quaternion[:] = validate_quaternion(quaternion)
+        self.desired_quaternion[:] = validate_quaternion(quaternion)
+
+    @property
+    def desired_quaternion(self) -> Array:
+        """Desired attitude, a unit quaternion from body to world, shape (4,)."""
+        desired: Array = self.memory.desired_quaternion
+        return desired
 
     @property
     def estimate(self) -> Array:

@@ -16,7 +16,7 @@ import numpy as np
 from benchmarks.contest import Contest, Entry
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import peer
-from benchmarks.timing import Contestant, NotMeasuredError, Own
+from benchmarks.timing import Contestant, NotMeasuredError
 from cosim.batch.fused import FusedFlyer
 from cosim.batch.variation import Variation
 from cosim.results.recorder import Recorder
@@ -98,25 +98,26 @@ def _system(environment: Environment, package: _Package, distribution: str, modu
 
 
 def _master(*, record: bool) -> Entry:
-    def entry(stack: ExitStack) -> Contestant:
-        master = stack.enter_context(Master(load_scenario(SCENARIO, [*CHANGES, "time.duration=1e6"])))
-        folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="benchmark-"))
-        recorder = Recorder(Path(folder), master.signals.columns) if record else None
-        if recorder is not None:
-            stack.callback(recorder.close)
-        done = 0
+    return lambda _: _Runs(record)
 
-        def work(count: int) -> None:
-            nonlocal done
-            for k in range(done, done + count):
-                master.step(k)
-                if recorder is not None:
-                    recorder.observe(k, master.signals.row)
-            done += count
 
-        return Own(work)
+class _Runs:
+    """Runs of the master, set up and closed outside the time."""
 
-    return entry
+    def __init__(self, record: bool) -> None:
+        self._record = record
+
+    def seconds(self, count: int) -> float:
+        """Do `count` steps, and return their time [s]."""
+        scenario = load_scenario(SCENARIO, [*CHANGES, f"time.duration={count * STEP!r}"])
+        with Master(scenario) as master, tempfile.TemporaryDirectory(prefix="benchmark-") as folder:
+            recorders = [Recorder(Path(folder), master.signals.columns)] if self._record else []
+            before = time.perf_counter()
+            master.run(recorders)
+            took = time.perf_counter() - before
+            for recorder in recorders:
+                recorder.close()
+        return took
 
 
 def flights(*, per_run: bool = True, changes: Sequence[str] = (), batch: int = BATCH, whole: bool = False) -> Entry:

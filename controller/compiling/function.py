@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from controller.compiling.library import library_of
+from controller.compiling.text_cache import c_text_of
 from controller.stack_array import ordered
 from controller.translator.arguments import words_of
-from controller.translator.program import Program
 from controller.translator.types import Type, check_shapes, type_of
 
 INTERPRETED = "SUBREACH_INTERPRETED"  # environment variable: if set, Python runs all functions, without a compiler
@@ -30,19 +30,12 @@ _CALLBACK = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
 
 def c_text(function: Callable[..., None], arguments: tuple[Any, ...]) -> str:
     """Translate a function to C for arguments of these types, as its library is compiled from it."""
-    return _text(function, tuple(map(type_of, arguments)))
-
-
-@functools.cache
-def _text(function: Callable[..., None], types: tuple[Type, ...]) -> str:
-    program = Program()
-    program.export("entry", function, types)
-    return program.text()
+    return c_text_of(function, tuple(map(type_of, arguments)))
 
 
 @functools.cache
 def _entry(function: FunctionType, types: tuple[Type, ...]) -> Any:
-    entry = library_of(_text(function, types)).entry
+    entry = library_of(c_text_of(function, types)).entry
     entry.argtypes, entry.restype = [ctypes.c_void_p], None
     return entry
 

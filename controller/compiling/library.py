@@ -45,9 +45,9 @@ _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 def library_of(text: str) -> ctypes.PyDLL:
     """Return the library of a C text, loaded; it is compiled where neither the package nor the cache has it."""
     name = library_name(text)
-    for folder in (PREBUILT / _platform(), _cache()):
+    for folder in (PREBUILT / _platform(), cache_folder()):
         path = folder / f"{name}{_SUFFIX}"
-        if _is_trusted(folder) and is_whole(path):
+        if is_trusted(folder) and is_whole(path):
             with contextlib.suppress(OSError):  # the library may be for another C library
                 return ctypes.PyDLL(str(path))
     return ctypes.PyDLL(str(_compiled(text, name)))
@@ -74,7 +74,8 @@ def _platform() -> str:
     return f"{_MACHINE.get(machine, machine)}-{_SYSTEM.get(sys.platform, sys.platform)}"
 
 
-def _cache() -> Path:
+def cache_folder() -> Path:
+    """Return the folder of the user's cache."""
     return Path(platformdirs.user_cache_dir("subreach")) / "functions"
 
 
@@ -90,7 +91,7 @@ def is_whole(path: Path) -> bool:
     return whole
 
 
-def _is_trusted(folder: Path) -> bool:
+def is_trusted(folder: Path) -> bool:
     """Return True if only the user, or the owner of the package, can write in a folder of libraries."""
     try:
         about, trusted = folder.stat(), {Path(__file__).stat().st_uid}
@@ -119,7 +120,7 @@ def _compiled(text: str, name: str) -> Path:
     source.write_text(text, encoding="utf-8")
     compile_file(source, built)
     log.debug("%s: compiled in %.2f s", name, time.perf_counter() - started)
-    return keep(built, _cache())
+    return keep(built, cache_folder())
 
 
 def keep(built: Path, folder: Path) -> Path:
@@ -127,12 +128,12 @@ def keep(built: Path, folder: Path) -> Path:
     cached = folder / built.name
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if not _is_trusted(folder):
+        if not is_trusted(folder):
             return built
         _remove_old_parts(folder)
         library = built.read_bytes()
-        _write_atomic(checksum_path(cached), digest_of(library).encode())
-        _write_atomic(cached, library)
+        write_atomic(checksum_path(cached), digest_of(library).encode())
+        write_atomic(cached, library)
     except OSError as error:
         log.warning("cache %s: %s; compiled for this process alone", folder, error.strerror or error)
         return built
@@ -147,7 +148,7 @@ def _remove_old_parts(folder: Path) -> None:
                 part.unlink()
 
 
-def _write_atomic(path: Path, data: bytes) -> None:
+def write_atomic(path: Path, data: bytes) -> None:
     """Write a file atomically."""
     handle, scratch = tempfile.mkstemp(dir=path.parent, prefix=".", suffix=".part")
     try:

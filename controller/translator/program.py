@@ -76,6 +76,11 @@ class Program:
                 code.insert(0, text)
         return "\n".join([_HEAD, *code])
 
+    @property
+    def modules(self) -> set[str]:
+        """Names of the modules of all translated functions."""
+        return {function.__module__ for function, *_ in self._instances}
+
     def instance(self, function: FunctionType, arguments: tuple[Type, ...], aliases: Aliases) -> tuple[str, Type, bool]:
         """Return the C name of a function for some arguments, the type of what it returns, and if it writes arrays."""
         key = (function, arguments, aliases)

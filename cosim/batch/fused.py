@@ -3,44 +3,48 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from controller import LAWS
-from controller.allocation import Allocation
-from controller.regions import pack
-from cosim.batch.flight_config import (
-    LOSSES,
-    PLANT_OUTPUTS,
-    SENSOR_OUTPUTS,
-    Allocator,
-    Array,
-    FlightConfig,
-    FlightMetrics,
-    find_bound,
-    make_workspace,
-)
-from cosim.batch.fused_loop import fly_law
+from controller.compiling.function import BoundCall
 from cosim.batch.outcome import OUTCOME, BatchResult, empty_outcomes
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
 from cosim.results.spans import SETTLED_FOR
 from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model
 from cosim.scenario.start_values import start_values
-from cosim.simulation.arbiter_inputs import pack_inputs
-from cosim.simulation.environment import shape_center, stay_steps
-from cosim.simulation.sensor import STREAM
+from cosim.simulation.compiled_rules import BoundRules
+from cosim.simulation.make_step import (
+    NO_CLOCK,
+    exchanged_variables,
+    make_calls,
+    make_data,
+    make_model,
+    make_noise,
+    step_signals,
+)
+from cosim.simulation.stepped_plant import LOSSES
+from cosim.step.score import FlightMetrics, empty_metrics, fly
+from cosim.step.step_model import ARBITER, LAW, Array, Integers, LawOutputs, StepData, StepModel, set_call
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant, PlantError
-from plant_fmu.running.native import Native
 
-_ROUNDING = 1e-6  # tolerance of times, as a part of a step, as in the master
-_NO_CLOCK = np.empty(0, np.int64)
-_NO_ALLOCATION = Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False)
+
+@dataclass(frozen=True)
+class Trace:
+    """The signals of a flight at each control step; none where they were not asked for."""
+
+    columns: tuple[str, ...]
+    rows: Array  # (control steps, columns), or (0, 0)
+
+    def __getitem__(self, column: str) -> Array:
+        """Return one signal, shape (control steps,)."""
+        values: Array = self.rows[:, self.columns.index(column)]
+        return values
 
 
 class FusedFlyer:
@@ -67,10 +71,10 @@ class FusedFlyer:
                 refused[row] = str(error)
         return BatchResult(outcomes, refused)
 
-    def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Array]:
-        """Fly one scenario of the variation; returns ()."""
-        metrics, setup, native, estimate, rows = fly_scenario(self._plant, scenario, trace)
-        return _outcome(metrics, setup, native, estimate), rows
+    def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Trace]:
+        """Fly one scenario of the variation; return its outcome, shape (), and its trace."""
+        metrics, model, data, signals = fly_scenario(self._plant, scenario, trace)
+        return _outcome(metrics, model, data), signals
 
     def close(self) -> None:
         """Free the plant. May be called twice."""
@@ -102,112 +106,44 @@ def _fixed_keys(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
 
 
 def fly_scenario(
-    plant: Plant, scenario: Scenario, trace: bool = False, clock: NDArray[np.int64] = _NO_CLOCK
-) -> tuple[FlightMetrics, FlightConfig, Native, Array, Array]:
-    """Reset a plant, and fly a scenario with it; returns (4,)."""
+    plant: Plant, scenario: Scenario, trace: bool = False, clock: Integers = NO_CLOCK
+) -> tuple[FlightMetrics[float], StepModel, StepData, Trace]:
+    """Reset a plant, and fly a scenario with it."""
     law = law_of(scenario)
-    n, through = scenario.vehicle.n_thrusters, scenario.actuation.through == "thrusters"
     plant.reset()
     plant.set(start_values(scenario))
     plant.initialize()
-    native = plant.native(*exchanged_variables(scenario))
-    names = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
-    effectiveness = plant.native(names, ())
-    effectiveness.inputs[:] = [plant[name] for name in names] if scenario.failures else 1.0
-    losses = plant.native(LOSSES, ())
-    losses.inputs[:] = [plant[name] for name in LOSSES] if scenario.outages else 0.0
-    setup = configure_flight(scenario, n if through else 0, clock)
-    allocator = failure_stages(scenario, setup) if through else _NO_ALLOCATION
+    inputs, outputs = exchanged_variables(scenario)
+    calls = make_calls(scenario, plant.native, inputs, outputs)
+    n = scenario.vehicle.n_thrusters
+    effectiveness = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
+    calls.effectiveness.inputs[:] = [plant[name] for name in effectiveness] if scenario.failures else 1.0
+    calls.losses.inputs[:] = [plant[name] for name in LOSSES] if scenario.outages else 0.0
+    model, signals = make_model(scenario, clock), step_signals(scenario, law, inputs, outputs)
+    given = LawOutputs(law.estimate, law.expected, law.report)
+    data = make_data(scenario, model, given, signals, inputs, outputs, make_noise(scenario))
+    forces = data.command if model.law_gives_wrench else data.thrusts
+    decide = law.bound(data.state, data.goal, data.regions, data.weights, forces)
+    weigh = BoundRules(scenario.rules.system, data.signals.inputs, data.by_criterion)
+    set_call(data, LAW, decide)
+    set_call(data, ARBITER, weigh)
     decisions = -(-scenario.steps // scenario.control_every)
-    criteria, rules = len(scenario.criteria), scenario.rules
-    inputs = native.inputs.size
-    rows = np.zeros((decisions, 17 + criteria + inputs + law.report.size) if trace else (0, 0))
-    workspace = make_workspace(setup, criteria, inputs, n)
-    metrics, estimate = fly_law(setup, native, effectiveness, losses, allocator, law, rules.system, workspace, rows)
-    return metrics, setup, native, estimate, rows
+    rows = np.zeros((decisions, signals.row.size) if trace else (0, 0))
+    values, metrics = empty_metrics()
+    BoundCall(fly, (model, data, calls, metrics, np.zeros(len(inputs)), rows)).call()
+    decide.raise_error()
+    weigh.raise_error()
+    names = tuple(column.name for column in signals.columns) if trace else ()
+    return FlightMetrics(*values.tolist()), model, data, Trace(names, rows)
 
 
-def exchanged_variables(scenario: Scenario) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return the names of the plant's variables that the loop exchanges with it in each step."""
-    if scenario.actuation.through == "thrusters":
-        n = scenario.vehicle.n_thrusters
-        inputs = tuple(f"thrust[{i + 1}]" for i in range(n))
-        forces = (*(f"thruster_force[{i + 1}]" for i in range(n)), *(f"actuation.{axis}" for axis in "XYZ"))
-    else:
-        inputs = tuple(f"wrench.{axis}" for axis in "XYZKMN")
-        forces = tuple(f"actuator.wrench.{axis}" for axis in "XYZ")  # states: they cost no evaluation
-    sensed = SENSOR_OUTPUTS if scenario.sensing.through == "sensors" else ()
-    return inputs, (*PLANT_OUTPUTS, *forces, *sensed)
-
-
-def configure_flight(scenario: Scenario, thrusters: int, clock: NDArray[np.int64] = _NO_CLOCK) -> FlightConfig:
-    """Make the configuration of a flight from a scenario."""
-    sensing, step = scenario.sensing, scenario.time.step
-    decisions = -(-scenario.steps // scenario.control_every)
-    noise = np.zeros((0, 6))
-    if sensing.through == "state" and not sensing.exact:
-        deviation = np.repeat([sensing.position_noise, sensing.velocity_noise], 3)
-        noise = deviation * np.random.default_rng([sensing.seed, STREAM]).standard_normal((decisions, 6))
-    sensors = scenario_sensors(scenario)
-    outages = outage_schedule(scenario.outages, sensors, step)
-    failures = sorted(
-        (math.ceil(f.time / step - _ROUNDING), f.thruster - 1, math.nan if f.stuck else f.effectiveness)
-        for f in scenario.failures
-    )
-    return FlightConfig(
-        goal=pack([scenario.goal_region]),
-        regions=pack([secondary.region for secondary in scenario.regions]),
-        criteria=np.array(scenario.criterion_places, np.int64),
-        priorities=np.array([secondary.priority for secondary in scenario.regions]),
-        inputs=pack_inputs(scenario.regions, scenario.criteria, scenario.rules, scenario.arbiter.ramp),
-        step=step,
-        steps=scenario.steps,
-        control_every=scenario.control_every,
-        arbiter_every=scenario.arbiter_every,
-        moving=bool(scenario.moving),
-        goal_places=(np.reshape(scenario.goal_then, (-1, 3)) - shape_center(scenario.goal)).astype(float),
-        goal_stay=stay_steps(scenario),
-        exact=sensing.exact,
-        noise=noise,
-        dead_from=sensing.dead_from,
-        dead_until=sensing.dead_from + sensing.dead_for,
-        frozen=sensing.frozen,
-        through_sensors=sensing.through == "sensors",
-        sensors=sensor_model(sensors),
-        outage_steps=np.array([step for step, _, _ in outages], np.int64),
-        outage_sensors=np.array([sensor for _, sensor, _ in outages], np.int64),
-        outage_losses=np.array([loss for _, _, loss in outages]),
-        failed=np.array([thruster for _, thruster, _ in failures], np.int64),
-        failure_steps=np.array([at for at, _, _ in failures], np.int64),
-        remaining=np.array([remaining for _, _, remaining in failures]),
-        report_failures=scenario.report_failures,
-        thrusters=thrusters,
-        bound=find_bound(LAWS[scenario.law.name].diagnostics),
-        clock=clock,
-    )
-
-
-def failure_stages(scenario: Scenario, setup: FlightConfig) -> Allocator:
-    """Return the arguments of the allocation for each number of reported failures."""
-    vehicle, limits = scenario.vehicle, scenario.actuation.limits
-    health, stages = np.ones(vehicle.n_thrusters), []
-    total = setup.failed[~(setup.remaining > 0.0)]
-    for failed in (None, *total) if setup.report_failures else (None,):
-        if failed is not None:
-            health[failed] = 0.0
-        lower, upper = vehicle.thrust_min * health, vehicle.thrust_max * health
-        stages.append(Allocation(vehicle.thruster_matrix, lower, upper, limits).arguments)
-    inverse, lower, upper, direction = zip(*stages, strict=True)
-    return Allocator(np.array(inverse), np.array(lower), np.array(upper), direction[0])
-
-
-def _outcome(metrics: FlightMetrics, setup: FlightConfig, native: Native, estimate: Array) -> NDArray[np.void]:
+def _outcome(metrics: FlightMetrics[float], model: StepModel, data: StepData) -> NDArray[np.void]:
     def when(step: float) -> float:
-        return step * setup.step if step >= 0 else math.nan
+        return step * model.step if step >= 0 else math.nan
 
     stopped = metrics.failed_step >= 0
-    last = metrics.failed_step if stopped else setup.steps
-    stayed = (last - metrics.last_entered) * setup.step if metrics.inside else 0.0
+    last = metrics.failed_step if stopped else model.steps
+    stayed = (last - metrics.last_entered) * model.step if metrics.inside else 0.0
     fields = {
         "reached": metrics.first_inside >= 0,
         "reach_time": when(metrics.first_inside),
@@ -220,8 +156,8 @@ def _outcome(metrics: FlightMetrics, setup: FlightConfig, native: Native, estima
         "effort": metrics.effort,
         "max_force": metrics.max_force,
         "max_speed": metrics.max_speed,
-        **{f"final_{axis}": native.outputs[i] for i, axis in enumerate("xyz")},
-        **{f"phi{i + 1}": estimate[i] for i in range(4)},
+        **{f"final_{axis}": data.outputs[i] for i, axis in enumerate("xyz")},
+        **{f"phi{i + 1}": data.estimate[i] for i in range(4)},
         "stopped_at": when(metrics.failed_step),
     }
     return np.array(tuple(fields[name] for name in OUTCOME.names or ()), OUTCOME)

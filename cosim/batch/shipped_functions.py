@@ -23,17 +23,19 @@ from controller.navigation.navigator import navigate
 from controller.regions import Region, Sphere, pack
 from controller.regions.rays import ray_distances
 from controller.regions.region_set import PackedRegions, evaluate_packed, write_clearances
-from cosim.batch.c_calls import Clock
-from cosim.batch.flight_config import Allocator, BoundArbiter, BoundLaw, FlightOutputs, make_workspace
-from cosim.batch.fused import configure_flight
-from cosim.batch.fused_loop import fly
 from cosim.scenario.arbiter_rules import PAPER_RULES
 from cosim.scenario.criteria import PAPER
+from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.vehicle_model import vehicle_model
-from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, pack_inputs, write_arbiter_state
 from cosim.simulation.compiled_rules import rules_text
-from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluate_places
+from cosim.simulation.make_step import exchanged_variables, make_data, make_model, make_noise, step_signals
+from cosim.step.arbiter_inputs import compute_inputs, empty_signals, pack_inputs
+from cosim.step.one_step import advance, locate, show_start
+from cosim.step.placed_regions import RegionEvaluation, RegionPlaces, evaluate_places
+from cosim.step.plant_calls import Clock, PlantCalls
+from cosim.step.score import empty_metrics, fly
+from cosim.step.step_model import LawOutputs
 from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
@@ -59,9 +61,8 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
     yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, _INTEGERS)
     inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
-    yield write_arbiter_state, (state, _FLAT, state)
     yield compute_inputs, (inputs, goal, regions, state, _FLAT, _FLAT, empty_signals(inputs, 1, 3))
-    yield fly, _flight_arguments()
+    yield from _step_functions()
 
 
 def _law_arguments(
@@ -72,13 +73,23 @@ def _law_arguments(
     return state, goal, regions, _FLAT, gains, made.memory, np.zeros(made.n_forces)
 
 
-def _flight_arguments() -> tuple[Any, ...]:
-    references, reports = np.zeros(1, np.uint32), np.zeros((0, 0))
-    native = Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)
-    setup = configure_flight(load_scenario("paper"), 1, Clock().numbers)
-    law, allocator = BoundLaw(0, 0, True, _FLAT, _FLAT, _FLAT), Allocator(np.zeros((1, 1, 6)), _TABLE, _TABLE, True)
-    out = FlightOutputs(_FLAT, _FLAT, reports, reports)
-    return setup, native, native, native, allocator, law, BoundArbiter(0, 0), make_workspace(setup, 3, 1, 1), out
+def _step_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]:
+    """Yield the functions of a step."""
+    scenario = load_scenario("paper")
+    (inputs, outputs), law, model = (
+        exchanged_variables(scenario),
+        law_of(scenario),
+        make_model(scenario, Clock().numbers),
+    )
+    given = LawOutputs(law.estimate, law.expected, law.report)
+    signals = step_signals(scenario, law, inputs, outputs)
+    data = make_data(scenario, model, given, signals, inputs, outputs, make_noise(scenario))
+    references, rows = np.zeros(1, np.uint32), np.zeros((0, 0))
+    calls = PlantCalls(*[Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)] * 3)
+    yield fly, (model, data, calls, empty_metrics()[1], _FLAT, rows)
+    yield advance, (model, data, calls, _INTEGERS, rows)
+    yield show_start, (model, data, calls)
+    yield locate, (model, data)
 
 
 def shipped_texts() -> dict[str, str]:

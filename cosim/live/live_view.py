@@ -73,6 +73,10 @@ class LiveView:
             self._due = now + PERIOD
             self._rows.append((self._run, row[self._picked]))
 
+    def take(self, first: int, rows: Array) -> None:
+        """Copy the last of the rows of the steps from `first` on, if a copy is due."""
+        self.observe(first + len(rows) - 1, rows[-1])
+
     def show_commands(self, k: int, commands: Sequence[Command]) -> None:
         """Show the commands that step `k` applies."""
         self._call(self._hub.show_commands, k, commands)

@@ -66,10 +66,13 @@ class LinkThread:
 
     def observe(self, k: int, row: Array) -> None:
         """Queue a copy of the row of step `k`, if a snapshot is due."""
-        if k % self._decimation:
-            return
-        self.dropped += len(self._queue) == MAX_SNAPSHOTS
-        self._queue.append(row.copy())
+        self.take(k, row[None])
+
+    def take(self, first: int, rows: Array) -> None:
+        """Queue copies of the rows of the steps from `first` on of which a snapshot is due."""
+        for row in rows[-first % self._decimation :: self._decimation]:
+            self.dropped += len(self._queue) == MAX_SNAPSHOTS
+            self._queue.append(row.copy())
 
     @property
     def waiting(self) -> int:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 from controller import VehicleState
+from controller.compiling.function import BoundCall
 from controller.paper_law import Gains, primary_error
 from controller.regions import Region, Sphere, pack
 from controller.regions.region_set import evaluate_at_pose
@@ -29,8 +30,8 @@ from controller.theory.model import asymmetry, damping, least_inertia, restoring
 from cosim.precheck.finding import Finding, status
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_model, true_vehicle
-from cosim.simulation.arbitration import Arbitration
 from cosim.simulation.signals import Array
+from cosim.step.arbiter_inputs import compute_inputs, empty_signals, pack_inputs
 from fuzzy_arbiter import Arbiter
 
 _ROUNDING = 1e-9  # tolerance of defects, as a part of the greatest element
@@ -93,11 +94,12 @@ def start_weights(scenario: Scenario) -> Array:
     clearances = evaluate_at_pose(secondary, initial.position, initial.quaternion)[2]
     position, quaternion, velocity = map(np.array, (initial.position, initial.quaternion, initial.velocity))
     state = VehicleState(position, quaternion, velocity, np.ones(scenario.vehicle.n_thrusters))
-    arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
-    n = len(scenario.criteria)
-    arbitration = Arbitration(scenario, arbiter, state, np.zeros(1), clearances, np.zeros(n), np.zeros(n))
-    arbitration.decide(pack([scenario.goal_region]), pack(secondary))
-    return arbitration.region_weights
+    packed = pack_inputs(scenario.regions, scenario.criteria, scenario.rules, scenario.arbiter.ramp)
+    signals = empty_signals(packed, len(secondary), len(scenario.criteria))
+    goal, regions = pack([scenario.goal_region]), pack(secondary)
+    BoundCall(compute_inputs, (packed, goal, regions, state, np.zeros(1), clearances, signals)).call()
+    weights = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)(signals.inputs.tolist())
+    return np.array(weights)[list(scenario.criterion_places)]
 
 
 @dataclass(frozen=True)

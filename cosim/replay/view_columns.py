@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -10,6 +10,7 @@ from cosim.replay.activity import RESTING_SIGNALS, active_regions, is_resting
 from cosim.results.required_columns import REGION_COLUMNS
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Column
+from fuzzy_arbiter import System
 from fuzzy_arbiter.engines.firing import Firing
 
 _DRAWN = (  # prefixes of the columns that a view draws
@@ -24,7 +25,7 @@ class ViewColumns:
 
     def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
         names = [column.name for column in columns]
-        self.picked = [i for i, name in enumerate(names) if _drawn(name)]
+        self.picked = [i for i, name in enumerate(names) if is_drawn(name)]
         self._criteria, names_of_criteria = scenario.criterion_places, scenario.criterion_names
         picked = [names[i] for i in self.picked]
         self._memberships = [picked.index(f"membership.{name}") for name in names_of_criteria]
@@ -35,12 +36,11 @@ class ViewColumns:
         self._inputs = self._memberships  # inputs of the rules
         if scenario.arbiter.file:
             self._inputs = [picked.index(f"arbiter.{signal.name}") for signal in scenario.rules.inputs]
-        self._firing, rules = Firing(system), system.rules
+        self._firing = Firing(system)
         self._low, self._high = np.array([variable.universe for variable in system.inputs]).T
         self.columns = (
             *(columns[i] for i in self.picked),
-            Column("active", "", "Region that the arbiter gives way to: 0 the goal, then the regions in their order"),
-            *(Column(f"rule.R{i + 1}", "", f"Strength of: {rule}") for i, rule in enumerate(rules)),
+            *added_columns(system),
         )
 
     def compute_rows(self, picked: Array) -> Array:
@@ -60,5 +60,13 @@ class ViewColumns:
         return np.column_stack([picked, active, strengths])
 
 
-def _drawn(name: str) -> bool:
+def added_columns(system: System) -> Iterator[Column]:
+    """Yield the columns that a view adds to those of the record."""
+    yield Column("active", "", "Region that the arbiter gives way to: 0 the goal, then the regions in their order")
+    for i, rule in enumerate(system.rules):
+        yield Column(f"rule.R{i + 1}", "", f"Strength of: {rule}")
+
+
+def is_drawn(name: str) -> bool:
+    """Return True if a view draws a column of the record."""
     return name.startswith(_DRAWN) or name.endswith(REGION_COLUMNS)

@@ -56,6 +56,20 @@ class Recorder:
         self._filled += 1
         self.rows += 1
 
+    def take(self, first: int, rows: Array) -> None:
+        """Record the rows of the steps from `first` on, shape (steps, columns) of float64."""
+        self._transpose()
+        size = self._columns.shape[1]
+        for begin in range(0, len(rows), size):
+            part = rows[begin : begin + size]
+            n = self._transposed + len(part)
+            if n > size or time.monotonic() > self._due:
+                self._flush()
+                n = len(part)
+            self._columns[:, self._transposed : n] = part.T
+            self._transposed = n
+        self.rows += len(rows)
+
     def close(self) -> None:
         """Write the remaining rows, and replace the stream by a Parquet file."""
         # after an error the stream keeps all rows for which the disk had space, and it may be called again

@@ -54,8 +54,12 @@ class _Progress:
         )  # fmt: skip
 
     def observe(self, k: int, row: Array) -> None:
-        if k and k % self._every == 0:
-            self._bar.update_to(k * self._step)
+        self.take(k, row[None])
+
+    def take(self, first: int, rows: Array) -> None:
+        last = first + len(rows) - 1
+        if last // self._every > (first - 1) // self._every:
+            self._bar.update_to(last * self._step)
 
     def close(self) -> None:
         self._bar.close()

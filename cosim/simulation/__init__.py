@@ -1,8 +1,7 @@
-"""One step of the co-simulation.
+"""A run of the co-simulation, step by step.
 
-The master measures the plant, evaluates the regions, computes weights and forces, allocates thrusters, steps the FMU
-and publishes the row. Each of these is a module here; `master.py` calls them in that order. Public: `Master`,
-`Observer`, `Signals`.
+`Master` binds plant, law, arbiter and commands to the arrays of a step, does blocks of steps, and publishes their rows.
+Public: `Master`, `Observer`, `BlockObserver`, `Signals`.
 
-Imports: controller, fuzzy_arbiter, plant_fmu, scenario.
+Imports: controller, fuzzy_arbiter, plant_fmu, scenario, step.
 """

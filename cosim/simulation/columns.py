@@ -20,7 +20,7 @@ _FORCE_UNITS = ("N",) * 3 + ("N.m",) * 3
 def columns_of(scenario: Scenario, plant: SteppedPlant, law: Law) -> list[Column]:
     """Return the columns of a run."""
     channels = (plant.outputs.channels, plant.flags.channels, plant.inputs.channels)
-    return _columns(scenario, *channels, law.diagnostics)
+    return columns_of_channels(scenario, *channels, law.diagnostics)
 
 
 def column_names(scenario: Scenario) -> list[str]:
@@ -31,16 +31,17 @@ def column_names(scenario: Scenario) -> list[str]:
 def columns_without_plant(scenario: Scenario) -> list[Column]:
     """Return the columns of a run as `columns_of` does, from the vehicle's table of variables and a built-in law."""
     law = LAWS.get(scenario.law.name)
-    return _columns(scenario, *vehicle_channels(scenario.vehicle), law.diagnostics if law else ())
+    return columns_of_channels(scenario, *vehicle_channels(scenario.vehicle), law.diagnostics if law else ())
 
 
-def _columns(
+def columns_of_channels(
     scenario: Scenario,
     outputs: Sequence[Channel],
     flags: Sequence[Channel],
     inputs: Sequence[Channel],
     diagnostics: Sequence[Diagnostic],
 ) -> list[Column]:
+    """Return the columns of a run that exchanges some channels with its plant."""
     regions = [("goal", scenario.goal), *((r.region.name, r.region.shape) for r in scenario.regions)]
     return [
         Column("time", "s", "Simulated time at the beginning of the step"),

@@ -2,64 +2,57 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 
 from controller import VehicleState
 from controller.compiling.function import CompiledFunction
-from controller.regions import Sphere, pack
-from controller.regions.region_set import PackedRegions, evaluate_packed, shape_entry
+from controller.regions import Region, Sphere, pack
+from controller.regions.region_set import PackedRegions, shape_entry
 from controller.regions.shape import Shape
 from cosim.errors import CommandError, RunError
 from cosim.scenario.region_tables import PARKED_POSITION, Vector3
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
+from cosim.step.placed_regions import RegionEvaluation, RegionPlaces, evaluate_places
+from cosim.step.step_model import StepData
 
+_SPHERE_NUMBERS = len(Sphere((0.0, 0.0, 0.0), 1.0).packed())
 _AT_REST = (0.0, 0.0, 0.0)
 _ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Target:
     """A target region."""
 
-    packed: PackedRegions  # this region alone
+    shape: Shape
     middle: Array  # (3,) m, NED: center of its shape as packed
     origin: Array  # (3,) m, NED: its shift from there, extrapolated to time 0 at its present velocity
-    radius: float  # m, radius of a sphere; 0 for the shape of the scenario's goal
-
-
-class RegionEvaluation(NamedTuple):
-    """Values of goal and n regions at a pose; the goal's come first."""
-
-    values: Array  # (n + 1,) g, above 0 where violated
-    gradients: Array  # (n + 1, 3) derivative of g by position, world frame
-    rotation_gradients: Array  # (n + 1, 3) derivative of g by rotation, body frame [1/rad]
-    clearances: Array  # (n + 1,) distance left to each boundary: m, or rad of attitude
-
-
-class RegionPlaces(NamedTuple):
-    """Goal and regions at their present positions."""
-
-    goal: PackedRegions
-    regions: PackedRegions
+    velocity: Array  # (3,) m/s, NED
+    radius: float = 0.0  # m, radius of a sphere; 0 for the shape of the scenario's goal
 
 
 class RegionEnvironment:
-    """Goal and regions, moved by their velocities, or by `move` where the scenario has ``streamed = true``."""
+    """Goal and regions, moved by their velocities, or by `move` where the scenario has ``streamed = true``.
 
-    def __init__(self, scenario: Scenario) -> None:
+    It changes those of a step's `data` in place, or its own.
+    """
+
+    def __init__(self, scenario: Scenario, data: StepData | None = None) -> None:
         secondary = [region.region for region in scenario.regions]
-        self.regions = pack(secondary)
+        self.goal = pack([scenario.goal_region]) if data is None else data.goal
+        self.regions = pack(secondary) if data is None else data.regions
+        # m, NED: shift of goal and regions, extrapolated to time 0 at their present velocities
+        self._goal_origin: Array = np.zeros((1, 3)) if data is None else data.goal_origin
+        self._goal_center: Array = np.zeros(3) if data is None else data.goal_center
+        self._origins: Array = np.zeros((len(secondary), 3)) if data is None else data.region_origins
         self._deviations = self.regions.deviations.copy()  # m, standard deviations as in the scenario
-        self._goal_region, self._middle = scenario.goal_region, shape_center(scenario.goal)
-        self._target = self._reached = self._new_target(None, self._middle)
-        self._then = [np.subtract(place, self._middle) for place in scenario.goal_then]
-        self._place, self._stay, self._stayed = 0, stay_steps(scenario), 0
+        self._goal_shape, self._middle = scenario.goal, np.array(shape_center(scenario.goal))
+        goal_velocity = np.array(scenario.goal_velocity, dtype=float)
+        self._target = self._reached = _Target(scenario.goal, self._middle, np.zeros(3), goal_velocity)
         self._places = RegionPlaces(self.goal, self.regions)
         self._names = ["goal", *(region.name for region in secondary)]
         self._streamed = ["goal"] if scenario.goal_streamed else []
@@ -68,20 +61,13 @@ class RegionEnvironment:
         ]
         self._moving = [self._names.index(name) for name in scenario.moving]
         self._dynamic = [i for i, region in enumerate(scenario.regions) if region.is_dynamic]
-        # m, NED: shift of each region, extrapolated to time 0 at its present velocity
-        self._origins: Array = np.zeros((len(secondary), 3))
         self._evaluate_places = CompiledFunction(evaluate_places)
-
-    @property
-    def goal(self) -> PackedRegions:
-        """The target region alone, at its present position."""
-        return self._target.packed
 
     def update_positions(self, time: float, shifts: Array) -> None:
         """Move all regions to their positions at a time; time [s], shifts (moving regions, 3) [m, NED]."""
         if not self._moving:
             return
-        for packed, origins in ((self.goal, self._target.origin), (self.regions, self._origins)):
+        for packed, origins in ((self.goal, self._goal_origin), (self.regions, self._origins)):
             packed.move_to(time)
             packed.shifts[:] += origins
         for i, at in enumerate(self._moving):
@@ -108,17 +94,6 @@ class RegionEnvironment:
         self.evaluate(VehicleState(position, quaternion, np.zeros(6), np.zeros(0)), found)
         return found.clearances
 
-    def advance_goal(self, clearance: float, place: Array) -> None:
-        """Move the goal to its next place, from the next step on, once the vehicle has stayed in it long enough."""
-        # with clearance [m]
-        place[:] = self._place
-        if self._place == len(self._then):
-            return
-        self._stayed = self._stayed + 1 if clearance >= 0.0 else 0
-        if self._stayed > self._stay:
-            self._target.origin[:] = self._then[self._place]
-            self._place, self._stayed = self._place + 1, 0
-
     # ---- moved from outside ----
 
     def move(self, name: str, displacement: Array, velocity: Array, time: float) -> None:
@@ -134,8 +109,9 @@ class RegionEnvironment:
         if at:
             self._set_motion(at - 1, to, going, time)
         else:
-            self._reached.packed.velocities[0] = going
-            self._reached.origin[:] = to - going * time
+            self._store_target()
+            self._reached.velocity, self._reached.origin = going, to - going * time
+            self._load_target()
 
     def _set_motion(self, i: int, displacement: Array, velocity: Array, time: float) -> None:
         self.regions.velocities[i] = velocity
@@ -179,10 +155,16 @@ class RegionEnvironment:
     ) -> None:
         """Set position, shape and velocity of the target region; position [m, NED], radius [m], velocity [m/s, NED]."""
         # with time [s]
-        target = self._new_target(radius, position)
-        target.packed.velocities[0] = velocity
-        target.origin[:] -= np.multiply(velocity, time)
-        self._use_target(target)
+        self._store_target()
+        if radius is None:
+            origin = np.subtract(position, self._middle)
+            self._target = _Target(self._goal_shape, self._middle, origin, np.array(velocity))
+        else:
+            self._target = _Target(
+                Sphere(position, radius), np.array(position), np.zeros(3), np.array(velocity), radius
+            )
+        self._target.origin -= np.multiply(velocity, time)
+        self._load_target()
 
     def save_target(self) -> None:
         """Save the present target for `restore_target`."""
@@ -190,19 +172,21 @@ class RegionEnvironment:
 
     def restore_target(self) -> None:
         """Restore the target that was saved last; the scenario's goal, if none was."""
-        self._use_target(self._reached)
+        self._store_target()
+        self._target = self._reached
+        self._load_target()
 
-    def _use_target(self, target: _Target) -> None:
-        self._target = target
-        self._places = self._places._replace(goal=target.packed)
+    def _store_target(self) -> None:
+        """Take over the origin of the target, which a step changes where the scenario has goals in turn."""
+        self._target.origin = self._goal_origin[0].copy()
 
-    def _new_target(self, radius: float | None, position: Vector3) -> _Target:
-        """Return a target at rest with its center at a position, a sphere or with the shape of the scenario's goal."""
-        if radius is None:
-            origin = np.subtract(position, self._middle)
-            return _Target(pack([self._goal_region]), np.array(self._middle), origin, 0.0)
-        sphere = dataclasses.replace(self._goal_region, shape=Sphere(position, radius))
-        return _Target(pack([sphere]), np.array(position), np.zeros(3), radius)
+    def _load_target(self) -> None:
+        """Write the target into the arrays of the goal."""
+        numbers = self._target.shape.packed()
+        self.goal.kinds[0], self.goal.offsets[1] = self._target.shape.kind, len(numbers)
+        self.goal.numbers[: len(numbers)] = numbers
+        self.goal.velocities[0], self._goal_origin[0] = self._target.velocity, self._target.origin
+        self.goal.shifts[0], self._goal_center[:] = self._target.origin, self._target.middle
 
     # ---- changed from outside ----
 
@@ -216,21 +200,22 @@ class RegionEnvironment:
         if at:
             self._reshape(self.regions, at - 1, shape)
             return
-        self._goal_region = dataclasses.replace(self._goal_region, shape=shape)
+        self._goal_shape = shape
         for target in (self._reached, self._target):
             if not target.radius:
-                self._reshape(target.packed, 0, shape)
+                target.shape = shape
+        self._store_target()
+        self._load_target()
 
     @staticmethod
     def _reshape(regions: PackedRegions, i: int, shape: Shape) -> None:
         regions.numbers[regions.offsets[i] : regions.offsets[i + 1]] = shape.packed()
 
 
-def evaluate_places(places: RegionPlaces, state: VehicleState, found: RegionEvaluation) -> None:
-    """Evaluate the goal into the first elements, and the regions into those behind, in one call."""
-    p, e, g, c = state.position, state.quaternion, found.values, found.clearances
-    evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.rotation_gradients[:1], c[:1])
-    evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.rotation_gradients[1:], c[1:])
+def pack_target(goal: Region) -> PackedRegions:
+    """Pack a goal with space for a sphere in its place."""
+    packed = pack([goal])
+    return packed._replace(numbers=np.resize(packed.numbers, max(packed.numbers.size, _SPHERE_NUMBERS)))
 
 
 def stay_steps(scenario: Scenario) -> int:

@@ -1,43 +1,44 @@
 """The co-simulation master: steps plant, arbiter and controller, and publishes their signals."""
 
-# `Master.run` loops over the steps; `Master.step` does one, with a call for each stage. After each step the observers
-# receive the row of signals, which is read-only, and which the next step overwrites.
+# A step is `cosim.step.one_step.step`, plain functions that run as C. `Master.run` does blocks of steps, and passes
+# their rows to the observers; one step at a time where commands, observers or the caller may change it between steps.
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 from types import TracebackType
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from controller import CompiledLaw, Law, VehicleState
-from controller.law import NOTHING_EXPECTED
+from controller import CompiledLaw, Law
+from controller.compiling.function import BoundCall
 from controller.quaternion import from_axis_angle
 from cosim.scenario.law_factory import law_of, with_custom_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
-from cosim.simulation.actuators import Actuators
-from cosim.simulation.arbitration import Arbitration
+from cosim.simulation.actuation_limits import ActuationLimits
 from cosim.simulation.columns import columns_of
 from cosim.simulation.commands.command_handler import CommandHandler
 from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.sources import CommandSource
+from cosim.simulation.decisions import BoundArbiter, BoundLaw, ending, outputs_of
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.lyapunov_signals import LyapunovSignals
+from cosim.simulation.make_step import NoiseSource, make_data, make_model
 from cosim.simulation.pace import Pace
-from cosim.simulation.sensor_navigation import SensorNavigation, make_sensing
 from cosim.simulation.signals import Array, Signals
-from cosim.simulation.stepped_plant import SteppedPlant, validate_plant
+from cosim.simulation.stepped_plant import BoundPlant, SteppedPlant, validate_plant
+from cosim.step.one_step import advance, locate, show_start
+from cosim.step.step_model import LOCATED, MEASURED, set_call
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant
 
 _ARMING_PERIOD = 0.005  # s of the wall clock, between polls of the commands while the run waits for arming
-_ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
+_BLOCK = 256  # maximum number of steps of a block
+_BLOCK_TIME = 0.002  # s of the wall clock that a block takes: Ctrl-C and other threads wait for its end
 _DOWN: Array = np.array([0.0, 0.0, 1.0])
-_FIRST_APPLIED = "thruster_force[1]"  # outputs before it are read before doStep, it and the later ones after
 
 
 class Observer(Protocol):
@@ -45,6 +46,15 @@ class Observer(Protocol):
 
     def observe(self, k: int, row: Array) -> None:
         """Take the row of step `k`, shape (n,). The next step overwrites it: copy what you keep."""
+        ...
+
+
+@runtime_checkable
+class BlockObserver(Observer, Protocol):
+    """Receives the rows of several steps at once; it must not change the run."""
+
+    def take(self, first: int, rows: Array) -> None:
+        """Take the rows of the steps from `first` on, shape (steps, n). The next block overwrites them."""
         ...
 
 
@@ -66,9 +76,9 @@ class Master:
     signals : Signals
         Row that each step fills.
     true_state, state : VehicleState
-        The plant's state, and the measured one that law and arbiter receive; the same object where sensing is exact.
-    navigator : Navigator or None
-        Filter that estimates the state; None unless sensing is through sensors.
+        The plant's state, and the measured one that law and arbiter receive.
+    model, data : StepModel, StepData
+        Constants, and state and signals, of a step.
 
     Raises
     ------
@@ -97,9 +107,6 @@ class Master:
         self.scenario = scenario
         self.arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
         self.law: Law = law_of(scenario) if law is None else law
-        self._jacobi = scenario.master.order == "jacobi"
-        self._failures = bool(scenario.failures)
-        self.environment = RegionEnvironment(scenario)
         self._boundary = 0.0  # s, beginning of the next step
 
         self.plant: SteppedPlant = Plant(scenario.vehicle, scenario.plant.fmi) if plant is None else plant
@@ -107,63 +114,49 @@ class Master:
             self.plant.set(start_values(scenario))
             self.plant.initialize()
             self.signals = Signals(columns_of(scenario, self.plant, self.law))
-            self._bind()
+            self._bind(own_plant=plant is None)
         except BaseException:
             self.plant.close()
             raise
 
-    def _bind(self) -> None:
-        """Bind actuators, sensing, arbiter and commands to their parts of the row."""
-        s, n = self.signals, len(self.scenario.regions)
-        self.actuators = Actuators(self.scenario, self.plant, s)
-        plant, n_outputs = self.plant, len(self.plant.outputs)
-        n_measured = plant.outputs.names.index(_FIRST_APPLIED)
-        # memoryviews: copying one takes a third of the time of copying an array
-        outputs, plant_outputs = s.view("position.x", n_outputs).data, plant.outputs.values.data
-        self._measured, self._plant_measured = outputs[:n_measured], plant_outputs[:n_measured]
-        self._applied, self._plant_applied = outputs[n_measured:], plant_outputs[n_measured:]
-        self._flags = s.view("position.x", n_outputs + len(plant.flags))[n_outputs:]
-        self._raised = b""  # the flags as they were last written into the row
-
-        true_state = VehicleState(
-            position=s.view("position.x", 3),
-            quaternion=s.view("quaternion.e0", 4),
-            velocity_body=s.view("velocity.u", 6),
-            thruster_health=self.actuators.health,
-        )
-        self.true_state = true_state
-        self.state, self._sensor = make_sensing(self.scenario, self.plant, s, true_state)
-        self.navigator = self._sensor.navigator if isinstance(self._sensor, SensorNavigation) else None
-
-        values, clearances = s.view("goal.value", n + 1), s.view("goal.clearance", n + 1)
-        # where sensing is exact, the arbiter uses the evaluation that is recorded
-        self._true_evaluation = self._given_evaluation = self.environment.empty_evaluation(values, clearances)
-        if self._sensor is not None:
-            self._given_evaluation = self.environment.empty_evaluation(np.zeros(n + 1), np.zeros(n + 1))
-        moving, then = self.scenario.moving, self.scenario.goal_then
-        self._goal_place = s.view("goal.place", 1) if then else np.empty(0)
-        self._shifts = s.view(f"{moving[0]}.shift.x", 3 * len(moving)).reshape(-1, 3) if moving else np.empty((0, 3))
-        names, inputs = self.scenario.criterion_names, self.scenario.rules.inputs
-        self._arbitration = Arbitration(
-            self.scenario, self.arbiter, self.state, s.row[:1], self._given_evaluation.clearances[1:],
-            s.view(f"membership.{names[0]}", len(names)), s.view(f"weight.{names[0]}", len(names)),
-            s.view(f"arbiter.{inputs[0].name}", len(inputs)) if self.scenario.arbiter.file else None,
+    def _bind(self, own_plant: bool) -> None:
+        """Bind plant, law, arbiter and commands to the arrays of a step."""
+        s, scenario = self.signals, self.scenario
+        self._plant = BoundPlant(scenario, self.plant, native=own_plant)
+        inputs, outputs, flags = (c.names for c in (self.plant.inputs, self.plant.outputs, self.plant.flags))
+        self._noise = NoiseSource(scenario, 1 + _BLOCK // scenario.control_every)
+        self.model = make_model(scenario, full=True, law=self.law)
+        self.data = make_data(
+            scenario, self.model, outputs_of(self.law), s, inputs, outputs, self._noise.values, flags
         )  # fmt: skip
-        self._expected = NOTHING_EXPECTED  # the law's prediction for the next step; unused where sensing is exact
-        self._estimate = s.view("estimate.phi1", 4)
-        n_reports = len(self.law.diagnostics)
-        self._reports = n_reports > 0
-        self._report = s.view(f"law.{self.law.diagnostics[0].name}", n_reports) if n_reports else np.empty(0)
+        self.true_state, self.state = self.data.true_state, self.data.state
+        self.environment = RegionEnvironment(scenario, self.data)
+        self._law = BoundLaw(self.law, self.model, self.data)
+        self._arbiter = BoundArbiter(self.arbiter, self.data)
+        self._span = np.zeros(3, np.int64)
+        self._rows: Array = np.zeros((_BLOCK, s.row.size))
+        arguments = self.model, self.data, self._plant.calls
+        self._advance_one = BoundCall(advance, (*arguments, self._span, self._rows[:0]))
+        self._advance_block = BoundCall(advance, (*arguments, self._span, self._rows))
         self._lyapunov: LyapunovSignals | None = None
+        if scenario.record.lyapunov:
+            self._lyapunov = LyapunovSignals(
+                scenario, self.data.true_state, self.data.goal, self.data.regions, self.data.weights,
+                self.data.estimate, s.view("lyapunov.printed", 4),
+            )  # fmt: skip
         self.command_handler: CommandHandler | None = None
-        if self.scenario.commands.enabled:
+        self._commands: CommandSource | None = None  # of the present step
+        if scenario.commands.enabled:
+            limits = ActuationLimits(scenario, self.plant, self.model, self.data)
             self.command_handler = CommandHandler(
-                self.scenario, self.environment, self.actuators, self.state, s.view("commands.armed", 7)
+                scenario, self.environment, limits, self.data.state, s.view("commands.armed", 7)
             )
-        if self.scenario.record.lyapunov:
-            out, goal, regions = s.view("lyapunov.printed", 4), self.environment.goal, self.environment.regions
-            weights = self._arbitration.region_weights
-            self._lyapunov = LyapunovSignals(self.scenario, true_state, goal, regions, weights, self._estimate, out)
+            self._locate = BoundCall(locate, (self.model, self.data))
+            self._hooks = [BoundCall(ending(self.data, f), ()) for f in (self._take_commands, self._continue_mission)]
+            for when, hook in zip((MEASURED, LOCATED), self._hooks, strict=True):
+                set_call(self.data, when, hook)
+        # the caller of a plant of its own, and commands, change it between steps
+        self._in_blocks = own_plant and self._lyapunov is None and self.command_handler is None
 
     @property
     def row(self) -> Array:
@@ -200,11 +193,38 @@ class Master:
         PlantError
             If the FMU fails in a step.
         """
-        step, last = self.scenario.time.step, self.scenario.steps
+        if self._in_blocks and rate is None and all(isinstance(observer, BlockObserver) for observer in observers):
+            self._run_blocks([observer for observer in observers if isinstance(observer, BlockObserver)])
+        else:
+            self._run_steps(observers, rate, commands, awaiting)
+
+    def _run_blocks(self, observers: Sequence[BlockObserver]) -> None:
+        """Do all steps in blocks, each of about the same wall-clock time."""
+        k, size = 0, 1
+        while k <= self.scenario.steps:
+            started = time.perf_counter()
+            n = min(size, self.scenario.steps + 1 - k)
+            try:
+                self._advance(self._advance_block, k, n)
+            finally:
+                done = int(self._span[2])
+                for observer in observers if done else ():
+                    observer.take(k, self._rows[:done])
+            k += n
+            size = max(1, min(_BLOCK, 4 * size, int(n * _BLOCK_TIME / (time.perf_counter() - started))))
+
+    def _run_steps(
+        self,
+        observers: Sequence[Observer],
+        rate: float | None,
+        commands: CommandSource | None,
+        awaiting: Observer | None,
+    ) -> None:
+        """Do all steps one by one."""
         row = self.row
         waited = self._await_arming(commands, awaiting)
-        pace = None if rate is None else Pace(step / rate)
-        for k in range(last + 1):
+        pace = None if rate is None else Pace(self.scenario.time.step / rate)
+        for k in range(self.scenario.steps + 1):
             self.step(k, commands if k or not waited else None)
             for observer in observers:
                 observer.observe(k, row)
@@ -228,54 +248,39 @@ class Master:
         PlantError
             If the FMU fails.
         """
-        scenario, step, jacobi = self.scenario, self.scenario.time.step, self._jacobi
-        self.signals.row[0] = k * step
-        if self._failures:
-            self._fail_scheduled_thrusters(k)
-        if jacobi and k:
-            self._exchange_delayed(k - 1)
-        self._measure(k)
-        if self.command_handler is not None and commands is not None:
-            self._apply_commands(self.command_handler, commands.take(k))
-        self._evaluate_regions()
-        if self.command_handler is not None and self.command_handler.update(
-            float(self.signals.row[0]), float(self._given_evaluation.clearances[0])
-        ):
-            self._apply_commands(self.command_handler, ())  # changes by the next mission item
-            self._evaluate_regions()
-        if not jacobi and k % scenario.arbiter_every == 0:
-            self._arbitrate()
-        if k % scenario.control_every == 0:
-            self._control()
+        self._commands = commands
+        self._advance(self._advance_one, k, 1)
         if self._lyapunov is not None:
             self._lyapunov.write()
-        if k < scenario.steps:
-            self.actuators.write_inputs()
-            self._step_plant(step)
-        self._boundary = (k + 1) * step
 
-    # ---- the stages of a step ----
+    def _advance(self, call: BoundCall, k: int, n: int) -> None:
+        """Do `n` steps from step `k` on; raise the error of plant, law, arbiter or command that ends one early."""
+        step, span = self.scenario.time.step, self._span
+        span[0], span[1], span[2] = k, n, 0
+        self._noise.draw(1 + (k + n - 1) // self.scenario.control_every)
+        self._law.refresh()
+        self._plant.prepare_steps(step)
+        try:
+            call.call()
+        finally:
+            done = int(span[2])
+            self._plant.count_steps(done - (k + done > self.scenario.steps))
+            self._boundary = (k + done) * step
+        self._raise_errors()
+        if self.data.failed_step[0] >= 0:
+            self._plant.raise_failure()
 
-    def _fail_scheduled_thrusters(self, k: int) -> None:
-        """Fail the thrusters that are scheduled for step `k`."""
-        for failure in self.scenario.failures:
-            if k == math.ceil(failure.time / self.scenario.time.step - _ROUNDING):
-                self.actuators.fail(failure)
-
-    def _measure(self, k: int) -> None:
-        """Copy the plant's outputs into the row, and update the measured state."""
-        self._measured[:] = self._plant_measured
-        if self._sensor is not None:
-            self._sensor.measure(self.signals.row[0], k % self.scenario.control_every == 0)
+    def _raise_errors(self) -> None:
+        self._law.raise_error()
+        self._arbiter.raise_error()
+        for hook in self._hooks if self.command_handler is not None else ():
+            hook.raise_error()
 
     def measure_initial_state(self) -> None:
         """Fill the row with the initial state, which law and arbiter receive without noise; do not step the plant."""
-        self._measured[:] = self._plant_measured
-        for given, true in zip(self.state[:3], self.true_state[:3], strict=True):  # the same where sensing is exact
-            given[:] = true
-        self._evaluate_regions()
+        BoundCall(show_start, (self.model, self.data, self._plant.calls)).call()
         if self.command_handler is not None:
-            self.command_handler.update(0.0, float(self._given_evaluation.clearances[0]))
+            self.command_handler.update(0.0, self._goal_clearance)
 
     def _await_arming(self, commands: CommandSource | None, awaiting: Observer | None) -> bool:
         """Apply commands before step 0 until one arms the vehicle or the source is exhausted; return True if waited."""
@@ -291,79 +296,48 @@ class Master:
             time.sleep(_ARMING_PERIOD)
         return True
 
+    # ---- called by a step of a run with commands ----
+
+    def _take_commands(self) -> None:
+        """Apply the commands of this step, after it has measured."""
+        if self.command_handler is not None and self._commands is not None:
+            self._apply_commands(self.command_handler, self._commands.take(int(self.data.k[0])))
+
+    def _continue_mission(self) -> None:
+        """Begin the next mission item if it is time, and compute a manual command, once the regions are evaluated."""
+        handler, data = self.command_handler, self.data
+        assert handler is not None
+        if handler.update(float(data.now[0]), self._goal_clearance):
+            self._apply_commands(handler, ())  # changes by the next mission item
+            self._locate.call()
+        if data.k[0] % self.model.control_every == 0:
+            data.manual[0] = not handler.automatic_control
+            if data.manual[0]:
+                data.command[:] = handler.wrench()
+
+    @property
+    def _goal_clearance(self) -> float:
+        """Clearance of the goal at the pose that the arbiter uses [m]."""
+        evaluation = self.data.true_evaluation if self.model.exact else self.data.given_evaluation
+        return float(evaluation.clearances[0])
+
     def _apply_commands(self, command_handler: CommandHandler, commands: Sequence[Command]) -> None:
         """Apply the commands of this step, and pass changed settings to law and arbiter."""
         for command in commands:
-            command_handler.apply(command, float(self.signals.row[0]))
+            command_handler.apply(command, float(self.data.now[0]))
         if command_handler.control_regained:
-            self.law = law_of(self.scenario)
+            self._law.restart(law_of(self.scenario))
         if isinstance(self.law, CompiledLaw) and (
             command_handler.control_regained or command_handler.changed or command_handler.turned
         ):
             self.law.gains = command_handler.settings.gains
+            self._law.refresh()
             if command_handler.heading is not None:
                 self.law.set_attitude(from_axis_angle(_DOWN, command_handler.heading))
         if command_handler.changed:
-            self._arbitration.set_ramp(command_handler.settings["arbiter.ramp"])
+            memberships = self.model.inputs.memberships
+            memberships.ramps[memberships.follows] = command_handler.settings["arbiter.ramp"]
         command_handler.mark_applied()
-
-    def _evaluate_regions(self) -> None:
-        """Move the regions to the present time, and evaluate them at the arbiter's pose and at the true pose."""
-        self.environment.update_positions(self.signals.row[0], self._shifts)
-        self._arbitration.observe(self._expected)
-        if self._sensor is not None:
-            self.environment.evaluate(self._arbitration.state, self._given_evaluation)
-        self.environment.evaluate(self.true_state, self._true_evaluation)
-        self.environment.advance_goal(self._true_evaluation.clearances[0], self._goal_place)
-
-    def _arbitrate(self) -> None:
-        """Compute the criteria's weights; while the position is lost, keep the last ones."""
-        if self._position_known:
-            self._arbitration.decide(self.environment.goal, self.environment.regions)
-
-    def _exchange_delayed(self, before: int) -> None:
-        """Pass on the outputs that regions and arbiter computed from the inputs of step `before` (Jacobi)."""
-        if before % self.scenario.arbiter_every == 0:
-            self._arbitration.weigh()
-        if self._position_known:
-            self._arbitration.update(self.environment.goal, self.environment.regions)
-
-    @property
-    def _position_known(self) -> bool:
-        return self._sensor is None or bool(np.isfinite(self.state.position).all())
-
-    def _control(self) -> None:
-        """Compute the forces of the coming control period, by law or manual control, and allocate them."""
-        actuators = self.actuators
-        self._expected = NOTHING_EXPECTED
-        if self.command_handler is not None and not self.command_handler.automatic_control:
-            actuators.command[:] = self.command_handler.wrench()
-            actuators.allocate()
-            return
-        if self.navigator is not None and not self.navigator.started:  # there is no state estimate yet
-            actuators.command[:] = actuators.thrusts[:] = 0.0
-            actuators.allocate()
-            return
-        self._estimate[...] = self.law.estimate
-        law, by_wrench = self.law, self.law.output == "wrench"
-        forces = actuators.command if by_wrench else actuators.thrusts
-        law.step(self.state, self.environment.goal, self.environment.regions, self._arbitration.region_weights, forces)
-        if self._reports:
-            self._report[...] = law.report
-        if self._sensor is not None and isinstance(law, CompiledLaw):
-            self._expected = law.expected
-        if by_wrench:
-            actuators.allocate()
-        else:
-            actuators.apply_thrusts()
-
-    def _step_plant(self, step: float) -> None:
-        self.plant.step(step)
-        self._applied[:] = self._plant_applied
-        flags = self.plant.read_flags()
-        raised = flags.tobytes()
-        if raised != self._raised:
-            self._flags[...], self._raised = flags, raised
 
     def move_region(self, name: str, displacement: Array, velocity: Array) -> None:
         """Set position and velocity of a streamed region from the next step on.

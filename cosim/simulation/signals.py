@@ -28,6 +28,9 @@ class Signals:
         self.row: Array = np.zeros(len(self.columns))
         self._at = {column.name: i for i, column in enumerate(self.columns)}
 
+    def __contains__(self, name: str) -> bool:
+        return name in self._at
+
     def index(self, name: str) -> int:
         """Return the index of the column `name` in the row."""
         return self._at[name]

@@ -12,9 +12,11 @@ from controller.regions.region_set import of_attitude
 from cosim.scenario.keys import comments, unit_of_gain
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
+from cosim.simulation.signals import Array
 from cosim.ssp.c_sources import c_files, under_own_names
 from cosim.ssp.documentation import contents
-from cosim.ssp.translated import Translated, translate_loop
+from cosim.ssp.loop import Loop
+from cosim.ssp.translated import translate_controller
 from plant_fmu import quantities as q
 from plant_fmu.compiling.sources import plant_sources
 from plant_fmu.component import Component
@@ -47,15 +49,16 @@ _GAIN_UNITS = {"m2": "N/m2", "m": "N/m", "": "N", "rad": "N/rad"}
 def controller_component(scenario: Scenario) -> Component:
     """Make the component of a scenario's controller."""
     regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
-    translated = translate_loop(scenario, regions, prefixes(regions))
-    rows = tuple(_variables(scenario, regions, translated.constants))
+    loop = Loop(scenario)
+    files = translate_controller(loop, scenario, regions, prefixes(regions))
+    rows = tuple(_variables(scenario, regions, loop))
     return Component(
         name="controller",
         description=f"Law {scenario.law.name} of the scenario: {scenario.title}",
         variables=rows,
-        sources=_sources(translated),
+        sources=_sources(files),
         contents=lambda fmi: contents("Controller", _WORDS, rows, fmi),
-        constants=translated.constants,
+        constants=loop.constants | loop.memory.sizes(),
         stop_time=scenario.time.duration,
         step=scenario.time.step,
     )
@@ -73,39 +76,43 @@ def prefixes(regions: Sequence[Region]) -> list[str]:
     return found
 
 
-def _sources(translated: Translated) -> dict[str, bytes]:
+def _sources(files: Mapping[str, str]) -> dict[str, bytes]:
     plant = plant_sources()
     return {
         **c_files("cosim.ssp", "csrc/controller"),
-        **under_own_names({name: text.encode() for name, text in translated.files.items()}),
+        **under_own_names({name: text.encode() for name, text in files.items()}),
         "ticks.h": c_files("cosim.ssp", "csrc")["ticks.h"],
         **{name: plant[name] for name in ("random.c", "random.h", "elementary.c", "elementary.h")},
     }
 
 
-def _variables(scenario: Scenario, regions: Sequence[Region], indices: Mapping[str, int]) -> Iterator[Variable]:
+def _variables(scenario: Scenario, regions: Sequence[Region], loop: Loop) -> Iterator[Variable]:
     yield Variable("time", "time", "time", q.TIME, "Simulated time")
-    yield from _motion("", "input", "inputs.motion", [0.0] * 13, "The vehicle's")
+    yield from _motion("", "input", loop, loop.inputs.motion, [0.0] * 13, "The vehicle's")
     if scenario.sensing.through == "sensors":
-        yield from _samples(scenario)
+        yield from _samples(scenario, loop)
     for i, name in enumerate(scenario.criterion_names):
-        yield Variable(f"weight.{name}", "input", f"inputs.weights[{i}]", q.FRACTION, f"Weight of criterion {name}")
-    yield from _outputs(scenario, regions)
-    yield from _parameters(scenario, indices)
-    yield from _region_parameters(regions, indices)
+        yield Variable(
+            f"weight.{name}", "input", loop.member(loop.data.by_criterion, i), q.FRACTION, f"Weight of criterion {name}"
+        )
+    yield from _outputs(scenario, regions, loop)
+    yield from _parameters(scenario, loop)
+    yield from _region_parameters(regions, loop)
 
 
-def _samples(scenario: Scenario) -> Iterator[Variable]:
+def _samples(scenario: Scenario, loop: Loop) -> Iterator[Variable]:
     """Yield an input for each sensor output of the plant."""
     found = [v for v in variables(scenario.vehicle) if v.name.startswith("measured.")]
     values = [v for v in found if not v.name.startswith("measured.time.")]
-    for member, rows in (("samples", values), ("sample_times", found[len(values) :])):
+    for array, rows in ((loop.inputs.samples, values), (loop.inputs.sample_times, found[len(values) :])):
         for i, v in enumerate(rows):
             quantity = Quantity(v.quantity.unit, -1e15, 1e15)
-            yield Variable(v.name, "input", f"inputs.{member}[{i}]", quantity, v.description)
+            yield Variable(v.name, "input", loop.member(array, i), quantity, v.description)
 
 
-def _motion(prefix: str, role: Role, member: str, start: Sequence[float], whose: str) -> Iterator[Variable]:
+def _motion(
+    prefix: str, role: Role, loop: Loop, array: Array, start: Sequence[float], whose: str
+) -> Iterator[Variable]:
     where = ("north", "east", "down")
     names = [
         *((f"position.{AXES[i]}", q.LENGTH, f"position, {where[i]}, world frame NED") for i in range(3)),
@@ -116,47 +123,49 @@ def _motion(prefix: str, role: Role, member: str, start: Sequence[float], whose:
         ),
     ]
     for i, (name, quantity, description) in enumerate(names):
-        yield Variable(f"{prefix}{name}", role, f"{member}[{i}]", quantity, f"{whose} {description}", start[i])
+        yield Variable(f"{prefix}{name}", role, loop.member(array, i), quantity, f"{whose} {description}", start[i])
 
 
-def _outputs(scenario: Scenario, regions: Sequence[Region]) -> Iterator[Variable]:
-    def output(name: str, member: str, unit: str, description: str) -> Variable:
-        return Variable(name, "output", f"outputs.{member}", q.unbounded(unit), description)
+def _outputs(scenario: Scenario, regions: Sequence[Region], loop: Loop) -> Iterator[Variable]:
+    data, out = loop.data, loop.out
+
+    def output(name: str, array: Array, i: int, unit: str, description: str) -> Variable:
+        return Variable(name, "output", loop.member(array, i), q.unbounded(unit), description)
 
     if scenario.actuation.through != "thrusters":  # with thrusters, the wrench would act in addition to their forces
         for i, name in enumerate(FORCES):
             what = f"{'Force along' if i < 3 else 'Moment about'} body {AXES[i % 3]} that the law asks for"
-            yield output(f"wrench.{name}", f"wrench[{i}]", "N" if i < 3 else "N.m", what)
+            yield output(f"wrench.{name}", data.command, i, "N" if i < 3 else "N.m", what)
     else:
         for i in range(scenario.vehicle.n_thrusters):
-            yield output(f"thrust[{i + 1}]", f"thrusts[{i}]", "N", f"Commanded force of thruster {i + 1}")
+            yield output(f"thrust[{i + 1}]", out.thrusts, i, "N", f"Commanded force of thruster {i + 1}")
     for j in sorted({failure.thruster for failure in scenario.failures if not failure.stuck}):
         what = f"Part of the force of thruster {j} that is lost"
-        yield output(f"thrust_failure[{j}]", f"failures[{j - 1}]", "", what)
+        yield output(f"thrust_failure[{j}]", out.lost, j - 1, "", what)
     for sensor in sorted({outage.sensor for outage in scenario.outages}):
         what = "1 in an outage, in which no samples are given, else 0"
-        yield output(f"{sensor}.outage", f"outages[{SENSORS.index(sensor)}]", "", what)
+        yield output(f"{sensor}.outage", out.outages, SENSORS.index(sensor), "", what)
     for i, name in enumerate(scenario.criterion_names):
         what = f"Degree to which criterion {name} asks for attention"
-        yield output(f"membership.{name}", f"memberships[{i}]", "", what)
+        yield output(f"membership.{name}", data.signals.memberships, i, "", what)
     for i, signal in enumerate(scenario.rules.signals):
         unit = signal.unit if signal.unit in UNITS else ""
-        yield output(f"arbiter.{signal.name}", f"rule_inputs[{i}]", unit, f"Of the arbiter's rules: {signal.what}")
+        yield output(f"arbiter.{signal.name}", data.signals.inputs, i, unit, f"Of the arbiter's rules: {signal.what}")
     for i in range(4):
         what = f"Estimate of phi {i + 1} in (12), with which the forces were made"
-        yield output(f"estimate.phi{i + 1}", f"estimate[{i}]", "N.m" if i else "N", what)
+        yield output(f"estimate.phi{i + 1}", data.estimate, i, "N.m" if i else "N", what)
     for i, (region, prefix) in enumerate(zip(regions, prefixes(regions), strict=True)):
         what = f"g of {region.name}, above 0 where violated"
-        yield output(f"{prefix}.value", f"values[{i}]", region.shape.unit, what)
+        yield output(f"{prefix}.value", out.values, i, region.shape.unit, what)
         unit, kind = ("rad", "Angle left within") if of_attitude(region.shape) else ("m", "Distance to the surface of")
-        yield output(f"{prefix}.clearance", f"clearances[{i}]", unit, f"{kind} {region.name}, below 0 where violated")
+        yield output(f"{prefix}.clearance", out.clearances, i, unit, f"{kind} {region.name}, below 0 where violated")
 
 
 def _parameter(name: str, member: str, quantity: Quantity, description: str, start: float) -> Variable:
     return Variable(name, "parameter", member, quantity, description, float(start))
 
 
-def _parameters(scenario: Scenario, indices: Mapping[str, int]) -> Iterator[Variable]:
+def _parameters(scenario: Scenario, loop: Loop) -> Iterator[Variable]:
     law, said = law_of(scenario), comments(scenario.law.name, scenario.vehicle)
     for i, (name, start) in enumerate(law.gains._asdict().items()):
         unit = unit_of_gain(law.name, name).replace(" ", ".")
@@ -165,18 +174,18 @@ def _parameters(scenario: Scenario, indices: Mapping[str, int]) -> Iterator[Vari
         maximum = next((x for x in (_MOST, 1.0) if _accepts(law, name, x)), max(float(start), minimum))
         quantity = Quantity(unit if unit in UNITS else "", minimum, maximum, is_gain=True)
         description = _without_unit(said.get(f"law.gains.{name}", "")) or f"Gain {name} of the law"
-        yield _parameter(f"law.gains.{name}", f"parameters.gains[{i}]", quantity, description, start)
+        yield _parameter(f"law.gains.{name}", f"gains[{i}]", quantity, description, start)
     for i, start in enumerate(scenario.law.desired_quaternion):
         description = f"Attitude to be kept, as unit quaternion from body to world, part {i}"
-        member = f"numbers[{indices['AT_DESIRED'] + i}]"
+        member = loop.member(loop.law.desired_quaternion, i)
         yield _parameter(f"law.desired_quaternion.e{i}", member, q.QUATERNION, description, start)
     description = "Width over which a membership falls from 1 to 0 outside a region [m], rad for regions of attitude"
     ramp = Quantity("", 0.0, 1e6)
-    yield _parameter("arbiter.ramp", "parameters.ramp", ramp, description, scenario.arbiter.ramp)
-    yield _parameter("time.control", "parameters.period", _PERIOD, "Period of the law", scenario.time.control)
+    yield _parameter("arbiter.ramp", loop.member(loop.ramp), ramp, description, scenario.arbiter.ramp)
+    yield _parameter("time.control", loop.member(loop.period), _PERIOD, "Period of the law", scenario.time.control)
     initial = scenario.initial
     numbers = [*initial.position, *initial.quaternion, *initial.velocity]
-    yield from _motion("initial.", "parameter", "parameters.start", numbers, "At the start:")
+    yield from _motion("initial.", "parameter", loop, loop.inputs.start, numbers, "At the start:")
 
 
 def _accepts(law: CompiledLaw, gain: str, value: float) -> bool:
@@ -194,23 +203,18 @@ def _without_unit(comment: str) -> str:
     return words[:1].upper() + words[1:]
 
 
-def _region_parameters(regions: Sequence[Region], indices: Mapping[str, int]) -> Iterator[Variable]:
-    number = 0
+def _region_parameters(regions: Sequence[Region], loop: Loop) -> Iterator[Variable]:
     for i, (region, prefix) in enumerate(zip(regions, prefixes(regions), strict=True)):
+        packed, k = (loop.data.regions, i - 1) if i else (loop.data.goal, 0)
         if i:
             quantity = Quantity(_GAIN_UNITS[region.shape.unit], 0.0, _MOST)
-            member = f"numbers[{indices['AT_REGION_GAINS'] + i - 1}]"
+            member = loop.member(packed.gains, k)
             yield _parameter(f"{prefix}.gain", member, quantity, f"Gain of {region.name}", region.gain)
-        first = indices["AT_REGION_VELOCITIES"] + 3 * (i - 1) if i else indices["AT_GOAL_VELOCITIES"]
         for j, axis in enumerate(AXES):
             description = f"How fast {region.name} moves, {('north', 'east', 'down')[j]}"
-            yield _parameter(
-                f"{prefix}.velocity.{axis}", f"numbers[{first + j}]", q.SPEED, description, region.velocity[j]
-            )
-        first = indices["AT_REGION_NUMBERS"] if i else indices["AT_GOAL_NUMBERS"]
-        for (name, unit, low, high, _), start in zip(region.shape.numbers(), region.shape.packed(), strict=True):
+            member = loop.member(packed.velocities[k], j)
+            yield _parameter(f"{prefix}.velocity.{axis}", member, q.SPEED, description, region.velocity[j])
+        numbers, first = zip(region.shape.numbers(), region.shape.packed(), strict=True), int(packed.offsets[k])
+        for j, ((name, unit, low, high, _), start) in enumerate(numbers, first):
             description, quantity = f"Of the shape of {region.name}, where it is at time 0", Quantity(unit, low, high)
-            yield _parameter(f"{prefix}.shape.{name}", f"numbers[{first + number}]", quantity, description, start)
-            number += 1
-        if not i:
-            number = 0
+            yield _parameter(f"{prefix}.shape.{name}", loop.member(packed.numbers, j), quantity, description, start)

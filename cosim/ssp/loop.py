@@ -1,103 +1,95 @@
-"""The loop of a scenario in the controller's FMU: its functions in Python, and their arrays."""
-
-# The functions are those of the master and the fused loop; `cosim.ssp.translated` translates them to C.
+"""A scenario's controller in its FMU: model and data of its step, and the places of their arrays."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from controller import CompiledLaw, VehicleState
-from controller.allocation import allocate
-from controller.law import NOTHING_EXPECTED
-from controller.navigation.estimate import empty_memory
-from controller.navigation.measurements import empty_measurements
-from controller.navigation.navigator import navigate
-from controller.regions.region_set import PackedRegions, clearance_of_pose
-from controller.stack_array import zeros
-from cosim.batch.flight_config import Allocator, FlightConfig
-from cosim.batch.fused import configure_flight, failure_stages
+from controller import CompiledLaw
+from controller.navigation.measurements import N_SENSORS, N_VALUES, empty_measurements
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.arbiter_inputs import (
-    ArbiterSignals,
-    PackedInputs,
-    compute_inputs,
-    empty_signals,
-    empty_state,
-    write_arbiter_state,
-)
-from cosim.simulation.environment import RegionEvaluation, RegionPlaces, evaluate_places
-from cosim.simulation.signals import Array
-
-
-def decide(
-    places: RegionPlaces,
-    measured: VehicleState,
-    expected: Array,
-    state: VehicleState,
-    evaluation: RegionEvaluation,
-    inputs: PackedInputs,
-    now: Array,
-    signals: ArbiterSignals,
-) -> None:
-    """Evaluate the regions at the arbiter's pose, and compute the inputs of its rules; expected (6,), now (1,) [s]."""
-    write_arbiter_state(measured, expected, state)
-    evaluate_places(places, state, evaluation)
-    compute_inputs(inputs, places.goal, places.regions, state, now, evaluation.clearances[1:], signals)
-
-
-def allocate_wrench(allocator: Allocator, stage: Array, wrench: Array, forces: Array) -> None:
-    """Allocate a wrench [N, N m] to thruster forces [N] while `stage` thrusters are reported as failed."""
-    k = int(stage[0])
-    allocate(allocator.inverse[k], allocator.lower[k], allocator.upper[k], allocator.direction, wrench, forces)
-
-
-def find_goal(goal: PackedRegions, position: Array, quaternion: Array, clearance: Array) -> None:
-    """Write the clearance of the goal at the true pose, shape (1,) [m]."""
-    clearance[0] = clearance_of_pose(goal, 0, position, quaternion, zeros(3))
+from cosim.simulation.make_step import exchanged_variables, make_data, make_model
+from cosim.simulation.signals import Array, Column, Signals
+from cosim.ssp.controller_step import ControllerInputs, ControllerOutputs
+from cosim.ssp.memory import Memory, arrays_of
+from cosim.step.step_model import Integers, LawOutputs, StepData, StepModel
 
 
 class Loop:
-    """A scenario's loop without plant and arbiter."""
+    """The arguments of `step_controller` for a scenario, placed in the model of an FMU."""
 
     def __init__(self, scenario: Scenario) -> None:
-        m, n = scenario.vehicle.n_thrusters, len(scenario.regions)
-        self.through_thrusters = scenario.actuation.through == "thrusters"
-        self.setup: FlightConfig = configure_flight(scenario, m if self.through_thrusters else 0)
         self.law: CompiledLaw = law_of(scenario)
-        self.allocates = self.through_thrusters and self.law.output == "wrench"
-        self.state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), np.ones(m), np.zeros(12))
-        self.arbiter_state, self.expected = empty_state(), NOTHING_EXPECTED.copy()
-        self.evaluation = RegionEvaluation(np.zeros(n + 1), np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1))
-        self.signals = empty_signals(self.setup.inputs, n, len(scenario.criteria))
-        self.now, self.stage, self.goal_clearance = np.zeros(1), np.zeros(1), np.zeros(1)
-        self.weights, self.wrench, self.thrusts = np.zeros(n), np.zeros(6), np.zeros(m)
-        self.true_position, self.true_quaternion = np.zeros(3), np.zeros(4)
-        self.measurements, self.navigation = empty_measurements(), empty_memory()
-        self.allocator = failure_stages(scenario, self.setup)
+        nothing: Integers = np.empty(0, np.int64)
+        self.model: StepModel = make_model(scenario)._replace(
+            full=True, jacobi=True, moving=True, moving_regions=nothing, control_every=1, arbiter_every=1
+        )  # the importer sets velocities, and the C code counts the law's period
+        inputs, outputs = exchanged_variables(scenario)
+        signals, noise = Signals([Column("time", "s", "Simulated time")]), np.zeros((1, 6))
+        law = LawOutputs(self.law.estimate, self.law.expected, self.law.report)
+        data = make_data(scenario, self.model, law, signals, inputs, outputs, noise)
+        self.data: StepData = data._replace(measurements=empty_measurements())
+        n_values, n_sensors = (N_VALUES, N_SENSORS) if self.model.through_sensors else (0, 0)
+        self.inputs = ControllerInputs(
+            motion=np.zeros(13), start=np.zeros(13), samples=np.zeros(n_values), sample_times=np.zeros(n_sensors),
+            end=np.zeros(1), controls=np.zeros(1, np.int64),
+        )  # fmt: skip
+        m, n = self.data.thrusts.size, 1 + len(scenario.regions)
+        self.out = ControllerOutputs(
+            thrusts=np.zeros(m), lost=np.zeros(m), outages=np.zeros(N_SENSORS), values=np.zeros(n),
+            clearances=np.zeros(n), failures=np.zeros(1, np.int64), changes=np.zeros(1, np.int64),
+        )  # fmt: skip
+        self.period: Array = self.law.memory.period
+        self.ramp = np.array([scenario.arbiter.ramp])
+        self.memory = Memory()
+        self.constants = self._place_arrays()
 
-    @property
-    def functions(self) -> dict[str, tuple[Any, tuple[Any, ...]]]:
-        """Functions that a step calls, with their arguments, by name in C."""
-        goal, regions = self.setup.goal, self.setup.regions
-        forces = self.wrench if self.law.output == "wrench" else self.thrusts
-        calls: dict[str, tuple[Any, tuple[Any, ...]]] = {
-            "decide": (decide, (
-                RegionPlaces(goal, regions), self.state, self.expected, self.arbiter_state, self.evaluation,
-                self.setup.inputs, self.now, self.signals,
-            )),
-            "steer": (type(self.law).function, (
-                self.state, goal, regions, self.weights, self.law.gains, self.law.memory, forces,
-            )),
-        }  # fmt: skip
-        if self.setup.through_sensors:
-            sensors = self.setup.sensors
-            given = (self.measurements, self.now, sensors, self.navigation, self.state)
-            calls["navigate"] = navigate, given
-        if self.allocates:
-            calls["allocate"] = allocate_wrench, (self.allocator, self.stage, self.wrench, self.thrusts)
-        if self.setup.goal_places.size:
-            calls["find_goal"] = find_goal, (goal, self.true_position, self.true_quaternion, self.goal_clearance)
-        return calls
+    def member(self, array: Array, i: int = 0) -> str:
+        """Return the member of the FMU's model that holds an item of an array."""
+        return f"numbers[{self.memory.keep(array) + i}]"
+
+    def _place_arrays(self) -> dict[str, int]:
+        """Place what the importer sets, then outputs, then other variables; return the constants of the C header."""
+        memory, model, data, given, out = self.memory, self.model, self.data, self.inputs, self.out
+        for array in (
+            data.goal.numbers, data.goal.velocities, data.regions.numbers, data.regions.gains, data.regions.velocities,
+            self.law.desired_quaternion, self.period, self.ramp,
+            given.start, given.motion, given.samples, given.sample_times, data.by_criterion,
+        ):  # fmt: skip
+            memory.keep(array)
+        given_size = memory.size
+        for array in (
+            data.command, out.thrusts, out.lost, out.outages, data.signals.memberships, data.signals.inputs,
+            data.estimate, out.values, out.clearances,
+        ):  # fmt: skip
+            memory.keep(array)
+        output_size = memory.size - given_size
+        memory.keep(model.inputs.memberships.ramps)
+        for array in (data.goal.shifts, data.regions.shifts, *arrays_of(self.law.memory)):
+            memory.keep(array)
+        memory.fix(model, data.goal, data.regions, data.allocator, data.k, data.manual, data.failed_step)
+        if not model.through_sensors:
+            memory.fix(data.navigation, data.measurements)
+        return {
+            "N_GIVEN": given_size,
+            "N_OUTPUTS": output_size,
+            "AT_PERIOD": memory.keep(self.period),
+            "AT_RAMP": memory.keep(self.ramp),
+            "AT_NOW": memory.keep(data.now),
+            "AT_END": memory.keep(given.end),
+            "AT_CONTROLS": memory.keep(given.controls),
+            "AT_NOISE": memory.keep(data.noise),
+            "N_GAINS": max(len(self.law.gains), 1),
+        }
+
+    def counters(self) -> dict[int, int]:
+        """Return the largest valid number of each counter, by its index in the model's integers."""
+        model, data, out = self.model, self.data, self.out
+        counters = (
+            (data.stage, len(data.allocator.lower) - 1),
+            (data.goal_index, len(model.goal_places)),
+            (data.failures, model.failed.size),
+            (out.failures, model.failed.size),
+            (out.changes, model.outage_steps.size),
+        )
+        return {self.memory.keep(counter): most for counter, most in counters}

@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, NoReturn, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,6 +184,22 @@ class CoSimulationInstance:
             raise PlantError(f"t = {self.time:.6g} s: {self._failure_message()}")
         if self._ended.value:
             raise PlantError(f"t = {self.time:.6g} s: the FMU requests the end of the simulation")
+
+    def prepare_steps(self, step: float) -> None:
+        """Prepare steps of `step` seconds by the functions of `native_channels`."""
+        self._require_initialized("cannot step")
+        if step != self._step:
+            self._change_step(step)
+
+    def count_steps(self, n: int) -> None:
+        """Advance the clock by `n` steps, which were made by the functions of `native_channels`."""
+        self._count += n
+        self.time = self._start + self._count * self._step
+
+    def raise_failure(self, ended: bool = False) -> NoReturn:
+        """Raise the error of a step that the functions of `native_channels` failed in, or after which the FMU ends."""
+        reason = "the FMU requests the end of the simulation" if ended else self._failure_message()
+        raise PlantError(f"t = {self.time:.6g} s: {reason}")
 
     def _change_step(self, step: float) -> None:
         """Prepare steps of another length than before."""

@@ -12,6 +12,9 @@ from plant_fmu.errors import PlantError
 from plant_fmu.running.channels import DOUBLES
 from plant_fmu.running.instance import Instance
 
+_NO_REFERENCES = np.empty(0, np.uint32)
+_NO_FLAGS = np.empty(0, np.bool_)
+
 
 class Native(NamedTuple):
     """An FMI 3.0 instance for callers in C: addresses of C functions, and the buffers that they read and fill."""
@@ -27,9 +30,13 @@ class Native(NamedTuple):
     output_references: NDArray[np.uint32]  # (m,) value references of the outputs
     outputs: NDArray[np.float64]  # (m,) values filled in by get_values
     results: NDArray[np.int64]  # (4,) results of fmi3DoStep by pointer, each at the first byte of its element
+    get_flags: int = 0  # fmi3GetBoolean
+    flag_references: NDArray[np.uint32] = _NO_REFERENCES  # (f,) value references of the Boolean outputs
+    flags: NDArray[np.bool_] = _NO_FLAGS  # (f,) values filled in by get_flags
 
 
-def native_calls(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Native:
+def native_calls(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str, ...],
+                 flags: tuple[str, ...] = ()) -> Native:  # fmt: skip
     """Return the addresses of an instance's C functions, with buffers."""
     if instance.fmi != 3:
         raise PlantError(f"{instance.path}: FMI {instance.fmi}.0, expected 3.0 for compiled stepping")
@@ -48,12 +55,15 @@ def native_calls(instance: Instance, inputs: tuple[str, ...], outputs: tuple[str
         output_references=_references(instance, outputs),
         outputs=np.zeros(len(outputs)),
         results=np.zeros(4, np.int64),
+        get_flags=address("fmi3GetBoolean"),
+        flag_references=_references(instance, flags, ("Boolean",)),
+        flags=np.zeros(len(flags), np.bool_),
     )
 
 
-def _references(instance: Instance, names: tuple[str, ...]) -> NDArray[np.uint32]:
+def _references(instance: Instance, names: tuple[str, ...], types: tuple[str, ...] = DOUBLES) -> NDArray[np.uint32]:
     for name in names:
         variable = instance.variables.get(name)
-        if variable is None or variable.type not in DOUBLES or variable.dimensions:
-            raise PlantError(f"FMU variable {name!r} is no real scalar of {instance.path}")
+        if variable is None or variable.type not in types or variable.dimensions:
+            raise PlantError(f"FMU variable {name!r} is no scalar of type {' or '.join(types)} of {instance.path}")
     return np.array([instance.variables[name].valueReference for name in names], dtype=np.uint32)

@@ -191,6 +191,22 @@ class Plant(CoSimulationInstance):
         self._require_initialized("cannot be stepped")
         return native_calls(self._instance, tuple(inputs), tuple(outputs))
 
+    def native_channels(self) -> Native:
+        """Return the C functions of `native` for all channels, with the plant's own buffers.
+
+        Report the steps that were made with them by `count_steps`, or their failure by `raise_failure`.
+
+        Raises
+        ------
+        PlantError
+            As for `native`.
+        """
+        self._require_initialized("cannot be stepped")
+        channels = self.inputs, self.outputs, self.flags
+        native = native_calls(self._instance, *(channel.names for channel in channels))
+        inputs, outputs, flags = (channel.values for channel in channels)
+        return native._replace(inputs=inputs, outputs=outputs, flags=flags)
+
     def _real(self, name: str) -> int:
         """Return the value reference of a variable that has derivatives."""
         variable = self._variable(name)

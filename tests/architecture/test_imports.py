@@ -19,7 +19,20 @@ MAY_IMPORT = {
 
 # the rooms of cosim from the ground up: each imports rooms above it in this list, and none below
 FLOORS = (
-    *("io", "scenario", "simulation", "results", "batch", "ssp", "replay", "mavlink", "report", "export", "live"),
+    *(
+        "io",
+        "scenario",
+        "step",
+        "simulation",
+        "results",
+        "batch",
+        "ssp",
+        "replay",
+        "mavlink",
+        "report",
+        "export",
+        "live",
+    ),
     *("precheck", "run", "logs", "companion", "identification", "sitl", "campaigns", "command_line"),
 )
 MOST_MODULES = 20  # in one room

@@ -153,11 +153,11 @@ def test_failed_write_keeps_the_old_file(tmp_path):
 def test_code_cached_in_a_writable_folder_is_not_loaded(tmp_path, monkeypatch):
     folder = tmp_path / "kept"
     folder.mkdir(mode=0o755)
-    assert library._is_trusted(folder)
+    assert library.is_trusted(folder)
     folder.chmod(0o777)
     assert stat.S_IMODE(folder.stat().st_mode) == 0o777
-    assert not library._is_trusted(folder)
+    assert not library.is_trusted(folder)
     folder.chmod(0o755)
     monkeypatch.setattr(os, "geteuid", lambda: folder.stat().st_uid + 1)
-    assert library._is_trusted(folder) == (os.stat(library.__file__).st_uid == folder.stat().st_uid)
-    assert not library._is_trusted(tmp_path / "none yet")
+    assert library.is_trusted(folder) == (os.stat(library.__file__).st_uid == folder.stat().st_uid)
+    assert not library.is_trusted(tmp_path / "none yet")

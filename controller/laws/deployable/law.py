@@ -355,6 +355,8 @@ class DeployableLaw(CompiledLaw):
         expected: Array = self.memory.expected
         return expected
 
-    def set_attitude(self, quaternion: Array) -> None:
-        """Set the preferred attitude, a unit `quaternion`, from the next step on."""
-        self.memory.attitude.preferred[:] = validate_quaternion(quaternion)
+    @property
+    def desired_quaternion(self) -> Array:
+        """Preferred attitude, a unit quaternion from body to world, shape (4,)."""
+        preferred: Array = self.memory.attitude.preferred
+        return preferred

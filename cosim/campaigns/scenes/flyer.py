@@ -6,17 +6,16 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from cosim.batch.c_calls import Clock
-from cosim.batch.flight_config import FlightMetrics
-from cosim.batch.fused import fly_scenario
+from cosim.batch.fused import Trace, fly_scenario
 from cosim.campaigns.scenes.as_scenario import VEHICLE, scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import law_named
 from cosim.campaigns.scenes.scenario_scene import AnyScene
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.vehicle_model import vehicle_model
+from cosim.step.plant_calls import Clock
+from cosim.step.score import FlightMetrics
 from plant_fmu import Plant
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
@@ -83,7 +82,7 @@ class SceneFlyer:
         self._clock = Clock()
         self._plants = {VEHICLE: Plant(vehicle)}
 
-    def fly(self, scene: AnyScene, trace: bool = False) -> tuple[Score, NDArray[np.float64]]:
+    def fly(self, scene: AnyScene, trace: bool = False) -> tuple[Score, Trace]:
         """Fly one scene.
 
         Parameters
@@ -91,12 +90,12 @@ class SceneFlyer:
         scene : Scene or ScenarioScene
             Scene to fly.
         trace : bool
-            True to return a trace, see `cosim.batch.flight_config`.
+            True to return a trace.
 
         Returns
         -------
-        Score, ndarray
-            Score of the flight; trace, shape (0, 0) without one.
+        Score, Trace
+            Score of the flight, and its signals by name, such as ``trace["position.x"]``.
 
         Raises
         ------
@@ -107,16 +106,16 @@ class SceneFlyer:
         """
         scenario = scene_scenario(scene, self.law, self.gains, self.conditions)
         plant = self._plant(scenario.vehicle)
-        metrics, _, _, _, rows = fly_scenario(plant, scenario, trace, self._clock.numbers)
-        return self._score(metrics, scenario), rows
+        metrics, _, _, signals = fly_scenario(plant, scenario, trace, self._clock.numbers)
+        return self._score(metrics, scenario), signals
 
     def _plant(self, vehicle: Vehicle) -> Plant:
         if vehicle.name not in self._plants:
             self._plants[vehicle.name] = Plant(vehicle)
         return self._plants[vehicle.name]
 
-    def _score(self, metrics: FlightMetrics, scenario: Scenario) -> Score:
-        inside, since, step = metrics.inside and metrics.failed_step < 0, metrics.last_entered, scenario.time.step
+    def _score(self, metrics: FlightMetrics[float], scenario: Scenario) -> Score:
+        inside, since, step = metrics.inside > 0.0 and metrics.failed_step < 0, metrics.last_entered, scenario.time.step
         return Score(
             reached=inside and scenario.steps - since >= math.ceil(self.conditions.settled / step - _ROUNDING),
             reach_time=since * step if inside else math.inf,

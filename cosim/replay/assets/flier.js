@@ -1,16 +1,12 @@
 // Web worker that runs the scenario's WebAssembly: it sets the inputs, simulates, and returns the results.
 
-const ARRAYS = { trace: "trace", reasons: "reasons", rules: "strengths" }; // results, and the functions that have them
 let flight = null; // exports of the module
 
 /** Write numbers into an array of the module: [[index, value], ...]. */
 function put(Type, address, numbers) {
   const array = new Type(flight.memory.buffer, address);
-  for (const [place, value] of numbers) array[place] = value;
+  for (const [index, value] of numbers) array[index] = value;
 }
-
-/** Return a copy of `count` numbers at an address of the module. */
-const copied = (address, count) => new Float64Array(flight.memory.buffer, address, count).slice();
 
 /** Return the last message of the plant. */
 function lastMessage() {
@@ -24,18 +20,22 @@ function check(ok) {
 }
 
 /** Simulate one flight and return its results. */
-function simulate({ numbers, integers, gains, starts, noise, sizes, metrics: [first, count] }) {
+function simulate({ numbers, integers, gains, starts, noise, metrics, size }) {
   check(flight.begin());
   put(Float64Array, flight.numbers(), numbers);
-  put(BigInt64Array, flight.integers(), integers.map(([place, value]) => [place, BigInt(value)]));
+  put(BigInt64Array, flight.integers(), integers.map(([index, value]) => [index, BigInt(value)]));
   put(Float64Array, flight.gains(), gains);
   for (const [reference, value] of starts) check(flight.set_start(reference, value));
   const began = performance.now();
   check(flight.fly(...noise));
   const took = performance.now() - began;
-  const result = { took, message: lastMessage(), metrics: copied(flight.numbers() + 8 * first, count) };
-  for (const [name, size] of Object.entries(sizes)) result[name] = copied(flight[ARRAYS[name]](), size);
-  return result;
+  const numbersNow = new Float64Array(flight.memory.buffer, flight.numbers());
+  return {
+    took,
+    message: lastMessage(),
+    metrics: Object.fromEntries(Object.entries(metrics).map(([name, index]) => [name, numbersNow[index]])),
+    rows: new Float64Array(flight.memory.buffer, flight.rows(), size).slice(),
+  };
 }
 
 self.onmessage = async ({ data }) => {
@@ -46,7 +46,7 @@ self.onmessage = async ({ data }) => {
       self.postMessage({ ready: true });
     } else {
       const result = simulate(data);
-      self.postMessage(result, Object.keys(ARRAYS).map((name) => result[name].buffer));
+      self.postMessage(result, [result.rows.buffer]);
     }
   } catch (error) {
     self.postMessage({ refused: error.message || "the flight was refused" });

@@ -2,8 +2,7 @@
 
 /** Return the header fields that a recorded run has, for a simulated one: summary, verdict, events, status. */
 function outcomeOf(data, result, run, failure) {
-  const [firstInside, lastEntered, inside] = result.metrics;
-  const refused = result.metrics[12];
+  const { first_inside: firstInside, last_entered: lastEntered, inside, failed_step: refused } = result.metrics;
   const end = refused >= 0 ? refused : (run.end - run.start) / data.step;
   const settled = inside > 0 && (end - lastEntered) * data.step >= data.settled_for;
   const clearances = run.header.regions.slice(1).map(({ name }) => {
@@ -20,7 +19,7 @@ function outcomeOf(data, result, run, failure) {
 
 function verdictOf({ metrics, message }, run, { reach_time: reach, settle_time: settled, min_clearance: clearances }) {
   const [goal, ...regions] = run.header.regions;
-  const [goals, goalIndex, closest] = [goal.places?.length ?? 1, run.goalPlace(run.end), -metrics[5]];
+  const [goals, goalIndex, closest] = [goal.places?.length ?? 1, run.goalPlace(run.end), -metrics.goal_clearance];
   const unknown = "how near it came is not recorded";
   const near = Number.isFinite(closest) ? `it came within ${decimals(closest, 2)} m of it` : unknown;
   const entered = `The vehicle entered the goal region at ${decimals(reach, 2)} s`;
@@ -35,7 +34,7 @@ function verdictOf({ metrics, message }, run, { reach_time: reach, settle_time: 
   });
   const regionText = broken.length ? `violated ${broken.join(", ")}` : "kept every region";
   const stopped = ` The flight ended before its time: ${message || "the plant refused a step"}.`;
-  return `${words}; it ${regionText}.${metrics[12] >= 0 ? stopped : ""}`;
+  return `${words}; it ${regionText}.${metrics.failed_step >= 0 ? stopped : ""}`;
 }
 
 function eventsOf(run, { reach_time: reach }, failure) {

@@ -40,7 +40,7 @@ class WhatIf {
       if (!by[axis]) return;
       const values = keys.map((key) => this.value(key));
       // move both ends of a cylinder by exactly the same step, so that its length stays
-      const along = this.flight.slots.get(keys[0])?.places[0][0] === "middle" && values[0] !== values[1];
+      const along = this.flight.slots.get(keys[0])?.target === "middle" && values[0] !== values[1];
       const step = Math.round(1024 * by[axis]) / 1024;
       const shifted = (value) => (along ? value + step : Number((value + by[axis]).toFixed(4)));
       keys.forEach((key, i) => this._put(key, shifted(values[i])));

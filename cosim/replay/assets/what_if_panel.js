@@ -86,7 +86,7 @@ class WhatIfPanel extends FieldPanel {
     if (!failures) return [];
     let time = Number((0.25 * whatIf.recorded.end).toFixed(1));
     const apply = () => whatIf.fail(choice.value === "0" ? null : { thruster: Number(choice.value), time });
-    const options = failures.limits[0].map((_, i) => [i + 1, `thruster ${i + 1}`]);
+    const options = Array.from({ length: failures.thrusters }, (_, i) => [i + 1, `thruster ${i + 1}`]);
     const now = () => whatIf.failure?.thruster ?? 0;
     const choice = this._choice("thruster that fails", [[0, "none"], ...options], now, apply);
     const changed = (value) => {

@@ -1,19 +1,15 @@
 """The numbers of a scenario that a page may change, and where the WebAssembly of its flight keeps them."""
 
-# Each key is tried: the arrays in which its new number appears unchanged are those that hold it. A key whose
-# number is only used to compute others is not offered: the page writes numbers, and computes none from them.
+# Only keys whose numbers the flight uses as they are, and positions, are offered.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
-from numpy.typing import NDArray
 
 from controller import ControllerError
 from controller.regions.region_set import shape_entry
+from controller.regions.shape import Shape
 from cosim.errors import ScenarioError
 from cosim.replay.interactive.flight import Flight
 from cosim.scenario.changes import value_at, with_values
@@ -21,19 +17,15 @@ from cosim.scenario.key_names import PARAMETERS, key_name
 from cosim.scenario.scenario import Scenario, validate_scenario
 from cosim.ssp.memory import Memory
 from plant_fmu import PlantFmuError
-from plant_fmu.variables import variables
 
-CURRENT = tuple(f"plant.current.{axis}" for axis in range(3))
 BUOYANCY = f"{PARAMETERS}buoyancy"
-NOISE = ("sensing.position_noise", "sensing.velocity_noise")
-# keys of shapes that hold a position, a list of positions, or a depth
-_POINTS = ("center", "feature", "point", "start", "end")
-_LISTS = ("points", "corners")
-_DEPTHS = ("top", "bottom", "depth")
-# tried numbers differ from the scenario's by the first, and these differences from each other by the second
-_STEP, _APART = 0.0037291, 1.7e-5
-# m, by which both ends of a cylinder are moved together along each axis: these keep its length to the last bit
-_TOGETHER = (2.0**-8, 2.0**-9, 2.0**-10)
+_STARTS = {**{f"plant.current.{i}": f"current.{axis}" for i, axis in enumerate("xyz")}, BUOYANCY: "buoyancy"}
+_NOISE = ("sensing.position_noise", "sensing.velocity_noise")
+_AXES = {"x": 0, "y": 1, "z": 2, "north": 0, "east": 1}
+_POINTS = ("center", "feature", "point", "middle", "corner")  # packed numbers that are a position
+_DEPTHS = ("top", "bottom", "depth")  # packed numbers that are a depth
+
+Axes = tuple[tuple[str, ...], ...]  # keys that move a region along each axis
 
 
 @dataclass(frozen=True)
@@ -44,37 +36,41 @@ class Slot:
     words: str  # description and unit for the page
     unit: str  # description and unit for the page
     value: float  # value in the scenario
-    # places: ``number`` or ``gain`` with a place in the module's arrays, ``start`` with a value reference of the
-    # plant, ``noise`` with 0 or 1; ``middle`` with the place of the mean of a cylinder's two ends; ``shift`` with the
-    # place of the difference to the goal's center
-    places: tuple[tuple[str, int], ...]
+    # where the number goes: ``numbers`` or ``gains`` of the module, ``starts`` of the plant, or ``noise``; ``middle``
+    # of a cylinder's two ends, ``shift`` from the goal's center, which are ``numbers`` that the page computes
+    target: str
+    offsets: tuple[int, ...]  # indices there, or value references of the plant
 
 
-def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[tuple[tuple[str, ...], ...] | None]]:
-    """Return the numbers that a page may change."""
-    scenario, table = flight.scenario, flight.scenario.table
-    noise = NOISE if flight.exact or (flight.noisy and not scenario.sensing.exact) else ()
-    numbers = [*CURRENT, BUOYANCY, *noise, *(f"law.gains.{name}" for name in scenario.law.gains._fields)]
-    shapes = [("goal", table["goal"]), *((f"regions.{i}.shape", r["shape"]) for i, r in enumerate(table["regions"]))]
-    moving = [_moving_keys(path, shape) for path, shape in shapes]
-    moving_keys = [key for axes in moving for keys in axes for key in keys]
-    slots_of_keys = dict(_search(flight, memory, [*numbers, *moving_keys]))
-    for path, shape in shapes:
-        if {"start", "end"} <= shape.keys():
-            slots_of_keys |= _ends_by_middle(flight, memory, path)
-    then = [f"goal.then.{i}.{axis}" for i in range(len(scenario.goal_then)) for axis in range(3)]
-    first = memory.keep(flight.setup.goal_places)
-    slots_of_keys |= {key: (("shift", first + i),) for i, key in enumerate(then)}
-    moves = [
-        axes if any(axes) and all(key in slots_of_keys for keys in axes for key in keys) else None for axes in moving
-    ]
-    if then and shape_entry(scenario.goal).center is None:
-        moves[0] = None  # the page does not know where its center would be
-    offered = {key for axes in moves if axes for keys in axes for key in keys}.union(numbers, then)
+def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | None]]:
+    """Return the numbers that a page may change, and for each region the keys that move it; None if none do."""
+    scenario, data, model = flight.scenario, flight.data, flight.model
+    targets: dict[str, tuple[str, tuple[int, ...]]] = {
+        key: ("starts", (flight.reference(name),)) for key, name in _STARTS.items()
+    }
+    if flight.noise.size:
+        targets |= {key: ("noise", (i,)) for i, key in enumerate(_NOISE)}
+    targets |= {f"law.gains.{name}": ("gains", (i,)) for i, name in enumerate(scenario.law.gains._fields)}
+    moves: list[Axes | None] = []
+    has_center = shape_entry(scenario.goal).center is not None
+    shapes = [("goal", scenario.goal, data.goal, 0)]
+    shapes += [(f"regions.{i}.shape", r.region.shape, data.regions, i) for i, r in enumerate(scenario.regions)]
+    for path, shape, packed, i in shapes:
+        positions, first = list(_positions(path, shape)), memory.keep(packed.numbers) + int(packed.offsets[i])
+        # of a goal without a point for its center, the page does not know the shifts to its next positions
+        if not positions or (path == "goal" and scenario.goal_then and not has_center):
+            moves.append(None)
+            continue
+        moves.append(tuple(tuple(key for _, a, keys in positions if a == axis for key in keys) for axis in range(3)))
+        for index, axis, keys in positions:
+            of_center = (memory.keep(model.goal_center) + axis,) if path == "goal" and has_center else ()
+            targets |= dict.fromkeys(keys, ("numbers" if len(keys) == 1 else "middle", (first + index, *of_center)))
+    for i in range(model.goal_places.size):
+        targets[f"goal.then.{i // 3}.{i % 3}"] = "shift", (memory.keep(model.goal_places) + i,)
     slots = []
-    for key in (key for key in slots_of_keys if key in offered):
-        name = key_name(key, table, scenario.vehicle)
-        slots.append(Slot(key, name.words, name.unit, _value(scenario, key), slots_of_keys[key]))
+    for key, target in targets.items():
+        name, value = key_name(key, scenario.table, scenario.vehicle), value_at(scenario.table, key, scenario.vehicle)
+        slots.append(Slot(key, name.words, name.unit, float(value), *target))
     return slots, moves
 
 
@@ -86,107 +82,19 @@ def changed_scenario(scenario: Scenario, changes: Mapping[str, float]) -> Scenar
         raise ScenarioError(str(error)) from error
 
 
-def _moving_keys(path: str, shape: dict[str, Any]) -> tuple[tuple[str, ...], ...]:
-    axes: tuple[list[str], ...] = ([], [], [])
-    for name, value in shape.items():
-        if name in _POINTS and isinstance(value, list | tuple):
-            vectors = [(f"{path}.{name}", value)]
-        elif name in _LISTS:
-            vectors = [(f"{path}.{name}.{i}", vector) for i, vector in enumerate(value)]
-        elif name in _DEPTHS:
-            axes[2].append(f"{path}.{name}")
-            continue
-        else:
-            continue
-        for at, vector in vectors:
-            for axis in range(len(vector)):
-                axes[axis].append(f"{at}.{axis}")
-    return tuple(map(tuple, axes))
-
-
-def _ends_by_middle(flight: Flight, memory: Memory, path: str) -> dict[str, tuple[tuple[str, int], ...]]:
-    """Return both ends of an axis with the places of its middle, which alone changes when both move by the same."""
-    ends = [(f"{path}.start.{axis}", f"{path}.end.{axis}") for axis in range(3)]
-    changes = {key: _value(flight.scenario, key) + by for pair, by in zip(ends, _TOGETHER, strict=True) for key in pair}
-    try:
-        other = Flight(changed_scenario(flight.scenario, changes))
-    except ScenarioError:
-        return {}
-    middles = {(changes[start] + changes[end]) / 2.0: start for start, end in ends}
-    middle_slots = _places(flight, memory, other, middles) or {}
-    if len(middle_slots) < len(ends):
-        return {}
-    return {key: tuple(("middle", place) for _, place in middle_slots[pair[0]]) for pair in ends for key in pair}
-
-
-def _search(flight: Flight, memory: Memory, keys: Sequence[str]) -> Iterator[tuple[str, tuple[tuple[str, int], ...]]]:
-    """Yield keys with the places of their numbers; many are tried at once, and fewer if their places are ambiguous."""
-    for sign in (1.0, -1.0):
-        changes = {key: _value(flight.scenario, key) + sign * (_STEP + _APART * i) for i, key in enumerate(keys)}
-        try:
-            other = Flight(changed_scenario(flight.scenario, changes))
-        except ScenarioError:
-            continue
-        places = _places(flight, memory, other, {value: key for key, value in changes.items()})
-        if places is not None and len(places) == len(keys):
-            yield from ((key, tuple(dict.fromkeys(found))) for key, found in places.items())
-            return
-    if len(keys) > 1:
-        half = len(keys) // 2
-        yield from _search(flight, memory, keys[:half])
-        yield from _search(flight, memory, keys[half:])
-
-
-def _value(scenario: Scenario, key: str) -> float:
-    return float(value_at(scenario.table, key, scenario.vehicle))
-
-
-def _places(
-    flight: Flight, memory: Memory, other: Flight, keys: Mapping[float, str]
-) -> dict[str, list[tuple[str, int]]] | None:
-    """Return the places of numbers in the flight, by comparison with one that has the numbers of `keys` there."""
-    # None if anything else differs: then a changed number also enters a computation.
-    slots: dict[str, list[tuple[str, int]]] = {}
-
-    def put(value: float, kind: str, index: int) -> bool:
-        if value in keys:
-            slots.setdefault(keys[value], []).append((kind, index))
-        return value in keys
-
-    for array, changed in zip(flight.arrays(), other.arrays(), strict=True):
-        if array is flight.setup.goal_places:  # the page computes these from the goal's keys
-            continue
-        if array.shape != changed.shape:
-            return None
-        differs = np.flatnonzero(~_equal(array, changed).ravel())
-        if differs.size and (array.dtype != np.float64 or memory.is_named(array)):
-            return None
-        for i in differs.tolist():
-            if not put(float(changed.ravel()[i]), "number", memory.keep(array) + i):
-                return None
-    for i, (one, new) in enumerate(zip(flight.law.gains, other.law.gains, strict=True)):
-        if one != new and not put(new, "gain", i):
-            return None
-    references = {v.name: (i, v.type) for i, v in enumerate(variables(flight.scenario.vehicle))}
-    for name, new in other.start.items():
-        index, kind = references[name]
-        if flight.start.get(name) != new and not (kind == "real" and put(new, "start", index)):
-            return None
-    for value, key in keys.items():
-        if key in NOISE:
-            put(value, "noise", NOISE.index(key))
-    return slots if list(_numbers(flight.fly)) == list(_numbers(other.fly)) else None
-
-
-def _numbers(value: Any) -> Iterator[Any]:
-    """Yield the arguments of the loop that are not arrays."""
-    if isinstance(value, tuple):
-        for item in value:
-            yield from _numbers(item)
-    elif not isinstance(value, np.ndarray) and value == value:
-        yield value
-
-
-def _equal(one: np.ndarray, other: np.ndarray) -> NDArray[np.bool_]:
-    same = np.asarray(one == other)
-    return np.asarray(same | (np.isnan(one) & np.isnan(other))) if one.dtype == np.float64 else same
+def _positions(path: str, shape: Shape) -> Iterator[tuple[int, int, tuple[str, ...]]]:
+    """Yield index and axis of each packed number of a shape that is a position, with the keys that move it."""
+    for index, number in enumerate(shape.numbers()):
+        vector, _, axis = number.name.partition(".")
+        name, _, nth = vector.rstrip("]").partition("[")
+        if name in _DEPTHS:
+            yield index, 2, (f"{path}.{name}",)
+        elif name == "middle":
+            yield index, _AXES[axis], tuple(f"{path}.{end}.{_AXES[axis]}" for end in ("start", "end"))
+        elif name in _POINTS and not nth:
+            yield index, _AXES[axis], (f"{path}.{name}.{_AXES[axis]}",)
+        elif name in _POINTS:
+            vectors = getattr(shape, f"{name}s")
+            in_order = shape.packed()[-len(vectors[-1]) :] == tuple(vectors[-1])  # a prism may pack them in reverse
+            item = int(nth) - 1 if in_order else len(vectors) - int(nth)
+            yield index, _AXES[axis], (f"{path}.{name}s.{item}.{_AXES[axis]}",)

@@ -1,28 +1,26 @@
-"""A scenario's flight with all arrays of the fused loop, before a plant exists."""
+"""A scenario's flight with all arrays of its step, before a plant exists."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
+from controller.law import Diagnostic
 from controller.translator.static_data import Expression
-from cosim.batch.flight_config import (
-    LOSSES,
-    Allocator,
-    BoundArbiter,
-    BoundLaw,
-    FlightMetrics,
-    FlightOutputs,
-    make_workspace,
-)
-from cosim.batch.fused import configure_flight, exchanged_variables, failure_stages, require_fused
+from cosim.batch.fused import require_fused
+from cosim.replay.view_columns import added_columns, is_drawn
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
-from cosim.simulation.signals import Array
-from cosim.ssp.memory import arrays_of
+from cosim.simulation.columns import columns_of_channels
+from cosim.simulation.make_step import SENSED, exchanged_variables, make_calls, make_data, make_model
+from cosim.simulation.signals import Column, Signals
+from cosim.simulation.stepped_plant import vehicle_channels
+from cosim.step.score import empty_metrics
+from cosim.step.step_model import LawOutputs
+from plant_fmu.running.channels import Channel
 from plant_fmu.running.native import Native
 from plant_fmu.variables import variables
 
@@ -30,82 +28,70 @@ NEVER = -1  # step of an unused failure
 
 
 class Flight:
-    """The arguments of `cosim.batch.fused_loop.fly` for a scenario, with a slot for one more thruster failure."""
+    """The arguments of `cosim.step.score.fly` and of the law for a scenario, with one more thruster failure."""
 
     def __init__(self, scenario: Scenario) -> None:
         require_fused(scenario, "a page that flies")
-        self.scenario, self.law = scenario, law_of(scenario)
-        self.start = start_values(scenario)
-        through, m = scenario.actuation.through == "thrusters", scenario.vehicle.n_thrusters
-        self.setup = configure_flight(scenario, m if through else 0)
-        decisions = -(-scenario.steps // scenario.control_every)
-        self.noisy = scenario.sensing.through == "state"
-        self.exact = self.noisy and not scenario.sensing.dead_for > 0.0
-        self.noise = np.zeros((decisions if self.noisy else 0, 6))
-        stages = failure_stages(scenario, self.setup) if through else _empty_allocator()
-        self.setup = self.setup._replace(
-            noise=self.noise,
-            exact=Expression("m->exact") if self.exact else self.setup.exact,  # type: ignore[arg-type]
-            failed=np.append(self.setup.failed, 0),
-            failure_steps=np.append(self.setup.failure_steps, NEVER),
-            remaining=np.append(self.setup.remaining, 1.0),
+        self.scenario, self.law, self.start = scenario, law_of(scenario), start_values(scenario)
+        self._variables = {v.name: (reference, v) for reference, v in enumerate(variables(scenario.vehicle))}
+        through_state = scenario.sensing.through == "state"
+        channels, sensed = vehicle_channels(scenario.vehicle), () if through_state else SENSED
+        inputs, _ = exchanged_variables(scenario)
+        outputs = [channel.name for channel in channels.outputs if is_drawn(channel.name) or channel.name in sensed]
+        flags = [channel.name for channel in channels.flags if is_drawn(channel.name)]
+        signals = Signals(_columns(scenario, outputs, flags, self.law.diagnostics))
+        self.columns = {column.name: i for i, column in enumerate(signals.columns)}
+        model = make_model(scenario, full=True)
+        self.model = model._replace(
+            # the page can add noise to an exact state
+            exact=Expression("m->exact") if through_state and not scenario.sensing.dead_for > 0.0 else model.exact,  # type: ignore[arg-type]
+            failed=np.append(model.failed, 0),
+            failure_steps=np.append(model.failure_steps, NEVER),
+            remaining=np.append(model.remaining, 0.0),
         )
-        if self.setup.report_failures:
-            inverse, lower, upper = (np.concatenate([rows, rows[-1:]]) for rows in stages[:3])
-            stages = Allocator(inverse, lower, upper, stages.direction)
-        self.allocator = stages
-        inputs, outputs = exchanged_variables(scenario)
-        self.native = self._plant(inputs, outputs)
-        self.effectiveness = self._plant(tuple(f"thrust_effectiveness[{i + 1}]" for i in range(m)), ())
-        self.losses = self._plant(LOSSES, ())
-        criteria, n = len(scenario.criteria), len(scenario.regions)
-        self.workspace = make_workspace(self.setup, criteria, len(inputs), m)
-        rule_inputs, forces = self.workspace.signals.inputs.size, (m if through else 0) + 3
-        self.trace = np.zeros((decisions, 17 + criteria + len(inputs) + self.law.report.size))
-        self.reasons = np.zeros((decisions, 12 + n + criteria + rule_inputs + forces))
-        self.metrics, self.estimate = np.zeros(len(FlightMetrics._fields)), np.zeros(4)
-        self.expected = np.zeros(6)  # placeholder for the law's expected state, or for NaN where sensing is exact
+        periods = scenario.steps // scenario.control_every
+        self.noise = np.zeros((1 + periods if through_state else 0, 6))
+        of_law = LawOutputs(self.law.estimate, self.law.expected, self.law.report)
+        self.data = make_data(scenario, self.model, of_law, signals, inputs, outputs, self.noise, flags)
+        calls = make_calls(scenario, self._native, inputs, outputs)
+        self.plant = calls._replace(native=self._native(inputs, outputs, flags))
+        _, self.metrics = empty_metrics()
+        self.rows = np.zeros((-(-scenario.steps // scenario.control_every), len(self.columns)))
+        self.fly = self.model, self.data, self.plant, self.metrics, np.zeros(len(inputs)), self.rows
+        data, forces = self.data, self.data.command if model.law_gives_wrench else self.data.thrusts
+        self.control = data.state, data.goal, data.regions, data.weights, self.law.gains, self.law.memory, forces
 
-    @property
-    def decide(self) -> tuple[Any, ...]:
-        """Arguments of the law."""
-        through, wrench = self.setup.thrusters > 0, self.law.output == "wrench"
-        setup, w = self.setup, self.workspace
-        forces = w.wrench if through and wrench else self.native.inputs
-        return w.state, setup.goal, setup.regions, w.weights, self.law.gains, self.law.memory, forces
+    def reference(self, name: str) -> int:
+        """Return the value reference of a variable of the plant."""
+        return self._variables[name][0]
 
-    @property
-    def fly(self) -> tuple[Any, ...]:
-        """Arguments of the loop."""
-        law = BoundLaw(
-            Expression("(intptr_t)call_law"), Expression("(intptr_t)m"), self.law.output == "wrench", self.law.estimate,
-            self.expected if self.exact else self.law.expected, self.law.report,
-        )  # fmt: skip
-        arbiter = BoundArbiter(Expression("(intptr_t)call_rules"), Expression("(intptr_t)m"))
-        out = FlightOutputs(self.metrics, self.estimate, self.trace, self.reasons)
-        plants = self.native, self.effectiveness, self.losses
-        return self.setup, *plants, self.allocator, law, arbiter, self.workspace, out
-
-    def arrays(self) -> Iterator[Array]:
-        """Yield every array of loop and law, in an order that is the same for scenarios of one kind."""
-        yield from arrays_of((self.fly, self.decide))
-
-    def _plant(self, inputs: tuple[str, ...], outputs: tuple[str, ...]) -> Native:
+    def _native(self, inputs: Sequence[str], outputs: Sequence[str], flags: Sequence[str] = ()) -> Native:
         """Return the plant's C functions with buffers for some variables, at their start values."""
-        table = {v.name: (i, v) for i, v in enumerate(variables(self.scenario.vehicle))}
-        starts = [self.start.get(name, table[name][1].start) for name in inputs]
+
+        def references(names: Sequence[str]) -> NDArray[np.uint32]:
+            return np.array([self.reference(name) for name in names], np.uint32)
+
         return Native(
             instance=Expression("(intptr_t)PLANT"),
             set_values=Expression("(intptr_t)fmi3SetFloat64"),
             get_values=Expression("(intptr_t)fmi3GetFloat64"),
             do_step=Expression("(intptr_t)fmi3DoStep"),
-            input_references=np.array([table[name][0] for name in inputs], np.uint32),
-            inputs=np.array(starts, float),
-            output_references=np.array([table[name][0] for name in outputs], np.uint32),
+            input_references=references(inputs),
+            inputs=np.array([self.start.get(name, self._variables[name][1].start) for name in inputs], float),
+            output_references=references(outputs),
             outputs=np.zeros(len(outputs)),
             results=np.zeros(4, np.int64),
+            get_flags=Expression("(intptr_t)fmi3GetBoolean"),
+            flag_references=references(flags),
+            flags=np.zeros(len(flags), np.bool_),
         )
 
 
-def _empty_allocator() -> Allocator:
-    return Allocator(np.zeros((1, 0, 6)), np.zeros((1, 0)), np.zeros((1, 0)), False)
+def _columns(
+    scenario: Scenario, outputs: Sequence[str], flags: Sequence[str], diagnostics: Sequence[Diagnostic]
+) -> list[Column]:
+    """Return the columns of a flight's row: those of a record that a page draws, and those that a page adds."""
+    of_outputs, of_flags = ([Channel(name, "", "") for name in names] for names in (outputs, flags))
+    recorded = columns_of_channels(scenario, of_outputs, of_flags, (), diagnostics)
+    kept = (column for column in recorded if is_drawn(column.name) or column.name in outputs)
+    return [*kept, *added_columns(scenario.rules.system)]

@@ -5,16 +5,16 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Iterator, Sequence
 
-from controller.law import NOTHING_EXPECTED
 from controller.translator.operands import number
 from controller.translator.program import Program
 from controller.translator.types import type_of
-from cosim.batch.fused_loop import fly
 from cosim.replay.interactive.flight import Flight
 from cosim.replay.interactive.normal_numbers import normal_numbers
-from cosim.simulation.sensor import STREAM
+from cosim.simulation.make_step import STREAM
 from cosim.ssp.c_sources import c_files
 from cosim.ssp.memory import Memory, Named
+from cosim.step.score import fly
+from cosim.step.step_model import ARBITER, LAW
 from fuzzy_arbiter import Constant, Output, Rule, System, Term
 from fuzzy_arbiter.export import to_c
 from plant_fmu.variables import variables
@@ -28,8 +28,8 @@ typedef struct {
     int64_t exact; /* nothing but the true state is measured */
 } Model;
 
-static double NOISE[6 * N_NOISE + 1], TRACE[N_TRACE], REASONS[N_REASONS];
-static double NOTHING[6] = {NAN, NAN, NAN, NAN, NAN, NAN};
+static double NOISE[6 * N_NOISE + 1], ROWS[N_ROWS * N_COLUMNS];
+static int64_t CALLS[N_CALLS]; /* addresses of the law's and the arbiter's function, and of their arguments */
 int rules_evaluate(const double inputs[], double outputs[]);
 int strengths_evaluate(const double inputs[], double outputs[]);
 static int call_law(void *model), call_rules(void *model);
@@ -51,6 +51,9 @@ static int call_rules(void *model)
 
 static void rewind_model(Model *m)
 {
+    CALLS[LAW] = (intptr_t)call_law;
+    CALLS[ARBITER] = (intptr_t)call_rules;
+    CALLS[LAW + 1] = CALLS[ARBITER + 1] = (intptr_t)m;
     memcpy(m->numbers, FIRST_NUMBERS, sizeof FIRST_NUMBERS);
     memcpy(m->integers, FIRST_INTEGERS, sizeof FIRST_INTEGERS);
     memcpy(m->words, FIRST_WORDS, sizeof FIRST_WORDS);
@@ -62,21 +65,23 @@ static void rewind_model(Model *m)
 
 def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, bytes]:
     """Return the C files of a flight, to be compiled with those of the plant's FMU."""
-    program, calls, law = Program(), [], flight.law
-    _name_arrays(flight, memory)
-    for name, function, arguments in (("law", type(law).function, flight.decide), ("fly", fly, flight.fly)):
+    program, calls, law, data = Program(), [], flight.law, flight.data
+    for array, name in ((flight.noise, "NOISE"), (flight.rows, "ROWS"), (data.calls, "CALLS")):
+        memory.name(array, name)
+    for native in flight.plant:
+        memory.fix(native.input_references, native.output_references, native.flag_references)
+    for name, function, arguments in (("law", type(law).function, flight.control), ("fly", fly, flight.fly)):
         program.export(f"translated_{name}", function, tuple(map(type_of, arguments)))
         given = (Named(a, "gains") if a is law.gains else a for a in arguments)
         calls.append(f"static {memory.call(program, name, tuple(given))}")
-    scenario, signals = flight.scenario, flight.workspace.signals
-    system = scenario.rules.system
+    system = flight.scenario.rules.system
     gains = ", ".join(map(number, law.gains)) or "0.0"
+    row, rule_inputs = memory.keep(data.row), memory.keep(data.signals.inputs)
     sizes = memory.sizes() | {
-        "N_GAINS": max(len(law.gains), 1), "N_NOISE": len(flight.noise), "N_TRACE": flight.trace.size,
-        "N_REASONS": flight.reasons.size, "N_ROWS": len(flight.trace), "N_RULES": len(system.rules),
-        "N_RULE_INPUTS": len(system.inputs), "REASONS_WIDTH": flight.reasons.shape[1],
-        "AT_REASONED_INPUTS": 1 + len(scenario.regions) + len(scenario.criteria),
-        "AT_RULE_INPUTS": memory.keep(signals.inputs), "AT_WEIGHTS": memory.keep(flight.workspace.by_criterion),
+        "N_GAINS": max(len(law.gains), 1), "N_NOISE": len(flight.noise), "N_ROWS": len(flight.rows),
+        "N_COLUMNS": data.row.size, "N_CALLS": data.calls.size, "LAW": LAW, "ARBITER": ARBITER,
+        "AT_RULE_INPUTS": rule_inputs, "AT_WEIGHTS": memory.keep(data.by_criterion),
+        "RULE_INPUTS": rule_inputs - row, "RULES": flight.columns.get("rule.R1", 0),
     }  # fmt: skip
     text = "\n".join([
         "/* A scenario's flight: generated. */",
@@ -96,19 +101,6 @@ def flight_sources(flight: Flight, memory: Memory, token: str) -> dict[str, byte
         "rules.c": to_c(dataclasses.replace(system, name="rules")).encode(),
         "strengths.c": to_c(_strengths(system)).encode(),
     }
-
-
-def _name_arrays(flight: Flight, memory: Memory) -> None:
-    """Name the arrays that are outside the model, or not always in it."""
-    for array, name in ((flight.noise, "NOISE"), (flight.trace, "TRACE"), (flight.reasons, "REASONS")):
-        memory.name(array, name)
-    memory.name(NOTHING_EXPECTED, "NOTHING")
-    if flight.exact:
-        expected = flight.law.expected
-        own = "NOTHING" if expected is NOTHING_EXPECTED else f"m->numbers + {memory.keep(expected)}"
-        memory.name(flight.expected, f"(m->exact ? NOTHING : {own})")
-    for native in (flight.native, flight.effectiveness, flight.losses):
-        memory.fix(native.input_references, native.output_references)
 
 
 def _strengths(system: System) -> System:

@@ -11,7 +11,7 @@ import numpy as np
 from controller import VehicleState
 from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.actuators import Actuators
+from cosim.simulation.actuation_limits import ActuationLimits
 from cosim.simulation.commands.commands import (
     MODES,
     STICK_MODES,
@@ -51,7 +51,7 @@ class CommandHandler:
         self,
         scenario: Scenario,
         environment: RegionEnvironment,
-        actuators: Actuators,
+        limits: ActuationLimits,
         state: VehicleState,
         out: Array,
     ) -> None:
@@ -59,7 +59,7 @@ class CommandHandler:
         self.armed, self.mode = not scenario.commands.await_arm, "reach"
         self.heading: float | None = None  # desired heading [rad], None until one is commanded
         self.control_regained = self.turned = self.changed = self.reset = False
-        self._environment, self._actuators, self._state, self._out = environment, actuators, state, out
+        self._environment, self._limits, self._state, self._out = environment, limits, state, out
         vehicle = scenario.vehicle
         # maximum wrench along and about each axis, which a full stick commands
         self._greatest_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
@@ -159,14 +159,14 @@ class CommandHandler:
         self.control_regained = self.turned = self.changed = False
 
     def _apply_setting(self, key: str) -> None:
-        """Apply a changed setting to regions or actuators; gains of the law and the arbiter's ramp are the master's."""
+        """Apply a changed setting to regions or actuation; gains of the law and the arbiter's ramp are the master's."""
         settings, region = self.settings, self.settings.region_of(key)
         if region is not None and key.endswith(".gain"):
             self._environment.set_gain(region, settings[key])
         elif region is not None:
             self._environment.set_shape(region, settings.shapes[region])
         elif key in settings.of_plant:
-            self._actuators.limit(settings.of_plant[key], settings[key])
+            self._limits.set(settings.of_plant[key], settings[key])
 
     def _set_mode(self, mode: Mode, time: float) -> None:
         north, east, down = (float(x) for x in self._state.position)

@@ -102,4 +102,4 @@ def test_the_snippet_runs(tmp_path, monkeypatch):
     names = {}
     (scene,) = re.findall(r"```python\n(.*?)```", PAGE, re.S)
     exec(scene, names)
-    assert names["trace"].shape == (6000, 28) and names["score"].effort > 0.0
+    assert names["depths"].shape == (6000,) and names["score"].effort > 0.0

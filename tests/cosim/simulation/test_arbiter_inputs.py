@@ -11,7 +11,7 @@ from controller.regions import Box, Cone, DepthBand, Orientation, Region, Sphere
 from cosim.scenario.arbiter_rules import ArbiterRules, InputSignal
 from cosim.scenario.criteria import PAPER
 from cosim.scenario.region_tables import SecondaryRegion
-from cosim.simulation.arbiter_inputs import compute_inputs, empty_signals, empty_state, pack_inputs, write_arbiter_state
+from cosim.step.arbiter_inputs import compute_inputs, empty_signals, empty_state, pack_inputs, write_arbiter_state
 from fuzzy_arbiter import Criterion, prioritized, rising
 
 GOAL = Region("goal", Sphere((5.0, 0.0, 2.0), 1.0), "in", velocity=(0.1, 0.0, 0.0))

@@ -54,8 +54,8 @@ def test_fused_loop_equals_the_master(run):
             outcome, trace = flyer.fly_one(scenario, trace=True)
         if duration == 40.0:
             record = load_record(run.folder)
-            for i, axis in enumerate("xyz"):
-                np.testing.assert_array_equal(trace[:, 1 + i], record[f"position.{axis}"][:-1:2])
+            for column in [*(f"position.{axis}" for axis in "xyz"), "goal.clearance", "goal.place"]:
+                np.testing.assert_array_equal(trace[column], record[column][:-1:2])
             for name in ("reached", "reach_time", "settled", "settle_time", "closest_to_goal"):
                 assert outcome[name] == run.summary[name]
         else:

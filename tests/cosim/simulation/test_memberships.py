@@ -11,8 +11,8 @@ from controller.regions import Orientation, Region, Sphere
 from cosim.errors import ScenarioError
 from cosim.scenario.criteria import PAPER, check_criteria
 from cosim.scenario.region_tables import CriterionEntry, SecondaryRegion
-from cosim.simulation.curves import _power, _quotient
-from cosim.simulation.memberships import compute_memberships, pack_memberships
+from cosim.step.curves import _power, _quotient
+from cosim.step.memberships import compute_memberships, pack_memberships
 from fuzzy_arbiter import Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.kinds import KINDS

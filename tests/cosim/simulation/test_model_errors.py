@@ -6,22 +6,19 @@ import numpy as np
 import pytest
 
 from benchmarks.thruster_failures import scene
-from controller import LAWS
 from cosim.batch.fused import FusedFlyer
 from cosim.batch.variation import Variation
 from cosim.scenario.scenario import load_scenario, validate_scenario
 from plant_fmu.vehicle import load_vehicle
 
 LAG = {"bluerov2_heavy": 0.15, "bluerov2_heavy_wu": 0.15}
-FAILED = [diagnostic.name for diagnostic in LAWS["deployable"].diagnostics].index("failed_thruster")
 
 
 def fly(scenario):
     """Fly a scenario; return its outcome, and the isolated thrusters."""
     with FusedFlyer(Variation(scenario, ())) as flyer:
         outcome, trace = flyer.fly_one(scenario, trace=True)
-    isolated = trace[:, trace.shape[1] - len(LAWS["deployable"].diagnostics) + FAILED]
-    return outcome, set(np.unique(isolated)) - {0.0}
+    return outcome, set(np.unique(trace["law.failed_thruster"])) - {0.0}
 
 
 def check(scenario):

@@ -16,8 +16,8 @@ from lxml import etree
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
+from cosim.simulation.make_step import STREAM
 from cosim.simulation.master import Master
-from cosim.simulation.sensor import STREAM
 from cosim.ssp import package_system
 from cosim.ssp.system import MOTION
 from plant_fmu.running.co_simulation_instance import CoSimulationInstance

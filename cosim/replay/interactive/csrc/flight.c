@@ -1,4 +1,4 @@
-/* Flights of one scenario, for a host that sets numbers before each: the fused loop, the law, the arbiter's rules, and the
+/* Flights of one scenario, for a host that sets numbers before each: the step, the law, the arbiter's rules, and the
  * plant behind FMI 3.0's functions. The host reads and writes the arrays in place. */
 #include <math.h>
 #include <stdbool.h>
@@ -18,7 +18,6 @@ __extension__ typedef unsigned __int128 Wide;
 #include "loop.h" /* generated: the translated functions, their arrays in a Model, and the scene */
 
 static Model MODEL;
-static double STRENGTHS[N_ROWS][N_RULES]; /* of the rules, at each control step */
 static char MESSAGE[512]; /* why the last flight did not begin, or ended before its time */
 
 static void log_callback(fmi3InstanceEnvironment environment, fmi3Status status, fmi3String category, fmi3String message)
@@ -87,21 +86,18 @@ EXPORT(fly) int fly(double position_noise, double velocity_noise)
 {
     MODEL.exact = position_noise == 0.0 && velocity_noise == 0.0;
     draw_noise(position_noise, velocity_noise);
-    memset(TRACE, 0, sizeof TRACE);
-    memset(REASONS, 0, sizeof REASONS);
+    memset(ROWS, 0, sizeof ROWS);
     if (fmi3EnterInitializationMode(PLANT, false, 0.0, 0.0, false, 0.0) > fmi3Warning ||
         fmi3ExitInitializationMode(PLANT) > fmi3Warning)
         return 0;
     control_fly(&MODEL);
-    for (int i = 0; i < N_ROWS; i++)
-        strengths_evaluate(REASONS + i * REASONS_WIDTH + AT_REASONED_INPUTS, STRENGTHS[i]);
+    for (double *row = ROWS; row < ROWS + N_ROWS * N_COLUMNS; row += N_COLUMNS)
+        strengths_evaluate(row + RULE_INPUTS, row + RULES);
     return 1;
 }
 
 EXPORT(numbers) double *numbers(void) { return MODEL.numbers; }
 EXPORT(integers) int64_t *integers(void) { return MODEL.integers; }
 EXPORT(gains) double *gains(void) { return MODEL.gains; }
-EXPORT(trace) double *trace(void) { return TRACE; }
-EXPORT(reasons) double *reasons(void) { return REASONS; }
-EXPORT(strengths) double *strengths(void) { return STRENGTHS[0]; }
+EXPORT(rows) double *rows(void) { return ROWS; }
 EXPORT(message) char *message(void) { return MESSAGE; }

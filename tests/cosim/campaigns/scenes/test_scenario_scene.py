@@ -137,8 +137,8 @@ def test_the_weighted_violation_is_the_integral_of_depth_times_priority():
     table["scenario"]["time"]["step"] = 0.02  # a row of the trace at each step
     scene = scene_of(table)
     with SceneFlyer("pd") as flyer:
-        score, rows = flyer.fly(scene, trace=True)
-    down, expected = rows[:, 3], 0.0
+        score, trace = flyer.fly(scene, trace=True)
+    down, expected = trace["position.z"], 0.0
     for region in table["scenario"]["regions"]:
         at, sign = region["shape"]["point"][2], region["shape"]["normal"][2]
         inside = sign * (at - down)  # m, within the half-space

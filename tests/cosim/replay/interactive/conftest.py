@@ -12,7 +12,6 @@ import pytest
 
 from cosim.replay.interactive.data import flight_data
 from cosim.replay.trace import trace_of
-from cosim.replay.view_columns import ViewColumns
 
 NODE = shutil.which("node")
 _FLY = Path(__file__).parent / "fly.mjs"
@@ -43,8 +42,7 @@ def fly(builds, tmp_path_factory):
 
     def fly_page(run, values=None, failure=None):
         if run.folder not in known:
-            columns = ViewColumns(run.scenario, run.record.columns).columns
-            known[run.folder] = flight_data(run, columns), trace_of(run).header
+            known[run.folder] = flight_data(run), trace_of(run).header
         data, header = known[run.folder]
         folder = tmp_path_factory.mktemp("flown")
         job = {"data": data, "header": header, "values": values or {}, "failure": failure}

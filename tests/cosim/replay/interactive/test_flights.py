@@ -48,7 +48,6 @@ SCENES = {
          "time.duration=15", "sensing.dead_from=8", "sensing.dead_for=1"),
     ),
 }  # fmt: skip
-ROUNDED = ("attitude.", "command.", "actuation.", ".shift.", "water_velocity.")  # what the page works out
 
 
 def flown_run(scenario, folder):
@@ -56,7 +55,7 @@ def flown_run(scenario, folder):
 
 
 def assert_same(flown, run):
-    """Hold every signal of a flight against the record, to the last bit but for what the page works out itself."""
+    """Hold every signal of a flight against the record, to the last bit."""
     viewing = ViewColumns(run.scenario, run.record.columns)
     names = [run.record.columns[i].name for i in viewing.picked]
     picked = viewing.compute_rows(np.column_stack([run.record[name] for name in names]))
@@ -65,11 +64,7 @@ def assert_same(flown, run):
     assert len(flown.columns) > 30 and {"active", "rule.R1", "position.x", "estimate.phi1"} <= set(flown.columns)
     for name, column in flown.columns.items():
         expected = recorded[name][: run.scenario.steps : every]
-        if any(part in name for part in ROUNDED):
-            loose = name.startswith("water_velocity.")  # of its variation, the page has six decimals
-            np.testing.assert_allclose(column, expected, rtol=1e-12, atol=2e-6 if loose else 1e-9, err_msg=name)
-        else:
-            np.testing.assert_array_equal(column, expected, err_msg=name)
+        np.testing.assert_array_equal(column, expected, err_msg=name)
 
 
 @pytest.mark.parametrize("scene", SCENES)

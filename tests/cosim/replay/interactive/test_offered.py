@@ -1,36 +1,141 @@
 """What a page that flies offers, before anything is compiled: numbers and their places, and what it refuses."""
 
 import importlib.util
+import json
+import subprocess
+from dataclasses import fields, replace
+from importlib import resources
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from controller import LAWS
+from controller.regions.region_set import shape_entry
+from controller.regions.shapes import ENTRIES
 from cosim.command_line.cli import main
 from cosim.errors import RunError
 from cosim.replay.interactive.adjustable import changed_scenario, find_slots
 from cosim.replay.interactive.data import flight_data
 from cosim.replay.interactive.flight import Flight
-from cosim.replay.interactive.module import flight_module
+from cosim.replay.interactive.module import FlightModule, flight_module
 from cosim.replay.interactive.scenario_template import scenario_template
-from cosim.replay.interactive.sources import flight_sources
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.environment import shape_center
-from cosim.ssp.memory import Memory
+from cosim.ssp.memory import Memory, arrays_of
 from plant_fmu.errors import BuildError
+from tests.cosim.replay.interactive.conftest import NODE
 
 pytestmark = pytest.mark.medium
+
+WATER = ("current.x", "current.y", "current.z", "buoyancy")
+THEN = "then = [[6.1, -2.5, 3.2], [5.3, 0.7, 4.1]]"
 
 
 @pytest.fixture(scope="module")
 def docking():
-    flight, memory = Flight(load_scenario("docking")), Memory()
-    flight_sources(flight, memory, "token")
-    return flight, memory, *find_slots(flight, memory)
+    return Flight(load_scenario("docking")), Memory()
+
+
+@pytest.fixture
+def asked(tmp_path, monkeypatch):
+    """Return a function that gives what a page's script asks of its worker for other numbers, without a module."""
+    if not NODE:
+        pytest.skip("node is not installed")
+
+    def ask(flight, memory, values, failure=None):
+        made = FlightModule(flight, memory, b"")
+        monkeypatch.setattr("cosim.replay.interactive.data.flight_module", lambda _: made)
+        data = flight_data(SimpleNamespace(scenario=flight.scenario, folder="run"))
+        (tmp_path / "job.json").write_text(json.dumps({"data": data, "values": values, "failure": failure}))
+        command = [NODE, Path(__file__).parent / "job.mjs", str(resources.files("cosim.replay") / "assets")]
+        done = subprocess.run([*command, tmp_path / "job.json"], capture_output=True, check=True, timeout=60)
+        return json.loads(done.stdout)
+
+    return ask
+
+
+def written(array, memory, job):
+    """Return an array of a flight with the numbers that a page asks for."""
+    now, first = np.array(array), memory.keep(array)
+    for index, value in job[{np.float64: "numbers", np.int64: "integers"}[array.dtype.type]]:
+        if first <= index < first + array.size:
+            now.ravel()[index - first] = np.nan if value is None else value
+    return now
+
+
+def same(one, other):
+    return one.shape == other.shape and np.array_equal(one, other, equal_nan=one.dtype == np.float64)
+
+
+def toml(shape):
+    return ", ".join(f"{field.name} = {nested(getattr(shape, field.name))}" for field in fields(shape))
+
+
+def nested(value):
+    return f"[{', '.join(map(nested, value))}]" if isinstance(value, tuple) else repr(value)
+
+
+def shapes():
+    """Return each kind of shape, and a prism whose corners are packed in the reverse order."""
+    examples = {name: entry.example for name, entry in ENTRIES.items()}
+    prism = examples["prism"]
+    return examples | {"reversed prism": replace(prism, corners=prism.corners[::-1])}
+
+
+def with_every_shape():
+    regions = [
+        f"{{name = '{name}', criterion = 'shape', keep = 'out', gain = 1.0, hard = false, "
+        f"shape = {{type = '{name.split()[-1]}', {toml(shape)}}}}}"
+        for name, shape in shapes().items()
+    ]
+    return [f"regions=[{', '.join(regions)}]", "intersection=[]"]
+
+
+SCENARIOS = {
+    **{law: ("docking", [f"law.name={law}"]) for law in LAWS},
+    **{name: (name, []) for name in ("harbour", "depth-transit", "pipe-inspection", "dense-field")},
+    "wrench": ("paper", ["arbiter.engine=closed"]),
+    "every shape": ("docking", with_every_shape()),
+    **{f"goals, {name}": ("docking", [f"goal={{type = '{name.split()[-1]}', {toml(shape)}, {THEN}}}"])
+       for name, shape in shapes().items() if not shape_entry(shape).of_attitude},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("case", SCENARIOS)
+def test_numbers_that_a_page_writes_are_those_of_the_changed_scenario(case, asked):
+    """Everything else stays: no number that is offered enters a computation before the flight."""
+    name, overrides = SCENARIOS[case]
+    flight, memory = Flight(load_scenario(name, overrides)), Memory()
+    slots, moves = find_slots(flight, memory)
+    moved = {key: axis for axes in moves if axes for axis, keys in enumerate(axes) for key in keys}
+    changes = {  # a region moves as a whole, by steps that leave the length of a cylinder
+        slot.key: slot.value + (2.0 ** (moved[slot.key] - 8) if slot.key in moved else 1.3e-4 * (i + 1))
+        for i, slot in enumerate(slots)
+    }
+    other, job = Flight(changed_scenario(flight.scenario, changes)), asked(flight, memory, changes)
+    kept = set()
+    for array, changed in zip(
+        arrays_of((flight.fly, flight.control)), arrays_of((other.fly, other.control)), strict=True
+    ):
+        if array is flight.model.goal_center and shape_entry(flight.scenario.goal).center is None:
+            continue  # rounds displacements in the record of a moving goal alone
+        is_kept = array.dtype == np.float64 and array is not flight.noise and array is not flight.rows
+        assert same(written(array, memory, job) if is_kept else array, changed)
+        if is_kept:
+            kept |= set(range(memory.keep(array), memory.keep(array) + array.size))
+    assert {index for index, _ in job["numbers"]} <= kept
+    gains = dict(map(tuple, job["gains"]))
+    assert [gains[i] for i in range(len(gains))] == list(other.law.gains)
+    starts = flight.start | {name: dict(map(tuple, job["starts"]))[flight.reference(name)] for name in WATER}
+    assert starts == other.start
+    sensing = other.scenario.sensing
+    assert job["noise"] == [sensing.position_noise, sensing.velocity_noise]
 
 
 def test_gains_water_noise_and_positions_are_adjustable(docking):
-    flight, _, slots, moves = docking
+    flight, _ = docking
+    slots, moves = find_slots(*docking)
     keys = {slot.key for slot in slots}
     assert keys > {f"law.gains.{name}" for name in flight.scenario.law.gains._fields}
     assert keys > {"plant.current.0", "plant.parameters.buoyancy", "sensing.position_noise", "sensing.velocity_noise"}
@@ -38,75 +143,44 @@ def test_gains_water_noise_and_positions_are_adjustable(docking):
     assert [name for name, axes in zip(names, moves, strict=True) if axes is None] == ["heading"]
 
 
-def test_values_in_memory_equal_those_of_the_changed_scenario(docking):
-    flight, memory, slots, _ = docking
-    changes = {slot.key: slot.value + 1.3e-4 * (i + 1) for i, slot in enumerate(slots)}
-    other = Flight(changed_scenario(flight.scenario, changes))
-    numbers = {place: changes[slot.key] for slot in slots for kind, place in slot.places if kind == "number"}
-    seen = set()
-    for array, changed in zip(flight.arrays(), other.arrays(), strict=True):
-        if array.dtype == np.float64 and array.size and not memory.is_named(array):
-            at = memory.keep(array)
-            put = [numbers.get(at + i, x) for i, x in enumerate(array.ravel())]
-            seen |= {at + i for i in range(array.size)} & numbers.keys()
-            np.testing.assert_array_equal(put, changed.ravel())
-    assert seen == numbers.keys() and len(seen) >= 18
-    gains = {place: changes[slot.key] for slot in slots for kind, place in slot.places if kind == "gain"}
-    assert [gains[i] for i in range(len(gains))] == list(other.law.gains)
+def test_regions_of_every_shape_with_a_position_are_movable():
+    slots, moves = find_slots(Flight(load_scenario("docking", with_every_shape())), Memory())
+    offered = {slot.key for slot in slots}
+    expected = {"orientation": None, "depth_band": ([], [], ["depth"])}
+    expected["cylinder"] = tuple([f"start.{axis}", f"end.{axis}"] for axis in range(3))
+    for i, name in enumerate(shapes()):
+        axes = moves[1 + i]
+        assert (axes is None) == (name == "orientation"), name
+        if axes:
+            assert offered.issuperset(key for keys in axes for key in keys)
+        if name in expected and axes:
+            path = f"regions.{i}.shape."
+            assert [[key.removeprefix(path) for key in keys] for keys in axes] == list(expected[name])
 
 
-def test_a_cylinder_moves_by_its_middle():
-    """The law is given middle, axis and half length, of which the last two stay when both ends move by the same."""
-    ends = "type = 'cylinder', start = [9,5.1,1], end = [9,5.1,6], radius = 0.3"
-    cylinder = f"{{name = 'leg', criterion = 'obstacle', keep = 'out', gain = 100.0, shape = {{{ends}}}}}"
-    flight, memory = Flight(load_scenario("docking", [f"regions=[{cylinder}]", "intersection=[]"])), Memory()
-    flight_sources(flight, memory, "token")
-    slots, moves = find_slots(flight, memory)
-    path = "regions.0.shape"
-    assert moves[1] == tuple((f"{path}.start.{axis}", f"{path}.end.{axis}") for axis in range(3))
-    changes = {slot.key: slot.value + 0.34 for slot in slots if slot.key.startswith(path) and slot.key[-1] == "1"}
-    other = Flight(changed_scenario(flight.scenario, changes))
-    places = {place for slot in slots if slot.key in changes for kind, place in slot.places if kind == "middle"}
-    assert len(changes) == 2
-    differs = set()
-    for array, changed in zip(flight.arrays(), other.arrays(), strict=True):
-        if array.dtype == np.float64 and array.size and not memory.is_named(array):
-            at = memory.keep(array) + np.flatnonzero((array != changed).ravel() & ~np.isnan(array).ravel())
-            differs |= set(at.tolist())
-            assert (changed.ravel()[at - memory.keep(array)] == sum(changes.values()) / 2.0).all()
-    assert differs == places and len(places) >= 1
-
-
-@pytest.mark.parametrize(
-    ("shape", "movable"),
-    [("type='box', center=[7.1,0.1,4], size=[1,2,1], quaternion=[0.9,0.1,0,0.4]", True),
-     ("type='ellipsoid', center=[7.1,0.3,4], semi_axes=[0.3,0.7,1.1]", True),
-     ("type='cylinder', start=[7.1,0,3], end=[7.2,0,5], radius=0.7", True),
-     ("type='prism', corners=[[6,-1],[8,-1],[8,1],[6,2]], top=3, bottom=5", False)],
-    ids=["box", "ellipsoid", "cylinder", "prism"],
-)  # fmt: skip
-def test_each_place_of_goals_in_turn_is_offered(shape, movable):
-    """The loop is given differences to the goal's center, which the page computes from both keys to the last bit."""
-    goal = f"goal={{{shape}, then=[[6.1,-2.5,3.2],[5.3,0.7,4.1]]}}"
-    flight, memory = Flight(load_scenario("docking", [goal])), Memory()
-    flight_sources(flight, memory, "token")
-    slots, moves = find_slots(flight, memory)
-    assert (moves[0] is not None) == movable
-    changes = {s.key: s.value + 0.0137 * (i + 1) for i, s in enumerate(slots) if s.key.startswith("goal.")}
-    assert len(changes) == 6 + (sum(map(len, moves[0])) if movable else 0)
-    changed = Flight(changed_scenario(flight.scenario, changes)).setup.goal_places.ravel()
-    ends = [[changes.get(f"goal.{end}.{axis}", 0.0) for axis in range(3)] for end in ("start", "end")]
-    middle = [(a + b) / 2.0 for a, b in zip(*ends, strict=True)] if any(map(any, ends)) else [None] * 3
-    center = [changes.get(f"goal.center.{axis}", middle[axis]) for axis in range(3)]
-    center = [x if x is not None else y for x, y in zip(center, shape_center(flight.scenario.goal), strict=True)]
-    places = {
-        place: changes[s.key] - center[int(s.key[-1])] for s in slots for kind, place in s.places if kind == "shift"
-    }
-    assert [places[memory.keep(flight.setup.goal_places) + i] for i in range(6)] == changed.tolist()
+@pytest.mark.parametrize("time", [0.5, 2.0, 9.0])
+@pytest.mark.parametrize("law", ["pd", "deployable"])
+def test_added_failure_is_that_of_a_scenario_with_it(law, time, asked):
+    own = [
+        "{thruster = 2, time = 3.0}",
+        "{thruster = 5, time = 1.0, stuck = true}",
+        "{thruster = 7, time = 2.0, effectiveness = 0.4}",
+    ]
+    settings = ["report_failures=true", f"law.name={law}"]
+    flight, memory = Flight(load_scenario("docking", [*settings, f"failures=[{', '.join(own)}]"])), Memory()
+    own.append(f"{{thruster = 3, time = {time}}}")
+    other = Flight(load_scenario("docking", [*settings, f"failures=[{', '.join(own)}]"]))
+    job = asked(flight, memory, {}, {"thruster": 3, "time": time})
+    for name in ("failed", "failure_steps", "remaining"):
+        assert same(written(getattr(flight.model, name), memory, job), getattr(other.model, name)[:-1]), name
+    if flight.model.law_gives_wrench:
+        for name in ("inverse", "lower", "upper"):
+            mine, theirs = getattr(flight.data.allocator, name), getattr(other.data.allocator, name)
+            assert len(theirs) == 5 and same(written(mine, memory, job), theirs[:-1]), name
 
 
 def test_filled_template_equals_the_scenario(docking, tmp_path):
-    flight, _, slots, _ = docking
+    flight, slots = docking[0], find_slots(*docking)[0]
     template, values = scenario_template(flight.scenario, slots), {slot.key: repr(slot.value) for slot in slots}
     filled = [values.get(key, '"Again"') for key in template.keys]
     parts = [part for pair in zip(template.parts, [*filled, ""], strict=True) for part in pair]
@@ -149,4 +223,4 @@ def test_missing_webassembly_compiler_error_names_the_install_command(monkeypatc
 def test_imported_log_is_rejected():
     run = SimpleNamespace(folder="dive", scenario=SimpleNamespace(log="dive.tlog"))
     with pytest.raises(RunError, match=r"imported from dive\.tlog"):
-        flight_data(run, ())
+        flight_data(run)

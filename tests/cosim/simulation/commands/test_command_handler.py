@@ -8,10 +8,10 @@ from cosim.results.as_flown import scenario_as_flown
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.actuators import MAX_WRENCH, saturate
 from cosim.simulation.commands import MODES, CommandQueue, LoggedCommands, ReplayedCommands
 from cosim.simulation.commands import commands as cmd
 from cosim.simulation.commands.command_handler import greatest_wrench
+from cosim.step.decision import MAX_WRENCH, bound_wrench
 from plant_fmu.vehicle import load_vehicle
 from tests.cosim.simulation.keep import kept_rows
 
@@ -400,9 +400,9 @@ def test_distant_target_saturates_and_does_not_abort(fly, name, away):
 
 def test_saturation_zeroes_non_finite_wrenches():
     wrench = np.array([np.nan, 1.0, np.inf, 2 * MAX_WRENCH, -MAX_WRENCH, 0.0])
-    assert saturate(wrench)
+    assert bound_wrench(wrench)
     assert wrench.tolist() == [0.0, 0.0, 0.0, MAX_WRENCH, -MAX_WRENCH / 2, 0.0]
-    assert not saturate(wrench)
+    assert not bound_wrench(wrench)
 
 
 @pytest.mark.parametrize(("gain", "value"), [("k_p2", 3e38), ("sigma_a", 3e38), ("gamma", 1e-45)])

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from controller.stack_array import zeros
 from cosim.scenario.membership_terms import FUNCTIONS, pieces_of
-from cosim.simulation.signals import Array
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.parser import Node
+
+Array = NDArray[np.float64]
 
 _WORDS = ("number", "x", *FUNCTIONS)
 _NUMBER, _X, _ADD, _SUBTRACT, _MULTIPLY, _DIVIDE, _POWER, _POW, _NEGATE, _ABS, _SQRT, _EXP, _LOG = range(13)

@@ -17,8 +17,9 @@ from controller.stack_array import zeros
 from cosim.scenario.arbiter_rules import ArbiterRules
 from cosim.scenario.criteria import CriterionSetup
 from cosim.scenario.region_tables import SecondaryRegion
-from cosim.simulation.memberships import PackedMemberships, compute_memberships, pack_memberships
-from cosim.simulation.signals import Array
+from cosim.step.memberships import PackedMemberships, compute_memberships, pack_memberships
+
+Array = NDArray[np.float64]
 
 _KINDS = ("membership", "clearance", "closing_speed", "approach_time", "depth", "speed", "time", "given")
 _MEMBERSHIP, _CLEARANCE, _CLOSING_SPEED, _APPROACH_TIME, _DEPTH, _SPEED, _TIME, _GIVEN = range(len(_KINDS))

@@ -1,9 +1,10 @@
-"""Calls of C functions by address in the fused loop: those of an FMI 3.0 FMU, and the clock."""
+"""Calls of C functions by address in a step: those of an FMI 3.0 FMU, and the clock."""
 
 from __future__ import annotations
 
 import ctypes
 import sys
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,16 +21,36 @@ _DO_STEP = (POINTER, DOUBLE, DOUBLE, BOOL, POINTER, POINTER, POINTER, POINTER)  
 _CLOCK_GETTIME, _QUERY_COUNTER = (INT, POINTER), (POINTER,)
 
 
+class PlantCalls(NamedTuple):
+    """The plant's FMU, with the variables that a step sends and reads."""
+
+    native: Native  # inputs and outputs of every step
+    effectiveness: Native  # effectiveness of each thruster
+    losses: Native  # loss probability of each sensor
+
+
 def fmi_set(native: Native) -> bool:
     """Set the inputs; return True unless the FMU fails."""
-    references, values, n = native.input_references, native.inputs, native.inputs.size
+    references, values, n = native.input_references, native.inputs, native.input_references.size
+    if native.set_values == 0:
+        return True
     return call_c(native.set_values, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
 
 
 def fmi_get(native: Native) -> bool:
     """Get the outputs; return True unless the FMU fails."""
-    references, values, n = native.output_references, native.outputs, native.outputs.size
+    references, values, n = native.output_references, native.outputs, native.output_references.size
+    if native.get_values == 0:
+        return True
     return call_c(native.get_values, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
+
+
+def fmi_get_flags(native: Native) -> bool:
+    """Get the Boolean outputs; return True unless the FMU fails."""
+    references, values, n = native.flag_references, native.flags, native.flag_references.size
+    if native.get_flags == 0 or n == 0:
+        return True
+    return call_c(native.get_flags, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
 
 
 def fmi_do_step(native: Native, now: float, step: float) -> bool:

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from cosim.scenario.criteria import CriterionSetup
 from cosim.scenario.region_tables import SecondaryRegion
-from cosim.simulation.curves import PackedCurves, curve_degree, pack_curves
-from cosim.simulation.signals import Array
+from cosim.step.curves import PackedCurves, curve_degree, pack_curves
 from fuzzy_arbiter import Shape, ramp
+
+Array = NDArray[np.float64]
 
 _APPROACH_TIME = 1
 

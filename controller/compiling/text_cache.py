@@ -1,0 +1,80 @@
+"""Keep the C texts of this package's functions between processes: translating takes longer than many a run."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import logging
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import FunctionType
+
+from controller.compiling.library import cache_folder, is_trusted, write_atomic
+from controller.translator.program import Program
+from controller.translator.types import Type
+
+log = logging.getLogger(__name__)
+_OWN = ("controller", "cosim", "plant_fmu", "fuzzy_arbiter")  # others' functions may depend on more than on their files
+_IMPORT = re.compile(r"^\s*(?:from|import) +([\w.]+)", re.M)
+
+
+def c_text_of(function: Callable[..., None], types: tuple[Type, ...]) -> str:
+    """Translate a function to C for arguments of some types, or take the text from the cache."""
+    module = getattr(function, "__module__", None) or ""
+    if not isinstance(function, FunctionType) or module.partition(".")[0] not in _OWN:
+        return _translated(function, types).text()
+    key = hashlib.sha256(f"{module} {function.__qualname__} {types} {sys.version}".encode()).hexdigest()[:32]
+    path = cache_folder() / f"{key}.json"
+    text = _kept(path)
+    if text is None:
+        program = _translated(function, types)
+        text = program.text()
+        digests = {name: _digest(name) for name in sorted(_closure(program.modules))}
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+            if is_trusted(path.parent):
+                write_atomic(path, json.dumps({"modules": digests, "text": text}).encode())
+        except OSError as error:
+            log.debug("%s: %s", path, error)
+    return text
+
+
+def _translated(function: Callable[..., None], types: tuple[Type, ...]) -> Program:
+    program = Program()
+    program.export("entry", function, types)
+    return program
+
+
+def _kept(path: Path) -> str | None:
+    """Return a text from the cache; None unless all files that it was made from are as they were."""
+    try:
+        kept = json.loads(path.read_bytes()) if is_trusted(path.parent) else {}
+        if all(_digest(name) == digest for name, digest in kept["modules"].items()):
+            return str(kept["text"])
+    except (OSError, ValueError, KeyError, AttributeError, TypeError):
+        pass
+    return None
+
+
+@functools.cache
+def _source(module: str) -> str:
+    return Path(sys.modules[module].__file__ or "").read_text(encoding="utf-8")
+
+
+@functools.cache
+def _digest(module: str) -> str:
+    return hashlib.sha256(_source(module).encode()).hexdigest()
+
+
+def _closure(modules: set[str]) -> set[str]:
+    """Return modules with all modules of these packages that they import, from which their constants may come."""
+    found, new = set[str](), set(modules)
+    while new:
+        name = new.pop()
+        found.add(name)
+        parts = _IMPORT.findall(_source(name))
+        new |= {part for part in parts if part.partition(".")[0] in _OWN and part in sys.modules} - found
+    return found

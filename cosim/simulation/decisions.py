@@ -1,0 +1,136 @@
+"""The law and the arbiter of a run as functions that a step can call, in C or in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from controller import LAWS, CompiledLaw, Law
+from controller.compiling.function import BoundCall
+from controller.errors import CompilationError
+from cosim.simulation.compiled_rules import BoundRules
+from cosim.simulation.signals import Array
+from cosim.step.step_model import ARBITER, LAW, LawOutputs, StepData, StepModel, set_call
+from fuzzy_arbiter import Arbiter
+
+_COMPILED = "closed"  # engine whose numbers C computes too, with the same bits
+
+
+def is_compiled(law: Law) -> bool:
+    """Return True if C can call a law's function itself, and read its outputs from its memory."""
+    return type(law) in LAWS.values() and type(law).step is CompiledLaw.step
+
+
+def outputs_of(law: Law) -> LawOutputs:
+    """Return arrays of a law's outputs: its own, or those that `BoundLaw` updates."""
+    if is_compiled(law):
+        assert isinstance(law, CompiledLaw)
+        return LawOutputs(law.estimate, law.expected, law.report)
+    return LawOutputs(np.array(law.estimate, float), np.full(6, np.nan), np.array(law.report, float))
+
+
+class BoundLaw:
+    """Binds a law to the arrays of a step."""
+
+    def __init__(self, law: Law, model: StepModel, data: StepData) -> None:
+        self.law, self._data = law, data
+        self._forces = data.command if model.law_gives_wrench else data.thrusts
+        self._gains: Any = self  # no gains yet
+        self.compiled = is_compiled(law)
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Bind the law anew if its gains have changed."""
+        gains, data = getattr(self.law, "gains", None), self._data
+        if gains is self._gains:
+            return
+        self._gains = gains
+        arguments = data.state, data.goal, data.regions, data.weights, self._forces
+        if self.compiled:
+            assert isinstance(self.law, CompiledLaw)
+            self._call = self.law.bound(*arguments)
+        else:
+            self._call = BoundCall(ending(data, _PythonStep(self.law, data.law)), arguments)
+        set_call(data, LAW, self._call)
+
+    def restart(self, fresh: CompiledLaw) -> None:
+        """Return the law's memory to that of a new law."""
+        for old, new in zip(_arrays(self.law.memory), _arrays(fresh.memory), strict=True):  # type: ignore[attr-defined]
+            if old.flags.writeable:
+                old[...] = new
+
+    def raise_error(self) -> None:
+        """Raise the error of the law's last step, if it raised one."""
+        self._call.raise_error()
+
+
+class _PythonStep:
+    """A step of a law that runs in Python."""
+
+    def __init__(self, law: Law, out: LawOutputs) -> None:
+        self._law, self._out = law, out
+
+    def __call__(self, *arguments: Any) -> None:
+        law, out = self._law, self._out
+        law.step(*arguments)
+        out.estimate[:], out.report[:] = law.estimate, law.report
+        if isinstance(law, CompiledLaw):
+            out.expected[:] = law.expected
+
+
+class BoundArbiter:
+    """Binds an arbiter's rules to the arrays of a step."""
+
+    def __init__(self, arbiter: Arbiter, data: StepData) -> None:
+        self._call: BoundRules | BoundCall
+        self.compiled = False
+        if arbiter.engine == _COMPILED:
+            try:
+                self._call = BoundRules(arbiter.system, data.signals.inputs, data.by_criterion)
+                self.compiled = True
+            except CompilationError:  # no compiler for rules of one's own
+                pass
+        if not self.compiled:
+            self._call = BoundCall(ending(data, _PythonRules(arbiter)), (data.signals.inputs, data.by_criterion))
+        set_call(data, ARBITER, self._call)
+
+    def raise_error(self) -> None:
+        """Raise the error of the last evaluation, if it raised one."""
+        self._call.raise_error()
+
+
+def ending(data: StepData, function: Callable[..., None]) -> Callable[..., None]:
+    """Return a function whose errors end the block of steps that calls it."""
+
+    class Ending:  # no plain function, which would be translated
+        def __call__(self, *arguments: Any) -> None:
+            try:
+                function(*arguments)
+            except BaseException:
+                data.failed_step[0] = data.k[0]
+                raise
+
+    return Ending()
+
+
+class _PythonRules:
+    """Rules that run in Python."""
+
+    def __init__(self, arbiter: Arbiter) -> None:
+        self._arbiter = arbiter
+        self._last: list[float] | None = None  # inputs from which the present weights were computed
+
+    def __call__(self, inputs: Array, outputs: Array) -> None:
+        numbers: list[float] = inputs.tolist()
+        if numbers != self._last:
+            self._last = numbers
+            outputs[:] = self._arbiter(numbers)
+
+
+def _arrays(value: Any) -> list[Array]:
+    """Return all arrays of a law's memory."""
+    if isinstance(value, tuple):
+        return [array for item in value for array in _arrays(item)]
+    return [value] if isinstance(value, np.ndarray) else []

@@ -1,0 +1,94 @@
+"""A step of the packaged controller: the one step of the co-simulation, without plant and arbiter."""
+
+# Its order is Jacobi's: weights and motion are those of the step's beginning, and the outputs act from its end on.
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from controller.linear_algebra import copy
+from cosim.step.decision import update_inputs, weigh
+from cosim.step.one_step import decide
+from cosim.step.placed_regions import completed_steps
+from cosim.step.sensing import estimate_state, position_is_known, report_failures
+from cosim.step.step_model import Array, Integers, StepData, StepModel
+
+
+class ControllerInputs(NamedTuple):
+    """What the importer gives, beside the weights."""
+
+    motion: Array  # (13,) position, quaternion and velocity of the vehicle
+    start: Array  # (13,) the same at the start, for masters that begin with zeros
+    samples: Array  # (15,) of the sensors; (0,) without sensors
+    sample_times: Array  # (5,) s
+    end: Array  # (1,) s, end of the step
+    controls: Integers  # (1,) 1 if the law runs in the step
+
+
+class ControllerOutputs(NamedTuple):
+    """Outputs that are not in `StepData`, and the progress of what they schedule."""
+
+    thrusts: Array  # (m,) N; (0,) without thrusters
+    lost: Array  # (m,) lost fraction of each thruster's force
+    outages: Array  # (5,) probability that a sensor loses a sample by an outage
+    values: Array  # (n + 1,) g of goal and regions at the last known position
+    clearances: Array  # (n + 1,) m or rad
+    failures: Integers  # (1,) number of failures that the plant has received
+    changes: Integers  # (1,) number of changes of sensors that it has received
+
+
+def step_controller(model: StepModel, data: StepData, given: ControllerInputs, out: ControllerOutputs) -> None:
+    """Decide by the inputs; the weights are given, and the rules' inputs are those of the step's end."""
+    read_inputs(data, given)
+    report_failures(model, data)
+    weigh(model, data)
+    estimate_state(model, data)
+    decide(model, data, True, given.controls[0] > 0)
+    data.now[0] = given.end[0]
+    if position_is_known(model, data):
+        update_inputs(model, data)
+        copy(data.true_evaluation.values if model.exact else data.given_evaluation.values, out.values)
+        copy(data.true_evaluation.clearances if model.exact else data.given_evaluation.clearances, out.clearances)
+    schedule_failures(model, data, out)
+    for j in range(out.thrusts.size):
+        out.thrusts[j] = data.stuck[j] if math.isfinite(data.stuck[j]) else data.thrusts[j]
+
+
+def read_inputs(data: StepData, given: ControllerInputs) -> None:
+    """Write the vehicle's motion and the samples; inputs of zeros alone come before the plant's first outputs."""
+    motion, state = given.start if is_zero(given.motion) else given.motion, data.true_state
+    copy(motion, state.position)
+    copy(motion[3:], state.quaternion)
+    copy(motion[7:], state.velocity_body)
+    if is_zero(state.quaternion):
+        state.quaternion[0] = 1.0
+    if not is_zero(given.samples):
+        copy(given.samples, data.measurements.values)
+        copy(given.sample_times, data.measurements.times)
+
+
+def is_zero(values: Array) -> bool:
+    """Return True if all numbers are 0."""
+    zero = True
+    for i in range(values.size):
+        zero = zero and values[i] == 0.0
+    return zero
+
+
+def schedule_failures(model: StepModel, data: StepData, out: ControllerOutputs) -> None:
+    """Give the plant the failures of thrusters and the outages of sensors that are due by the step's end."""
+    i, k = out.failures[0], completed_steps(model, data.now[0])
+    while i < model.failed.size and model.failure_steps[i] <= k:
+        thruster, remaining = model.failed[i], model.remaining[i]
+        if remaining >= 0.0:
+            out.lost[thruster] = 1.0 - remaining
+        else:
+            data.stuck[thruster] = out.thrusts[thruster]
+        i += 1
+    out.failures[0] = i
+    i = out.changes[0]
+    while i < model.outage_steps.size and model.outage_steps[i] <= k:
+        out.outages[model.outage_sensors[i]] = float(model.outage_losses[i] == 1.0)
+        i += 1
+    out.changes[0] = i

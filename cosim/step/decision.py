@@ -1,0 +1,100 @@
+"""The decision of a step: weights of the criteria, and forces."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.allocation import allocate
+from controller.linear_algebra import copy, product
+from controller.translator.foreign import POINTER, call_c
+from cosim.step.arbiter_inputs import compute_inputs
+from cosim.step.plant_calls import seconds
+from cosim.step.sensing import position_is_known
+from cosim.step.step_model import ARBITER, LAW, Array, StepData, StepModel
+
+_WORDS = (POINTER,)  # argument of the C functions of `StepData.calls`
+MAX_WRENCH = 1e5  # N, N m: bound of the wrench in runs with commands, as some laws ask for any force to a far target
+
+
+def call_back(data: StepData, call: int) -> None:
+    """Call a C function of `StepData.calls`, if there is one."""
+    if data.calls[call] != 0:
+        call_c(data.calls[call], _WORDS, data.calls[call + 1])
+
+
+def arbitrate(model: StepModel, data: StepData) -> None:
+    """Compute the criteria's weights; while the position is lost, the last ones hold."""
+    if position_is_known(model, data):
+        update_inputs(model, data)
+        weigh(model, data)
+
+
+def update_inputs(model: StepModel, data: StepData) -> None:
+    """Compute the memberships and the inputs of the arbiter's rules."""
+    found = data.true_evaluation.clearances if model.exact else data.given_evaluation.clearances
+    compute_inputs(model.inputs, data.goal, data.regions, data.arbiter_state, data.now, found[1:], data.signals)
+    copy(data.signals.memberships, data.shown_inputs)
+
+
+def weigh(model: StepModel, data: StepData) -> None:
+    """Compute the weights from the inputs of the rules."""
+    call_back(data, ARBITER)
+    for i in range(data.weights.size):
+        data.weights[i] = data.by_criterion[model.criteria[i]]
+
+
+def exchange_delayed(model: StepModel, data: StepData) -> None:
+    """Take over the weights and the arbiter's inputs that follow from the step before (Jacobi)."""
+    if (data.k[0] - 1) % model.arbiter_every == 0:
+        weigh(model, data)
+    if position_is_known(model, data):
+        update_inputs(model, data)
+
+
+def control(model: StepModel, data: StepData) -> None:
+    """Compute the forces of the coming control period, and allocate them; 0 before there is a state estimate."""
+    started = seconds(model.clock, data.ticks) if model.clock.size > 0 else 0.0
+    data.expected[:] = np.nan
+    if controls(model, data):
+        copy(data.law.estimate, data.estimate)
+        call_back(data, LAW)
+        copy(data.law.report, data.report)
+        if not model.exact:
+            copy(data.law.expected, data.expected)
+        if not model.law_gives_wrench and model.full:
+            product(model.thruster_matrix, data.thrusts, data.command)
+    elif data.manual[0] == 0:
+        data.command[:] = 0.0
+    by_wrench = model.law_gives_wrench or not controls(model, data)
+    if by_wrench and model.through_thrusters:
+        stage, allocator = data.stage[0], data.allocator
+        lower, upper, direction = allocator.lower[stage], allocator.upper[stage], allocator.direction
+        data.saturated[0] = allocate(allocator.inverse[stage], lower, upper, direction, data.command, data.thrusts)
+    elif by_wrench:
+        copy(data.command, data.wrench)
+        if model.commands:
+            data.saturated[0] = bound_wrench(data.wrench)
+    if model.clock.size > 0:
+        data.worst[0] = max(data.worst[0], seconds(model.clock, data.ticks) - started)
+
+
+def controls(model: StepModel, data: StepData) -> bool:
+    """Return True if the law computes the forces: the command is not given, and there is a state."""
+    return data.manual[0] == 0 and (not model.through_sensors or data.navigation.started[0] > 0.0)
+
+
+def bound_wrench(wrench: Array) -> bool:
+    """Scale force and moment of a wrench to at most `MAX_WRENCH`; set them to 0 if they are not finite."""
+    changed = False
+    for part in range(2):
+        largest, finite = 0.0, True
+        for i in range(3 * part, 3 * part + 3):
+            largest = max(largest, abs(wrench[i]))
+            finite = finite and math.isfinite(wrench[i])
+        if not (finite and largest <= MAX_WRENCH):
+            changed = True
+            for i in range(3 * part, 3 * part + 3):
+                wrench[i] = wrench[i] * (MAX_WRENCH / largest) if finite else 0.0
+    return changed

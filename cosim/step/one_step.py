@@ -1,0 +1,92 @@
+"""The order of one step of the co-simulation."""
+
+from __future__ import annotations
+
+import math
+
+from controller.linear_algebra import copy
+from cosim.step.arbiter_inputs import write_arbiter_state
+from cosim.step.decision import arbitrate, call_back, control, exchange_delayed
+from cosim.step.placed_regions import advance_goal, evaluate, move_regions
+from cosim.step.plant_calls import PlantCalls, fmi_do_step, fmi_get, fmi_get_flags, fmi_set
+from cosim.step.sensing import fail_thrusters, measure
+from cosim.step.step_model import LOCATED, MEASURED, Array, Integers, StepData, StepModel
+
+
+def step(model: StepModel, data: StepData, plant: PlantCalls, k: int) -> None:
+    """Do step `k`; the last one does not advance the plant."""
+    data.k[0] = k
+    data.now[0] = k * model.step
+    fail_thrusters(model, data, plant)
+    if model.jacobi and k > 0:
+        exchange_delayed(model, data)
+    measure(model, data, plant)
+    decide(model, data, k % model.arbiter_every == 0, k % model.control_every == 0)
+    if k < model.steps and data.failed_step[0] < 0:
+        step_plant(model, data, plant)
+
+
+def decide(model: StepModel, data: StepData, arbitrates: bool, controls: bool) -> None:
+    """Evaluate the regions, and decide by the measured state."""
+    call_back(data, MEASURED)
+    locate(model, data)
+    call_back(data, LOCATED)
+    if data.failed_step[0] >= 0:
+        return
+    if arbitrates and not model.jacobi:
+        arbitrate(model, data)
+    if controls:
+        control(model, data)
+
+
+def advance(model: StepModel, data: StepData, plant: PlantCalls, span: Integers, rows: Array) -> None:
+    """Do span[1] steps from step span[0] on, and copy their rows; span[2] counts those that succeeded."""
+    span[2] = 0
+    for i in range(span[1]):
+        step(model, data, plant, span[0] + i)
+        if data.failed_step[0] >= 0:
+            break
+        span[2] = i + 1
+        if rows.shape[0] > 0:
+            copy(data.row, rows[i])
+
+
+def show_start(model: StepModel, data: StepData, plant: PlantCalls) -> None:
+    """Measure the initial state without noise, and evaluate the regions, as a run does that waits for its start."""
+    data.k[0] = 0
+    data.now[0] = 0.0
+    copy(plant.native.outputs, data.outputs[: data.applied[0]])
+    copy(data.true_state.position, data.state.position)
+    copy(data.true_state.quaternion, data.state.quaternion)
+    copy(data.true_state.velocity_body, data.state.velocity_body)
+    locate(model, data)
+
+
+def locate(model: StepModel, data: StepData) -> None:
+    """Move the regions, evaluate them at the arbiter's pose and at the true one, and advance the goal."""
+    if model.moving:
+        move_regions(model, data)
+    if model.full or data.k[0] % model.arbiter_every == 0:
+        write_arbiter_state(data.state, data.expected, data.arbiter_state)
+        if not model.exact:
+            evaluate(model, data, data.arbiter_state, data.given_evaluation)
+    evaluate(model, data, data.true_state, data.true_evaluation)
+    advance_goal(model, data)
+
+
+def step_plant(model: StepModel, data: StepData, plant: PlantCalls) -> None:
+    """Send the inputs, those of stuck thrusters as they are, and advance the plant."""
+    native = plant.native
+    own = data.stuck.size
+    for j in range(own):
+        given = data.delayed[j] if model.jacobi else data.inputs[j]
+        data.delayed[j] = data.inputs[j]
+        native.inputs[j] = data.stuck[j] if math.isfinite(data.stuck[j]) else given
+    copy(native.inputs[own:], data.inputs[own:])  # of a coupled plant: its caller sets them
+    if fmi_set(native) and fmi_do_step(native, data.now[0], model.step) and fmi_get(native) and fmi_get_flags(native):
+        first = data.applied[0]
+        copy(native.outputs[first:], data.outputs[first:])
+        for j in range(data.flags.size):
+            data.flags[j] = native.flags[j]
+    else:
+        data.failed_step[0] = data.k[0]

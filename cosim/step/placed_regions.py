@@ -1,0 +1,104 @@
+"""Goal and regions at their present positions, and their evaluation at a pose."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller import VehicleState
+from controller.regions import Sphere
+from controller.regions.region_set import PackedRegions, clearance_of_pose, clearance_of_sphere, evaluate_packed
+from controller.stack_array import zeros
+
+if TYPE_CHECKING:
+    from cosim.step.step_model import StepData, StepModel
+
+Array = NDArray[np.float64]
+
+_SPHERE = Sphere.kind
+_ROUNDING = 1e-6  # tolerance of times, as a part of a step
+
+
+class RegionEvaluation(NamedTuple):
+    """Values of goal and n regions at a pose; the goal's come first."""
+
+    values: Array  # (n + 1,) g, above 0 where violated
+    gradients: Array  # (n + 1, 3) derivative of g by position, world frame
+    rotation_gradients: Array  # (n + 1, 3) derivative of g by rotation, body frame [1/rad]
+    clearances: Array  # (n + 1,) distance left to each boundary: m, or rad of attitude
+
+
+class RegionPlaces(NamedTuple):
+    """Goal and regions at their present positions."""
+
+    goal: PackedRegions
+    regions: PackedRegions
+
+
+def evaluate_places(places: RegionPlaces, state: VehicleState, found: RegionEvaluation) -> None:
+    """Evaluate the goal into the first elements, and the regions into those behind, in one call."""
+    p, e, g, c = state.position, state.quaternion, found.values, found.clearances
+    evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.rotation_gradients[:1], c[:1])
+    evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.rotation_gradients[1:], c[1:])
+
+
+def evaluate(model: StepModel, data: StepData, state: VehicleState, evaluation: RegionEvaluation) -> None:
+    """Evaluate goal and regions at a pose: all values for a record, otherwise clearances alone."""
+    if model.full:
+        evaluate_places(RegionPlaces(data.goal, data.regions), state, evaluation)
+    else:
+        write_clearances_of_pose(data.goal, state, evaluation.clearances[:1])
+        write_clearances_of_pose(data.regions, state, evaluation.clearances[1:])
+
+
+def write_clearances_of_pose(regions: PackedRegions, state: VehicleState, clearances: Array) -> None:
+    """Write the clearance of each region, [m] or [rad], at a pose."""
+    scratch = zeros(3)
+    for i in range(regions.kinds.size):
+        if regions.kinds[i] == _SPHERE:
+            clearances[i] = clearance_of_sphere(regions, i, state.position)
+        else:
+            clearances[i] = clearance_of_pose(regions, i, state.position, state.quaternion, scratch)
+
+
+def move_regions(model: StepModel, data: StepData) -> None:
+    """Move goal and regions to their positions at the present time."""
+    move_packed(data.goal, data.goal_origin, data.now[0])
+    move_packed(data.regions, data.region_origins, data.now[0])
+    for i in range(model.moving_regions.size):
+        region = model.moving_regions[i]
+        for axis in range(3):
+            if region > 0:
+                data.shifts[i, axis] = data.regions.shifts[region - 1, axis]
+            else:
+                center = data.goal_center[axis] + data.goal.shifts[0, axis]
+                data.shifts[i, axis] = center - model.goal_center[axis]
+
+
+def move_packed(regions: PackedRegions, origins: Array, now: float) -> None:
+    """Move regions to their positions at a time [s]; origins (n, 3) [m, NED]."""
+    for i in range(regions.kinds.size):
+        for axis in range(3):
+            regions.shifts[i, axis] = regions.velocities[i, axis] * now + origins[i, axis]
+
+
+def advance_goal(model: StepModel, data: StepData) -> None:
+    """Move the goal to its next position, from the next step on, once the vehicle has stayed in it long enough."""
+    index = data.goal_index[0]
+    data.shown_goal_index[0] = index
+    if index == model.goal_places.shape[0]:
+        return
+    now, since = data.now[0], data.inside_since
+    since[0] = min(since[0], now) if data.true_evaluation.clearances[0] >= 0.0 else math.inf
+    if completed_steps(model, now - since[0]) >= model.goal_stay:
+        for axis in range(3):
+            data.goal_origin[0, axis] = model.goal_places[index, axis]
+        data.goal_index[0], since[0] = index + 1, math.inf
+
+
+def completed_steps(model: StepModel, duration: float) -> float:
+    """Return the number of steps in a duration [s], with a tolerance for its rounding."""
+    return duration / model.step + _ROUNDING

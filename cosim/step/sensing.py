@@ -1,0 +1,91 @@
+"""The beginning of a step: failures of thrusters, outages of sensors, and the measured state."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from controller.linear_algebra import copy
+from controller.navigation.navigator import navigate
+from cosim.step.placed_regions import completed_steps
+from cosim.step.plant_calls import PlantCalls, fmi_get, fmi_set
+from cosim.step.step_model import StepData, StepModel
+
+
+def fail_thrusters(model: StepModel, data: StepData, plant: PlantCalls) -> None:
+    """Fail the thrusters that are scheduled for this step, and report total failures."""
+    first = data.failures[0]
+    report_failures(model, data)
+    for i in range(first, data.failures[0]):
+        thruster, remaining = model.failed[i], model.remaining[i]
+        if remaining >= 0.0:
+            plant.effectiveness.inputs[thruster] = remaining
+            if not (fmi_set(plant.effectiveness) and fmi_get(plant.native)):
+                data.failed_step[0] = data.k[0]
+        else:
+            data.stuck[thruster] = plant.native.inputs[thruster]
+
+
+def report_failures(model: StepModel, data: StepData) -> None:
+    """Report total failures of thrusters that are due to law and allocation."""
+    i, k = data.failures[0], completed_steps(model, data.now[0])
+    while i < model.failed.size and model.failure_steps[i] <= k:
+        if model.report_failures and not model.remaining[i] > 0.0:
+            data.state.thruster_health[model.failed[i]] = 0.0
+            data.stage[0] = min(data.stage[0] + 1, data.allocator.lower.shape[0] - 1)
+        i += 1
+    data.failures[0] = i
+
+
+def measure(model: StepModel, data: StepData, plant: PlantCalls) -> None:
+    """Copy the plant's outputs, and write the state that law and arbiter receive."""
+    copy(plant.native.outputs, data.outputs[: data.applied[0]])
+    if model.through_sensors:
+        lose_samples(model, data, plant)
+    estimate_state(model, data)
+
+
+def estimate_state(model: StepModel, data: StepData) -> None:
+    """Write the state that law and arbiter receive."""
+    if model.through_sensors:
+        navigate(data.measurements, data.now, model.sensors, data.navigation, data.state)
+    else:
+        sense(model, data)
+
+
+def lose_samples(model: StepModel, data: StepData, plant: PlantCalls) -> None:
+    """Change the sensors' loss probabilities where an outage begins or ends with this step."""
+    i = data.outages[0]
+    while i < model.outage_steps.size and data.k[0] == model.outage_steps[i]:
+        plant.losses.inputs[model.outage_sensors[i]] = model.outage_losses[i]
+        if not fmi_set(plant.losses):
+            data.failed_step[0] = data.k[0]
+        i += 1
+    data.outages[0] = i
+
+
+def sense(model: StepModel, data: StepData) -> None:
+    """Write the measured state: with noise, held, or lost."""
+    true_state, state, now = data.true_state, data.state, data.now[0]
+    copy(true_state.quaternion, state.quaternion)
+    copy(true_state.velocity_body[3:], state.velocity_body[3:])
+    lost = model.dead_from <= now < model.dead_until
+    if lost and model.frozen and now > 0.0:
+        return
+    control = data.k[0] // model.control_every
+    if data.noise.shape[0] > 0:
+        control %= data.noise.shape[0]
+    for i in range(3):
+        state.position[i], state.velocity_body[i] = true_state.position[i], true_state.velocity_body[i]
+        if lost and not model.frozen:
+            state.position[i] = state.velocity_body[i] = np.nan
+        elif not (lost or model.exact):
+            state.position[i] += data.noise[control, i]
+            state.velocity_body[i] += data.noise[control, 3 + i]
+
+
+def position_is_known(model: StepModel, data: StepData) -> bool:
+    """Return True if the measured position is finite."""
+    x = data.state.position
+    return bool(model.exact) or (math.isfinite(x[0]) and math.isfinite(x[1]) and math.isfinite(x[2]))

@@ -1,0 +1,143 @@
+"""The constants of a step, and its state and signals: records of arrays that C and Python share."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controller import VehicleState
+from controller.navigation.estimate import NavigationMemory
+from controller.navigation.measurements import Measurements, SensorModel
+from controller.regions.region_set import PackedRegions
+from cosim.step.arbiter_inputs import ArbiterSignals, PackedInputs
+from cosim.step.placed_regions import RegionEvaluation
+
+Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+
+# indices in `StepData.calls`: law, arbiter, and what a run does after measuring and after evaluating the regions
+LAW, ARBITER, MEASURED, LOCATED = 0, 2, 4, 6
+N_CALLS = 8
+
+
+class Callable(Protocol):
+    """A function that C can call: its address, and that of its argument."""
+
+    address: int
+    words: int
+
+
+class StepModel(NamedTuple):
+    """Constants of a scenario."""
+
+    step: float  # s
+    steps: int  # number of steps
+    control_every: int  # steps between two control steps
+    arbiter_every: int  # steps between two evaluations of the arbiter
+    jacobi: bool  # True: the plant and the arbiter's weights receive what the step before gave
+    commands: bool  # True: a run with commands, which bound the wrench
+    full: bool  # True: values, gradients and the wrench of thrusters are computed too, for a record
+    criteria: Integers  # (n,) index of each region's criterion
+    priorities: Array  # (n,) factor of each region's violation in the score; laws do not receive it
+    inputs: PackedInputs  # sources of the arbiter's inputs
+    moving: bool  # True if any region moves
+    moving_regions: Integers  # (moving,) index of each region that moves, 0 for the goal
+    goal_center: Array  # (3,) m, NED: center of the goal in the scenario, from which its displacement counts
+    goal_places: Array  # (p, 3) m, NED: shifts of the goal to its next positions, in turn
+    goal_stay: int  # steps that the vehicle has to stay in the goal before it moves to its next position
+    exact: bool  # True if law and arbiter receive the true state
+    dead_from: float  # s, time at which position and linear velocity are lost
+    dead_until: float  # s, time at which they are measured again
+    frozen: bool  # True: their last values are held meanwhile; False: they are NaN
+    through_sensors: bool  # True: the law receives the navigation filter's estimate
+    sensors: SensorModel  # the filter's model of the sensors
+    outage_steps: Integers  # (o,) steps at which a sensor's loss probability changes, in order
+    outage_sensors: Integers  # (o,) index of the sensor
+    outage_losses: Array  # (o,) new loss probability
+    failed: Integers  # (f,) thrusters that fail, from 0, in the order of their failures
+    failure_steps: Integers  # (f,) steps at which they fail
+    remaining: Array  # (f,) remaining effectiveness; NaN for a thruster that is stuck at its last force
+    report_failures: bool  # True if failures are reported to the law
+    through_thrusters: bool  # True: thrusters give the wrench; False: it acts on the body directly
+    law_gives_wrench: bool  # True: the law gives a wrench; False: thruster forces
+    thruster_matrix: Array  # (6, m) body wrench of one newton of each thruster
+    bound: int  # index in the law's report of its bound of the clearances; -1: it has none
+    clock: Integers  # (3,) numbers of a `Clock`; (0,) if the law is not timed
+
+
+class Allocator(NamedTuple):
+    """Arguments of `controller.allocation.allocate`, with a stage for each number of reported failures."""
+
+    inverse: Array  # (stages, m, 6) N per N, N m: thruster forces for a wrench
+    lower: Array  # (stages, m) N
+    upper: Array  # (stages, m) N
+    direction: bool  # True: saturation keeps the wrench's direction; False: it clips each thruster
+
+
+class LawOutputs(NamedTuple):
+    """What a law writes into its own memory, beside its forces."""
+
+    estimate: Array  # (4,) N, N m: estimate of phi (12)
+    expected: Array  # (6,) prediction for the next step: m, NED, and m/s, body
+    report: Array  # (r,) diagnostics
+
+
+class StepData(NamedTuple):
+    """State and signals. Signals are parts of the row, if the row has them."""
+
+    row: Array  # (columns,)
+    k: Integers  # (1,) number of the step
+    now: Array  # (1,) s
+    outputs: Array  # (o,) the plant's outputs, from the beginning of the step, and from `applied` on from its end
+    applied: Integers  # (1,) index of the first output from the end of the step
+    forces: Array  # (m,) N, given by the thrusters; (0,) without thrusters
+    force: Array  # (3,) N, on the body
+    flags: Array  # (f,) Boolean outputs of the plant, from the end of the step
+    inputs: Array  # (i,) inputs of the plant, as computed; after the vehicle's own those that others set
+    wrench: Array  # (6,) N, N m: that of the inputs
+    delayed: Array  # (j,) the vehicle's own inputs in the step before
+    goal: PackedRegions
+    regions: PackedRegions
+    goal_center: Array  # (3,) m, NED: center of the present goal, without its shift
+    goal_origin: Array  # (1, 3) m, NED: shift of the goal, extrapolated to time 0
+    region_origins: Array  # (n, 3) m, NED
+    shifts: Array  # (moving, 3) m, NED
+    goal_index: Integers  # (1,) index of the goal's present position
+    shown_goal_index: Array  # (1,) the same during the step
+    inside_since: Array  # (1,) s, time since which the vehicle has been in the goal; inf: it is outside
+    true_state: VehicleState
+    state: VehicleState  # measured state, which law and arbiter receive
+    arbiter_state: VehicleState  # state that the arbiter uses
+    noise: Array  # (c, 6) m, m/s: added to position and linear velocity, in turn; (0, 6) without noise
+    measurements: Measurements
+    navigation: NavigationMemory
+    true_evaluation: RegionEvaluation
+    given_evaluation: RegionEvaluation  # at the arbiter's pose
+    signals: ArbiterSignals
+    shown_inputs: Array  # (m,) the memberships as inputs of a file's rules; (0,) for others
+    by_criterion: Array  # (criteria,) weight of each criterion
+    weights: Array  # (n,) weight of each region's criterion
+    calls: Integers  # (8,) addresses of C functions and of their arguments; 0: none
+    manual: Integers  # (1,) 1: the command is given, and the law does not compute it
+    law: LawOutputs
+    expected: Array  # (6,) prediction that the arbiter uses; NaN: none
+    estimate: Array  # (4,) N, N m: estimate before the last call of the law
+    report: Array  # (r,) diagnostics of the law
+    command: Array  # (6,) N, N m, body frame
+    saturated: Array  # (1,) 1 if the limits clipped the command
+    thrusts: Array  # (m,) N, commanded thruster forces
+    allocator: Allocator
+    stage: Integers  # (1,) number of reported failures
+    stuck: Array  # (j,) the vehicle's own inputs of stuck thrusters, NaN for others
+    failures: Integers  # (1,) number of failures so far
+    outages: Integers  # (1,) number of changes of sensors so far
+    failed_step: Integers  # (1,) step in which the FMU failed, -1 for none
+    ticks: Integers  # (2,) for `plant_calls.seconds`
+    worst: Array  # (1,) s of the wall clock, longest time of law and allocation in a step
+
+
+def set_call(data: StepData, which: int, call: Callable) -> None:
+    """Let a step call a function at `LAW`, `ARBITER`, `MEASURED` or `LOCATED`; the caller keeps it alive."""
+    data.calls[which : which + 2] = call.address, call.words
