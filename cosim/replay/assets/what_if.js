@@ -148,11 +148,9 @@ class WhatIf {
     const { recorded } = this;
     const { step, every } = this.flight.data; // the simulation has a row for each decision, the record for each step
     const isComplete = recorded.end - run.end <= step * every;
-    if (this.repeats !== 0 || !isComplete || run.rows <= recorded.rows) return;
-    // signals that the simulation lacks are held from row to row of the record, as it is drawn
-    const { signals } = recorded.header;
-    const columns = signals.map(({ name }) => run.column(name) ?? run.time.map((t) => recorded.held(name, t)));
-    this.recorded = this.run = new Run(recorded.header, columns);
+    const isFiner = isComplete && run.rows > recorded.rows && run.header.signals.length === recorded.header.signals.length;
+    if (this.repeats !== 0 || !isFiner) return;
+    this.recorded = this.run = run.withHeader(recorded.header);
     if (this.page.runs.length === 1) this.page.replace([this.recorded]);
   }
 

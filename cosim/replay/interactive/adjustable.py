@@ -4,19 +4,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from controller import ControllerError
 from controller.regions.region_set import shape_entry
 from controller.regions.shape import Shape
-from cosim.errors import ScenarioError
 from cosim.replay.interactive.flight import Flight
-from cosim.scenario.changes import value_at, with_values
+from cosim.scenario.changes import value_at
 from cosim.scenario.key_names import PARAMETERS, key_name
-from cosim.scenario.scenario import Scenario, validate_scenario
 from cosim.ssp.memory import Memory
-from plant_fmu import PlantFmuError
 
 BUOYANCY = f"{PARAMETERS}buoyancy"
 _STARTS = {**{f"plant.current.{i}": f"current.{axis}" for i, axis in enumerate("xyz")}, BUOYANCY: "buoyancy"}
@@ -72,14 +68,6 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
         name, value = key_name(key, scenario.table, scenario.vehicle), value_at(scenario.table, key, scenario.vehicle)
         slots.append(Slot(key, name.words, name.unit, float(value), *target))
     return slots, moves
-
-
-def changed_scenario(scenario: Scenario, changes: Mapping[str, float]) -> Scenario:
-    """Return a scenario with other numbers at some keys."""
-    try:
-        return validate_scenario(with_values(scenario.table, changes), scenario.name, scenario.vehicle)
-    except (PlantFmuError, ControllerError) as error:
-        raise ScenarioError(str(error)) from error
 
 
 def _positions(path: str, shape: Shape) -> Iterator[tuple[int, int, tuple[str, ...]]]:

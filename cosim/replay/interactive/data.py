@@ -9,10 +9,11 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from msgspec.structs import replace
 
 from cosim.errors import RunError
 from cosim.io.strict_json import nan_to_none
-from cosim.replay.interactive.adjustable import BUOYANCY, changed_scenario, find_slots
+from cosim.replay.interactive.adjustable import BUOYANCY, find_slots
 from cosim.replay.interactive.flight import Flight
 from cosim.replay.interactive.module import flight_module
 from cosim.replay.interactive.scenario_template import scenario_template
@@ -59,10 +60,11 @@ def flight_data(run: Run) -> dict[str, Any]:
 
 def _restoring(scenario: Scenario) -> dict[str, Any]:
     """Return the true restoring parameters (12) as a linear function of the buoyancy."""
-    buoyancy = float(scenario.plant.parameters.get("buoyancy", scenario.vehicle.buoyancy))
-    truth = scenario.true_restoring_parameters
-    slopes = changed_scenario(scenario, {BUOYANCY: buoyancy + 1.0}).true_restoring_parameters - truth
-    weight = scenario.plant.parameters.get("weight", scenario.vehicle.weight)
+    parameters, truth = scenario.plant.parameters, scenario.true_restoring_parameters
+    lighter = parameters | {"buoyancy": parameters.get("buoyancy", scenario.vehicle.buoyancy) + 1.0}
+    changed = dataclasses.replace(scenario, plant=replace(scenario.plant, parameters=lighter))
+    slopes = changed.true_restoring_parameters - truth
+    weight = parameters.get("weight", scenario.vehicle.weight)
     return {"key": BUOYANCY, "weight": weight, "truth": truth.tolist(), "slopes": slopes.tolist()}
 
 

@@ -24,7 +24,7 @@ from plant_fmu.running.channels import Channel
 from plant_fmu.running.native import Native
 from plant_fmu.variables import variables
 
-NEVER = -1  # step of an unused failure
+NEVER = 2**62  # step of an unused failure
 
 
 class Flight:
@@ -33,7 +33,8 @@ class Flight:
     def __init__(self, scenario: Scenario) -> None:
         require_fused(scenario, "a page that flies")
         self.scenario, self.law, self.start = scenario, law_of(scenario), start_values(scenario)
-        self._variables = {v.name: (reference, v) for reference, v in enumerate(variables(scenario.vehicle))}
+        self.variables = {v.name: v for v in variables(scenario.vehicle)}
+        self._references = {name: i for i, name in enumerate(self.variables)}
         through_state = scenario.sensing.through == "state"
         channels, sensed = vehicle_channels(scenario.vehicle), () if through_state else SENSED
         inputs, _ = exchanged_variables(scenario)
@@ -63,7 +64,7 @@ class Flight:
 
     def reference(self, name: str) -> int:
         """Return the value reference of a variable of the plant."""
-        return self._variables[name][0]
+        return self._references[name]
 
     def _native(self, inputs: Sequence[str], outputs: Sequence[str], flags: Sequence[str] = ()) -> Native:
         """Return the plant's C functions with buffers for some variables, at their start values."""
@@ -77,7 +78,7 @@ class Flight:
             get_values=Expression("(intptr_t)fmi3GetFloat64"),
             do_step=Expression("(intptr_t)fmi3DoStep"),
             input_references=references(inputs),
-            inputs=np.array([self.start.get(name, self._variables[name][1].start) for name in inputs], float),
+            inputs=np.array([self.start.get(name, self.variables[name].start) for name in inputs], float),
             output_references=references(outputs),
             outputs=np.zeros(len(outputs)),
             results=np.zeros(4, np.int64),

@@ -1,4 +1,4 @@
-"""The C of a flight: translated functions, the places of their arrays, and the start values of the plant."""
+"""The C of a flight: translated functions, their arrays, and the start values of the plant."""
 
 from __future__ import annotations
 
@@ -17,7 +17,6 @@ from cosim.step.score import fly
 from cosim.step.step_model import ARBITER, LAW
 from fuzzy_arbiter import Constant, Output, Rule, System, Term
 from fuzzy_arbiter.export import to_c
-from plant_fmu.variables import variables
 
 _MODEL = """\
 typedef struct {
@@ -120,14 +119,13 @@ def _strengths(system: System) -> System:
 def _scene(flight: Flight, token: str) -> Iterator[str]:
     """Yield the plant's start values, and the random numbers of the noise, as C."""
     scenario = flight.scenario
-    table = {v.name: (i, v.type) for i, v in enumerate(variables(scenario.vehicle))}
     yield f'#define PLANT_TOKEN "{token}"'
     for kind, prefix, names, c in (
         ("real", "START", "STARTS", "fmi3Float64"),
         ("integer", "WHOLE", "WHOLE_STARTS", "fmi3Int32"),
         ("boolean", "FLAG", "FLAG_STARTS", "fmi3Boolean"),
     ):
-        given = [(table[name][0], value) for name, value in flight.start.items() if table[name][1] == kind]
+        given = [(flight.reference(name), x) for name, x in flight.start.items() if flight.variables[name].type == kind]
         values = [number(float(value)) if kind == "real" else str(int(value)) for _, value in given]
         yield f"#define N_{names} {len(given)}"
         references = [str(at) for at, _ in given] or ["0"]

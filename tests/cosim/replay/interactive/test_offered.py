@@ -3,7 +3,7 @@
 import importlib.util
 import json
 import subprocess
-from dataclasses import fields, replace
+from dataclasses import asdict
 from importlib import resources
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,12 +16,13 @@ from controller.regions.region_set import shape_entry
 from controller.regions.shapes import ENTRIES
 from cosim.command_line.cli import main
 from cosim.errors import RunError
-from cosim.replay.interactive.adjustable import changed_scenario, find_slots
+from cosim.replay.interactive.adjustable import find_slots
 from cosim.replay.interactive.data import flight_data
 from cosim.replay.interactive.flight import Flight
 from cosim.replay.interactive.module import FlightModule, flight_module
 from cosim.replay.interactive.scenario_template import scenario_template
-from cosim.scenario.scenario import load_scenario
+from cosim.scenario.changes import with_values
+from cosim.scenario.scenario import load_scenario, validate_scenario
 from cosim.ssp.memory import Memory, arrays_of
 from plant_fmu.errors import BuildError
 from tests.cosim.replay.interactive.conftest import NODE
@@ -29,7 +30,7 @@ from tests.cosim.replay.interactive.conftest import NODE
 pytestmark = pytest.mark.medium
 
 WATER = ("current.x", "current.y", "current.z", "buoyancy")
-THEN = "then = [[6.1, -2.5, 3.2], [5.3, 0.7, 4.1]]"
+THEN = [[6.1, -2.5, 3.2], [5.3, 0.7, 4.1]]
 
 
 @pytest.fixture(scope="module")
@@ -68,56 +69,47 @@ def same(one, other):
     return one.shape == other.shape and np.array_equal(one, other, equal_nan=one.dtype == np.float64)
 
 
-def toml(shape):
-    return ", ".join(f"{field.name} = {nested(getattr(shape, field.name))}" for field in fields(shape))
-
-
-def nested(value):
-    return f"[{', '.join(map(nested, value))}]" if isinstance(value, tuple) else repr(value)
-
-
 def shapes():
-    """Return each kind of shape, and a prism whose corners are packed in the reverse order."""
-    examples = {name: entry.example for name, entry in ENTRIES.items()}
-    prism = examples["prism"]
-    return examples | {"reversed prism": replace(prism, corners=prism.corners[::-1])}
+    """Return each kind of shape as a table of a scenario, and a prism whose corners are packed in the reverse order."""
+    tables = {name: {"type": name} | asdict(entry.example) for name, entry in ENTRIES.items()}
+    return tables | {"reversed prism": tables["prism"] | {"corners": tables["prism"]["corners"][::-1]}}
 
 
-def with_every_shape():
-    regions = [
-        f"{{name = '{name}', criterion = 'shape', keep = 'out', gain = 1.0, hard = false, "
-        f"shape = {{type = '{name.split()[-1]}', {toml(shape)}}}}}"
-        for name, shape in shapes().items()
-    ]
-    return [f"regions=[{', '.join(regions)}]", "intersection=[]"]
+def flight_of(name, overrides=(), **table):
+    scenario = load_scenario(name, overrides)
+    return Flight(validate_scenario(scenario.table | table, name, scenario.vehicle))
 
 
-SCENARIOS = {
-    **{law: ("docking", [f"law.name={law}"]) for law in LAWS},
-    **{name: (name, []) for name in ("harbour", "depth-transit", "pipe-inspection", "dense-field")},
-    "wrench": ("paper", ["arbiter.engine=closed"]),
-    "every shape": ("docking", with_every_shape()),
-    **{f"goals, {name}": ("docking", [f"goal={{type = '{name.split()[-1]}', {toml(shape)}, {THEN}}}"])
-       for name, shape in shapes().items() if not shape_entry(shape).of_attitude},
+def regions_of_every_shape():
+    traits = {"criterion": "shape", "keep": "out", "gain": 1.0, "hard": False}
+    return [{"name": name, "shape": shape} | traits for name, shape in shapes().items()]
+
+
+FLIGHTS = {
+    **{law: lambda law=law: flight_of("docking", [f"law.name={law}"]) for law in LAWS},
+    **{name: lambda name=name: flight_of(name) for name in ("harbour", "depth-transit", "pipe-inspection")},
+    "wrench": lambda: flight_of("paper", ["arbiter.engine=closed"]),
+    "every shape": lambda: flight_of("docking", regions=regions_of_every_shape(), intersection=[]),
+    **{f"goals, {name}": lambda shape=shape: flight_of("docking", goal=shape | {"then": THEN})
+       for name, shape in shapes().items() if name not in ("orientation", "visibility")},
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("case", SCENARIOS)
+@pytest.mark.parametrize("case", FLIGHTS)
 def test_numbers_that_a_page_writes_are_those_of_the_changed_scenario(case, asked):
     """Everything else stays: no number that is offered enters a computation before the flight."""
-    name, overrides = SCENARIOS[case]
-    flight, memory = Flight(load_scenario(name, overrides)), Memory()
+    flight, memory = FLIGHTS[case](), Memory()
     slots, moves = find_slots(flight, memory)
     moved = {key: axis for axes in moves if axes for axis, keys in enumerate(axes) for key in keys}
     changes = {  # a region moves as a whole, by steps that leave the length of a cylinder
         slot.key: slot.value + (2.0 ** (moved[slot.key] - 8) if slot.key in moved else 1.3e-4 * (i + 1))
         for i, slot in enumerate(slots)
     }
-    other, job = Flight(changed_scenario(flight.scenario, changes)), asked(flight, memory, changes)
+    table = with_values(flight.scenario.table, changes)
+    other = Flight(validate_scenario(table, flight.scenario.name, flight.scenario.vehicle))
+    job = asked(flight, memory, changes)
     kept = set()
-    for array, changed in zip(
-        arrays_of((flight.fly, flight.control)), arrays_of((other.fly, other.control)), strict=True
-    ):
+    for array, changed in zip(*(arrays_of((of.fly, of.control)) for of in (flight, other)), strict=True):
         if array is flight.model.goal_center and shape_entry(flight.scenario.goal).center is None:
             continue  # rounds displacements in the record of a moving goal alone
         is_kept = array.dtype == np.float64 and array is not flight.noise and array is not flight.rows
@@ -144,32 +136,20 @@ def test_gains_water_noise_and_positions_are_adjustable(docking):
 
 
 def test_regions_of_every_shape_with_a_position_are_movable():
-    slots, moves = find_slots(Flight(load_scenario("docking", with_every_shape())), Memory())
-    offered = {slot.key for slot in slots}
-    expected = {"orientation": None, "depth_band": ([], [], ["depth"])}
-    expected["cylinder"] = tuple([f"start.{axis}", f"end.{axis}"] for axis in range(3))
-    for i, name in enumerate(shapes()):
-        axes = moves[1 + i]
-        assert (axes is None) == (name == "orientation"), name
-        if axes:
-            assert offered.issuperset(key for keys in axes for key in keys)
-        if name in expected and axes:
-            path = f"regions.{i}.shape."
-            assert [[key.removeprefix(path) for key in keys] for keys in axes] == list(expected[name])
+    numbers = {"cylinder": 6, "pipe": 9, "prism": 12, "reversed prism": 12, "depth_band": 1, "orientation": 0}
+    slots, moves = find_slots(flight_of("docking", regions=regions_of_every_shape(), intersection=[]), Memory())
+    assert [sum(map(len, axes or ())) for axes in moves[1:]] == [numbers.get(name, 3) for name in shapes()]
+    assert {slot.key for slot in slots} >= {key for axes in moves if axes for keys in axes for key in keys}
 
 
 @pytest.mark.parametrize("time", [0.5, 2.0, 9.0])
 @pytest.mark.parametrize("law", ["pd", "deployable"])
 def test_added_failure_is_that_of_a_scenario_with_it(law, time, asked):
-    own = [
-        "{thruster = 2, time = 3.0}",
-        "{thruster = 5, time = 1.0, stuck = true}",
-        "{thruster = 7, time = 2.0, effectiveness = 0.4}",
-    ]
-    settings = ["report_failures=true", f"law.name={law}"]
-    flight, memory = Flight(load_scenario("docking", [*settings, f"failures=[{', '.join(own)}]"])), Memory()
-    own.append(f"{{thruster = 3, time = {time}}}")
-    other = Flight(load_scenario("docking", [*settings, f"failures=[{', '.join(own)}]"]))
+    own = [{"thruster": 2, "time": 3.0}, {"thruster": 5, "time": 1.0, "stuck": True}]
+    own.append({"thruster": 7, "time": 2.0, "effectiveness": 0.4})
+    failures, settings = [own, [*own, {"thruster": 3, "time": time}]], ["report_failures=true", f"law.name={law}"]
+    flight, other = (flight_of("docking", settings, failures=of) for of in failures)
+    memory = Memory()
     job = asked(flight, memory, {}, {"thruster": 3, "time": time})
     for name in ("failed", "failure_steps", "remaining"):
         assert same(written(getattr(flight.model, name), memory, job), getattr(other.model, name)[:-1]), name
