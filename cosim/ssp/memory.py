@@ -57,10 +57,6 @@ class Memory:
         self._constants[id(array)] = expression
         self._kept.append(array)
 
-    def is_named(self, array: np.ndarray) -> bool:
-        """Return True if an array is a constant, or has the address of a C expression."""
-        return id(array) in self._constants
-
     def call(self, program: Program, name: str, arguments: tuple[Any, ...]) -> str:
         """Return the C code of ``void control_name(Model *m)``, which calls a function of the program."""
 
