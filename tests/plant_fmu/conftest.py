@@ -18,6 +18,7 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from plant_fmu import Plant, build_fmu, load_vehicle
 from plant_fmu.build import cached_fmu
+from plant_fmu.vehicle_component import make_vehicle_component
 
 STATES = [
     *(f"position.{a}" for a in "xyz"),
@@ -34,6 +35,11 @@ def extracted(path, modified):
     folder = extract(str(path))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder, read_model_description(folder)
+
+
+@functools.cache
+def coupled_odin():
+    return make_vehicle_component(load_vehicle("odin"), coupled=True)
 
 
 KINDS = {(2, "cs"): FMU2Slave, (3, "cs"): FMU3Slave, (2, "me"): FMU2Model, (3, "me"): FMU3Model}
@@ -181,8 +187,9 @@ def make_slave():
     """Return a function that makes slaves, closed when the test ends."""
     slaves = []
 
-    def make(vehicle="odin", fmi=3, **more):
-        slaves.append(CoSimulationInstance(cached_fmu(load_vehicle(vehicle), fmi), **more))
+    def make(vehicle="odin", fmi=3, coupled=False, **more):
+        what = coupled_odin() if coupled else load_vehicle(vehicle)
+        slaves.append(CoSimulationInstance(cached_fmu(what, fmi), **more))
         return slaves[-1]
 
     yield make

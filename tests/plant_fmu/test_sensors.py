@@ -1,8 +1,7 @@
-"""Measured outputs: true values by default, and samples with seeded noise."""
+"""Samples of the sensors and their seeded noise; test_derivatives has the true values."""
 
 import numpy as np
 import pytest
-from scipy import stats
 from scipy.spatial.transform import Rotation
 
 from tests.plant_fmu.conftest import STATES
@@ -29,28 +28,6 @@ def test_of_two_uniform_numbers_the_first_is_above_0_and_may_be_1(make_slave, fm
     expected = normal(2705167, 0, 0)
     assert 0.0 < abs(expected) < 2e-3
     assert slave.get("measured.depth", "position.z") == [pytest.approx(expected, rel=1e-12, abs=0.0), 0.0]
-
-
-def test_sensors_are_ideal_by_default(make_slave, fmi):
-    slave = make_slave(fmi=fmi).start(**TILTED, **{"position.z": 5.0, "bottom_depth": 30.0})
-    slave.set_values({"wrench.X": 10.0})
-    slave.step(1.0)
-    true = {"heading": "attitude.yaw", "depth": "position.z"} | {
-        f"angular_velocity.{a}": f"velocity.{a}" for a in "pqr"
-    }
-    channels = [channel for channel, _, _ in SENSORS if not channel.startswith("acceleration")]
-    assert slave.get(*(f"measured.{c}" for c in channels)) == slave.get(*(true.get(c, c) for c in channels))
-    assert slave.get("altitude") == [30.0 - slave.get("position.z")[0]]
-
-
-def test_an_accelerometer_at_rest_feels_gravity_upwards(make_slave, fmi):
-    """A neutral vehicle at rest, rolled by 30 degrees: the specific force is 9.81 m/s2 towards the surface."""
-    roll = np.radians(30.0)
-    slave = make_slave(fmi=fmi).start(
-        weight=1228.25, **{"quaternion.e0": np.cos(roll / 2), "quaternion.e1": np.sin(roll / 2), "r_G.z": 0.0}
-    )
-    expected = Rotation.from_euler("x", roll).inv().apply([0.0, 0.0, -9.81])
-    assert slave.get(*(f"measured.acceleration.{a}" for a in "xyz")) == pytest.approx(list(expected), abs=1e-12)
 
 
 def test_specific_force_is_the_second_derivative_of_the_path(make_slave):
@@ -100,39 +77,6 @@ def test_samples_do_not_depend_on_the_communication_step(make_slave, fmi):
             slave.fmu.doStep(3.0 * k / n, 3.0 * (k + 1) / n - 3.0 * k / n)
         ends.append(slave.get("measured.depth")[0])
     assert ends == pytest.approx([ends[0]] * 4, abs=1e-9)
-
-
-def test_noise_is_normal_and_white(make_slave):
-    slave = make_slave().start(
-        weight=1228.25, **{"depth_sensor.rate": 1e3, "depth_sensor.noise": 0.5, "usbl.rate": 1e3, "usbl.noise": 2.0}
-    )
-    rows = []
-    for k in range(4000):
-        slave.fmu.doStep(k * 1e-3, 1e-3)
-        rows.append(slave.get("measured.depth", "measured.position.x"))
-    depth, x = np.array(rows).T
-    assert stats.kstest(depth / 0.5, "norm").pvalue > 1e-3
-    assert stats.kstest(x / 2.0, "norm").pvalue > 1e-3
-    assert abs(np.corrcoef(depth, x)[0, 1]) < 0.06
-    assert abs(np.corrcoef(depth[1:], depth[:-1])[0, 1]) < 0.06
-
-
-def test_seeds_differ_and_repeat(make_slave, fmi):
-    def samples(seed):
-        slave = make_slave(fmi=fmi).start(**{"usbl.rate": 1.0, "usbl.noise": 1.0, "seed": seed})
-        return slave.get("measured.position.x", "measured.position.y")
-
-    assert samples(1) == samples(1)
-    assert len({*samples(1), *samples(2)}) == 4
-
-
-def test_biases_add_up_and_headings_wrap(make_slave, fmi):
-    half = np.pi / 2 - 0.01  # yaw of pi - 0.02
-    attitude = {"quaternion.e0": np.cos(half), "quaternion.e3": np.sin(half)}
-    biases = {"compass.bias": 0.05, "depth_sensor.bias": 0.3, "imu.angular_velocity_bias.q": 0.01}
-    slave = make_slave(fmi=fmi).start(**attitude, **biases)
-    assert slave.get("measured.heading")[0] == pytest.approx(-np.pi + 0.03)
-    assert slave.get("measured.depth", "measured.angular_velocity.q") == [0.3, 0.01]
 
 
 def test_sensor_rate_may_change_during_a_run(make_slave, fmi):
@@ -203,38 +147,3 @@ def test_sample_loss_and_outliers_use_their_own_streams(make_slave, fmi):
         lost, outliers = lost + is_lost, outliers + (is_outlier and not is_lost)
         slave.step(0.1)
     assert lost > 5 and outliers > 5
-
-
-def test_sensor_outage_can_start_and_end_during_a_run(make_slave, fmi):
-    slave = make_slave(fmi=fmi).start(**{"dvl.rate": 10.0, "velocity.u": 1.0})
-    slave.step(0.95)
-    slave.set_values({"dvl.loss_probability": 1.0})
-    before = slave.get("measured.velocity.u", "measured.time.dvl")
-    slave.step(5.0)
-    assert slave.get("measured.velocity.u", "measured.time.dvl") == before
-    slave.set_values({"dvl.loss_probability": 0.0})
-    slave.step(0.1)
-    assert slave.get("measured.time.dvl")[0] == pytest.approx(6.0)
-
-
-def test_restored_state_keeps_delayed_samples(make_slave, fmi):
-    slave = make_slave(fmi=fmi).start(
-        **{"dvl.rate": 20.0, "dvl.delay": 0.3, "dvl.velocity_noise": 0.1, "dvl.loss_probability": 0.3, "wrench.X": 50.0}
-    )
-    names = ("measured.velocity.u", "measured.velocity.w", "measured.time.dvl")
-    slave.step(1.0)
-    state = slave.save()
-    rows = []
-    for _ in range(2):
-        slave.restore(state)
-        rows.append([])
-        for k in range(20):
-            slave.fmu.doStep(1.0 + 0.05 * k, 0.05)
-            rows[-1].append(slave.get(*names))
-    assert rows[0] == rows[1]
-    assert len({tuple(row) for row in rows[0]}) > 8
-
-
-def test_a_scale_error_is_part_of_the_velocity(make_slave, fmi):
-    slave = make_slave(fmi=fmi).start(**{"velocity.u": 2.0, "velocity.w": -1.0, "dvl.scale_error": 0.01})
-    assert slave.get("measured.velocity.u", "measured.velocity.w") == pytest.approx([2.02, -1.01])

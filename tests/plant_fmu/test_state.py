@@ -11,8 +11,9 @@ LIVELY = {
     "velocity.u": 0.4, "velocity.r": 0.3, "position.z": 2.0, "current.x": 0.2, "seed": 7, "current_variation.x": 0.2,
     "current_variation.z": 0.1, "current_correlation_time": 3.0, "current_variation_period": 0.13,
     "depth_sensor.rate": 9.0, "depth_sensor.noise": 0.05, "imu.rate": 70.0, "imu.acceleration_noise": 0.1,
-    "dvl.rate": 7.0, "dvl.velocity_noise": 0.02, "compass.rate": 11.0, "compass.noise": 0.01, "usbl.rate": 1.0,
-    "usbl.noise": 0.5, "thrust_time_constant[1]": 0.2, "thrust_rate_limit[2]": 30.0, "wrench_time_constant": 0.4,
+    "dvl.rate": 7.0, "dvl.velocity_noise": 0.02, "dvl.delay": 0.3, "dvl.loss_probability": 0.3, "compass.rate": 11.0,
+    "compass.noise": 0.01, "usbl.rate": 1.0, "usbl.noise": 0.5, "thrust_time_constant[1]": 0.2,
+    "thrust_rate_limit[2]": 30.0, "wrench_time_constant": 0.4,
 }  # fmt: skip
 
 

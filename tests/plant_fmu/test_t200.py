@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from plant_fmu.t200 import PULSES, RPM, VOLTAGES, force_of_pulse
-from tests.plant_fmu.t200_by_rpm import force_of_rpm
+from plant_fmu.t200 import RPM, force_of_pulse
+from tests.plant_fmu.transcription import t200_force
 
 # us, V, rev/min without a sign, kgf; of Blue Robotics' table of September 2019, none of the points kept here
 ROWS = [
@@ -14,6 +14,10 @@ ROWS = [
     (1124, 18, 3528, -4.35), (1580, 18, 1052, 0.43), (1224, 20, 2856, -2.67), (1828, 20, 3380, 4.82),
 ]  # fmt: skip
 KGF = 9.80665  # N
+
+
+def force_of_rpm(rpm, voltages):
+    return np.array([t200_force(*point, RPM) for point in zip(rpm, voltages, strict=True)])
 
 
 @pytest.mark.parametrize(
@@ -38,16 +42,6 @@ def test_rows_between_the_kept_ones_differ_by_what_the_docs_say():
     np.testing.assert_allclose(force_of_rpm(np.sign(forces) * rpm, voltages), forces, rtol=0.0, atol=1.6)
 
 
-def test_revolutions_of_a_pulse_have_its_force():
-    """Also between pulses and voltages: both are linear there."""
-    for voltage in (10.0, 11.3, 15.0, 18.9, 20.0):
-        for pulse in np.arange(1100.0, 1901.0, 7.0):
-            rows = [np.interp(pulse, PULSES, row) for row in RPM]
-            at, pulse_at = np.array([voltage]), np.array([pulse])
-            rpm = np.array([np.interp(voltage, VOLTAGES, rows)])
-            np.testing.assert_allclose(force_of_rpm(rpm, at), force_of_pulse(pulse_at, at), rtol=0.0, atol=1e-12)
-
-
 def test_force_grows_with_voltage_and_is_zero_at_neutral():
     pulses = np.arange(1100.0, 1901.0, 5.0)
     low, high = (force_of_pulse(pulses, np.full_like(pulses, volts)) for volts in (12.0, 15.3))
@@ -64,4 +58,3 @@ def test_force_grows_with_revolutions_up_to_those_of_the_voltage():
     assert (np.diff(forces) >= 0.0).all()
     assert forces[90] == 0.0 and forces[89] < 0.0 < forces[91]
     assert (forces[[0, -1]] == force_of_pulse(np.array([1100.0, 1900.0]), at[:2])).all()
-    assert np.isnan(force_of_rpm(np.array([np.nan, 900.0]), np.array([15.0, np.nan]))).all()

@@ -5,6 +5,9 @@ It takes complex numbers, so that complex steps give its derivatives to rounding
 
 import numpy as np
 
+from plant_fmu.t200 import FORCES as T200_FORCES
+from plant_fmu.t200 import PULSES, RPM, VOLTAGES
+
 AXES, VELOCITIES, FORCES = "xyz", "uvwpqr", "XYZKMN"
 TURN = 2 * np.pi
 
@@ -58,9 +61,41 @@ def mass_matrices(v):
     return rigid, added
 
 
+def t200_force(command, voltage, commands):
+    """Force [N] at a pulse [us] or revolutions [rev/min]; `commands` has a row of points for each voltage."""
+    row = int(np.clip((np.real(voltage) - VOLTAGES[0]) // 2.0, 0, len(VOLTAGES) - 2))
+    blend = (voltage - VOLTAGES[row]) / 2.0  # a point keeps its command and its force together between voltages
+    xs, ys = (table[row] + blend * (table[row + 1] - table[row]) for table in (commands, T200_FORCES))
+    i = int(np.clip(np.searchsorted(np.real(xs), np.real(command)) - 1, 0, len(xs) - 2))
+    return ys[i] + clip((command - xs[i]) / (xs[i + 1] - xs[i]), 0, 1) * (ys[i + 1] - ys[i])
+
+
+PULSE_ROWS = np.tile(PULSES, (len(VOLTAGES), 1))
+
+
+def commanded_thrust(v, i):
+    command = v[f"thrust[{i}]"]
+    if f"thrust_pulse[{i}]" not in v:
+        return command
+    share, pulse = v[f"thrust_normalized[{i}]"], v[f"thrust_pulse[{i}]"]
+    command = command + share * (v[f"thrust_max[{i}]"] if np.real(share) > 0 else -v[f"thrust_min[{i}]"])
+    command = command + (t200_force(pulse, v["supply_voltage"], PULSE_ROWS) if np.real(pulse) > 0 else 0)
+    return command + t200_force(v[f"thrust_rpm[{i}]"], v["supply_voltage"], RPM)
+
+
+def external_wrench(v, R):
+    """Wrench of the coupling inputs in body axes; 0 for a plant that has none."""
+    total = np.zeros(6)
+    for frame, to_body in (("world", R.T), ("body", np.eye(3))):
+        if f"external.{frame}.force.x" in v:
+            force, moment = (to_body @ vector(v, f"external.{frame}.{kind}") for kind in ("force", "moment"))
+            total = total + np.r_[force, moment + np.cross(vector(v, f"external.{frame}.point"), force)]
+    return total
+
+
 def steady_thrust(v, i):
     low, high = v[f"thrust_min[{i}]"], v[f"thrust_max[{i}]"]
-    command = clip(v[f"thrust[{i}]"], low, high)
+    command = clip(commanded_thrust(v, i), low, high)
     limit = high if np.real(command) > 0 else low
     dead, curve = v[f"thrust_dead_band[{i}]"], v[f"thrust_curve[{i}]"]
     live = (command / limit - dead) / (1 - dead)
@@ -110,11 +145,14 @@ def evaluate(v, n_thrusters, drift=(0, 0, 0), drift_slope=(0, 0, 0)):
     """Return all calculated variables of continuous sensors by name; `drift` is the current's variation now."""
     out = {}
     forces = []
+    if "current_input.x" in v:
+        drift, drift_slope = (np.array(a) + vector(v, b) for a, b in
+                              ((drift, "current_input"), (drift_slope, "current_input_rate")))  # fmt: skip
     for i in range(1, n_thrusters + 1):
         lag = v[f"thrust_time_constant[{i}]"], v[f"thrust_rate_limit[{i}]"]
         rate, force = lagging(v[f"actuator.thrust[{i}]"], steady_thrust(v, i), *lag)
         out[f"der(actuator.thrust[{i}])"] = rate
-        forces.append(force * v[f"thrust_effectiveness[{i}]"])
+        forces.append(force * v[f"thrust_effectiveness[{i}]"] * (1 - v.get(f"thrust_failure[{i}]", 0)))
         out[f"thruster_force[{i}]"] = forces[-1]
     tau = []
     for i, (name, target) in enumerate(zip(FORCES, steady_wrench(v), strict=True), 1):
@@ -150,7 +188,8 @@ def evaluate(v, n_thrusters, drift=(0, 0, 0), drift_slope=(0, 0, 0)):
     g = -np.r_[(W - B) * k, np.cross(vector(v, "r_G") * W - vector(v, "r_B") * B, k)]
     bottom = np.r_[R.T @ contact(v, M_RB + M_A, depth, velocity_world), np.zeros(3)]
     force = np.array(tau) - coriolis(M_RB, nu) @ nu - coriolis(M_A, nu_r) @ nu_r - damping * nu_r - g
-    nu_rate = np.linalg.solve(M_RB + M_A, force + bottom + M_A @ nu_c_rate)
+    force = force + bottom + external_wrench(v, R)
+    nu_rate = np.linalg.solve(M_RB + M_A, force + M_A @ nu_c_rate)
     out |= {f"der(velocity.{a})": x for a, x in zip(VELOCITIES, nu_rate, strict=True)}
 
     roll, yaw = angle(R[2, 1], R[2, 2]), angle(R[1, 0], R[0, 0])
@@ -159,14 +198,23 @@ def evaluate(v, n_thrusters, drift=(0, 0, 0), drift_slope=(0, 0, 0)):
     specific = nu_rate[:3] + np.cross(omega, nu[:3]) - v["gravity"] * k
     out["measured.depth"] = depth + v["depth_sensor.bias"]
     out["measured.altitude"] = out["altitude"]
-    out["measured.heading"] = yaw + v["compass.bias"]
+    heading = yaw + v["compass.bias"]
+    out["measured.heading"] = heading - TURN * np.round(np.real(heading) / TURN)
     for i, a in enumerate(AXES):
         out[f"measured.velocity.{'uvw'[i]}"] = (1 + v["dvl.scale_error"]) * nu[i]
         out[f"measured.acceleration.{a}"] = specific[i] + v[f"imu.acceleration_bias.{a}"]
         rate = "pqr"[i]
         out[f"measured.angular_velocity.{rate}"] = omega[i] + v[f"imu.angular_velocity_bias.{rate}"]
         out[f"measured.position.{a}"] = v[f"position.{a}"]
-    out |= {
-        f"measured.time.{sensor}": v.get("time", 0.0) for sensor in ("depth_sensor", "dvl", "imu", "compass", "usbl")
+    sensors = ("depth_sensor", "dvl", "imu", "compass", "usbl")
+    return out | {f"measured.time.{sensor}": v.get("time", 0.0) for sensor in sensors}
+
+
+def flags(v, n_thrusters):
+    """Return all Boolean outputs by name."""
+    low_high = [(v[f"thrust_min[{i}]"], v[f"thrust_max[{i}]"]) for i in range(1, n_thrusters + 1)]
+    saturated = [not low <= commanded_thrust(v, i) <= high for i, (low, high) in enumerate(low_high, 1)]
+    return {f"thrust_saturated[{i}]": flag for i, flag in enumerate(saturated, 1)} | {
+        "wrench_saturated": norm(vector(v, "wrench", FORCES[:3])) > v["wrench_force_limit"],
+        "bottom_contact": v["position.z"] + v["hull_radius"] > v["bottom_depth"],
     }
-    return out
