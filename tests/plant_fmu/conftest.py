@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fmpy import extract, read_model_description
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackLoggerTYPE
 from fmpy.fmi2 import defaultCallbacks as defaults
 from fmpy.fmi3 import FMU3Model, FMU3Slave
@@ -161,6 +162,16 @@ class CoSimulationInstance:
 
     def close(self):
         self.fmu.freeInstance()
+
+
+def refused(slave, call, *words, status=3):
+    """Require that an FMU refuses a call with this status or a worse one, and logs the words."""
+    slave.said.clear()
+    with pytest.raises(FMICallException) as caught:
+        call()
+    text = " ".join(message for _, message in slave.said)
+    assert caught.value.status >= status and all(logged >= status for logged, _ in slave.said)
+    assert slave.said and all(word in text for word in words), text
 
 
 @pytest.fixture(params=[2, 3], ids=["fmi2", "fmi3"])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-SLOW = {"weight": 131.588, "substep": 0.5}
+from tests.plant_fmu.conftest import refused
 
 
 @pytest.mark.slow
@@ -12,7 +12,7 @@ def test_step_with_unstable_stages_is_rejected(make_slave):
     """Ends may rest by chance while the stages between do not: each accepted run stays near the true speed."""
     accepted = 0
     for force in [5.0, *np.linspace(1.0, 400.0, 60)]:
-        slave = make_slave("bluerov2_heavy").start(**SLOW)
+        slave = make_slave("bluerov2_heavy").start(weight=131.588, substep=0.5)
         slave.set_values({"wrench.X": force})
         true = (-13.7 + np.sqrt(13.7**2 + 4 * 141.0 * force)) / (2 * 141.0)
         try:
@@ -36,9 +36,7 @@ def test_step_with_unstable_stages_is_rejected(make_slave):
 )
 def test_motion_too_fast_for_the_substep_is_rejected(make_slave, fmi, values, substep):
     slave = make_slave(fmi=fmi).start(**values, substep=substep)
-    with pytest.raises(FMICallException):
-        slave.step(10 * substep)
-    assert "too long for this motion" in slave.said[-1][1]
+    refused(slave, lambda: slave.step(10 * substep), "too long for this motion", status=2)
 
 
 def test_sample_ticks_continue_through_time_zero(make_slave, fmi):
@@ -46,28 +44,24 @@ def test_sample_ticks_continue_through_time_zero(make_slave, fmi):
     model = make_slave(fmi=fmi, interface="me")
     model.set_values({"imu.rate": 1e4})
     model.begin(-1500.0)
+    _, following = model.update_discrete()
     for near in (-15.0886, -1.9999, -1e-3):
-        _, following = model.update_discrete()
-        model.fmu.enterContinuousTimeMode()
-        model.fmu.setTime(near)
-        model.fmu.enterEventMode()
-        for _ in range(300):
-            _, following = model.update_discrete()
+        time = near
+        for _ in range(301):
             model.fmu.enterContinuousTimeMode()
-            model.fmu.setTime(following)
+            model.fmu.setTime(time)
             model.fmu.enterEventMode()
-            _, after = model.update_discrete()
-            assert after > following
+            before, (_, following) = time, model.update_discrete()
+            assert following > before
+            time = following
 
 
 @pytest.mark.medium
 def test_accumulated_step_times_miss_no_sample(make_slave, fmi):
     """A minute and more of 10 ms steps at 100 Hz: each step ends with its own sample."""
     slave = make_slave(fmi=fmi).start(**{"depth_sensor.rate": 100.0, "wrench.Z": 20.0, "substep": 0.01})
-    t = 0.0
     for _ in range(30_000):
-        slave.fmu.doStep(t, 0.01)
-        t += 0.01
+        slave.step(0.01)
         measured, true = slave.get("measured.depth", "position.z")
         assert abs(measured - true) < 1e-7
 
@@ -98,16 +92,13 @@ def test_repeated_step_is_rejected(make_slave, fmi, start):
     slave.begin(start)
     slave.fmu.doStep(start, 1e-3)
     for time in (start, start + 0.05):
-        with pytest.raises(FMICallException):
-            slave.fmu.doStep(time, 1e-3)
+        refused(slave, lambda: slave.fmu.doStep(time, 1e-3))  # noqa: B023
 
 
 def test_time_beyond_the_representable_range_is_rejected(make_slave, fmi):
     slave = make_slave(fmi=fmi)
     slave.begin(1e9)
-    with pytest.raises(FMICallException):
-        slave.step(1.0)
-    assert "beyond 1e+09 s" in slave.said[-1][1]
+    refused(slave, lambda: slave.step(1.0), "beyond 1e+09 s")
 
 
 def test_outputs_of_initialization_are_those_after_it(make_slave, fmi):
@@ -131,13 +122,12 @@ def test_zero_quaternion_has_zero_derivatives(make_model, length):
     x = model.states()
     x[3:7] = [length, 0.0, 0.0, 0.0]
     model.put_states(x)
-    found = model.jacobian(
-        ["der(position.x)", "attitude.yaw", "der(velocity.w)"], [f"quaternion.e{i}" for i in range(4)]
-    )
-    assert (found == 0.0).all()
+    unknowns = ["der(position.x)", "attitude.yaw", "der(velocity.w)"]
+    assert not model.jacobian(unknowns, [f"quaternion.e{i}" for i in range(4)]).any()
 
 
 @pytest.mark.parametrize("i", range(4))
 def test_non_unit_quaternion_is_normalized_and_logged(make_slave, fmi, i):
-    said = make_slave(fmi=fmi, logging_on=True).start(**{"quaternion.e0": 0.0, f"quaternion.e{i}": 1.5}).said
-    assert said[0][1] == "quaternion of length 1.5 normalized"
+    slave = make_slave(fmi=fmi, logging_on=True).start(**{"quaternion.e0": 0.0, f"quaternion.e{i}": 1.5})
+    assert slave.said[0][1] == "quaternion of length 1.5 normalized"
+    assert slave.get(f"quaternion.e{i}") == [1.0]

@@ -20,7 +20,7 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import PLATFORMS
 from plant_fmu.errors import BuildError
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
-from tests.plant_fmu.libraries import commands, parts, read_libraries
+from tests.plant_fmu.libraries import macs, parts, read_libraries
 
 pytestmark = pytest.mark.timeout(900)  # libraries for all platforms take minutes beside other tests
 
@@ -40,17 +40,6 @@ def binaries(path):
         return {name.split("/")[1]: archive.read(name) for name in archive.namelist() if name.startswith("binaries/")}
 
 
-def test_library_readers_parse_third_party_libraries():
-    """The readers of this folder, on libraries that FMPy ships."""
-    files = sorted((Path(fmpy.__file__).parent / "sundials").glob("*/sundials_cvode.*"))
-    if not files:
-        pytest.skip("this FMPy ships no libraries")
-    for file in files:
-        for library in read_libraries(file.read_bytes()):
-            assert {"CVode", "CVodeCreate", "CVodeFree"} <= library.exports
-            assert any("sundials_core" in name for name in library.needs)
-
-
 @pytest.mark.slow
 def test_every_platform_has_its_binaries_folder(all_platforms, fmi):
     with zipfile.ZipFile(all_platforms(fmi)) as archive:
@@ -64,44 +53,25 @@ def test_every_platform_has_its_binaries_folder(all_platforms, fmi):
 
 
 @pytest.mark.slow
-def test_each_library_is_for_its_machine(all_platforms, fmi):
-    for folder, data in binaries(all_platforms(fmi)).items():
-        machines = MACHINES.get(folder, [folder.split("-")[0]])
-        assert [library.machine for library in read_libraries(data)] == machines
-
-
-@pytest.mark.slow
-def test_exactly_the_fmi_api_is_exported(all_platforms, fmi):
+def test_libraries_export_the_api_and_need_only_the_system(all_platforms, fmi):
+    """Each for its machine; none contains a path of the build."""
     header = (HEADERS / f"fmi{fmi}Functions.h").read_text()
     api = set(re.findall(rf"FMI{fmi}_Export\s+fmi{fmi}\w+TYPE\s+(fmi{fmi}\w+);", header))
     assert len(api) > 40
-    for folder, data in binaries(all_platforms(fmi)).items():
-        for library in read_libraries(data):
-            assert library.exports - (OF_THE_LINKER if "darwin" in folder else set()) == api, folder
-
-
-@pytest.mark.slow
-def test_libraries_depend_only_on_system_libraries(all_platforms, fmi):
-    for folder, data in binaries(all_platforms(fmi)).items():
-        for library in read_libraries(data):
-            assert library.needs
-            if "linux" in folder:
-                assert library.needs <= {"libc.so.6", "libm.so.6"}
-                versions = {tuple(map(int, v.removeprefix("GLIBC_").split("."))) for v in library.versions}
-                assert max(versions) <= (2, 17)
-            elif "win" in folder and "darwin" not in folder:
-                assert {n for n in library.needs if not n.startswith("api-ms-win-crt-")} == {"KERNEL32.dll"}
-                assert library.name == "odin.dll"
-            else:
-                assert library.needs == {"/usr/lib/libSystem.B.dylib"}
-                assert library.name == "@rpath/odin.dylib"
-                assert library.minimum == "11.0"
-
-
-@pytest.mark.slow
-def test_libraries_contain_no_paths(all_platforms, fmi):
     places = {"/tmp", "/root", "/home", "/Users", "C:\\", "plant_fmu", ".pdb", str(Path.home()), sys.prefix}
     for folder, data in binaries(all_platforms(fmi)).items():
+        libraries = read_libraries(data)
+        assert [library.machine for library in libraries] == MACHINES.get(folder, [folder.split("-")[0]])
+        for library in libraries:
+            if "linux" in folder:
+                assert library.needs <= {"libc.so.6", "libm.so.6"} and library.minimum <= (2, 17)
+            elif "darwin" in folder:
+                assert library.needs == {"/usr/lib/libSystem.B.dylib"} and library.minimum == (11, 0)
+                assert library.name == "@rpath/odin.dylib"
+            else:
+                assert {n for n in library.needs if not n.startswith("api-ms-win-crt-")} == {"KERNEL32.dll"}
+                assert library.name == "odin.dll"
+            assert library.exports - (OF_THE_LINKER if "darwin" in folder else set()) == api, folder
         assert not [place for place in places if place.encode() in data], folder
         assert not re.search(rb"\w\w\.c\0", data), folder  # a file's name: the bytes of ".c" alone may be an address
 
@@ -119,8 +89,7 @@ def test_builds_for_all_platforms_are_reproducible(all_platforms, fmi, tmp_path,
 def test_arm_mac_signatures_are_valid(all_platforms, fmi):
     """They load no library without one; it holds a hash of each page (Apple's cs_blobs.h)."""
     data = binaries(all_platforms(fmi))["darwin64" if fmi == 2 else "aarch64-darwin"]
-    library = parts(data)[1] if fmi == 2 else data
-    ((signature,),) = [struct.unpack_from("<I", library, at + 8) for kind, at, _ in commands(library) if kind == 0x1D]
+    library, signature = parts(data)[-1], macs(data)[-1].code_signature.data_offset
     directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
     magic, _, _, _, hashes, _, _, slots, limit = struct.unpack_from(">9I", library, directory)
     size, kind, _, page = struct.unpack_from(">4B", library, directory + 36)
@@ -134,33 +103,14 @@ def test_arm_mac_signatures_are_valid(all_platforms, fmi):
 @pytest.mark.slow
 def test_mac_stub_symbols_match_their_pointers(all_platforms, fmi):
     """Each call leaps through a pointer, and both have their symbol's number: ziglang's linker forgets some with -x."""
-    found = [data for folder, data in binaries(all_platforms(fmi)).items() if "darwin" in folder]
-    for library in [part for data in found for part in (parts(data) if data[0] == 0xCA else [data])]:
-        numbers, sections = (), {}
-        for kind, at, size in commands(library):
-            if kind == 0x0B:  # dynamic symbols
-                place, n = struct.unpack_from("<2I", library, at + 56)
-                numbers = struct.unpack_from(f"<{n}I", library, place)
-            elif kind == 0x19:  # segment
-                for i in range(at + 72, at + size, 80):
-                    name = library[i : i + 16].rstrip(b"\0").decode()
-                    length, first, step = (struct.unpack_from("<Q", library, i + 40)[0],
-                                           *struct.unpack_from("<2I", library, i + 68))  # fmt: skip
-                    sections[name] = (first, length // (step or 8))
-        calls, pointers = (
-            numbers[first : first + n] for first, n in (sections["__stubs"], sections["__la_symbol_ptr"])
-        )
-        assert len(calls) > 10
-        assert calls == pointers
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(shutil.which("file") is None, reason="needs the command file")
-def test_file_command_recognizes_the_universal_library(all_platforms, tmp_path):
-    (tmp_path / "odin.dylib").write_bytes(binaries(all_platforms(2))["darwin64"])
-    said = subprocess.run(["file", tmp_path / "odin.dylib"], capture_output=True, text=True, check=True).stdout
-    assert "universal binary with 2 architectures" in said
-    assert "x86_64" in said and "arm64" in said
+    data = [data for folder, data in binaries(all_platforms(fmi)).items() if "darwin" in folder]
+    for mac in (mac for file in data for mac in macs(file)):
+        symbols = [symbol.name for symbol in mac.dynamic_symbol_command.indirect_symbols]
+        stubs, pointers = mac.get_section("__stubs"), mac.get_section("__la_symbol_ptr")
+        n = stubs.size // stubs.reserved2
+        assert n > 10 and n == pointers.size // 8
+        calls, targets = (symbols[section.reserved1 :][:n] for section in (stubs, pointers))
+        assert calls == targets
 
 
 def command(platform, tmp_path):

@@ -19,7 +19,7 @@ from plant_fmu.description import token
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
-from tests.plant_fmu.libraries import commands
+from tests.plant_fmu.libraries import macs
 
 HERE = native_platform()
 
@@ -194,7 +194,7 @@ def test_prebuilt_libraries_match_linker_output(prebuilt_of_eight, monkeypatch):
         assert not differing(ours, theirs) - identity(platform, ours), platform.name
         assert differing(ours, before) - identity(platform, ours), platform.name
         if platform.name == "aarch64-darwin":
-            ((place, page),) = pages(ours)[:1]
+            ((place, page),) = pages(ours, *macs(ours))[:1]
             assert ours[place:][:32] == hashlib.sha256(ours[:page]).digest()
 
 
@@ -208,25 +208,21 @@ def identity(platform, library):
     if platform.system == "windows":  # its "time stamp", in the header and in the directory of debug information
         stamp = library[struct.unpack_from("<I", library, 60)[0] + 8 :][:4]
         return {i + j for i in range(len(library)) if library.startswith(stamp, i) for j in range(4)}
-    found = set()
     if platform.system == "linux":  # GNU_BUILD_ID, which some compilers ask their linker for
-        at = library.find(struct.pack("<3I", 4, 20, 3) + b"GNU\0")
-        found |= set(range(at + 16, at + 36)) if at >= 0 else set()
-    if platform.system == "darwin":  # LC_UUID, and with a signature the hash of the page that it is on
-        for command, at, size in commands(library):
-            if command == 0x1B:
-                found |= set(range(at + 8, at + size))
-        for place, _ in pages(library)[:1]:
-            found |= set(range(place, place + 32))
+        start = library.find(struct.pack("<3I", 4, 20, 3) + b"GNU\0") + 16
+        return set(range(start, start + 20)) if start >= 16 else set()
+    (mac,) = macs(library)  # LC_UUID, and with a signature the hash of the page that it is on
+    found = set(range(mac.uuid.command_offset + 8, mac.uuid.command_offset + mac.uuid.size))
+    for place, _ in pages(library, mac)[:1]:
+        found |= set(range(place, place + 32))
     return found
 
 
-def pages(library):
+def pages(library, mac):
     """Return where the hash of each page of a signed Mach-O is, and the size of a page."""
-    for command, at, _ in commands(library):
-        if command == 0x1D:
-            (signature,) = struct.unpack_from("<I", library, at + 8)
-            directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
-            hashes, slots = (struct.unpack_from(">I", library, directory + place)[0] for place in (16, 28))
-            return [(directory + hashes + 32 * i, 1 << library[directory + 39]) for i in range(slots)]
-    return []
+    if not mac.has_code_signature:
+        return []
+    signature = mac.code_signature.data_offset
+    directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
+    hashes, slots = (struct.unpack_from(">I", library, directory + place)[0] for place in (16, 28))
+    return [(directory + hashes + 32 * i, 1 << library[directory + 39]) for i in range(slots)]

@@ -41,7 +41,6 @@ IMPORTERS = (
     _importer("fmu-manipulation-toolbox", "toolbox:run", "", "fmu-manipulation-toolbox"),
     _importer("libcosim", "libcosim:run", "CS", "libcosimpy", _not_libcosim),
     _importer("Ecos", "ecos:run", "CS", "ecospy", _not_many),
-    _importer("FMPy CVode", "fmpy_cvode:run", "ME", "fmpy"),
     _importer("CasADi", "casadi_import:run", "ME", "casadi", _not_casadi),
 )
 JACOBIAN = _importer("CasADi Jacobian", "casadi_import:differentiate", "ME", "casadi", _not_casadi)
