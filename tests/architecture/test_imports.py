@@ -162,6 +162,7 @@ def test_base_install_imports_all_modules_without_extras():
         ("fuzzy_arbiter", {"skfuzzy", "numba", "scipy", "matplotlib", "networkx"}),
         ("controller", {"matplotlib", "fmpy", "pyarrow", "msgspec"}),
         ("plant_fmu", {"numba", "scipy", "matplotlib", "pyarrow"}),
+        ("plant_fmu.__main__", {"matplotlib"}),
         ("cosim.scenario.scenario", {"matplotlib", "pandas", "skfuzzy", *OF_SHOWING}),
         ("cosim.run.run", OF_SHOWING),
     ],

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import io
 from dataclasses import dataclass
 
@@ -21,10 +22,16 @@ class Library:
     minimum: tuple[int, ...]  # version of the C library in ELF, of the system in Mach-O
 
 
+@functools.cache
+def universal(data: bytes):  # kept, for the parts of a universal library die with it
+    """Parse a library for Macs, or a universal one."""
+    lief = pytest.importorskip("lief", reason="lief is not installed: nothing reads libraries of other systems")
+    return lief.MachO.parse(io.BytesIO(data))
+
+
 def macs(data: bytes) -> list:
     """Parse a library for Macs, or those in a universal one."""
-    lief = pytest.importorskip("lief", reason="lief is not installed: nothing reads libraries of other systems")
-    return list(lief.MachO.parse(io.BytesIO(data)))
+    return list(universal(data))
 
 
 def parts(data: bytes) -> list[bytes]:

@@ -2,17 +2,12 @@
 
 import ctypes
 import resource
-import threading
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import fmpy
-import numpy as np
 import pytest
 
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
-from tests.plant_fmu.test_state import LIVELY
 
 needs_proc = pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="reads memory from /proc")
 
@@ -24,15 +19,12 @@ def resident():
 
 
 @pytest.fixture
-def library(tmp_path):
+def library(make_slave):
     """The FMI 3.0 library through ctypes alone, and its token."""
-
-    fmpy.extract(str(cached_fmu(load_vehicle("odin"), 3)), str(tmp_path))
-    description = fmpy.read_model_description(str(tmp_path))
-    (path,) = tmp_path.glob("binaries/*/odin.*")
-    loaded = ctypes.CDLL(str(path))
-    loaded.fmi3InstantiateCoSimulation.restype = ctypes.c_void_p
-    return loaded, description.guid.encode()
+    slave = make_slave()
+    loaded = slave.fmu.dll
+    loaded["fmi3InstantiateCoSimulation"].restype = ctypes.c_void_p
+    return loaded, slave.description.guid.encode()
 
 
 def make(library, token):
@@ -110,27 +102,3 @@ def test_simultaneous_instances_are_independent(library):
         assert loaded.fmi3GetFloat64(instance, reference, one, ctypes.byref(value), one) == 0
         assert value.value == i
         loaded.fmi3FreeInstance(instance)
-
-
-def run(barrier=None):
-    """All outputs after each of 2,000 steps of a lively plant."""
-    with Plant("odin") as plant:
-        plant.set(LIVELY)
-        plant.initialize()
-        rows = np.zeros((2000, len(plant.outputs)))
-        if barrier:
-            barrier.wait()
-        for k in range(2000):
-            plant["thrust[3]"] = 10.0 * np.sin(k)
-            plant.step(0.005)
-            rows[k] = plant.outputs.values
-    return rows
-
-
-@pytest.mark.slow
-def test_parallel_threads_give_identical_results():
-    alone = run()
-    barrier = threading.Barrier(4)
-    with ThreadPoolExecutor(4) as threads:
-        together = list(threads.map(run, [barrier] * 4))
-    assert all(np.array_equal(rows, alone) for rows in together)

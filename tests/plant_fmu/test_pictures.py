@@ -1,7 +1,5 @@
 """Pictures of a vehicle: consistent with its file, without overlapping labels."""
 
-import subprocess
-import sys
 from itertools import combinations
 
 import numpy as np
@@ -123,10 +121,3 @@ def test_plot_command_rejects_unknown_formats_and_vehicles(tmp_path, capsys):
     assert "expected a name that ends in .png, .svg, .pdf" in capsys.readouterr().err
     assert main(["plot", "nautilus", "thrusters", "--out", str(tmp_path / "out.png")]) == 2
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.medium
-def test_matplotlib_is_imported_only_for_a_picture():
-    code = "import sys, plant_fmu, plant_fmu.pictures, plant_fmu.__main__; print('matplotlib' in sys.modules)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout == "False\n"

@@ -32,16 +32,6 @@ def edited(tmp_path, edit, fmi=3, drop=()):
 # ---- several at once, and foreign ones ----
 
 
-def test_plants_are_independent(make_plant):
-    plants = [make_plant("odin", fmi) for fmi in (2, 3, 2, 3)]
-    plants[1]["wrench.X"] = plants[2]["wrench.X"] = 50.0
-    for plant in plants:
-        plant.step(0.1)
-    assert [plant["velocity.u"] > 0.0 for plant in plants] == [False, True, True, False]
-    plants[0].close()
-    plants[1].step(0.1)
-
-
 def test_threads_have_a_plant_each(scratch, fmi):
     here, runs = os.getcwd(), {}
 
