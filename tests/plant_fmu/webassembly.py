@@ -1,6 +1,4 @@
-"""An importer of fmi-ls-wasm with wasmtime, and one of the module alone: neither shares code with what is built."""
-
-import struct
+"""An importer of fmi-ls-wasm with wasmtime, which shares no code with what is built."""
 
 import wasmtime
 from wasmtime import component as model
@@ -60,26 +58,3 @@ class ComponentInstance:
 
     def drop(self):
         self.resource.drop(self.store)
-
-
-class Module:
-    """The module alone, called as a page calls it: numbers, and addresses in its memory."""
-
-    def __init__(self, data):
-        engine = wasmtime.Engine()
-        self.store = wasmtime.Store(engine)
-        module = wasmtime.Module(engine, data)
-        assert module.imports == []
-        self.exports = wasmtime.Instance(self.store, module, []).exports(self.store)
-        self.call("_initialize")
-
-    def call(self, name, *arguments):
-        return self.exports[name](self.store, *arguments)
-
-    def put(self, data):
-        address = self.call("malloc", len(data))
-        self.exports["memory"].write(self.store, data, address)
-        return address
-
-    def doubles(self, address, n):
-        return struct.unpack(f"<{n}d", self.exports["memory"].read(self.store, address, address + 8 * n))
