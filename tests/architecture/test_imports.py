@@ -60,11 +60,7 @@ ONE_PLACE = {
 }
 
 # of these, what the base install does not bring, and the modules that cannot be imported without it
-OPTIONAL = {
-    "dask",
-    "distributed",
-    "foxglove_schemas_protobuf",
-}
+OPTIONAL = {"dask", "distributed", "foxglove_schemas_protobuf"}
 OPTIONAL |= {"google", "mcap", "mcap_protobuf", "pandas", "rerun", "rosbags"}
 WANT_AN_EXTRA = {
     "cosim.export.mcap_writer",

@@ -8,12 +8,7 @@ from tests.plant_fmu.conftest import STATES, UNDAMPED
 from tests.plant_fmu.philox import normal
 
 NEUTRAL = {"weight": 1228.25, "r_G.z": 0.0}
-GAUSS_MARKOV = {
-    "current_correlation_time": 5.0,
-    "current_variation_period": 0.5,
-    "current_variation.y": 0.2,
-    "seed": 42,
-}
+GAUSS_MARKOV = {"current_correlation_time": 5.0, "current_variation_period": 0.5, "current_variation.y": 0.2}
 
 
 def run(slave, n, h):
@@ -46,10 +41,7 @@ def test_axis_variation_switched_on_late_starts_from_the_stationary_distribution
     T, dt, s = 5.0, 0.5, 0.3
     slave = make_slave(fmi=fmi).start(**GAUSS_MARKOV, seed=42)
     slave.step(0.7)
-    for on, off, knot in (
-        (0.4, 0.2, 2),
-        (0.1, 0.0, 4),
-    ):  # the y axis has had knots at 0 and 0.5 s, and one at each switch
+    for on, off, knot in ((0.4, 0.2, 2), (0.1, 0.0, 4)):  # after knots at 0 and 0.5 s, and one at each switch
         slave.set_values({"current_variation.z": s})
         slave.step(on)
         begin = s * normal(42, 15 + 2 + 3, knot)
@@ -62,13 +54,8 @@ def test_axis_variation_switched_on_late_starts_from_the_stationary_distribution
 
 
 def test_changed_knot_period_keeps_the_current_continuous(make_slave, fmi):
-    slow = {
-        "current_variation.x": 1.0,
-        "current_correlation_time": 1000.0,
-        "current_variation_period": 100.0,
-        "seed": 3,
-    }
-    slave = make_slave(fmi=fmi).start(**slow)
+    slow = {"current_variation.x": 1.0, "current_correlation_time": 1000.0, "current_variation_period": 100.0}
+    slave = make_slave(fmi=fmi).start(**slow, seed=3)
     slave.step(50.0)
     before = slave.get("water_velocity.x")[0]
     slave.set_values({"current_variation_period": 1.0})

@@ -7,8 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.portability.running import FOLDER, ROOT, environment_of, look, run
-from tests.portability.variants import Variant, by_turns, chosen, table
+from tests.portability.variants import FOLDER, ROOT, Variant, chosen, look, run, table
 
 
 def main() -> int:
@@ -21,20 +20,18 @@ def main() -> int:
     parser.add_argument("tests", nargs="*", help="arguments of pytest, after -- (all fast tests)")
     arguments = parser.parse_args()
     try:
-        variants = chosen(arguments.only)
-        if arguments.turn:
-            variants = by_turns(_hash_of(arguments.turn), variants)
+        variants = chosen(arguments.only, _hash_of(arguments.turn) if arguments.turn else "")
     except ValueError as error:
         parser.error(str(error))
     if arguments.list:
         sys.stdout.write("\n".join(variant.name for variant in variants) + "\n")
         return 0
 
-    machine, results = look(Path(sys.executable), environment_of(Variant("itself"), None)), []
+    machine, results = look(Path(sys.executable), Variant("itself").environment(None)), []
     for variant in variants:
         sys.stdout.write(f"{variant.name} ...\n")
         sys.stdout.flush()
-        results.append(run(variant, machine, arguments.tests, arguments.limit, arguments.extras.split(",")))
+        results.append(run(variant, machine, arguments.tests, arguments.limit, arguments.extras))
         sys.stdout.write(table(results[-1:]).splitlines()[1] + "\n")
         if not results[-1].good and (output := FOLDER / variant.name / "output.txt").exists():
             sys.stdout.write("\n".join(output.read_text(errors="replace").splitlines()[-100:]) + "\n")
