@@ -29,31 +29,11 @@ _GENERATED_PARTS = re.compile(
 )
 
 
-def pages() -> list[Path]:
-    """Return README and the pages of the documents."""
-    return [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
-
-
-def words_of(page: Path) -> int:
-    """Return how many words a page has, as ``wc -w`` counts them."""
-    return len(page.read_text(encoding="utf-8").split())
-
-
 def words_by_hand(page: Path) -> int:
     """Return the number of handwritten words of a page, without generated ones."""
     if page.relative_to(ROOT).as_posix() in GENERATED:
         return 0
     return len(_GENERATED_PARTS.sub("", page.read_text(encoding="utf-8")).split())
-
-
-def modules_per_folder() -> Counter[str]:
-    """Return how many Python modules stand in each folder of the four packages."""
-    return Counter(room_of(module) for module in FILES)
-
-
-def lines_per_file() -> dict[str, int]:
-    """Return how many lines each module of the four packages has."""
-    return {module: len(path.read_text(encoding="utf-8").splitlines()) for module, path in FILES.items()}
 
 
 @dataclass
@@ -125,9 +105,11 @@ def lines_of_public_docstrings() -> int:
 
 def table() -> list[tuple[str, str]]:
     """Return each count with what it counts."""
-    folders, lines = modules_per_folder(), lines_per_file()
-    all_words = sum(words_of(page) for page in pages())
-    by_hand = {page.relative_to(ROOT).as_posix(): words_by_hand(page) for page in pages()}
+    folders = Counter(room_of(module) for module in FILES)
+    lines = {module: len(path.read_text(encoding="utf-8").splitlines()) for module, path in FILES.items()}
+    pages = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+    by_hand = {page.relative_to(ROOT).as_posix(): words_by_hand(page) for page in pages}
+    generated = sum(len(page.read_text(encoding="utf-8").split()) for page in pages) - sum(by_hand.values())
     longest = max(lines, key=lambda module: lines[module])
     rooms, others = lines_per_room(), lines_of_other_languages()
     product = sum(rooms.values(), Lines())
@@ -149,7 +131,7 @@ def table() -> list[tuple[str, str]]:
         ("  longest pages", ", ".join(f"{page} {n}" for page, n in Counter(by_hand).most_common(5))),
         (
             "  generated besides",
-            f"{all_words - sum(by_hand.values())}: {', '.join(GENERATED)}; tables of figures and keys",
+            f"{generated}: {', '.join(GENERATED)}; tables of figures and keys",
         ),
     ]
 

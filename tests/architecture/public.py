@@ -69,28 +69,17 @@ def members(cls: griffe.Class) -> Iterator[griffe.Object]:
 def line(name: str, what: griffe.Object) -> str:
     """A public thing, its parameters and its type."""
     if isinstance(what, griffe.Function):
-        return f"{name}{_parameters(what)} -> {what.returns or 'None'}"
+        return _signature(what, name) or f"{name}()"
     if isinstance(what, griffe.Class):
         bases = f" of {', '.join(map(str, what.bases))}" if what.bases else ""
         start = what.members.get("__init__")
-        return f"{name}{_parameters(start) if isinstance(start, griffe.Function) else ''}{bases}"
+        return (_signature(start, name) if isinstance(start, griffe.Function) else name) + bases
     return f"{name}: {what.annotation}" if what.annotation else name
 
 
-def _parameters(function: griffe.Function) -> str:
-    shown = [p for p in function.parameters if p.name not in ("self", "cls")]
-    parts, kind = [], griffe.ParameterKind
-    for i, p in enumerate(shown):
-        if p.kind is kind.keyword_only and not any(
-            q.kind in (kind.keyword_only, kind.var_positional) for q in shown[:i]
-        ):
-            parts.append("*")
-        star = {kind.var_positional: "*", kind.var_keyword: "**"}.get(p.kind, "")
-        default = f" = {p.default}" if p.default is not None and not star else ""
-        parts.append(f"{star}{p.name}: {p.annotation}{default}" if p.annotation else f"{star}{p.name}{default}")
-        if p.kind is kind.positional_only and all(q.kind is not kind.positional_only for q in shown[i + 1 :]):
-            parts.append("/")
-    return f"({', '.join(parts)})"
+def _signature(function: griffe.Function, name: str) -> str:
+    shown = function.signature(name=name, return_type=function.name != "__init__")
+    return shown.replace("(self, ", "(").replace("(cls, ", "(").replace("(self)", "()").replace("(cls)", "()")
 
 
 def text() -> str:

@@ -2,7 +2,7 @@
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cache
 
 import griffe
@@ -10,8 +10,6 @@ import pytest
 
 from tests.architecture import public
 from tests.architecture.modules import FILES, tree_of
-
-pytestmark = pytest.mark.slow  # to read all of the code takes seconds
 
 # words of a name that make a number a physical quantity
 KINDS = re.compile(
@@ -28,14 +26,12 @@ UNIT = re.compile(
 )
 # what a function may raise without a word: that it is abstract, a fault of our own, Ctrl-C, or argparse's own errors
 UNSAID = {"NotImplementedError", "AssertionError", "KeyboardInterrupt", "ArgumentTypeError"}
-
-ELSEWHERE = re.compile(
-    r"(?:Do what|Return what|[Aa]rguments as|[Aa]s|[Aa]s for|see|of) `([\w.]+)`"
-)  # the rest is said there
-
+# the rest is said there
+ELSEWHERE = re.compile(r"(?:Do what|Return what|[Aa]rguments as|[Aa]s|[Aa]s for|see|of) `([\w.]+)`")
 NOT_IMPERATIVE = {"What", "Whether", "How", "Where", "When", "Who", "Which", "The", "A", "An", "Its", "Each", "All"}
 
 Part = griffe.DocstringSectionKind
+Complaints = Iterator[tuple[str, object]]  # path of what is wrong, and what is
 
 
 def everything() -> Iterator[griffe.Object]:
@@ -64,11 +60,8 @@ def public_functions() -> Iterator[griffe.Function]:
                 yield one
 
 
-def docstring_text(what: griffe.Object) -> str:
-    """Return a docstring, with those of the functions that it refers to."""
-    words = what.docstring.value if what.docstring else ""
-    others = [path for name in ELSEWHERE.findall(words) for path in _paths() if f".{path}".endswith(f".{name}")]
-    return "\n".join([words, *(_paths()[path] for path in others)])
+def text_of(what: griffe.Object) -> str:
+    return what.docstring.value if what.docstring else ""
 
 
 @cache
@@ -76,38 +69,33 @@ def _paths() -> dict[str, str]:
     return {what.path: what.docstring.value for what in everything() if what.docstring}
 
 
+def whole_text(what: griffe.Object) -> str:
+    """Return a docstring, with those of the functions that it refers to."""
+    others = [path for name in ELSEWHERE.findall(text_of(what)) for path in _paths() if f".{path}".endswith(f".{name}")]
+    return "\n".join([text_of(what), *(_paths()[path] for path in others)])
+
+
 def section(what: griffe.Object, kind: griffe.DocstringSectionKind) -> list[tuple[str, str]]:
     """Return the names and descriptions of one section of a docstring."""
     parts = what.docstring.parse("numpy") if what.docstring else []
-    entries = [entry for part in parts if part.kind is kind for entry in part.value]
     return [
         (name.strip().lstrip("*"), f"{entry.annotation} {entry.description}")
-        for entry in entries
+        for part in parts if part.kind is kind
+        for entry in part.value
         for name in (entry.name.split(",") if kind in (Part.parameters, Part.attributes) else [""])
-    ]
-
-
-def shown(wrong: dict[str, object]) -> str:
-    return "\n".join(f"{path}: {what}" for path, what in wrong.items())
+    ]  # fmt: skip
 
 
 def parameters(function: griffe.Function) -> list[griffe.Parameter]:
     return [p for p in function.parameters if p.name not in ("self", "cls")]
 
 
-def comment_on(attribute: griffe.Attribute) -> str:
-    """The comment behind an attribute, and those on the lines before it."""
-    lines = attribute.lines_collection[attribute.filepath]
-    first = attribute.lineno - 1
-    while lines[first - 1].strip().startswith("#"):
+def comments(what: griffe.Object, above: bool = False) -> str:
+    """The comments beside a definition and within it, and those on the lines above it."""
+    lines, first = what.lines_collection[what.filepath], what.lineno - 1
+    while above and lines[first - 1].strip().startswith("#"):
         first -= 1
-    return " ".join(line.partition("#")[2] for line in lines[first : attribute.endlineno])
-
-
-def comments_in(function: griffe.Function) -> str:
-    """The comments of a function, those in its signature included."""
-    lines = function.lines_collection[function.filepath][function.lineno - 1 : function.endlineno]
-    return " ".join(line.partition("#")[2] for line in lines)
+    return " ".join(line.partition("#")[2] for line in lines[first : what.endlineno])
 
 
 def physical(name: str, kind: object) -> bool:
@@ -116,8 +104,7 @@ def physical(name: str, kind: object) -> bool:
 
 @cache
 def _definitions(module: str) -> dict[int, ast.AST]:
-    tree = tree_of(FILES[module])
-    nodes = [node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)]
+    nodes = [n for n in ast.walk(tree_of(FILES[module])) if isinstance(n, ast.FunctionDef | ast.AsyncFunctionDef)]
     return {min([node.lineno, *(d.lineno for d in node.decorator_list)]): node for node in nodes}
 
 
@@ -131,47 +118,36 @@ def body(function: griffe.Function) -> Iterator[ast.AST]:
                 pending.append(child)
 
 
-def test_parameters_sections_match_signatures():
-    wrong = {}
+# ---- the rules -----------------------------------------------------------------------------------------------------
+
+
+def parameters_sections_match_signatures() -> Complaints:
     for function in functions():
         documented = sorted(name for name, _ in section(function, Part.parameters))
-        there = sorted(p.name for p in parameters(function))
-        if documented and documented != there:
-            wrong[function.path] = sorted(set(documented) ^ set(there)) or documented
-    assert not wrong, shown(wrong)
+        if documented and documented != sorted(p.name for p in parameters(function)):
+            yield function.path, documented
 
 
-def test_public_docstrings_name_every_parameter():
+def public_docstrings_name_every_parameter() -> Complaints:
     """In a section, or in the words where there is none."""
-    wrong = {}
     for function in public_functions():
         listed = {entry for entry, _ in section(function, Part.parameters)}
-        words = set(re.findall(r"\w+", docstring_text(function)))
-        if missing := [p.name for p in parameters(function) if p.name not in (listed or words)]:
-            wrong[function.path] = missing
-    assert not wrong, shown(wrong)
+        words = listed or set(re.findall(r"\w+", whole_text(function)))
+        yield from ((function.path, p.name) for p in parameters(function) if p.name not in words)
 
 
-def test_internal_docstrings_have_one_line():
+def internal_docstrings_have_one_line() -> Complaints:
     """But for parameters and fields, whose units stand beside them, and comments below for the reasons."""
     allowed = {what.path for what in map(public.target, public.names())} | {one.path for one in public_functions()}
-    wrong = {
-        what.path: what.docstring.value
-        for what in everything()
-        if what.docstring and "\n" in what.docstring.value and not _is_within(what.path, allowed)
-    }
-    assert not wrong, shown(wrong)
+    for what in everything():
+        if "\n" in text_of(what) and not {what.path, what.path.rpartition(".")[0]} & allowed:
+            yield what.path, text_of(what)
 
 
-def _is_within(path: str, allowed: set[str]) -> bool:
-    return path in allowed or path.rpartition(".")[0] in allowed
-
-
-def test_return_values_are_documented():
-    wrong = []
+def return_values_are_documented() -> Complaints:
     for function in public_functions():
         kinds = {part.kind for part in function.docstring.parse("numpy")} if function.docstring else set()
-        summary = docstring_text(function).partition("\n\n")[0]
+        summary = whole_text(function).partition("\n\n")[0]
         if any(isinstance(node, ast.Yield | ast.YieldFrom) for node in body(function)):
             context = any("contextmanager" in str(d.value) for d in function.decorators)
             right = context or Part.yields in kinds or summary.startswith("Yield")
@@ -179,55 +155,73 @@ def test_return_values_are_documented():
             right = bool({Part.returns, Part.yields} & kinds) or "eturn" in summary
         else:
             right = bool(summary)
-        wrong += [] if right else [function.path]
-    assert not wrong, "\n".join(wrong)
+        if not right:
+            yield function.path, summary
 
 
-def test_raised_exceptions_are_documented():
-    wrong = {}
+def raised_exceptions_are_documented() -> Complaints:
     for function in public_functions():
         own = list(body(function))
-        caught = {
-            id(n) for t in own if isinstance(t, ast.Try) and t.handlers for part in t.body for n in ast.walk(part)
-        }
+        tries = [node for node in own if isinstance(node, ast.Try) and node.handlers]
+        caught = {id(inner) for node in tries for part in node.body for inner in ast.walk(part)}
         raised = [n.exc for n in own if isinstance(n, ast.Raise) and n.exc and id(n) not in caught]
         names = {ast.unparse(e.func if isinstance(e, ast.Call) else e).split(".")[-1] for e in raised}
         types = {name for name in names if name.isidentifier() and name[0].isupper()} - UNSAID
-        if silent := {name for name in types if name not in docstring_text(function)}:
-            wrong[function.path] = silent
-    assert not wrong, shown(wrong)
+        yield from ((function.path, name) for name in types if name not in whole_text(function))
 
 
-def test_physical_quantities_have_documented_units():
+def physical_quantities_have_documented_units() -> Complaints:
     """Parameters and return values: in their section, else in the docstring, the comments below it, or beside them."""
-    wrong = {}
     for function in functions():
-        words = f"{docstring_text(function)} {comments_in(function)}"
+        words = f"{whole_text(function)} {comments(function)}"
         entries = dict(section(function, Part.parameters))
         for p in parameters(function):
             if physical(p.name, p.annotation) and not UNIT.search(entries.get(p.name, words)):
-                wrong[f"{function.path}({p.name})"] = entries.get(p.name, words)
+                yield f"{function.path}({p.name})", entries.get(p.name, words)
         back = " ".join(text for _, text in section(function, Part.returns)) or words
         if physical(function.name, function.returns) and not UNIT.search(back):
-            wrong[function.path] = back
-    assert not wrong, shown(wrong)
+            yield function.path, back
 
 
-def test_fields_and_properties_that_are_physical_quantities_have_units():
+def fields_and_properties_that_are_physical_quantities_have_units() -> Complaints:
     """In a comment, in the class's section of attributes or parameters, or in the property's docstring."""
-    wrong = {}
     for attribute in everything():
         field = isinstance(attribute, griffe.Attribute) and attribute.parent.is_class
         if field and physical(attribute.name, attribute.annotation):
             about = dict(section(attribute.parent, Part.attributes) + section(attribute.parent, Part.parameters))
-            unit = re.search(
-                r"""key\((?:'[^']*'|"[^"]*"), '([^']*)'""", str(attribute.annotation)
-            )  # of a scenario's key
-            texts = [docstring_text(attribute), comment_on(attribute), about.get(attribute.name, "")]
-            words = " ".join([*texts, unit[1] if unit else ""])
+            key = re.search(r"""key\((?:'[^']*'|"[^"]*"), '([^']*)'""", str(attribute.annotation))  # of a scenario
+            texts = [whole_text(attribute), comments(attribute, above=True), about.get(attribute.name, "")]
+            words = " ".join([*texts, key[1] if key else ""])
             if not UNIT.search(words):
-                wrong[attribute.path] = words
-    assert not wrong, shown(wrong)
+                yield attribute.path, words
+
+
+def summaries_are_imperative_and_no_parameter_is_described_as_any() -> Complaints:
+    """Functions begin with an imperative verb; properties may begin with a noun."""
+    for function in functions():
+        words = text_of(function)
+        is_property = "property" in function.labels or {"property", "cached_property"} & {
+            str(d.value) for d in function.decorators
+        }
+        if words and not is_property and words.split()[0] in NOT_IMPERATIVE:
+            yield function.path, words.splitlines()[0]
+        if re.search(r"^\s*Any\.$", words, re.M):
+            yield function.path, "Any."
+
+
+RULES: tuple[Callable[[], Complaints], ...] = (
+    parameters_sections_match_signatures, public_docstrings_name_every_parameter, internal_docstrings_have_one_line,
+    return_values_are_documented, raised_exceptions_are_documented, physical_quantities_have_documented_units,
+    fields_and_properties_that_are_physical_quantities_have_units,
+    summaries_are_imperative_and_no_parameter_is_described_as_any,
+)  # fmt: skip
+
+
+@pytest.mark.slow  # to read all of the code takes seconds
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
+def test_docstrings(rule):
+    wrong = [f"{path}: {what}" for path, what in rule()]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_unit_check_detects_missing_units():
@@ -235,18 +229,3 @@ def test_unit_check_detects_missing_units():
         assert not UNIT.search(words), words
     for words in ("[m]", "m, NED", "# s", "(3,) m/s", "float [N m]", "[-]", "shape (6,) [N, N m]", "in seconds"):
         assert UNIT.search(words), words
-
-
-def test_summaries_are_imperative_and_no_parameter_is_described_as_any():
-    """Functions begin with an imperative verb; properties may begin with a noun."""
-    wrong = {}
-    for function in functions():
-        words = function.docstring.value if function.docstring else ""
-        is_property = {"property", "cached_property"} & {str(d.value) for d in function.decorators} or (
-            "property" in function.labels
-        )
-        if words and not is_property and words.split()[0] in NOT_IMPERATIVE:
-            wrong[function.path] = words.splitlines()[0]
-        if re.search(r"^\s*Any\.$", words, re.M):
-            wrong[function.path] = "Any."
-    assert not wrong, shown(wrong)

@@ -4,7 +4,8 @@ import copy
 import json
 import re
 import tomllib
-from functools import cache
+from functools import cache, reduce
+from operator import getitem
 
 import pytest
 import tomli_w
@@ -17,7 +18,7 @@ from cosim.errors import CosimError, RunError, ScenarioError
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.sources import read_log
 from fuzzy_arbiter import ArbiterError
-from fuzzy_arbiter.formats import reads
+from fuzzy_arbiter.formats import load
 from plant_fmu import PlantFmuError, load_vehicle, shipped_vehicles
 from tests.architecture.modules import ROOT
 
@@ -39,61 +40,38 @@ COMMANDS_LOG = [
     {"command": "reset"},
 ]
 CRITERIA = {"criteria": [{"name": "a", "off": "below 1"}, {"name": "b"}]}
+READERS = {  # how a table is written, and what reads it
+    "scenario": (tomli_w.dumps, "toml", load_scenario),
+    "vehicle": (tomli_w.dumps, "toml", load_vehicle),
+    "scenes": (json.dumps, "jsonl", lambda path: list(read_scenes(path))),
+    "commands": (lambda table: json.dumps(table) + "\n", "jsonl", read_log),
+    "arbiter in TOML": (tomli_w.dumps, "toml", load),
+    "arbiter in JSON": (json.dumps, "json", load),
+}
+# tables whose keys are names that the file itself gives
+FREE = re.compile(r"(inputs|outputs)\.terms|criteria\.terms")
 
 
-# ---- the formats: an example of each kind, and how it is read --------------------------------------------------------
-
-
-def scenario(table, folder):
-    path = folder / "scenario.toml"
-    path.write_text(tomli_w.dumps(table))
-    return load_scenario(str(path))
-
-
-def vehicle(table, folder):
-    path = folder / "vehicle.toml"
-    path.write_text(tomli_w.dumps(table))
-    return load_vehicle(path)
-
-
-def scenes(table, folder):
-    path = folder / "scenes.jsonl"
-    path.write_text(json.dumps(table))
-    return list(read_scenes(path))
-
-
-def commands(table, folder):
-    path = folder / "commands.jsonl"
-    path.write_text(json.dumps(table) + "\n")
-    return read_log(path)
-
-
-def arbiter_toml(table, _):
-    return reads(tomli_w.dumps(table), "toml")
-
-
-def arbiter_json(table, _):
-    return reads(json.dumps(table), "json")
+def read(kind, table, folder):
+    write, suffix, reader = READERS[kind]
+    path = folder / f"it.{suffix}"
+    path.write_text(write(table))
+    return reader(path)
 
 
 @cache
 def examples():
-    """Files that are good, each with what reads it."""
+    """Tables that are good, each with the kind of its file."""
     tipping = tomllib.loads((ROOT / "tests" / "data" / "fuzzy" / "tipping.toml").read_text())
     scene = json.loads((ROOT / "tests" / "data" / "scenes" / "hard.jsonl").read_text().splitlines()[0])
     scene |= {"noise": {"position": 0.1}, "failed_thruster": {"index": 1, "time": 2.0}}
     scenarios = ("paper", "docking", str(ROOT / "tests" / "cosim" / "ssp" / "all-shapes.toml"))
-    found = [(scenario, tomllib.loads(load_scenario(name).toml())) for name in scenarios]
+    found = [("scenario", tomllib.loads(load_scenario(name).toml())) for name in scenarios]
     found[1][1]["failures"] = [{"thruster": 1, "time": 3.0}]
-    found += [
-        (vehicle, tomllib.loads((ROOT / f"plant_fmu/vehicles/{name}.toml").read_text())) for name in shipped_vehicles()
-    ]
-    found += [(read, table) for read in (arbiter_toml, arbiter_json) for table in (tipping, CRITERIA)]
-    return found + [(scenes, scene)] + [(commands, {"step": 1, "command": order}) for order in COMMANDS_LOG]
-
-
-# tables whose keys are names that the file itself gives
-FREE = re.compile(r"(inputs|outputs)\.terms|criteria\.terms")
+    vehicles = [(ROOT / f"plant_fmu/vehicles/{name}.toml").read_text() for name in shipped_vehicles()]
+    found += [("vehicle", tomllib.loads(text)) for text in vehicles]
+    found += [(kind, table) for kind in list(READERS)[-2:] for table in (tipping, CRITERIA)]
+    return found + [("scenes", scene)] + [("commands", {"step": 1, "command": order}) for order in COMMANDS_LOG]
 
 
 def tables(value, path=()):
@@ -104,55 +82,46 @@ def tables(value, path=()):
         yield from tables(inner, (*path, key))
 
 
-def at(table, path):
-    for key in path:
-        table = table[key]
-    return table
-
-
 def kind_of(table, path):
     """Its path without numbers, and its type where it has one: one of a kind is enough."""
-    inner = at(table, path)
+    inner = reduce(getitem, path, table)
     named = [inner[key] for key in ("type", "command") if isinstance(inner.get(key), str)]
     return ".".join([*(key for key in path if isinstance(key, str)), *named])
 
 
 def cases():
     seen = set()
-    for read, table in examples():
+    for file, table in examples():
         for path in tables(table):
-            kind = (read.__name__, kind_of(table, path), table.get("law", {}).get("name") if "gains" in path else None)
+            kind = (file, kind_of(table, path), table.get("law", {}).get("name") if "gains" in path else None)
             if kind not in seen and not FREE.fullmatch(kind[1]):
                 seen.add(kind)
-                yield pytest.param(read, table, path, id="-".join(filter(None, kind)))
+                yield pytest.param(file, table, path, id="-".join(filter(None, kind)))
 
 
 @pytest.mark.medium(fast=18)
-@pytest.mark.parametrize(("read", "table", "path"), list(cases()))
-def test_unknown_keys_are_rejected_by_name(read, table, path, tmp_path):
-    inner = at(table, path)
-    near = [key + key[-1] for key in inner][:1]
+@pytest.mark.parametrize(("file", "table", "path"), list(cases()))
+def test_unknown_keys_are_rejected_by_name(file, table, path, tmp_path):
+    near = [key + key[-1] for key in reduce(getitem, path, table)][:1]
     for key in [LIKE_NONE, *near]:
         changed = copy.deepcopy(table)
-        at(changed, path)[key] = 1.0
+        reduce(getitem, path, changed)[key] = 1.0
         with pytest.raises((CosimError, PlantFmuError, ArbiterError)) as caught:
-            read(changed, tmp_path)
-        said = str(caught.value)
-        assert re.search(rf"\b{key}\b", said)
-        assert "\n" not in said
+            read(file, changed, tmp_path)
+        assert re.search(rf"\b{key}\b", str(caught.value)) and "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("read", list(dict.fromkeys(read for read, _ in examples())), ids=lambda read: read.__name__)
-def test_example_tables_are_valid(read, tmp_path):
-    for reader, table in examples():
-        if reader is read:
-            reader(table, tmp_path)
+@pytest.mark.parametrize("file", READERS)
+def test_example_tables_are_valid(file, tmp_path):
+    good = [table for kind, table in examples() if kind == file]
+    assert good
+    for table in good:
+        read(file, table, tmp_path)
 
 
 def test_every_shape_has_an_example():
-    assert {f"regions.shape.{name}" for name in SHAPES} <= {
-        kind_of(table, path) for read, table in examples() if read is scenario for path in tables(table)
-    }
+    kinds = {kind_of(table, path) for file, table in examples() if file == "scenario" for path in tables(table)}
+    assert {f"regions.shape.{name}" for name in SHAPES} <= kinds
 
 
 def test_unknown_gains_are_rejected_for_every_law():
