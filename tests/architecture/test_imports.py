@@ -10,13 +10,6 @@ import pytest
 from tests.architecture.modules import FILES, PACKAGES, ROOT, imported
 from tests.architecture.rooms import ROOMS, arrows, imports_of, room_of, stated_imports_of
 
-MAY_IMPORT = {
-    "fuzzy_arbiter": {"fuzzy_arbiter"},
-    "plant_fmu": {"plant_fmu"},
-    "controller": {"controller"},
-    "cosim": set(PACKAGES),
-}
-
 # the rooms of cosim from the ground up: each imports rooms above it in this list, and none below
 FLOORS = (
     *(
@@ -60,14 +53,10 @@ ONE_PLACE = {
 }
 
 # of these, what the base install does not bring, and the modules that cannot be imported without it
-OPTIONAL = {"dask", "distributed", "foxglove_schemas_protobuf"}
-OPTIONAL |= {"google", "mcap", "mcap_protobuf", "pandas", "rerun", "rosbags"}
-WANT_AN_EXTRA = {
-    "cosim.export.mcap_writer",
-    "cosim.export.rrd_writer",
-    "cosim.export.foxglove_scene",
-    "cosim.export.protobuf_table",
-}
+OPTIONAL = {
+    "dask", "distributed", "foxglove_schemas_protobuf", "google", "mcap", "mcap_protobuf", "pandas", "rerun", "rosbags",
+}  # fmt: skip
+WANT_AN_EXTRA = {f"cosim.export.{name}" for name in ("mcap_writer", "rrd_writer", "foxglove_scene", "protobuf_table")}
 
 # what shows a run while it goes on: a run that nobody watches does without
 OF_SHOWING = {"pymavlink", "rich", "websockets"}
@@ -90,8 +79,11 @@ for module in {modules!r}:
 
 
 def test_packages_import_only_allowed_packages():
-    packages = {module: {name.split(".")[0] for name in imported(module)} & set(PACKAGES) for module in FILES}
-    assert {module: used for module, used in packages.items() if not used <= MAY_IMPORT[module.split(".")[0]]} == {}
+    """Cosim imports all, the others none but themselves; controller and arbiter neither FMPy nor pymavlink."""
+    for module in FILES:
+        package, used = module.split(".")[0], {name.split(".")[0] for name in imported(module)}
+        assert package == "cosim" or not used & set(PACKAGES) - {package}, module
+        assert package in ("cosim", "plant_fmu") or not used & {"fmpy", "pymavlink"}, module
 
 
 def test_imports_have_no_cycles():
@@ -121,12 +113,6 @@ def test_subpackages_hold_a_bounded_number_of_modules():
     held = Counter(room_of(module) for module in FILES)
     assert {room: count for room, count in held.items() if count > MOST_MODULES} == {}
     assert held["cosim"] <= MOST_AT_THE_ROOT
-
-
-def test_controller_and_arbiter_import_neither_fmpy_nor_pymavlink():
-    for module in FILES:
-        if module.split(".")[0] in ("controller", "fuzzy_arbiter"):
-            assert not {name.split(".")[0] for name in imported(module)} & {"fmpy", "pymavlink"}
 
 
 def test_optional_libraries_are_imported_in_one_module_each():

@@ -22,8 +22,8 @@ def resident():
 def library(make_slave):
     """The FMI 3.0 library through ctypes alone, and its token."""
     slave = make_slave()
-    loaded = slave.fmu.dll
-    loaded["fmi3InstantiateCoSimulation"].restype = ctypes.c_void_p
+    loaded = ctypes.CDLL(slave.fmu.dll._name)  # without FMPy's conversions
+    loaded.fmi3InstantiateCoSimulation.restype = ctypes.c_void_p
     return loaded, slave.description.guid.encode()
 
 
