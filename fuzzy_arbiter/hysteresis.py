@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
@@ -65,11 +66,6 @@ class HysteresisArbiter:
     [0.0, 1.0, 1.0, 0.0]
     """
 
-    __slots__ = (
-        "_dwell", "_enter", "_graded", "_names", "_off_places", "_on", "_on_places", "_release", "_shapes", "_since",
-        "_time", "arbiter",
-    )  # fmt: skip
-
     def __init__(
         self,
         arbiter: Arbiter,
@@ -93,10 +89,11 @@ class HysteresisArbiter:
             if not lower < upper:
                 raise DefinitionError(f"release: got {lower:g} for {name!r}, expected less than enter, {upper:g}")
         self._graded = graded
-        self._on = terms = _on_terms(arbiter.system, on)
-        self._shapes = [_shape(v, term) for v, term in zip(variables, terms, strict=True)]
-        self._on_places = [_place(v, shape, 1.0) for v, shape in zip(variables, self._shapes, strict=True)]
-        self._off_places = [_place(v, shape, 0.0) for v, shape in zip(variables, self._shapes, strict=True)]
+        self._on = _on_terms(arbiter.system, on)
+        shapes = {(v.name, term.name): term.straight for v in variables for term in v.terms}
+        self._shapes = [shapes[pair] for pair in zip(self._names, self._on, strict=True)]
+        pairs = list(zip(variables, self._shapes, strict=True))
+        self._on_places, self._off_places = ([_place(v, shape, x) for v, shape in pairs] for x in (1.0, 0.0))
         self.reset()
 
     def reset(self) -> None:
@@ -187,17 +184,14 @@ _RANGES: dict[str, tuple[str, Callable[[float], bool]]] = {
 
 def _settings(key: str, received: Setting, names: Sequence[str]) -> list[float]:
     """Return one setting for each input, from one for all or from a mapping."""
-    expected, fits = _RANGES[key]
-    if isinstance(received, Mapping):
-        _require_names(key, received, names)
-        each = [received[name] for name in names]
-    else:
-        each = [received] * len(names)
-    for name, x in zip(names, each, strict=True):
-        if not isinstance(x, Real) or isinstance(x, bool) or not fits(float(x)):
-            where = f" for {name!r}" if isinstance(received, Mapping) else ""
+    expected, is_valid = _RANGES[key]
+    by_name = received if isinstance(received, Mapping) else dict.fromkeys(names, received)
+    _require_names(key, by_name, names)
+    for name, x in by_name.items():
+        if not isinstance(x, Real) or isinstance(x, bool) or not is_valid(float(x)):
+            where = f" for {name!r}" if by_name is received else ""
             raise DefinitionError(f"{key}: got {x!r}{where}, expected {expected}")
-    return [float(x) for x in each]
+    return [float(by_name[name]) for name in names]
 
 
 def _require_names(key: str, received: Mapping[str, object], names: Sequence[str]) -> None:
@@ -211,17 +205,15 @@ def _require_names(key: str, received: Mapping[str, object], names: Sequence[str
 
 def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
     """Return the term of each input that asks for attention."""
+    names = variable_names(system.inputs)
     for v in system.inputs:
         if len(v.terms) != 2 or stretches(v):
-            raise DefinitionError(
-                f"input {v.name!r}: its terms are no criterion, expected two that sum to 1 everywhere"
-            )
+            what = "its terms are no criterion, expected two that sum to 1 everywhere"
+            raise DefinitionError(f"input {v.name!r}: {what}")
     if on is not None:
         if not isinstance(on, Mapping):
-            raise DefinitionError(
-                f"on is {on!r}, expected a term for each of {', '.join(variable_names(system.inputs))}"
-            )
-        _require_names("on", on, variable_names(system.inputs))
+            raise DefinitionError(f"on is {on!r}, expected a term for each of {', '.join(names)}")
+        _require_names("on", on, names)
         for v in system.inputs:
             if on[v.name] not in v.term_names:
                 expected = " or ".join(v.term_names)
@@ -238,10 +230,6 @@ def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
         )
     rest = ask.places(answer.boxes[0])
     return [next(term for term in v.term_names if term != rest[v.name]) for v in system.inputs]
-
-
-def _shape(variable: Variable, term: str) -> Shape:
-    return next(t.straight for t in variable.terms if t.name == term)
 
 
 def _place(variable: Variable, shape: Shape, degree: float) -> float:
@@ -273,7 +261,7 @@ def _validate_times(times: ArrayLike | None, rows: int, last: float) -> Array:
         raise InputError(f"times: {error}, expected numbers") from None
     if moments.shape != (rows,):
         raise InputError(f"times have the shape {moments.shape}, expected ({rows},), one for each row of the inputs")
-    for row, (before, now) in enumerate(zip([last, *moments.tolist()], moments.tolist(), strict=False)):
+    for row, (before, now) in enumerate(itertools.pairwise([last, *moments.tolist()])):
         try:
             _validate_time(now, before)
         except InputError as error:

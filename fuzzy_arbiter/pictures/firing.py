@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -95,14 +95,13 @@ def rules(arbiter: Arbiter, inputs: Sample, output: str | None = None, ax: Axes 
     ax = new_axes(7.2, 1.3 + 0.58 * len(rows) + 0.1 * lines + 0.95) if ax is None else ax
 
     x = points_along(variable, 801)
-    scaled = implications == {"prod"}
-    clipped = [_cut(term.membership.of_many(x), cut, scaled) for term, cut in zip(variable.terms, cuts, strict=True)]
+    degrees = [term.membership.of_many(x) for term in variable.terms]
+    bound = np.multiply if implications == {"prod"} else np.minimum
     for line, row in enumerate(rows):  # rows are counted downwards
-        shape = variable.terms[row.term].membership
-        _draw_row(ax, variable, line, row, (x, _cut(shape.of_many(x), row.strength, scaled)), cuts[row.term])
+        _draw_row(ax, variable, line, row, (x, bound(degrees[row.term], row.strength)), cuts[row.term])
     foot = len(rows) + _TALL - 0.6
     tall = _TALL * _HEIGHT
-    joined = np.max(clipped, axis=0)
+    joined = np.max([bound(*pair) for pair in zip(degrees, cuts, strict=True)], axis=0)
     ax.plot(variable.universe, [foot, foot], color=INK, linewidth=1.0)
     ax.fill_between(x, foot, foot - tall * joined, facecolor="#d9d9d9", linewidth=0)
     ax.plot(x, foot - tall * joined, color=INK, linewidth=1.8)
@@ -157,16 +156,12 @@ def _draw_row(ax: Axes, variable: Output, baseline: int, row: _Row, outline: tup
     )  # fmt: skip
 
 
-def _cut(degrees: Array, strength: float, scaled: bool) -> Array:
-    return degrees * strength if scaled else np.minimum(degrees, strength)
-
-
 def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[float, float], fires: bool) -> str:
     """Draw the centroid at the foot, and return the output's value in words."""
     output = arbiter.system.outputs[k]
     foot, tall = place
     if fires:
-        center, meaning = _alone(arbiter, output)(values)[0], "centroid"
+        center, meaning = arbiter.centroids(values)[k], "centroid"
     elif output.default is not None:
         center, meaning = output.default, "default"
     else:
@@ -180,12 +175,3 @@ def _centroid(ax: Axes, arbiter: Arbiter, values: Sample, k: int, place: tuple[f
         bbox={"facecolor": "white", "edgecolor": "none", "pad": 1.0, "alpha": 0.85},
     )  # fmt: skip
     return f"{output.name} = {arbiter(values)[k]:.4g}"
-
-
-def _alone(arbiter: Arbiter, output: Output) -> Arbiter:
-    """Return an arbiter of this output's centroid alone."""
-    system = arbiter.system
-    parts = [(rule, tuple(c for c in rule.conclusions if c.variable == output.name)) for rule in system.rules]
-    rules = tuple(replace(rule, conclusions=conclusions) for rule, conclusions in parts if conclusions)
-    alone = replace(system, outputs=(output,), rules=rules, normalization="none", weights_of=())
-    return Arbiter(system=alone, engine=arbiter.engine)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from collections.abc import Callable, Sequence
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from fuzzy_arbiter.definition import Variable
 from fuzzy_arbiter.shapes import Shape
 
 Ranks = NDArray[np.int32]  # there are up to twice as many levels as there are weights of rules
+Limits = Callable[[Fraction], tuple[Fraction, Fraction]]  # degrees just before and just after a place
 Kind = Literal["gap", "below", "above"]
 ROUNDING = Fraction(1, 2**50)  # a sum of degrees that is nearer to 1 than this is 1: decimal degrees are rounded
 
@@ -69,44 +71,42 @@ def crisp(variable: Variable, levels: Sequence[Fraction]) -> Domain:
 
 def graded(variable: Variable, levels: Sequence[Fraction]) -> Domain:
     """Return the domain of an input that may be any real number in its universe."""
-    degrees = _exact(variable)
+    terms = _exact(variable)
     knots = list(map(Fraction, variable.knots))
     crossings = {
         a + (level - left) * (b - a) / (right - left)
-        for a, b in zip(knots, knots[1:], strict=False)
-        for left, right in zip(_between(degrees, a, b, False), _between(degrees, a, b, True), strict=True)
+        for a, b in pairwise(knots)
+        for left, right in ((limits(a)[1], limits(b)[0]) for limits in terms)
         for level in levels
         if (left - level) * (right - level) < 0
     }
     knots = sorted({*knots, *crossings})
-    middles = [(a + b) / 2 for a, b in zip(knots, knots[1:], strict=False)]
     patterns: dict[tuple[int, ...], float] = {}
-    for place in sorted([*knots, *middles]):
-        pattern = tuple(rank(max(of(place, False), of(place, True)), levels) for of in degrees)
-        patterns.setdefault(pattern, float(place))
-    return Domain(
-        variable.name, variable.term_names, tuple(patterns.values()), np.array(list(patterns), dtype=np.int32)
-    )
+    for place in sorted([*knots, *((a + b) / 2 for a, b in pairwise(knots))]):
+        patterns.setdefault(tuple(rank(max(limits(place)), levels) for limits in terms), float(place))
+    ranks = np.array(list(patterns), dtype=np.int32)
+    return Domain(variable.name, variable.term_names, tuple(patterns.values()), ranks)
 
 
 def stretches(variable: Variable) -> tuple[Stretch, ...]:
     """Return the stretches of an input's universe on which the degrees do not sum to 1."""
-    degrees = _exact(variable)
+    terms = _exact(variable)
     places = list(map(Fraction, variable.knots))
 
-    def at(place: Fraction) -> Fraction:
-        return _snapped(sum((max(of(place, False), of(place, True)) for of in degrees), Fraction(0)))
+    def part(place: Fraction) -> tuple[Fraction, Fraction, Fraction, Fraction]:
+        total = _sum(max(limits(place)) for limits in terms)
+        return place, place, total, total
 
     # places and the open intervals between them by turns: start, end, and the sum at both ends
-    parts = [(places[0], places[0], at(places[0]), at(places[0]))]
-    for a, b in zip(places, places[1:], strict=False):
-        left, right = (_snapped(sum(_between(degrees, a, b, end), Fraction(0))) for end in (False, True))
+    parts = [part(places[0])]
+    for a, b in pairwise(places):
+        left, right = _sum(limits(a)[1] for limits in terms), _sum(limits(b)[0] for limits in terms)
         if (left - 1) * (right - 1) < 0:
             one = a + (1 - left) * (b - a) / (right - left)
             parts += [(a, one, left, Fraction(1)), (one, one, Fraction(1), Fraction(1)), (one, b, Fraction(1), right)]
         else:
             parts.append((a, b, left, right))
-        parts.append((b, b, at(b), at(b)))
+        parts.append(part(b))
     kinds: dict[Kind, Callable[[Fraction, Fraction], bool]] = {
         "gap": lambda left, right: left == right == 0,
         "below": lambda left, right: left + right < 2,
@@ -134,24 +134,24 @@ def _joined(
     return result
 
 
-def _snapped(total: Fraction) -> Fraction:
+def _sum(degrees: Iterable[Fraction]) -> Fraction:
+    total = sum(degrees, Fraction(0))
     return Fraction(1) if abs(total - 1) <= ROUNDING else total
 
 
-Degree = Callable[[Fraction, bool], Fraction]
-
-
-def _exact(variable: Variable) -> list[Degree]:
-    """Return each term's exact degree just before or just after a place, complements as one minus the other."""
-    result: list[Degree] = []
+def _exact(variable: Variable) -> list[Limits]:
+    """Return each term's exact degrees just before and just after a place, complements as one minus the other."""
+    result: list[Limits] = []
     for i, term in enumerate(variable.terms):
-        of = _limit(term.straight)
-        for j, earlier in enumerate(variable.terms[:i]):
-            if _opposite(earlier.straight, term.straight):
-                of = _complement(result[j])
-                break
-        result.append(of)
+        opposite = (j for j, earlier in enumerate(variable.terms[:i]) if _opposite(earlier.straight, term.straight))
+        j = next(opposite, None)
+        limits = _limits(term.straight) if j is None else _complement(result[j])
+        result.append(limits)
     return result
+
+
+def _complement(limits: Limits) -> Limits:
+    return lambda place: (1 - limits(place)[0], 1 - limits(place)[1])
 
 
 def _opposite(shape: Shape, other: Shape) -> bool:
@@ -164,27 +164,15 @@ def _opposite(shape: Shape, other: Shape) -> bool:
     )
 
 
-def _complement(of: Degree) -> Degree:
-    return lambda place, after: 1 - of(place, after)
-
-
-def _limit(shape: Shape) -> Degree:
+def _limits(shape: Shape) -> Limits:
     points = [(Fraction(x), Fraction(degree)) for x, degree in shape.points]
     places = [x for x, _ in points]
 
-    def of(place: Fraction, after: bool) -> Fraction:
-        i = bisect_left(places, place)  # the first point that is not before the place
-        if after:
-            while i < len(places) and places[i] == place:
-                i += 1
-        if i == 0 or i == len(points):
+    def degree(place: Fraction, i: int) -> Fraction:
+        """Return the degree at a place by the line that ends at the i-th point."""
+        if i in (0, len(points)):
             return points[min(i, len(points) - 1)][1]
         (a, left), (b, right) = points[i - 1], points[i]
         return left + (right - left) * (place - a) / (b - a)
 
-    return of
-
-
-def _between(degrees: Sequence[Degree], a: Fraction, b: Fraction, end: bool) -> list[Fraction]:
-    """Return the degrees just within the interval from a to b, at its end or at its start."""
-    return [of(b, False) if end else of(a, True) for of in degrees]
+    return lambda place: (degree(place, bisect_left(places, place)), degree(place, bisect_right(places, place)))

@@ -38,12 +38,6 @@ def test_latch_closes_at_enter_and_opens_at_release_after_the_dwell(dwell, degre
     assert [h([degree, 0.0, 0.0], i * 0.125)[0] for i, degree in enumerate(degrees)] == weights
 
 
-def test_weights_are_those_of_crisp_rows():
-    h = steady()
-    rows = [[0.1, 0.9, 0.7], [0.9, 0.9, 0.9], [0.1, 0.1, 0.5], [0.1, 0.1, 0.1]]
-    assert [h(row, i) for i, row in enumerate(rows)] == [(0, 1, 0), (1, 0, 0), (0, 0, 1), (0, 0, 0)]
-
-
 def test_graded_mode_uses_the_degree_until_the_latch_sets():
     h = steady(graded=True)
     for i, (degree, counted) in enumerate([(0.5, 0.5), (0.8, 1.0), (0.3, 1.0), (0.2, 0.2)]):

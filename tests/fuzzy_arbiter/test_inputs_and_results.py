@@ -4,6 +4,7 @@ import copy
 import math
 import pickle
 from dataclasses import replace
+from decimal import Decimal
 from fractions import Fraction
 
 import numpy as np
@@ -32,6 +33,8 @@ from fuzzy_arbiter import (
 )
 from fuzzy_arbiter.errors import DefinitionError, FormatError, InputError
 from fuzzy_arbiter.formats import FORMATS, reads, writes
+
+pd = pytest.importorskip("pandas")
 
 EXACT = float(Fraction(12118694, 610275))  # of the tip at service 9.8, food 6.5
 SERVICE = Variable("service", (0, 10), auto_terms(3))
@@ -135,6 +138,16 @@ def test_batch_columns_are_named_in_input_and_result(tipping, table):
     assert [tipping(row)["tip"] for row in ROWS] == pytest.approx(rows[:, 0].tolist(), abs=1e-13)
 
 
+def test_data_frames_give_columns_by_name_and_their_rows_are_samples(tipping):
+    service, food = zip(*ROWS, strict=True)
+    frame = pd.DataFrame({"who": ["a", "b", "c"], "food": food, "service": service}, index=[7, 5, 3])
+    columns = tipping.batch(frame)
+    assert isinstance(columns, Result) and columns["tip"].tolist() == tipping.batch(ROWS)[:, 0].tolist()
+    assert frame.assign(**columns._asdict())["tip"].tolist() == columns["tip"].tolist()
+    for i, row in enumerate(ROWS):
+        assert tipping(frame.iloc[i]) == tipping(row) and tipping.explain(frame.iloc[i]) == tipping.explain(row)
+
+
 def test_keyword_columns_broadcast_scalars(tipping):
     assert (
         tipping.batch(service=[9.8, 3.0], food=6.5)["tip"].tolist()
@@ -144,27 +157,57 @@ def test_keyword_columns_broadcast_scalars(tipping):
     assert [column.tolist() for column in weights] == [[0.0, 0.15625], [1.0, 0.84375], [0.0, 0.0]]
 
 
+@pytest.mark.parametrize("arbiter", [Arbiter(system=TIPPING), Arbiter([Criterion("service"), Criterion("food")])])
 @pytest.mark.parametrize(
     ("ask", "fault"),
     [
-        (lambda a: a([1, 2], service=3), "got inputs by position and service by keyword"),
-        (lambda a: a(service=3), "food: input is missing, expected service, food"),
-        (lambda a: a(service=3, food=4, fod=4), "fod: unknown input, expected service, food"),
-        (lambda a: a(service=[3, 4], food=[4, 5]), r"service: input is \[3, 4\], .*; for columns there is batch"),
+        (lambda a: a([0.1]), "inputs: got 1, expected 2: service, food"),
+        (lambda a: a([0.1, math.nan]), "food: input is nan"),
+        (lambda a: a([0.1, 11]), r"food: input is 11, expected a number in \[0, 10?\]"),
+        (lambda a: a([0.1, -math.inf]), "food: input is -inf"),
+        (lambda a: a([None, 0.2]), "service: input is None"),
+        (lambda a: a(["good", 0.2]), "service: input is 'good'"),
+        (lambda a: a([[0.1], 0.2]), r"service: input is \[0.1\], .*; for columns there is batch"),
+        (lambda a: a([Decimal("0.1"), 0.2]), "service: input is Decimal"),
+        (lambda a: a(np.array([[0.1, 0.2]])), "inputs: got 1"),
+        (lambda a: a("ab"), "service: input is 'a'"),
         (lambda a: a(), "inputs are None, expected 2 numbers"),
+        (lambda a: a(0.5), "inputs are 0.5"),
+        (lambda a: a({0.1, 0.2}), "inputs are"),
+        (lambda a: a([1, 2], service=3), "got inputs by position and service by keyword"),
+        (lambda a: a(service=0.3), "food: input is missing, expected service, food"),
+        (lambda a: a(service=0.3, food=0.4, fod=0.4), "fod: unknown input, expected service, food"),
+        (lambda a: a(np.ma.array([0.3, 0.4], mask=[0, 1])), "food: input is masked, expected a number"),
+        (lambda a: a(pd.DataFrame({"service": [3], "food": [4]})), "service: input is .*; for columns there is batch"),
+        (lambda a: a(pd.Series([3.0, 4.0])), "service: input is missing"),
+        (lambda a: a.batch([0.1, 0.2]), r"shape \(2,\), expected \(n, 2\)"),
+        (lambda a: a.batch([[0.1, 0.2], [0.1, math.nan]]), "row 1: food is nan"),
+        (lambda a: a.batch([[0.1, 0.2], [0.1, 99]]), r"row 1: food is 99.0, expected a number in \[0, 10?\]"),
+        (lambda a: a.batch([[0.1, "0.2"]]), r"got values of the type str\d+; expected rows of numbers for service"),
+        (lambda a: a.batch([[1j, 0.0]]), "got values of the type complex128"),
+        (lambda a: a.batch(np.array([[0.1, "0.2"]], dtype=object)), "got a text among the values"),
+        (lambda a: a.batch([[10**400, 0]]), "int too large to convert to float; expected rows of numbers"),
+        (lambda a: a.batch([[0.1, 0.2], [0.1]]), "expected rows of numbers for service"),
         (lambda a: a.batch(service=[3]), "food: input is missing"),
         (lambda a: a.batch(service=[3], food=[4], fod=[4]), "fod: unknown input"),
         (lambda a: a.batch(service=[3], food=[4, 5]), r"columns have the shapes service \(1,\), food \(2,\), expected"),
         (lambda a: a.batch(service=3, food=4), r"columns have the shapes service \(\), food \(\), expected"),
-        (lambda a: a.batch(service=[3, 11], food=[4, 5]), r"row 1: service is 11.0, expected a number in \[0, 10\]"),
         (lambda a: a.batch(service=["3"], food=["4"]), "values of the type str"),
-        (lambda a: a.batch({"service": [3, None], "food": [4, 5]}), "row 1: service is nan"),
-        (lambda a: a(np.ma.array([3, 4], mask=[0, 1])), "food: input is masked, expected a number"),
+        (lambda a: a.batch({"service": [0.3, None], "food": [0.4, 0.5]}), "row 1: service is nan"),
+        (lambda a: a.batch(pd.DataFrame({"service": [1.0]})), "food: column is missing in service; expected"),
+        (
+            lambda a: a.batch(pd.DataFrame([[1, 2, 3]], columns=["food", "food", "service"])),
+            "food: column stands twice",
+        ),
+        (
+            lambda a: a.batch(pd.DataFrame({"service": ["3"], "food": [4]})),
+            "got a text among the values; expected rows",
+        ),
     ],
 )
-def test_mismatched_inputs_are_rejected_by_name(tipping, ask, fault):
+def test_invalid_inputs_are_rejected_by_name(arbiter, ask, fault):
     with pytest.raises(InputError, match=fault):
-        ask(tipping)
+        ask(arbiter)
 
 
 def test_masked_rows_stay_masked(tipping):
