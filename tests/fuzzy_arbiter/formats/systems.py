@@ -1,6 +1,7 @@
 """Systems for the tests of the formats: the tipping problem, and random ones."""
 
 from dataclasses import replace
+from pathlib import Path
 
 from hypothesis import strategies as st
 
@@ -9,6 +10,9 @@ from fuzzy_arbiter.propositions import And, Is, Not, Or
 from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.terms.curves import curve
 from fuzzy_arbiter.terms.values import Constant, Formula, Linear
+
+# files in the manner of other tools, by name
+FOREIGN = {path.name: path.read_text() for path in (Path(__file__).parents[2] / "data" / "fuzzy" / "foreign").iterdir()}
 
 
 def _grades(low, mid, high):

@@ -10,44 +10,10 @@ from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.terms.curves import curve
 from fuzzy_arbiter.terms.values import Constant
-from tests.fuzzy_arbiter.formats.systems import TIPPING
+from tests.fuzzy_arbiter.formats.systems import FOREIGN, TIPPING
 
 # in the manner of jFuzzyLogic's example: comments of three kinds, no ranges, no OR
-OTHERS = """
-/* a tip
-   for the waiter */
-FUNCTION_BLOCK tipper  // there may be a name
-VAR_INPUT
-    service : REAL;
-    food : real;
-END_VAR
-VAR_OUTPUT tip : REAL; END_VAR
-FUZZIFY service
-    TERM poor := (0, 1) (4, 0) ;
-    TERM good := (1, 0) (4,1), (6,1) (9,0);
-    TERM excellent := (6, 0) (9, 1);
-END_FUZZIFY
-FUZZIFY food
-    TERM rancid := (0, 1) (1, 1) (3,0) ;
-    TERM delicious := (7,0) (9,1);
-END_FUZZIFY
-Defuzzify tip
-    TERM cheap := TRIAN 0 5 10;
-    TERM average := TRAPE 10 15 15 20;
-    TERM generous := (20,0) (25,1) (30,0);
-    METHOD : COG;    (* Center Of Gravity *)
-    DEFAULT := 0;
-END_DEFUZZIFY
-RULEBLOCK No1
-    AND : MIN;
-    ACT : MIN;
-    ACCU : MAX;
-    RULE 1 : IF service IS poor OR food IS rancid THEN tip IS cheap;
-    RULE 2 : IF service IS good THEN tip IS average WITH 0.5;
-    RULE three : IF NOT (service IS NOT excellent OR NOT food IS delicious) THEN tip IS generous;
-END_RULEBLOCK
-END_FUNCTION_BLOCK
-"""
+OTHERS = FOREIGN["tipper.fcl"]
 
 
 def test_foreign_function_block_is_read():
@@ -215,18 +181,7 @@ def test_names_that_differ_only_in_case_are_rejected():
         writes(replace(TIPPING, inputs=(*TIPPING.inputs, twin)), "fcl")
 
 
-BLOCKS = """FUNCTION_BLOCK first
-VAR_INPUT x : REAL; RANGE := (0 .. 1); END_VAR
-VAR_OUTPUT y : REAL; END_VAR
-FUZZIFY x TERM on := (0, 0) (1, 1); END_FUZZIFY
-DEFUZZIFY y TERM low := 1; TERM small := 1; TERM high := 3; METHOD : COGS; END_DEFUZZIFY
-RULEBLOCK one
-  RULE 1 : IF x IS on THEN y IS low;
-  RULE 2 : IF x IS on THEN y IS small;
-  RULE 3 : IF x IS on THEN y IS high;
-END_RULEBLOCK
-END_FUNCTION_BLOCK
-"""
+BLOCKS = FOREIGN["blocks.fcl"]
 
 
 def test_one_of_several_blocks_is_chosen_by_name(tmp_path):

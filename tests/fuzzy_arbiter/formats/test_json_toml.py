@@ -21,27 +21,9 @@ from fuzzy_arbiter import (
 )
 from fuzzy_arbiter.errors import DefinitionError, FormatError
 from fuzzy_arbiter.formats import reads, writes
-from tests.fuzzy_arbiter.formats.systems import TIPPING
+from tests.fuzzy_arbiter.formats.systems import FOREIGN, TIPPING
 
-LONG = """
-rules = [
-  "if wind is calm then sail is full",
-  'if wind is strong or wind is "too strong" then sail is reefed with 0.5',
-]
-
-[[inputs]]
-name = "wind"
-universe = [0, 20]
-terms = {calm = {falling = [2, 6]}, strong = {trapezoid = [2, 6, 8, 12]}, "too strong" = [[8, 0], [12, 1]]}
-
-[[outputs]]
-name = "sail"
-universe = [0, 1]
-default = 0.5
-[outputs.terms]
-reefed = {triangle = [0, 0.25, 0.5]}
-full = {rising = [0.5, 1]}
-"""
+LONG = FOREIGN["sail.toml"]
 
 
 def test_terms_may_use_named_shapes():
@@ -75,15 +57,7 @@ def test_a_default_may_be_null_in_json():
     assert reads(json.dumps(data), "json").outputs[0].default is None
 
 
-SHORT = """
-name = "regions"
-form = "minimal"
-normalization = "sum"
-outside = "clip"
-points = 55
-criteria = [{name = "obstacle", on = "near", off = "far", membership = {falling = [1, 3]}}, {name = "depth"}]
-weight = {name = "w", universe = [0, 1], terms = {low = {falling = [0.3, 0.7]}, high = [[0.3, 0], [0.7, 1]]}}
-"""
+SHORT = FOREIGN["criteria.toml"]
 
 
 def test_criteria_are_the_short_form():
@@ -146,21 +120,13 @@ def changed(path, value):
         (["inputs", 0, "terms", "calm"], 1, r"^inputs\[0\].terms.calm: got 1, expected a list of points, or a table"),
         (["inputs", 0, "terms", "too strong"], [[1, 2]], r"^inputs\[0\].terms.'too strong': shape: point \(1.0, 2.0\)"),
         (["inputs", 0, "terms", "calm"], [], r"^inputs\[0\].terms.calm: shape: got no points"),
-        (
-            ["inputs", 0, "terms", "calm"],
-            [[0, 1], 2],
-            r"^inputs\[0\].terms.calm: inputs|^inputs\[0\].terms.calm\[1\]: got 2",
-        ),
+        (["inputs", 0, "terms", "calm"], [[0, 1], 2], r"^inputs\[0\].terms.calm: inputs|^inputs\[0\].terms.calm\[1\]:"),
         (["inputs", 0, "terms", "calm"], {"gauss": [1, 2]}, r"calm.gauss: unknown key, expected one of triangle, trap"),
         (["inputs", 0, "terms", "calm"], {"triangle": [1, 2]}, r"calm.triangle: got a list, expected a list of 3 num"),
         (["inputs", 0, "terms", "calm"], {"rising": [2, 1]}, r"^inputs\[0\].terms.calm: shape: place 1.0 comes after"),
         (["outputs", 0, "default"], "x", r"^outputs\[0\].default: got 'x', expected a finite number"),
         (["rules", 1], 5, r"^rules\[1\]: got 5, expected text"),
-        (
-            ["rules", 1],
-            "if wind is",
-            r"^rules\[1\]: rule 'if wind is': got the end after 'is', expected a term's name",
-        ),
+        (["rules", 1], "if wind is", r"^rules\[1\]: rule 'if wind is': got the end after 'is', expected a term's name"),
         (["rules", 1], "if wind is wet then sail is full", r"^R2 'if wind is wet .*'wind' has no term 'wet', expected"),
         (["conjunction"], "mn", "^conjunction is 'mn', expected one of min, prod"),
         (["conjunction"], 1, "^conjunction: got 1, expected text"),
@@ -218,14 +184,8 @@ def test_invalid_json_is_rejected(text, fault):
         ("name = \n", r"^expected TOML: Invalid value"),
         ('name = "a"\nname = "b"\n', r"^expected TOML: Cannot overwrite a value .*line 2"),
         ("points = 2020-01-01", "^points is datetime.date.2020, 1, 1., expected a whole number|inputs: key is missing"),
-        (
-            LONG.replace("universe = [0, 20]", "universe = [0, inf]"),
-            r"^inputs\[0\].universe: got inf, expected a finite",
-        ),
-        (
-            LONG.replace("universe = [0, 20]", "universe = [0, nan]"),
-            r"^inputs\[0\].universe: got nan, expected a finite",
-        ),
+        (LONG.replace("universe = [0, 20]", "universe = [0, inf]"), r"^inputs\[0\].universe: got inf, expected a fini"),
+        (LONG.replace("universe = [0, 20]", "universe = [0, nan]"), r"^inputs\[0\].universe: got nan, expected a fini"),
     ],
 )
 def test_invalid_toml_is_rejected(text, fault):
