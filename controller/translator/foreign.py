@@ -5,6 +5,8 @@ from __future__ import annotations
 import ctypes
 from typing import Any
 
+import numpy as np
+
 # types of arguments, as C writes them
 POINTER, SIZE, INT, DOUBLE, BOOL = "void *", "size_t", "int", "double", "bool"
 
@@ -20,5 +22,12 @@ _TYPES = {
 def call_c(address: int, kinds: tuple[str, ...], *arguments: Any) -> int:
     """Call a C function that returns an int, by its address."""
     function = ctypes.PYFUNCTYPE(ctypes.c_int, *(_TYPES[kind] for kind in kinds))(int(address))
-    returned: int = function(*(getattr(argument, "ctypes", argument) for argument in arguments))
+    returned: int = function(*map(_plain, arguments))
     return returned
+
+
+def _plain(argument: Any) -> Any:
+    """Return an argument as ctypes takes it."""
+    if isinstance(argument, np.ndarray):
+        return argument.ctypes
+    return argument.item() if isinstance(argument, np.generic) else argument

@@ -281,3 +281,21 @@ def test_signal_storm_neither_loses_nor_duplicates_rows(tmp_path):
         signal.signal(signal.SIGALRM, before)
     recorder.close()
     assert numbered(tmp_path) == recorder.rows
+
+
+@pytest.mark.parametrize("batch", [1, 7, 1000])
+def test_blocks_and_single_rows_make_one_record(tmp_path, batch):
+    rows = np.random.default_rng(batch).normal(size=(600, 2))
+    recorder = Recorder(tmp_path, COLUMNS[:2], batch_rows=batch)
+    done = 0
+    for size in (1, 0, 256, 3, 100, 240):
+        if size == 3:
+            for row in rows[done : done + size]:
+                recorder.observe(done, row)
+        else:
+            recorder.take(done, rows[done : done + size])
+        done += size
+    recorder.close()
+    record = load_record(tmp_path)
+    np.testing.assert_array_equal(record.stack(list(record.units)), rows)
+    assert recorder.rows == 600 == done

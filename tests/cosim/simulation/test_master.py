@@ -5,6 +5,8 @@ import time
 import numpy as np
 import pytest
 
+from controller import FunctionLaw
+from controller.compiling.function import INTERPRETED
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from plant_fmu import PlantError
@@ -98,3 +100,61 @@ def test_rate_paces_by_the_wall_clock():
         before = time.perf_counter()
         master.run(rate=1.0)
         assert time.perf_counter() - before >= 0.2
+
+
+class Blocks:
+    """Observer that keeps blocks of rows."""
+
+    def __init__(self):
+        self.sizes, self.rows = [], []
+
+    def observe(self, k, row):
+        self.take(k, row[None])
+
+    def take(self, first, rows):
+        assert first == len(self.rows)
+        self.sizes.append(len(rows))
+        self.rows.extend(rows.copy())
+
+
+@pytest.mark.parametrize("changes", [[], ["sensing.position_noise=0.02"], ["time.control=0.007"], ["plant.fmi=2"]])
+def test_blocks_hold_the_rows_of_single_steps(changes):
+    scenario = load_scenario("paper-limited", [*SHORT, *changes])
+    blocks = Blocks()
+    with Master(scenario) as master:
+        master.run([blocks])
+        assert master.plant.time == pytest.approx(0.5)
+    assert max(blocks.sizes) > 1
+    np.testing.assert_array_equal(blocks.rows, kept_rows(scenario).rows)
+
+
+@pytest.mark.medium(fast=1)
+@pytest.mark.parametrize(
+    "changes",
+    [
+        ["commands.enabled=true"],
+        ["master.order=jacobi"],
+        ["sensing.through=sensors", "sensing.position_noise=0", "sensing.velocity_noise=0"],
+        ["failures=[{thruster=2,time=0.1}]"],
+    ],
+)
+def test_python_runs_the_step_with_the_bits_of_c(changes, monkeypatch):
+    scenario = load_scenario("docking", ["arbiter.engine=closed", "time.duration=0.2", *changes])
+    compiled = kept_rows(scenario).rows
+    monkeypatch.setenv(INTERPRETED, "1")
+    np.testing.assert_array_equal(kept_rows(scenario).rows, compiled)
+
+
+@pytest.mark.parametrize("error", [ZeroDivisionError, KeyboardInterrupt])
+def test_an_error_of_a_python_law_ends_the_block_before_its_step(error):
+    calls, blocks = [], Blocks()
+
+    def law(state, *_):
+        calls.append(state.position)
+        if len(calls) == 300:
+            raise error
+        return [5.0, 0.0, 0.0, 0.0, 0.0, 0.0]
+
+    with Master(load_scenario("paper", SHORT), FunctionLaw(law)) as master, pytest.raises(error):
+        master.run([blocks])
+    assert len(calls) == 300 and len(blocks.rows) == 299 and max(blocks.sizes) > 1
