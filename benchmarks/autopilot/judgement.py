@@ -112,7 +112,7 @@ def clearances_at(scenario: Scenario, record: Record, time: Array) -> Array:
     found = np.zeros((len(time), len(scenario.regions) + 1))
     for row, at in enumerate(time.tolist()):
         environment.update_positions(max(at, 0.0), shifts)
-        found[row] = environment.clearances(positions[row], quaternions[row])
+        found[row] = environment.evaluate(positions[row], quaternions[row])[1]
     return found
 
 

@@ -32,7 +32,6 @@ from cosim.simulation.compiled_rules import rules_text
 from cosim.simulation.make_step import exchanged_variables, make_data, make_model, make_noise, step_signals
 from cosim.step.arbiter_inputs import compute_inputs, empty_signals, pack_inputs
 from cosim.step.one_step import advance, locate, show_start
-from cosim.step.placed_regions import RegionEvaluation, RegionPlaces, evaluate_places
 from cosim.step.plant_calls import Clock, PlantCalls
 from cosim.step.score import empty_metrics, fly
 from cosim.step.step_model import LawOutputs
@@ -54,8 +53,6 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield navigate, (empty_measurements(), _FLAT, SensorModel(), empty_memory(), state)
     for law in LAWS.values():
         yield law.function, _law_arguments(law, state, goal, regions)
-    found = RegionEvaluation(_FLAT, _TABLE, _TABLE, _FLAT)
-    yield evaluate_places, (RegionPlaces(goal, regions), state, found)
     yield evaluate_packed, (regions, state.position, state.quaternion, _FLAT, _TABLE, _TABLE, _FLAT)
     yield write_clearances, (regions, _TABLE, _FLAT, _FLAT)
     yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)

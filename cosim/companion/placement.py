@@ -37,12 +37,12 @@ class Placement:
 
     def clearance(self, position: Array, quaternion: Array) -> float:
         """Return the minimum clearance of hard regions [m] at a pose; infinite if there are none."""
-        return float(np.min(self._environment.clearances(position, quaternion)[self.hard], initial=math.inf))
+        return float(np.min(self._environment.evaluate(position, quaternion)[1][self.hard], initial=math.inf))
 
     def describe(self, position: Array, quaternion: Array) -> str:
         """Describe a pose by its position [m, NED], and its distances to the goal and the nearest hard region."""
         north, east, down = position.tolist()
-        clearances = self._environment.clearances(position, quaternion)
+        _, clearances = self._environment.evaluate(position, quaternion)
         parts = [f"in the scene: {north:.2f} m north, {east:.2f} m east, {down:.2f} m down"]
         if self._has_goal:
             parts.append("inside the goal" if clearances[0] >= 0.0 else f"goal {format_distance(-clearances[0])} away")

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller import VehicleState
 from cosim.logs.forces import CommandForces
 from cosim.logs.frames import euler_zyx, rotate_to_body
 from cosim.logs.resampling import TopicReader
@@ -138,25 +137,16 @@ class _RegionColumns:
         self._clearances = [columns[f"{name}.clearance"] for name in names]
         self._shifts = [columns[f"{name}.shift.{a}"] for name in scenario.moving for a in "xyz"]
         self._position, self._quaternion = [columns[n] for n in _POSITION], [columns[n] for n in _QUATERNION]
-        n = 1 + len(scenario.regions)
         self._environment = RegionEnvironment(scenario)
-        self._evaluation = self._environment.empty_evaluation(np.zeros(n), np.zeros(n))
         self._shift: Array = np.zeros((len(scenario.moving), 3))
-        self._health = np.ones(scenario.vehicle.n_thrusters)
         self._time = columns["time"]
 
     def put(self, rows: Array) -> None:
         """Write values, clearances and shifts into rows; NaN where the pose is unknown."""
         known = np.asarray(np.isfinite(rows[:, [*self._position, *self._quaternion]]).all(axis=1))
-        still = np.zeros(6)
         for k, row in enumerate(rows):
             self._environment.update_positions(float(row[self._time]), self._shift)
             row[self._shifts] = self._shift.ravel()
             if known[k]:
-                state = VehicleState(
-                    np.ascontiguousarray(row[self._position]), np.ascontiguousarray(row[self._quaternion]), still,
-                    self._health,
-                )  # fmt: skip
-                self._environment.evaluate(state, self._evaluation)
-                row[self._values] = self._evaluation.values[self._first :]
-                row[self._clearances] = self._evaluation.clearances[self._first :]
+                values, clearances = self._environment.evaluate(row[self._position], row[self._quaternion])
+                row[self._values], row[self._clearances] = values[self._first :], clearances[self._first :]

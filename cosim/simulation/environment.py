@@ -7,8 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from controller import VehicleState
-from controller.compiling.function import CompiledFunction
 from controller.regions import Region, Sphere, pack
 from controller.regions.region_set import PackedRegions, shape_entry
 from controller.regions.shape import Shape
@@ -16,7 +14,6 @@ from cosim.errors import CommandError, RunError
 from cosim.scenario.region_tables import PARKED_POSITION, Vector3
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
-from cosim.step.placed_regions import RegionEvaluation, RegionPlaces, evaluate_places
 from cosim.step.step_model import StepData
 
 _SPHERE_NUMBERS = len(Sphere((0.0, 0.0, 0.0), 1.0).packed())
@@ -53,15 +50,16 @@ class RegionEnvironment:
         self._goal_shape, self._middle = scenario.goal, np.array(shape_center(scenario.goal))
         goal_velocity = np.array(scenario.goal_velocity, dtype=float)
         self._target = self._reached = _Target(scenario.goal, self._middle, np.zeros(3), goal_velocity)
-        self._places = RegionPlaces(self.goal, self.regions)
         self._names = ["goal", *(region.name for region in secondary)]
         self._streamed = ["goal"] if scenario.goal_streamed else []
         self._streamed += [
             region.region.name for region in scenario.regions if region.streamed and not region.is_dynamic
         ]
+        # the same arrays each time: C is bound to arrays
+        self._position, self._quaternion = np.zeros(3), np.zeros(4)
+        self._out = [(np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)) for n in (1, len(secondary))]
         self._moving = [self._names.index(name) for name in scenario.moving]
         self._dynamic = [i for i, region in enumerate(scenario.regions) if region.is_dynamic]
-        self._evaluate_places = CompiledFunction(evaluate_places)
 
     def update_positions(self, time: float, shifts: Array) -> None:
         """Move all regions to their positions at a time; time [s], shifts (moving regions, 3) [m, NED]."""
@@ -77,22 +75,13 @@ class RegionEnvironment:
         """Add a standard deviation [m] to the position uncertainty of every region, which widens the margins."""
         np.hypot(self._deviations, deviation, out=self.regions.deviations)
 
-    def empty_evaluation(self, values: Array, clearances: Array) -> RegionEvaluation:
-        """Return an evaluation for `evaluate` to fill; values, clearances (n + 1,)."""
-        n = len(self._names)
-        return RegionEvaluation(values, np.zeros((n, 3)), np.zeros((n, 3)), clearances)
-
-    def evaluate(self, state: VehicleState, evaluation: RegionEvaluation) -> None:
-        """Evaluate goal and regions at a pose."""
-        self._evaluate_places(self._places, state, evaluation)
-
-    def clearances(self, position: Array, quaternion: Array) -> Array:
-        """Return the clearances of goal and regions at a pose, shape (n + 1,) [m, rad of attitude]."""
-        # with position [m, NED]
-        n = len(self._names)
-        found = self.empty_evaluation(np.zeros(n), np.zeros(n))
-        self.evaluate(VehicleState(position, quaternion, np.zeros(6), np.zeros(0)), found)
-        return found.clearances
+    def evaluate(self, position: Array, quaternion: Array) -> tuple[Array, Array]:
+        """Return values and clearances of goal and regions at a pose, shape (n + 1,) each; position [m, NED]."""
+        self._position[:], self._quaternion[:] = position, quaternion
+        for packed, out in zip((self.goal, self.regions), self._out, strict=True):
+            packed.evaluate(self._position, self._quaternion, *out)
+        values, _, _, clearances = (np.concatenate(parts) for parts in zip(*self._out, strict=True))
+        return values, clearances
 
     # ---- moved from outside ----
 

@@ -31,24 +31,13 @@ class RegionEvaluation(NamedTuple):
     clearances: Array  # (n + 1,) distance left to each boundary: m, or rad of attitude
 
 
-class RegionPlaces(NamedTuple):
-    """Goal and regions at their present positions."""
-
-    goal: PackedRegions
-    regions: PackedRegions
-
-
-def evaluate_places(places: RegionPlaces, state: VehicleState, found: RegionEvaluation) -> None:
-    """Evaluate the goal into the first elements, and the regions into those behind, in one call."""
-    p, e, g, c = state.position, state.quaternion, found.values, found.clearances
-    evaluate_packed(places.goal, p, e, g[:1], found.gradients[:1], found.rotation_gradients[:1], c[:1])
-    evaluate_packed(places.regions, p, e, g[1:], found.gradients[1:], found.rotation_gradients[1:], c[1:])
-
-
 def evaluate(model: StepModel, data: StepData, state: VehicleState, evaluation: RegionEvaluation) -> None:
     """Evaluate goal and regions at a pose: all values for a record, otherwise clearances alone."""
     if model.full:
-        evaluate_places(RegionPlaces(data.goal, data.regions), state, evaluation)
+        p, e, g, c = state.position, state.quaternion, evaluation.values, evaluation.clearances
+        slopes, turns = evaluation.gradients, evaluation.rotation_gradients
+        evaluate_packed(data.goal, p, e, g[:1], slopes[:1], turns[:1], c[:1])
+        evaluate_packed(data.regions, p, e, g[1:], slopes[1:], turns[1:], c[1:])
     else:
         write_clearances_of_pose(data.goal, state, evaluation.clearances[:1])
         write_clearances_of_pose(data.regions, state, evaluation.clearances[1:])
