@@ -59,8 +59,9 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
             continue
         moves.append(tuple(tuple(key for _, a, keys in positions if a == axis for key in keys) for axis in range(3)))
         for index, axis, keys in positions:
-            of_center = (memory.keep(model.goal_center) + axis,) if path == "goal" and has_center else ()
-            targets |= dict.fromkeys(keys, ("numbers" if len(keys) == 1 else "middle", (first + index, *of_center)))
+            centers = (model.goal_center, data.goal_center) if path == "goal" and has_center else ()
+            offsets = first + index, *(memory.keep(center) + axis for center in centers)
+            targets |= dict.fromkeys(keys, ("numbers" if len(keys) == 1 else "middle", offsets))
     for i in range(model.goal_places.size):
         targets[f"goal.then.{i // 3}.{i % 3}"] = "shift", (memory.keep(model.goal_places) + i,)
     slots = []
