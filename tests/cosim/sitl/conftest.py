@@ -1,11 +1,13 @@
 """A server in a thread, for stand-in autopilots to connect to."""
 
 import threading
+from functools import partial
 
 import pytest
 
+from cosim.sitl.hil_server import HilServer
 from cosim.sitl.json_server import JsonServer
-from cosim.sitl.law import make_pwm_law
+from cosim.sitl.law import make_control_law, make_pwm_law
 from cosim.sitl.sitl_session import FlightOptions, SitlSession
 
 
@@ -48,3 +50,8 @@ def serve(tmp_path):
     yield begin
     for served in begun:
         served.join(60.0)
+
+
+@pytest.fixture
+def serve_px4(serve):
+    return partial(serve, kind=HilServer, of=("px4", make_control_law), record_rate=1000.0)

@@ -1,4 +1,4 @@
-"""An independent stand-in for ArduPilot that packs frames and parses answers as ArduPilot does."""
+"""Independent stand-ins that pack frames and parse answers by hand: for ArduPilot as it does, for PX4 by MAVLink 2."""
 
 import re
 import socket
@@ -62,7 +62,17 @@ def frame(count, pwm=(), rate=1200, channels=16):
     return head + b"".join(struct.pack("<H", value) for value in [*pwm, *[0] * (channels - len(pwm))])
 
 
-class StandIn:
+class Peer:
+    """Closes its socket with its context."""
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.socket.close()
+
+
+class StandIn(Peer):
     """Sends frames from a socket of its own, and waits for each answer."""
 
     def __init__(self, address, rate=1200, channels=16):
@@ -70,12 +80,6 @@ class StandIn:
         self.socket.settimeout(120.0)
         self.address, self.rate, self.channels = address, rate, channels
         self.count = 0
-
-    def __enter__(self):
-        return self
-
-    def __exit__(self, *_):
-        self.socket.close()
 
     def send(self, data):
         self.socket.sendto(data, self.address)
@@ -107,3 +111,85 @@ NEUTRAL = (1501,) * 8  # armed, inside the dead band
 def heave(u):
     """Pulses of vectored_6dof that push down with u|u|, u from -1 to 1, by the vertical thrusters, 5 to 8."""
     return (*NEUTRAL[:4], *(round(1500 + 400 * u),) * 4)
+
+
+# ---- PX4 ----
+
+# id: extra byte of the checksum, and the payload's fields as they go over the wire
+MESSAGES = {
+    0: (50, "<IBBBBB"),
+    93: (47, "<QQ16fB"),
+    107: (108, "<Q13fIB"),
+    113: (124, "<QiiiHHHhhhHBB"),
+    115: (4, "<Q4f3fiiihhhHHhhh"),
+}
+ARMED = 128
+
+
+def checksum(data):
+    """CRC-16/MCRF4XX, as MAVLink has it."""
+    crc = 0xFFFF
+    for byte in data:
+        crc ^= byte
+        for _ in range(8):
+            crc = crc >> 1 ^ (0x8408 if crc & 1 else 0)
+    return crc
+
+
+def packed(number, *values, sequence=0):
+    extra, layout = MESSAGES[number]
+    payload = struct.pack(layout, *values).rstrip(b"\0") or b"\0"
+    frame = bytes([len(payload), 0, 0, sequence % 256, 1, 1]) + number.to_bytes(3, "little") + payload
+    return b"\xfd" + frame + checksum(frame + bytes([extra])).to_bytes(2, "little")
+
+
+class Px4(Peer):
+    """Takes sensors and answers them."""
+
+    def __init__(self, address):
+        self.socket = socket.create_connection(address, timeout=120.0)
+        self.data, self.seen, self.frames = b"", {}, 0
+        self.say(packed(0, 0, 2, 12, 0, 4, 3))
+
+    def say(self, data):
+        self.socket.sendall(data)
+
+    def message(self):
+        """The next message's number and fields; its checksum must be right."""
+        while len(self.data) < 12 or len(self.data) < 12 + self.data[1]:
+            data = self.socket.recv(4096)
+            if not data:
+                raise EOFError
+            self.data += data
+        n = self.data[1]
+        frame, self.data = self.data[: 12 + n], self.data[12 + n :]
+        assert frame[0] == 0xFD
+        number = int.from_bytes(frame[7:10], "little")
+        extra, layout = MESSAGES[number]
+        assert checksum(frame[1:-2] + bytes([extra])) == int.from_bytes(frame[-2:], "little")
+        size = struct.calcsize(layout)  # zeros at the end are left out, extensions come behind it
+        return number, struct.unpack(layout, frame[10:-2].ljust(size, b"\0")[:size])
+
+    def sensors(self):
+        """Return the next HIL_SENSOR; earlier messages are in `seen`."""
+        while True:
+            number, fields = self.message()
+            self.seen[number] = fields
+            if number == 107:
+                return fields
+
+    def answer(self, controls, mode=ARMED):
+        values = (*controls, *[0.0] * (16 - len(controls)))
+        self.say(packed(93, self.frames, 1, *values, mode, sequence=self.frames))
+        self.frames += 1
+
+    def fly(self, controls, frames=1):
+        """Answer so many frames of sensors, perhaps by a function of them; return the last."""
+        for _ in range(frames):
+            fields = self.sensors()
+            self.answer(controls(fields) if callable(controls) else controls)
+        return fields
+
+
+def down(u):
+    return (0.0,) * 4 + (-u,) * 4

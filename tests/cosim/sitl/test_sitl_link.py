@@ -89,6 +89,7 @@ def test_estimate_is_recorded_and_arming_releases_the_vehicle(tmp_path):
     assert outcome.counts.steps == STEPS and outcome.counts.waited >= 60
     deltas = [one for one in heard if one.get_type() == "VISION_POSITION_DELTA"]
     assert deltas and np.abs([one.position_delta for one in deltas]).max() < 1e-3
+    assert {one.time_delta_usec for one in deltas} == {10_000}  # the DVL's rate
     asked = {one.param1 for one in heard if one.get_type() == "COMMAND_LONG"}
     assert asked == {0.0, 31.0, 32.0}
     record = load_record(outcome.runs[0].folder)
