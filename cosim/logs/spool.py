@@ -112,3 +112,8 @@ class LogContents:
         sources = {s.name: s for s in self.sources.values() if s.quantity == quantity and s.count}
         preferred = (sources[name] for name in self.preferences.get(quantity, ()) if name in sources)
         return next(preferred, max(sources.values(), key=lambda source: source.count, default=None))
+
+
+def handled_names(reader: type) -> frozenset[str]:
+    """Return the names of the messages X that a class converts by a method ``_read_x``."""
+    return frozenset(name.removeprefix("_read_").upper() for name in vars(reader) if name.startswith("_read_"))

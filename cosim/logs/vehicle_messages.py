@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from cosim.logs.frames import ReadComponents, attitude_of_angles, attitude_of_quaternion, scale_fields
-from cosim.logs.spool import LogContents
+from cosim.logs.spool import LogContents, handled_names
 from cosim.mavlink.wire.dialect import dialect
 
 AUTOPILOT = 1  # component id of an autopilot
@@ -38,8 +38,6 @@ _SAMPLES: dict[str, tuple[tuple[str, ReadComponents], ...]] = {  # message: quan
     "DISTANCE_SENSOR": (("altitude", scale_fields("current_distance", 0.01)),),
     "SERVO_OUTPUT_RAW": (("pulses", scale_fields(" ".join(f"servo{i}_raw" for i in range(1, 17)))),),
 }  # fmt: skip
-# these and the ones that `VehicleMessages.add` converts by hand
-MESSAGES = _SAMPLES.keys() | {"MANUAL_CONTROL", "SYS_STATUS", "VISION_POSITION_DELTA", "PARAM_VALUE", "STATUSTEXT"}
 _IN_MICROSECONDS = ("ODOMETRY", "RAW_IMU")  # messages of _SAMPLES with time_usec; others have time_boot_ms
 _PREFERENCES = {
     "attitude": ("ODOMETRY", "ATTITUDE_QUATERNION", "ATTITUDE"),
@@ -51,7 +49,7 @@ _PREFERENCES = {
 
 
 class VehicleMessages:
-    """Add messages of a vehicle and its pilot to the contents of a log."""
+    """Add messages of a vehicle and its pilot to the contents of a log; ``_read_x`` converts messages X by hand."""
 
     def __init__(self, contents: LogContents, system: int, autopilot: int, kind: int) -> None:
         self._contents = contents
@@ -72,19 +70,28 @@ class VehicleMessages:
             stamp = message.time_usec * 1e-6
         for quantity, components in _SAMPLES.get(name, ()):
             contents.put(quantity, name, stamp, written, components(message.__getattribute__))
-        match name:
-            case "MANUAL_CONTROL":
-                contents.put("sticks", name, math.nan, written, self._sticks(message))
-            case "SYS_STATUS" if 0 < message.voltage_battery < 0xFFFF:
-                contents.put("voltage", name, math.nan, written, (message.voltage_battery * 1e-3,))
-            case "VISION_POSITION_DELTA" if message.time_delta_usec > 0:  # mean over the time before the reception
-                seconds = message.time_delta_usec * 1e-6
-                velocity = [distance / seconds for distance in message.position_delta]
-                contents.put("dvl", name, math.nan, written - 0.5 * seconds, velocity)
-            case "PARAM_VALUE":
-                contents.put_parameter(_text(message.param_id).rstrip("\0")[:16], float(message.param_value))
-            case "STATUSTEXT" if (text := _text(message.text)).startswith(_FRAME):
-                contents.frame = text.removeprefix(_FRAME).split("\0")[0].strip()
+        if (read := getattr(self, f"_read_{name.lower()}", None)) is not None:
+            read(message, written)
+
+    def _read_manual_control(self, m: Any, written: float) -> None:
+        self._contents.put("sticks", "MANUAL_CONTROL", math.nan, written, self._sticks(m))
+
+    def _read_sys_status(self, m: Any, written: float) -> None:
+        if 0 < m.voltage_battery < 0xFFFF:
+            self._contents.put("voltage", "SYS_STATUS", math.nan, written, (m.voltage_battery * 1e-3,))
+
+    def _read_vision_position_delta(self, m: Any, written: float) -> None:
+        if m.time_delta_usec > 0:  # the mean over the time before the reception
+            seconds = m.time_delta_usec * 1e-6
+            velocity = [distance / seconds for distance in m.position_delta]
+            self._contents.put("dvl", "VISION_POSITION_DELTA", math.nan, written - 0.5 * seconds, velocity)
+
+    def _read_param_value(self, m: Any, written: float) -> None:
+        self._contents.put_parameter(_text(m.param_id).rstrip("\0")[:16], float(m.param_value))
+
+    def _read_statustext(self, m: Any, written: float) -> None:
+        if (text := _text(m.text)).startswith(_FRAME):
+            self._contents.frame = text.removeprefix(_FRAME).split("\0")[0].strip()
 
     def _rejection(self, name: str, system: int, component: int, m: Any) -> str:
         """Return what distinguishes a message that is not read; empty for one that is."""
@@ -106,6 +113,9 @@ class VehicleMessages:
         roll = _stick(m.t) if m.enabled_extensions & 2 else 0.0
         pitch = _stick(m.s) if m.enabled_extensions & 1 else 0.0
         return _stick(m.x), _stick(m.y), -_limit(up) + 0.0, roll, pitch, _stick(m.r)
+
+
+MESSAGES = _SAMPLES.keys() | handled_names(VehicleMessages)  # that are read
 
 
 def _text(text: str | bytes) -> str:

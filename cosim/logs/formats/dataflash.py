@@ -17,7 +17,7 @@ from cosim.logs.chunked_file import ChunkedFile, OnProgress
 from cosim.logs.clocks import Clock
 from cosim.logs.column_map import ColumnMap
 from cosim.logs.frames import ReadComponents, attitude_of_angles, attitude_of_quaternion, scale_fields
-from cosim.logs.spool import LogContents
+from cosim.logs.spool import LogContents, handled_names
 from cosim.logs.vehicle_messages import DOWNWARD
 
 _HEAD = b"\xa3\x95"  # first bytes of each message
@@ -38,8 +38,6 @@ _SAMPLES: dict[str, tuple[tuple[str, ReadComponents], ...]] = {  # message: quan
     "RFND": (("altitude", scale_fields("Dist")),),
     "BAT": (("voltage", scale_fields("Volt")),),
 }
-# these and the ones that `_Messages` converts by hand
-_READ = frozenset(_SAMPLES.keys() | {"PARM", "MSG", "VISO", "RCOU"})
 
 Fields = dict[str, Any]
 
@@ -82,7 +80,7 @@ def _preferred_barometers(contents: LogContents) -> tuple[str, ...]:
 
 
 class _Messages:
-    """Add messages to the contents of a log."""
+    """Add messages to the contents of a log; ``_read_x`` converts messages X by hand."""
 
     def __init__(self, contents: LogContents) -> None:
         self._contents = contents
@@ -112,24 +110,34 @@ class _Messages:
         source = name if instance is None else f"{name}[{instance}]"
         for quantity, components in _SAMPLES.get(name, ()):
             self._contents.put(quantity, source, math.nan, time, components(m.__getitem__))
-        match name:
-            case "PARM":
-                self._contents.put_parameter(str(m["Name"]), float(m["Value"]))
-                if m["Name"] == "FRAME_CONFIG" and 0 <= m["Value"] < len(_FRAMES):
-                    self._contents.frame = _FRAMES[int(m["Value"])]
-            case "MSG" if (firmware := str(m["Message"]).split(" ")[0]) in _OTHERS:
-                self._contents.kind = f"vehicle of {firmware}"
-            case "VISO" if m["dt"] > 0.0:  # the mean over dt, which ends at the stamp
-                velocity = [m[f"PosD{axis}"] / m["dt"] for axis in "XYZ"]
-                self._contents.put("dvl", source, math.nan, time - 0.5 * m["dt"], velocity)
-            case "RCOU":
-                pulses = [float(m[f"C{i}"]) for i in range(1, 33) if f"C{i}" in m]
-                self._contents.put("pulses", source, math.nan, time, pulses)
+        if (read := getattr(self, f"_read_{name.lower()}", None)) is not None:
+            read(m, source, time)
+
+    def _read_parm(self, m: Fields, source: str, time: float) -> None:
+        self._contents.put_parameter(str(m["Name"]), float(m["Value"]))
+        if m["Name"] == "FRAME_CONFIG" and 0 <= m["Value"] < len(_FRAMES):
+            self._contents.frame = _FRAMES[int(m["Value"])]
+
+    def _read_msg(self, m: Fields, source: str, time: float) -> None:
+        if (firmware := str(m["Message"]).split(" ")[0]) in _OTHERS:
+            self._contents.kind = f"vehicle of {firmware}"
+
+    def _read_viso(self, m: Fields, source: str, time: float) -> None:
+        if m["dt"] > 0.0:  # the mean over dt, which ends at the stamp
+            velocity = [m[f"PosD{axis}"] / m["dt"] for axis in "XYZ"]
+            self._contents.put("dvl", source, math.nan, time - 0.5 * m["dt"], velocity)
+
+    def _read_rcou(self, m: Fields, source: str, time: float) -> None:
+        pulses = [float(m[f"C{i}"]) for i in range(1, 33) if f"C{i}" in m]
+        self._contents.put("pulses", source, math.nan, time, pulses)
 
     def _is_stale(self, stamp: float) -> bool:
         """Return True for a RATE that repeats an old stamp [s], since the rate controller rests, as in MANUAL."""
         last, self._rate_stamp = self._rate_stamp, stamp
         return stamp == last or self.clock.is_behind(stamp)
+
+
+_READ = frozenset(_SAMPLES) | handled_names(_Messages)
 
 
 def parse_messages(

@@ -134,32 +134,49 @@ def test_docking_by_wrench_keeps_walls_and_heading_by_the_true_state(tmp_path):
 
 
 @pytest.mark.medium
-def test_wrong_surveyed_origin_misses_the_goal(tmp_path):
-    """A surveyed origin is believed, so that a wrong one leads elsewhere."""
-    flight = Flight(tmp_path, 20.0, origin=SceneOrigin(surveyed=(0.0, 0.0, 0.0)))
+def test_surveyed_origin_is_believed_and_a_wrong_one_misses_the_goal(tmp_path):
+    surveyed = (0.3, 0.0, -0.4)
+    flight = Flight(tmp_path, 20.0, origin=SceneOrigin(surveyed=surveyed))
     true = np.array([flight.link.now(f"position.{axis}") for axis in "xyz"])
+    assert flight.companion.session.alignment.offset.tolist() == [*surveyed]
+    believed = flight.companion.session.alignment.to_scene(flight.companion.session.reported.position)
+    assert believed - true == pytest.approx(np.add(SHIFT, surveyed), abs=0.05)
     assert np.linalg.norm(true - flight.target()) > 1.0
 
 
-@pytest.mark.medium
-def test_no_setpoints_are_sent_before_frame_alignment(tmp_path):
-    with pytest.raises(RunError, match="waiting for the scene's origin"):
-        Flight(tmp_path, origin=SceneOrigin())
-    link = StandIn(profile="generic", silent=["GLOBAL_POSITION_INT"])
-    with pytest.raises(RunError, match="the autopilot has no global position"):
-        Flight(tmp_path, link=link)
-    assert not link.of_type(*STICKS)
+def parameter(name, value):
+    return mavlink.MAVLink_param_value_message(name, value, 9, 1, 0)
+
+
+# what a vehicle is like that is not steered, the companion's options, what the autopilot says, and the reason
+NOT_STEERED = {
+    "no origin": ({}, {"origin": SceneOrigin()}, None, "waiting for the scene's origin"),
+    "no global position": ({"silent": ["GLOBAL_POSITION_INT"]}, {}, None, "the autopilot has no global position"),
+    "not armed, by default": ({"armed": False}, {}, None, "waiting for arming"),
+    "an ArduSub that would ignore sticks": (
+        {"profile": "ardusub"}, {"profile": "ardusub"}, parameter(b"SYSID_MYGCS", 250.0),
+        r"SYSID_MYGCS is 250, and the companion's system id 255"),
+    "an ArduSub that would misread sticks": (
+        {"profile": "ardusub"}, {"profile": "ardusub"},
+        mavlink.MAVLink_named_value_float_message(0, b"PilotGain", 0.25),
+        r"the autopilot's pilot gain is 0.25, expected 0.5 of --pilot-gain"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("kind", "options", "says", "words"), NOT_STEERED.values(), ids=NOT_STEERED)
+def test_no_setpoints_are_sent_to_a_vehicle_that_cannot_be_steered(tmp_path, kind, options, says, words):
+    link = StandIn(**{"profile": "generic", "shift": SHIFT} | kind)
+    link.events = [(0.5, lambda: link.hear(says, 1, 1))] if says else []
+    with pytest.raises(RunError, match=words):
+        Flight(tmp_path, link=link, **options)
+    assert not link.of_type(*STICKS) and 400 not in {m.command for m in link.of_type("COMMAND_LONG")}
     assert not (tmp_path / "run").exists()
 
 
 @pytest.mark.medium
-def test_companion_waits_for_arming_by_default(tmp_path):
-    link = StandIn(profile="generic", armed=False)
-    with pytest.raises(RunError, match="waiting for arming"):
-        Flight(tmp_path, link=link)
-    assert 400 not in {m.command for m in link.of_type("COMMAND_LONG")}
-    armed = Flight(tmp_path, 2.0, link=StandIn(profile="generic", armed=False), arm=True)
-    assert armed.status == "completed" and armed.link.now("commands.armed") == 1.0
+def test_companion_arms_the_vehicle_if_it_may(tmp_path):
+    flight = Flight(tmp_path, 2.0, link=StandIn(profile="generic", armed=False), arm=True)
+    assert flight.status == "completed" and flight.link.now("commands.armed") == 1.0
 
 
 @pytest.mark.medium
@@ -339,23 +356,6 @@ def test_dead_reckoning_widens_margins_with_distance(tmp_path, margins, link):
     assert margins[-1] - UNSEEN == pytest.approx(0.05 * moved, rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("message", "words"),
-    [
-        (mavlink.MAVLink_param_value_message(b"SYSID_MYGCS", 250.0, 9, 1, 0),
-         r"SYSID_MYGCS is 250, and the companion's system id 255"),
-        (mavlink.MAVLink_named_value_float_message(0, b"PilotGain", 0.25),
-         r"the autopilot's pilot gain is 0.25, expected 0.5 of --pilot-gain"),
-    ],
-)  # fmt: skip
-def test_an_ardusub_that_would_ignore_or_misread_sticks_gets_none(tmp_path, message, words):
-    link = StandIn(profile="ardusub", shift=SHIFT)
-    link.events = [(0.5, lambda: link.hear(message, 1, 1))]
-    with pytest.raises(RunError, match=words):
-        Flight(tmp_path, link=link, profile="ardusub")
-    assert not link.of_type(*STICKS)
-
-
 @pytest.mark.medium
 def test_violated_hard_region_holds_the_vehicle(tmp_path):
     flight = Flight(tmp_path, 8.0, origin=SceneOrigin(surveyed=(0.0, 3.2, -1.9)))  # as if it were beside the pipe
@@ -458,6 +458,14 @@ def test_record_holds_the_exchange_with_the_autopilot(tmp_path):
     offset = np.outer(flight.companion.session.alignment.offset, np.ones(151))
     assert scene - estimate - way == pytest.approx(offset, abs=3e-3)
     assert set(table["companion.state"].to_numpy()[2:]) == {STATES.index("steering")}
+    late = round(0.15 / flight.link.step)  # steps: pulses come at 10 Hz, in whole microseconds
+    begun = len(flight.link.rows) - round(3.0 / flight.link.step) - 1
+    for i in (1, 8):
+        true, force = flight.link.column(f"thrust[{i}]"), table[f"thruster_force[{i}]"].to_numpy()
+        for k in range(20, 150):
+            now = begun + round(0.02 * k / flight.link.step)
+            assert np.abs(true[now - late : now + 2] - force[k]).min() < 0.2
+        assert np.ptp(force[20:150]) > 0.5
     assert table["companion.round_trip"].to_numpy()[-1] == pytest.approx(0.067, abs=0.03)
 
 

@@ -9,9 +9,6 @@ import pytest
 from cosim.live.hub import Hub
 from cosim.results.record import load_record
 from cosim.results.wording import verdict
-from cosim.run.run import run_scenario
-from cosim.scenario.scenario import load_scenario
-from tests.cosim.live.conftest import require_same_record
 
 
 @pytest.mark.medium
@@ -27,17 +24,6 @@ def test_viewers_see_rows_of_the_record_to_the_last_bit(live):
         if signal["name"] in record.units:
             assert np.array_equal(viewer.column(signal["name"]), record[signal["name"]][steps]), signal["name"]
     assert end == {"type": "end", "status": "completed", "verdict": verdict(done.summary)}
-
-
-@pytest.mark.medium
-def test_viewers_do_not_change_the_record(live, tmp_path):
-    alone = run_scenario(load_scenario("harbour", ["time.duration=2"]), tmp_path / "alone", report=False)
-    running = live(rate=4.0)
-    with running.viewer() as one, running.viewer() as other:
-        one.until("end")
-        other.until("end")
-    require_same_record(alone, running.end())
-    assert np.array_equal(one.column("time")[-5:], other.column("time")[-5:])
 
 
 @pytest.mark.slow

@@ -1,5 +1,7 @@
 """Logs that others wrote, and their import."""
 
+import copy
+import functools
 import tomllib
 from pathlib import Path
 
@@ -42,6 +44,17 @@ def refused(imported, tmp_path):
         assert not (tmp_path / "run").exists()
 
     return refused
+
+
+def changed(table, key, value):
+    """Return a column map's text with a value at a dotted key, or without the key for None."""
+    table = copy.deepcopy(table)
+    *path, last = key.split(".")
+    inner = functools.reduce(dict.__getitem__, path, table)
+    inner |= {last: value}
+    if value is None:
+        del inner[last]
+    return tomli_w.dumps(table)
 
 
 def facts_by_quantity(run):

@@ -55,9 +55,8 @@ def msg_definition(rng: random.Random) -> tuple[str, str]:
     n = rng.choice((3, 50, 1000, 30_000))
     words = ("class", "x", "__init__", "None", "X", "x__y", "_x", "é", "x-y", "x;import os", "structure_needs_at_least")
     word, other = rng.choice(words), rng.choice(words)
-    number = rng.choice(
-        ("1e999", "-1e999", "nan", "1<<40", "9" * 5000, "0x" + "f" * n, '\'a"""\'', '"\\"', "1", "-" * n)
-    )
+    numbers = ("1e999", "-1e999", "nan", "1<<40", "9" * 5000, "0x" + "f" * n, '\'a"""\'', '"\\"', "1", "-" * n)
+    number = rng.choice(numbers)
     body = rng.choice((
         f"float64 X={number}\n",
         f"{rng.choice(('int8', 'bool', 'string', 'time', 'duration', 'byte', 'char'))} {other}={number}\n",
@@ -143,9 +142,8 @@ def packed(rng: random.Random, compression: str, data: bytes) -> bytes:
     if trick == "zeros":
         data += bytes(rng.choice((1 << 20, 1 << 26)))
     if trick == "messages":
-        data = data[: 1 << 16] * max(
-            1, (1 << (21 if compression == "bz2" else rng.choice((22, 26)))) // max(1, len(data[: 1 << 16]))
-        )
+        size = 1 << (21 if compression == "bz2" else rng.choice((22, 26)))
+        data = data[: 1 << 16] * max(1, size // max(1, len(data[: 1 << 16])))
     result = PACK["zstd" if trick == "lie" else compression](data)
     return result[: len(result) // 2] if trick == "cut" else result
 
@@ -165,9 +163,8 @@ def mcap_bag(rng: random.Random, path: Path) -> None:
     for k, (when, data) in enumerate(messages):
         Message(k % channels if rng.random() < 0.9 else 60_000, when, data, when, k).write(inner)
     for _ in range(rng.choice((0, 0, 0, 2000))):  # tiny records
-        inner.write(
-            struct.pack("<BQ", rng.choice((3, 4, 5, 6, 7, 9, 12, 99)), rng.choice((0, 0, 22, 2**40, 2**64 - 1)))
-        )
+        kind, size = rng.choice((3, 4, 5, 6, 7, 9, 12, 99)), rng.choice((0, 0, 22, 2**40, 2**64 - 1))
+        inner.write(struct.pack("<BQ", kind, size))
     data, compression = inner.end(), rng.choice(("zstd", "lz4", "", "zstd", "lz4", "zstd", "xz"))
     for _ in range(rng.choice((1, 1, 3, 10))):
         body = packed(rng, compression if compression in PACK else "", data)
@@ -264,19 +261,16 @@ def number(value: int, form: str = "<I") -> bytes:
 
 def ros1_bag(rng: random.Random, path: Path) -> None:
     name, text = msg_definition(rng)
-    about = header(
-        topic=b"/odom", type=name.replace("/msg/", "/").encode(), md5sum=b"*", message_definition=text.encode()
-    )
-    connection = header(op=b"\7", conn=number(0), topic=b"/odom") + about
+    about = {"topic": b"/odom", "type": name.replace("/msg/", "/").encode(), "message_definition": text.encode()}
+    connection = header(op=b"\7", conn=number(0), topic=b"/odom") + header(**about, md5sum=b"*")
     body, entries = BytesIO(), []
     for when, data in payloads(rng, b""):
         time = number(min(when // 10**9, 2**32 - 1)) + number(when % 10**9)
         entries.append(time + number(body.tell()))
         for _ in range(rng.choice((0, 0, 0, 1)) if len(entries) > 1 else rng.choice((1, 5000, 50_000))):
             body.write(connection[:200])
-        body.write(
-            header(op=b"\2", conn=number(0 if rng.random() < 0.999 else 9), time=time) + number(len(data)) + data
-        )
+        connected = number(0 if rng.random() < 0.999 else 9)
+        body.write(header(op=b"\2", conn=connected, time=time) + number(len(data)) + data)
     if rng.random() < 0.2:
         entries = [rng.choice(entries)] * rng.choice((10, 20_000))
     out = BytesIO()

@@ -7,11 +7,13 @@ import sys
 
 import numpy as np
 import pytest
+import tomli_w
+from scipy.spatial.transform import Rotation
 
 from cosim.logs.bag_storage import stored_messages
 from cosim.logs.formats.bag import Decoder
 from cosim.results.log_facts import load_log_facts
-from tests.cosim.logs.conftest import LOGS, has_remark
+from tests.cosim.logs.conftest import LOGS, changed, has_remark
 from tests.cosim.logs.dive import Dive, assert_flown
 
 zstandard = pytest.importorskip("zstandard")
@@ -22,57 +24,36 @@ typesys = pytest.importorskip("rosbags.typesys")
 
 ODOMETRY, _ = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE).generate_msgdef("nav_msgs/msg/Odometry", ros_version=2)
 FORCES = "float64[] data\n"
-MAP = """
-world = "ENU"
-body = "FLU"
-
-[position]
-topic = "/odom"
-columns = ["pose.pose.position.x", "pose.pose.position.y", "pose.pose.position.z"]
-time = { column = "header.stamp" }
-
-[attitude]
-topic = "/odom"
-columns = ["pose.pose.orientation.x", "pose.pose.orientation.y", "pose.pose.orientation.z", "pose.pose.orientation.w"]
-quaternion = "xyzw"
-time = { column = "header.stamp" }
-
-[velocity]
-topic = "/odom"
-columns = ["twist.twist.linear.x", "twist.twist.linear.y", "twist.twist.linear.z"]
-time = { column = "header.stamp" }
-
-[thrust]
-topic = "/thrusters"
-columns = ["data[0]", "data[1]", "data[2]", "data[3]", "data[4]", "data[5]", "data[6]", "data[7]"]
-"""
+STAMP = {"column": "header.stamp"}
+TABLE = {
+    "world": "ENU", "body": "FLU",
+    "position": {"topic": "/odom", "columns": [f"pose.pose.position.{a}" for a in "xyz"], "time": STAMP},
+    "attitude": {"topic": "/odom", "columns": [f"pose.pose.orientation.{a}" for a in "xyzw"], "quaternion": "xyzw",
+                 "time": STAMP},
+    "velocity": {"topic": "/odom", "columns": [f"twist.twist.linear.{a}" for a in "xyz"], "time": STAMP},
+    "thrust": {"topic": "/thrusters", "columns": [f"data[{i}]" for i in range(8)]},
+}  # fmt: skip
+MAP = tomli_w.dumps(TABLE)
 START = 1_700_000_000
 
 
 def messages_of(dive):
     """Yield topic, message and time [ns]: odometry at 20 Hz in ENU and FLU, and forces; each 80 ms after its stamp."""
-    from scipy.spatial.transform import Rotation
-
     swap = Rotation.from_matrix([[0, 1, 0], [1, 0, 0], [0, 0, -1]])
     flip = Rotation.from_matrix(np.diag([1.0, -1.0, -1.0]))
-    R = Rotation.from_quat(np.roll(dive.quaternion, -1, axis=1))
-    quaternions = (swap * R * flip).as_quat()
-    velocities = R.inv().apply(dive.velocity_world) * [1, -1, -1]
+    R = Rotation.from_quat(dive.quaternion, scalar_first=True)
+    positions, velocities = swap.apply(dive.position), flip.apply(R.inv().apply(dive.velocity_world))
+    quaternions, covariance = (swap * R * flip).as_quat(), [0.0] * 36
     for k, t in enumerate(dive.times):
         stamp = round(1e9 * t)
-        (n, e, d), (x, y, z, w), (u, v, up) = dive.position[k], quaternions[k], velocities[k]
+        position, linear = dict(zip("xyz", positions[k], strict=True)), dict(zip("xyz", velocities[k], strict=True))
+        pose = {"position": position, "orientation": dict(zip("xyzw", quaternions[k], strict=True))}
+        twist = {"linear": linear, "angular": dict.fromkeys("xyz", 0.0)}
         odometry = {
             "header": {"stamp": {"sec": START + stamp // 10**9, "nanosec": stamp % 10**9}, "frame_id": "odom"},
-            "child_frame_id": "base_link",
-            "pose": {
-                "pose": {"position": {"x": e, "y": n, "z": -d}, "orientation": {"x": x, "y": y, "z": z, "w": w}},
-                "covariance": [0.0] * 36,
-            },
-            "twist": {
-                "twist": {"linear": {"x": u, "y": v, "z": up}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}},
-                "covariance": [0.0] * 36,
-            },
-        }
+            "child_frame_id": "base_link", "pose": {"pose": pose, "covariance": covariance},
+            "twist": {"twist": twist, "covariance": covariance},
+        }  # fmt: skip
         yield "/odom", odometry, START * 10**9 + stamp + 80_000_000
         yield "/thrusters", {"data": dive.thrust[k].tolist()}, START * 10**9 + stamp
         yield "/else", {"data": []}, START * 10**9 + stamp
@@ -196,12 +177,6 @@ def bags(tmp_path_factory, dive, bag):
     }
 
 
-STORAGES = (
-    "MCAP", "SQLite", "folder", "two files", "compressed messages", "journal", "no definitions",
-    "short names of types", "ROS 1",
-)  # fmt: skip
-
-
 @pytest.fixture
 def columns(tmp_path):
     """A column map beside the definitions of its messages."""
@@ -213,7 +188,11 @@ def columns(tmp_path):
     return tmp_path / "map.toml"
 
 
-@pytest.mark.parametrize("storage", STORAGES)
+@pytest.mark.parametrize(
+    "storage",
+    ["MCAP", "SQLite", "folder", "two files", "compressed messages", "journal", "no definitions",
+     "short names of types", "ROS 1"],
+)  # fmt: skip
 def test_imported_bag_matches_the_dive(bags, storage, columns, dive, imported):
     run = imported(bags[storage], columns=columns)
     assert_flown(run.record, dive, 1e-6)
@@ -273,19 +252,22 @@ def test_truncated_bag_is_read_to_its_end(bag, columns, tmp_path, imported):
     assert 0.0 < run.summary["simulated_time"] < 20.0
 
 
+POSITION = TABLE["position"]["columns"][:2]
+
+
 @pytest.mark.parametrize(
-    ("old", "new", "what"),
+    ("key", "value", "what"),
     [
-        ('topic = "/thrusters"', 'topic = "/thruster"', "has no topic '/thruster', .*did you mean '/thrusters'"),
-        ("pose.pose.position.z", "pose.pose.position.zz", r"/odom has no field 'pose\.pose\.position\.zz'"),
-        ("pose.pose.position.z", "header.frame_id", "/odom: header.frame_id is str, expected a number"),
-        ("pose.pose.position.z", "pose position", "is no path, expected one such as"),
-        ('topic = "/thrusters"\n', "", r"the map says no topic for \[thrust\]"),
-        ("data[7]", "data[8]", r"/thrusters has no field 'data\[8\]'"),
+        ("thrust.topic", "/thruster", "has no topic '/thruster', .*did you mean '/thrusters'"),
+        ("thrust.topic", None, r"the map says no topic for \[thrust\]"),
+        ("position.columns", [*POSITION, "pose.pose.position.zz"], r"/odom has no field 'pose\.pose\.position\.zz'"),
+        ("position.columns", [*POSITION, "header.frame_id"], "/odom: header.frame_id is str, expected a number"),
+        ("position.columns", [*POSITION, "pose position"], "is no path, expected one such as"),
+        ("thrust.columns", [*TABLE["thrust"]["columns"][:7], "data[8]"], r"/thrusters has no field 'data\[8\]'"),
     ],
 )
-def test_missing_bag_topics_are_named(bag, columns, refused, old, new, what):
-    columns.write_text(MAP.replace(old, new, 1))
+def test_missing_bag_topics_are_named(bag, columns, refused, key, value, what):
+    columns.write_text(changed(TABLE, key, value))
     refused(what, bag, columns=columns)
 
 

@@ -7,45 +7,26 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
+import tomli_w
 from scipy.spatial.transform import Rotation
 
 import cosim
 from controller.quaternion import rotation_matrix
 from cosim.results.log_facts import load_log_facts
-from tests.cosim.logs.conftest import facts_by_quantity, has_remark
+from tests.cosim.logs.conftest import changed, facts_by_quantity, has_remark
 from tests.cosim.logs.dive import Dive, assert_flown
 
 QUATERNION = [f"quaternion.e{i}" for i in range(4)]
-MAP = """
-time = { column = "t", unit = "ms" }
-world = "ENU"
-body = "FLU"
-
-[position]
-columns = ["x", "y", "z"]
-unit = "cm"
-
-[attitude]
-columns = ["yaw", "pitch", "roll"]
-euler = "ZYX"
-unit = "deg"
-
-[rates]
-columns = ["wx", "wy", "wz"]
-unit = "deg/s"
-
-[depth]
-columns = ["altitude above the sea"]
-sign = -1
-
-[thrust]
-columns = ["f1", "f2", "f3", "f4", "f5", "f6", "f7", "f8"]
-unit = "kgf"
-
-[voltage]
-columns = ["battery"]
-unit = "mV"
-"""
+TABLE = {
+    "time": {"column": "t", "unit": "ms"}, "world": "ENU", "body": "FLU",
+    "position": {"columns": [*"xyz"], "unit": "cm"},
+    "attitude": {"columns": ["yaw", "pitch", "roll"], "euler": "ZYX", "unit": "deg"},
+    "rates": {"columns": ["wx", "wy", "wz"], "unit": "deg/s"},
+    "depth": {"columns": ["altitude above the sea"], "sign": -1},
+    "thrust": {"columns": [f"f{i}" for i in range(1, 9)], "unit": "kgf"},
+    "voltage": {"columns": ["battery"], "unit": "mV"},
+}  # fmt: skip
+MAP = tomli_w.dumps(TABLE)
 
 
 def frame_of(dive):
@@ -103,13 +84,8 @@ def test_euler_angles_are_products_of_elementary_rotations(write, imported, orde
     """Capital letters: about the axes of the turned body; small ones: about those of the world."""
     angles = np.cumsum(np.random.default_rng(0).uniform(-0.1, 0.1, (50, 3)), axis=0)
     frame = pd.DataFrame({"t": 0.1 * np.arange(50), **{f"a{i}": angles[:, i] for i in range(3)}})
-    text = f'''time = {{ column = "t" }}
-[attitude]
-columns = ["a0", "a1", "a2"]
-euler = "{order}"
-inverse = {str(inverse).lower()}
-'''
-    quaternions = imported(**write(frame, text)).record.stack(QUATERNION)
+    table = {"time": {"column": "t"}, "attitude": {"columns": ["a0", "a1", "a2"], "euler": order, "inverse": inverse}}
+    quaternions = imported(**write(frame, tomli_w.dumps(table))).record.stack(QUATERNION)
     for q, row in zip(quaternions, angles, strict=True):
         parts = [about(axis.lower(), angle) for axis, angle in zip(order, row, strict=True)]
         expected = np.linalg.multi_dot(parts if order.isupper() else parts[::-1])
@@ -121,14 +97,9 @@ def test_scalar_last_quaternions_and_ground_velocity_are_imported(write, importe
     w, x, y, z = dive.quaternion.T
     frame = pd.DataFrame({"t": dive.times, "x": x, "y": y, "z": z, "w": w})
     frame[["vn", "ve", "vd"]] = dive.velocity_world
-    text = """time = { column = "t" }
-[attitude]
-columns = ["x", "y", "z", "w"]
-quaternion = "xyzw"
-[velocity_world]
-columns = ["vn", "ve", "vd"]
-"""
-    record = imported(**write(frame, text)).record
+    table = {"time": {"column": "t"}, "attitude": {"columns": [*"xyzw"], "quaternion": "xyzw"},
+             "velocity_world": {"columns": ["vn", "ve", "vd"]}}  # fmt: skip
+    record = imported(**write(frame, tomli_w.dumps(table))).record
     expected = Rotation.from_quat(np.column_stack([x, y, z, w])).inv().apply(dive.velocity_world)
     np.testing.assert_allclose(record.stack([f"velocity.{a}" for a in "uvw"]), expected, atol=1e-9)
 
@@ -139,15 +110,12 @@ def test_iso_8601_times_and_per_topic_times_are_imported(write, imported):
     stamps = [(start + datetime.timedelta(seconds=float(t))).isoformat() for t in dive.times]
     frame = pd.DataFrame({"when": stamps, "yaw": dive.yaw, "pitch": dive.pitch, "roll": dive.roll})
     frame["deep"], frame["deep at"] = dive.position[:, 2], 1e9 * start.timestamp() + 1e9 * dive.times + 2e7
-    text = """time = { column = "when", unit = "iso8601" }
-[attitude]
-columns = ["yaw", "pitch", "roll"]
-euler = "ZYX"
-[depth]
-columns = ["deep"]
-time = { column = "deep at", unit = "ns" }
-"""
-    run = imported(**write(frame, text))
+    table = {
+        "time": {"column": "when", "unit": "iso8601"},
+        "attitude": {"columns": ["yaw", "pitch", "roll"], "euler": "ZYX"},
+        "depth": {"columns": ["deep"], "time": {"column": "deep at", "unit": "ns"}},
+    }  # fmt: skip
+    run = imported(**write(frame, tomli_w.dumps(table)))
     assert load_log_facts(run.folder).start == pytest.approx(start.timestamp() + 0.02, abs=1e-3)
     stamps = run.record["measured.time.depth_sensor"]
     np.testing.assert_allclose(np.diff(np.unique(stamps[np.isfinite(stamps)])), 0.1, atol=1e-5)
@@ -184,25 +152,24 @@ def test_clock_jump_becomes_a_marked_gap(write, imported, by):
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "what"),
+    ("key", "value", "what"),
     [
-        ('"roll"]', '"rol"]', r"dive\.csv: has no column 'rol', which the map names; did you mean 'roll'"),
-        ('unit = "deg"', "", r"yaw, pitch, roll: attitude reaches 90 rad, expected at most .*unit = \"deg\""),
-        ('unit = "kgf"', 'unit = "lbf"', r"thrust\.unit is 'lbf', expected one of 'N', 'kgf'"),
-        ('euler = "ZYX"', 'euler = "ZZX"', r"attitude\.euler is 'ZZX', expected three axes"),
-        ('euler = "ZYX"', "", r"attitude\.columns has 3 names, expected 4 \(or 3 with euler\)"),
-        ("[rates]", "[rate]", r"map\.toml: .*rate.*rates"),
-        ('world = "ENU"', 'world = "NUE"', r"world: expected one of 'NED', 'ENU', 'NWU'"),
-        ('unit = "ms" }', 'unit = "ms" }\nnonsense = 1', r"map\.toml: .*nonsense"),
-        ('time = { column = "t", unit = "ms" }', "", r"the map says no time for \[position\], expected \[time\]"),
-        ('"f7", "f8"', '"f7"', "commands of 7 thrusters, expected 8 as vehicle 'bluerov2_heavy' has"),
-        ('["battery"]', '["junk, with a comma"]', r"junk, with a comma|cannot be read"),
-        ('["wx", "wy", "wz"]\nunit = "deg/s"', '["f1", "battery", "wz"]', r"rates reaches 1.58e\+04 rad/s"),
+        ("attitude.columns", ["yaw", "pitch", "rol"],
+         r"dive\.csv: has no column 'rol', which the map names; did you mean 'roll'"),
+        ("attitude.unit", None, r"yaw, pitch, roll: attitude reaches 90 rad, expected at most .*unit = \"deg\""),
+        ("thrust.unit", "lbf", r"thrust\.unit is 'lbf', expected one of 'N', 'kgf'"),
+        ("attitude.euler", "ZZX", r"attitude\.euler is 'ZZX', expected three axes"),
+        ("attitude.euler", None, r"attitude\.columns has 3 names, expected 4 \(or 3 with euler\)"),
+        ("rate", TABLE["rates"], r"map\.toml: .*rate.*rates"), ("nonsense", 1, r"map\.toml: .*nonsense"),
+        ("world", "NUE", r"world: expected one of 'NED', 'ENU', 'NWU'"),
+        ("thrust.columns", TABLE["thrust"]["columns"][:7], "commands of 7 thrusters, expected 8 as vehicle"),
+        ("time", None, r"the map says no time for \[position\], expected \[time\]"),
+        ("voltage.columns", ["junk, with a comma"], r"junk, with a comma|cannot be read"),
+        ("rates", {"columns": ["f1", "battery", "wz"]}, r"rates reaches 1.58e\+04 rad/s"),
     ],
 )  # fmt: skip
-def test_invalid_column_map_is_rejected_by_name(write, refused, old, new, what):
-    assert old in MAP
-    refused(what, **write(frame_of(Dive(np.arange(0.0, 5.0, 0.1))), MAP.replace(old, new, 1)))
+def test_invalid_column_map_is_rejected_by_name(write, refused, key, value, what):
+    refused(what, **write(frame_of(Dive(np.arange(0.0, 5.0, 0.1))), changed(TABLE, key, value)))
 
 
 def test_column_map_is_accepted_only_with_tables(tmp_path, refused):
@@ -225,7 +192,7 @@ def test_log_without_motion_or_of_weeks_is_rejected_with_requirements(write, ref
 
 
 def test_log_without_commands_is_remarked(write, imported):
-    run = imported(**write(frame_of(Dive(np.arange(0.0, 5.0, 0.1))), MAP[: MAP.index("[thrust]")]))
+    run = imported(**write(frame_of(Dive(np.arange(0.0, 5.0, 0.1))), changed(TABLE, "thrust", None)))
     assert has_remark(run, "no commands of thrusters")
     assert cosim.load_run(run.folder).summary["max_force"] != 0.0
 

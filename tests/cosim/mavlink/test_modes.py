@@ -25,6 +25,8 @@ EXCHANGES = {
         *((long(PAUSE, value), ACCEPTED) for value in (0.0, 1.0)), *[(long(GOTO, 0.0, 2.0), ACCEPTED)] * 2,
         (long(GOTO, 1.0), ACCEPTED), (long(GOTO, 0.0, 3.0), UNSUPPORTED),
         [SetMode(mode) for mode in ("hold", "reach", "hold", "hold", "reach")]],
+    "continue in the mode before": [{"commands.mode": 6.0}, *((long(PAUSE, value), ACCEPTED) for value in (0.0, 1.0)),
+                                    [SetMode("hold"), SetMode("depth_hold")]],
     "land, and return home": [(long(LAND), ACCEPTED), (long(HOME), ACCEPTED), [SetMode("surface"), AT_HOME]],
     "restart": [(long(RESTART, 1.0), DENIED), (long(RESTART, 1.0, 0, 0, 0, 0, 20190226.0), ACCEPTED),
                 (long(RESTART, 3.0), UNSUPPORTED), [Reset()]],

@@ -1,15 +1,15 @@
 """A real ArduSub, if one is on the path: it arms, dives in MANUAL, and holds its depth in ALT_HOLD."""
 
-import contextlib
 import shutil
-import socket
 import subprocess
 import time
 
 import pytest
 
 from benchmarks.autopilot.flights import PARAMETERS
-from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.dialect import dialect, make_heartbeat
+from cosim.mavlink.wire.endpoint import parse_endpoint
+from cosim.mavlink.wire.ground_end import GroundLink
 from cosim.results.record import load_record
 
 ARDUSUB = shutil.which("ardusub")
@@ -24,48 +24,31 @@ class Ground:
     """The least of a ground station, over the autopilot's TCP port."""
 
     def __init__(self, port, speedup):
-        self.mavlink = dialect()
-        self.codec = self.mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
-        self.codec.robust_parsing = True  # it begins with text
-        self.speedup, self.latest, self.stick, self.sent = speedup, {}, 500, {}
-        self.acks = []
-        self.began = time.monotonic()
-        while True:
-            try:
-                self.socket = socket.create_connection(("127.0.0.1", port), timeout=5.0)
-                break
-            except OSError:
-                assert time.monotonic() - self.began < 30.0
-                time.sleep(0.1)
-        self.socket.settimeout(0.01)
+        self.link, self.began = GroundLink(parse_endpoint(f"tcp:127.0.0.1:{port}")), time.monotonic()
+        self.speedup, self.latest, self.stick, self.sent, self.acks = speedup, {}, 500, {}, []
 
-    def send(self, message):
-        self.socket.sendall(message.pack(self.codec))
-        self.codec.seq = (self.codec.seq + 1) % 256
-
-    def every(self, seconds, name, message):
+    def every(self, seconds, message):
         """Send once so many simulated seconds, by the wall clock."""
-        now = time.monotonic()
+        now, name = time.monotonic(), message.get_type()
         if now - self.sent.get(name, 0.0) > seconds / self.speedup:
             self.sent[name] = now
-            self.send(message)
+            self.link.send(message)
 
     def command(self, number, *parameters):
-        m = self.mavlink
-        self.send(m.MAVLink_command_long_message(1, 1, number, 0, *parameters, *[0.0] * (7 - len(parameters))))
+        filled = [*parameters, *[0.0] * (7 - len(parameters))]
+        self.link.send(dialect().MAVLink_command_long_message(1, 1, number, 0, *filled))
 
     def until(self, done):
         """Keep in touch until something is so."""
-        m = self.mavlink
+        m = dialect()
         while not done(self):
             assert time.monotonic() - self.began < WALL, {k: str(v) for k, v in self.latest.items()}
-            self.every(0.5, "heartbeat", m.MAVLink_heartbeat_message(m.MAV_TYPE_GCS, 8, 0, 0, 4, 3))
-            self.every(0.1, "sticks", m.MAVLink_manual_control_message(1, 0, 0, self.stick, 0, 0))
-            with contextlib.suppress(TimeoutError):
-                for message in self.codec.parse_buffer(self.socket.recv(4096)) or ():
-                    self.latest[message.get_type()] = message
-                    if message.get_type() == "COMMAND_ACK":
-                        self.acks.append((message.command, message.result))
+            self.every(0.5, make_heartbeat(m, m.MAV_TYPE_GCS, m.MAV_STATE_ACTIVE))
+            self.every(0.1, m.MAVLink_manual_control_message(1, 0, 0, self.stick, 0, 0))
+            for received in self.link.receive(0.01):
+                self.latest[received.name] = received.message
+                if received.name == "COMMAND_ACK":
+                    self.acks.append((received.message.command, received.message.result))
 
     def of(self, kind, field, default=0):
         return getattr(self.latest.get(kind), field, default)
@@ -104,7 +87,7 @@ def test_arms_dives_and_holds_depth_within_5_cm(serve, tmp_path, speedup):
         assert (400, 0) in ground.acks and ground.acks.count((176, 0)) == 2
     finally:
         if ground:
-            ground.socket.close()
+            ground.link.close()
         process.terminate()
         process.wait(30.0)
     outcome = served.outcome()

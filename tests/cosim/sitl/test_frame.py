@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from cosim.errors import RunError
-from cosim.scenario.scenario import load_scenario
 from cosim.sitl.law import make_control_law, make_pwm_law
 from plant_fmu import load_vehicle
 from tests.cosim.sitl.stand_in import VECTORED_6DOF
@@ -84,7 +83,3 @@ def test_controls_map_linearly_to_force_limits():
     expected = [1.0, 1.0, 0.5, 0.0, 1.0, 0.0, 0.0, 0.0][:n]
     limits = [vehicle.thrust_max[0], vehicle.thrust_min[1], *vehicle.thrust_max[2:]]
     assert given == pytest.approx(np.multiply(expected, limits))
-
-
-def test_the_scenario_is_shipped_with_a_vehicle_that_has_the_table():
-    assert load_scenario("sitl").vehicle.autopilot.frame == "vectored_6dof"
