@@ -14,7 +14,7 @@ from pathlib import Path
 from controller.errors import CompilationError
 
 # no contraction of a*b+c, and no debug information, which would name the folder of the build
-FLAGS = ("-std=c99", "-O2", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-shared")
+FLAGS = ("-std=c99", "-O3", "-fno-math-errno", "-g0", "-ffp-contract=off", "-fPIC", "-shared")
 
 
 def compiler_command() -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -101,26 +101,29 @@ def shaped(owner: Any, name: str, kind: Type) -> Type:
     """Return the type of a parameter or field for a value: with the shape of the annotation, which it has to have."""
     if not isinstance(kind, Array):
         return kind
+    return _array(kind.item, kind.ndim, kind.contiguous, _annotated(owner, name, kind.lengths))
+
+
+def _annotated(owner: Any, name: str, lengths: Sequence[int | None]) -> tuple[int | None, ...]:
+    """Return the shape that an annotation states, which lengths have to fit."""
     expected = annotated_shapes(owner).get(name, ())
     if expected:
-        fits = len(expected) == kind.ndim and all(
-            None in pair or pair[0] == pair[1] for pair in zip(expected, kind.lengths, strict=True)
+        fits = len(expected) == len(lengths) and all(
+            a is None or b is None or a == b for a, b in zip(expected, lengths, strict=True)
         )
         if not fits:
-            raise TypeError(f"{owner.__name__}: {name} has shape {described(kind)}, expected {_lengths(expected)}")
-    return replace(kind, shape=expected)
+            raise TypeError(f"{owner.__name__}: {name} has shape {_lengths(lengths)}, expected {_lengths(expected)}")
+    return expected
+
+
+_array = functools.cache(Array)
 
 
 def check_shapes(function: Any, arguments: Sequence[Any]) -> None:
     """Check the shapes of arguments against the annotations of a function."""
     for name, argument in zip(function.__code__.co_varnames, arguments, strict=False):
         if isinstance(argument, np.ndarray):
-            shaped(function, name, Array(DOUBLE, argument.ndim, True, argument.shape))
-
-
-def described(kind: Array) -> str:
-    """Describe the shape of an array."""
-    return _lengths(kind.lengths)
+            _annotated(function, name, argument.shape)
 
 
 def _lengths(lengths: Sequence[int | None]) -> str:
@@ -132,16 +135,17 @@ def type_of(value: Any) -> Type:
     if isinstance(value, np.ndarray):
         item = _ITEMS.get(value.dtype)
         if item is not None and value.flags.c_contiguous:
-            return Array(item, value.ndim)
+            return _array(item, value.ndim, True, ())
     elif isinstance(value, tuple):
         if not hasattr(value, "_fields"):
             return Tuple(tuple(map(type_of, value)))
-        kinds = []
+        owner, kinds = type(value), []
         for name, item in zip(value._fields, value, strict=True):
             kind = type_of(item)
-            kind = replace(kind, shape=item.shape) if isinstance(kind, Array) else kind
-            kinds.append(shaped(type(value), name, kind))
-        return Record(type(value), tuple(kinds))
+            if isinstance(kind, Array):
+                kind = _array(kind.item, kind.ndim, True, _annotated(owner, name, item.shape))
+            kinds.append(kind)
+        return Record(owner, tuple(kinds))
     elif isinstance(value, float):
         return DOUBLE
     elif isinstance(value, int | np.int64):  # truth values too: each takes a word
