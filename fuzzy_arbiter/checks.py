@@ -24,6 +24,12 @@ def finite(value: object) -> float | None:
     return x + 0.0 if math.isfinite(x) else None  # -0.0 becomes 0.0, so that equal values have equal texts
 
 
+def finite_numbers(values: Iterable[object]) -> tuple[float, ...] | None:
+    """Return numbers as floats; None if one of them is not finite."""
+    numbers = tuple(map(finite, values))
+    return None if None in numbers else numbers  # type: ignore[return-value]
+
+
 def all_of(kind: type[_T] | tuple[type[_T], ...], values: object, where: object, expected: str) -> tuple[_T, ...]:
     """Return the members of an iterable as a tuple, and check the type of each."""
     if isinstance(values, str) or not isinstance(values, Iterable):

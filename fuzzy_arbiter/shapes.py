@@ -7,6 +7,7 @@ from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
+from operator import itemgetter
 from typing import ClassVar
 
 import numpy as np
@@ -121,7 +122,7 @@ class Shape(Membership):
         if x != x:
             return x
         points = self.points
-        i = bisect_left(points, x, key=_place)
+        i = bisect_left(points, x, key=itemgetter(0))
         if i == len(points):
             return points[-1][1]
         b, right = points[i]
@@ -204,10 +205,6 @@ class Shape(Membership):
                 slope = (right - left) / (b - a)
                 area += (end - start) * (left + slope * ((start + end) / 2 - a))
         return float(area)
-
-
-def _place(point: Point) -> float:
-    return point[0]
 
 
 def triangle(left: float, peak: float, right: float) -> Shape:

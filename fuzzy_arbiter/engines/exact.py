@@ -153,8 +153,10 @@ def _function(shape: Any, inputs: Sequence[str], outputs: Sequence[str]) -> Call
     if isinstance(shape, Constant):
         return lambda cut, columns: shape.value
     if isinstance(shape, Value):
-        function = shape.function(inputs, outputs)
-        return lambda cut, columns: function(columns)
+        whole, names = shape.expression(inputs, outputs), (*inputs, *outputs)
+        return lambda cut, columns: (whole.of_many if isinstance(columns, np.ndarray) else whole)(
+            dict(zip(names, columns, strict=True))
+        )
 
     def position(cut: Any, columns: Any) -> Any:
         if isinstance(cut, np.ndarray):  # a strength of 0 has no weight, so that its place does not matter

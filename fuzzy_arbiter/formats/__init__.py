@@ -22,18 +22,12 @@ FormatName = Literal["json", "toml", "fcl", "fis", "fll"]
 FORMATS: tuple[str, ...] = get_args(FormatName)
 MAX_FILE = 4_000_000  # maximum number of bytes of a file
 
-_READ: dict[str, Callable[[str], System]] = {
-    "json": json_toml.read_json,
-    "toml": json_toml.read_toml,
-    "fis": fis.read,
-    "fll": fll.read,
-}
-_WRITE: dict[str, Callable[[System], str]] = {
-    "json": json_toml.write_json,
-    "toml": json_toml.write_toml,
-    "fcl": fcl.write,
-    "fis": fis.write,
-    "fll": fll.write,
+_PARSERS: dict[str, tuple[Callable[[str], System], Callable[[System], str]]] = {
+    "json": (json_toml.read_json, json_toml.write_json),
+    "toml": (json_toml.read_toml, json_toml.write_toml),
+    "fcl": (fcl.read, fcl.write),
+    "fis": (fis.read, fis.write),
+    "fll": (fll.read, fll.write),
 }
 
 
@@ -77,7 +71,7 @@ def reads(text: str, format: str, block: str | None = None) -> System:
         return fcl.read(lines, block)
     if block is not None:
         raise FormatError(f"block is {shown(block)}, expected none for {format}: only FCL has function blocks")
-    return _READ[format](lines)
+    return _PARSERS[format][0](lines)
 
 
 def writes(system: System, format: str) -> str:
@@ -113,7 +107,7 @@ def writes(system: System, format: str) -> str:
     _require_format(format, f"format is {format!r}")
     if not isinstance(system, System):
         raise UnsupportedError(f"got {shown(system)}, expected a System")
-    return _WRITE[format](system)
+    return _PARSERS[format][1](system)
 
 
 def load(path: str | Path, block: str | None = None) -> System:

@@ -88,31 +88,26 @@ def read(text: str, block: str | None = None) -> System:
 def _declared(sections: Sequence[Block], declaration: str, kind: str, taken: Collection[str] = ()) -> list[Block]:
     """Return the sections of the declared variables in their order, with the ranges of the declarations."""
     declared: dict[str, tuple[int, str]] = {}  # line and range by name
-    for section in sections:
-        names: list[str] = []
-        for line, text in section.many if section.kind == declaration else ():
-            match = _DECLARATION.fullmatch(text)
-            if match:
-                names = match[1].split(" , ")
-            elif not names or not text.upper().startswith("RANGE "):
-                refuse(line, f"{text!r}, expected a variable's name, a colon and REAL")
-            for name in names:
-                if match and (name in declared or name in taken or name.lower() in RESERVED):
-                    fault = "a word of the language" if name.lower() in RESERVED else "declared twice"
-                    refuse(line, f"{name!r} is {fault}")
-                if not match and declared[name][1]:
-                    refuse(line, f"RANGE of {name!r} appears twice")
-                declared[name] = (line, "" if match else text[6:].removeprefix(":= "))
+    names: list[str] = []
+    for line, text in (entry for section in sections if section.kind == declaration for entry in section.many):
+        if match := _DECLARATION.fullmatch(text):
+            names = match[1].split(" , ")
+        elif not names or not text.upper().startswith("RANGE "):
+            refuse(line, f"{text!r}, expected a variable's name, a colon and REAL")
+        for name in names:
+            if match and (name in declared or name in taken or name.lower() in RESERVED):
+                fault = "a word of the language" if name.lower() in RESERVED else "declared twice"
+                refuse(line, f"{name!r} is {fault}")
+            if not match and declared[name][1]:
+                refuse(line, f"RANGE of {name!r} appears twice")
+            declared[name] = (line, "" if match else text[6:].removeprefix(":= "))
     blocks: dict[str, Block] = {}
     for section in sections:
-        if section.kind != kind:
-            continue
-        if section.name not in declared:
+        if section.kind == kind and section.name not in declared:
             known = ", ".join(declared) or "none: none is declared"
-            refuse(section.line, f"{kind} {section.name!r}, expected one of {known}")
-        if section.name in blocks:
-            refuse(section.line, f"{kind} {section.name!r} appears twice")
-        blocks[section.name] = section
+            refuse(section.line, f"{section.title}, expected one of {known}")
+        if section.kind == kind and blocks.setdefault(section.name, section) is not section:
+            refuse(section.line, f"{section.title} appears twice")
     for name, (line, universe) in declared.items():
         if name not in blocks:
             refuse(line, f"{name!r} has no {kind}")

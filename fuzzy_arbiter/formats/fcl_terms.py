@@ -36,8 +36,8 @@ def read_shape(text: str, line: int, inputs: Sequence[str] | None) -> tuple[Memb
         if len(numbers) != count:
             refuse(line, f"{word} has the numbers {rest!r}, expected {count}")
         return _curve(word.upper(), numbers)
-    if not rest and word[:1] in "+-.0123456789":
-        value = read_number(word, line, "a value")
+    if word and not rest and (word[0] in "+-.0123456789" or word.isidentifier()):
+        value = _number(word, line, "a value")
         return Constant(value) if inputs is not None else Curve("singleton", (value,)), [value]
     if not text or _POINT.sub("", text):
         expected = f"points such as (0, 0) (5, 1), a number, or one of {', '.join(('FUNCTION', *_COUNTS, *TYPES))}"

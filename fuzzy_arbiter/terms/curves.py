@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fuzzy_arbiter.checks import finite, shown
+from fuzzy_arbiter.checks import finite, finite_numbers, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.shapes import Array, Membership
 from fuzzy_arbiter.terms.expressions import Expression, array_function, number_function
@@ -56,14 +56,10 @@ class Curve(Membership):
         if kind is None:
             raise DefinitionError(f"curve is {shown(self.kind)}, expected one of {', '.join(KINDS)}")
         words = f"{self.kind} of {', '.join(kind.parameters)}"
-        given = (
-            self.parameters if isinstance(self.parameters, Sequence) and not isinstance(self.parameters, str) else ()
-        )
-        numbers = tuple(x for x in map(finite, given) if x is not None)
-        if len(numbers) != len(given) or len(numbers) != len(kind.parameters):
-            raise DefinitionError(
-                f"{words}: got {shown(self.parameters)}, expected {len(kind.parameters)} finite numbers"
-            )
+        count = len(kind.parameters)
+        numbers = finite_numbers(self.parameters) if isinstance(self.parameters, Sequence) else None
+        if numbers is None or len(numbers) != count:
+            raise DefinitionError(f"{words}: got {shown(self.parameters)}, expected {count} finite numbers")
         height = finite(self.height)
         if height is None or not 0.0 < height <= 1.0:
             raise DefinitionError(f"{words}: height is {shown(self.height)}, expected above 0 and at most 1")
@@ -72,13 +68,13 @@ class Curve(Membership):
             raise DefinitionError(f"{words}: got {shown(numbers)}, expected {expected}")
         named = dict(zip(kind.parameters, numbers, strict=True))
         pieces = [(end, _tree(text, named, height)) for end, text in kind.pieces(*numbers)]
-        object.__setattr__(self, "parameters", numbers)
-        object.__setattr__(self, "height", height)
-        object.__setattr__(self, "ends", tuple(end for end, _ in pieces))
-        object.__setattr__(self, "trees", tuple(tree for _, tree in pieces))
-        object.__setattr__(self, "_numbers", tuple(map(number_function, self.trees)))
-        object.__setattr__(self, "_arrays", tuple(map(array_function, self.trees)))
-        object.__setattr__(self, "_jumps", tuple(x for i, x in enumerate(self.ends[:-1]) if self._jump(i, x)))
+        ends, trees = zip(*pieces, strict=True)
+        computed = {"parameters": numbers, "height": height, "ends": ends, "trees": trees}
+        computed |= {"_numbers": tuple(map(number_function, trees)), "_arrays": tuple(map(array_function, trees))}
+        for key, value in computed.items():
+            object.__setattr__(self, key, value)
+        jumps = (x for i, x in enumerate(ends[:-1]) if abs(self._side(i, x) - self._side(i + 1, x)) > 1e-9)
+        object.__setattr__(self, "_jumps", tuple(jumps))
 
     @property
     def polynomial(self) -> bool:  # type: ignore[override]  # depends on the kind
@@ -92,9 +88,6 @@ class Curve(Membership):
 
     def _side(self, i: int, x: float) -> float:
         return self._numbers[i]({"x": x})
-
-    def _jump(self, i: int, end: float) -> bool:
-        return abs(self._side(i, end) - self._side(i + 1, end)) > 1e-9
 
     def __call__(self, x: float) -> float:
         """Return the degree at a place; of a jump the greater one; NaN for a place that is NaN."""
@@ -114,10 +107,10 @@ class Curve(Membership):
                 result[:] = self._arrays[0]({"x": places})
             else:
                 piece = np.searchsorted(self.ends, places)
-                for i, of in enumerate(self._arrays):
+                for i, degrees_of in enumerate(self._arrays):
                     inside = piece == i
                     if inside.any():
-                        result[inside] = of({"x": places[inside]})
+                        result[inside] = degrees_of({"x": places[inside]})
         for end in self._jumps:
             result[places == end] = self(end)
         np.minimum(np.maximum(result, 0.0, out=result), 1.0, out=result)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from fuzzy_arbiter.checks import all_of, finite, shown
+from fuzzy_arbiter.checks import all_of, finite, finite_numbers, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.shapes import Array, Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
@@ -25,16 +25,6 @@ class Value(ABC):
     @abstractmethod
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
         """Return the value as an expression of the inputs and of earlier outputs."""
-
-    def function(self, inputs: Sequence[str], outputs: Sequence[str]) -> Callable[[Any], Any]:
-        """Return a function from the inputs and outputs, a number or an array (n,) of each, to the value."""
-        whole, names = self.expression(inputs, outputs), (*inputs, *outputs)
-
-        def value(columns: Any) -> Any:
-            evaluate = whole.of_many if isinstance(columns, np.ndarray) else whole
-            return evaluate(dict(zip(names, columns, strict=True)))
-
-        return value
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,10 +83,10 @@ class Linear(Value):
     constant: float = 0.0
 
     def __post_init__(self) -> None:
-        given = all_of(object, self.coefficients, "linear", "a sequence of numbers")
-        numbers = tuple(map(finite, (*given, self.constant)))
-        if None in numbers:
-            raise DefinitionError(f"linear: got {shown((*given, self.constant))}, expected finite numbers")
+        given = (*all_of(object, self.coefficients, "linear", "a sequence of numbers"), self.constant)
+        numbers = finite_numbers(given)
+        if numbers is None:
+            raise DefinitionError(f"linear: got {shown(given)}, expected finite numbers")
         object.__setattr__(self, "coefficients", numbers[:-1])
         object.__setattr__(self, "constant", numbers[-1])
 

@@ -11,14 +11,9 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter import Arbiter, Output, System, Variable, falling, rising
 from fuzzy_arbiter.__main__ import main
 from fuzzy_arbiter.hierarchy import WEIGHT
-
-GAP = """
-if wind is calm then sail is full
-if wind is strong then sail is none
-"""
 
 
 @pytest.fixture
@@ -55,13 +50,11 @@ def refused(run, tmp_path):
 @pytest.fixture
 def gap(tmp_path):
     """A file whose rules leave winds between calm and strong without one."""
-    from fuzzy_arbiter import Output, System, Term, Variable, falling, rising
-
-    wind = Variable("wind", (0, 20), (Term("calm", falling(2, 6)), Term("strong", rising(8, 12))))
-    sail = Output("sail", (0, 1), (Term("none", falling(0, 1)), Term("full", rising(0, 1))))
-    path = tmp_path / "gap.json"
-    Arbiter(system=System((wind,), (sail,), tuple(GAP.split("\n")[1:3]), name="gap")).save(path)
-    return path
+    wind = Variable("wind", (0, 20), {"calm": falling(2, 6), "strong": rising(8, 12)})
+    sail = Output("sail", (0, 1), {"none": falling(0, 1), "full": rising(0, 1)})
+    rules = ("if wind is calm then sail is full", "if wind is strong then sail is none")
+    Arbiter(system=System((wind,), (sail,), rules, name="gap")).save(tmp_path / "gap.json")
+    return tmp_path / "gap.json"
 
 
 def test_show_prints_the_complete_definition(run):
@@ -167,15 +160,12 @@ def test_invalid_values_give_one_line_errors(refused, words, fault):
     assert fault in refused("eval", "section-vi", *words)
 
 
-def test_invalid_commands_give_one_line_errors(refused):
+def test_invalid_commands_and_definitions_give_one_line_errors(refused, tmp_path):
     assert "the following arguments are required: verb" in refused()
     assert "invalid choice: 'frob'" in refused("frob", "section-vi")
     assert "show: the following arguments are required: FILE" in refused("show")
     assert "unknown argument '1'" in refused("show", "section-vi", "1")
     assert "none.json" in refused("show", "none.json")
-
-
-def test_invalid_definition_gives_one_line_error(refused, tmp_path):
     (tmp_path / "bad.json").write_text('{"a": \n\n')
     assert "bad.json" in refused("verify", "bad.json")
     (tmp_path / "bad.fcl").write_text("FUNCTION_BLOCK\n\n;")
@@ -190,39 +180,28 @@ def test_undefined_output_is_printed_as_nan_with_a_reason(run, gap):
     assert "no rule fired, and no default" in run("explain", gap, "7")[1]
 
 
-def test_explain_prints_fired_rules(run):
+def test_explain_and_verify_print_text_or_json(run, refused, gap):
     status, out, _ = run("explain", "section-vi", "0.75", "1", "0")
     assert status == 0 and "R5" in out
     status, out, _ = run("explain", "section-vi", "obstacle=0.75", "shape=1", "depth=0", "--json")
-    assert status == 0 and json.loads(out)
-
-
-def test_verify_result_is_its_exit_status(run, refused, gap):
-    status, out, _ = run("verify", "section-vi")
-    assert status == 0 and out
-    status, out, _ = run("verify", gap)
-    assert status == 1 and out
-    status, out, _ = run("verify", gap, "--json")
-    assert status == 1 and json.loads(out)
+    assert status == 0 and json.loads(out)["winner"] == "obstacle"
+    for file, expected in (("section-vi", 0), (gap, 1)):
+        status, out, _ = run("verify", file)
+        assert status == expected and out.splitlines()[-1] == ("ok", "not ok")[expected]
+        assert json.loads(run("verify", file, "--json")[1])["ok"] is not bool(expected)
     assert "none.toml" in refused("verify", "none.toml")
 
 
-@pytest.mark.parametrize("suffix", ["json", "toml", "fcl", "fis", "fll"])
-def test_convert_keeps_the_weights(run, suffix, tmp_path):
+@pytest.mark.parametrize("suffix", ["json", "toml", "fcl", "fis", "fll", "c", "py"])
+def test_convert_keeps_the_weights_and_writes_code(run, suffix, tmp_path):
     native = ["--native"] if suffix in ("fcl", "fis", "fll") else []
     assert run("convert", "section-vi", f"a.{suffix}", *native) == (0, f"a.{suffix}\n", "")
+    if suffix in ("c", "py"):
+        assert "alpha_1" in (tmp_path / f"a.{suffix}").read_text()
+        return
     status, out, _ = run("eval", f"a.{suffix}", "--json", "0.3", "0.8", "0.1")
     assert status == 0
     assert list(json.loads(out).values()) == pytest.approx(Arbiter()([0.3, 0.8, 0.1]), abs=1e-12)
-
-
-@pytest.mark.parametrize("suffix", ["c", "py"])
-def test_convert_writes_code(run, suffix, tmp_path):
-    assert run("convert", "section-vi", f"a.{suffix}")[0] == 0
-    text = (tmp_path / f"a.{suffix}").read_text()
-    if suffix == "py":
-        compile(text, "a.py", "exec")
-    assert "alpha_1" in text
 
 
 def test_failed_convert_writes_nothing(refused, tmp_path):
@@ -318,20 +297,21 @@ def test_bench_times_every_engine_or_says_why_not(run, monkeypatch, gap):
     assert status == 0 and "closed" in out.splitlines()[1] and len(out.splitlines()[1].split()) > 6
 
 
-def test_closed_output_pipe_exits_silently_with_141(tmp_path):
-    command = [sys.executable, "-m", "fuzzy_arbiter", "show", "section-vi"]
+SHOW = [sys.executable, "-m", "fuzzy_arbiter", "show", "section-vi"]
+
+
+def test_closed_output_pipe_exits_silently_with_141():
     reading, writing = os.pipe()
     os.close(reading)
-    done = subprocess.run(command, stdout=writing, stderr=subprocess.PIPE, check=False)
+    done = subprocess.run(SHOW, stdout=writing, stderr=subprocess.PIPE, check=False)
     os.close(writing)
     assert (done.returncode, done.stderr) == (141, b"")
 
 
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
 def test_full_standard_output_gives_one_line_error():
-    command = [sys.executable, "-m", "fuzzy_arbiter", "show", "section-vi"]
     with open("/dev/full", "wb") as full:
-        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+        done = subprocess.run(SHOW, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert (done.returncode, done.stderr) == (2, "fuzzy_arbiter: standard output: No space left on device\n")
 
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from benchmarks.fuzzy_accuracy import BOUND as ACCURACY
-from benchmarks.fuzzy_accuracy import errors, random_cases
-from fuzzy_arbiter import Arbiter, Output, Rule, System, Term, Variable, falling, rising, triangle
+from benchmarks.fuzzy_accuracy import errors, random_cases, strengths_system
+from fuzzy_arbiter import Arbiter, Output, Rule, Term, falling, rising, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.quadrature import Quadrature
 from fuzzy_arbiter.errors import EngineError
@@ -34,21 +34,9 @@ TERMS = (
 )
 
 
-def system(output, implication="min", blocks=None):
-    """Inputs that are the strengths of rules, one for each term of an output."""
-    terms = output.term_names
-    inputs = tuple(Variable(f"x{j}", (0, 1), (Term("on", rising(0, 1)),)) for j in range(len(terms)))
-    blocks = blocks or [None] * len(terms)
-    rules = tuple(
-        Rule(Is(f"x{j}", "on"), (Is("y", t),), operators=block)
-        for j, (t, block) in enumerate(zip(terms, blocks, strict=True))
-    )
-    return System(inputs, (output,), rules, implication=implication, normalization="none")
-
-
 def value(output, cuts, implication="min"):
     """The output's value for some strengths."""
-    return ExactEngine(system(output, implication)).centroids(cuts)[0]
+    return ExactEngine(strengths_system(output, implication)).centroids(cuts)[0]
 
 
 def sampled(output, cuts, implications, points=500_000):
@@ -159,7 +147,7 @@ def test_a_sum_of_straight_terms_is_rational(drawn, data):
         alone = replace(output, terms=(term,), aggregation="max")
         own = reference.integrals(alone, [Fraction(cut)])
         area, moment = area + own[0], moment + own[1]
-    engine = ExactEngine(system(output))
+    engine = ExactEngine(strengths_system(output, "min"))
     assert engine.methods["y"] == "integrals of polynomials, to rounding"
     assert engine.centroids(cuts)[0] == pytest.approx(float(moment / area), abs=1e-13)
 
@@ -170,7 +158,7 @@ def test_piecewise_linear_terms_match_the_exact_sweep(drawn, data):
     """Which is rational, see test_exact."""
     output = Output("y", (0.0, 1.0), tuple(Term(f"t{j}", shape) for j, shape in enumerate(drawn)))
     cuts = [data.draw(st.integers(1, 16)) / 16 for _ in drawn]
-    engine = ExactEngine(system(output))
+    engine = ExactEngine(strengths_system(output, "min"))
     engine.defuzzifiers[0] = Quadrature(output, engine.firing.slots[0])
     exact = reference.centroid(output, list(map(Fraction, cuts)))
     assert engine.centroids(cuts)[0] == pytest.approx(float(exact), abs=1e-12)
@@ -194,7 +182,7 @@ def test_every_defuzzifier_is_the_limit_of_dense_sampling(defuzzifier, implicati
         expected, off = {"mom": top.mean(), "som": top[0], "lom": top[-1]}[defuzzifier], 6e-3
     if implication == "drastic_product" and not (y > 0).mean() > 1e-4:
         return
-    made = system(output, implication)
+    made = strengths_system(output, implication)
     assert ExactEngine(made).centroids(cuts)[0] == pytest.approx(expected, abs=off)
     grid = Arbiter(system=replace(made, points=4001), engine="grid")
     assert grid(cuts)[0] == pytest.approx(expected, abs=max(off, 6e-3))
@@ -235,15 +223,16 @@ def test_singletons_count_only_if_no_area_fires():
 
 def test_rule_blocks_use_their_own_implication():
     output = Output("y", (0, 10), TERMS[:2])
-    blocks = [Operators(implication="prod"), Operators(implication="min")]
+    made = strengths_system(output, "min")
+    rules = (replace(made.rules[0], operators=Operators(implication="prod")), made.rules[1])
     x, y = sampled(output, [0.5, 0.5], ["prod", "min"])
-    made = system(output, blocks=blocks)
-    assert ExactEngine(made).centroids([0.5, 0.5])[0] == pytest.approx((x * y).sum() / y.sum(), abs=2e-9)
+    engine = ExactEngine(replace(made, rules=rules))
+    assert engine.centroids([0.5, 0.5])[0] == pytest.approx((x * y).sum() / y.sum(), abs=2e-9)
 
 
 def test_one_term_concluded_twice_counts_twice_in_a_sum():
     output = Output("y", (0, 10), (Term("a", triangle(0, 2, 4)), Term("b", triangle(6, 8, 10))), aggregation="sum")
-    made = system(output)
+    made = strengths_system(output, "min")
     again = replace(made, rules=(*made.rules, Rule(Is("x0", "on"), (Is("y", "a"),))))
     assert ExactEngine(made).centroids([0.5, 0.5])[0] == pytest.approx(5.0)
     assert ExactEngine(again).centroids([0.5, 0.5])[0] == pytest.approx((2 * 2 + 8) / 3)
@@ -252,7 +241,7 @@ def test_one_term_concluded_twice_counts_twice_in_a_sum():
 
 
 def test_batches_equal_single_samples():
-    made = system(Output("y", (0, 10), TERMS))
+    made = strengths_system(Output("y", (0, 10), TERMS), "min")
     rows = np.random.default_rng(0).random((20, 4))
     engine = ExactEngine(made)
     assert engine.centroids_of_many(rows)[:, 0].tolist() == [engine.centroids(row)[0] for row in rows.tolist()]
@@ -271,10 +260,10 @@ def test_unintegrable_terms_are_rejected():
 
 
 def test_arbiter_names_the_evaluation_method_of_each_output():
-    made = system(Output("y", (0, 10), TERMS))
+    made = strengths_system(Output("y", (0, 10), TERMS), "min")
     assert Arbiter(system=made).engine_reason.endswith("'y': adaptive quadrature, within 1e-09 of the universe's width")
     formula = Output("y", (0, 10), {"a": Formula("max(0, 1 - abs(x - 3.001) * 50)"), "b": triangle(4, 5, 6)})
-    assert "without a bound" in Arbiter(system=system(formula)).engine_reason
-    straight = system(Output("y", (0, 10), TERMS[3:]))
+    assert "without a bound" in Arbiter(system=strengths_system(formula, "min")).engine_reason
+    straight = strengths_system(Output("y", (0, 10), TERMS[3:]), "min")
     assert Arbiter(system=straight).engine_reason.startswith("there is no closed form: ")
     assert "quadrature" not in Arbiter(system=straight).engine_reason

@@ -15,7 +15,6 @@ from fuzzy_arbiter import (
     Rule,
     Shape,
     System,
-    Term,
     Variable,
     falling,
     prioritized,
@@ -110,8 +109,8 @@ def test_engine_equals_stock_scikit_fuzzy_bit_for_bit(system):
 
 def gap(default=None):
     """No rule fires between 4 and 6."""
-    x = Variable("x", (0, 10), (Term("a", falling(0, 4)), Term("b", rising(6, 10))))
-    y = Output("y", (5, 6), (Term("a", triangle(5, 5.2, 5.4)), Term("b", triangle(5.4, 5.8, 6))), default=default)
+    x = Variable("x", (0, 10), {"a": falling(0, 4), "b": rising(6, 10)})
+    y = Output("y", (5, 6), {"a": triangle(5, 5.2, 5.4), "b": triangle(5.4, 5.8, 6)}, default=default)
     return System((x,), (y,), (Rule(x["a"], y["a"]), Rule(x["b"], y["b"])), normalization="none")
 
 
@@ -146,7 +145,7 @@ def test_systems_unsupported_by_scikit_fuzzy_are_rejected_by_name(system, words)
 
 
 def test_edges_at_the_ends_of_an_input_are_no_jumps():
-    x = Variable("x", (0, 1), (Term("low", triangle(0, 0, 1)), Term("high", triangle(0, 1, 1))))
+    x = Variable("x", (0, 1), {"low": triangle(0, 0, 1), "high": triangle(0, 1, 1)})
     engine = ScikitEngine(System((x,), (TIP,), ("if x is low then tip is low",), normalization="none"))
     assert engine.centroids([0.0]) == [engine.defuzzifiers[0].value([1, 0, 0], ())]
 

@@ -38,23 +38,6 @@ pkg load fuzzy-logic-toolkit
 y = evalfis([{samples}], readfis('{path}'), {points});
 for i = 1:rows(y) printf('%.17g ', y(i, :)); printf('\\n'); end
 """
-_JFUZZYLOGIC = """
-import net.sourceforge.jFuzzyLogic.*;
-import java.util.*;
-public class Evaluate {
-  public static void main(String[] args) throws Exception {
-    FunctionBlock block = FIS.load(args[0], false).getFunctionBlock(null);
-    Scanner scanner = new Scanner(System.in);
-    while (scanner.hasNext()) {
-      for (String name : args[1].split(",")) block.setVariable(name, Double.parseDouble(scanner.next()));
-      block.evaluate();
-      String row = "row";
-      for (String name : args[2].split(",")) row += " " + block.getVariable(name).getValue();
-      System.out.println(row);
-    }
-  }
-}
-"""
 
 
 def fuzzylite_python():
@@ -102,9 +85,8 @@ def with_octave(system, samples, folder):
 
 
 def with_jfuzzylogic(system, samples, folder):
-    path, source = folder / "system.fcl", folder / "Evaluate.java"
+    path, source = folder / "system.fcl", DATA / "tools" / "Evaluate.java"
     path.write_text(writes(system, "fcl"))
-    source.write_text(_JFUZZYLOGIC)
     names = [",".join(v.name for v in variables) for variables in (system.inputs, system.outputs)]
     text = "\n".join(" ".join(map(repr, sample)) for sample in samples)
     out = _output(["java", "-cp", jfuzzylogic_classes(), str(source), str(path), *names], text)

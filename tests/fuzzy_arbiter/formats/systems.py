@@ -15,24 +15,14 @@ from fuzzy_arbiter.terms.values import Constant, Formula, Linear
 FOREIGN = {path.name: path.read_text() for path in (Path(__file__).parents[2] / "data" / "fuzzy" / "foreign").iterdir()}
 
 
-def _grades(low, mid, high):
-    a, b, c = 0, 5, 10
-    return Term(low, triangle(a, a, b)), Term(mid, triangle(a, b, c)), Term(high, triangle(b, c, c))
+def _grades(*names):
+    return dict(zip(names, (triangle(0, 0, 5), triangle(0, 5, 10), triangle(5, 10, 10)), strict=True))
 
 
 # the tipping problem of scikit-fuzzy's and MATLAB's manuals; at quality 6.5 and service 9.8 the tip is 12118694/610275
 TIPPING = System(
-    (
-        Variable("quality", (0, 10), _grades("poor", "average", "good")),
-        Variable("service", (0, 10), _grades("poor", "average", "good")),
-    ),
-    (
-        Output(
-            "tip",
-            (0, 25),
-            (Term("low", triangle(0, 0, 13)), Term("medium", triangle(0, 13, 25)), Term("high", triangle(13, 25, 25))),
-        ),
-    ),
+    tuple(Variable(name, (0, 10), _grades("poor", "average", "good")) for name in ("quality", "service")),
+    (Output("tip", (0, 25), {"low": triangle(0, 0, 13), "medium": triangle(0, 13, 25), "high": triangle(13, 25, 25)}),),
     (
         "if quality is poor or service is poor then tip is low",
         "if service is average then tip is medium",
@@ -44,19 +34,15 @@ TIPPING = System(
 
 # what only richer systems have, without what one of the formats cannot say
 _FIRST, _SECOND = TIPPING.inputs
+_MORE = Term("near", curve("gaussian", 5, 2)), Term("far", curve("bell", 5, 2, 3))
+_ALSO = Term("slow", curve("sigmoid", 4, -2)), Term("at", curve("singleton", 3))
 RICH = replace(
     TIPPING,
     inputs=(
-        replace(
-            _FIRST, terms=(*_FIRST.terms, Term("near", curve("gaussian", 5, 2)), Term("far", curve("bell", 5, 2, 3)))
-        ),
-        replace(
-            _SECOND, terms=(*_SECOND.terms, Term("slow", curve("sigmoid", 4, -2)), Term("at", curve("singleton", 3)))
-        ),
+        replace(_FIRST, terms=(*_FIRST.terms, *_MORE)),
+        replace(_SECOND, terms=(*_SECOND.terms, *_ALSO)),
     ),
-    outputs=(
-        Output("tip", (0, 25), (Term("low", Constant(5)), Term("high", Linear((1, 0.5), 2))), None, "average", "sum"),
-    ),
+    outputs=(Output("tip", (0, 25), {"low": Constant(5), "high": Linear((1, 0.5), 2)}, None, "average", "sum"),),
     rules=(
         "if quality is poor or service is poor then tip is low",
         "if quality is near and service is not slow then tip is high with 0.5",
@@ -64,7 +50,7 @@ RICH = replace(
         "if service is at then tip is high",
     ),
     conjunction="einstein_product",
-)
+)  # fmt: skip
 # and what a format can say beyond, by format
 RICHER = {
     "fcl": replace(RICH, rules=(*RICH.rules, Rule(Is("quality", "poor"), (Is("tip", "low"),), 1.0, Operators("prod")))),
@@ -98,23 +84,8 @@ RICHER["json"] = RICHER["toml"] = RICHER["fll"]
 
 WORDS = ("low", "high", "a", "B2", "wind_speed", "x__y", "Zz", "mid")
 NAMES = (
-    *WORDS,
-    "not exist",
-    "max",
-    "_x",
-    "very",
-    "Low",
-    "sin",
-    "à la",
-    "it's",
-    "a=b",
-    "a#b",
-    "%",
-    "é",
-    "1st",
-    "is",
-    "日",
-)
+    *WORDS, "not exist", "max", "_x", "very", "Low", "sin", "à la", "it's", "a=b", "a#b", "%", "é", "1st", "is", "日",
+)  # fmt: skip
 places = st.one_of(
     st.integers(-4, 12).map(float),
     st.floats(-10, 15, allow_subnormal=False),

@@ -27,7 +27,7 @@ def test_jfuzzylogic_functions_and_defaults_are_read():
     assert [of["g"](3.0), of["g"](3.1), of["h"](6.0)] == [1.0, 0.0, 1.0]
     low, mid, high = (term.shape for term in system.outputs[0].terms)
     assert (low, mid) == (Constant(5), Linear((2.0, 0.5), 1.0))
-    assert high.function(("x", "z"), ())([10.0, 0.0]) == pytest.approx(1.0 + 100 % 4)
+    assert high.expression(("x", "z"))({"x": 10.0, "z": 0.0}) == pytest.approx(1.0 + 100 % 4)
     # singletons and functions by COGS; of two rules for one the greater counts, for ACCU is MAX
     assert (system.outputs[0].defuzzifier, system.outputs[0].aggregation) == ("average", "max")
     assert Arbiter(system=system)([3.0, 0.25]) == pytest.approx((0.25 * 5 + 0.75 * 7.125,))

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fuzzy_arbiter import Arbiter, Output, System, Term, Variable, falling, prioritized, rising, trapezoid, triangle
+from fuzzy_arbiter import Arbiter, Output, System, Variable, falling, prioritized, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.errors import EngineError, UnsupportedError
 from fuzzy_arbiter.formats import fold_normalization
@@ -24,16 +24,13 @@ PAIRS = {
 
 
 def weight(pair, universe=(0.0, 1.0), default=None):
-    return Output("w", universe, (Term("low", PAIRS[pair][0]), Term("high", PAIRS[pair][1])), default)
+    return Output("w", universe, dict(zip(("low", "high"), PAIRS[pair], strict=True)), default)
 
 
-def test_triangles_extend_one_width_beyond_both_ends():
+def test_triangles_extend_one_width_beyond_both_ends_which_are_exact():
     output = fold_normalization(prioritized()).outputs[0]
     assert output.universe == (-1.0, 2.0)
     assert [term.shape for term in output.terms] == [falling(-1, 2), rising(-1, 2)]
-
-
-def test_the_ends_are_exact():
     assert range_ends(weight("triangles")) == (Fraction(1, 3), Fraction(2, 3))
 
 
@@ -57,31 +54,29 @@ def test_system_without_normalization_is_unchanged():
     assert fold_normalization(system) is system
 
 
-@pytest.mark.parametrize("normalization", ["sum", "max"])
-def test_a_normalization_over_all_outputs_is_refused(normalization):
-    with pytest.raises(UnsupportedError, match=f"no universe can say the normalization '{normalization}'"):
-        fold_normalization(prioritized(normalization=normalization))
+NEAR = Output("w", (0, 1), {"low": falling(0, 1e-200), "high": falling(0, 2e-200)})
+TWIN = Output("w", (0, 1), {"low": triangle(0, 0.5, 1), "high": trapezoid(0, 0.4, 0.6, 1)})
+APART = {"low": falling(-2, -1), "high": rising(0, 1)}
 
 
-def test_terms_with_one_centroid_are_refused():
-    twin = Output("w", (0, 1), (Term("low", triangle(0, 0.5, 1)), Term("high", trapezoid(0, 0.4, 0.6, 1))))
-    with pytest.raises(UnsupportedError, match=r"output 'w_1': its terms have one centroid, 0\.5"):
-        fold_normalization(prioritized(weight=twin))
-
-
-def test_terms_too_close_for_floating_point_are_refused():
-    near = Output("w", (0, 1), (Term("low", falling(0, 1e-200)), Term("high", falling(0, 2e-200))))
-    with pytest.raises(UnsupportedError, match="too far apart, or too close"):
-        fold_normalization(prioritized(weight=near))
-
-
-@pytest.mark.parametrize("defuzzifier", ["bisector", "average"])
-def test_what_no_universe_can_fold_is_refused(defuzzifier):
-    terms = {"low": falling(-2, -1), "high": rising(0, 1)}
-    output = Output("y", (0, 1), terms if defuzzifier == "average" else {"high": rising(0, 1)}, defuzzifier=defuzzifier)
+def of(output):
     made = System((Variable("x", (0, 1), {"on": rising(0, 1)}),), (output,), ("if x is on then y is high",))
-    with pytest.raises(UnsupportedError, match=f"'y' has the defuzzifier {defuzzifier}"):
-        fold_normalization(replace(made, normalization="range"))
+    return replace(made, normalization="range")
+
+
+@pytest.mark.parametrize(
+    ("system", "fault"),
+    [
+        *((prioritized(normalization=n), f"no universe can say the normalization '{n}'") for n in ("sum", "max")),
+        (prioritized(weight=TWIN), r"output 'w_1': its terms have one centroid, 0\.5"),
+        (prioritized(weight=NEAR), "too far apart, or too close"),
+        (of(Output("y", (0, 1), {"high": rising(0, 1)}, defuzzifier="bisector")), "'y' has the defuzzifier bisector"),
+        (of(Output("y", (0, 1), APART, defuzzifier="average")), "'y' has the defuzzifier average"),
+    ],
+)
+def test_what_no_universe_can_fold_is_refused(system, fault):
+    with pytest.raises(UnsupportedError, match=fault):
+        fold_normalization(system)
 
 
 def test_locks_survive_folding():

@@ -111,7 +111,7 @@ def test_arbitrary_text_raises_only_typed_errors(text):
 def test_linear_values_round_trip():
     made = Linear((2.0, 0.0, -0.5), 1.5)
     names = ("a", "b", "c")
-    assert made.function(names, ())([1.0, 9.0, 4.0]) == 1.5
+    assert made.expression(names)({"a": 1.0, "b": 9.0, "c": 4.0}) == 1.5
     assert Linear.of(made.expression(names).tree, names) == made
     assert Linear.of(Expression("a * 2").tree, names) is None
     assert Linear.of(Expression("sin(a)").tree, names) is None
