@@ -1,5 +1,6 @@
 """Systems for the tests of the formats: the tipping problem, and random ones."""
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,6 +14,8 @@ from fuzzy_arbiter.terms.values import Constant, Formula, Linear
 
 # files in the manner of other tools, by name
 FOREIGN = {path.name: path.read_text() for path in (Path(__file__).parents[2] / "data" / "fuzzy" / "foreign").iterdir()}
+
+FAULTS = tomllib.loads(FOREIGN["faults.toml"])
 
 
 def _grades(*names):

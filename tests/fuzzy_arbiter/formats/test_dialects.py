@@ -8,7 +8,7 @@ from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter.errors import DefinitionError, FormatError
 from fuzzy_arbiter.formats import reads
 from fuzzy_arbiter.terms import Constant, Curve, Formula, Linear
-from tests.fuzzy_arbiter.formats.systems import FOREIGN
+from tests.fuzzy_arbiter.formats.systems import FAULTS, FOREIGN
 
 JFUZZYLOGIC = FOREIGN["jfuzzylogic.fcl"]
 
@@ -184,3 +184,17 @@ def test_fuzzylite_5_keywords_are_read():
     (y,) = system.outputs
     assert (system.implication, system.points) == ("einstein_product", 50)
     assert (y.aggregation, y.defuzzifier) == ("bounded_sum", "lom")
+
+
+@pytest.mark.parametrize(
+    ("file", "old", "new", "fault"), [(file, *row) for file in FAULTS if file != "sail.toml" for row in FAULTS[file]]
+)
+def test_unknown_constructs_are_rejected_with_their_line(file, old, new, fault):
+    text, format = FOREIGN[file], file.partition(".")[2]
+    assert old in text
+    edited = text.replace(old, new) if format == "fcl" else text.replace(old, new, 1)
+    if not fault:
+        assert reads(edited, format) == reads(text, format)
+        return
+    with pytest.raises((FormatError, DefinitionError), match=fault):
+        reads(edited, format)

@@ -21,7 +21,7 @@ from fuzzy_arbiter import (
 )
 from fuzzy_arbiter.errors import DefinitionError, FormatError
 from fuzzy_arbiter.formats import reads, writes
-from tests.fuzzy_arbiter.formats.systems import FOREIGN, TIPPING
+from tests.fuzzy_arbiter.formats.systems import FAULTS, FOREIGN, TIPPING
 
 LONG = FOREIGN["sail.toml"]
 
@@ -82,42 +82,7 @@ def changed(path, value):
     return json.dumps(data)
 
 
-@pytest.mark.parametrize(
-    ("path", "value", "fault"),
-    [
-        (["rule"], [], "^rule: unknown key, expected one of name, .*rules; did you mean 'rules'"),
-        (["not a key"], 1, "^'not a key': unknown key, expected one of name, conjunction"),
-        (["inputs", 0, "unverse"], 1, r"^inputs\[0\].unverse: unknown key, expected one of name, .*did you mean 'univ"),
-        (["inputs", 0, "default"], 1, r"^inputs\[0\].default: unknown key, expected one of name, universe, terms"),
-        (["inputs"], {}, "^inputs: got a table, expected a list"),
-        (["inputs"], [], "^inputs: got none, expected at least one"),
-        (["inputs", 0], 3, r"^inputs\[0\]: got 3, expected a table of keys and values"),
-        (["inputs", 0, "name"], 3, r"^inputs\[0\].name: got 3, expected text"),
-        (["inputs", 0, "name"], " x", r"^inputs\[0\]: variable name is ' x', expected printable text"),
-        (["inputs", 0, "universe"], [0], r"^inputs\[0\].universe: got a list, expected a list of 2 numbers"),
-        (["inputs", 0, "universe"], [0, "1"], r"^inputs\[0\].universe: got '1', expected a finite number"),
-        (["inputs", 0, "universe"], [0, True], r"^inputs\[0\].universe: got True, expected a finite number"),
-        (["inputs", 0, "universe"], [0, 10**400], r"^inputs\[0\].universe: got 1000.*, expected a finite number"),
-        (["inputs", 0, "universe"], [2, 1], r"^inputs\[0\]: variable 'wind': universe is \[2.0, 1.0\]"),
-        (["inputs", 0, "terms"], [], r"^inputs\[0\].terms: got a list, expected a table"),
-        (["inputs", 0, "terms", "calm"], 1, r"^inputs\[0\].terms.calm: got 1, expected a list of points, or a table"),
-        (["inputs", 0, "terms", "too strong"], [[1, 2]], r"^inputs\[0\].terms.'too strong': shape: point \(1.0, 2.0\)"),
-        (["inputs", 0, "terms", "calm"], [], r"^inputs\[0\].terms.calm: shape: got no points"),
-        (["inputs", 0, "terms", "calm"], [[0, 1], 2], r"^inputs\[0\].terms.calm: inputs|^inputs\[0\].terms.calm\[1\]:"),
-        (["inputs", 0, "terms", "calm"], {"gauss": [1, 2]}, r"calm.gauss: unknown key, expected one of triangle, trap"),
-        (["inputs", 0, "terms", "calm"], {"triangle": [1, 2]}, r"calm.triangle: got a list, expected a list of 3 num"),
-        (["inputs", 0, "terms", "calm"], {"rising": [2, 1]}, r"^inputs\[0\].terms.calm: shape: place 1.0 comes after"),
-        (["outputs", 0, "default"], "x", r"^outputs\[0\].default: got 'x', expected a finite number"),
-        (["rules", 1], 5, r"^rules\[1\]: got 5, expected text"),
-        (["rules", 1], "if wind is", r"^rules\[1\]: rule 'if wind is': got the end after 'is', expected a term's name"),
-        (["rules", 1], "if wind is wet then sail is full", r"^R2 'if wind is wet .*'wind' has no term 'wet', expected"),
-        (["conjunction"], "mn", "^conjunction is 'mn', expected one of min, prod"),
-        (["conjunction"], 1, "^conjunction: got 1, expected text"),
-        (["points"], 2, "^points is 2, expected a whole number, 3 or more"),
-        (["points"], 101.0, "^points is 101.0, expected a whole number"),
-        (["criteria"], [], "^inputs: unknown key, expected one of name, criteria|^rules: unknown key, expected one of"),
-    ],
-)
+@pytest.mark.parametrize(("path", "value", "fault"), FAULTS["sail.toml"])
 def test_errors_name_the_key(path, value, fault):
     with pytest.raises((FormatError, DefinitionError), match=fault):
         reads(changed(path, value), "json")
