@@ -1,13 +1,11 @@
 """The arbiter: section VI, normalization, definitions, threads, memory, imports."""
 
 import copy
-import gc
 import math
 import pickle
 import subprocess
 import sys
 import threading
-import tracemalloc
 from fractions import Fraction
 
 import numpy as np
@@ -150,28 +148,6 @@ def test_threads_do_not_disturb_each_other(arbiter):
     for thread in threads:
         thread.join()
     assert wrong == []
-
-
-@pytest.mark.slow
-def test_arbiters_leak_no_memory():
-    def build(count):
-        for _ in range(count):
-            Arbiter()([0.3, 0.6, 0.2])
-
-    def in_use():
-        gc.collect()
-        return len(gc.get_objects()), tracemalloc.get_traced_memory()[0]
-
-    tracemalloc.start()
-    try:
-        build(30)
-        objects, memory = in_use()
-        build(300)
-        more_objects, more_memory = in_use()
-    finally:
-        tracemalloc.stop()
-    assert more_objects <= objects + 5
-    assert more_memory - memory < 20_000  # bytes, for all of them
 
 
 def test_ramp_is_one_up_to_the_boundary_and_falls_outside():

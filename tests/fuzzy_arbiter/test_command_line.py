@@ -14,6 +14,7 @@ import pytest
 from fuzzy_arbiter import Arbiter, Output, System, Variable, falling, rising
 from fuzzy_arbiter.__main__ import main
 from fuzzy_arbiter.hierarchy import WEIGHT
+from tests.fuzzy_arbiter.formats.systems import REFUSED
 
 
 @pytest.fixture
@@ -114,18 +115,7 @@ def test_eval_of_a_table_takes_columns_by_name(run, tmp_path):
 
 @pytest.mark.parametrize(
     ("table", "fault"),
-    [
-        ("", "column 'obstacle' is missing in the first line, which has none"),
-        ("obstacle;shape\n", "column 'obstacle' is missing in the first line, which has 'obstacle;shape'"),
-        ("obstacle,shape\n1,1\n", "column 'depth' is missing"),
-        ("obstacle,shape,shape,depth\n", "column 'shape' stands twice"),
-        ("obstacle,shape,depth\n0,0,0\n\n0,0,x\n", "line 4: depth: 'x' is not a number"),
-        ("obstacle,shape,depth\n0,0,0\n0,0,2\n", "line 3: depth: input is 2.0, expected a number in [0, 1]"),
-        ("obstacle,shape,depth\n0,0,nan\n", "line 2: depth: input is nan"),
-        ("obstacle,shape,depth\n0,0\n", "line 2: 2 cells, expected 3"),
-        ("obstacle,shape,depth\n0,0,0,0\n", "line 2: 4 cells, expected 3"),
-        ('obstacle,shape,depth\n"0' + "1" * 200_000, "line 2: field larger than field limit"),
-    ],
+    [*REFUSED["csv"], ('obstacle,shape,depth\n"0' + "1" * 200_000, "line 2: field larger than field limit")],
 )
 def test_invalid_table_leaves_no_file(refused, table, fault):
     assert f"standard input: {fault}" in refused("eval", "section-vi", "--csv", "-", "--out", "w.csv", stdin=table)
@@ -141,23 +131,10 @@ def test_unreadable_tables_are_rejected(refused, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("words", "fault"),
-    [
-        ([], "got no values, expected obstacle, shape, depth"),
-        (["1", "0"], "inputs: got 2, expected 3: obstacle, shape, depth"),
-        (["obstacle=1", "0", "0"], "got some values with a name and some without"),
-        (["obstacle=1", "obstacle=1", "shape=0"], "obstacle appears twice"),
-        (["obstacle=1", "speed=1", "shape=0", "depth=0"], "speed: unknown input"),
-        (["obstacle=1", "shape=0"], "depth: input is missing"),
-        (["obstacle=high", "shape=0", "depth=0"], "obstacle=high: 'high' is not a number"),
-        (["0", "0", "-1e-3"], "depth: input is -0.001, expected a number in [0, 1]"),
-        (["0", "0", "0", "--frob"], "unknown argument '--frob'"),
-        (["0", "0", "0", "--csv", "x.csv"], "got '0' with --csv"),
-        (["0", "0", "0", "--engine", "magic"], "argument --engine: invalid choice: 'magic'"),
-    ],
+    ("verb", "words", "fault"), [(verb, *row) for verb in ("eval", "plot") for row in REFUSED[verb]]
 )
-def test_invalid_values_give_one_line_errors(refused, words, fault):
-    assert fault in refused("eval", "section-vi", *words)
+def test_invalid_arguments_give_one_line_errors(refused, verb, words, fault):
+    assert fault in refused(verb, "section-vi", *words)
 
 
 def test_invalid_commands_and_definitions_give_one_line_errors(refused, tmp_path):
@@ -258,27 +235,6 @@ def test_plot_rules_defaults_to_range_centers_with_a_notice(run, tmp_path, gap):
 def test_plot_format_follows_the_suffix(run, tmp_path, suffix, magic):
     assert run("plot", "section-vi", "terms", "--input", "depth", "--out", f"a.{suffix}")[0] == 0
     assert (tmp_path / f"a.{suffix}").read_bytes().startswith(magic)
-
-
-@pytest.mark.parametrize(
-    ("words", "fault"),
-    [
-        (["terms", "--out", "a.gif"], "a.gif: suffix is '.gif', expected .png, .svg, .pdf"),
-        (["terms", "--input", "speed", "--out", "a.png"], "no variable 'speed', expected one of obstacle, shape, dept"),
-        (["rules", "--at", "0.3", "--out", "a.png"], "inputs: got 1, expected 3: obstacle, shape, depth"),
-        (["rules", "--at", "speed=1", "--out", "a.png"], "speed: unknown input"),
-        (["decisions", "--input", "shape", "--out", "a.png"], "decisions: 1 of --input, expected 2 of obstacle, shape"),
-        (["decisions", "--at", "0.5", "--out", "a.png"], "--at 0.5: expected name=value"),
-        (["decisions", "--at", "obstacle=0.5", "--out", "a.png"], "the picture goes over it"),
-        (["surface", "--output", "beta", "--out", "a.png"], "no output 'beta'"),
-        (["rules", "--input", "depth", "--out", "a.png"], "rules: got --input, expected none but --output, --at"),
-        (["decisions", "--relief", "--out", "a.png"], "decisions: got --relief, expected none but --input, --at"),
-        (["terms", "--at", "speed=1", "--out", "a.png"], "--at speed: its terms are not drawn, expected one of obst"),
-        (["terms"], "plot: the following arguments are required: --out"),
-    ],
-)
-def test_invalid_plot_arguments_give_one_line_errors(refused, words, fault):
-    assert fault in refused("plot", "section-vi", *words)
 
 
 def test_bench_times_every_engine_or_says_why_not(run, monkeypatch, gap):

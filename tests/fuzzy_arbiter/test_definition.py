@@ -112,15 +112,3 @@ def test_writers_require_systems_and_readers_require_text():
         writes("x", "json")
     with pytest.raises(FormatError, match=r"got b'{}', expected text"):
         reads(b"{}", "json")
-
-
-def test_variables_are_listed_once_for_all_rules(monkeypatch):
-    """So that the time to build a system grows with the number of rules, not with its square."""
-    counts = []
-    names = Variable.term_names.fget
-    monkeypatch.setattr(Variable, "term_names", property(lambda v: (counts.append(1), names(v))[1]))
-    rules = ("if wind is calm then sail is full", "if wind is strong then sail is reefed")
-    for repeats in (1, 200):
-        counts.clear()
-        system(*(rules * repeats))
-        assert len(counts) < 10

@@ -24,7 +24,6 @@ from fuzzy_arbiter import (
     triangle,
 )
 from fuzzy_arbiter.engines.closed import ClosedEngine
-from fuzzy_arbiter.engines.rational_pieces import pieces
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Or
 from tests.examples import examples
@@ -131,18 +130,6 @@ def test_pieces_are_exact_where_the_area_is_small_and_next_to_their_starts(low, 
     for h in [*small, *(1 - x for x in small), *starts]:
         exact = float(reference.centroid(output, [1 - Fraction(h), Fraction(h)]))
         assert engine.weights([h])[0] == pytest.approx(exact, abs=16 * EPS)
-
-
-def test_number_of_cubic_pieces_is_minimal():
-    """One for the full triangles, also for trapezoids that meet there; three for the asymmetric pair."""
-    pairs = [
-        (falling(0, 1), rising(0, 1)),
-        (falling(0.3, 0.7), rising(0.3, 0.7)),
-        (falling(0.2, 0.55), rising(0.37, 0.83)),
-    ]
-    counts = [pieces(Output("y", (0, 1), {"low": low, "high": high}))[1] for low, high in pairs]
-    # beside them there may be one for h = 1 alone
-    assert [sum(piece.start < 1.0 for piece in scaled) for scaled in counts] == [1, 1, 3]
 
 
 @pytest.mark.parametrize("n", range(1, 13))

@@ -63,17 +63,6 @@ def gaussians(*parameters, universe=(0, 25), **options):
     return Output("y", universe, {f"t{i}": curve("gaussian", *p) for i, p in enumerate(parameters)}, **options)
 
 
-@pytest.mark.parametrize("deviation", [6.0, 0.5, 0.05, 1e-3, 1e-6])
-@pytest.mark.parametrize("implication", T_NORMS)
-def test_a_lone_gaussian_has_its_mean_for_all_values(deviation, implication):
-    for defuzzifier in ("centroid", "bisector", "mom"):
-        output = gaussians((9.7, deviation), universe=(9.7 - 10, 9.7 + 10), defuzzifier=defuzzifier)
-        for cut in (1.0, 0.6):
-            if implication == "drastic_product" and cut < 1.0 and defuzzifier != "mom":
-                continue  # a single place, which has no area
-            assert value(output, [cut], implication) == pytest.approx(9.7, abs=1e-9), (defuzzifier, cut)
-
-
 @pytest.mark.parametrize(
     ("parameters", "cuts"),
     [

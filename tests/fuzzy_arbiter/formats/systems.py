@@ -15,7 +15,7 @@ from fuzzy_arbiter.terms.values import Constant, Formula, Linear
 # files in the manner of other tools, by name
 FOREIGN = {path.name: path.read_text() for path in (Path(__file__).parents[2] / "data" / "fuzzy" / "foreign").iterdir()}
 
-FAULTS = tomllib.loads(FOREIGN["faults.toml"])
+FAULTS, REFUSED = (tomllib.loads(FOREIGN[f"{name}.toml"]) for name in ("faults", "refused"))
 
 
 def _grades(*names):
