@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from controller.laws import LAWS
 from cosim.replay.events import active_region_changes
-from cosim.report.log_contents import LogContents, log_contents, log_facts
-from cosim.report.table import Table
+from cosim.results.log_facts import IMPORT, LogFacts, TopicFacts, load_log_facts
 from cosim.results.paper_claims import paper_claims
 from cosim.results.run_result import Run
 from cosim.results.spans import Spans
@@ -19,53 +18,43 @@ from cosim.results.wording import describe_task, format_isolations, format_numbe
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
+_NAMED = 12  # maximum number of unused kinds of messages, and of gaps, that a table lists
 _MAX_SPANS = 6  # maximum number of spans that a table lists for a criterion
 
 
-@dataclass(frozen=True)
-class Contents:
-    """What a report says beside its figures and the numbers of the summary, as plain text without escapes."""
+class Table(NamedTuple):
+    """A table of texts."""
 
-    asked: str
-    verdict: str
-    remarks: tuple[str, ...]
-    claims: Table | None  # comparison with the paper's claims
-    regions: Table | None
-    criteria: Table | None
-    nearest: str  # distance of the run from the goal's surface
-    windows: str  # times within the overlap of regions
-    arbiter: str
-    outages: str
-    isolated: str  # thrusters that the law isolated
-    limited: bool  # the force on the body
-    log: LogContents | None  # of an imported run
-    repeatable: bool  # by ``cosim run`` from the folder
+    title: str
+    head: tuple[str, ...]  # names of the columns
+    rows: tuple[tuple[str, ...], ...]
 
 
-def contents_of(run: Run) -> Contents:
-    """Make the contents of the report of a completed, interrupted or killed run."""
+def contents_of(run: Run) -> dict[str, Any]:
+    """Return what the report of a run says beside its figures and the summary, as plain text without escapes."""
     s, outside = run.scenario, run.summary["closest_to_goal"]
     side = f"{format_number(abs(outside), 4)} m {'outside' if outside > 0.0 else 'inside'}"
-    return Contents(
-        asked=describe_task(s),
-        verdict=verdict(run.summary),
-        remarks=_remarks(run),
-        claims=_claims(run),
-        regions=_regions(run),
-        criteria=_criteria(run),
-        nearest=side if math.isfinite(outside) else "no number",
-        windows=", ".join(f"{start:.3f} to {end:.3f}" for start, end in run.summary["intersection_windows"]) or "never",
-        arbiter=f"{s.arbiter.engine}; {_rules(s)}",
-        outages=", ".join(f"{o.sensor} {o.time:g} to {o.time + o.duration:g} s" for o in s.outages),
-        isolated=format_isolations(run.summary) or "none",
-        limited=math.isfinite(s.limit.force) or s.limit.time_constant > 0.0,
-        log=log_contents(run),
-        repeatable=not s.log and not s.law.is_custom and s.law.name in LAWS,
-    )
+    windows = ", ".join(f"{start:.3f} to {end:.3f}" for start, end in run.summary["intersection_windows"])
+    return {
+        "asked": describe_task(s),
+        "verdict": verdict(run.summary),
+        "remarks": _remarks(run),
+        "claims": _claims(run),
+        "regions": _regions(run),
+        "criteria": _criteria(run),
+        "nearest": side if math.isfinite(outside) else "no number",
+        "windows": windows or "never",  # within the overlap of regions
+        "arbiter": f"{s.arbiter.engine}; {_rules(s)}",
+        "outages": ", ".join(f"{o.sensor} {o.time:g} to {o.time + o.duration:g} s" for o in s.outages),
+        "isolated": format_isolations(run.summary) or "none",
+        "limited": math.isfinite(s.limit.force) or s.limit.time_constant > 0.0,
+        "log": _log(run),
+        "repeatable": not s.log and not s.law.is_custom and s.law.name in LAWS,  # by ``cosim run`` from the folder
+    }
 
 
 def _remarks(run: Run) -> tuple[str, ...]:
-    facts = log_facts(run)
+    facts = _log_facts(run)
     remarks = facts.remarks if facts else ()
     names = [f"position.{axis}" for axis in "xyz"]
     names += ["goal.clearance"] if run.scenario.has_goal else []
@@ -180,3 +169,44 @@ def _rules(scenario: Scenario) -> str:
         return f"{', '.join(scenario.criterion_names)}: {scenario.arbiter.rules}"
     ramp = f"memberships fall to 0 over {scenario.arbiter.ramp:g} m (rad for attitude)"
     return ramp if scenario.has_paper_criteria else f"{', '.join(scenario.criterion_names)}, in this order"
+
+
+def _log_facts(run: Run) -> LogFacts | None:
+    """Load the facts about an imported run; None for other runs."""
+    return load_log_facts(run.folder) if run.scenario.log and (run.folder / IMPORT).exists() else None
+
+
+def _log(run: Run) -> dict[str, Any] | None:
+    """Return what is said about the sources and the gaps of an imported run; None for other runs."""
+    facts = _log_facts(run)
+    if facts is None:
+        return None
+    rows = tuple(
+        (
+            t.quantity, t.source, str(t.samples), format_number(t.rate, 3), str(t.gaps),
+            format_number(max((end - begin for begin, end in t.longest_gaps), default=0.0), 3), _repairs(t),
+        )
+        for t in facts.topics
+    )  # fmt: skip
+    topics = Table("Log", ("Quantity", "From", "Samples", "Rate [Hz]", "Gaps", "Longest [s]", "Mended"), rows)
+    gaps = sorted((begin, end, t.quantity) for t in facts.topics for begin, end in t.longest_gaps)
+    listed = [(quantity, f"{begin:.2f} to {end:.2f}") for begin, end, quantity in gaps[:_NAMED]]
+    listed += [("and more", str(len(gaps) - _NAMED))] if len(gaps) > _NAMED else []
+    more = f" and {len(facts.unread) - _NAMED} more kinds" if len(facts.unread) > _NAMED else ""
+    return {
+        "topics": topics,
+        "gaps": Table("Gaps of the log", ("Quantity", "From and to [s]"), tuple(listed)) if gaps else None,
+        "commands": facts.commands or "none",
+        "unread": f"{', '.join(list(facts.unread)[:_NAMED])}{more}" or "nothing",
+    }
+
+
+def _repairs(topic: TopicFacts) -> str:
+    """Describe the repairs of the samples of a topic."""
+    words = (
+        (topic.held, "repeats of held values left out"),
+        (topic.bursts, "samples of bursts spread"),
+        (topic.late, "out of order left out"),
+        (topic.broken, "without a number left out"),
+    )
+    return "; ".join(f"{count} {text}" for count, text in words if count) or "–"

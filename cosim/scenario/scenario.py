@@ -57,6 +57,10 @@ from plant_fmu.vehicle import Vehicle, load_vehicle
 
 __all__ = ["VEHICLE_COPY", "Limit", "Scenario", "Time", "load_scenario"]
 
+_AS_READ = (  # fields of a scenario that are those of its file
+    "time", "plant", "initial", "arbiter", "limit", "actuation", "sensing", "failures", "outages", "master", "record",
+    "commands", "report_failures", "compare",
+)  # fmt: skip
 VEHICLE_COPY = "vehicle.toml"  # name in a run folder of a vehicle that is not shipped
 
 
@@ -323,25 +327,13 @@ def make_scenario(file: File, name: str, vehicle: Vehicle | None = None) -> Scen
         name=name,
         vehicle=vehicle,
         vehicle_file=vehicle_file,
-        time=time,
+        **{name: getattr(file, name) for name in _AS_READ},
         steps=steps_per_period("time.duration", time.duration, time.step),
         control_every=steps_per_period("time.control", time.control, time.step),
         arbiter_every=steps_per_period("time.arbiter", time.arbiter, time.step),
-        plant=file.plant,
-        initial=file.initial,
         law=law,
-        arbiter=file.arbiter,
         criteria=criteria,
         rules=rules,
-        limit=file.limit,
-        actuation=file.actuation,
-        sensing=file.sensing,
-        failures=file.failures,
-        outages=file.outages,
-        master=file.master,
-        record=file.record,
-        commands=file.commands,
-        report_failures=file.report_failures,
         goal=goal,
         goal_velocity=motion.velocity,
         goal_streamed=motion.streamed or file.commands.enabled,
@@ -349,6 +341,5 @@ def make_scenario(file: File, name: str, vehicle: Vehicle | None = None) -> Scen
         goal_stay=motion.stay,
         regions=regions + slots,
         intersection=overlapping,
-        compare=file.compare,
         table=msgspec.to_builtins(msgspec.structs.replace(file, intersection=names)),
     )

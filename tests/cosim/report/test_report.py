@@ -216,7 +216,7 @@ def test_summary_numbers_are_labeled_with_units(shipped_run):
 
 def test_region_table_gives_violation_time_and_duration(shipped_run):
     run = load_run(shipped_run("paper", *SHORT, report=True).folder)
-    rows = {row[0]: row for row in contents_of(run).regions.rows}
+    rows = {row[0]: row for row in contents_of(run)["regions"].rows}
     signal, time = run.record["SR1.clearance"], run.record["time"]
     assert rows["SR1"][:5] == ("SR1", "sphere", "obstacle", "out of", "hard")
     assert float(rows["SR1"][5].removesuffix(" m").replace("−", "-")) == pytest.approx(signal.min(), rel=1e-3)
