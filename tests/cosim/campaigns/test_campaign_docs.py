@@ -30,7 +30,7 @@ def test_every_key_of_a_scene_is_documented():
     [
         (
             "columns of cosim/campaigns/scenes/rows.py",
-            {field.name: field.metadata[b"unit"].decode() for field in SCHEMA},
+            {f.name: f.metadata[b"unit"].decode() for f in SCHEMA},
         ),
         ("outcomes of cosim/batch/outcome.py", {name: unit for name, (_, unit, _) in FIELDS.items()}),
     ],

@@ -3,7 +3,6 @@
 import json
 import re
 import shutil
-from html.parser import HTMLParser
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -22,40 +21,12 @@ from cosim.report.web_page import number
 from tests.cosim.campaigns.fake import Choosy, design, fakes, paper
 from tests.cosim.campaigns.scene_data import BRIEF, HARD, PLAIN, write
 from tests.cosim.campaigns.test_comparison import idle
+from tests.page_checker import Checker
 from tests.security.test_pages import Elements
 
 __all__ = ["fakes", "idle"]
 
 REFUSED = PLAIN[2] | {"seed": 7, "weight_minus_buoyancy": 1e6}
-
-
-class Checker(HTMLParser):
-    """Collects what a page asks for, and whether its tags close."""
-
-    def __init__(self, text):
-        super().__init__()
-        self.open, self.asked, self.rows = [], [], []
-        self.feed(text)
-        assert self.open == []
-
-    def handle_starttag(self, tag, attributes):
-        if tag != "meta":
-            self.open.append(tag)
-        if tag == "tr":
-            self.rows.append([])
-        elif tag in ("td", "th"):
-            self.rows[-1].append("")
-        self.asked += [v for k, v in attributes if k in ("src", "href", "xlink:href") and not v.startswith("#")]
-
-    def handle_startendtag(self, tag, attributes):
-        pass
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if self.open and {"td", "th"} & set(self.open):
-            self.rows[-1][-1] += data
 
 
 def check(page):

@@ -2,7 +2,6 @@
 
 import html
 import re
-from html.parser import HTMLParser
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -17,38 +16,12 @@ from cosim.results.paper_claims import paper_claims
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
+from tests.page_checker import Checker
 
 FIGURES = [
     "attitude", "clearance", "estimates", "forces", "path-3d", "path-plane", "position-error", "thrusters", "weights",
 ]  # fmt: skip
-VOID = {"meta", "br", "img"}
 SHORT = ("arbiter.engine=closed", "time.duration=0.3")  # long enough to be inside SR1 and SR2
-
-
-class Checker(HTMLParser):
-    """Collects what a page asks the network for, and whether its tags close."""
-
-    def __init__(self):
-        super().__init__()
-        self.open, self.asked, self.captions, self.words = [], [], [], []
-
-    def handle_starttag(self, tag, attributes):
-        if tag not in VOID:
-            self.open.append(tag)
-        if tag == "figcaption":
-            self.captions.append("")
-        for name, value in attributes:
-            if name in ("src", "href", "xlink:href") and value and not value.startswith(("#", "data:")):
-                self.asked.append(value)
-
-    def handle_endtag(self, tag):
-        assert self.open.pop() == tag
-
-    def handle_data(self, data):
-        if "style" not in self.open and "svg" not in self.open:
-            self.words.append(data)
-        if "figcaption" in self.open:
-            self.captions[-1] += data
 
 
 def page_of(run):
@@ -65,9 +38,7 @@ def page_of(run):
 )
 def test_page_is_whole_and_needs_no_network(shipped_run, name, overrides):
     page = page_of(shipped_run(name, *overrides, report=True))
-    checker = Checker()
-    checker.feed(page)
-    assert checker.open == []
+    checker = Checker(page)
     assert not [target for target in checker.asked if "://" in target or target.startswith("/")]
     assert "<script" not in page
     assert len(page) < 1_000_000
@@ -78,8 +49,7 @@ def test_every_figure_is_there_as_a_vector_file_numbered_and_with_a_caption(ship
     run = shipped_run("paper", *SHORT, report=True)
     names = sorted([*FIGURES, "weights-overlap"])
     assert sorted(p.name for p in (run.folder / "figures").iterdir()) == sorted(f"{name}.svg" for name in names)
-    checker = Checker()
-    checker.feed(page_of(run))
+    checker = Checker(page_of(run))
     assert len(checker.captions) == len(names)
     for i, caption in enumerate(checker.captions):
         assert re.match(rf"Figure {i + 1}\. .{{20,}}", caption)
@@ -112,8 +82,7 @@ def test_grays_change_places_and_light_hues_stay_in_the_dark(light, dark):
 
 def test_every_link_target_of_the_page_exists(shipped_run):
     run = shipped_run("paper", *SHORT, report=True)
-    checker = Checker()
-    checker.feed(page_of(run))
+    checker = Checker(page_of(run))
     assert {"replay.html", "record.parquet", "summary.json", "scenario.toml", "figures/"} < set(checker.asked)
     for target in checker.asked:
         assert (run.folder / target).exists(), target
@@ -205,8 +174,7 @@ def test_thinned_curves_keep_their_extremes_and_gaps():
 
 def test_summary_numbers_are_labeled_with_units(shipped_run):
     run = shipped_run("paper", *SHORT, report=True)
-    checker = Checker()
-    checker.feed(page_of(run))
+    checker = Checker(page_of(run))
     words = " ".join(" ".join(checker.words).split())
     assert "maximum force that acted, norm [N]" in words
     assert f"{run.summary['max_force']:,.0f}".replace(",", " ") in words

@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from cosim.results.record import load_record
+from cosim.run.run import run_scenario
+from cosim.scenario.scenario import load_scenario
 
 BOTH = pytest.mark.parametrize("engine", ["closed", pytest.param("skfuzzy", marks=pytest.mark.slow)])
 
@@ -27,21 +29,13 @@ def test_unlimited_paper_run_matches_reference_figures(shipped_run, engine):
     assert summary["saturated_time"] == 0.0
 
 
-@pytest.mark.medium
-def test_shipped_paper_runs_scikit_fuzzy(shipped_run):
-    assert shipped_run("paper", "arbiter.engine=skfuzzy", "time.duration=5").summary["arbiter"] == "skfuzzy"
-    from cosim.scenario.scenario import load_scenario
-
-    assert load_scenario("paper").arbiter.engine == "skfuzzy"
-
-
 @pytest.mark.parametrize("duration", [5, pytest.param(60, marks=pytest.mark.slow)])
 def test_both_arbiter_engines_give_the_same_path(shipped_run, duration):
     """Their weights differ by at most the square of the grid's step over 2; the path hardly notices."""
-    closed, skfuzzy = (
-        load_record(shipped_run("paper", f"arbiter.engine={e}", f"time.duration={duration}").folder)
-        for e in ("closed", "skfuzzy")
-    )
+    engines = ("closed", load_scenario("paper").arbiter.engine)
+    runs = [shipped_run("paper", f"arbiter.engine={e}", f"time.duration={duration}") for e in engines]
+    assert [run.summary["arbiter"] for run in runs] == ["closed", "skfuzzy"]
+    closed, skfuzzy = (load_record(run.folder) for run in runs)
     names = [f"weight.{name}" for name in ("obstacle", "shape", "depth")]
     assert np.abs(closed.stack(names) - skfuzzy.stack(names)).max() < 1e-4
     path = [f"position.{axis}" for axis in "xyz"]
@@ -91,9 +85,6 @@ def test_paper_calibrated_meets_the_papers_window(shipped_run):
 @pytest.mark.medium
 def test_a_run_repeats_to_the_last_bit(shipped_run, tmp_path):
     """The scenario file in a run folder is all that a run depends on."""
-    from cosim.run.run import run_scenario
-    from cosim.scenario.scenario import load_scenario
-
     first = shipped_run("paper-calibrated", "arbiter.engine=closed", "time.duration=5", "plant.current=[0.1,0.2,0.0]")
     again = run_scenario(load_scenario(first.folder / "scenario.toml"), tmp_path / "again", report=False)
     one, two = load_record(first.folder), load_record(again.folder)
