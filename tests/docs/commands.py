@@ -66,23 +66,19 @@ def run_commands(block: Block, prepare: Callable[[list[str]], object] = lambda w
 def check_commands(block: Block) -> None:
     """Check a block without running it: our programs must understand its commands, of a template verb and flags."""
     for command in commands(block):
-        reasons = of_command(block.directives.not_run, command.words)
-        _check_unrun(block, command, "".join(reasons[:1]))
+        _check_unrun(block, command, "".join(of_command(block.directives.not_run, command.words)[:1]))
 
 
-def _check_unrun(block: Block, command: Command, reason: str) -> None:
+def _check_unrun(block: Block, command: Command, reason: str | None) -> bool:
+    """Check a command, whose words are not parsed where it has no reason; return whether it is not run in any case."""
     where = f"{block.page}:{command.line}"
     if unknown := wrong_flags(command.words):
         raise PageError(f"{where}: {' '.join(command.words[:3])} does not know {', '.join(unknown)}")
     ours = program(command.words)
-    if ours and not reason.startswith("template") and (why := parses(*ours)):
+    if ours and reason is not None and not reason.startswith("template") and (why := parses(*ours)):
         raise PageError(f"{where}: {why}")
-    _checked_foreign(where, command.words)
-
-
-def _checked_foreign(where: str, words: list[str]) -> bool:
     try:
-        return check_foreign(words)
+        return check_foreign(command.words)
     except PageError as error:
         raise PageError(f"{where}: {error}") from error
 
@@ -90,10 +86,8 @@ def _checked_foreign(where: str, words: list[str]) -> bool:
 def _run(block: Block, command: Command) -> str:
     where = f"{block.page}:{command.line}"
     directives = block.directives
-    if reasons := of_command(directives.not_run, command.words):
-        _check_unrun(block, command, reasons[0])
-        return ""
-    if _checked_foreign(where, command.words):
+    reasons = of_command(directives.not_run, command.words)
+    if _check_unrun(block, command, reasons[0] if reasons else None) or reasons:
         return ""
     more = " ".join(of_command(directives.run_with, command.words))
     words = command.words + shlex.split(more)

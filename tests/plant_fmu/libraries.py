@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import functools
 import io
 from dataclasses import dataclass
@@ -27,6 +28,9 @@ def universal(data: bytes):  # kept, for the parts of a universal library die wi
     """Parse a library for Macs, or a universal one."""
     lief = pytest.importorskip("lief", reason="lief is not installed: nothing reads libraries of other systems")
     return lief.MachO.parse(io.BytesIO(data))
+
+
+atexit.register(universal.cache_clear)  # else LIEF complains of leaks
 
 
 def macs(data: bytes) -> list:
