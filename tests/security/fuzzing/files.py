@@ -25,7 +25,6 @@ from cosim.mavlink.wire.signing import load_key
 from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import Arbiter
 from fuzzy_arbiter import formats as arbiters
-from fuzzy_arbiter.command_line.files import read_text
 from fuzzy_arbiter.command_line.values import evaluated_table
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.checking.fmu_file import read_fmu
@@ -74,13 +73,16 @@ for _format, _kind, _parser in (
 
 
 @reader(
-    "table of samples", "text", "fuzzy_arbiter.command_line.files:read_text", "fuzzy_arbiter.command_line.values:_rows"
+    "table of samples",
+    "text",
+    "fuzzy_arbiter.command_line.values:evaluated_table",
+    "fuzzy_arbiter.command_line.values:_rows",
 )
 def samples(seeds: Seeds) -> Case:
     arbiter = Arbiter()
 
     def read(path: Path) -> object:
-        return evaluated_table(arbiter, *read_text(str(path), None), as_json=False)
+        return evaluated_table(arbiter, str(path), None, as_json=False)
 
     return seeds.file("it.csv", read, b'obstacle,shape, depth,note\n0.75,1,0,a\n1,0.5,0.25,"b,c"\n\n0,0,1e-3,\n')
 

@@ -69,18 +69,6 @@ def test_readers_survive_many_mutations(name, seeds):
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < MEMORY * 1024
 
 
-@pytest.mark.medium(fast=11)
-@pytest.mark.parametrize("name", READERS)
-def test_unmodified_files_are_accepted(name, seeds):
-    case = READERS[name].case(seeds)
-    for content in case.contents:
-        if name == "model description, run":  # which have no binary
-            with pytest.raises(KINDS, match="has no binary"):
-                case.read(content)
-        else:
-            case.read(content)
-
-
 @pytest.mark.medium
 @pytest.mark.parametrize("name", ["telemetry log", "dataflash log", "log of PX4"])
 def test_most_logs_with_flipped_bits_are_read(name, seeds):
