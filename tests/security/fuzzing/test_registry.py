@@ -22,6 +22,7 @@ METHODS = {
     "ParquetFile", "read_table", "read_metadata", "read_schema", "fromstring", "iterparse", "unpack", "unpack_from",
 }  # fmt: skip
 ITS_OWN = {  # what parses nothing that comes from outside: why
+    "controller.compiling.text_cache:_kept": "a file of its own cache, in a folder that nobody else can write to",
     "cosim.mavlink.wire.framing:encode_v1": "a frame that pymavlink has just encoded",
     "cosim.companion.failsafes:Failsafes.receive": "the four bytes of a number of a message",
     "cosim.campaigns.rerun:_of_sweep": "a copy of the plan, which was read",
