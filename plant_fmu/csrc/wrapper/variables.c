@@ -98,7 +98,7 @@ static Status check_value(const Instance *instance, Type type, unsigned referenc
     if (!(modes_to_set(v->role) & (unsigned)instance->mode))
         return instance_require(instance, modes_to_set(v->role), v->name);
     if (!isfinite(value))
-        return instance_refuse(instance, "%s = %g refused: not a finite number", v->name, value);
+        return instance_refuse(instance, "%s = %g refused: not a finite number", v->name, isnan(value) ? fabs(value) : value);
     if (value < v->min || value > v->max)
         return instance_refuse(instance, "%s = %.9g refused: outside [%.9g, %.9g]", v->name, value, v->min, v->max);
     return STATUS_OK;
