@@ -12,13 +12,12 @@ from fmpy.fmi2 import FMU2Slave
 
 from cosim.scenario.scenario import load_scenario
 from cosim.ssp import arbiter_component, controller_component
-from cosim.ssp.system import MOTION, WRENCH
 from fuzzy_arbiter import Arbiter
 from plant_fmu import PlantError
 from plant_fmu.build import cached_fmu
 from plant_fmu.checking.check import check_fmu
 from plant_fmu.running.co_simulation_instance import CoSimulationInstance
-from tests.cosim.ssp.jacobi import Parts
+from tests.cosim.ssp.jacobi import MOTION, WRENCH, Parts
 from tests.cosim.ssp.noise import Noise
 from tests.plant_fmu.importers import installed
 
