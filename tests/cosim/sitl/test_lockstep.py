@@ -69,7 +69,8 @@ def test_a_new_connection_or_count_starts_a_new_run_from_the_initial_state(kind,
         with Px4(served.address):
             pass  # left before it said anything: no run
         after = fly(kind, served, 25)
-    assert after[: len(before)] == before
+    same = {"json": 50, "hil": 1}[kind]  # PX4's sensors go on while it has not answered
+    assert after[:same] == before[:same]
     one, two = served.outcome().runs
     assert (one.summary["status"], two.summary["status"]) == ({"json": RESTARTED, "hil": LEFT}[kind], "completed")
     assert two.folder.name == f"{one.folder.name}-2"
