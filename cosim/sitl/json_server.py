@@ -6,7 +6,6 @@ import logging
 import socket
 import time
 from dataclasses import dataclass, field
-from typing import Literal
 
 from cosim.sitl import json_protocol
 from cosim.sitl.lockstep_server import LockstepServer
@@ -15,31 +14,9 @@ from cosim.sitl.sitl_session import MIN_RATE, RESTARTED
 log = logging.getLogger(__name__)
 
 Sender = tuple[str, int]
-Frame = Literal["first", "next", "resent", "gap", "restart"]
 
 _SENDER_TIMEOUT = 1.0  # s of the wall clock without frames, after which another sender is accepted
 _WARNING_PERIOD = 10.0  # s of the wall clock, between two warnings of one kind
-
-
-class Lockstep:
-    """Tracks the frame count of one autopilot, which increases by one with each answer that it has received."""
-
-    def __init__(self) -> None:
-        self.count: int | None = None
-        self.missed = 0
-
-    def classify(self, count: int) -> Frame:
-        """Classify a frame, and store its count."""
-        last, self.count = self.count, count
-        self.missed = 0
-        if last is None:
-            return "first"
-        if count == last:
-            return "resent"
-        if count < last:
-            return "restart"
-        self.missed = count - last - 1
-        return "gap" if self.missed else "next"
 
 
 @dataclass(eq=False)
@@ -47,7 +24,8 @@ class JsonServer(LockstepServer):
     """Fly the plant in lockstep with an ArduPilot."""
 
     kind = socket.SOCK_DGRAM
-    _lockstep: Lockstep = field(default_factory=Lockstep, init=False)
+    # frames that the autopilot has counted, one more with each answer that it has received; None before the first
+    _count: int | None = field(default=None, init=False)
     _sender: Sender | None = field(default=None, init=False)
     _answer: bytes = field(default=b"", init=False)
     _warned: dict[str, float] = field(default_factory=dict, init=False)  # s, time of the last warning of each kind
@@ -81,14 +59,14 @@ class JsonServer(LockstepServer):
             return False
         if sender != self._sender and not self._accept_sender(packet, sender, now):
             return False
-        frame = self._lockstep.classify(packet.frame_count)
-        if frame == "resent":
+        last, self._count = self._count, packet.frame_count
+        if packet.frame_count == last:
             self.counts.resent += 1
         else:
-            if frame == "gap":
-                self._count_lost(self._lockstep.missed)
-            elif frame != "next":
+            if last is None or packet.frame_count < last:
                 self._begin(packet.frame_rate)
+            elif packet.frame_count > last + 1:
+                self._count_lost(packet.frame_count - last - 1)
             self._step(packet)
         try:
             self._socket.sendto(self._answer, sender)
@@ -105,8 +83,8 @@ class JsonServer(LockstepServer):
                 self.counts.rejected += 1
                 self._warn("rejected", f"{sender[0]}:{sender[1]} also sends, beside {present}: rejected")
                 return False
-            if self._lockstep.count is None or packet.frame_count != self._lockstep.count + 1:
-                self._lockstep = Lockstep()  # another autopilot, not the same from another port: restart for any count
+            if self._count is None or packet.frame_count != self._count + 1:
+                self._count = None  # another autopilot, not the same from another port: restart for any count
         self._sender = sender
         return True
 

@@ -18,7 +18,7 @@ from plant_fmu import PlantFmuError, Vehicle
 from plant_fmu.build import cached_fmu
 
 SCENARIO = "sitl"  # default scenario
-MIN_RATE, MAX_RATE = 11, 65535  # Hz: an autopilot's frame is shorter than 0.1 s, and a packet holds 16 bits
+MIN_RATE = 11  # Hz: an autopilot's frame is shorter than 0.1 s
 RESTARTED = "ended: the autopilot restarted"
 
 _VALIDATION_RATE = 1000  # Hz, frame rate for the validation of a scenario before an autopilot connects

@@ -18,10 +18,6 @@ _MIN_WIDTH = 40
 _ARDUPILOT, _PX4, _SUBMARINE = 3, 12, 12  # MAV_AUTOPILOT, MAV_AUTOPILOT, MAV_TYPE
 _MAIN, _SUB = 16, 24  # bits by which PX4's main mode and sub-mode are shifted
 
-_ARDUSUB = {
-    0: "STABILIZE", 1: "ACRO", 2: "ALT_HOLD", 3: "AUTO", 4: "GUIDED", 7: "CIRCLE", 9: "SURFACE", 16: "POSHOLD",
-    19: "MANUAL", 20: "MOTOR_DETECT", 21: "SURFTRAK",
-}  # fmt: skip
 _PX4_MAIN = {
     1: "MANUAL", 2: "ALTCTL", 3: "POSCTL", 4: "AUTO", 5: "ACRO", 6: "OFFBOARD", 7: "STABILIZED",
 }  # fmt: skip
@@ -80,7 +76,7 @@ def mode_name(heartbeat: Any, names: Mapping[int, str]) -> str:
         name = _PX4_MAIN.get(main, str(main))
         return f"{name}.{_PX4_AUTO.get(sub, sub)}" if sub else name
     if heartbeat.autopilot == _ARDUPILOT and heartbeat.type == _SUBMARINE:
-        return _ARDUSUB.get(number, str(number))
+        return _enum("SUB_MODE", number)
     return str(number)
 
 

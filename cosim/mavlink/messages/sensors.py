@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 from cosim.mavlink.messages.pose import to_lat_lon_alt
 from cosim.mavlink.vehicle.proximity import MAX_RANGE, SECTORS
@@ -94,26 +95,26 @@ def battery_status(context: VehicleContext) -> Iterator[Fields]:
     yield *kind, [0xFFFF] * 10, -1, -1, -1, -1
 
 
-def _position_known(context: VehicleContext) -> bool:
-    return all(map(math.isfinite, context.view.position_ned))
+def _known_states(context: VehicleContext, prefix: str) -> int:
+    """Return the flags of attitude and velocity, and those of the position if it is finite."""
+    is_placed = all(map(math.isfinite, context.view.position_ned))
+    names = "ATTITUDE VELOCITY_HORIZ VELOCITY_VERT" + is_placed * " POS_HORIZ_REL POS_HORIZ_ABS POS_VERT_ABS"
+    return combine_flags(context.mavlink, prefix, names)
+
+
+def combine_flags(mavlink: Any, prefix: str, names: str) -> int:
+    """Combine flags of an enumeration, whose names are given without their prefix."""
+    return sum(getattr(mavlink, prefix + name) for name in names.split())
 
 
 def estimator_status(context: VehicleContext) -> Iterator[Fields]:
     """ESTIMATOR_STATUS: flags of the known states; innovations are unknown."""
-    m = context.mavlink
-    flags = m.ESTIMATOR_ATTITUDE | m.ESTIMATOR_VELOCITY_HORIZ | m.ESTIMATOR_VELOCITY_VERT
-    if _position_known(context):
-        flags |= m.ESTIMATOR_POS_HORIZ_REL | m.ESTIMATOR_POS_HORIZ_ABS | m.ESTIMATOR_POS_VERT_ABS
-    yield context.view.boot_us, flags, *[0.0] * 6, math.nan, math.nan
+    yield context.view.boot_us, _known_states(context, "ESTIMATOR_"), *[0.0] * 6, math.nan, math.nan
 
 
 def ekf_status_report(context: VehicleContext) -> Iterator[Fields]:
     """EKF_STATUS_REPORT: the same flags for ArduPilot's stations."""
-    m = context.mavlink
-    flags = m.EKF_ATTITUDE | m.EKF_VELOCITY_HORIZ | m.EKF_VELOCITY_VERT
-    if _position_known(context):
-        flags |= m.EKF_POS_HORIZ_REL | m.EKF_POS_HORIZ_ABS | m.EKF_POS_VERT_ABS
-    yield flags, *[0.0] * 5
+    yield _known_states(context, "EKF_"), *[0.0] * 5
 
 
 def obstacle_distance(context: VehicleContext) -> Iterator[Fields]:

@@ -5,11 +5,10 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 from importlib import metadata
-from typing import Any
 
 from packaging.version import Version
 
-from cosim.mavlink.messages.sensors import has_bottom
+from cosim.mavlink.messages.sensors import combine_flags, has_bottom
 from cosim.mavlink.vehicle.profile import MODE_TABLE, SUBMARINE
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import Fields
@@ -81,11 +80,6 @@ def capabilities(context: VehicleContext) -> int:
     names = "MISSION_FLOAT PARAM_FLOAT MISSION_INT COMMAND_INT FTP SET_POSITION_TARGET_LOCAL_NED"
     names += " SET_POSITION_TARGET_GLOBAL_INT MAVLINK2"
     return combine_flags(context.mavlink, "MAV_PROTOCOL_CAPABILITY_", names)
-
-
-def combine_flags(mavlink: Any, prefix: str, names: str) -> int:
-    """Combine flags of an enumeration, whose names are given without their prefix."""
-    return sum(getattr(mavlink, prefix + name) for name in names.split())
 
 
 def autopilot_version(context: VehicleContext) -> Iterator[Fields]:

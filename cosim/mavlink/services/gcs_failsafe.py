@@ -6,9 +6,13 @@ from typing import Any
 
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
+from cosim.mavlink.wire.options import LossAction
 from cosim.simulation.commands.commands import Arm, Command, SetMode
 
 _REPORT_PERIOD = 30.0  # s
+_ACTIONS: dict[LossAction, Command] = {
+    "disarm": Arm(False), "hold": SetMode("hold"), "surface": SetMode("surface"),
+}  # fmt: skip
 
 
 class GcsFailsafe(Service):
@@ -50,13 +54,5 @@ class GcsFailsafe(Service):
 
     def _apply_action(self) -> bool:
         """Submit the command of the loss action; return False if the queue was full."""
-        context = self.context
-        command: Command
-        match context.loss_action:
-            case "disarm":
-                command = Arm(False)
-            case "hold" | "surface" as mode:
-                command = SetMode(mode)
-            case _:
-                return True
-        return context.submit(command) != Result.TEMPORARILY_REJECTED
+        command = _ACTIONS.get(self.context.loss_action)
+        return command is None or self.context.submit(command) != Result.TEMPORARILY_REJECTED

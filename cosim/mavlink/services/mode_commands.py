@@ -87,24 +87,19 @@ class ModeCommands(Service):
     def _execute_override_goto(self, request: CommandRequest) -> Result:
         m = self.context.mavlink
         here = request.int_param(2) in (None, 0, m.MAV_GOTO_HOLD_AT_CURRENT_POSITION)
-        if request.int_param(1) == m.MAV_GOTO_DO_HOLD and here:
-            return self._hold(request.sender)
-        if request.int_param(1) == m.MAV_GOTO_DO_CONTINUE:
-            return self._steer(request.sender, self._paused_from)
-        return Result.UNSUPPORTED
+        actions = {m.MAV_GOTO_DO_CONTINUE: False} | ({m.MAV_GOTO_DO_HOLD: True} if here else {})
+        pause = actions.get(request.int_param(1))
+        return Result.UNSUPPORTED if pause is None else self._pause(request.sender, pause)
 
     def _execute_do_pause_continue(self, request: CommandRequest) -> Result:
-        if request[1] == 0.0:
-            return self._hold(request.sender)
-        if request[1] == 1.0:
-            return self._steer(request.sender, self._paused_from)
-        return Result.DENIED
+        return Result.DENIED if request[1] not in (0.0, 1.0) else self._pause(request.sender, request[1] == 0.0)
 
-    def _hold(self, sender: Sender) -> Result:
+    def _pause(self, sender: Sender, pause: bool) -> Result:
+        """Hold, or continue in the mode before."""
         mode = self.context.mode_ahead
-        if mode != "hold":
+        if pause and mode != "hold":
             self._paused_from = mode
-        return self._steer(sender, "hold")
+        return self._steer(sender, "hold" if pause else self._paused_from)
 
     # ---- restart ----
 

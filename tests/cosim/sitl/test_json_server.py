@@ -7,7 +7,6 @@ from importlib import resources
 import numpy as np
 import pytest
 
-from cosim.errors import RunError
 from cosim.results.record import load_record
 from cosim.simulation.master import Master
 from cosim.sitl import motion
@@ -16,7 +15,7 @@ from cosim.sitl.sitl_session import RESTARTED, FlightOptions, SitlSession, scena
 from plant_fmu import load_vehicle
 from tests.cosim.sitl.stand_in import DISARMED, NEUTRAL, StandIn, frame, heave, newest_line, parse
 
-DT = 1.0 / 1200
+DT, HALF = 1.0 / 1200, 0.5**0.5
 
 
 def rows(run):
@@ -25,9 +24,15 @@ def rows(run):
 
 
 def fly(served, frames, pwm=NEUTRAL, **pilot):
-    """Exchange so many frames, with constant pulses or a function of the frame's number; return the answers."""
+    """Exchange so many frames, with constant pulses or a function of the frame's number.
+
+    Return the answers, the outcome, and the record of its one run.
+    """
     with StandIn(served.address, **pilot) as pilot:
-        return [pilot.fly(pwm(k) if callable(pwm) else pwm) for k in range(frames)]
+        answers = [pilot.fly(pwm(k) if callable(pwm) else pwm) for k in range(frames)]
+    outcome = served.outcome()
+    (run,) = outcome.runs
+    return answers, outcome, load_record(run.folder)
 
 
 def pulses(k):
@@ -36,48 +41,45 @@ def pulses(k):
 
 
 def test_each_frame_is_a_step_of_the_plant(serve):
-    served = serve("time.duration=0.25")
-    said = fly(served, 300, heave(0.5))
-    outcome = served.outcome()
+    said, outcome, record = fly(serve("time.duration=0.25"), 300, heave(0.5))
     assert [s["timestamp"] for s in said] == [(k + 1) * DT for k in range(300)]
     assert (outcome.counts.steps, outcome.counts.lost, outcome.counts.resent) == (300, 0, 0)
-    (run,) = outcome.runs
-    assert (run.summary["status"], run.summary["law"], run.summary["steps"]) == ("completed", "ardupilot", 300)
-    record = load_record(run.folder)
+    summary = outcome.runs[0].summary
+    assert (summary["status"], summary["law"], summary["steps"]) == ("completed", "ardupilot", 300)
     assert record["time"].tolist() == [k * DT for k in range(301)]
-    for i, axis in enumerate("xyz"):
-        assert record[f"position.{axis}"][1:].tolist() == [s["position"][i] for s in said]
+    assert record.stack([f"position.{a}" for a in "xyz"])[1:].tolist() == [list(s["position"]) for s in said]
     assert record["position.z"][-1] > 0.3
     assert set(record["law.pwm5"]) == {1700.0} and not record["law.lost"].any()
     assert set(record["thrust[5]"]) == {-10.0}
 
 
-def test_imu_at_rest_measures_gravity_and_rangefinder_the_bottom(serve):
-    """Weight and buoyancy are off by the same amount: the IMU measures gravity alone."""
-    served = serve("time.duration=0.01", "plant.parameters.weight=131.588", "initial.position=[1,2,3]")
-    said = fly(served, 12)
-    served.outcome()
-    assert said[0]["gyro"] == (0.0, 0.0, 0.0)
-    assert said[0]["accel_body"] == pytest.approx((0.0, 0.0, -9.81), abs=1e-12)
-    assert said[0]["position"] == pytest.approx((1.0, 2.0, 3.0))
-    assert said[0]["quaternion"] == (1.0, 0.0, 0.0, 0.0)
-    assert said[0]["rng_1"] == pytest.approx(27.0)
+STARTS = {  # overrides, and the values of the first answer with their tolerances
+    # weight and buoyancy are off by the same amount: the IMU measures gravity alone
+    "at rest": (("plant.parameters.weight=131.588", "initial.position=[1,2,3]"), {
+        "gyro": ((0.0, 0.0, 0.0), 0.0), "accel_body": ((0.0, 0.0, -9.81), 1e-12), "position": ((1.0, 2.0, 3.0), 1e-6),
+        "quaternion": ((1.0, 0.0, 0.0, 0.0), 0.0), "rng_1": (27.0, 1e-5)}),
+    # heading east without roll: forward is east, right is south
+    "a velocity in NED": ((f"initial.quaternion=[{HALF},0,0,{HALF}]", "initial.velocity=[1.0,0.5,0.25,0,0,0]"), {
+        "velocity": ((-0.5, 1.0, 0.25), 0.02), "attitude": ((0.0, 0.0, np.pi / 2), 1e-3)}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("overrides", "expected"), STARTS.values(), ids=STARTS)
+def test_first_answer_is_the_motion_at_the_start(serve, overrides, expected):
+    (first, *_), *_ = fly(serve("time.duration=0.01", *overrides), 12)
+    for key, (value, tolerance) in expected.items():
+        assert first[key] == pytest.approx(value, rel=0.0, abs=tolerance), key
 
 
 def test_vehicle_is_held_until_a_thruster_is_driven(serve):
     """Rolled over and 1 N light it would move; time and the record's time begin apart."""
-    half = 0.5**0.5
-    served = serve("time.duration=0.1", f"initial.quaternion=[{half},{half},0,0]", "initial.position=[1,2,0]")
-    with StandIn(served.address) as pilot:
-        waited = [pilot.fly(pwm) for pwm in 100 * (DISARMED, (0,) * 8)]
-        flown = [pilot.fly(NEUTRAL) for _ in range(120)]
-    assert [s["timestamp"] for s in waited + flown] == pytest.approx([(k + 1) * DT for k in range(320)], abs=1e-12)
-    assert all(s["position"] == (1.0, 2.0, 0.0) and not any(s["velocity"] + s["gyro"]) for s in waited)
-    assert waited[0]["accel_body"] == pytest.approx((0.0, -9.81, 0.0), abs=1e-9)
-    assert any(flown[-1]["velocity"])
-    outcome = served.outcome()
+    served = serve("time.duration=0.1", f"initial.quaternion=[{HALF},{HALF},0,0]", "initial.position=[1,2,0]")
+    said, outcome, record = fly(served, 320, lambda k: (DISARMED, (0,) * 8)[k % 2] if k < 200 else NEUTRAL)
+    assert [s["timestamp"] for s in said] == pytest.approx([(k + 1) * DT for k in range(320)], abs=1e-12)
+    assert all(s["position"] == (1.0, 2.0, 0.0) and not any(s["velocity"] + s["gyro"]) for s in said[:200])
+    assert said[0]["accel_body"] == pytest.approx((0.0, -9.81, 0.0), abs=1e-9) and any(said[-1]["velocity"])
     assert (outcome.counts.waited, outcome.counts.steps) == (200, 120)
-    assert load_record(outcome.runs[0].folder)["time"][-1] == pytest.approx(0.1)
+    assert record["time"][-1] == pytest.approx(0.1)
 
 
 def test_an_idle_autopilot_is_lowered_from_the_surface_and_starts_where_the_scenario_does(serve, monkeypatch):
@@ -85,8 +87,7 @@ def test_an_idle_autopilot_is_lowered_from_the_surface_and_starts_where_the_scen
     monkeypatch.setattr(motion, "_SURFACE_TIME", 0.02)
     monkeypatch.setattr(motion, "_MAX_DURATION", 0.04)
     served = serve("time.duration=0.02", "initial.position=[1,2,3]")
-    said = fly(served, 96, lambda k: DISARMED if k < 36 else NEUTRAL)
-    outcome = served.outcome()
+    said, outcome, _ = fly(served, 96, lambda k: DISARMED if k < 36 else NEUTRAL)
     depth = np.array([s["position"][2] for s in said])
     assert not depth[:24].any() and depth[71] == pytest.approx(3.0) and depth[-1] == pytest.approx(3.0, abs=1e-3)
     assert all(np.diff(depth[:72]) >= 0.0)
@@ -102,25 +103,13 @@ def test_lowering_motion_is_consistent_with_its_depths():
         assert lowering.at(at)[1:] == pytest.approx(
             [(after - before) / (2 * h), (after - 2 * now + before) / h**2], abs=1e-5
         )
-    half, zero = 0.5**0.5, (0.0, 0.0, 0.0)
-    on_its_side = motion.Motion(0.0, zero, zero, (1.0, 2.0, 4.0), zero, zero, (half, half, 0.0, 0.0), 6.0, zero)
+    zero = (0.0, 0.0, 0.0)
+    on_its_side = motion.Motion(0.0, zero, zero, (1.0, 2.0, 4.0), zero, zero, (HALF, HALF, 0.0, 0.0), 6.0, zero)
     carried = motion.with_vertical_motion(on_its_side, 3.0, 0.5, 0.2)
     assert carried.specific_force == pytest.approx((0.0, 0.2 - 9.81, 0.0)) and carried.dvl == pytest.approx(
         (0.0, 0.5, 0.0)
     )
     assert (carried.position_ned, carried.velocity_ned, carried.altitude) == ((1.0, 2.0, 3.0), (0.0, 0.0, 0.5), 7.0)
-
-
-def test_velocity_is_reported_in_ned(serve):
-    """Heading east without roll: forward is east, right is south."""
-    half = 0.5**0.5
-    served = serve(
-        "time.duration=0.01", f"initial.quaternion=[{half},0,0,{half}]", "initial.velocity=[1.0,0.5,0.25,0,0,0]"
-    )
-    said = fly(served, 12)
-    served.outcome()
-    assert said[0]["velocity"] == pytest.approx((-0.5, 1.0, 0.25), abs=0.02)
-    assert said[0]["attitude"][2] == pytest.approx(np.pi / 2, abs=1e-3)
 
 
 def test_run_equals_a_master_with_the_autopilot_as_law(serve):
@@ -129,18 +118,14 @@ def test_run_equals_a_master_with_the_autopilot_as_law(serve):
         "time.duration=0.5", "plant.current=[0.2,-0.1,0.0]", "failures=[{thruster=5,time=0.2}]",
         "initial.position=[0,0,0.1]",
     )  # fmt: skip
-    served = serve(*overrides)
-    fly(served, 600, pulses)
-    (run,) = served.outcome().runs
-    law = make_pwm_law(load_vehicle("bluerov2_heavy"))
+    _, outcome, record = fly(serve(*overrides), 600, pulses)
+    law, expected = make_pwm_law(load_vehicle("bluerov2_heavy")), []
     with Master(scenario_to_fly("sitl", overrides, None, 1200, "ardupilot"), law) as master:
-        expected = []
         for k in range(601):
             law.set_outputs(pulses(min(k, 599)))
             master.step(k)
             expected.append(master.signals.row.copy())
-    assert np.array_equal(rows(run), np.array(expected))
-    record = load_record(run.folder)
+    assert np.array_equal(rows(outcome.runs[0]), np.array(expected))
     assert record["thruster_force[5]"][239] != 0.0 and not record["thruster_force[5]"][240:].any()
     assert record["weight.depth"].any()
 
@@ -179,10 +164,9 @@ def test_thirty_two_channels_are_accepted(serve, tmp_path):
     text = (resources.files("plant_fmu") / "vehicles" / "bluerov2_heavy.toml").read_text()
     path.write_text(text.replace("signs = -1", "signs = -1\nchannels = [25, 26, 27, 28, 29, 30, 31, 32]"))
     served = serve("time.duration=0.1", vehicle=str(path))
-    answer = fly(served, 120, (*[1900] * 24, *heave(0.5)), channels=32)[-1]
-    (run,) = served.outcome().runs
+    (*_, answer), _, record = fly(served, 120, (*[1900] * 24, *heave(0.5)), channels=32)
     assert answer["velocity"][2] > 0.05 and abs(answer["velocity"][0]) < 1e-3
-    assert set(load_record(run.folder)["law.pwm32"]) == {1700.0}
+    assert set(record["law.pwm32"]) == {1700.0}
 
 
 @pytest.mark.medium
@@ -193,12 +177,9 @@ def test_record_does_not_depend_on_wall_clock_timing(serve):
         time.sleep(draw.random() * 0.005 if draw.random() < 0.05 else 0.0)
         return pulses(k)
 
-    records, noise = [], ("plant.parameters.imu.rate=100", "plant.parameters.imu.acceleration_noise=0.1")
-    for pwm in (pulses, late_pulses):
-        served = serve("time.duration=0.3", *noise)
-        fly(served, 360, pwm)
-        records.append(rows(served.outcome().runs[0]))
-    assert np.array_equal(*records)
+    noise = "plant.parameters.imu.rate=100", "plant.parameters.imu.acceleration_noise=0.1"
+    flights = [fly(serve("time.duration=0.3", *noise), 360, pwm) for pwm in (pulses, late_pulses)]
+    assert np.array_equal(*(rows(outcome.runs[0]) for _, outcome, _ in flights))
 
 
 def test_second_sender_is_rejected_while_the_first_is_active(serve):
@@ -243,21 +224,16 @@ def test_rate_change_during_a_run_keeps_the_step(serve):
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("rate", [11, 50, 400, 4000])
 def test_the_step_is_that_of_the_first_frame(serve, rate):
-    served = serve("time.duration=0.5")
     n = round(0.5 * rate)
-    times = [answer["timestamp"] for answer in fly(served, n, rate=rate)]
-    assert times == [(k + 1) * (1.0 / rate) for k in range(n)]
-    assert served.outcome().runs[0].summary["status"] == "completed"
+    answers, outcome, _ = fly(serve("time.duration=0.5"), n, rate=rate)
+    assert [answer["timestamp"] for answer in answers] == [(k + 1) * (1.0 / rate) for k in range(n)]
+    assert outcome.runs[0].summary["status"] == "completed"
 
 
 @pytest.mark.medium
 def test_record_is_decimated_and_summary_uses_all_steps(serve):
-    found = []
-    for rate in (100.0, 1200.0):
-        served = serve("time.duration=0.5", record_rate=rate)
-        fly(served, 600, heave(0.5))
-        found.append(served.outcome().runs[0])
-    thin, full = found
+    flights = [fly(serve("time.duration=0.5", record_rate=rate), 600, heave(0.5)) for rate in (100.0, 1200.0)]
+    thin, full = (outcome.runs[0] for _, outcome, _ in flights)
     assert len(load_record(thin.folder)["time"]) == 51
     assert np.array_equal(rows(thin), rows(full)[::12])
     assert thin.summary["steps"] == full.summary["steps"] == 600
@@ -278,21 +254,15 @@ def test_a_plant_that_fails_leaves_its_record(serve):
 
 
 @pytest.mark.parametrize(
-    ("overrides", "vehicle", "words"),
+    ("changes", "words"),
     [
-        ((), "odin", "has no table"),
-        ((), "ordin", "is unknown"),
-        (("commands.enabled=true",), None, "commands.enabled is true, expected false: the autopilot steers"),
-        (("time.duratoin=3",), None, "duratoin"),
-        (("record.lyapunov=true",), None, "record.lyapunov"),
+        ({"vehicle": "odin"}, "has no table"), ({"vehicle": "ordin"}, "is unknown"),
+        ({"overrides": ("commands.enabled=true",)}, "commands.enabled is true, expected false: the autopilot steers"),
+        ({"overrides": ("time.duratoin=3",)}, "duratoin"),
+        ({"overrides": ("record.lyapunov=true",)}, "record.lyapunov"),
+        ({"out": resources.files("plant_fmu")}, "exists and is not empty"),
     ],
-)
-def test_invalid_scenario_is_rejected_before_waiting(overrides, vehicle, words):
+)  # fmt: skip
+def test_invalid_scenario_or_folder_is_rejected_before_waiting(changes, words):
     with pytest.raises(Exception, match=words):
-        SitlSession(FlightOptions("sitl", overrides, vehicle), "ardupilot", make_pwm_law)
-
-
-def test_nonempty_folder_is_rejected_before_waiting(tmp_path):
-    (tmp_path / "here").touch()
-    with pytest.raises(RunError, match="exists and is not empty"):
-        SitlSession(FlightOptions(out=tmp_path), "ardupilot", make_pwm_law)
+        SitlSession(FlightOptions(**changes), "ardupilot", make_pwm_law)
