@@ -12,10 +12,11 @@ def clearances(goal=-3.0, first=2.0, band=2.0):
     return {"goal.clearance": (goal, first, 2.0, band, 1e5, 1e5)}
 
 
-# rows, each 0.1 s after the one before, and the texts of them all with their severities
+# rows, each 0.1 s after the one before, with what is heard between; the texts of them all with their severities
 EVENTS = {
     "a region is entered and left, with hysteresis": (
-        [clearances(first=first) for first in (-0.005, -0.02, 0.005, -0.02, 0.02)],
+        [clearances(first=-0.005), None, clearances(first=-0.02), "entered", clearances(first=0.005), None,
+         clearances(first=-0.02), clearances(first=0.02)],
         [(4, "Region SR1 entered: keep out"), (6, "Region SR1 left")]),
     "the target": ([clearances(goal=0.1), clearances(goal=-0.1)], [(6, "Target reached"), (6, "Target left")]),
     "saturation": (

@@ -124,11 +124,13 @@ def test_decoder_error_counts_as_malformed():
     assert read(open_filter(), with_checksum(frame[:-2], 0)) == ([], [], {"malformed": 1})
 
 
-def test_longer_payload_of_a_newer_dialect_is_truncated():
+def test_longer_payload_of_a_newer_dialect_is_truncated_in_mavlink_2():
     payload = struct.pack("<IBBBBB", 7, 12, 0, 0, 4, 3) + b"new"
     head = bytes([0xFD, len(payload), 0, 0, 0, 255, 190, 0, 0, 0])
     ((found,), _, _) = read(open_filter(), with_checksum(head + payload, 0))
     assert found.custom_mode == 7 and found.mavlink_version == 3
+    old = bytes([0xFE, len(payload), 0, 255, 190, 0])  # in MAVLink 1 no field may be added
+    assert read(open_filter(), with_checksum(old + payload, 0)) == ([], [], {"checksum": 1})
 
 
 def test_stream_buffer_holds_at_most_one_frame():

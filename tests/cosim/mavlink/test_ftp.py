@@ -139,6 +139,8 @@ def test_stations_do_not_share_a_session(client):
     assert len({client.one(READ, size=40, system=system).payload for system in range(240, 248)}) == 8
     for system in range(2, 200):  # many more: the oldest go
         assert client.one(OPEN, FILE, system=system).opcode == ACK
+    assert client.one(READ, size=40, system=199).opcode == ACK
+    assert client.error(READ, size=40, system=2) == INVALID_SESSION
 
 
 any_station = cache(Station)

@@ -41,8 +41,8 @@ def test_commands_are_answered_and_applied(each_station, steps):
     each_station.play(*steps)
 
 
-_PX4 = {"manual": [(1, 0), (1, NAN)], "hold": [(4, 3)], "reach": [(6, 0)], "mission": [(4, 4)], "surface": [(4, 6)],
-        "stabilize": [(7, 0)], "depth_hold": [(2, 0)]}  # fmt: skip
+_PX4 = {"manual": [(1, 0), (1, NAN)], "hold": [(4, 3)], "reach": [(6, 0), (6 << 16, 0)], "mission": [(4, 4)],
+        "surface": [(4, 6)], "stabilize": [(7, 0)], "depth_hold": [(2, 0)]}  # fmt: skip
 _ARDUSUB = {"manual": [(19,)], "hold": [(16,)], "reach": [(4,)], "mission": [(3,)], "surface": [(9,)],
             "stabilize": [(0,)], "depth_hold": [(2,)]}  # fmt: skip
 # the parameters of DO_SET_MODE for each mode, and what is none: as pymavlink's mode_mapping_sub and ArduSub's modes

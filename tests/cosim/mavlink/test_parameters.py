@@ -202,7 +202,8 @@ def test_full_queue_leaves_the_value_unchanged(station):
     for i in range(300):
         put(station, "GOAL_RADIUS", 1.0 + i)
     assert len(station.commanded()) == 256
-    assert value_of(station, "GOAL_RADIUS") == 256.0
+    settings = {setting.key: setting.value for setting in station.autopilot._context.settings}
+    assert value_of(station, "GOAL_RADIUS") == settings["goal.radius"] == 256.0
 
 
 def crc_by_bits(data):
