@@ -69,7 +69,7 @@ def test_streamed_run_gives_the_same_report_and_trace(name, run_of, streamed):
 def test_streamed_run_with_gaps_gives_the_same_report_and_trace(docking, copy_of, spoil, streamed):
     run = load_run(spoil(copy_of(docking), "gaps"))
     long = streamed(run)
-    assert contents_of(long) == contents_of(run) and contents_of(run).remarks
+    assert contents_of(long) == contents_of(run) and contents_of(run)["remarks"]
     assert trace_of(long).as_json() == trace_of(run).as_json()
 
 

@@ -54,7 +54,7 @@ def test_events_and_report_name_the_active_criterion(four):
         "Gives way to view (visibility)", "Gives way to pillar (obstacle)", "Goes for the goal again",
         "Gives way to pillar (obstacle)", "Goes for the goal again", "Gives way to view (visibility)",
     ]  # fmt: skip
-    table = contents_of(four).criteria
+    table = contents_of(four)["criteria"]
     assert [row[0] for row in table.rows] == [f"{i + 1} {name}" for i, (name, _) in enumerate(CRITERIA)]
     obstacle, shape, _, visibility = table.rows
     assert obstacle[1] == "within 0.3 m or rad; approach time: 1 at 1 s, 0 at 3 s" and shape[2] == "never"
@@ -95,4 +95,4 @@ def test_rules_of_an_arbiter_file_match_its_explanation(ruled):
     for row in rows[::40]:
         explained = [rule.strength for rule in arbiter.explain(row[inputs].tolist()).rules]
         assert row[fired].tolist() == pytest.approx(explained, abs=1e-15)
-    assert contents_of(ruled).arbiter.startswith("closed; the rules of mine.toml, of distance (clearance.mooring), ")
+    assert contents_of(ruled)["arbiter"].startswith("closed; the rules of mine.toml, of distance (clearance.mooring), ")
