@@ -12,6 +12,7 @@ from scipy.stats import qmc
 
 from cosim.campaigns.sweeps.design import KINDS, MAX_ROWS, Design, Vary, design_of, vary_from
 from cosim.errors import RunError
+from tests.refusals import refusals
 
 TWO = vary_from(["a=-2:2", "b=1:1000:log"])
 KEYS = (("a", 1), ("b", 2), ("c", -1))  # of pairs, with a factor for each
@@ -107,27 +108,13 @@ def test_varied_keys_are_parsed(text, expected):
 
 
 @pytest.mark.parametrize(
-    ("texts", "words"),
-    [
-        (["k"], "expected key=low:high"),
-        (["=1:2"], "expected key=low:high"),
-        (["k="], "expected key=low:high"),
-        (["k=2:1"], "k goes from 2 to 1, expected the lower end first"),
-        (["k=1:1"], "the lower end first"),
-        (["k=nan:1"], "'nan' is no finite number"),
-        (["k=1:inf"], "'inf' is no finite number"),
-        (["k=1,nan"], "'nan' is no finite number"),
-        (["k=a:1"], "'a' is no finite number"),
-        (["k=1:2:1"], "'1' points, expected a whole number from 2"),
-        (["k=1:2:x"], "'x' points"),
-        (["k=1:2:3:4"], "either with :log"),
-        (["k=0:2:log"], "logarithmic scale, expected above 0"),
-        (["k=1:2", "k=2:3"], "k varies twice"),
-    ],
+    ("text", "words"),
+    [*refusals("ranges"), ("=1:2", ["expected key=low:high"]), ("k=1:2 k=2:3", ["k varies twice"])],
 )
-def test_invalid_varied_keys_are_rejected(texts, words):
-    with pytest.raises(RunError, match=words):
-        vary_from(texts)
+def test_invalid_varied_keys_are_rejected(text, words):
+    with pytest.raises(RunError) as refused:
+        vary_from(text.split())
+    assert all(word in str(refused.value) for word in words)
 
 
 @pytest.mark.parametrize(
