@@ -65,11 +65,6 @@ class Poisoned(Fake):
             os.kill(os.getpid(), signal.SIGKILL)
 
 
-class Deadly(Fake):
-    def meet(self, row):
-        os.kill(os.getpid(), signal.SIGKILL)
-
-
 class Unfit(Fake):
     def __init__(self, variation):
         raise RunError("the engine cannot fly this")

@@ -100,18 +100,8 @@ def test_run_of_a_custom_law_is_exported_and_streamed(kind, tmp_path, capsys):
     for form in EXPORTS:
         assert main(["export", str(run.folder), "--to", form, "--out", str(tmp_path / f"run.{form}")]) == 0
     for profile in PROFILES:
-        words = [
-            "mavlink",
-            "stream",
-            str(run.folder),
-            "--mavlink",
-            "udpout:127.0.0.1:9",
-            "--rate",
-            "max",
-            "--profile",
-            profile,
-        ]
-        assert main(words) == 0
+        words = f"mavlink stream {run.folder} --mavlink udpout:127.0.0.1:9 --rate max --profile {profile}"
+        assert main(words.split()) == 0
     assert main(["check", str(run.folder / "scenario.toml")]) in (0, 1)
     capsys.readouterr()
 
