@@ -16,7 +16,7 @@ from dataclasses import replace
 from controller.regions.region_set import of_attitude
 from cosim.scenario.arbiter_rules import ArbiterRules, InputSignal
 from cosim.scenario.region_tables import SecondaryRegion
-from fuzzy_arbiter import Arbiter, System
+from fuzzy_arbiter import Arbiter
 
 _EQUAL = 2.0  # m, cost at share 1/2
 _PREFERRED = 5.0  # factor of the cost at share 1
@@ -30,55 +30,35 @@ def with_crossing_costs(
     if not soft:
         return regions
     of_regions = tuple(region.criterion for region in regions)
-    is_soft = tuple(name in soft for name in criteria)
-    costs = dict(
-        zip(criteria, _costs(rules.system, rules.inputs, tuple(criteria), is_soft, of_regions, depth), strict=True)
-    )
-    return tuple(replace(r, region=replace(r.region, crossing_cost=costs[r.criterion])) for r in regions)
+    costs = _costs(rules, tuple(criteria), tuple(name for name in criteria if name in soft), of_regions, depth)
+    return tuple(replace(r, region=replace(r.region, crossing_cost=costs.get(r.criterion, _EQUAL))) for r in regions)
 
 
 @functools.lru_cache(maxsize=64)
 def _costs(
-    system: System,
-    inputs: tuple[InputSignal, ...],
-    criteria: tuple[str, ...],
-    is_soft: tuple[bool, ...],
-    of_regions: tuple[str, ...],
-    depth: float,
-) -> tuple[float, ...]:
-    """Return the cost of each criterion [m]."""
-    arbiter, indices = Arbiter(system=system), [i for i, soft in enumerate(is_soft) if soft]
-    costs = []
-    for i in range(len(criteria)):
-        shares = []
-        for j in indices:
-            if i in indices and i != j:
-                pressing = {criteria[i], criteria[j]}
-                values = [
-                    _input(signal, upper.universe[1], pressing, criteria, of_regions, depth)
-                    for signal, upper in zip(inputs, system.inputs, strict=False)
-                ]
-                weights = arbiter(values)
-                total = weights[i] + weights[j]
-                shares.append(weights[i] / total if total > 0.0 else 0.5)
-        share = math.fsum(shares) / len(shares) if shares else 0.5
-        costs.append(_EQUAL * _PREFERRED ** (2.0 * share - 1.0))
-    return tuple(costs)
+    rules: ArbiterRules, criteria: tuple[str, ...], soft: tuple[str, ...], of_regions: tuple[str, ...], depth: float
+) -> dict[str, float]:
+    """Return the cost of each criterion with soft regions [m]."""
+    arbiter = Arbiter(system=rules.system)
 
+    def value(signal: InputSignal, far: float, pressing: Sequence[str]) -> float:
+        """Return the value of an input while two criteria have membership 1; `far` is its upper bound."""
+        if signal.kind == "membership":
+            return float(criteria[signal.of] in pressing)
+        if signal.kind in ("clearance", "approach_time"):  # 0: on the surface
+            return 0.0 if signal.of and of_regions[signal.of - 1] in pressing else far
+        if signal.kind == "given":
+            return signal.course[0][1]
+        return depth if signal.kind == "depth" else 0.0
 
-def _input(
-    signal: InputSignal,
-    far: float,
-    pressing: set[str],
-    criteria: Sequence[str],
-    of_regions: Sequence[str],
-    depth: float,
-) -> float:
-    """Return the value of an input while the criteria `pressing` have membership 1; `far` is its upper bound."""
-    if signal.kind == "membership":
-        return float(criteria[signal.of] in pressing)
-    if signal.kind in ("clearance", "approach_time"):  # 0: on the surface
-        return 0.0 if signal.of and of_regions[signal.of - 1] in pressing else far
-    if signal.kind == "given":
-        return signal.course[0][1]
-    return depth if signal.kind == "depth" else 0.0
+    def share(*pair: str) -> float:
+        inputs = zip(rules.inputs, rules.system.inputs, strict=False)
+        weights = arbiter([value(signal, variable.universe[1], pair) for signal, variable in inputs])
+        one, other = (weights[criteria.index(name)] for name in pair)
+        return one / (one + other) if one + other > 0.0 else 0.5
+
+    costs = {}
+    for name in soft:
+        shares = [share(name, other) for other in soft if other != name] or [0.5]
+        costs[name] = _EQUAL * _PREFERRED ** (2.0 * math.fsum(shares) / len(shares) - 1.0)
+    return costs
