@@ -19,7 +19,7 @@ from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
 from cosim.simulation.signals import Array
 
-_ROUNDING = 1e-6  # N, tolerance of the linear programs
+_ROUNDING = 1e-6  # N, a force up to which nothing counts as left
 
 
 def thrust_findings(scenario: Scenario) -> Iterator[Finding]:
