@@ -21,7 +21,7 @@ from plant_fmu.compiling.compiler import FLAGS, cross_compiler, find_compiler
 from plant_fmu.compiling.libraries import compiled_libraries, digest
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform, without_wasm
 from plant_fmu.compiling.prebuilt import prebuilt_files, prebuilt_libraries
-from plant_fmu.compiling.sources import build_description, c_sources, header
+from plant_fmu.compiling.sources import all_sources, build_description
 from plant_fmu.compiling.universal import universal_library
 from plant_fmu.component import Component
 from plant_fmu.description import model_description, token
@@ -171,7 +171,7 @@ def neutral_members(what: Vehicle | Component, fmi: int) -> dict[str, bytes]:
     """Return all members of an FMU but the binaries, by name in the archive."""
     component = _component(what)
     key = token(component, fmi)
-    sources = c_sources(component, fmi) | {component.header: header(component, key).encode()}
+    sources = all_sources(component, fmi, key)
     if fmi == 3:
         sources["buildDescription.xml"] = build_description(component).encode()
     return {

@@ -12,7 +12,7 @@ import fmpy
 from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import FLAGS, compile_library
 from plant_fmu.compiling.platforms import Platform
-from plant_fmu.compiling.sources import c_sources, compiled_files, header
+from plant_fmu.compiling.sources import all_sources, compiled_files
 from plant_fmu.component import Component
 
 FMI_HEADERS = Path(fmpy.__file__).parent / "c-code"
@@ -25,7 +25,7 @@ def compiled_libraries(
     """Compile a component for some platforms."""
     libraries = []
     with temporary_folder("plant_fmu-") as folder:
-        for name, data in {**c_sources(component, fmi), component.header: header(component, token).encode()}.items():
+        for name, data in all_sources(component, fmi, token).items():
             (folder / name).write_bytes(data)
         files = [folder / file for file in compiled_files(component, fmi)]
         for platform, compiler in compilers:
@@ -38,7 +38,7 @@ def compiled_libraries(
 
 def source_digest(component: Component, token: str, fmi: int) -> str:
     """Return a digest of the sources, headers and flags of libraries, independent of platform and compiler."""
-    files = {**c_sources(component, fmi), component.header: header(component, token).encode()}
+    files = all_sources(component, fmi, token)
     for file in FMI_HEADERS.glob(f"fmi{fmi}*.h"):
         declared = _COMMENT.sub(" ", file.read_text(encoding="utf-8"))  # without what differs between releases of FMPy
         files[f"fmi/{file.name}"] = " ".join(declared.split()).encode()

@@ -31,6 +31,11 @@ def c_sources(component: Component, fmi: int) -> dict[str, bytes]:
     return dict(sorted({**wrapper, **component.sources}.items()))
 
 
+def all_sources(component: Component, fmi: int, token: str) -> dict[str, bytes]:
+    """Return the C files of a component's FMU and the header that is generated from its variables."""
+    return c_sources(component, fmi) | {component.header: header(component, token).encode()}
+
+
 def _files(folder: str) -> dict[str, bytes]:
     """Return the C files and headers of a folder of this package, by name."""
     root = resources.files("plant_fmu").joinpath(*folder.split("/"))

@@ -13,7 +13,7 @@ from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import FLAGS, cross_compiler, run_compiler
 from plant_fmu.compiling.libraries import FMI_HEADERS
 from plant_fmu.compiling.platforms import Platform
-from plant_fmu.compiling.sources import c_sources, compiled_files, header
+from plant_fmu.compiling.sources import all_sources, compiled_files
 from plant_fmu.component import Component
 from plant_fmu.contents.html_templates import make_environment
 from plant_fmu.errors import BuildError
@@ -81,7 +81,7 @@ def _compile_module(
     component: Component, token: str, folder: Path, more: dict[str, bytes], flags: tuple[str, ...]
 ) -> bytes:
     """Return a core module of a component's sources and more; `folder` is for intermediate files."""
-    for name, data in {**c_sources(component, 3), component.header: header(component, token).encode(), **more}.items():
+    for name, data in (all_sources(component, 3, token) | more).items():
         (folder / name).write_bytes(data)
     files = [*compiled_files(component, 3), *(name for name in more if name.endswith(".c"))]
     options = [

@@ -12,7 +12,7 @@ from plant_fmu import load_vehicle
 from plant_fmu.compiling.compiler import compile_library, find_compiler
 from plant_fmu.compiling.libraries import FMI_HEADERS
 from plant_fmu.compiling.platforms import native_platform
-from plant_fmu.compiling.sources import c_sources, header
+from plant_fmu.compiling.sources import all_sources, c_sources
 from plant_fmu.vehicle_component import make_vehicle_component
 
 TURN = Decimal("6.28318530717958647692528676655900576839433879875021")
@@ -26,7 +26,7 @@ def functions(once):
 
     def make(folder):
         component = make_vehicle_component(load_vehicle("odin"))
-        for name, data in {**c_sources(component, 3), component.header: header(component, "").encode()}.items():
+        for name, data in all_sources(component, 3, "").items():
             (folder / name).write_bytes(data)
         # by its plain name, and for other libraries to see
         (folder / "shown.c").write_text(

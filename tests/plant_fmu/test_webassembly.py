@@ -20,7 +20,7 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.compiling import webassembly
 from plant_fmu.compiling.libraries import FMI_HEADERS
 from plant_fmu.compiling.platforms import without_wasm
-from plant_fmu.compiling.sources import c_sources, compiled_files, header
+from plant_fmu.compiling.sources import all_sources, compiled_files
 from plant_fmu.description import token
 from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.conftest import CoSimulationInstance
@@ -140,8 +140,7 @@ def test_other_processors_equal_the_native_library_bit_for_bit(expected, target,
         pytest.skip("qemu-aarch64 is not installed")
     plan, want = expected
     component = make_vehicle_component(load_vehicle("odin"))
-    files = {**c_sources(component, 3), component.header: header(component, plan["token"]).encode()}
-    for name, data in files.items():
+    for name, data in all_sources(component, 3, plan["token"]).items():
         (tmp_path / name).write_bytes(data)
     lists = {"START": "start", "VALUES": "values", "FORCED": "forced", "FORCES": "forces", "OUTPUTS": "outputs"}
     lines = [f"enum {{ STEPS = {STEPS} }};", f"#define STEP {STEP!r}"]
