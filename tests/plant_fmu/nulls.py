@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import re
 import subprocess
-from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
 import pytest
 
-from plant_fmu.build import neutral_members
 from plant_fmu.compiling.compiler import find_compiler
+from plant_fmu.compiling.sources import all_sources
 from plant_fmu.component import Component
 from plant_fmu.description import token
 
@@ -30,77 +29,29 @@ MAY_BE_NULL = {
 }  # fmt: skip
 IGNORED = {"fmi2FreeFMUstate", "fmi3FreeFMUState", "fmi2FreeInstance", "fmi3FreeInstance"}  # a NULL to be freed
 
-_HANDLES = {"fmi2Component", "fmi3Instance"}
-_STATES = {"fmi2FMUstate", "fmi3FMUState"}
-_POINTERS = _HANDLES | _STATES | {"fmi2String", "fmi3String", "fmi3InstanceEnvironment"}
-_GIVEN = {
-    "functions": "&callbacks", "logMessage": "log_callback", "instanceName": '"x"',
-    "fmuGUID": "TOKEN", "instantiationToken": "TOKEN",
-}  # fmt: skip
-_COUNTS = {
-    "nx": "SOME_STATES",
-    "nContinuousStates": "SOME_STATES",
-    "size": "size",
-    "nRequiredIntermediateVariables": "0",
-}
+# what is passed where it is not to be NULL, by the argument's name, type and rest of its declaration
+_GIVEN = (
+    ("functions .*", "&callbacks"), ("logMessage .*", "log_callback"), ("instanceName .*", '"x"'),
+    ("(fmuGUID|instantiationToken) .*", "TOKEN"), (r"\w+ (fmi2Component|fmi3Instance) ", "c"),
+    (r"\w+ (fmi2FMUstate|fmi3FMUState) \*", "&slot"), (r"\w+ (fmi2FMUstate|fmi3FMUState) ", "saved"),
+    ("(nx|nContinuousStates) size_t ", "SOME_STATES"), ("size size_t ", "size"),
+    ("nRequiredIntermediateVariables size_t ", "0"), (r"\w+ size_t ", "1"), (r"\w+ fmi\dString \[\]", "names"),
+    (r".* (\*|\[\]|\*\[\])", "(void *)area"), (".*", "0"),
+)  # fmt: skip
+_POINTERS = re.compile(r"fmi2(Component|FMUstate|String)|fmi3(Instance|FMUState|String|InstanceEnvironment)|.*Callback")
+
+Arguments = list[tuple[str, str, str]]  # name, type, rest of the declaration
 
 
-@dataclass(frozen=True)
-class Argument:
-    """Of a function, as the header declares it."""
-
-    kind: str
-    name: str
-    stars: str  # the rest of its declaration
-
-    @property
-    def is_pointer(self) -> bool:
-        """Whether it can be NULL."""
-        return bool(self.stars) or self.kind in _POINTERS or self.kind.endswith("Callback")
-
-    @property
-    def is_counted(self) -> bool:
-        """Whether another argument gives the number of values."""
-        return self.stars == "[]" and not self.name.startswith("serializedState")
-
-    def given(self) -> str:
-        """What is passed where it is not to be NULL."""
-        if self.name in _GIVEN:
-            return _GIVEN[self.name]
-        if self.kind in _HANDLES:
-            return "c"
-        if self.kind in _STATES:
-            return "&slot" if self.stars else "saved"
-        if self.kind == "size_t" and not self.stars:
-            return _COUNTS.get(self.name, "1")
-        if self.stars == "[]" and self.kind.endswith("String"):
-            return "names"
-        return "(void *)area" if self.stars else "0"
-
-
-@dataclass(frozen=True)
-class Function:
-    """Of FMI."""
-
-    name: str
-    returns: str
-    arguments: tuple[Argument, ...]
-
-
-def functions(fmi: int) -> list[Function]:
-    """Return all functions that FMI's header declares the types of."""
+def functions(fmi: int) -> dict[str, tuple[str, Arguments]]:
+    """Return what each function returns and takes, of all that FMI's header declares the types of."""
     text = re.sub(r"/\*.*?\*/", "", (HEADERS / f"fmi{fmi}FunctionTypes.h").read_text(), flags=re.S)
-    found = []
+    found = {}
     for returns, name, inside in re.findall(r"typedef\s+([\w ]+\*?)\s*(fmi\d\w+)TYPE\s*\(([^;]*)\)\s*;", text):
-        arguments = []
-        for declared in re.sub(r"\s+", " ", inside).strip().split(","):
-            if declared.strip() == "void":
-                continue
-            kind, stars, label, array = re.fullmatch(r"\s*(?:const )?(\w+) ?(\*?) ?(\w*)(\[\])?\s*", declared).groups(
-                ""
-            )
-            arguments.append(Argument(kind, label or "serializedState", stars + array))
-        found.append(Function(name, returns.strip(), tuple(arguments)))
+        declared = [part for part in re.sub(r"\s+", " ", inside).strip().split(",") if part.strip() != "void"]
+        parts = [re.fullmatch(r"\s*(?:const )?(\w+) ?(\*?) ?(\w*)(\[\])?\s*", part).groups("") for part in declared]
+        arguments = [(label or "serializedState", kind, stars + array) for kind, stars, label, array in parts]
+        found[name] = returns.strip(), arguments
     return found
 
 
@@ -110,32 +61,32 @@ def exports(fmi: int) -> set[str]:
     return {f"fmi{fmi}{name}" for name in re.findall(rf"^\s*FMI{fmi}_Export fmi{fmi}(\w+)TYPE", text, re.MULTILINE)}
 
 
-def _calls(function: Function) -> list[tuple[str, str]]:
+def _calls(function: str, arguments: Arguments) -> list[tuple[str, str]]:
     """Return what is called: the argument that is NULL, and the call."""
-    given = {a.name: a.given() for a in function.arguments}
+    given = {a[0]: next(text for form, text in _GIVEN if re.fullmatch(form, " ".join(a))) for a in arguments}
 
     def call(**changed: str) -> str:
-        return f"{function.name}({', '.join({**given, **changed}.values())})"
+        return f"{function}({', '.join((given | changed).values())})"
 
     found = [(NO_ARGUMENT, call())]
-    found += [(a.name, call(**{a.name: "NULL"})) for a in function.arguments if a.is_pointer]
-    if any(a.is_counted for a in function.arguments):
-        none = {a.name: "0" for a in function.arguments if a.kind == "size_t" and not a.stars}
-        found.append((NONE_OF_ALL, call(**none)))
-        found.append((NONE_OF_ALL, call(**none, **{a.name: "NULL" for a in function.arguments if a.is_counted})))
+    found += [(name, call(**{name: "NULL"})) for name, kind, rest in arguments if rest or _POINTERS.fullmatch(kind)]
+    arrays = {a[0]: "NULL" for a in arguments if a[2] == "[]" and not a[0].startswith("serializedState")}
+    if arrays:
+        none = {name: "0" for name, kind, rest in arguments if kind == "size_t" and not rest}
+        found += [(NONE_OF_ALL, call(**none)), (NONE_OF_ALL, call(**none, **arrays))]
     return found
 
 
 def program(fmi: int, token: str, states: int) -> str:
     """Return the C program, which prints a line for each call: mode, function, argument, status and what was logged."""
     cases = []
-    for function in functions(fmi):
-        for argument, call in _calls(function):
-            made = {"fmi2Component": f"taken({call})", "fmi3Instance": f"taken({call})"}
-            done = made.get(function.returns) or (f"(int){call}" if "Status" in function.returns else f"({call}, 0)")
-            if function.name.endswith("FreeInstance") and argument == NO_ARGUMENT:
+    for function, (returns, arguments) in functions(fmi).items():
+        for argument, call in _calls(function, arguments):
+            if function.endswith("FreeInstance") and argument == NO_ARGUMENT:
                 continue  # each call ends so
-            cases.append(f'    if (begin(mode, "{function.name}", "{argument}")) status = {done}, end(status);')
+            made = returns in ("fmi2Component", "fmi3Instance")
+            done = f"taken({call})" if made else f"(int){call}" if "Status" in returns else f"({call}, 0)"
+            cases.append(f'    if (begin(mode, "{function}", "{argument}")) status = {done}, end(status);')
     instantiate = {
         2: 'fmi2Instantiate("x", mode > 3 ? fmi2ModelExchange : fmi2CoSimulation, TOKEN, NULL, &callbacks, 0, 0)',
         3: 'mode > 3 ? fmi3InstantiateModelExchange("x", TOKEN, NULL, 0, 0, NULL, log_callback)\n'
@@ -143,12 +94,11 @@ def program(fmi: int, token: str, states: int) -> str:
     }[fmi]
     start = {2: "fmi2SetupExperiment(c, 0, 0, 0, 0, 0), fmi2EnterInitializationMode(c)",
              3: "fmi3EnterInitializationMode(c, 0, 0, 0, 0, 0)"}[fmi]  # fmt: skip
-    text = (Path(__file__).parent / "nulls.c").read_text()
     values = {
         "FMI": str(fmi), "TOKEN": token, "STATES": str(states), "INSTANTIATE": instantiate, "START": start,
         "CASES": "\n".join(cases), "FMUSTATE": "state" if fmi == 2 else "State",
     }  # fmt: skip
-    return re.sub(r"@(\w+)@", lambda match: values[match[1]], text)
+    return re.sub(r"@(\w+)@", lambda match: values[match[1]], (Path(__file__).parent / "nulls.c").read_text())
 
 
 def sweep(folder: Path, fmi: int, token: str, states: int, with_: list[str]) -> list[list[str]]:
@@ -167,16 +117,19 @@ def sweep(folder: Path, fmi: int, token: str, states: int, with_: list[str]) -> 
     return rows
 
 
+def write_sources(folder: Path, fmi: int, component: Component) -> list[str]:
+    """Write a component's C sources, and return the files to compile and the macro for FMI's plain names."""
+    for name, data in all_sources(component, fmi, token(component, fmi)).items():
+        (folder / name).write_bytes(data)
+    return [*sorted(map(str, folder.glob("*.c"))), f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX"]
+
+
 def sweep_sources(folder: Path, fmi: int, component: Component) -> list[list[str]]:
     """Sweep a component's C sources under AddressSanitizer and UndefinedBehaviorSanitizer, if there are any."""
-    for name, data in neutral_members(component, fmi).items():
-        if name.startswith("sources/"):
-            (folder / Path(name).name).write_bytes(data)
-    sources = sorted(str(path) for path in folder.glob("*.c"))
     states = sum(v.role == "state" for v in component.variables)
-    plain_names = f"-DFMI{fmi}_OVERRIDE_FUNCTION_PREFIX"
+    sources = write_sources(folder, fmi, component)
     try:
-        return sweep(folder, fmi, token(component, fmi), states, [*sources, plain_names, "-O1", *SANITIZERS])
+        return sweep(folder, fmi, token(component, fmi), states, [*sources, "-O1", *SANITIZERS])
     except subprocess.CalledProcessError as error:
         pytest.skip(f"the compiler has no sanitizers: {error.stderr[-300:]}")
 
@@ -188,26 +141,19 @@ def faults(rows: list[list[str]]) -> list[str]:
         if len(row) != 5:
             return [*found, f"crashed: {' '.join(row)}"]
         mode, function, argument, status, said = row
-        where = f"{function} with {argument} NULL, mode {mode}: {status} {said}"
-        if argument == NO_ARGUMENT and " is NULL" in said:
-            found.append(where)
-        elif argument == NONE_OF_ALL:
-            if before[:3] == row[:3] and before != row:
-                found.append(where)
-        elif argument in MAY_BE_NULL or (function in IGNORED and argument not in ("c", "instance")):
-            if " is NULL" in said:
-                found.append(where)
-        elif argument != NO_ARGUMENT and function not in ("fmi2FreeInstance", "fmi3FreeInstance"):
+        names_null = " is NULL" in said
+        if argument == NONE_OF_ALL:
+            wrong = before[:3] == row[:3] and before != row
+        elif argument in (NO_ARGUMENT, *MAY_BE_NULL) or (function in IGNORED and argument not in ("c", "instance")):
+            wrong = names_null
+        elif function in ("fmi2FreeInstance", "fmi3FreeInstance"):
+            wrong = False
+        else:
             heard = argument not in ("c", "instance", "functions") and not mode.startswith("silent")
-            words = (
-                f"{function}: {argument} is NULL",
-                "instance name is NULL",
-                'token is "NULL"',
-                "not offered",
-                "alone",
-            )
-            reason = any(word in said for word in (*words, "not scheduled execution"))
-            if int(status) < 3 or reason != heard:
-                found.append(where)
+            reasons = (f"{function}: {argument} is NULL", "instance name is NULL", 'token is "NULL"', "not offered",
+                       "alone", "not scheduled execution")  # fmt: skip
+            wrong = int(status) < 3 or any(reason in said for reason in reasons) != heard
+        if wrong:
+            found.append(f"{function} with {argument} NULL, mode {mode}: {status} {said}")
         before = row
     return found

@@ -3,37 +3,12 @@
 import subprocess
 from pathlib import Path
 
-import fmpy
 import pytest
 
 from plant_fmu import load_vehicle
-from plant_fmu.build import neutral_members
 from plant_fmu.compiling.compiler import find_compiler
-
-HERE = Path(__file__).parent
-
-
-@pytest.fixture(scope="module")
-def fuzzer(tmp_path_factory):
-    """Return a function that builds the fuzzer of one FMI version."""
-
-    def build(fmi, level):
-        folder = tmp_path_factory.mktemp(f"fuzz{fmi}")
-        for name, data in neutral_members(load_vehicle("odin"), fmi).items():
-            if name.startswith("sources/"):
-                (folder / Path(name).name).write_bytes(data)
-        program = folder / "fuzz"
-        command = [
-            *find_compiler(), "-std=c99", "-g", level, "-fsanitize=address,undefined", "-fno-sanitize-recover=all",
-            f"-DFMI={fmi}", f"-I{folder}", f"-I{Path(fmpy.__file__).parent / 'c-code'}",
-            *map(str, folder.glob("*.c")), str(HERE / "fuzz.c"), "-o", str(program), "-lm",
-        ]  # fmt: skip
-        done = subprocess.run(command, capture_output=True, text=True)
-        if done.returncode != 0:
-            pytest.skip(f"the compiler has no sanitizers: {done.stderr[-300:]}")
-        return program
-
-    return build
+from plant_fmu.vehicle_component import make_vehicle_component
+from tests.plant_fmu.nulls import HEADERS, SANITIZERS, write_sources
 
 
 @pytest.mark.medium
@@ -43,9 +18,15 @@ def fuzzer(tmp_path_factory):
     ids=["short", "long"],
 )
 @pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
-def test_any_call_order_is_memory_safe(fuzzer, fmi, seed, calls, level):
+def test_any_call_order_is_memory_safe(tmp_path, fmi, seed, calls, level):
     """No fault of memory or arithmetic, and no number out that is none; most functions succeed now and then."""
-    done = subprocess.run([fuzzer(fmi, level), str(seed), str(calls)], capture_output=True, text=True)
+    sources = write_sources(tmp_path, fmi, make_vehicle_component(load_vehicle("odin")))
+    options = ["-std=c99", "-g", level, *SANITIZERS, f"-DFMI={fmi}", f"-I{tmp_path}", f"-I{HEADERS}"]
+    files = [*sources, str(Path(__file__).parent / "fuzz.c"), "-o", str(tmp_path / "fuzz"), "-lm"]
+    done = subprocess.run([*find_compiler(), *options, *files], capture_output=True, text=True)
+    if done.returncode != 0:
+        pytest.skip(f"the compiler has no sanitizers: {done.stderr[-300:]}")
+    done = subprocess.run([tmp_path / "fuzz", str(seed), str(calls)], capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-500:] + done.stderr[-3000:]
     accepted = [int(n) for n in done.stdout.split("accepted")[1].split()]
     assert sum(accepted) > calls / 10
