@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy import constants
 
-from plant_fmu import Plant, load_vehicle
+from plant_fmu import load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.variables import variables
 from tests.plant_fmu.conftest import STATES, coupled_odin
@@ -13,21 +13,13 @@ from tests.plant_fmu.conftest import STATES, coupled_odin
 MOTION = {"position.z": 2.0, "velocity.u": 0.4, "velocity.q": 0.3}
 
 
-@pytest.fixture(scope="module")
-def coupled():
-    return cached_fmu(coupled_odin(), 3)
-
-
-def fly(fmu, inputs, **parameters):
-    """Return the states after 20 steps of 10 ms."""
-    with Plant(fmu) as plant:
-        plant.set(MOTION | parameters)
-        plant.initialize()
-        for name, value in inputs.items():
-            plant[name] = value
-        for _ in range(20):
-            plant.step(0.01)
-        return np.array([plant[name] for name in STATES])
+def fly(slave, inputs, **parameters):
+    """Return the states after 20 steps of 10 ms; the inputs are sent once."""
+    slave.start(**MOTION | parameters)
+    slave.set_values(inputs)
+    for _ in range(20):
+        slave.step(0.01)
+    return np.array(slave.get(*STATES))
 
 
 def test_without_coupling_inputs_the_variables_are_unchanged():
@@ -55,37 +47,34 @@ def test_importers_read_units_of_pulses_and_revolutions(fmi):
 
 
 @pytest.mark.medium
-def test_zero_coupling_inputs_change_no_bit(coupled):
-    np.testing.assert_array_equal(fly(coupled, {}), fly("odin", {}))
-    flights = (fly(fmu, {"thrust[1]": 9.0}, **{"current.x": 0.2}) for fmu in (coupled, "odin"))
+@pytest.mark.parametrize(("inputs", "parameters"), [({}, {}), ({"thrust[1]": 9.0}, {"current.x": 0.2})])
+def test_zero_coupling_inputs_change_no_bit(make_slave, inputs, parameters):
+    flights = (fly(make_slave(coupled=coupled), inputs, **parameters) for coupled in (False, True))
     np.testing.assert_array_equal(*flights)
 
 
 @pytest.mark.medium
-def test_inputs_act_as_parameters_do(coupled):
+def test_inputs_act_as_parameters_do(make_slave):
     inputs = {"current_input.x": 0.2, "current_input.z": -0.1, "thrust_failure[1]": 0.25, "thrust_normalized[1]": 0.8}
     inputs |= {"external.body.force.y": 5.0, "external.body.moment.z": -1.0, "thrust_normalized[2]": -0.5}
     plain = {"thrust[1]": 0.8 * 27.0, "thrust[2]": -0.5 * 27.0, "wrench.Y": 5.0, "wrench.N": -1.0}
     parameters = {"current.x": 0.3, "current.z": -0.1, "thrust_effectiveness[1]": 0.6}
-    expected = fly("odin", plain, **parameters)
-    found = fly(coupled, inputs, **{"current.x": 0.1, "thrust_effectiveness[1]": 0.8})
+    expected = fly(make_slave(), plain, **parameters)
+    found = fly(make_slave(coupled=True), inputs, **{"current.x": 0.1, "thrust_effectiveness[1]": 0.8})
     np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-14)
 
 
 @pytest.mark.medium
-def test_current_rate_acts_within_a_step(coupled):
+def test_current_rate_acts_within_a_step(make_slave):
     """Held at each step, its velocity alone lags by half a step; with its rate it is the straight line."""
 
-    def drift(step, with_rate):
-        with Plant(coupled) as plant:
-            plant.set({"position.z": 2.0, "substep": 0.001})
-            plant.initialize()
-            for k in range(round(1.0 / step)):
-                plant["current_input.x"] = 0.5 * k * step
-                plant["current_input_rate.x"] = 0.5 if with_rate else 0.0
-                plant.step(step)
-            return plant["position.x"]
+    def drift(step, rate):
+        slave = make_slave(coupled=True).start(**{"position.z": 2.0, "substep": 0.001, "current_input_rate.x": rate})
+        for k in range(round(1.0 / step)):
+            slave.set_values({"current_input.x": 0.5 * k * step})
+            slave.fmu.doStep(k * step, step)
+        return slave.get("position.x")[0]
 
-    fine = drift(0.01, True)
-    assert drift(0.1, True) == pytest.approx(fine, abs=1e-9)
-    assert abs(drift(0.1, False) - fine) > 1e-3
+    fine = drift(0.01, 0.5)
+    assert drift(0.1, 0.5) == pytest.approx(fine, abs=1e-9)
+    assert abs(drift(0.1, 0.0) - fine) > 1e-3
