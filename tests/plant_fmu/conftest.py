@@ -17,7 +17,7 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackL
 from fmpy.fmi2 import defaultCallbacks as defaults
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-from plant_fmu import Plant, build_fmu, load_vehicle
+from plant_fmu import Plant, build_fmu, load_vehicle, shipped_vehicles
 from plant_fmu.build import cached_fmu
 from plant_fmu.vehicle_component import make_vehicle_component
 
@@ -27,6 +27,8 @@ STATES = [
     *(f"velocity.{a}" for a in "uvwpqr"),
 ]
 WRENCH = [f"wrench.{a}" for a in "XYZKMN"]
+EACH_VEHICLE = [pytest.param(v, marks=() if v == "odin" else pytest.mark.slow) for v in shipped_vehicles()]
+EACH_FMI = pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
 UNDAMPED = {f"{kind}_damping[{i}]": 0.0 for kind in ("linear", "quadratic") for i in range(1, 7)}
 
 

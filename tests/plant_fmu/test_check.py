@@ -94,10 +94,12 @@ def test_importer_with_another_result_fails_the_check(odin):
         ('modelIdentifier="odin"', 'modelIdentifier="other"', "does not apply"),
     ],
 )
-def test_check_says_what_plant_says(edited, old, new, status):
+def test_check_says_what_plant_says(edited, scratch, old, new, status):
     path = edited((old, new))
     with pytest.raises(PlantError) as caught:
         Plant(path)
+    assert str(caught.value).startswith(f"{path}: ") and "\n" not in str(caught.value)
+    assert list(scratch.iterdir()) == []
     row = run_importer(PLANT, read_fmu(path), Task(0.1, 0.1))
     assert row.status == status
     assert row.note.removeprefix("the FMU ").partition(",")[0] in str(caught.value)

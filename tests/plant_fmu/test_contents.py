@@ -13,11 +13,12 @@ import pytest
 from fmpy import read_model_description
 from lxml import etree
 
-from plant_fmu import load_vehicle, shipped_vehicles
+from plant_fmu import load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.contents import contents
 from plant_fmu.contents.page import page
 from plant_fmu.variables import variables
+from tests.plant_fmu.conftest import EACH_VEHICLE
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3"
@@ -60,7 +61,7 @@ class Page(HTMLParser):
             self.rows[-1][-1] += data
 
 
-@pytest.fixture(params=["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in shipped_vehicles() if v != "odin")])
+@pytest.fixture(params=EACH_VEHICLE)
 def vehicle(request):
     return load_vehicle(request.param)
 

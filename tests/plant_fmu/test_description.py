@@ -14,15 +14,14 @@ from plant_fmu.description import documentation, model_description
 from plant_fmu.quantities import UNITS
 from plant_fmu.variables import variables
 from plant_fmu.vehicle_component import make_vehicle_component
+from tests.plant_fmu.conftest import EACH_FMI, EACH_VEHICLE
 
 ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.medium
-@pytest.mark.parametrize(
-    "name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in shipped_vehicles() if v != "odin")]
-)
-@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
+@pytest.mark.parametrize("name", EACH_VEHICLE)
+@EACH_FMI
 def test_fmpy_finds_no_problem(name, fmi):
     assert validate_fmu(str(cached_fmu(load_vehicle(name), fmi))) == []
 
@@ -39,7 +38,7 @@ def test_every_variable_has_description_unit_range_and_nominal():
             assert v.nominal > 0.0
 
 
-@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
+@EACH_FMI
 def test_fmu_start_values_match_the_model_description(make_slave, fmi):
     """The XML's start values are compiled into the binary too: a tool that sets none must get the same."""
     slave = make_slave("bluerov2_heavy", fmi)

@@ -1,6 +1,7 @@
 """The plant's own elementary functions, against exact rational arithmetic."""
 
 import ctypes
+import itertools
 import math
 import re
 from decimal import Decimal, getcontext
@@ -20,6 +21,10 @@ WITHIN = 2.0  # units in the last place, as elementary.h says
 ANY = np.random.default_rng(5)
 
 
+ARGUMENTS = {"log": "double x", "expm1": "double x", "cos_turns": "double x", "atan2": "double y, double x",
+             "hypot": "double x, double y"}  # fmt: skip
+
+
 @pytest.fixture(scope="module")
 def functions(once):
     """Return a function that gives one of the functions by name."""
@@ -28,31 +33,23 @@ def functions(once):
         component = make_vehicle_component(load_vehicle("odin"))
         for name, data in all_sources(component, 3, "").items():
             (folder / name).write_bytes(data)
-        # by its plain name, and for other libraries to see
-        (folder / "shown.c").write_text(
-            '#include "elementary.h"\n#pragma GCC visibility push(default)\n'
-            "double log_(double x) { return elementary_log(x); }\n"
-            "double expm1_(double x) { return elementary_expm1(x); }\n"
-            "double cos_(double x) { return elementary_cos_turns(x); }\n"
-            "double atan2_(double y, double x) { return elementary_atan2(y, x); }\n"
-            "double hypot_(double x, double y) { return elementary_hypot(x, y); }\n"
-        )
+        # by plain names, and for other libraries to see
+        shown = ['#include "elementary.h"', "#pragma GCC visibility push(default)"]
+        for name, arguments in ARGUMENTS.items():
+            passed = arguments.replace("double ", "")
+            shown.append(f"double {name}_({arguments}) {{ return elementary_{name}({passed}); }}")
+        (folder / "shown.c").write_text("\n".join([*shown, ""]))
         files = [folder / "shown.c", folder / "elementary.c"]
         compile_library(find_compiler(), native_platform(), files, [folder, FMI_HEADERS], folder / "shown.so")
 
     library = ctypes.CDLL(str(once("elementary", make) / "shown.so"))
 
-    def one(name, n=1):
+    def one(name):
         function = getattr(library, f"{name}_")
-        function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double] * n
+        function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double] * ARGUMENTS[name].count("double")
         return function
 
     return one
-
-
-def off(got, exact):
-    """Return by how many units in the last place a number is off."""
-    return abs(float((Decimal(got) - exact) / Decimal(math.ulp(float(exact)))))
 
 
 def sine(x):
@@ -65,52 +62,39 @@ def sine(x):
 
 
 @pytest.mark.medium
-def test_logarithm_matches_reference(functions):
-    getcontext().prec = 50
-    log = functions("log")
-    near = 1.0 - ANY.uniform(0.0, 1e-9, 50)
-    for x in map(float, [*ANY.uniform(0.0, 1.0, 800), *near, 2.0**-53, 1.0 - 2.0**-53, 0.7071, 1e300]):
-        assert off(log(x), Decimal(x).ln()) < WITHIN
-    assert log(1.0) == 0.0
-
-
-@pytest.mark.medium
-def test_expm1_matches_reference(functions):
+@pytest.mark.parametrize(
+    ("name", "exact", "points", "values"),
+    [
+        ("log", Decimal.ln, [*ANY.uniform(0.0, 1.0, 800), *(1.0 - ANY.uniform(0.0, 1e-9, 50)), 2.0**-53, 1.0 - 2.0**-53,
+                             0.7071, 1e300], {1.0: 0.0}),
+        ("expm1", lambda x: x.exp() - 1, [*-(10.0 ** ANY.uniform(-12.0, 1.77, 800)), -0.3466, -0.3465, -59.9],
+         {0.0: 0.0, -1e9: -1.0, -math.inf: -1.0}),
+        ("cos_turns", lambda x: sine(TURN * (Decimal("0.25") - x)),
+         [*ANY.uniform(0.0, 1.0, 400), 0.25 + 1e-9, 0.75 - 1e-12, 0.124999, 0.125001],
+         {0.0: 1.0, 0.25: 0.0, 0.5: -1.0, 0.75: 0.0}),
+    ],
+    ids=["log", "expm1", "cos_turns"],
+)  # fmt: skip
+def test_function_matches_exact_arithmetic(functions, name, exact, points, values):
     getcontext().prec = 60
-    expm1 = functions("expm1")
-    for x in map(float, [*-(10.0 ** ANY.uniform(-12.0, 1.77, 800)), -0.3466, -0.3465, -59.9]):
-        assert off(expm1(x), Decimal(x).exp() - 1) < WITHIN
-    assert [expm1(0.0), expm1(-1e9), expm1(-math.inf)] == [0.0, -1.0, -1.0]
-    assert math.isnan(expm1(math.nan))
+    function = functions(name)
+    for x in map(float, points):
+        true = exact(Decimal(x))
+        assert abs(float((Decimal(function(x)) - true) / Decimal(math.ulp(float(true))))) < WITHIN
+    assert {x: function(x) for x in values} == values
+    assert name != "expm1" or math.isnan(function(math.nan))
 
 
 @pytest.mark.medium
-def test_cosine_of_turn_fractions_matches_reference(functions):
-    getcontext().prec = 50
-    cos = functions("cos")
-    for x in map(float, [*ANY.uniform(0.0, 1.0, 400), 0.25 + 1e-9, 0.75 - 1e-12, 0.124999, 0.125001]):
-        exact = sine(TURN * (Decimal("0.25") - Decimal(x)))
-        assert off(cos(x), exact) < WITHIN
-    assert [cos(x) for x in (0.0, 0.25, 0.5, 0.75)] == [1.0, 0.0, -1.0, 0.0]
-
-
-@pytest.mark.medium
-def test_atan2_matches_reference(functions):
-    """The C library's result is itself within one unit in the last place."""
-    atan2 = functions("atan2", 2)
-    for y, x in [*ANY.normal(size=(800, 2)), *(ANY.normal(size=(200, 2)) * [1e-9, 1.0])]:
-        assert abs(atan2(y, x) - math.atan2(y, x)) <= 3.0 * math.ulp(math.atan2(y, x))
-    for y in (0.0, -0.0, 1.0, -1.0):
-        for x in (0.0, -0.0, 1.0, -1.0):
-            got, want = atan2(y, x), math.atan2(y, x)
-            assert (got, math.copysign(1.0, got)) == (want, math.copysign(1.0, want))
-
-
-@pytest.mark.medium
-def test_hypotenuse_matches_reference(functions):
-    hypot = functions("hypot", 2)
-    for x, y in [*ANY.normal(size=(200, 2)), *(ANY.normal(size=(50, 2)) * [1e-9, 1.0])]:
-        assert abs(hypot(x, y) - math.hypot(x, y)) <= WITHIN * math.ulp(math.hypot(x, y))
+@pytest.mark.parametrize(("name", "within", "n"), [("atan2", 3.0, 800), ("hypot", WITHIN, 200)])
+def test_function_of_two_numbers_matches_the_c_library(functions, name, within, n):
+    """The C library's arcus tangens is itself within one unit in the last place."""
+    function, reference = functions(name), getattr(math, name)
+    for point in [*ANY.normal(size=(n, 2)), *(ANY.normal(size=(n // 4, 2)) * [1e-9, 1.0])]:
+        assert abs(function(*point) - reference(*point)) <= within * math.ulp(reference(*point))
+    for point in itertools.product((0.0, -0.0, 1.0, -1.0), repeat=2) if name == "atan2" else ():
+        got, want = function(*point), reference(*point)
+        assert (got, math.copysign(1.0, got)) == (want, math.copysign(1.0, want))
 
 
 def arctangent(x):

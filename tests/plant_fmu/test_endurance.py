@@ -22,17 +22,14 @@ def resident():
 def library(make_slave):
     """The FMI 3.0 library through ctypes alone, and its token."""
     slave = make_slave()
-    loaded = ctypes.CDLL(slave.fmu.dll._name)  # without FMPy's conversions
-    loaded.fmi3InstantiateCoSimulation.restype = ctypes.c_void_p
-    return loaded, slave.description.guid.encode()
+    return ctypes.CDLL(slave.fmu.dll._name), slave.description.guid.encode()  # without FMPy's conversions
 
 
-def make(library, token):
+def make(library, token, prefix=""):
     """Make one instance."""
-    nothing = ctypes.c_void_p()
-    made = library.fmi3InstantiateCoSimulation(
-        b"x", token, None, *[ctypes.c_bool()] * 4, None, ctypes.c_size_t(0), *[nothing] * 3
-    )
+    instantiate, nothing = library[f"{prefix}fmi3InstantiateCoSimulation"], ctypes.c_void_p()
+    instantiate.restype = ctypes.c_void_p
+    made = instantiate(b"x", token, None, *[ctypes.c_bool()] * 4, None, ctypes.c_size_t(0), *[nothing] * 3)
     assert made
     return ctypes.c_void_p(made)
 

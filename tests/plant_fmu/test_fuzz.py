@@ -8,6 +8,7 @@ import pytest
 from plant_fmu import load_vehicle
 from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.vehicle_component import make_vehicle_component
+from tests.plant_fmu.conftest import EACH_FMI
 from tests.plant_fmu.nulls import HEADERS, SANITIZERS, write_sources
 
 
@@ -17,7 +18,7 @@ from tests.plant_fmu.nulls import HEADERS, SANITIZERS, write_sources
     [(1, 50_000, "-O0"), pytest.param(2, 1_000_000, "-O1", marks=pytest.mark.slow)],
     ids=["short", "long"],
 )
-@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
+@EACH_FMI
 def test_any_call_order_is_memory_safe(tmp_path, fmi, seed, calls, level):
     """No fault of memory or arithmetic, and no number out that is none; most functions succeed now and then."""
     sources = write_sources(tmp_path, fmi, make_vehicle_component(load_vehicle("odin")))

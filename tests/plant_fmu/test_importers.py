@@ -12,7 +12,7 @@ from plant_fmu.checking.fmu_file import read_fmu
 from plant_fmu.checking.process import run_importer
 from plant_fmu.checking.task import Task
 from tests.architecture.modules import ROOT
-from tests.plant_fmu.conftest import CoSimulationInstance
+from tests.plant_fmu.conftest import EACH_FMI, CoSimulationInstance
 from tests.plant_fmu.importers import IMPORTERS, JACOBIAN, missing
 
 IMPORTER = {importer.name: importer for importer in (*IMPORTERS, JACOBIAN)}
@@ -78,7 +78,7 @@ def test_co_simulation_results_agree_between_importers(name, fmu):
 
 
 @pytest.mark.medium
-@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
+@EACH_FMI
 def test_casadi_ends_where_co_simulation_does(fmu):
     assert difference(answer("FMPy", fmu), answer("CasADi", fmu)) < 1e-7
 

@@ -17,6 +17,7 @@ from plant_fmu.__main__ import main
 from plant_fmu.build import cached_fmu
 from plant_fmu.contents.layered import FOLDER, layered_files, reference_files
 from plant_fmu.contents.reference import COLUMNS, reference
+from tests.plant_fmu.conftest import EACH_VEHICLE
 
 XSD = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3LayeredStandardManifest.xsd"
 LS = "{http://fmi-standard.org/fmi-ls-manifest}"
@@ -52,9 +53,7 @@ def gap(fmu, folder, name, **how):
     return np.abs(difference).max()
 
 
-@pytest.mark.parametrize(
-    "name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in shipped_vehicles() if v != "odin")]
-)
+@pytest.mark.parametrize("name", EACH_VEHICLE)
 def test_fmu_reproduces_its_reference_results(name, fmi, unpacked):
     fmu = cached_fmu(load_vehicle(name), fmi)
     assert gap(fmu, unpacked(fmu), name, fmi_type="CoSimulation") < 1e-6

@@ -8,7 +8,7 @@ import zipfile
 
 import pytest
 
-from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
+from plant_fmu import build_fmu, load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling import prebuilt
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
@@ -18,7 +18,7 @@ from plant_fmu.compiling.signature import re_sign
 from plant_fmu.description import token
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle_component import make_vehicle_component
-from tests.plant_fmu.conftest import STATES, CoSimulationInstance
+from tests.plant_fmu.conftest import EACH_FMI, EACH_VEHICLE, STATES, CoSimulationInstance
 from tests.plant_fmu.libraries import macs
 
 HERE = native_platform()
@@ -68,10 +68,8 @@ def no_compiler(folder, monkeypatch):
 
 
 @pytest.mark.medium
-@pytest.mark.parametrize(
-    "vehicle", [name if name == "odin" else pytest.param(name, marks=pytest.mark.slow) for name in shipped_vehicles()]
-)
-@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3], ids=["fmi2", "fmi3"])
+@pytest.mark.parametrize("vehicle", EACH_VEHICLE)
+@EACH_FMI
 def test_prebuilt_plant_equals_a_compiled_one(vehicle, fmi, compiled, no_compiler, tmp_path):
     path = build_fmu(load_vehicle(vehicle), fmi, tmp_path / "x.fmu")
     answers = []

@@ -1,5 +1,6 @@
 """The sources in an FMU: complete, and equal in results once compiled."""
 
+import ctypes
 import re
 import shutil
 import subprocess
@@ -18,6 +19,7 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.compiler import find_compiler
 from plant_fmu.compiling.platforms import native_platform
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance
+from tests.plant_fmu.test_endurance import make
 
 FMPY = Path(fmpy.__file__).parent
 
@@ -92,51 +94,25 @@ def test_sources_compiled_by_fmpy_give_the_same_plant(bare, fmi, tmp_path, monke
     assert trajectory(packed) == pytest.approx(expected, rel=1e-10, abs=1e-10)
 
 
-TWO = """
-#include "fmi3PlatformTypes.h"
-#include "fmi3FunctionTypes.h"
-#include <stdio.h>
-extern fmi3InstantiateCoSimulationTYPE odin_fmi3InstantiateCoSimulation, rexrov_fmi3InstantiateCoSimulation;
-extern fmi3GetFloat64TYPE odin_fmi3GetFloat64, rexrov_fmi3GetFloat64;
-
-int main(int argc, char **argv)
-{
-    (void)argc;
-    fmi3Instance one = odin_fmi3InstantiateCoSimulation("1", argv[1], 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
-    fmi3Instance two = rexrov_fmi3InstantiateCoSimulation("2", argv[2], 0, 0, 0, 0, 0, 0, 0, 0, 0, 0);
-    fmi3ValueReference odin_mass = ODIN_MASS, rexrov_mass = REXROV_MASS;
-    double masses[2];
-    if (!one || !two || odin_fmi3GetFloat64(one, &odin_mass, 1, &masses[0], 1) ||
-        rexrov_fmi3GetFloat64(two, &rexrov_mass, 1, &masses[1], 1))
-        return 1;
-    printf("%g %g", masses[0], masses[1]);
-    return 0;
-}
-"""
-
-
 @pytest.mark.slow
-def test_two_vehicles_can_be_linked_into_one_program(tmp_path):
+def test_two_vehicles_can_be_linked_into_one_library(tmp_path):
     """Each under its own names, and each with its own numbers."""
-    compiler, tokens, objects, references = find_compiler(), [], [], []
+    descriptions, objects, library = {}, [], tmp_path / "two.so"
     for name in ("odin", "rexrov"):
         folder = tmp_path / name
         with zipfile.ZipFile(cached_fmu(load_vehicle(name), 3)) as archive:
             archive.extractall(folder)
-        description = read_model_description(folder)
-        tokens.append(description.guid)
-        (mass,) = (v.valueReference for v in description.modelVariables if v.name == "mass")
-        references.append(f"-D{name.upper()}_MASS={mass}")
-        sources = [str(path) for path in (folder / "sources").glob("*.c")]
-        done = subprocess.run(
-            [*compiler, "-std=c99", "-c", f"-I{FMPY / 'c-code'}", *sources], cwd=folder, capture_output=True
-        )
-        assert done.returncode == 0, done.stderr
-        objects += [str(path) for path in folder.glob("*.o")]
-    (tmp_path / "two.c").write_text(TWO)
-    program = str(tmp_path / "two")
-    command = [*compiler, f"-I{FMPY / 'c-code'}", *references, str(tmp_path / "two.c"), *objects, "-o", program, "-lm"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    done = subprocess.run([program, *tokens], capture_output=True, text=True)
-    assert (done.returncode, done.stdout) == (0, "125 1862.87")
+        descriptions[name] = read_model_description(folder)
+        command = [*find_compiler(), "-std=c99", "-fPIC", "-c", f"-I{FMPY / 'c-code'}", *folder.glob("sources/*.c")]
+        subprocess.run(command, cwd=folder, check=True, capture_output=True)
+        objects += folder.glob("*.o")
+    command = [*find_compiler(), "-shared", *objects, "-o", library, "-lm"]
+    subprocess.run(command, check=True, capture_output=True)
+    loaded, masses, one = ctypes.CDLL(str(library)), [], ctypes.c_size_t(1)
+    for name, description in descriptions.items():
+        plant, value = make(loaded, description.guid.encode(), f"{name}_"), ctypes.c_double()
+        (reference,) = (v.valueReference for v in description.modelVariables if v.name == "mass")
+        arguments = ((ctypes.c_uint * 1)(reference), one, ctypes.byref(value), one)
+        assert loaded[f"{name}_fmi3GetFloat64"](plant, *arguments) == 0
+        masses.append(value.value)
+    assert masses == [125.0, 1862.87]

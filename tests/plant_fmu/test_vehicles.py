@@ -12,6 +12,7 @@ from plant_fmu.__main__ import main
 from plant_fmu.autopilot import Autopilot, effort_of_pulse, pulse_of_effort
 from plant_fmu.build import neutral_members
 from plant_fmu.errors import VehicleError
+from tests.plant_fmu.conftest import EACH_VEHICLE
 from tests.plant_fmu.test_build import ODIN, written
 
 VEHICLES = shipped_vehicles()
@@ -54,7 +55,7 @@ def test_vehicle_parameters_are_physically_valid(name):
 
 
 @pytest.mark.parametrize("axis", ["roll", "pitch"])
-@pytest.mark.parametrize("name", ["odin", *(pytest.param(v, marks=pytest.mark.slow) for v in VEHICLES if v != "odin")])
+@pytest.mark.parametrize("name", EACH_VEHICLE)
 def test_vehicle_rights_itself(name, axis, make_slave):
     """Released at 60 degrees, a vehicle returns upright, and its oscillation decays."""
     e0, e = Rotation.from_euler("x", 60, degrees=True).as_quat()[[3, 0]]
