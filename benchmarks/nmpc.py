@@ -25,7 +25,7 @@ from controller import LAWS, VehicleModel, VehicleState
 from controller.compiling.function import CompiledFunction
 from controller.law import Array, CompiledLaw, Output, validate_gains
 from controller.laws.pid_cbf import PidCbfGains, PidCbfLaw, observe
-from controller.quaternion import error_parts, write_rotation
+from controller.quaternion import error, rotation_matrix
 from controller.regions import DepthBand, Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, position_clearance
@@ -36,7 +36,7 @@ ITERATIONS = 15  # maximum number of the solver's iterations
 SPHERES = {"obstacles": 8, "hard": 2, "soft": 0}
 SHAPES = {"obstacles": 0, "hard": 2, "soft": 3}  # numbers of constraints of a plan among regions of other shapes
 _FREE = (0.0, 0.0, 0.0, -1e3)  # a plane that is always satisfied
-_OBSERVE, _ROTATION = CompiledFunction(observe), CompiledFunction(write_rotation)
+_OBSERVE = CompiledFunction(observe)
 
 
 class NmpcGains(NamedTuple):
@@ -74,7 +74,7 @@ class _Step:
         forces: Array,
     ) -> None:
         observer = memory.observer
-        _ROTATION(state.quaternion, memory.R)
+        memory.R[:] = rotation_matrix(state.quaternion)
         _OBSERVE(observer.memory, state, memory.R, observer.gains)
         if memory.steps[0] % memory.plan_every == 0:
             forces[:] = self._plan(state, goal, regions, gains, memory)
@@ -97,8 +97,8 @@ class _Step:
         later = velocity + lag * known.disturbance
         later[:3] += lag * R @ np.linalg.solve(mass[:3, :3], wrench[:3] - drag)
         later[3:] += lag * np.linalg.solve(inertia, wrench[3:] + lost - inertia @ known.disturbance[3:])
-        error = np.array(error_parts(known.desired_quaternion, state.quaternion)[1:]) + 0.5 * lag * velocity[3:]
-        turning = inertia @ (gains.k_p2 * error + gains.k_v2 * later[3:])
+        e_att = error(known.desired_quaternion, state.quaternion)[1:] + 0.5 * lag * velocity[3:]
+        turning = inertia @ (gains.k_p2 * e_att + gains.k_v2 * later[3:])
         first = goal.offsets[0]
         given = {
             "position": (known.position + lag * velocity[:3]).tolist(),

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from controller.compiling.function import BoundCall, CompiledFunction
 from controller.errors import LawError
 from controller.regions.region_set import PackedRegions
+from controller.stack_array import Columns6, Matrix6, Vector3, Vector4, Vector6
 
 Array = NDArray[np.float64]
 Output = Literal["wrench", "thrusters"]
@@ -42,9 +43,9 @@ class VehicleState(NamedTuple):
     (6,)
     """
 
-    position: Array  # (3,) m, NED
-    quaternion: Array  # (4,) unit quaternion from body to world, scalar first
-    velocity_body: Array  # (6,) velocity over ground, body frame, m/s, rad/s
+    position: Vector3  # m, NED
+    quaternion: Vector4  # unit quaternion from body to world, scalar first
+    velocity_body: Vector6  # velocity over ground, body frame, m/s, rad/s
     thruster_health: Array  # (m,) 1 working, or not reported as failed; 0 reported to give no force
     deviation: Array = _NO_DEVIATION  # (12,) standard deviations of position [m], velocity [m/s], attitude [rad],
     # world axes, and rates [rad/s], body, of an estimate; 0: a measurement, whose noise is that of the law's gains
@@ -60,11 +61,11 @@ class VehicleModel(NamedTuple):
     ('thrust_min', 'thrust_max', 'thrust_time_constant')
     """
 
-    rigid_mass: Array  # (6, 6) kg, kg m2, with the center of gravity taken to be the origin
-    added_mass: Array  # (6, 6) kg, kg m, kg m2
-    linear_damping: Array  # (6,) N s/m, N m s/rad
-    quadratic_damping: Array  # (6,) N s2/m2, N m s2/rad2
-    thruster_matrix: Array  # (6, m) body wrench of one newton of each thruster
+    rigid_mass: Matrix6  # kg, kg m2, with the center of gravity taken to be the origin
+    added_mass: Matrix6  # kg, kg m, kg m2
+    linear_damping: Vector6  # N s/m, N m s/rad
+    quadratic_damping: Vector6  # N s2/m2, N m s2/rad2
+    thruster_matrix: Columns6  # body wrench of one newton of each thruster
     thrust_min: Array  # (m,) N, least force of each thruster, 0 or negative
     thrust_max: Array  # (m,) N, maximum force of each thruster
     thrust_time_constant: Array  # (m,) s, time constant of each thruster's lag

@@ -1,34 +1,32 @@
-"""Small dense products without allocation: in the order in which they are written, as C adds them."""
+"""Products and inverses of small vectors and matrices, in the order in which they are written."""
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+import math
 
-Array = NDArray[np.float64]
+import numpy as np
+
+from controller.stack_array import Array, Vector3, array
 
 
 def product(A: Array, x: Array, out: Array) -> None:
     """Write A x into `out`."""
-    for i in range(A.shape[0]):
-        total = 0.0
-        for j in range(A.shape[1]):
-            total += A[i, j] * x[j]
-        out[i] = total
+    out[:] = A @ x
 
 
 def copy(values: Array, out: Array) -> None:
-    """Write values, shape (n,), into `out`. A loop compiles in a tenth of the time of a slice."""
-    for i in range(out.size):
-        out[i] = values[i]
+    """Write the first of values, shape (n,), into `out`."""
+    out[:] = values[: out.size]
+
+
+def cross(a: Vector3, b: Vector3) -> Vector3:
+    """Return a x b."""
+    return array(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def norm(a: Array) -> float:
     """Return |a|."""
-    total = 0.0
-    for i in range(a.size):
-        total += a[i] * a[i]
-    return float(np.sqrt(total))
+    return math.sqrt(a @ a)
 
 
 def invert_symmetric(A: Array) -> None:

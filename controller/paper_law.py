@@ -7,14 +7,9 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from controller.arithmetic import length3
-from controller.quaternion import Vector3, error_parts, rotation_rows
-
-Array = NDArray[np.float64]
-Rows = tuple[Vector3, Vector3, Vector3]
+from controller.linear_algebra import cross, norm
+from controller.quaternion import error, rotation_matrix
+from controller.stack_array import Array, Matrix3, Rows3, Vector3, Vector4, Vector6, zeros
 
 
 class Gains(NamedTuple):
@@ -43,100 +38,60 @@ def positive_part(value: float) -> float:
     return 0.0 if value <= 0.0 else value
 
 
-def primary_error(value: float, gradient: Array) -> Array:
-    """Return e_p, shape (3,): (20), of f, `value`, and its `gradient`; k_p1 times it is (18), the potential's."""
+def primary_error(value: float, gradient: Vector3) -> Vector3:
+    """Return e_p: (20), of f, `value`, and its `gradient`; k_p1 times it is (18), the potential's."""
     return positive_part(value) * gradient
 
 
-def secondary_parts(values: Array, gradients: Array, alphas: Array, k_q: float) -> Vector3:
-    """Return e_s as `secondary_error` does, of alphas, shape (n,), of which beta_i = alpha_i / k_q."""
-    x, y, z = 0.0, 0.0, 0.0
+def secondary_error(values: Array, gradients: Rows3, alphas: Array, k_q: float = 1.0) -> Vector3:
+    """Return e_s: (21), (22), with beta_i = alpha_i / k_q; k_q times it is (19); values (n,), alphas (n,)."""
+    e_s = zeros(3)
     for i in range(values.size):
-        if not values[i] <= 0.0:
-            norm = length3(gradients[i, 0], gradients[i, 1], gradients[i, 2])
-            if not norm <= 0.0:
-                length = alphas[i] / k_q * values[i] / norm
-                x += length * gradients[i, 0]
-                y += length * gradients[i, 1]
-                z += length * gradients[i, 2]
-    return x, y, z
-
-
-def secondary_error(values: Array, gradients: Array, betas: Array) -> Array:
-    """Return e_s, shape (3,): (21), (22); k_q times it is (19); values (n,), gradients (n, 3), betas (n,)."""
-    e_s = np.empty(3)
-    e_s[0], e_s[1], e_s[2] = secondary_parts(values, gradients, betas, 1.0)
+        size = norm(gradients[i])
+        if not values[i] <= 0.0 and not size <= 0.0:
+            e_s += alphas[i] / k_q * values[i] / size * gradients[i]
     return e_s
-
-
-def to_body(R: Rows, x: Vector3) -> Vector3:
-    """Return R^T x, a world vector in body axes."""
-    return (
-        R[0][0] * x[0] + R[1][0] * x[1] + R[2][0] * x[2],
-        R[0][1] * x[0] + R[1][1] * x[1] + R[2][1] * x[2],
-        R[0][2] * x[0] + R[1][2] * x[1] + R[2][2] * x[2],
-    )
 
 
 def apply(
     e_p: Vector3,
     e_s: Vector3,
     e_att: Vector3,
-    R: Rows,
-    velocity_body: Array,
+    R: Matrix3,
+    nu: Vector6,
     gains: Gains,
     period: float,
-    estimate: Array,
-    tau: Array,
+    estimate: Vector4,
+    tau: Vector6,
 ) -> None:
     """Write tau: (25) with (26), (29); then update the estimate over a period: (27) with (28)."""
-    # with velocity_body [m/s, rad/s], gains [k_q R^T; 0], period [s], estimate [N, N m], tau [N, N m]
-    k_p1, k_q, nu = gains.k_p1, gains.k_q, velocity_body
-    # (12): Z = [-k 0; 0 S(k)] with k = R^T e3, the last row of R
-    k = R[2]
-    supported = cross_product(k, estimate[1], estimate[2], estimate[3])
-    pushed = to_body(R, (k_p1 * e_p[0] + k_q * e_s[0], k_p1 * e_p[1] + k_q * e_s[1], k_p1 * e_p[2] + k_q * e_s[2]))
-    for i in range(3):  # (25): Z phi-hat - K_0 e - K_s e_s - K_v nu
-        tau[i] = -k[i] * estimate[0] - pushed[i] - gains.k_v1 * nu[i]
-        tau[3 + i] = supported[i] - gains.k_p2 * e_att[i] - gains.k_v2 * nu[3 + i]
-
+    # with nu [m/s, rad/s], period [s], estimate [N, N m], tau [N, N m]
+    k = R[2]  # (12): Z = [-k 0; 0 S(k)] with k = R^T e3
+    # (25): Z phi-hat - K_0 e - K_s e_s - K_v nu
+    tau[:3] = -k * estimate[0] - R.T @ (gains.k_p1 * e_p + gains.k_q * e_s) - gains.k_v1 * nu[:3]
+    tau[3:] = cross(k, estimate[1:]) - gains.k_p2 * e_att - gains.k_v2 * nu[3:]
     # (27): -Gamma^-1 Z^T (nu + sigma J_e), of which Z^T = [-k^T 0; 0 -S(k)]
-    ratio = k_q / k_p1
-    off = to_body(R, (e_p[0] + ratio * e_s[0], e_p[1] + ratio * e_s[1], e_p[2] + ratio * e_s[2]))
-    sinking = 0.0
-    for i in range(3):
-        sinking += k[i] * (nu[i] + gains.sigma_p * off[i])
-    turning = cross_product(
-        k, nu[3] + gains.sigma_a * e_att[0], nu[4] + gains.sigma_a * e_att[1], nu[5] + gains.sigma_a * e_att[2]
-    )
-    estimate[0] += period / gains.gamma * sinking
-    for i in range(3):
-        estimate[1 + i] += period / gains.gamma * turning[i]
-
-
-def cross_product(k: Vector3, x: float, y: float, z: float) -> Vector3:
-    """Return S(k) [x y z]^T = k x [x y z]^T: (4)."""
-    return k[1] * z - k[2] * y, k[2] * x - k[0] * z, k[0] * y - k[1] * x
+    J_e = R.T @ (e_p + gains.k_q / gains.k_p1 * e_s)
+    estimate[0] += period / gains.gamma * (k @ (nu[:3] + gains.sigma_p * J_e))
+    estimate[1:] += period / gains.gamma * cross(k, nu[3:] + gains.sigma_a * e_att)
 
 
 def step(
-    quaternion: Array,
-    velocity_body: Array,
-    desired_quaternion: Array,
+    quaternion: Vector4,
+    velocity_body: Vector6,
+    desired_quaternion: Vector4,
     goal_value: float,
-    goal_gradient: Array,
+    goal_gradient: Vector3,
     values: Array,
-    gradients: Array,
+    gradients: Rows3,
     alphas: Array,
     gains: Gains,
     period: float,
-    estimate: Array,
-    tau: Array,
+    estimate: Vector4,
+    tau: Vector6,
 ) -> None:
     """Compute the wrench of one control period, then update the estimate over it; velocity_body [m/s, rad/s]."""
     # with period [s], estimate [N, N m], tau [N, N m]
-    f = positive_part(goal_value)
-    e_p = (f * goal_gradient[0], f * goal_gradient[1], f * goal_gradient[2])
-    e_s = secondary_parts(values, gradients, alphas, gains.k_q)
-    e_att = error_parts(desired_quaternion, quaternion)[1:]
-    apply(e_p, e_s, e_att, rotation_rows(quaternion), velocity_body, gains, period, estimate, tau)
+    e_p, e_s = primary_error(goal_value, goal_gradient), secondary_error(values, gradients, alphas, gains.k_q)
+    e_att, R = error(desired_quaternion, quaternion)[1:], rotation_matrix(quaternion)
+    apply(e_p, e_s, e_att, R, velocity_body, gains, period, estimate, tau)

@@ -6,34 +6,35 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 
-from controller.arithmetic import length3
 from controller.law import Array, VehicleState
+from controller.linear_algebra import norm
 from controller.paper_law import positive_part
-from controller.quaternion import Vector3, error_parts, write_rotation
+from controller.quaternion import error
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, evaluate_packed
+from controller.stack_array import Matrix3, Number, Rows3, Shape, Vector3, Vector4, Vector6
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
+Parameters9 = Annotated[Array, Shape(9)]
 
 
 class Field(NamedTuple):
     """Work arrays for the evaluation of regions, and the results."""
 
-    goal_value: Array  # (1,) g of the goal
-    goal_gradient: Array  # (1, 3) dg/dp, NED
-    goal_turning: Array  # (1, 3) dg/dtheta, body frame
-    goal_clearance: Array  # (1,) m
+    goal_value: Number  # g of the goal
+    goal_gradient: Rows3  # (1, 3) dg/dp, NED
+    goal_turning: Rows3  # (1, 3) dg/dtheta, body frame
+    goal_clearance: Number  # m
     values: Array  # (n,) g of the other regions
-    gradients: Array  # (n, 3) dg/dp, NED
-    rotation_gradients: Array  # (n, 3) dg/dtheta, body frame
+    gradients: Rows3  # dg/dp, NED
+    rotation_gradients: Rows3  # dg/dtheta, body frame
     clearances: Array  # (n,) m or rad
-    error: Array  # (3,) position error towards the goal, NED
-    push: Array  # (3,) N, NED, sum of the forces of all other regions
+    error: Vector3  # position error towards the goal, NED
+    push: Vector3  # N, NED, sum of the forces of all other regions
 
 
 def empty_field(n_regions: int) -> Field:
@@ -55,12 +56,12 @@ def empty_field(n_regions: int) -> Field:
 class PotentialMemory(NamedTuple):
     """State between steps, and work arrays, of a law for comparison."""
 
-    desired_quaternion: Array  # (4,)
-    period: Array  # (1,) s
-    estimate: Array  # (4,) phi-hat [N, N m]; zeros of a law that estimates nothing
+    desired_quaternion: Vector4
+    period: Number  # s
+    estimate: Vector4  # phi-hat [N, N m]; zeros of a law that estimates nothing
     report: Array  # (0,)
-    theta: Array  # (9,) parameters of a law with other ones than phi
-    drive: Array  # (6,) what drives the adaptation
+    theta: Parameters9  # parameters of a law with other ones than phi
+    drive: Vector6  # what drives the adaptation
     field: Field
 
 
@@ -71,31 +72,27 @@ def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> Pot
 
 
 def write_set_point_wrench(
-    state: VehicleState, goal: PackedRegions, regions: PackedRegions, gains: Any, memory: PotentialMemory, R: Array,
-    forces: Array,
+    state: VehicleState, goal: PackedRegions, regions: PackedRegions, gains: Any, memory: PotentialMemory, R: Matrix3,
+    forces: Vector6,
 ) -> Vector3:  # fmt: skip
-    """Write the wrench [N, N m] of pull, push and damping, and rotation `R`, (3, 3); return the attitude error (23)."""
+    """Write the wrench [N, N m] of pull, push and damping; return the attitude error (23)."""
     # with gains that have limit, inset, repulsion, reach, k_p1, k_p2, k_v1 and k_v2
     field = memory.field
-    write_rotation(state.quaternion, R)
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
-    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
-    write_damping(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2, forces)
-    add_turned(R, field.error, -gains.k_p1, forces)
-    add_turned(R, field.push, 1.0, forces)
+    e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    forces[:] = damping(state.velocity_body, e_att, gains.k_p2, gains.k_v1, gains.k_v2)
+    forces[:3] -= gains.k_p1 * (R.T @ field.error)
+    forces[:3] += R.T @ field.push
     return e_att
 
 
 def write_drive(
-    state: VehicleState, R: Array, e_att: Vector3, sigma_p: float, sigma_a: float, memory: PotentialMemory
+    state: VehicleState, R: Matrix3, e_att: Vector3, sigma_p: float, sigma_a: float, memory: PotentialMemory
 ) -> None:
     """Write nu + [sigma_p R^T e; sigma_a e_att], which drives an adaptation, into `memory.drive`."""
-    for i in range(6):
-        memory.drive[i] = state.velocity_body[i]
-    add_turned(R, memory.field.error, sigma_p, memory.drive)
-    for i in range(3):
-        memory.drive[3 + i] += sigma_a * e_att[i]
+    off = np.concatenate((sigma_p * (R.T @ memory.field.error), sigma_a * e_att))
+    memory.drive[:] = state.velocity_body + off
 
 
 def evaluate_field(
@@ -120,12 +117,11 @@ def evaluate_regions(state: VehicleState, goal: PackedRegions, regions: PackedRe
     evaluate_packed(regions, p, e, field.values, field.gradients, field.rotation_gradients, field.clearances)
 
 
-def add_along(gradient: Array, length: float, total: Array) -> None:
-    """Add a vector of a length [N] along a gradient, shape (3,), to `total`; nothing if the gradient is zero."""
-    norm = length3(gradient[0], gradient[1], gradient[2])
-    if not norm <= 0.0:
-        for axis in range(3):
-            total[axis] += length / norm * gradient[axis]
+def add_along(gradient: Vector3, length: float, total: Vector3) -> None:
+    """Add a vector of a length [N] along a gradient to `total`; nothing if the gradient is zero."""
+    size = norm(gradient)
+    if not size <= 0.0:
+        total += length / size * gradient
 
 
 def set_point_error(field: Field, inset: float, most: float) -> None:
@@ -138,32 +134,19 @@ def set_point_error(field: Field, inset: float, most: float) -> None:
     shorten(field.error, most)
 
 
-def shorten(vector: Array, most: float) -> None:
-    """Scale a vector, shape (3,), in place so that it is no longer than `most`; NaN stays."""
-    norm = length3(vector[0], vector[1], vector[2])
-    if norm > most:
-        for axis in range(3):
-            vector[axis] *= most / norm
+def shorten(vector: Vector3, most: float) -> None:
+    """Scale a vector in place so that it is no longer than `most`; NaN stays."""
+    size = norm(vector)
+    if size > most:
+        vector *= most / size
 
 
-def add_turned(R: Array, force: Array, factor: float, wrench: Array) -> None:
-    """Add `factor` times R^T `force` to a body wrench, shape (6,) [N, N m]; the force, shape (3,) [N], is in NED."""
-    for i in range(3):
-        wrench[i] += factor * (R[0, i] * force[0] + R[1, i] * force[1] + R[2, i] * force[2])
+def damping(nu: Vector6, e_att: Vector3, k_p2: float, k_v1: float, k_v2: float) -> Vector6:
+    """Return the part of (25) that every law has [N, N m]: -K_v nu, and -k_p2 times the attitude error (26)."""
+    return np.concatenate((-k_v1 * nu[:3], -k_p2 * e_att - k_v2 * nu[3:]))
 
 
-def write_damping(
-    velocity_body: Array, attitude_error: Vector3, k_p2: float, k_v1: float, k_v2: float, wrench: Array
-) -> None:
-    """Write the part of (25) that every law has, (6,) [N, N m]: -K_v nu, and -k_p2 times the attitude error (26)."""
-    for i in range(3):
-        wrench[i] = -k_v1 * velocity_body[i]
-        wrench[3 + i] = -k_p2 * attitude_error[i] - k_v2 * velocity_body[3 + i]
-
-
-def clip_estimate(estimate: Array, first: int, last: int, bound: float) -> None:
-    """Clip the numbers from `first` up to, not including, `last` of an estimate to +-`bound`; NaN stays."""
+def clip_estimate(estimate: Array, bound: float) -> None:
+    """Clip numbers of an estimate in place to +-`bound`; NaN stays."""
     # This projection prevents windup of the estimate while an obstacle holds the vehicle back.
-    for i in range(first, last):
-        if abs(estimate[i]) > bound:
-            estimate[i] = math.copysign(bound, estimate[i])
+    estimate[:] = np.clip(estimate, -bound, bound)

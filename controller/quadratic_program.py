@@ -26,7 +26,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.linear_algebra import copy
 
 Array = NDArray[np.float64]
 
@@ -84,7 +83,7 @@ def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: A
     # with lower, upper [N], forces [N]
     n = barriers + 2 * forces.size
     tolerance = _TOLERANCE * _prepare(work, barriers, inverse, lower, upper)
-    copy(work.nominal, forces)
+    forces[:] = work.nominal
     count, steps, max_steps = 0, 0, _STEPS_A_ROW * n
     row = _most_violated(work, barriers, lower, upper, forces, tolerance)
     while row >= 0 and steps < max_steps:
@@ -224,7 +223,7 @@ def _refine(
         finite += refined[j]
     if not np.isfinite(finite):  # numbers too great
         return
-    copy(refined, forces)
+    forces[:] = refined
     for a in range(count):
         i = work.passive[a]
         work.multipliers[i] = max(work.multipliers[i] + work.trial[a], 0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextvars
 import functools
 from dataclasses import dataclass
 from typing import Annotated, Any
@@ -26,10 +27,10 @@ Vector4 = Annotated[Array, Shape(4)]
 Vector6 = Annotated[Array, Shape(6)]
 Matrix3 = Annotated[Array, Shape(3, 3)]
 Matrix6 = Annotated[Array, Shape(6, 6)]
+Number = Annotated[Array, Shape(1)]  # a scalar that is kept
 Rows3 = Annotated[Array, Shape(None, 3)]
 Columns3 = Annotated[Array, Shape(3, None)]
 Columns6 = Annotated[Array, Shape(6, None)]
-Number = Annotated[Array, Shape(1)]
 
 
 class Ordered(np.ndarray):
@@ -37,22 +38,24 @@ class Ordered(np.ndarray):
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
         """Run a function of arrays; options as in NumPy."""
-        plain = [x.view(np.ndarray) if isinstance(x, Ordered) else x for x in inputs]
-        out = [x.view(np.ndarray) if isinstance(x, Ordered) else x for x in options.pop("out", ())]
-        own = None if options or out else _IN_ORDER.get((ufunc.__name__, method))
-        if method == "reduce" and options.get("axis", 0) is None:  # of all elements
-            own = _IN_ORDER.get((ufunc.__name__, method))
-        if own is None:
-            options |= {"out": tuple(out)} if out else {}
-            own = functools.partial(getattr(ufunc, method), **options)
-        return ordered(own(*plain))
+        options = {name: _plain(value) for name, value in options.items()}
+        own = _IN_ORDER.get((ufunc.__name__, method)) if options.get("axis") is None and "out" not in options else None
+        run = own or functools.partial(getattr(ufunc, method), **options)
+        return ordered(run(*map(_plain, inputs)))
 
     def __array_function__(self, *arguments: Any) -> Any:
         """Run another function of NumPy."""
         return ordered(super().__array_function__(*arguments))
 
 
-def _product(a: Array, b: Array) -> Array:
+def _plain(value: Any) -> Any:
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    return value.view(np.ndarray) if isinstance(value, Ordered) else value
+
+
+def _product(one: Any, other: Any) -> Array:
+    a, b = np.asarray(one), np.asarray(other)
     if a.shape[-1] != b.shape[0]:
         raise ValueError(f"product of shapes {a.shape} and {b.shape}")
     total = np.zeros(a.shape[:-1] + b.shape[1:])
@@ -97,12 +100,27 @@ def ordered(value: Any) -> Any:
     return value
 
 
+_in_order = contextvars.ContextVar("_in_order", default=False)
+
+
+def interpret(function: Any, arguments: tuple[Any, ...]) -> None:
+    """Run a translated function in Python with the bits of C, and as there without warnings of overflow or 1 / 0."""
+    token = _in_order.set(True)
+    try:
+        with np.errstate(all="ignore"):
+            function(*ordered(arguments))
+    finally:
+        _in_order.reset(token)
+
+
 def zeros(*shape: int) -> Array:
     """Return an array of zeros, which in C lasts until the calling function returns."""
     # It must not be stored beyond the call.
-    return np.zeros(shape).view(Ordered)
+    made = np.zeros(shape)
+    return made.view(Ordered) if _in_order.get() else made
 
 
 def array(*items: Any) -> Array:
     """Return an array of numbers, or of rows, which in C lasts as long as that of `zeros`."""
-    return np.array(items, dtype=float).view(Ordered)
+    made = np.array(items, dtype=float)
+    return made.view(Ordered) if _in_order.get() else made

@@ -16,7 +16,7 @@ import numpy as np
 
 from controller.compiling.library import library_of
 from controller.compiling.text_cache import c_text_of
-from controller.stack_array import ordered
+from controller.stack_array import interpret
 from controller.translator.arguments import words_of
 from controller.translator.types import Type, check_shapes, type_of
 
@@ -62,8 +62,7 @@ class BoundCall:
             call.kept = self._words, arguments  # so that `call` works without this object
             self.call: Callable[[], None] = call
         else:
-            arguments = ordered(arguments) if isinstance(function, FunctionType) else arguments
-            self.words, self.call = 0, functools.partial(_call_without_warnings, function, arguments)
+            self.words, self.call = 0, functools.partial(interpret, function, arguments)
             self._entry = _CALLBACK(self._called_back)
         self.address: int = ctypes.cast(self._entry, ctypes.c_void_p).value or 0
 
@@ -112,12 +111,6 @@ class CompiledFunction:
     def __reduce__(self) -> tuple[Any, ...]:
         """Leave the cache of arrays out of a copy."""
         return CompiledFunction, (self._function,)
-
-
-def _call_without_warnings(function: Any, arguments: tuple[Any, ...]) -> None:
-    """Call a function without warnings of overflow and division by 0, as in C."""
-    with np.errstate(all="ignore"):
-        function(*arguments)
 
 
 def _nothing() -> None:

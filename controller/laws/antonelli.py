@@ -16,13 +16,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import PotentialMemory, clip_estimate, make_memory, write_drive, write_set_point_wrench
-from controller.quaternion import down_parts
+from controller.quaternion import rotation_matrix, skew
 from controller.regions.region_set import PackedRegions
-from controller.stack_array import zeros
+from controller.stack_array import Matrix3, Shape, Vector6, zeros
+
+Regressor = Annotated[Array, Shape(6, 9)]
 
 
 class AntonelliGains(NamedTuple):
@@ -44,15 +46,11 @@ class AntonelliGains(NamedTuple):
     reach: float = 1.499  # m, clearance at which regions begin to push
 
 
-def write_regressor(quaternion: Array, R: Array, Phi: Array) -> None:
-    """Write Phi, shape (6, 9), of a unit quaternion, shape (4,), and its rotation, shape (3, 3), over zeros."""
-    x, y, z = down_parts(quaternion)
-    Phi[3, 1], Phi[3, 2] = -z, y
-    Phi[4, 0], Phi[4, 2] = z, -x
-    Phi[5, 0], Phi[5, 1] = -y, x
-    for i in range(3):
-        for j in range(3):
-            Phi[i, 3 + j] = Phi[3 + i, 6 + j] = R[j, i]
+def regressor(R: Matrix3) -> Regressor:
+    """Return Phi of a rotation."""
+    Phi = zeros(6, 9)
+    Phi[3:, :3], Phi[:3, 3:6], Phi[3:, 6:] = skew(R[2]), R.T, R.T
+    return Phi
 
 
 def step(
@@ -62,27 +60,23 @@ def step(
     weights: Array,
     gains: AntonelliGains,
     memory: PotentialMemory,
-    forces: Array,
+    forces: Vector6,
 ) -> None:
     """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
-    R, Phi, drive, theta = zeros(3, 3), zeros(6, 9), memory.drive, memory.theta
+    R, theta = rotation_matrix(state.quaternion), memory.theta
+    Phi = regressor(R)
     e_att = write_set_point_wrench(state, goal, regions, gains, memory, R, forces)
-    write_regressor(state.quaternion, R, Phi)
-    for i in range(6):
-        for j in range(9):
-            forces[i] += Phi[i, j] * theta[j]
+    forces += Phi @ theta
     # the estimate
     write_drive(state, R, e_att, gains.lambda_p, gains.lambda_a, memory)
-    for j in range(9):
-        k_theta = gains.k_theta if 3 <= j < 6 else gains.k_theta_moment
-        for i in range(6):
-            theta[j] -= memory.period[0] / k_theta * Phi[i, j] * drive[i]
-    clip_estimate(theta, 0, 3, gains.bound_moment)
-    clip_estimate(theta, 3, 6, gains.bound)
-    clip_estimate(theta, 6, 9, gains.bound_moment)
-    memory.estimate[0] = -theta[5]
-    for i in range(3):
-        memory.estimate[1 + i] = theta[i]
+    change = memory.period[0] * (Phi.T @ memory.drive)
+    theta[:3] -= change[:3] / gains.k_theta_moment
+    theta[3:6] -= change[3:6] / gains.k_theta
+    theta[6:] -= change[6:] / gains.k_theta_moment
+    clip_estimate(theta[:3], gains.bound_moment)
+    clip_estimate(theta[3:6], gains.bound)
+    clip_estimate(theta[6:9], gains.bound_moment)
+    memory.estimate[0], memory.estimate[1:] = -theta[5], theta[:3]
 
 
 class AntonelliLaw(WrenchLaw):

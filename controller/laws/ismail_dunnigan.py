@@ -11,14 +11,15 @@ from controller.law import Array, VehicleState, WrenchLaw
 from controller.paper_law import Gains
 from controller.potential_field import Field, empty_field, evaluate_regions
 from controller.regions.region_set import PackedRegions
+from controller.stack_array import Number, Vector4
 
 
 class IsmailDunniganMemory(NamedTuple):
     """State between steps, and work arrays for the regions."""
 
-    desired_quaternion: Array  # (4,)
-    period: Array  # (1,) s
-    estimate: Array  # (4,) phi-hat [N, N m]
+    desired_quaternion: Vector4
+    period: Number  # s
+    estimate: Vector4  # phi-hat [N, N m]
     report: Array  # (0,)
     field: Field  # regions; its error and push are not used
     alphas: Array  # (n,) gains of the regions times their weights
@@ -37,8 +38,7 @@ def step(
     field = memory.field
     # regions push by force alone (22): their derivatives by attitude are not used
     evaluate_regions(state, goal, regions, field)
-    for i in range(weights.size):
-        memory.alphas[i] = regions.gains[i] * weights[i]
+    memory.alphas[:] = regions.gains * weights
     paper_law.step(
         state.quaternion,
         state.velocity_body,

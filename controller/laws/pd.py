@@ -14,8 +14,9 @@ from typing import NamedTuple
 
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import PotentialMemory, make_memory, write_set_point_wrench
+from controller.quaternion import rotation_matrix
 from controller.regions.region_set import PackedRegions
-from controller.stack_array import zeros
+from controller.stack_array import Vector6
 
 
 class PdGains(NamedTuple):
@@ -38,10 +39,10 @@ def step(
     weights: Array,
     gains: PdGains,
     memory: PotentialMemory,
-    forces: Array,
+    forces: Vector6,
 ) -> None:
     """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
-    write_set_point_wrench(state, goal, regions, gains, memory, zeros(3, 3), forces)
+    write_set_point_wrench(state, goal, regions, gains, memory, rotation_matrix(state.quaternion), forces)
 
 
 class PdLaw(WrenchLaw):

@@ -28,7 +28,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -46,13 +45,12 @@ from controller.laws.deployable.barrier import (
     pose_gradient,
 )
 from controller.laws.deployable.model import Dynamics, Thrusters
-from controller.linear_algebra import copy
-from controller.potential_field import Field, add_turned, empty_field, evaluate_field, set_point_error, write_damping
+from controller.potential_field import Field, empty_field, evaluate_field, set_point_error
 from controller.quadratic_program import Workspace
-from controller.quaternion import error_parts, write_rotation
+from controller.quaternion import error, rotation_matrix
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions
-from controller.stack_array import zeros
+from controller.stack_array import Columns6, Matrix3, Number, Vector3, Vector4, Vector6, array, zeros
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _PRICE = 1e-6  # price of slack: squared force that costs as much as the square of slack times mass
@@ -78,15 +76,15 @@ class PidCbfGains(NamedTuple):
 class PidCbfMemory(NamedTuple):
     """State between steps, and work arrays; of six numbers three are linear in NED, three angular in body axes."""
 
-    desired_quaternion: Array  # (4,)
-    period: Array  # (1,) s
-    started: Array  # (1,) 1 after the first measurement
-    position: Array  # (3,) m, NED, estimated
-    velocity: Array  # (6,) m/s, rad/s, over ground, estimated
-    disturbance: Array  # (6,) m/s2, rad/s2: d-hat
+    desired_quaternion: Vector4
+    period: Number  # s
+    started: Number  # 1 after the first measurement
+    position: Vector3  # m, NED, estimated
+    velocity: Vector6  # m/s, rad/s, over ground, estimated
+    disturbance: Vector6  # m/s2, rad/s2: d-hat
     still: model.Loads  # loads of zero, in still water
-    acceleration: Array  # (6, m) acceleration by one newton of each thruster
-    estimate: Array  # (4,) vertical disturbance [N], which counts as weight, then zeros
+    acceleration: Columns6  # acceleration by one newton of each thruster
+    estimate: Vector4  # vertical disturbance [N], which counts as weight, then zeros
     report: Array  # (0,)
     field: Field
     observation: RegionObservation
@@ -105,37 +103,26 @@ def step(
     forces: Array,
 ) -> None:
     """Write the forces as `CompiledLaw.step`; all regions push in full, and hard ones are barriers."""
-    R, free, wrench, force = zeros(3, 3), zeros(6), zeros(6), zeros(3)
     dynamics, thrusters, field, work = memory.dynamics, memory.thrusters, memory.field, memory.program
-    mass, velocity = dynamics.translational_mass[0], memory.velocity
-    write_rotation(state.quaternion, R)
+    mass, velocity, R = dynamics.translational_mass[0], memory.velocity, rotation_matrix(state.quaternion)
     _update_thrusters(thrusters, state.thruster_health)
     # observer
     observe(memory, state, R, gains)
     # nominal forces
-    model.free_acceleration(dynamics, R, velocity[:3], velocity[3:], memory.still, free)
-    for i in range(6):
-        free[i] += memory.disturbance[i]
-    pose = VehicleState(memory.position, state.quaternion, state.velocity_body, state.thruster_health, state.deviation)
-    evaluate_field(pose, goal, regions, gains.repulsion, gains.reach, field)
+    free = model.free_acceleration(dynamics, R, velocity[:3], velocity[3:], memory.still) + memory.disturbance
+    evaluate_field(state._replace(position=memory.position), goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
-    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
-    write_damping(zeros(6), e_att, gains.k_p2, gains.k_v1, gains.k_v2, wrench)
-    for i in range(3):
-        force[i] = -gains.k_p1 * field.error[i] - gains.k_v1 * velocity[i] + field.push[i]
-        force[i] -= mass * memory.disturbance[i]
-        wrench[3 + i] -= gains.k_v2 * velocity[3 + i] + dynamics.mass[3 + i, 3 + i] * memory.disturbance[3 + i]
-    add_turned(R, force, 1.0, wrench)
-    for j in range(forces.size):
-        work.nominal[j] = 0.0
-        for k in range(6):
-            work.nominal[j] += thrusters.allocator[j, k] * wrench[k]
+    e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
+    inertia = array(dynamics.mass[3, 3], dynamics.mass[4, 4], dynamics.mass[5, 5])
+    force = -gains.k_p1 * field.error - gains.k_v1 * velocity[:3] + field.push - mass * memory.disturbance[:3]
+    moment = -gains.k_p2 * e_att - (gains.k_v2 * velocity[3:] + inertia * memory.disturbance[3:])
+    work.nominal[:] = thrusters.allocator @ np.concatenate((R.T @ force, moment))
     # filter
     observe_regions(memory.observation, regions, memory.position, state.quaternion, velocity)
     model.write_thruster_acceleration(dynamics, thrusters, R, R, memory.acceleration, memory.acceleration)
     rows = _write_rows(memory, regions, free, gains)
     quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
-    copy(forces, thrusters.forces)
+    thrusters.forces[:] = forces
     memory.estimate[0] = mass * memory.disturbance[2]
 
 
@@ -150,44 +137,31 @@ def _update_thrusters(thrusters: Thrusters, health: Array) -> None:
         model.reallocate(thrusters)
 
 
-def observe(memory: PidCbfMemory, state: VehicleState, R: Array, gains: PidCbfGains) -> None:
+def observe(memory: PidCbfMemory, state: VehicleState, R: Matrix3, gains: PidCbfGains) -> None:
     """Propagate the observer over the last period, and correct it by the finite measurements."""
-    measured, acceleration, thrust, period = zeros(6), zeros(6), zeros(6), memory.period[0]
-    position, velocity, disturbance = memory.position, memory.velocity, memory.disturbance
-    known = True
-    for i in range(3):
-        for k in range(3):
-            measured[i] += R[i, k] * state.velocity_body[k]
-        measured[3 + i] = state.velocity_body[3 + i]
-        known = known and math.isfinite(state.position[i])
-    for i in range(6):
-        known = known and math.isfinite(measured[i])
+    position, velocity, disturbance, period = memory.position, memory.velocity, memory.disturbance, memory.period[0]
+    measured = np.concatenate((R @ state.velocity_body[:3], state.velocity_body[3:]))
+    known = np.all(np.isfinite(state.position)) and np.all(np.isfinite(measured))
     if memory.started[0] == 0.0:
         if known:
-            copy(state.position, position)
-            copy(measured, velocity)
-            memory.started[0] = 1.0
+            position[:], velocity[:], memory.started[0] = state.position, measured, 1.0
         return
-    model.free_acceleration(memory.dynamics, R, velocity[:3], velocity[3:], memory.still, acceleration)
-    model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.forces, thrust)
-    z = 1.0 / (1.0 + gains.observer * period)
-    for i in range(3):
-        position[i] += period * velocity[i]
-        if known:
-            position[i] += (1.0 - z) * (state.position[i] - position[i])
-    for i in range(6):
-        velocity[i] += period * (acceleration[i] + thrust[i] + disturbance[i])
-        if known:
-            error = measured[i] - velocity[i]
-            velocity[i] += (1.0 - square(z)) * error
-            disturbance[i] += square(1.0 - z) / period * error
+    acceleration = model.free_acceleration(memory.dynamics, R, velocity[:3], velocity[3:], memory.still)
+    acceleration += model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.forces)
+    position += period * velocity[:3]
+    velocity += period * (acceleration + disturbance)
+    if known:
+        z, error = 1.0 / (1.0 + gains.observer * period), measured - velocity
+        position += (1.0 - z) * (state.position - position)
+        velocity += (1.0 - square(z)) * error
+        disturbance += square(1.0 - z) / period * error
 
 
-def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Array, gains: PidCbfGains) -> int:
+def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Vector6, gains: PidCbfGains) -> int:
     """Write the barrier of each hard region that the thrusters could violate; return the number of barriers."""
-    # `free`, shape (6,), is the acceleration without thrust.
+    # `free` is the acceleration without thrust.
     work, observation, rows = memory.program, memory.observation, 0
-    n, later, relative = zeros(6), zeros(6), zeros(6)
+    n, later = zeros(6), zeros(6)
     lower, upper, price = (
         memory.thrusters.lower,
         memory.thrusters.upper,
@@ -199,15 +173,12 @@ def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Array, gains
             observation.gradients, observation.rotation_gradients, i, of_attitude, n
         ):
             continue
-        for axis in range(6):
-            relative[axis] = memory.velocity[axis] - (regions.velocities[i, axis] if axis < 3 else 0.0)
+        relative = memory.velocity.copy()
+        relative[:3] -= regions.velocities[i]
         turning = 0.0
         if pose_gradient(observation.later_gradients, observation.later_rotation_gradients, i, of_attitude, later):
             turning = gradient_rate(regions.kinds[i], regions.signs[i], n, later, relative)
-        h, rate, drift_term = observation.clearances[i] - gains.margin, 0.0, 0.0
-        for axis in range(6):
-            rate += n[axis] * relative[axis]
-            drift_term += n[axis] * free[axis]
+        h, rate, drift_term = observation.clearances[i] - gains.margin, float(n @ relative), float(n @ free)
         right = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * h - drift_term - turning
         rows = add_row(work, rows, n, memory.acceleration, right, price, lower, upper)
     return rows

@@ -16,9 +16,10 @@ from typing import NamedTuple
 
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.potential_field import PotentialMemory, clip_estimate, make_memory, write_drive, write_set_point_wrench
+from controller.quaternion import rotation_matrix
 from controller.regions.region_set import PackedRegions
-from controller.restoring import write_regressor
-from controller.stack_array import zeros
+from controller.restoring import regressor
+from controller.stack_array import Vector6
 
 
 class SunCheahGains(NamedTuple):
@@ -46,22 +47,17 @@ def step(
     weights: Array,
     gains: SunCheahGains,
     memory: PotentialMemory,
-    forces: Array,
+    forces: Vector6,
 ) -> None:
     """Write the forces as `CompiledLaw.step`; all regions push in full, whatever their weights."""
-    R, Z, drive, estimate = zeros(3, 3), zeros(6, 4), memory.drive, memory.estimate
+    R, Z, estimate = rotation_matrix(state.quaternion), regressor(state.quaternion), memory.estimate  # (3), (12)
     e_att = write_set_point_wrench(state, goal, regions, gains, memory, R, forces)
-    write_regressor(state.quaternion, Z)  # (12)
-    for i in range(6):
-        for j in range(4):
-            forces[i] += Z[i, j] * estimate[j]
+    forces += Z @ estimate
     # the estimate
     write_drive(state, R, e_att, gains.sigma_p, gains.sigma_a, memory)
-    for j in range(4):
-        for i in range(6):
-            estimate[j] -= memory.period[0] / gains.gamma * Z[i, j] * drive[i]
-    clip_estimate(estimate, 0, 1, gains.bound)
-    clip_estimate(estimate, 1, 4, gains.bound_moment)
+    estimate -= memory.period[0] / gains.gamma * (Z.T @ memory.drive)
+    clip_estimate(estimate[:1], gains.bound)
+    clip_estimate(estimate[1:4], gains.bound_moment)
 
 
 class SunCheahLaw(WrenchLaw):

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 from controller import paper_law
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.paper_law import Gains, positive_part
+from controller.paper_law import Gains, primary_error
 from controller.potential_field import PotentialMemory, clip_estimate, evaluate_field, make_memory, shorten
-from controller.quaternion import error_parts, rotation_rows
+from controller.quaternion import error, rotation_matrix
 from controller.regions.region_set import PackedRegions
 
 
@@ -48,17 +48,15 @@ def step(
     k_q = 1.0  # cancels
     g = Gains(gains.k_p1, gains.k_p2, k_q, gains.k_v1, gains.k_v2, gains.sigma_p, gains.sigma_a, gains.gamma)
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
-    f = positive_part(field.goal_value[0] + gains.margin)
-    for axis in range(3):
-        field.error[axis] = f * field.goal_gradient[0, axis]  # (20)
+    field.error[:] = primary_error(field.goal_value[0] + gains.margin, field.goal_gradient[0])  # (20)
     shorten(field.error, gains.limit / gains.k_p1)
-    e_p = (field.error[0], field.error[1], field.error[2])
-    e_s = (-field.push[0] / k_q, -field.push[1] / k_q, -field.push[2] / k_q)  # (21), (22)
-    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]  # (23)
-    R = rotation_rows(state.quaternion)
-    paper_law.apply(e_p, e_s, e_att, R, state.velocity_body, g, memory.period[0], estimate, forces)  # (25), (27)
-    clip_estimate(estimate, 0, 1, gains.bound)
-    clip_estimate(estimate, 1, 4, gains.bound_moment)
+    e_s = -field.push / k_q  # (21), (22)
+    e_att, R = error(memory.desired_quaternion, state.quaternion)[1:], rotation_matrix(state.quaternion)  # (23), (3)
+    paper_law.apply(
+        field.error, e_s, e_att, R, state.velocity_body, g, memory.period[0], estimate, forces
+    )  # (25), (27)
+    clip_estimate(estimate[:1], gains.bound)
+    clip_estimate(estimate[1:4], gains.bound_moment)
 
 
 class UnarbitratedLaw(WrenchLaw):

@@ -29,7 +29,7 @@ from controller.navigation.inertial import estimate_at, rotate
 from controller.navigation.measurements import DEPTH, DEPTH_SENSOR, DVL, HEADING, USBL, Measurements, SensorModel
 from controller.navigation.measurements import POSITION as MEASURED_POSITION
 from controller.navigation.measurements import VELOCITY as MEASURED_VELOCITY
-from controller.quaternion import write_rotation
+from controller.quaternion import rotation_matrix
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -48,11 +48,11 @@ def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sens
     """Correct the estimate by the last sample of a sensor."""
     count = 3 if sensor in (DVL, USBL) else 1
     position, velocity, quaternion, innovation = zeros(3), zeros(3), zeros(4), zeros(3)
-    rows, R = zeros(3, 18), zeros(3, 3)
+    rows = zeros(3, 18)
     if not estimate_at(memory, measurements.times[sensor], position, velocity, quaternion):
         memory.innovations[sensor, 2] += 1.0
         return
-    write_rotation(quaternion, R)
+    R = rotation_matrix(quaternion)
     noise = _predict_sample(memory, measurements, sensor, sensors, position, velocity, R, innovation, rows)
     if noise < 0.0:
         return
@@ -217,8 +217,7 @@ def _correct_number(memory: NavigationMemory, error: Array, innovation: float, n
 
 def _apply(memory: NavigationMemory, error: Array) -> None:
     """Add an estimated error, shape (18,), to the estimate."""
-    R, turn = zeros(3, 3), zeros(3)
-    write_rotation(memory.quaternion, R)
+    R, turn = rotation_matrix(memory.quaternion), zeros(3)
     for i in range(3):
         memory.position[i] += error[POSITION + i]
         memory.velocity[i] += error[VELOCITY + i]

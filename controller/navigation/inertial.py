@@ -23,7 +23,7 @@ from controller.navigation.estimate import (
     NavigationMemory,
 )
 from controller.navigation.measurements import SensorModel
-from controller.quaternion import write_rotation
+from controller.quaternion import rotation_matrix
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -34,12 +34,12 @@ _DRIFT = 1e-3  # 1/sqrt(s), random walk of a constant error, as a fraction of it
 def propagate(memory: NavigationMemory, force: Array, omega: Array, sensors: SensorModel, period: float) -> None:
     """Propagate over a period [s] up to a sample of specific force [m/s2] and rates [rad/s], body axes, (3,) each."""
     # The force is that of the period before the sample; the rates change evenly within it.
-    R, turn, f = zeros(3, 3), zeros(3), zeros(3)
+    turn, f = zeros(3), zeros(3)
     for i in range(3):
         turn[i] = 0.5 * period * (memory.omega[i] + omega[i])
         f[i] = 0.5 * turn[i]
     rotate(memory.quaternion, f)  # to the middle of the period
-    write_rotation(memory.quaternion, R)
+    R = rotation_matrix(memory.quaternion)
     rotate(memory.quaternion, f)
     for axis in range(3):
         f[axis] = 0.0

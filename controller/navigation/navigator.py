@@ -37,7 +37,7 @@ from controller.navigation.measurements import (
     empty_measurements,
 )
 from controller.navigation.measurements import POSITION as MEASURED_POSITION
-from controller.quaternion import write_rotation
+from controller.quaternion import rotation_matrix
 from controller.stack_array import zeros
 
 Array = NDArray[np.float64]
@@ -135,11 +135,11 @@ def _set_attitude(quaternion: Array, roll: float, pitch: float, yaw: float) -> N
 
 def _write_state(memory: NavigationMemory, sensors: SensorModel, now: float, state: VehicleState) -> None:
     """Write the state at a time [s] with its standard deviations."""
-    velocity, R, P = zeros(3), zeros(3, 3), memory.covariance
+    velocity, P = zeros(3), memory.covariance
     known = memory.started[0] > 0.0 and now - memory.time[0] <= _MAX_GAP
     if known:
         estimate_at(memory, now, state.position, velocity, state.quaternion)
-        write_rotation(state.quaternion, R)
+    R = rotation_matrix(state.quaternion)
     fastest = 0.0
     for i in range(3):
         fastest = max(fastest, P[VELOCITY + i, VELOCITY + i])

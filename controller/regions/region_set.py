@@ -30,7 +30,7 @@ from controller.regions.shape import (
 from controller.regions.shapes import ENTRIES
 from controller.regions.shapes.depth_band import band_about
 from controller.regions.shapes.sphere import sphere_about
-from controller.stack_array import zeros
+from controller.stack_array import Rows3, zeros
 
 SHAPES: dict[str, type[Shape]] = {name: entry.shape for name, entry in ENTRIES.items()}
 
@@ -120,11 +120,11 @@ class PackedRegions(NamedTuple):
     signs: Array  # (n,) +1 kept within, -1 kept out of
     offsets: NDArray[np.int64]  # (n + 1,) into `numbers`
     numbers: Array  # packed numbers of the shapes, consecutive
-    shifts: Array  # (n, 3) m, NED: displacement of each from its packed place
-    velocities: Array  # (n, 3) m/s, NED
+    shifts: Rows3  # m, NED: displacement of each from its packed place
+    velocities: Rows3  # m/s, NED
     gains: Array  # (n,) alpha_i
     hard: NDArray[np.bool_]  # (n,) True for a hard region
-    deviations: Array  # (n, 3) m, standard deviations of each place, NED
+    deviations: Rows3  # m, standard deviations of each place, NED
     crossing_costs: Array  # (n,) m, added to a path's length per meter through each, half a meter deep
 
     def evaluate(

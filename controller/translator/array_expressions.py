@@ -97,7 +97,8 @@ class ArrayExpressions(Operands):
             strides = tuple(self.product(sizes[k + 1 :]) for k in range(kind.ndim))
         else:
             strides = tuple(f"{code}.s{i}" for i in range(kind.ndim))
-        return View(kind, code, True, roots, f"{code}.data", "0", sizes, strides)
+        box, axes = tuple(("0", n) for n in sizes), tuple(range(kind.ndim))
+        return View(kind, code, True, roots, f"{code}.data", "0", sizes, strides, False, box, axes)
 
     def product(self, sizes: Iterable[str]) -> str:
         """Return the C product of lengths."""
@@ -128,8 +129,8 @@ class ArrayExpressions(Operands):
             return operand
         if isinstance(operand, View):
             assert isinstance(operand.type, Array)
-            reads = ((operand.roots, operand),)
-            return Grid(operand.type.item, operand.sizes, lambda index: self.element_of(operand, index), reads)
+            item, reads = operand.type.item, ((operand, True),)
+            return Grid(item, operand.sizes, lambda index: self.element_of(operand, index), reads)
         value = self.scalar(operand, node)
         held = value if value.simple else self.temporary(value.type, value.code)
         assert isinstance(held.type, Scalar)
@@ -196,7 +197,8 @@ class ArrayExpressions(Operands):
         if not rows and len(b.sizes) == 1:
             value = at(())
             return self.temporary(value.type, value.code)
-        return Grid(DOUBLE, (*a.sizes[:rows], *b.sizes[1:]), at, (*_elsewhere(a), *_elsewhere(b)), True)
+        factors = (a, b) if len(a.sizes) == len(b.sizes) == 2 else None
+        return Grid(DOUBLE, (*a.sizes[:rows], *b.sizes[1:]), at, (*_elsewhere(a), *_elsewhere(b)), True, factors)
 
     def _for_reuse(self, operand: Operand, grid: Grid, node: ast.AST) -> Grid:
         if isinstance(operand, Grid) and known_shape(grid.sizes):
@@ -269,7 +271,29 @@ class ArrayExpressions(Operands):
             assert isinstance(target.type, Array)
             self.lines.append(f"{element.code} = {self.converted(value, target.type.item)};")
 
-        self.each(sizes, write)
+        if grid.factors and op is None and not known_shape([*sizes, *grid.factors[1].sizes]):
+            self._store_product(target, sizes, *grid.factors, node)
+        else:
+            self.each(sizes, write)
+
+    def _store_product(self, target: View, sizes: Index, a: Grid, b: Grid, node: ast.AST) -> None:
+        """Store a product of matrices row by row, in the same order of sums: fast along rows."""
+
+        def add(i: str, k: str) -> None:
+            factor = self.temporary(a.item, a.at((i, k)).code)
+            self._loop(sizes[1], lambda j: self.lines.append(f"{at(i, j)} += {times_of(factor, b.at((k, j)))};"))
+
+        def row(i: str) -> None:
+            self._loop(sizes[1], lambda j: self.lines.append(f"{at(i, j)} = 0.0;"))
+            self._loop(b.sizes[0], lambda k: add(i, k))
+
+        def at(*index: str) -> str:
+            return self.element_of(target, index).code
+
+        def times_of(one: Value, other: Value) -> str:
+            return self.converted(self.scalar(self.arithmetic(ast.Mult(), one, other, node), node), DOUBLE)
+
+        self._loop(sizes[0], row)
 
     def is_local(self, roots: frozenset[str]) -> bool:
         """Return True if an array is storage of this function."""
@@ -277,11 +301,11 @@ class ArrayExpressions(Operands):
 
     def _overlaps(self, target: View, grid: Grid) -> bool:
         """Return True if an element may be read after it was written."""
-        for roots, view in grid.reads:
-            same = view is not None and (view.data, view.offset, view.sizes, view.strides) == (
-                target.data, target.offset, target.sizes, target.strides,
-            )  # fmt: skip
-            if not same and self.may_overlap(roots, target.roots):
+        own = target.data, target.offset, target.sizes, target.strides
+        for view, same_index in grid.reads:
+            same = same_index and (view.data, view.offset, view.sizes, view.strides) == own
+            apart = view.data == target.data and any(map(_are_apart, view.box, target.box))
+            if not same and not apart and self.may_overlap(view.roots, target.roots):
                 return True
         return False
 
@@ -340,7 +364,7 @@ class ArrayExpressions(Operands):
         apart: list[Operand] = []
         for item in items:
             if self.is_array(item):
-                overlaps = any(self.may_overlap(roots, target.roots) for roots, _ in self.grid(item, node).reads)
+                overlaps = any(self.may_overlap(view.roots, target.roots) for view, _ in self.grid(item, node).reads)
                 apart.append(self.materialized(item, node) if overlaps else item)
             else:
                 value = self.scalar(item, node)
@@ -357,8 +381,17 @@ class ArrayExpressions(Operands):
         """Return an array with its axes reversed."""
         view = operand if isinstance(operand, View) else self.materialized(operand, node)
         assert isinstance(view.type, Array)
-        return self.view(view.type.item, view.data, view.offset, view.sizes[::-1], view.strides[::-1], view.roots)
+        turned = self.view(view.type.item, view.data, view.offset, view.sizes[::-1], view.strides[::-1], view.roots)
+        return replace(turned, box=view.box, axes=view.axes[::-1])
 
 
-def _elsewhere(grid: Grid) -> Iterable[tuple[frozenset[str], None]]:
-    return [(roots, None) for roots, _ in grid.reads]
+def _elsewhere(grid: Grid) -> Iterable[tuple[View, bool]]:
+    return [(view, False) for view, _ in grid.reads]
+
+
+def _are_apart(one: tuple[str, str], other: tuple[str, str]) -> bool:
+    """Return True if two ranges of indices, first and length, are known to have none in common."""
+    for (begin, _), (first, length) in ((one, other), (other, one)):
+        if begin.isdigit() and first.isdigit() and length.isdigit() and int(begin) >= int(first) + int(length):
+            return True
+    return False

@@ -14,7 +14,7 @@ from controller.stack_array import array, zeros
 from controller.translator.foreign import POINTER, call_c
 from controller.translator.operands import Known, Operand, Value, bracketed
 from controller.translator.subscripts import Subscripts
-from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, name_of, unified
+from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Record, name_of, unified
 
 _MATH = {
     "sqrt": "sqrt", "cos": "cos", "sin": "sin", "acos": "acos", "atan2": "atan2", "hypot": "hypot",
@@ -33,6 +33,8 @@ class Calls(Subscripts):
     def _call(self, node: ast.Call) -> Operand:
         if isinstance(node.func, ast.Attribute) and node.func.attr == "copy":
             return self.materialized(self.expression(node.func.value), node)
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
+            return self._replaced(node.func, node)
         called = self.expression(node.func)
         if not isinstance(called, Known):
             self.fail(node, "a call of what is no function")
@@ -66,6 +68,17 @@ class Calls(Subscripts):
         if isinstance(function, python_types.FunctionType):
             return self.call_translated(function, operands, node)
         return self.fail(node, f"a call of {name or function!r}")
+
+    def _replaced(self, function: ast.Attribute, node: ast.Call) -> Value:
+        """Return a named tuple with other values of some fields."""
+        record = self.value(self.expression(function.value), node)
+        if not isinstance(record.type, Record) or not {k.arg for k in node.keywords} <= {*record.type.fields}:
+            self.fail(node, "_replace of what is no named tuple, or of a field that it does not have")
+        changes = dict(
+            zip((k.arg for k in node.keywords), self.in_order([k.value for k in node.keywords]), strict=True)
+        )
+        items = [changes.get(field) or self.field(record, field) for field in record.type.fields]
+        return self.make_record(record.type.python, [self.value(item, node) for item in items], node)
 
     def _of_arrays(self, function: Any, operands: Sequence[Operand], node: ast.AST) -> Operand | None:
         """Return what a function makes of, or from, whole arrays; None if it is none of these."""

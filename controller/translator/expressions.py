@@ -46,11 +46,7 @@ class Expressions(ArrayExpressions):
             case Known(value):
                 return Known(getattr(value, node.attr))
             case Value(Record() as kind) if node.attr in kind.fields:
-                item = kind.items[kind.fields.index(node.attr)]
-                inside = f"{bracketed(owner)}->{node.attr}"
-                paths = [f"{root}.{node.attr}" for root in owner.roots]
-                roots = frozenset().union(*(self.made.get(path, {path}) for path in paths))
-                return self.held(item, f"(&{inside})" if isinstance(item, Record) else inside, True, roots)
+                return self.field(owner, node.attr)
             case View() if node.attr == "size":
                 return _length(self.product(owner.sizes))
             case View() if node.attr == "shape":
@@ -58,6 +54,14 @@ class Expressions(ArrayExpressions):
         if node.attr == "T" and self.is_array(owner):
             return self.transposed(owner, node)
         return self.fail(node, f"attribute {node.attr}")
+
+    def field(self, record: Value, name: str) -> Value:
+        """Return a field of a named tuple."""
+        assert isinstance(record.type, Record)
+        item, inside = record.type.items[record.type.fields.index(name)], f"{bracketed(record)}->{name}"
+        paths = [f"{root}.{name}" for root in record.roots]
+        roots = frozenset().union(*(self.made.get(path, {path}) for path in paths))
+        return self.held(item, f"(&{inside})" if isinstance(item, Record) else inside, True, roots)
 
     def _tuple(self, node: ast.Tuple) -> Operand:
         return Items(tuple(self.in_order(node.elts)))

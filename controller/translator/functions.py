@@ -128,7 +128,9 @@ class Function(Statements):
 
     def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str]) -> Value:
         """Return what a C variable or member holds."""
-        return self.view_of(kind, code, roots) if isinstance(kind, Array) else Value(kind, code, simple, roots)
+        if isinstance(kind, Array):
+            return self.view_of(kind, code, roots)
+        return Value(kind, code, simple, frozenset() if isinstance(kind, Scalar) else roots)
 
     def storage(self, stem: str, node: ast.AST, item: Scalar, size: int) -> str:
         """Declare storage on the stack, one for each place in the text, and return its name."""

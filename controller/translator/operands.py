@@ -46,6 +46,8 @@ class View(Value):
     sizes: tuple[str, ...] = ()  # C expressions; those that are known at translation are numbers
     strides: tuple[str, ...] = ()
     fresh: bool = False  # True if it was just made, and has no name yet
+    box: tuple[tuple[str, str], ...] = ()  # first index and length along each axis of what `data` points to
+    axes: tuple[int, ...] = ()  # its own axes among these
 
 
 @dataclass(frozen=True)
@@ -55,8 +57,9 @@ class Grid:
     item: Scalar
     sizes: tuple[str, ...]
     at: Callable[[tuple[str, ...]], Value]  # an element by its index
-    reads: tuple[tuple[frozenset[str], View | None], ...]  # roots of what it reads; the array, if at the same index
+    reads: tuple[tuple[View, bool], ...]  # what it reads, and if at the same index
     adds: bool = False  # True if an element is a sum
+    factors: tuple[Grid, Grid] | None = None  # of a product of matrices
 
 
 Operand = Value | Known | Items | Grid
@@ -160,6 +163,10 @@ class Operands:
         """Return the C expression of an array's struct, of a type that holds it."""
         raise NotImplementedError
 
+    def element_of(self, view: View, index: Sequence[str]) -> Value:
+        """Return an element of an array."""
+        raise NotImplementedError
+
     def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str]) -> Value:
         """Return what a C variable or member holds."""
         raise NotImplementedError
@@ -189,6 +196,8 @@ class Operands:
             case Value(Tuple() as kind, code):
                 codes = [f"{code}.{kind.item(i)}" for i in range(len(kind.items))]
                 return [self.held(k, c, operand.simple, operand.roots) for k, c in zip(kind.items, codes, strict=True)]
+            case View() if len(operand.sizes) == 1 and operand.sizes[0].isdigit():
+                return [self.element_of(operand, (str(i),)) for i in range(int(operand.sizes[0]))]
         return self.fail(node, "expected a tuple")
 
 

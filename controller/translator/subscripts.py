@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Sequence
+from dataclasses import replace
 
 from controller.translator.array_expressions import plus, times
 from controller.translator.expressions import Expressions
@@ -52,19 +53,24 @@ class Subscripts(Expressions):
             self.fail(node, f"{len(places)} indices of {name_of(array.type)}")
         if all(map(_is_whole, places)):
             return array
-        terms, sizes, strides = [array.offset], [], []
+        axes: list[int] = []
+        terms, sizes, strides, box = [array.offset], [], [], list(array.box)
         for axis, stride in enumerate(array.strides):
             place = places[axis] if axis < len(places) else ast.Slice()
             if isinstance(place, ast.Slice):
                 begin, size = self._bounds(array.sizes[axis], place)
                 sizes.append(size)
                 strides.append(stride)
+                axes += array.axes[axis : axis + 1]
             else:
-                begin = self.index(array.sizes[axis], place)
+                begin, size = self.index(array.sizes[axis], place), "1"
             terms.append(times(begin, stride))
+            for k in array.axes[axis : axis + 1]:
+                box[k] = plus([box[k][0], begin]), size
         if not sizes:
             return Value(array.type.item, f"{array.data}[{plus(terms)}]")
-        return self.view(array.type.item, array.data, plus(terms), tuple(sizes), tuple(strides), array.roots)
+        view = self.view(array.type.item, array.data, plus(terms), tuple(sizes), tuple(strides), array.roots)
+        return replace(view, box=tuple(box), axes=tuple(axes))
 
     def index(self, size: str, node: ast.expr) -> str:
         """Return an index of an axis; one that is a negative constant counts from the end."""

@@ -90,7 +90,8 @@ def annotated_shapes(owner: Any) -> dict[str, tuple[int | None, ...]]:
     shapes: dict[str, tuple[int | None, ...]] = {}
     names = getattr(owner, "__globals__", None) or vars(sys.modules[owner.__module__])
     for name, annotation in owner.__annotations__.items():
-        kind = names.get(annotation) if isinstance(annotation, str) else annotation
+        text = getattr(annotation, "__forward_arg__", annotation)
+        kind = names.get(text) if isinstance(text, str) else annotation
         for extra in getattr(kind, "__metadata__", ()):
             if isinstance(extra, Shape):
                 shapes[name] = extra.lengths

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from controller import paper_law
 from controller.force_limits import max_forces
 from controller.paper_law import primary_error, secondary_error
-from controller.quaternion import error_parts, rotation_rows
+from controller.quaternion import error, rotation_matrix
 from controller.regions.region_set import evaluate_at_pose
 from cosim.precheck.finding import Finding, status
 from cosim.precheck.thrust_margin import Margin, ThrustMargin, held_wrench, least_margins, thrust_margin
@@ -87,10 +87,10 @@ def initial_force_finding(scenario: Scenario, weights: Array) -> Finding:
     values, gradients, _ = evaluate_at_pose(regions, initial.position, initial.quaternion)
     betas = np.array([region.gain for region in regions]) * weights / gains.k_q
     quaternion, desired = np.array(initial.quaternion), np.array(scenario.law.desired_quaternion)
-    R, turned = rotation_rows(quaternion), error_parts(desired, quaternion)
+    R, e_att = rotation_matrix(quaternion), error(desired, quaternion)[1:]
     e_p, e_s = primary_error(float(f), slope), secondary_error(values, gradients, betas)
     tau, velocity = np.empty(6), np.array(initial.velocity)
-    paper_law.apply(tuple(e_p), tuple(e_s), turned[1:], R, velocity, gains, 0.0, np.zeros(4), tau)
+    paper_law.apply(e_p, e_s, e_att, R, velocity, gains, 0.0, np.zeros(4), tau)
     force = tau[:3]
     required = float(np.linalg.norm(force))
     if not required > 0.0:

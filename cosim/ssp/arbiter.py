@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import dataclasses
+import re
 from collections.abc import Iterator
 
 from cosim.scenario.scenario import Scenario
 from cosim.ssp.c_sources import c_files, under_own_names
 from cosim.ssp.documentation import contents
+from fuzzy_arbiter import System
 from fuzzy_arbiter.export import to_c
 from plant_fmu import quantities as q
 from plant_fmu.component import Component
@@ -19,6 +20,8 @@ fuzzy arbiter gives to each comes out, by the exact form of its rules.
 
 The weights are worked out in a step, from the inputs at its beginning, once in each time.arbiter counted
 from the start, and hold until the next time; before the first step they are 0."""
+
+_DECLARATION = re.compile(r"^int (\w+)\(const double inputs\[\d+\], double outputs\[\d+\]\);$", re.MULTILINE)
 
 
 def arbiter_component(scenario: Scenario) -> Component:
@@ -37,11 +40,7 @@ def arbiter_component(scenario: Scenario) -> Component:
         name="arbiter",
         description="Fuzzy arbiter: which criterion matters now",
         variables=rows,
-        sources={
-            **c_files("cosim.ssp", "csrc/arbiter"),
-            **under_own_names({"rules.c": to_c(dataclasses.replace(scenario.rules.system, name="rules")).encode()}),
-            "ticks.h": c_files("cosim.ssp", "csrc")["ticks.h"],
-        },
+        sources=_sources(scenario.rules.system),
         contents=lambda fmi: contents("Arbiter", _WORDS, rows, fmi),
         constants={"N_CRITERIA": len(scenario.criteria), "N_RULE_INPUTS": len(scenario.rules.inputs)},
         stop_time=scenario.time.duration,
@@ -59,3 +58,16 @@ def _inputs(scenario: Scenario) -> Iterator[Variable]:
     for i, name in enumerate(() if scenario.rules.signals else scenario.criterion_names):
         what = f"Degree to which criterion {name} asks for attention"
         yield Variable(f"membership.{name}", "input", f"inputs[{i}]", q.FRACTION, what)
+
+
+def _sources(system: System) -> dict[str, bytes]:
+    code = to_c(system)
+    declared = _DECLARATION.search(code)
+    if declared is None:
+        raise AssertionError("the arbiter's C code declares no function that evaluates it")
+    header = f"/* The arbiter's rules: generated. */\n{declared[0]}\n#define EVALUATE_RULES {declared[1]}\n"
+    return {
+        **c_files("cosim.ssp", "csrc/arbiter"),
+        **under_own_names({"rules.c": code.encode(), "rules.h": header.encode()}),
+        "ticks.h": c_files("cosim.ssp", "csrc")["ticks.h"],
+    }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from controller import CompiledLaw, LawError
 from controller.navigation.measurements import SENSORS
@@ -13,7 +13,7 @@ from cosim.scenario.keys import comments, unit_of_gain
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
-from cosim.ssp.c_sources import c_files
+from cosim.ssp.c_sources import c_files, under_own_names
 from cosim.ssp.documentation import contents
 from cosim.ssp.loop import Loop
 from cosim.ssp.translated import translate_controller
@@ -49,23 +49,16 @@ _GAIN_UNITS = {"m2": "N/m2", "m": "N/m", "": "N", "rad": "N/rad"}
 def controller_component(scenario: Scenario) -> Component:
     """Make the component of a scenario's controller."""
     regions = [scenario.goal_region, *(secondary.region for secondary in scenario.regions)]
-    names, loop, plant = prefixes(regions), Loop(scenario), plant_sources()
-    inputs, parameters = [*_inputs(scenario, loop)], [*_parameters(scenario, loop), *_region_parameters(regions, loop)]
-    code = translate_controller(loop, scenario, regions, names)
-    time = Variable("time", "time", "time", q.TIME, "Simulated time")
-    rows = time, *inputs, *_outputs(scenario, regions, loop), *parameters
+    loop = Loop(scenario)
+    files = translate_controller(loop, scenario, regions, prefixes(regions))
+    rows = tuple(_variables(scenario, regions, loop))
     return Component(
         name="controller",
         description=f"Law {scenario.law.name} of the scenario: {scenario.title}",
         variables=rows,
-        sources={
-            **c_files("cosim.ssp", "csrc/controller"),
-            "loop.h": code,
-            "ticks.h": c_files("cosim.ssp", "csrc")["ticks.h"],
-            **{name: plant[name] for name in ("random.c", "random.h", "elementary.c", "elementary.h")},
-        },
+        sources=_sources(files),
         contents=lambda fmi: contents("Controller", _WORDS, rows, fmi),
-        constants=loop.memory.sizes() | {"N_GAINS": max(len(loop.law.gains), 1)},
+        constants=loop.constants | loop.memory.sizes(),
         stop_time=scenario.time.duration,
         step=scenario.time.step,
     )
@@ -83,18 +76,38 @@ def prefixes(regions: Sequence[Region]) -> list[str]:
     return found
 
 
-def _inputs(scenario: Scenario, loop: Loop) -> Iterator[Variable]:
+def _sources(files: Mapping[str, str]) -> dict[str, bytes]:
+    plant = plant_sources()
+    return {
+        **c_files("cosim.ssp", "csrc/controller"),
+        **under_own_names({name: text.encode() for name, text in files.items()}),
+        "ticks.h": c_files("cosim.ssp", "csrc")["ticks.h"],
+        **{name: plant[name] for name in ("random.c", "random.h", "elementary.c", "elementary.h")},
+    }
+
+
+def _variables(scenario: Scenario, regions: Sequence[Region], loop: Loop) -> Iterator[Variable]:
+    yield Variable("time", "time", "time", q.TIME, "Simulated time")
     yield from _motion("", "input", loop, loop.inputs.motion, [0.0] * 13, "The vehicle's")
-    # a sample of each sensor output of the plant
-    sensed = [v for v in variables(scenario.vehicle) if v.name.startswith("measured.")]
-    places = [
-        loop.member(array, i) for array in (loop.inputs.samples, loop.inputs.sample_times) for i in range(array.size)
-    ]
-    for v, place in zip(sensed, places, strict=False):  # there are no places without sensors
-        yield Variable(v.name, "input", place, Quantity(v.quantity.unit, -1e15, 1e15), v.description)
+    if scenario.sensing.through == "sensors":
+        yield from _samples(scenario, loop)
     for i, name in enumerate(scenario.criterion_names):
-        place = loop.member(loop.data.by_criterion, i)
-        yield Variable(f"weight.{name}", "input", place, q.FRACTION, f"Weight of criterion {name}")
+        yield Variable(
+            f"weight.{name}", "input", loop.member(loop.data.by_criterion, i), q.FRACTION, f"Weight of criterion {name}"
+        )
+    yield from _outputs(scenario, regions, loop)
+    yield from _parameters(scenario, loop)
+    yield from _region_parameters(regions, loop)
+
+
+def _samples(scenario: Scenario, loop: Loop) -> Iterator[Variable]:
+    """Yield an input for each sensor output of the plant."""
+    found = [v for v in variables(scenario.vehicle) if v.name.startswith("measured.")]
+    values = [v for v in found if not v.name.startswith("measured.time.")]
+    for array, rows in ((loop.inputs.samples, values), (loop.inputs.sample_times, found[len(values) :])):
+        for i, v in enumerate(rows):
+            quantity = Quantity(v.quantity.unit, -1e15, 1e15)
+            yield Variable(v.name, "input", loop.member(array, i), quantity, v.description)
 
 
 def _motion(

@@ -1,8 +1,6 @@
-"""A scenario's controller in its FMU: the arguments of its step, and the places of their arrays."""
+"""A scenario's controller in its FMU: model and data of its step, and the places of their arrays."""
 
 from __future__ import annotations
-
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -44,29 +42,54 @@ class Loop:
         self.period: Array = self.law.memory.period
         self.ramp = np.array([scenario.arbiter.ramp])
         self.memory = Memory()
+        self.constants = self._place_arrays()
 
     def member(self, array: Array, i: int = 0) -> str:
         """Return the member of the FMU's model that holds an item of an array."""
         return f"numbers[{self.memory.keep(array) + i}]"
 
-    def place_arrays(self) -> None:
-        """Place what a step writes; other arrays of its constants become constants of the C code."""
-        model, data, memory = self.model, self.data, self.memory
-        changing = model.inputs.memberships.ramps, data.goal.shifts, data.regions.shifts, *arrays_of(self.law.memory)
-        for array in changing:
+    def _place_arrays(self) -> dict[str, int]:
+        """Place what the importer sets, then outputs, then other variables; return the constants of the C header."""
+        memory, model, data, given, out = self.memory, self.model, self.data, self.inputs, self.out
+        for array in (
+            data.goal.numbers, data.goal.velocities, data.regions.numbers, data.regions.gains, data.regions.velocities,
+            self.law.desired_quaternion, self.period, self.ramp,
+            given.start, given.motion, given.samples, given.sample_times, data.by_criterion,
+        ):  # fmt: skip
+            memory.keep(array)
+        given_size = memory.size
+        for array in (
+            data.command, out.thrusts, out.lost, out.outages, data.signals.memberships, data.signals.inputs,
+            data.estimate, out.values, out.clearances,
+        ):  # fmt: skip
+            memory.keep(array)
+        output_size = memory.size - given_size
+        memory.keep(model.inputs.memberships.ramps)
+        for array in (data.goal.shifts, data.regions.shifts, *arrays_of(self.law.memory)):
             memory.keep(array)
         memory.fix(model, data.goal, data.regions, data.allocator, data.k, data.manual, data.failed_step)
         if not model.through_sensors:
             memory.fix(data.navigation, data.measurements)
+        return {
+            "N_GIVEN": given_size,
+            "N_OUTPUTS": output_size,
+            "AT_PERIOD": memory.keep(self.period),
+            "AT_RAMP": memory.keep(self.ramp),
+            "AT_NOW": memory.keep(data.now),
+            "AT_END": memory.keep(given.end),
+            "AT_CONTROLS": memory.keep(given.controls),
+            "AT_NOISE": memory.keep(data.noise),
+            "N_GAINS": max(len(self.law.gains), 1),
+        }
 
-    def counters(self) -> Iterator[tuple[int, int]]:
-        """Yield the index of each counter in the model's integers, with its largest valid number."""
+    def counters(self) -> dict[int, int]:
+        """Return the largest valid number of each counter, by its index in the model's integers."""
         model, data, out = self.model, self.data, self.out
-        for counter, most in (
+        counters = (
             (data.stage, len(data.allocator.lower) - 1),
             (data.goal_index, len(model.goal_places)),
             (data.failures, model.failed.size),
             (out.failures, model.failed.size),
             (out.changes, model.outage_steps.size),
-        ):
-            yield self.memory.keep(counter), most
+        )
+        return {self.memory.keep(counter): most for counter, most in counters}

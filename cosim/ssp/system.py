@@ -22,9 +22,16 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import NATIVE
 from plant_fmu.component import Component
 from plant_fmu.contents.parameter_set import parameter_set
+from plant_fmu.variables import AXES, FORCES, VELOCITIES
 from plant_fmu.vehicle_component import make_vehicle_component
 
 _EXACT = ("closed", "exact")  # engines whose weights are those of the closed form
+MOTION = (
+    *(f"position.{axis}" for axis in AXES),
+    *(f"quaternion.e{i}" for i in range(4)),
+    *(f"velocity.{name}" for name in VELOCITIES),
+)
+WRENCH = tuple(f"wrench.{name}" for name in FORCES)
 
 
 def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str = NATIVE) -> Path:

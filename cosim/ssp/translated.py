@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -17,49 +17,87 @@ from cosim.ssp.loop import Loop
 from cosim.ssp.memory import Named
 from cosim.step.step_model import N_CALLS
 
+_REWIND = """\
+void control_rewind(Model *m)
+{
+    memcpy(m->numbers + N_GIVEN, FIRST_NUMBERS + N_GIVEN, sizeof m->numbers - N_GIVEN * sizeof(double));
+    memcpy(m->integers, FIRST_INTEGERS, sizeof m->integers);
+    memcpy(m->words, FIRST_WORDS, sizeof m->words);
+    memcpy(m->flags, FIRST_FLAGS, sizeof m->flags);
+}
+"""
 
-def translate_controller(loop: Loop, scenario: Scenario, regions: Sequence[Region], names: Sequence[str]) -> bytes:
-    """Return the C code of a controller whose parameters and inputs are the numbers that have a place already."""
+_CALL_LAW = """\
+static int call_law(void *model)
+{
+    control_law(model);
+    return 0;
+}
+"""
+
+_DECLARED = """\
+/* Puts all but what the importer sets to what it is at the beginning. */
+void control_rewind(Model *m);
+void control_law(Model *m);
+void control_step(Model *m);
+void translated_law(const void *words);
+void translated_step(const void *words);
+"""
+
+
+def translate_controller(
+    loop: Loop, scenario: Scenario, regions: Sequence[Region], names: Sequence[str]
+) -> dict[str, str]:
+    """Return the C files and headers of a controller, by name."""
     law, data, memory, program = loop.law, loop.data, loop.memory, Program()
-    scene = {"N_GIVEN": str(memory.size)} | _scene(loop, scenario, regions, names)
-    loop.place_arrays()
     forces = data.command if loop.model.law_gives_wrench else data.thrusts
     decided = data.state, data.goal, data.regions, data.weights, law.gains, law.memory, forces
     # addresses are no part of the model, which FMU states copy
     memory.name(data.calls, f"(int64_t[{N_CALLS}]){{(intptr_t)call_law, (intptr_t)m}}")
-    calls = []
     stepped = loop.model, data, loop.inputs, loop.out
+    calls = []
     for name, function, arguments in (("law", type(law).function, decided), ("step", step_controller, stepped)):
         program.export(f"translated_{name}", function, tuple(map(type_of, arguments)))
         given = tuple(Named(a, "gains") if a is law.gains else a for a in arguments)
-        calls.append(f"static {memory.call(program, name, given)}")
-    return "\n".join([
-        '/* The controller of a scenario: generated. */\n#include "model.h"\n\nstatic int call_law(void *model);\n',
+        calls.append(memory.call(program, name, given))
+    code = "\n".join([
+        '#include "model.h"\n#include "loop.h"\n',
         program.text(),
         *memory.definitions,
         *memory.starts(),
-        *calls,
-        *(f"#define {key} {value}" for key, value in scene.items()),
-    ]).encode()  # fmt: skip
+        _REWIND,
+        calls[0],
+        _CALL_LAW,
+        calls[1],
+    ])  # fmt: skip
+    header = "\n".join([
+        "/* The controller of a scenario: generated. */",
+        "#ifndef LOOP_H",
+        "#define LOOP_H",
+        "",
+        '#include "model.h"',
+        "",
+        _DECLARED,
+        *(f"#define {key} {value}" for key, value in _scene(loop, scenario, regions, names).items()),
+        "",
+        "#endif",
+        "",
+    ])  # fmt: skip
+    return {"loop.c": code, "loop.h": header}
 
 
 def _scene(loop: Loop, scenario: Scenario, regions: Sequence[Region], names: Sequence[str]) -> dict[str, str]:
     """Return the constants of the scenario that component.c uses, as C macros."""
-    keep, memberships, sensing = loop.memory.keep, loop.model.inputs.memberships, scenario.sensing
-    ramps = keep(memberships.ramps) + np.flatnonzero(memberships.follows)
-    deviations = [sensing.position_noise] * 3 + [sensing.velocity_noise] * 3
+    memberships, sensing = loop.model.inputs.memberships, scenario.sensing
+    ramps = loop.memory.keep(memberships.ramps)
     return {
-        "AT_PERIOD": str(keep(loop.period)),
-        "AT_RAMP": str(keep(loop.ramp)),
-        "AT_NOW": str(keep(loop.data.now)),
-        "AT_END": str(keep(loop.inputs.end)),
-        "AT_CONTROLS": str(keep(loop.inputs.controls)),
-        "AT_NOISE": str(keep(loop.data.noise)),
         "SCENE_CONSTRAINTS": _braced([*_constraints(loop, regions, names), "{HOLDS_UNIT, 0, 0, NULL}"]),
-        "SCENE_RAMPS": _braced([*ramps, -1]),
-        "SCENE_COUNTERS": _braced(map(_braced, loop.counters())),
+        "SCENE_RAMPS": _braced([*(ramps + int(i) for i in np.flatnonzero(memberships.follows)), -1]),
+        "SCENE_COUNTERS": _braced(_braced(item) for item in loop.counters().items()),
         "SCENE_SEED": str(sensing.seed % 2**31),
-        "SCENE_DEVIATIONS": _braced(map(number, deviations)),
+        "SCENE_DEVIATIONS": _braced(
+            number(deviation) for deviation in [sensing.position_noise] * 3 + [sensing.velocity_noise] * 3
+        ),
     }
 
 
@@ -75,5 +113,5 @@ def _constraints(loop: Loop, regions: Sequence[Region], names: Sequence[str]) ->
             yield f'{{HOLDS_{what.upper()}, {first + index}, {more}, "{name}: {fault}"}}'
 
 
-def _braced(values: Iterable[object]) -> str:
-    return f"{{{', '.join(map(str, values))}}}"
+def _braced(values: object) -> str:
+    return f"{{{', '.join(map(str, values))}}}"  # type: ignore[call-overload]

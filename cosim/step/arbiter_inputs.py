@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from controller import VehicleState
 from controller.arithmetic import length3
-from controller.quaternion import rate_parts, rotation_rows
+from controller.linear_algebra import norm
+from controller.quaternion import rate, rotation_matrix
 from controller.regions.region_set import PackedRegions, clearance_of_pose
 from controller.stack_array import zeros
 from cosim.scenario.arbiter_rules import ArbiterRules
@@ -162,20 +163,9 @@ def _approach_time(clearance: float, speed: float) -> float:
 
 def _closing_speed(regions: PackedRegions, i: int, state: VehicleState, clearance: float) -> float:
     """Return the closing speed of a region [m/s or rad/s]: the rate at which its clearance shrinks."""
-    ahead, turned, scratch, omega = zeros(3), zeros(4), zeros(3), zeros(3)
-    u, v, w = state.velocity_body[0], state.velocity_body[1], state.velocity_body[2]
-    rows = rotation_rows(state.quaternion)
-    ahead[0] = rows[0][0] * u + rows[0][1] * v + rows[0][2] * w
-    ahead[1] = rows[1][0] * u + rows[1][1] * v + rows[1][2] * w
-    ahead[2] = rows[2][0] * u + rows[2][1] * v + rows[2][2] * w
-    for axis in range(3):
-        ahead[axis] = state.position[axis] + _AHEAD * (ahead[axis] - regions.velocities[i, axis])
-        omega[axis] = state.velocity_body[3 + axis]
-    rate = rate_parts(state.quaternion, omega)
-    for j in range(4):
-        turned[j] = state.quaternion[j] + _AHEAD * rate[j]
-    size = math.sqrt(turned[0] * turned[0] + turned[1] * turned[1] + turned[2] * turned[2] + turned[3] * turned[3])
-    for j in range(4):
-        turned[j] /= size
-    speed: float = (clearance - clearance_of_pose(regions, i, ahead, turned, scratch)) / _AHEAD
+    e, nu = state.quaternion, state.velocity_body
+    ahead = state.position + _AHEAD * (rotation_matrix(e) @ nu[:3] - regions.velocities[i])
+    turned = e + _AHEAD * rate(e, nu[3:])
+    later = clearance_of_pose(regions, i, ahead, turned / norm(turned), zeros(3))
+    speed: float = (clearance - later) / _AHEAD
     return speed

@@ -12,10 +12,10 @@ from typing import NamedTuple
 import numpy as np
 
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.potential_field import Field, add_turned, empty_field, evaluate_field, set_point_error
-from controller.quaternion import error_parts, write_rotation
+from controller.potential_field import Field, empty_field, evaluate_field, set_point_error
+from controller.quaternion import error, rotation_matrix
 from controller.regions.region_set import PackedRegions
-from controller.stack_array import zeros
+from controller.stack_array import Vector4
 
 
 class SlidingModeGains(NamedTuple):
@@ -35,11 +35,10 @@ class SlidingModeGains(NamedTuple):
 class SlidingModeMemory(NamedTuple):
     """Nothing that lasts; where it computes."""
 
-    desired_quaternion: Array  # (4,)
-    estimate: Array  # (4,) zero: it estimates nothing
+    desired_quaternion: Vector4
+    estimate: Vector4  # zero: it estimates nothing
     report: Array  # (0,)
     field: Field
-    wanted: Array  # (6,) velocity, body frame [m/s, rad/s]
 
 
 def step(
@@ -52,23 +51,18 @@ def step(
     forces: Array,
 ) -> None:
     """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
-    R, field, wanted = zeros(3, 3), memory.field, memory.wanted
-    write_rotation(state.quaternion, R)
+    R, field = rotation_matrix(state.quaternion), memory.field
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.speed / gains.slope)
-    e_att = error_parts(memory.desired_quaternion, state.quaternion)[1:]
-    for i in range(3):
-        wanted[i], wanted[3 + i] = 0.0, -gains.turning * e_att[i]
-    add_turned(R, field.error, -gains.slope, wanted)
-    add_turned(R, field.push, 1.0, wanted)
-    for i in range(6):
-        s = (state.velocity_body[i] - wanted[i]) / gains.layer
-        forces[i] = -(gains.force if i < 3 else gains.moment) * min(1.0, max(-1.0, s))
+    e_att = error(memory.desired_quaternion, state.quaternion)[1:]
+    wanted = np.concatenate((R.T @ (field.push - gains.slope * field.error), -gains.turning * e_att))
+    s = np.clip((state.velocity_body - wanted) / gains.layer, -1.0, 1.0)
+    forces[:3], forces[3:] = -gains.force * s[:3], -gains.moment * s[3:]
 
 
 def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> SlidingModeMemory:
     """Return the memory before the first step; `period` [s] has shape (1,)."""
-    return SlidingModeMemory(desired_quaternion, np.zeros(4), np.zeros(0), empty_field(n_regions), np.zeros(6))
+    return SlidingModeMemory(desired_quaternion, np.zeros(4), np.zeros(0), empty_field(n_regions))
 
 
 class SlidingModeLaw(WrenchLaw):

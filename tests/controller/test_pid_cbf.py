@@ -9,7 +9,8 @@ import pytest
 from controller import VehicleState
 from controller.laws import pid_cbf
 from controller.laws.deployable import model
-from controller.quaternion import error_parts, rotation_matrix
+from controller.quaternion import error as quaternion_error
+from controller.quaternion import rotation_matrix
 from controller.regions import DepthBand, Region, Sphere, pack
 from tests.controller.deployable import scenery
 from tests.controller.deployable.scenery import GOAL, LEVEL, Sea
@@ -50,13 +51,13 @@ def test_step_is_its_equations(ball):
     R = rotation_matrix(turned)
     measured = np.r_[R.T @ memory.velocity[:3], memory.velocity[3:]] + rng.normal(size=6) * 0.05
     state = VehicleState(np.array([3.1, 0.01, 2.39]), turned, measured, np.ones(8))
-    before, free = copy.deepcopy(memory), np.empty(6)
+    before = copy.deepcopy(memory)
     law.step(state, pack([GOAL]), pack([ball]), np.ones(1), forces)
     p, v, d, M = memory.position, memory.velocity, memory.disturbance, memory.dynamics.mass
     # observer
     turning = np.kron(np.diag([1, 0]), R) + np.kron(np.diag([0, 1]), np.eye(3))
     pushes = turning @ memory.dynamics.inverse_mass @ memory.thrusters.matrix
-    model.free_acceleration(memory.dynamics, R, before.velocity[:3], before.velocity[3:], memory.still, free)
+    free = model.free_acceleration(memory.dynamics, R, before.velocity[:3], before.velocity[3:], memory.still)
     z, change = 1.0 / (1.0 + gains.observer * PERIOD), free + pushes @ before.thrusters.forces + before.disturbance
     predicted = before.velocity + PERIOD * change
     off = turning @ measured - predicted
@@ -65,14 +66,14 @@ def test_step_is_its_equations(ball):
     )
     assert v == pytest.approx(predicted + (1.0 - z**2) * off, rel=1e-9)
     assert d == pytest.approx(before.disturbance + (1.0 - z) ** 2 / PERIOD * off, rel=1e-9)
-    model.free_acceleration(memory.dynamics, R, v[:3], v[3:], memory.still, free)
+    free = model.free_acceleration(memory.dynamics, R, v[:3], v[3:], memory.still)
     # nominal forces
     error, away = p - GOAL.shape.center, p - ball.shape.center
     error *= min(1.0, gains.limit / gains.k_p1 / np.linalg.norm(error))
     n, h = away / np.linalg.norm(away), np.linalg.norm(away) - ball.shape.radius
     force = -gains.k_p1 * error - gains.k_v1 * v[:3] - np.trace(M[:3, :3]) / 3.0 * d[:3]
     force += gains.repulsion * max(gains.reach - h, 0.0) * n
-    moment = -gains.k_p2 * np.array(error_parts(LEVEL, turned)[1:]) - gains.k_v2 * v[3:] - np.diag(M)[3:] * d[3:]
+    moment = -gains.k_p2 * quaternion_error(LEVEL, turned)[1:] - gains.k_v2 * v[3:] - np.diag(M)[3:] * d[3:]
     nominal = memory.thrusters.allocator @ np.r_[R.T @ force, moment]
     assert memory.program.nominal == pytest.approx(nominal, rel=1e-9)
     # barrier

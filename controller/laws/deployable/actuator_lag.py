@@ -15,15 +15,14 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.arithmetic import exponential, length3
+from controller.arithmetic import exponential
 from controller.laws.deployable.attitude import integrate_attitude
 from controller.laws.deployable.estimate import EFFECTIVENESS, LAG, Estimate
 from controller.laws.deployable.model import Thrusters
 from controller.laws.deployable.thrust_limit import limited_force
-
-Array = NDArray[np.float64]
+from controller.linear_algebra import norm
+from controller.stack_array import Array, Vector3, Vector4, Vector6
 
 _GREATEST_TURN = 0.5  # rad, greatest turn of the predicted attitude
 
@@ -85,9 +84,9 @@ def _of_lag(lag: float, period: float) -> tuple[float, float]:
 class PredictedState(NamedTuple):
     """The predicted state, ahead by the lag."""
 
-    position: Array  # (3,) m, NED
-    velocity: Array  # (6,) m/s over ground, NED, and rad/s, body axes
-    quaternion: Array  # (4,) from body to world
+    position: Vector3  # m, NED
+    velocity: Vector6  # m/s over ground, NED, and rad/s, body axes
+    quaternion: Vector4  # from body to world
 
 
 def empty_prediction() -> PredictedState:
@@ -97,18 +96,16 @@ def empty_prediction() -> PredictedState:
 
 def predict_state(
     predicted: PredictedState,
-    position: Array,
-    velocity: Array,
-    quaternion: Array,
-    omega: Array,
-    acceleration: Array,
+    position: Vector3,
+    velocity: Vector3,
+    quaternion: Vector4,
+    omega: Vector3,
+    acceleration: Vector6,
     lag: float,
 ) -> None:
     """Predict the state ahead; position, velocity [m], omega [rad/s], acceleration [m/s2], lag [s]."""
-    for i in range(3):
-        predicted.position[i] = position[i] + lag * velocity[i]
-        predicted.velocity[i] = velocity[i] + lag * acceleration[i]
-        predicted.velocity[3 + i] = omega[i] + lag * acceleration[3 + i]
-    angle = lag * length3(omega[0], omega[1], omega[2])
+    predicted.position[:] = position + lag * velocity
+    predicted.velocity[:] = np.concatenate((velocity, omega)) + lag * acceleration
+    angle = lag * norm(omega)
     share = lag if angle < _GREATEST_TURN else lag * _GREATEST_TURN / angle
-    integrate_attitude(quaternion, omega, share, predicted.quaternion)
+    predicted.quaternion[:] = integrate_attitude(quaternion, omega, share)

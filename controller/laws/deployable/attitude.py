@@ -12,19 +12,16 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.arithmetic import cosine, length3, square
+from controller.arithmetic import cosine
 from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.model import Dynamics, Loads, free_wrench
-from controller.linear_algebra import copy
-from controller.quaternion import down_parts, error_parts, rate_parts
+from controller.linear_algebra import cross, norm
+from controller.quaternion import down_in_body, error, rate
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, attitude_clearance
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.stack_array import Array, Matrix3, Number, Vector3, Vector4, Vector6, array, zeros
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _RETURN = 0.2  # 1/s, rate of return to the preferred attitude
@@ -35,12 +32,12 @@ _TURN = 4.0  # 1/s, turning rate per radian by which the clearance of a region o
 class Attitude(NamedTuple):
     """State of the attitude loop."""
 
-    preferred: Array  # (4,) from body to world: attitude where no region requires another
-    desired: Array  # (4,) from body to world: setpoint of the loop
-    last_omega: Array  # (3,) rad/s, body rates of the last step
+    preferred: Vector4  # from body to world: attitude where no region requires another
+    desired: Vector4  # from body to world: setpoint of the loop
+    last_omega: Vector3  # rad/s, body rates of the last step
     by_current: Array  # (3, 2) N s, derivative of the modeled moment by the current, north and east
-    measured_moment: Array  # (3,) N m, body axes: moment of thrusters and weight over the last period
-    started: Array  # (1,) 1 if `last_omega` was measured in the last step, else 0
+    measured_moment: Vector3  # N m, body axes: moment of thrusters and weight over the last period
+    started: Number  # 1 if `last_omega` was measured in the last step, else 0
 
 
 def empty_attitude(preferred: Array) -> Attitude:
@@ -49,116 +46,77 @@ def empty_attitude(preferred: Array) -> Attitude:
 
 
 def measure_moment(
-    attitude: Attitude,
-    dynamics: Dynamics,
-    R: Array,
-    omega: Array,
-    estimate: Estimate,
-    period: float,
+    attitude: Attitude, dynamics: Dynamics, R: Matrix3, omega: Vector3, estimate: Estimate, period: float
 ) -> bool:
     """Measure the moment of thrusters and weight by the change of the rates over the period [s]; omega [rad/s]."""
     started = bool(attitude.started[0] > 0.0)
-    mean, water, wrench, perturbed_wrench, rate = zeros(3), zeros(3), zeros(6), zeros(6), zeros(6)
-    loads = Loads(water, zeros(1), zeros(3))  # only the current: weight and buoyancy are the unknowns
-    copy(estimate.water_velocity, water)
-    for i in range(3):
-        mean[i] = 0.5 * (attitude.last_omega[i] + omega[i])
-    free_wrench(dynamics, R, estimate.velocity, mean, loads, wrench)
-    for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
-        rate[3 + i] = (omega[i] - attitude.last_omega[i]) / period
-        for k in range(3):  # nu_r' = R^T a - omega x nu_r
-            turning = R[k, a] * mean[b] - R[k, b] * mean[a]
-            rate[i] += R[k, i] * estimate.acceleration[k] + turning * (
-                estimate.velocity[k] - estimate.water_velocity[k]
-            )
+    mean, none = 0.5 * (attitude.last_omega + omega), zeros(3)
+    loads = Loads(estimate.water_velocity, zeros(1), none)  # weight and buoyancy are the unknowns
+    wrench = free_wrench(dynamics, R, estimate.velocity, mean, loads)
     for axis in range(2):  # Munk's moment depends on the current
-        copy(estimate.water_velocity, water)
+        water = estimate.water_velocity.copy()
         water[axis] += _CURRENT_STEP
-        free_wrench(dynamics, R, estimate.velocity, mean, loads, perturbed_wrench)
-        for i in range(3):
-            attitude.by_current[i, axis] = (perturbed_wrench[3 + i] - wrench[3 + i]) / _CURRENT_STEP
-    for i in range(3):
-        attitude.measured_moment[i] = -wrench[3 + i]
-        for j in range(6):
-            attitude.measured_moment[i] += dynamics.mass[3 + i, j] * rate[j]
-    copy(omega, attitude.last_omega)
+        perturbed = free_wrench(dynamics, R, estimate.velocity, mean, loads._replace(water_velocity=water))
+        attitude.by_current[:, axis] = (perturbed[3:] - wrench[3:]) / _CURRENT_STEP
+    # nu_r' = R^T a - omega x nu_r
+    nu_r = R.T @ (estimate.velocity - estimate.water_velocity)
+    linear_rate = R.T @ estimate.acceleration - cross(mean, nu_r)
+    rate = np.concatenate((linear_rate, (omega - attitude.last_omega) / period))
+    attitude.measured_moment[:] = dynamics.mass[3:] @ rate - wrench[3:]
+    attitude.last_omega[:] = omega
     attitude.started[0] = 1.0
     return started
 
 
 def update_desired(
-    attitude: Attitude, regions: PackedRegions, position: Array, gains: DeployableGains, period: float
+    attitude: Attitude, regions: PackedRegions, position: Vector3, gains: DeployableGains, period: float
 ) -> None:
     """Turn the desired attitude towards the preferred one, or until regions of attitude have their comfort."""
     # with position [m, NED], period [s]
-    error, omega, gradient, k = zeros(4), zeros(3), zeros(3), zeros(3)
-    error[0], error[1], error[2], error[3] = error_parts(attitude.preferred, attitude.desired)
-    for axis in range(3):  # desired = preferred * back
-        omega[axis] = -2.0 * _RETURN * error[1 + axis]
+    e, gradient = error(attitude.preferred, attitude.desired), zeros(3)  # desired = preferred * back
+    omega = -2.0 * _RETURN * e[1:]
     limited = False
     for i in range(regions.kinds.size):
         if regions.kinds[i] < _ATTITUDE:
             continue
         clearance = attitude_clearance(regions, i, position, attitude.desired, gradient)
-        size = length3(gradient[0], gradient[1], gradient[2])
+        size = norm(gradient)
         if clearance < gains.comfort:
             limited = True
             if size > 0.0:
-                _add_scaled(_TURN * (gains.comfort - clearance) / size, gradient, omega)
+                omega += _TURN * (gains.comfort - clearance) / size * gradient
             elif clearance < 0.0:  # half a turn away all axes are equivalent: turn about the vertical
-                k[0], k[1], k[2] = down_parts(attitude.desired)
-                _add_scaled(_TURN * (gains.comfort - clearance), k, omega)
-    if not limited and error[0] > 1.0 - 1e-15:
+                omega += _TURN * (gains.comfort - clearance) * down_in_body(attitude.desired)
+    if not limited and e[0] > 1.0 - 1e-15:
         return
-    size = length3(omega[0], omega[1], omega[2])
+    size = norm(omega)
     if size > gains.turning_rate:
-        for axis in range(3):
-            omega[axis] *= gains.turning_rate / size
-    integrate_attitude(attitude.desired, omega, period, attitude.desired)
+        omega *= gains.turning_rate / size
+    attitude.desired[:] = integrate_attitude(attitude.desired, omega, period)
     # within the allowed tilt: only the turn about the vertical remains
-    upright = down_parts(attitude.desired)[2]
-    if upright < cosine(gains.tilt) and upright < down_parts(attitude.preferred)[2]:
-        for axis in range(3):
-            omega[axis] = -omega[axis]
-        integrate_attitude(attitude.desired, omega, period, attitude.desired)
-        k[0], k[1], k[2] = down_parts(attitude.desired)
-        along = -(k[0] * omega[0] + k[1] * omega[1] + k[2] * omega[2])
-        for axis in range(3):
-            omega[axis] = along * k[axis]
-        integrate_attitude(attitude.desired, omega, period, attitude.desired)
+    upright = down_in_body(attitude.desired)[2]
+    if upright < cosine(gains.tilt) and upright < down_in_body(attitude.preferred)[2]:
+        attitude.desired[:] = integrate_attitude(attitude.desired, -omega, period)
+        k = down_in_body(attitude.desired)
+        attitude.desired[:] = integrate_attitude(attitude.desired, (k @ omega) * k, period)
 
 
-def _add_scaled(scale: float, values: Array, out: Array) -> None:
-    """Add `scale` times the values, shape (3,), to `out`."""
-    for axis in range(3):
-        out[axis] += scale * values[axis]
-
-
-def integrate_attitude(quaternion: Array, omega: Array, period: float, out: Array) -> None:
-    """Integrate a body rate [rad/s] over a period [s] into `out`, shape (4,), which may be `quaternion` itself."""
-    rate = rate_parts(quaternion, omega)
-    for i in range(4):
-        out[i] = quaternion[i] + period * rate[i]
-    length = np.sqrt(square(out[0]) + square(out[1]) + square(out[2]) + square(out[3]))
-    for i in range(4):
-        out[i] /= length
+def integrate_attitude(quaternion: Vector4, omega: Vector3, period: float) -> Vector4:
+    """Integrate a body rate [rad/s] over a period [s]."""
+    e = quaternion + period * rate(quaternion, omega)
+    return e / norm(e)
 
 
 def compute_moment(
     attitude: Attitude,
     dynamics: Dynamics,
-    quaternion: Array,
-    omega: Array,
-    free: Array,
+    quaternion: Vector4,
+    omega: Vector3,
+    free: Vector6,
     gains: DeployableGains,
-    out: Array,
-) -> None:
-    """Write the desired moment, shape (3,) [N m], body axes: cancels the `free` wrench, except its damping."""
-    e = zeros(4)
-    e[0], e[1], e[2], e[3] = error_parts(attitude.desired, quaternion)
-    w = gains.attitude_bandwidth
-    for i in range(3):
-        damping = (dynamics.linear_damping[3 + i] + dynamics.quadratic_damping[3 + i] * abs(omega[i])) * omega[i]
-        inertia = dynamics.mass[3 + i, 3 + i]
-        out[i] = -free[3 + i] - damping - 2.0 * inertia * w * (w * e[1 + i] + omega[i])
+) -> Vector3:
+    """Return the desired moment [N m], body axes: it cancels the `free` wrench, except its damping."""
+    e, w = error(attitude.desired, quaternion)[1:], gains.attitude_bandwidth
+    inertia = array(dynamics.mass[3, 3], dynamics.mass[4, 4], dynamics.mass[5, 5])
+    damping = (dynamics.linear_damping[3:] + dynamics.quadratic_damping[3:] * abs(omega)) * omega
+    return -free[3:] - damping - 2.0 * inertia * w * (w * e + omega)

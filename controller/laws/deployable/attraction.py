@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.arithmetic import length3, square
+from controller.arithmetic import square
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.path_planning.planner import PathPlan
-from controller.linear_algebra import copy
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.linear_algebra import norm
+from controller.stack_array import Vector3, zeros
 
 _AHEAD = 0.4  # m, lookahead distance along the path
 _SLOWEST_CORNER = 0.25  # speed at corners of 120 degrees and more, as a fraction of the full speed
@@ -26,47 +23,33 @@ def approach_speed(distance: float, deceleration: float, slope: float) -> float:
     return float(np.sqrt(2.0 * deceleration * distance + offset * offset)) - offset
 
 
-def desired_velocity(plan: PathPlan, position: Array, goal_velocity: Array, gains: DeployableGains, out: Array) -> None:
-    """Write the velocity [m/s], NED, shape (3,), that follows the path from a position [m, NED], shape (3,)."""
+def desired_velocity(plan: PathPlan, position: Vector3, goal_velocity: Vector3, gains: DeployableGains) -> Vector3:
+    """Return the velocity [m/s], NED, that follows the path from a position [m, NED]."""
     waits, path = plan.waits[0], plan.path
     count = 1 if waits else plan.counts[0]
-    speed, remaining, traveled, heading = gains.speed, 0.0, 0.0, zeros(3)
-    to_go, before = _AHEAD, zeros(3)
+    speed, traveled, to_go = gains.speed, 0.0, _AHEAD
+    heading, before = zeros(3), zeros(3)
     for leg in range(count):
-        length, direction = 0.0, zeros(3)
-        for axis in range(3):
-            direction[axis] = path[leg, axis] - (position[axis] if leg == 0 else path[leg - 1, axis])
-            length += square(direction[axis])
-        length = np.sqrt(length)
+        direction = path[leg] - (position if leg == 0 else path[leg - 1])
+        length = norm(direction)
         if length > 0.0:
-            for axis in range(3):
-                direction[axis] /= length
+            direction /= length
         if leg > 0:  # slower round a corner
-            turn = before[0] * direction[0] + before[1] * direction[1] + before[2] * direction[2]
-            at_corner = gains.speed * max(_SLOWEST_CORNER, 0.5 * (1.0 + turn))
+            at_corner = gains.speed * max(_SLOWEST_CORNER, 0.5 * (1.0 + before @ direction))
             speed = min(speed, np.sqrt(square(at_corner) + 2.0 * gains.acceleration * traveled))
         part = min(to_go, length)
-        for axis in range(3):
-            heading[axis] += part * direction[axis]
+        heading += part * direction
         to_go -= part
         traveled += length
-        copy(direction, before)
-    remaining = traveled
-    speed = min(speed, approach_speed(remaining, gains.acceleration, gains.position_bandwidth))
-    size = length3(heading[0], heading[1], heading[2])
-    for axis in range(3):
-        out[axis] = 0.0 if waits else goal_velocity[axis]
-        if size > 1e-9:
-            out[axis] += speed * heading[axis] / size
+        before[:] = direction
+    speed = min(speed, approach_speed(traveled, gains.acceleration, gains.position_bandwidth))
+    size = norm(heading)
+    along = speed * heading / size if size > 1e-9 else zeros(3)
+    return along if waits else goal_velocity + along
 
 
-def desired_acceleration(desired: Array, velocity: Array, gains: DeployableGains, out: Array) -> None:
-    """Write the acceleration [m/s2], NED, that brings the velocity to the desired one, bounded in length."""
-    size = 0.0
-    for axis in range(3):
-        out[axis] = gains.velocity_bandwidth * (desired[axis] - velocity[axis])
-        size += square(out[axis])
-    size = np.sqrt(size)
-    if size > gains.acceleration:
-        for axis in range(3):
-            out[axis] *= gains.acceleration / size
+def desired_acceleration(desired: Vector3, velocity: Vector3, gains: DeployableGains) -> Vector3:
+    """Return the acceleration [m/s2], NED, that brings the velocity to the desired one, bounded in length."""
+    acceleration = gains.velocity_bandwidth * (desired - velocity)
+    size = norm(acceleration)
+    return gains.acceleration / size * acceleration if size > gains.acceleration else acceleration

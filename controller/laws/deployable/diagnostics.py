@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
-from controller.arithmetic import length3
 from controller.law import Diagnostic
 from controller.laws.deployable.estimate import Estimate
-from controller.linear_algebra import copy
-
-Array = NDArray[np.float64]
+from controller.linear_algebra import norm
+from controller.stack_array import Array, Vector3
 
 NO_BOUND = -1e6  # m, reported bound without an estimate, or without barriers
 
@@ -37,12 +32,12 @@ DIAGNOSTICS = (
 REJECTED = 17  # index of `rejected` in `DIAGNOSTICS`
 
 
-def write_report(report: Array, estimate: Estimate, cost: float, points: int, health: Array, desired: Array) -> None:
+def write_report(report: Array, estimate: Estimate, cost: float, points: int, health: Array, desired: Vector3) -> None:
     """Write the `DIAGNOSTICS` of estimate, path and thrusters; `report` has the thruster that was isolated last."""
-    copy(estimate.position, report[:3])
-    copy(estimate.velocity, report[3:6])
-    copy(estimate.water_velocity, report[6:8])
-    report[8] = length3(desired[0], desired[1], desired[2])
+    report[:3] = estimate.position
+    report[3:6] = estimate.velocity
+    report[6:8] = estimate.water_velocity[:2]
+    report[8] = norm(desired)
     report[9] = cost
     report[10] = points - 1
     last = int(report[14])

@@ -5,15 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.arithmetic import square
 from controller.law import VehicleModel
 from controller.laws.deployable.gains import DeployableGains
-from controller.linear_algebra import copy
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.stack_array import Array, Columns3, Number, Vector3, Vector6, zeros
 
 # index of the first state of each kind
 POSITION, VELOCITY, CURRENT, NET_WEIGHT, MOMENTS, HEIGHT, LAG, EFFECTIVENESS = 0, 3, 6, 8, 9, 12, 13, 14
@@ -39,29 +35,29 @@ class Estimate(NamedTuple):
     first_covariance: Array  # (14 + 2 m, 14 + 2 m) covariance before the first measurement
     state: Array  # (14 + 2 m,) in the order of `observer`; SI, NED, moments in body axes
     covariance: Array  # (14 + 2 m, 14 + 2 m) covariance of the state
-    position: Array  # (3,) m, NED
-    velocity: Array  # (3,) m/s over ground, NED
-    water_velocity: Array  # (3,) m/s, NED; its down component is 0
-    net_weight: Array  # (1,) N, W - B
-    moments: Array  # (3,) phi_2..phi_4 [N m], body axes
-    acceleration: Array  # (3,) m/s2 over ground, NED, predicted for the last period
-    time_since_measurement: Array  # (1,) s since the last valid measurement; negative before the first
+    position: Vector3  # m, NED
+    velocity: Vector3  # m/s over ground, NED
+    water_velocity: Vector3  # m/s, NED; its down component is 0
+    net_weight: Number  # N, W - B
+    moments: Vector3  # phi_2..phi_4 [N m], body axes
+    acceleration: Vector3  # m/s2 over ground, NED, predicted for the last period
+    time_since_measurement: Number  # s since the last valid measurement; negative before the first
     time_since_valid: Array  # (2,) s since the last valid position, and velocity
     repeated: Array  # (2,) 1 if the last position, or velocity, equals the one before bit for bit
     slow: Array  # (2,) 1 if position, or velocity, repeats while the vehicle moves: its sensor is slower than the steps
-    longest_gap: Array  # (1,) s, longest recent time without a measurement
-    weight: Array  # (1,) weight of positions and velocities as evidence of failures: below 1 for lasting errors
-    last_measured: Array  # (6,) last measured position [m, NED] and velocity [m/s, body axes]
-    mass_scale: Array  # (1,) mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
-    lags: Array  # (3,) s: estimated lag less a standard deviation, at least 0; the lag itself; the lag plus one
+    longest_gap: Number  # s, longest recent time without a measurement
+    weight: Number  # weight of positions and velocities as evidence of failures: below 1 for lasting errors
+    last_measured: Vector6  # last measured position [m, NED] and velocity [m/s, body axes]
+    mass_scale: Number  # mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
+    lags: Vector3  # s: estimated lag less a standard deviation, at least 0; the lag itself; the lag plus one
     bracket: Array  # (2, m) N, forces at the end of the period, for the minimum and the maximum of `lags`
     by_lag: Array  # (m,) N/s, secant of the acting forces between the minimum and the maximum of `lags`
     curvature: Array  # (m,) N, difference of the acting forces from that secant
     # (3, m) N, by the ceiling: derivative of the acting forces; of those at the end of the period; (-) the ceilings
     # of these forces
     by_ceiling: Array
-    transition: Array  # (3, 14 + 2 m) derivative of the next velocity by the state
-    product: Array  # (3, 14 + 2 m) transition times covariance
+    transition: Columns3  # (3, 14 + 2 m) derivative of the next velocity by the state
+    product: Columns3  # (3, 14 + 2 m) transition times covariance
     row: Array  # (14 + 2 m,) derivative of a measured number by the state
     gain: Array  # (14 + 2 m,) Kalman gain of a measured number
     deviation: Array  # (2 m, 14 + 2 m) true state less estimate by each hypothesis: j, thruster j is lost; m + j, stuck
@@ -72,7 +68,7 @@ class Estimate(NamedTuple):
     # the expected ones squared
     evidence: Array
     bias: Array  # (9,) low-passed innovations over their standard deviations: of moments, position, velocity
-    misfit: Array  # (1,) mean square of `bias`, smoothed, relative to that of a model that fits
+    misfit: Number  # mean square of `bias`, smoothed, relative to that of a model that fits
 
 
 def make_estimate(vehicle: VehicleModel) -> Estimate:
@@ -131,16 +127,15 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
 
 def reset(estimate: Estimate) -> None:
     """Reset all to the state before the first measurement, except the effectiveness of the thrusters."""
-    for i in range(EFFECTIVENESS):
-        estimate.state[i] = estimate.first_state[i]
-        for k in range(estimate.state.size):
-            estimate.covariance[i, k] = estimate.covariance[k, i] = estimate.first_covariance[i, k]
+    P, P_0 = estimate.covariance, estimate.first_covariance
+    estimate.state[:EFFECTIVENESS] = estimate.first_state[:EFFECTIVENESS]
+    P[:EFFECTIVENESS], P[:, :EFFECTIVENESS] = P_0[:EFFECTIVENESS], P_0[:, :EFFECTIVENESS]
     estimate.deviation[:, :] = 0.0
     estimate.time_since_measurement[0] = -1.0
     publish(estimate)
 
 
-def initialize(estimate: Estimate, position: Array, velocity: Array, gains: DeployableGains) -> None:
+def initialize(estimate: Estimate, position: Vector3, velocity: Vector3, gains: DeployableGains) -> None:
     """Initialize from the first measurement [m, m/s, NED]; an unmeasured velocity is assumed to be zero."""
     start_from(estimate, POSITION, position, gains.position_noise)
     if np.isnan(velocity[0] + velocity[1] + velocity[2]):
@@ -151,40 +146,33 @@ def initialize(estimate: Estimate, position: Array, velocity: Array, gains: Depl
     estimate.time_since_measurement[0] = 0.0
 
 
-def start_from(estimate: Estimate, first: int, measured: Array, deviation: float) -> None:
+def start_from(estimate: Estimate, first: int, measured: Vector3, deviation: float) -> None:
     """Replace the estimate of position or velocity by a measurement; all other states keep their estimate."""
-    P = estimate.covariance
-    for axis in range(3):
-        i = first + axis
-        estimate.state[i] = measured[axis]
-        for k in range(estimate.state.size):
-            P[i, k] = P[k, i] = 0.0
-        P[i, i] = square(deviation)
-        for j in range(estimate.direct.size):
-            estimate.deviation[j, i] = 0.0
+    estimate.state[first : first + 3] = measured
+    for i in range(first, first + 3):
+        _decouple(estimate, i, square(deviation))
     estimate.time_since_valid[0 if first == POSITION else 1] = 0.0
     publish(estimate)
+
+
+def _decouple(estimate: Estimate, i: int, variance: float) -> None:
+    """Set the variance of a state, which no longer depends on the others."""
+    P = estimate.covariance
+    P[i], P[:, i], P[i, i] = 0.0, 0.0, variance
+    estimate.deviation[:, i] = 0.0
 
 
 def publish(estimate: Estimate) -> None:
     """Copy the parts of the state that other modules read."""
     x = estimate.state
-    copy(x[:3], estimate.position)
-    copy(x[VELOCITY:CURRENT], estimate.velocity)
-    copy(x[MOMENTS:HEIGHT], estimate.moments)
-    estimate.water_velocity[0], estimate.water_velocity[1] = x[CURRENT], x[CURRENT + 1]
-    estimate.net_weight[0] = x[NET_WEIGHT]
+    estimate.position[:], estimate.velocity[:], estimate.moments[:] = x[:3], x[VELOCITY:CURRENT], x[MOMENTS:HEIGHT]
+    estimate.water_velocity[:2], estimate.net_weight[0] = x[CURRENT:NET_WEIGHT], x[NET_WEIGHT]
 
 
 def set_effectiveness(estimate: Estimate, j: int, value: float) -> None:
     """Set the effectiveness of a thruster: 0 for an isolated one, 1 for one that works again."""
-    P, k = estimate.covariance, EFFECTIVENESS + j
-    estimate.state[k] = value
-    for i in range(estimate.state.size):
-        P[i, k] = P[k, i] = 0.0
-    P[k, k] = square(_FIRST_EFFECTIVENESS) * value
-    for i in range(estimate.direct.size):
-        estimate.deviation[i, k] = 0.0
+    estimate.state[EFFECTIVENESS + j] = value
+    _decouple(estimate, EFFECTIVENESS + j, square(_FIRST_EFFECTIVENESS) * value)
 
 
 def inflate_effectiveness(estimate: Estimate, j: int) -> None:
@@ -197,9 +185,7 @@ def freeze(estimate: Estimate, gains: DeployableGains) -> None:
     P = estimate.covariance
     for i in range(LAG, estimate.state.size):
         if (gains.lag_bound if i == LAG else gains.effectiveness_estimation) == 0.0:
-            for k in range(estimate.state.size):
-                P[i, k] = P[k, i] = 0.0
-            P[i, i] = square(_KNOWN_LAG) if i == LAG else 0.0
+            P[i], P[:, i], P[i, i] = 0.0, 0.0, square(_KNOWN_LAG) if i == LAG else 0.0
 
 
 def project(estimate: Estimate, gains: DeployableGains) -> None:
@@ -225,6 +211,5 @@ def _bound(estimate: Estimate, i: int, least: float, most: float) -> None:
     excess = x[i] - min(max(x[i], least), most)
     if excess != 0.0:
         if P[i, i] > 0.0:
-            for k in range(x.size):
-                x[k] -= P[k, i] / P[i, i] * excess
+            x -= P[:, i] / P[i, i] * excess
         x[i] = min(max(x[i], least), most)

@@ -8,14 +8,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from controller.arithmetic import square
+from controller.linear_algebra import norm
 from controller.regions.kinds import KINKED_INSIDE, KINKED_OUTSIDE
 from controller.regions.region_set import PackedRegions, clearance_at_position, position_clearance
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.stack_array import Vector3, zeros
 
 FACES = 2  # maximum number of faces besides the nearest that have barriers
 _LINE_SAMPLES = 16  # a stride along a line, which ends with an evaluation, is at least the line's length over this
@@ -29,17 +26,12 @@ def has_faces(kind: int, sign: float) -> bool:
 
 
 def face_ahead(
-    regions: PackedRegions, i: int, position: Array, nearest: Array, velocity: Array, reach: float, face: Array
+    regions: PackedRegions, i: int, position: Vector3, nearest: Vector3, velocity: Vector3, reach: float, face: Vector3
 ) -> float:
     """Find the face of region `i` that the vehicle heads for, beside the nearest one; position [m, NED]."""
     # with velocity [m/s], reach [m], returns [m]
-    approach_speed, speed = 0.0, 0.0
-    for axis in range(3):
-        approach_speed += velocity[axis] * nearest[axis]
-    for axis in range(3):
-        velocity[axis] -= min(approach_speed, 0.0) * nearest[axis]
-        speed += square(velocity[axis])
-    speed = np.sqrt(speed)
+    velocity -= min(float(velocity @ nearest), 0.0) * nearest
+    speed = norm(velocity)
     if not speed > 1e-6:
         return np.inf
     point, gradient, low, high = zeros(3), zeros(3), 0.0, 0.0
@@ -55,18 +47,14 @@ def face_ahead(
             low = middle
         else:
             high = middle
-    for axis in range(3):
-        point[axis] = position[axis] + low / speed * velocity[axis]
+    point[:] = position + low / speed * velocity
     distance = position_clearance(regions, i, point, face)
-    for axis in range(3):
-        distance += face[axis] * (position[axis] - point[axis])
-    return distance
+    return distance + float(face @ (position - point))
 
 
 def _clearance_along(
-    regions: PackedRegions, i: int, position: Array, velocity: Array, time: float, point: Array, gradient: Array
+    regions: PackedRegions, i: int, position: Vector3, velocity: Vector3, time: float, point: Vector3, gradient: Vector3
 ) -> float:
-    """Return the clearance after a time at a velocity; write `point` and `gradient`, shape (3,) each."""
-    for axis in range(3):
-        point[axis] = position[axis] + time * velocity[axis]
+    """Return the clearance after a time at a velocity; write `point` and `gradient`."""
+    point[:] = position + time * velocity
     return clearance_at_position(regions, i, point, gradient)

@@ -15,11 +15,9 @@ from controller.laws.deployable import estimate as estimate_state
 from controller.laws.deployable.estimate import Estimate
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.memory import DeployableMemory
-from controller.linear_algebra import copy
-from controller.quaternion import write_rotation
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.linear_algebra import norm
+from controller.quaternion import rotation_matrix
+from controller.stack_array import Array, Matrix3, Vector3, Vector4, Vector6
 
 _FARTHEST = 1e6  # m, bound of each coordinate of a plausible position
 _JUMP = 0.5  # fraction of an estimated position's standard deviation that is noise
@@ -71,31 +69,22 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     estimate, period = memory.state_estimate, memory.period[0]
     valid = _is_plausible_attitude(state.quaternion, state.velocity_body)
     if valid:
-        e = state.quaternion
-        length = np.sqrt(square(e[0]) + square(e[1]) + square(e[2]) + square(e[3]))
-        for i in range(4):
-            memory.quaternion[i] = e[i] / length
-        copy(state.velocity_body[3:], memory.omega)
+        memory.quaternion[:] = state.quaternion / norm(state.quaternion)
+        memory.omega[:] = state.velocity_body[3:]
     else:
         _propagate_attitude(memory)
         memory.attitude.started[0] = 0.0  # the next change of the rates would span several periods
-    R, position, velocity = zeros(3, 3), zeros(3), zeros(3)
-    write_rotation(memory.quaternion, R)
-    position_noise, velocity_noise, max_deviation = gains.position_noise, gains.velocity_noise, 0.0
-    for i in range(12):
-        memory.deviation[i] = min(max(state.deviation[i], 0.0), _FARTHEST) if state.deviation[i] >= 0.0 else _FARTHEST
-    for i in range(3):  # an estimated state drifts, and jumps by a fraction of its deviation
-        position_noise = max(position_noise, _JUMP * memory.deviation[i])
-        velocity_noise = max(velocity_noise, square(memory.deviation[3 + i]) / _STEADY)
-        max_deviation = max(max_deviation, memory.deviation[3 + i])
+    R, deviation = rotation_matrix(memory.quaternion), memory.deviation
+    deviation[:] = np.where(state.deviation >= 0.0, np.minimum(state.deviation, _FARTHEST), _FARTHEST)
+    # an estimated state drifts, and jumps by a fraction of its deviation
+    max_deviation = np.max(deviation[3:6])
+    position_noise = max(gains.position_noise, _JUMP * np.max(deviation[:3]))
+    velocity_noise = max(gains.velocity_noise, square(max_deviation) / _STEADY)
     estimate.weight[0] = 1.0 if max_deviation <= _STEADY else square(_STEADY / max_deviation)
-    for i in range(3):
-        for k in range(3):
-            velocity[i] += R[i, k] * state.velocity_body[k]
-        position[i] = state.position[i] if abs(state.position[i]) < _FARTHEST else np.nan
-    for i in range(3):
-        if not (valid and _is_plausible_velocity(velocity)):
-            velocity[i] = np.nan
+    position = np.where(abs(state.position) < _FARTHEST, state.position, np.nan)
+    velocity = R @ state.velocity_body[:3]
+    if not (valid and np.all(abs(velocity) < _FASTEST)):
+        velocity[:] = np.nan
     position_repeats = _repeats(state.position, estimate.last_measured[:3])
     velocity_repeats = _repeats(state.velocity_body[:3], estimate.last_measured[3:])
 
@@ -110,7 +99,7 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     if valid:
         _correct_by_rates(memory, R, started, gains)
     if not started:
-        if not valid or np.isnan(position[0] + position[1] + position[2]):
+        if not valid or np.any(np.isnan(position)):
             return False
         estimate_state.initialize(estimate, position, velocity, gains)
         return True
@@ -129,8 +118,8 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
 def _is_new(estimate: Estimate, group: int, repeats: bool, gains: DeployableGains) -> bool:
     """Return True if a position or velocity is new: not a repetition, or a repetition of a fast sensor at rest."""
     v, a = estimate.velocity, estimate.acceleration
-    rests = abs(v[0]) + abs(v[1]) + abs(v[2]) < _RESTING
-    moves = not rests or abs(a[0]) + abs(a[1]) + abs(a[2]) > _PUSHED
+    rests = np.sum(abs(v)) < _RESTING
+    moves = not rests or np.sum(abs(a)) > _PUSHED
     if repeats and moves:
         estimate.slow[group] = 1.0
     elif not repeats and estimate.repeated[group] == 0.0:
@@ -141,39 +130,31 @@ def _is_new(estimate: Estimate, group: int, repeats: bool, gains: DeployableGain
     return bool(rests and estimate.time_since_valid[group] > gains.coast)
 
 
-def _correct_group(memory: DeployableMemory, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:
+def _correct_group(
+    memory: DeployableMemory, first: int, measured: Vector3, noise: float, gains: DeployableGains
+) -> bool:
     """Correct by a position or a velocity; replace the estimate if all were rejected for longer than `coast`."""
     estimate, group = memory.state_estimate, 0 if first == estimate_state.POSITION else 1
     corrected = observer.correct(estimate, first, measured, noise, gains)
-    if not (np.isnan(measured[0]) and np.isnan(measured[1]) and np.isnan(measured[2])):
+    if not np.all(np.isnan(measured)):
         memory.samples[0] += 1.0
         memory.samples[1] += 0.0 if corrected else 1.0
     if corrected:
         estimate.time_since_valid[group] = 0.0
         return True
-    if estimate.time_since_valid[group] > gains.coast and not np.isnan(measured[0] + measured[1] + measured[2]):
+    if estimate.time_since_valid[group] > gains.coast and not np.any(np.isnan(measured)):
         estimate_state.start_from(estimate, first, measured, noise)
     return False
 
 
-def _repeats(measured: Array, last: Array) -> bool:
+def _repeats(measured: Vector3, last: Vector3) -> bool:
     """Return True if a measurement equals the last one bit for bit; store it as the last one."""
-    repeats = True
-    for i in range(3):
-        repeats = repeats and (measured[i] == last[i] or (np.isnan(measured[i]) and np.isnan(last[i])))
-        last[i] = measured[i]
-    return repeats
+    repeats = np.all(np.where(np.isnan(measured), np.isnan(last), measured == last))
+    last[:] = measured
+    return bool(repeats)
 
 
-def _is_plausible_velocity(velocity: Array) -> bool:
-    """Return True if a velocity [m/s] is finite and plausible."""
-    can = True
-    for i in range(3):
-        can = can and abs(velocity[i]) < _FASTEST
-    return can
-
-
-def _correct_by_rates(memory: DeployableMemory, R: Array, predicted: bool, gains: DeployableGains) -> None:
+def _correct_by_rates(memory: DeployableMemory, R: Matrix3, predicted: bool, gains: DeployableGains) -> None:
     """Correct the estimate by the moment from the change of the rates, if the estimate was `predicted`."""
     estimate, attitude, period = memory.state_estimate, memory.attitude, memory.period[0]
     known = attitude_loop.measure_moment(attitude, memory.dynamics, R, memory.omega, estimate, period)
@@ -193,36 +174,25 @@ def _correct_by_rates(memory: DeployableMemory, R: Array, predicted: bool, gains
         )
 
 
-def _is_plausible_attitude(quaternion: Array, velocity_body: Array) -> bool:
+def _is_plausible_attitude(quaternion: Vector4, velocity_body: Vector6) -> bool:
     """Return True if a quaternion has length 1 and the rates are plausible."""
-    size, fastest = 0.0, 0.0
-    for i in range(4):
-        size += square(quaternion[i])
-    for i in range(3):
-        fastest += abs(velocity_body[3 + i])
-    return abs(size - 1.0) < 1e-2 and fastest < _FASTEST
+    return bool(abs(quaternion @ quaternion - 1.0) < 1e-2 and np.sum(abs(velocity_body[3:])) < _FASTEST)
 
 
 def _propagate_attitude(memory: DeployableMemory) -> None:
     """Propagate attitude and rates over the last period by the model."""
-    R, free, thrust_acceleration, period = zeros(3, 3), zeros(6), zeros(6), memory.period[0]
-    estimate = memory.state_estimate
-    write_rotation(memory.quaternion, R)
+    estimate, thrusters, period = memory.state_estimate, memory.thrusters, memory.period[0]
+    R = rotation_matrix(memory.quaternion)
     loads = model.Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
-    model.free_acceleration(memory.dynamics, R, estimate.velocity, memory.omega, loads, free)
-    model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.acting, thrust_acceleration)
-    for i in range(3):
-        memory.omega[i] += period * (free[3 + i] + thrust_acceleration[3 + i])
-        memory.omega[i] = min(max(memory.omega[i], -_FASTEST), _FASTEST)
-    attitude_loop.integrate_attitude(memory.quaternion, memory.omega, period, memory.quaternion)
+    acceleration = model.free_acceleration(memory.dynamics, R, estimate.velocity, memory.omega, loads)
+    acceleration += model.thrust_acceleration(memory.dynamics, thrusters, R, thrusters.acting)
+    memory.omega[:] = np.clip(memory.omega + period * acceleration[3:], -_FASTEST, _FASTEST)
+    memory.quaternion[:] = attitude_loop.integrate_attitude(memory.quaternion, memory.omega, period)
 
 
-def _is_plausible_motion(position: Array, velocity: Array) -> bool:
+def _is_plausible_motion(position: Vector3, velocity: Vector3) -> bool:
     """Return True if position [m] and velocity [m/s] are finite and plausible."""
-    can = _is_plausible_velocity(velocity)
-    for i in range(3):
-        can = can and abs(position[i]) < _FARTHEST
-    return can
+    return bool(np.all(abs(velocity) < _FASTEST) and np.all(abs(position) < _FARTHEST))
 
 
 def _reset_estimate(memory: DeployableMemory) -> None:

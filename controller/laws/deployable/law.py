@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from controller import quadratic_program
-from controller.arithmetic import length3, square
+from controller.arithmetic import square
 from controller.law import (
     Array,
     CompiledLaw,
@@ -55,12 +55,12 @@ from controller.laws.deployable.memory import DeployableMemory
 from controller.laws.deployable.model import Dynamics, Loads, make_dynamics, make_thrusters
 from controller.laws.deployable.path_planning.planner import empty_plan, go_straight, improve_path
 from controller.laws.deployable.path_planning.search import PathLimits
-from controller.linear_algebra import copy
+from controller.linear_algebra import norm
 from controller.quadratic_program import empty_workspace
-from controller.quaternion import write_rotation
+from controller.quaternion import rotation_matrix
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at
-from controller.stack_array import zeros
+from controller.stack_array import Matrix3, Vector3, array, zeros
 
 _STALE = 0.15  # s without a measurement after which the speed is reduced
 _TRUSTED_SPREAD = 0.3  # m, `SPREADS` deviations of the position above which the speed is reduced; it is 0 at twice that
@@ -84,25 +84,20 @@ def step(
     """Run a step of the deployable law, as specified by `CompiledLaw.step`; `forces` are those of the thrusters [N]."""
     estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period[0]
     input_validation.smooth_weights(weights, memory.weights, regions.hard, period / (period + gains.price_smoothing))
-    R, desired, acceleration, free, against, wrench = zeros(3, 3), zeros(3), zeros(6), zeros(6), zeros(6), zeros(6)
-
     # estimate
     input_validation.process_measurement(memory, state, gains)
     memory.report[REJECTED] = memory.samples[1] / max(memory.samples[0], 1.0)
-    write_rotation(memory.quaternion, R)
+    R = rotation_matrix(memory.quaternion)
     # there is no estimate, or it is too old
     if estimate.time_since_measurement[0] < 0.0 or estimate.time_since_measurement[0] > gains.coast:
         _hold_weight(memory, R, gains, forces)
-        copy(forces, thrusters.forces)
+        thrusters.forces[:] = forces
         memory.report[15], memory.report[16] = estimate.time_since_measurement[0], NO_BOUND
         memory.clearance_bound[:] = memory.expected[:] = np.nan
         return
 
-    for axis in range(3):
-        memory.expected[axis] = estimate.position[axis] + period * estimate.velocity[axis]
-        memory.expected[3 + axis] = 0.0
-        for k in range(3):
-            memory.expected[3 + axis] += R[k, axis] * estimate.velocity[k]
+    memory.expected[:3] = estimate.position + period * estimate.velocity
+    memory.expected[3:] = R.T @ estimate.velocity
 
     # fault detection
     changed = fault_detection.detect_fault(memory.fault_state, estimate, thrusters, gains)
@@ -115,67 +110,51 @@ def step(
         input_validation.update_thrusters(memory, state.thruster_health)
 
     # prediction
-    lag, ahead, R_ahead = estimate.state[LAG], memory.predicted, zeros(3, 3)
+    lag, ahead = estimate.state[LAG], memory.predicted
     loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
-    model.free_wrench(dynamics, R, estimate.velocity, memory.omega, loads, against)
-    model.to_acceleration(dynamics, R, estimate.velocity, memory.omega, loads, against, free)
+    acceleration = zeros(6)
     if lag > 0.0:
-        model.thrust_acceleration(dynamics, thrusters, R, thrusters.acting_now, acceleration)
-        for i in range(6):
-            acceleration[i] += free[i]
+        acceleration = model.thrust_acceleration(dynamics, thrusters, R, thrusters.acting_now)
+        acceleration += model.free_acceleration(dynamics, R, estimate.velocity, memory.omega, loads)
     predict_state(ahead, estimate.position, estimate.velocity, memory.quaternion, memory.omega, acceleration, lag)
-    write_rotation(ahead.quaternion, R_ahead)
-    model.free_wrench(dynamics, R_ahead, ahead.velocity[:3], ahead.velocity[3:], loads, against)
-    model.to_acceleration(dynamics, R_ahead, ahead.velocity[:3], ahead.velocity[3:], loads, against, free)
+    R_ahead, velocity, omega = rotation_matrix(ahead.quaternion), ahead.velocity[:3], ahead.velocity[3:]
+    against = model.free_wrench(dynamics, R_ahead, velocity, omega, loads)
+    free = model.to_acceleration(dynamics, R_ahead, velocity, omega, loads, against)
     # where goal and regions will be at the time of that state
     predict_shifts(goal, lag, memory.goal_shifts)
     predict_shifts(regions, lag, memory.region_shifts)
-    goal_ahead = PackedRegions(
-        goal.kinds, goal.signs, goal.offsets, goal.numbers, memory.goal_shifts, goal.velocities, goal.gains,
-        goal.hard, goal.deviations, goal.crossing_costs,
-    )  # fmt: skip
-    regions_ahead = PackedRegions(
-        regions.kinds, regions.signs, regions.offsets, regions.numbers, memory.region_shifts, regions.velocities,
-        regions.gains, regions.hard, regions.deviations, regions.crossing_costs,
-    )  # fmt: skip
+    goal_ahead = goal._replace(shifts=memory.goal_shifts)
+    regions_ahead = regions._replace(shifts=memory.region_shifts)
 
     # path planner, bounded attraction
-    spread = 0.0
-    for axis in range(3):
-        memory.position_variance[axis] = estimate.covariance[axis, axis] + square(memory.deviation[axis])
-        spread = max(spread, SPREADS * np.sqrt(memory.position_variance[axis]))
-        memory.position_variance[axis] = min(memory.position_variance[axis], square(2.0 * _TRUSTED_SPREAD / SPREADS))
+    P = estimate.covariance
+    variance = array(P[0, 0], P[1, 1], P[2, 2]) + memory.deviation[:3] ** 2
+    spread = SPREADS * np.sqrt(np.max(variance))
+    memory.position_variance[:] = np.minimum(variance, square(2.0 * _TRUSTED_SPREAD / SPREADS))
     wider = min(spread, _TRUSTED_SPREAD)
     limits = PathLimits(gains.clearance + wider, gains.margin + wider, gains.speed, gains.depth)
     if gains.path_planning > 0.0:
         improve_path(memory.plan, ahead.position, goal_ahead, regions_ahead, limits, period)
     else:
         go_straight(memory.plan, ahead.position, goal_ahead, limits)
-    desired_velocity(memory.plan, ahead.position, goal.velocities[0], gains, desired)
+    desired = desired_velocity(memory.plan, ahead.position, goal.velocities[0], gains)
     _limit_speed(estimate, spread, gains, desired)
-    desired_acceleration(desired, ahead.velocity[:3], gains, acceleration[:3])
 
     # desired wrench
     observe_regions(memory.observation, regions_ahead, ahead.position, ahead.quaternion, ahead.velocity)
     fraction = period / (period + gains.smoothing)
-    for axis in range(3):
-        memory.filtered_acceleration[axis] += fraction * (
-            acceleration[axis] - free[axis] - memory.filtered_acceleration[axis]
-        )
-    _force_of(dynamics, R_ahead, memory.filtered_acceleration, wrench)
+    by_thrust = desired_acceleration(desired, velocity, gains) - free[:3]
+    memory.filtered_acceleration[:] += fraction * (by_thrust - memory.filtered_acceleration)
+    force = dynamics.mass[:3, :3] @ (R_ahead.T @ memory.filtered_acceleration)
     deep = min(clearance_at(goal_ahead, 0, memory.plan.path[memory.plan.counts[0] - 1]), gains.depth)
     entered = min(max(clearance_at(goal_ahead, 0, ahead.position) / max(deep, _SHALLOWEST), 0.0), 1.0)
-    _soft_forces(memory.observation, regions, memory.weights[1], desired, entered, R_ahead, dynamics, wrench)
+    pushed = _soft_forces(memory.observation, regions, memory.weights[1], desired, entered, dynamics)
     attitude_loop.update_desired(memory.attitude, regions_ahead, ahead.position, gains, period)
-    attitude_loop.compute_moment(
-        memory.attitude, dynamics, ahead.quaternion, ahead.velocity[3:], against, gains, wrench[3:]
-    )
+    moment = attitude_loop.compute_moment(memory.attitude, dynamics, ahead.quaternion, omega, against, gains)
+    wrench = np.concatenate((force + R_ahead.T @ pushed, moment))
     work = memory.program
-    for j in range(forces.size):
-        work.nominal[j] = 0.0
-        for k in range(6):
-            work.nominal[j] += thrusters.allocator[j, k] * wrench[k]
-        work.nominal[j] *= min(max(thrusters.effectiveness[j] / _LEAST_EFFECTIVENESS, _LEAST_SHARE), 1.0)
+    work.nominal[:] = thrusters.allocator @ wrench
+    work.nominal[:] *= np.clip(thrusters.effectiveness / _LEAST_EFFECTIVENESS, _LEAST_SHARE, 1.0)
     lower, upper = memory.given_limits[0], memory.given_limits[1]
     model.write_force_limits(thrusters, memory.given_limits)
 
@@ -193,7 +172,7 @@ def step(
         gains.braking_share * model.available_braking(dynamics, thrusters),
         0.5 * gains.acceleration * (square(period) + square(lag)),
         memory.position_variance,
-        max(memory.deviation[6], memory.deviation[7], memory.deviation[8]),
+        np.max(memory.deviation[6:9]),
     )
     rows = 0
     memory.observation.bound[0] = NO_BOUND
@@ -209,9 +188,9 @@ def step(
     # quadratic program
     steps = quadratic_program.solve(work, rows, thrusters.inverse, lower, upper, forces)
     model.command_forces(thrusters, forces)
-    copy(forces, thrusters.forces)
+    thrusters.forces[:] = forces
     memory.estimate[0] = estimate.net_weight[0]
-    copy(estimate.moments, memory.estimate[1:])
+    memory.estimate[1:] = estimate.moments
     write_report(memory.report, estimate, memory.plan.cost[0], memory.plan.counts[0], thrusters.health, desired)
     write_program_report(memory.report, work.multipliers, work.price, rows, steps)
     beyond = max(spread - 2.0 * _TRUSTED_SPREAD, 0.0)  # spread that the margins do not cover
@@ -220,20 +199,15 @@ def step(
     memory.report[16] = memory.clearance_bound[0] - beyond - slack / (gains.barrier_rate * gains.barrier_slope)
 
 
-def _hold_weight(memory: DeployableMemory, R: Array, gains: DeployableGains, forces: Array) -> None:
+def _hold_weight(memory: DeployableMemory, R: Matrix3, gains: DeployableGains, forces: Array) -> None:
     """Write the forces that compensate W - B, plus `rise`; zeros before the first estimate, or without an attitude."""
     thrusters, wrench = memory.thrusters, zeros(6)
     if memory.state_estimate.time_since_measurement[0] > 0.0 and memory.attitude.started[0] > 0.0:
-        for k in range(3):
-            wrench[k] = -R[2, k] * (memory.state_estimate.net_weight[0] + gains.rise)
-    for j in range(forces.size):
-        force = 0.0
-        for k in range(6):
-            force += thrusters.allocator[j, k] * wrench[k]
-        forces[j] = min(max(force, thrusters.lower[j]), thrusters.upper[j])
+        wrench[:3] = -R[2] * (memory.state_estimate.net_weight[0] + gains.rise)
+    forces[:] = np.clip(thrusters.allocator @ wrench, thrusters.lower, thrusters.upper)
 
 
-def _limit_speed(estimate: Estimate, spread: float, gains: DeployableGains, desired: Array) -> None:
+def _limit_speed(estimate: Estimate, spread: float, gains: DeployableGains, desired: Vector3) -> None:
     """Limit the desired velocity so that the vehicle can stop before `coast` ends or the position is too uncertain."""
     # `spread` is the uncertainty of the position [m].
     gap = max(estimate.time_since_measurement[0], estimate.longest_gap[0])
@@ -242,57 +216,40 @@ def _limit_speed(estimate: Estimate, spread: float, gains: DeployableGains, desi
         max_speed = min(max_speed, gains.acceleration * max(gains.coast - gap, 0.0))
     if spread > _TRUSTED_SPREAD:
         max_speed = min(max_speed, gains.speed * max(2.0 - spread / _TRUSTED_SPREAD, 0.0))
-    speed = length3(desired[0], desired[1], desired[2])
+    speed = norm(desired)
     if speed > max_speed:
-        for axis in range(3):
-            desired[axis] *= max_speed / speed
-
-
-def _force_of(dynamics: Dynamics, R: Array, acceleration: Array, out: Array) -> None:
-    """Write the body force [N] of an acceleration, world frame, into out[:3]."""
-    for i in range(3):
-        out[i] = 0.0
-        for k in range(3):
-            along = 0.0
-            for axis in range(3):
-                along += R[axis, k] * acceleration[axis]
-            out[i] += dynamics.mass[i, k] * along
+        desired *= max_speed / speed
 
 
 def _soft_forces(
     observation: RegionObservation,
     regions: PackedRegions,
     weights: Array,
-    desired: Array,
+    desired: Vector3,
     entered: float,
-    R: Array,
     dynamics: Dynamics,
-    wrench: Array,
-) -> None:
-    """Add the repulsive force of violated soft regions of position (22), -alpha_i g_i grad g_i / |grad g_i|."""
+) -> Vector3:
+    """Return the repulsive force of violated soft regions of position (22), -alpha_i g_i grad g_i / |grad g_i|, NED."""
     # Each is at most the force that the thrusters give in every direction. The path decides what is crossed: on the
     # way, which is as fast as `desired` [m/s, NED], a region pushes aside, but not back. Nor does it outside the goal
     # region, however slow the approach is: `entered` is 0 there, and 1 where the vehicle is as deep in it as the path's
     # end.
-    speed, force = length3(desired[0], desired[1], desired[2]), zeros(3)
-    most = dynamics.translational_mass[0] * model.smallest(dynamics.braking)
+    speed, total = norm(desired), zeros(3)
+    most = dynamics.translational_mass[0] * np.min(dynamics.braking)
     for i in range(regions.kinds.size):
         if regions.hard[i] or not observation.values[i] > 0.0 or regions.kinds[i] >= _ATTITUDE:
             continue
-        size = length3(observation.gradients[i, 0], observation.gradients[i, 1], observation.gradients[i, 2])
+        size = norm(observation.gradients[i])
         if not size > 0.0:
             continue
-        push, along = min(regions.gains[i] * weights[i] * observation.values[i], most), 0.0
-        for axis in range(3):
-            force[axis] = -push * observation.gradients[i, axis] / size
-            along += force[axis] * desired[axis]
+        push = min(regions.gains[i] * weights[i] * observation.values[i], most)
+        force = -push * observation.gradients[i] / size
+        along = force @ desired
         if along < 0.0:
             spared = max(min(speed / _ON_THE_WAY, 1.0), 1.0 - entered)  # share of the push back
-            for axis in range(3):
-                force[axis] -= spared * along * desired[axis] / square(speed)
-        for k in range(3):
-            for axis in range(3):
-                wrench[k] += R[axis, k] * force[axis]
+            force -= spared * along * desired / square(speed)
+        total += force
+    return total
 
 
 class DeployableLaw(CompiledLaw):

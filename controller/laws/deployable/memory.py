@@ -4,9 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from controller.laws.deployable.actuator_lag import PredictedState
 from controller.laws.deployable.attitude import Attitude
 from controller.laws.deployable.barrier import RegionObservation
@@ -15,15 +12,14 @@ from controller.laws.deployable.fault_detection import FaultState
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.laws.deployable.path_planning.planner import PathPlan
 from controller.quadratic_program import Workspace
-
-Array = NDArray[np.float64]
+from controller.stack_array import Array, Columns6, Number, Rows3, Vector3, Vector4, Vector6
 
 
 class DeployableMemory(NamedTuple):
     """State between steps, as arrays, for the translation to C."""
 
-    period: Array  # (1,) s, control period
-    estimate: Array  # (4,) phi_hat of (12) [N, N m]
+    period: Number  # s, control period
+    estimate: Vector4  # phi_hat of (12) [N, N m]
     report: Array  # (r,) diagnostics of the last step
     dynamics: Dynamics
     thrusters: Thrusters
@@ -34,18 +30,18 @@ class DeployableMemory(NamedTuple):
     observation: RegionObservation
     program: Workspace
     predicted: PredictedState
-    expected: Array  # (6,) m, NED, and m/s, body: predicted position and velocity at the next step; NaN if unknown
-    quaternion: Array  # (4,) from body to world, measured, or propagated by the model
-    omega: Array  # (3,) rad/s, body rates, measured, or propagated by the model
+    expected: Vector6  # m, NED, and m/s, body: predicted position and velocity at the next step; NaN if unknown
+    quaternion: Vector4  # from body to world, measured, or propagated by the model
+    omega: Vector3  # rad/s, body rates, measured, or propagated by the model
     deviation: Array  # (12,) standard deviations of the measured state, as in `VehicleState`
-    position_variance: Array  # (3,) m2, NED: variance of the estimated position
+    position_variance: Vector3  # m2, NED: variance of the estimated position
     clearance_bound: Array  # (2,) m, of the clearances: guaranteed; of the last step; NaN without one
-    goal_shifts: Array  # (1, 3) m, NED: shift of the goal at the time of the predicted state
-    region_shifts: Array  # (n, 3) m, NED: those of the regions
+    goal_shifts: Rows3  # (1, 3) m, NED: shift of the goal at the time of the predicted state
+    region_shifts: Rows3  # m, NED: those of the regions
     samples: Array  # (2,) number of position and velocity samples: that reached the gate; that it rejected
     weights: Array  # (2, n) sanitized weights of the arbiter, smoothed in two stages for hard regions; NaN at first
     reported: Array  # (m,) health of the thrusters as last reported
-    filtered_acceleration: Array  # (3,) m/s2, NED: desired acceleration by the thrusters, low-pass filtered
-    thruster_acceleration: Array  # (6, m) m/s2, rad/s2: acceleration by one newton of each thruster
-    acceleration_ahead: Array  # (6, m) m/s2, rad/s2: the same at the predicted attitude
+    filtered_acceleration: Vector3  # m/s2, NED: desired acceleration by the thrusters, low-pass filtered
+    thruster_acceleration: Columns6  # m/s2, rad/s2: acceleration by one newton of each thruster
+    acceleration_ahead: Columns6  # m/s2, rad/s2: the same at the predicted attitude
     given_limits: Array  # (2, m) N, true force of each thruster at its lower and upper limit

@@ -10,6 +10,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -29,11 +31,11 @@ from controller.laws.deployable.estimate import (
 )
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.model import Dynamics, Loads, Thrusters, free_acceleration
-from controller.quaternion import down_parts
-from controller.stack_array import zeros
+from controller.linear_algebra import cross
+from controller.quaternion import down_in_body
+from controller.stack_array import Columns6, Matrix3, Shape, Vector3, Vector4
 
-Array = NDArray[np.float64]
-
+Moments2 = Annotated[NDArray[np.float64], Shape(3, 2)]
 
 _UNMODELED = 0.03  # m/s2/sqrt(Hz), acceleration noise of the model
 _SLOWEST = 0.15  # m/s against the water, least speed at which drag is linearized
@@ -56,42 +58,38 @@ def predict(
     estimate: Estimate,
     dynamics: Dynamics,
     thrusters: Thrusters,
-    thruster_acceleration: Array,
-    R: Array,
-    omega_body: Array,
+    thruster_acceleration: Columns6,
+    R: Matrix3,
+    omega_body: Vector3,
     gains: DeployableGains,
     period: float,
 ) -> None:
     """Predict the estimate over a period [s] under the forces that acted in it."""
-    # `thruster_acceleration`, shape (6, m), is the acceleration by one newton of each thruster.
+    # `thruster_acceleration` is the acceleration by one newton of each thruster.
     x, P, F = estimate.state, estimate.covariance, estimate.transition
-    mass, T, m = dynamics.translational_mass[0], period, thrusters.acting.size
-    free, curvature = zeros(6), zeros(3)
+    T, m, B = period, thrusters.acting.size, thruster_acceleration[:3]
+    effectiveness = x[EFFECTIVENESS : EFFECTIVENESS + m]
     loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
-    free_acceleration(dynamics, R, estimate.velocity, omega_body, loads, free)
-    linear = (dynamics.linear_damping[0] + dynamics.linear_damping[1] + dynamics.linear_damping[2]) / 3.0
-    quadratic = (dynamics.quadratic_damping[0] + dynamics.quadratic_damping[1] + dynamics.quadratic_damping[2]) / 3.0
+    free = free_acceleration(dynamics, R, estimate.velocity, omega_body, loads)
+    acceleration = free[:3] + B @ (thrusters.acting * effectiveness)
+    curvature = T * (B @ (estimate.curvature * effectiveness))
     _update_misfit(estimate, T)
+    # derivatives of the next velocity; drag is that of the mean axis, linearized
+    linear, quadratic = np.sum(dynamics.linear_damping[:3]) / 3.0, np.sum(dynamics.quadratic_damping[:3]) / 3.0
+    speed = np.maximum(abs(estimate.velocity - estimate.water_velocity), _SLOWEST)
+    slope = (linear + 2.0 * quadratic * speed) / dynamics.translational_mass[0]
     F[:, :] = 0.0
     for axis in range(3):
-        relative = abs(estimate.velocity[axis] - estimate.water_velocity[axis])
-        slope = (linear + 2.0 * quadratic * max(relative, _SLOWEST)) / mass
-        F[axis, VELOCITY + axis] = 1.0 - slope * T
-        if axis < 2:
-            F[axis, CURRENT + axis] = slope * T
-        else:
-            F[axis, NET_WEIGHT] = T / mass
-        acceleration = free[axis]
-        for j in range(m):
-            effectiveness, by_force = x[EFFECTIVENESS + j], thruster_acceleration[axis, j]
-            acceleration += by_force * thrusters.acting[j] * effectiveness
-            F[axis, EFFECTIVENESS + j] = T * by_force * thrusters.acting[j]
-            F[axis, EFFECTIVENESS + m + j] = T * by_force * estimate.by_ceiling[0, j] * effectiveness
-            F[axis, LAG] += T * by_force * estimate.by_lag[j] * effectiveness
-            curvature[axis] += T * by_force * estimate.curvature[j] * effectiveness
-        estimate.acceleration[axis] = acceleration
-        x[axis] += T * (estimate.velocity[axis] + 0.5 * T * acceleration)
-        x[VELOCITY + axis] += T * acceleration
+        F[axis, VELOCITY + axis] = 1.0 - slope[axis] * T
+    F[0, CURRENT], F[1, CURRENT + 1] = slope[0] * T, slope[1] * T
+    F[2, NET_WEIGHT] = T / dynamics.translational_mass[0]
+    F[:, LAG] = T * (B @ (estimate.by_lag * effectiveness))
+    F[:, EFFECTIVENESS : EFFECTIVENESS + m] = T * B * thrusters.acting
+    F[:, EFFECTIVENESS + m : EFFECTIVENESS + m + m] = T * B * estimate.by_ceiling[0] * effectiveness
+    # the state and its covariance
+    estimate.acceleration[:] = acceleration
+    x[:3] += T * (estimate.velocity + 0.5 * T * acceleration)
+    x[VELOCITY:CURRENT] += T * acceleration
     _propagate_covariance(estimate, T)
     for axis in range(3):
         P[VELOCITY + axis, VELOCITY + axis] += square(_UNMODELED) * T + _CURVED / T * square(curvature[axis])
@@ -101,28 +99,24 @@ def predict(
         P[CURRENT + axis, CURRENT + axis] += square(gains.current_drift) * T
     P[NET_WEIGHT, NET_WEIGHT] += square(gains.restoring_drift * estimate.mass_scale[0]) * T
     P[LAG, LAG] += square(_LAG_DRIFT) * T
-    for j in range(m):
-        k = EFFECTIVENESS + m + j
-        thrusters.effectiveness[j], thrusters.ceiling[0, j] = x[EFFECTIVENESS + j], x[k]
-        thrusters.ceiling[1, j] = np.sqrt(P[k, k])
-        if P[EFFECTIVENESS + j, EFFECTIVENESS + j] > 0.0:
-            P[EFFECTIVENESS + j, EFFECTIVENESS + j] += square(_WEAR) * T
-        P[k, k] += square(_SAG) * T
+    thrusters.effectiveness[:], thrusters.ceiling[0] = effectiveness, x[EFFECTIVENESS + m : EFFECTIVENESS + m + m]
+    for j in range(EFFECTIVENESS, EFFECTIVENESS + m):
+        thrusters.ceiling[1, j - EFFECTIVENESS] = np.sqrt(P[j + m, j + m])
+        if P[j, j] > 0.0:
+            P[j, j] += square(_WEAR) * T
+        P[j + m, j + m] += square(_SAG) * T
     freeze(estimate, gains)
     _propagate_deviations(estimate, thrusters, thruster_acceleration, T)
     estimate.evidence[:, :] = 0.0
     estimate.time_since_measurement[0] += period
-    for group in range(2):
-        estimate.time_since_valid[group] += period
+    estimate.time_since_valid[:] += period
     estimate.longest_gap[0] *= 1.0 - period / _GAP_MEMORY
     publish(estimate)
 
 
 def _update_misfit(estimate: Estimate, period: float) -> None:
     """Update the misfit of the model over a period [s]: innovations of a model that fits are white."""
-    mean = 0.0
-    for i in range(estimate.bias.size):
-        mean += square(estimate.bias[i]) / estimate.bias.size
+    mean = estimate.bias @ estimate.bias / estimate.bias.size
     relative = min(mean / _USUAL_BIAS, _GREATEST_MISFIT)
     estimate.misfit[0] += period / (period + _MISFIT_MEMORY) * (relative - estimate.misfit[0])
 
@@ -130,75 +124,50 @@ def _update_misfit(estimate: Estimate, period: float) -> None:
 def _propagate_covariance(estimate: Estimate, period: float) -> None:
     """Propagate the covariance over a period [s]: first the positions, then the velocities by `transition`."""
     P, F, W = estimate.covariance, estimate.transition, estimate.product
-    n = estimate.state.size
-    for axis in range(3):
-        for k in range(n):
-            P[axis, k] += period * P[VELOCITY + axis, k]
-        for k in range(n):
-            P[k, axis] += period * P[k, VELOCITY + axis]
-    for i in range(3):
-        W[i, :] = 0.0
-        for q in range(VELOCITY, n):
-            share = F[i, q]
-            if share != 0.0:
-                for k in range(n):
-                    W[i, k] += share * P[q, k]
-    for i in range(3):
-        for k in range(n):
-            P[VELOCITY + i, k] = P[k, VELOCITY + i] = W[i, k]
-    for i in range(3):
-        for k in range(3):
-            total = 0.0
-            for q in range(VELOCITY, n):
-                total += W[i, q] * F[k, q]
-            P[VELOCITY + i, VELOCITY + k] = total
+    P[:3] += period * P[VELOCITY:CURRENT]
+    P[:, :3] += period * P[:, VELOCITY:CURRENT]
+    W[:] = F[:, VELOCITY:] @ P[VELOCITY:]
+    P[VELOCITY:CURRENT], P[:, VELOCITY:CURRENT] = W, W.T
+    P[VELOCITY:CURRENT, VELOCITY:CURRENT] = W[:, VELOCITY:] @ F[:, VELOCITY:].T
 
 
 def _propagate_deviations(
-    estimate: Estimate, thrusters: Thrusters, thruster_acceleration: Array, period: float
+    estimate: Estimate, thrusters: Thrusters, thruster_acceleration: Columns6, period: float
 ) -> None:
     """Propagate the deviations of all hypotheses over a period [s], with the missing force of stuck thrusters."""
-    F, deviation, m = estimate.transition, estimate.deviation, thrusters.acting.size
+    F, m = estimate.transition, thrusters.acting.size
+    estimate.missing[:] = estimate.supposed[0] * (estimate.supposed[1] - thrusters.acting)
     for j in range(2 * m):
-        for axis in range(3):
-            deviation[j, axis] += period * deviation[j, VELOCITY + axis]
-            estimate.gain[axis] = 0.0
-            for q in range(VELOCITY, estimate.state.size):
-                estimate.gain[axis] += F[axis, q] * deviation[j, q]
-        for axis in range(3):
-            deviation[j, VELOCITY + axis] = estimate.gain[axis]
-    for j in range(m):
-        estimate.missing[j] = estimate.supposed[0, j] * (estimate.supposed[1, j] - thrusters.acting[j])
-        for axis in range(3):
-            deviation[m + j, VELOCITY + axis] += period * thruster_acceleration[axis, j] * estimate.missing[j]
+        d = estimate.deviation[j]
+        d[:3] += period * d[VELOCITY:CURRENT]
+        d[VELOCITY:CURRENT] = F[:, VELOCITY:] @ d[VELOCITY:]
+        if j >= m:
+            d[VELOCITY:CURRENT] += period * thruster_acceleration[:3, j - m] * estimate.missing[j - m]
 
 
 def correct_by_moment(
     estimate: Estimate,
-    moment: Array,
-    by_current: Array,
-    rate_deviation: Array,
+    moment: Vector3,
+    by_current: Moments2,
+    rate_deviation: Vector3,
     dynamics: Dynamics,
     thrusters: Thrusters,
-    R: Array,
-    quaternion: Array,
-    omega_body: Array,
+    R: Matrix3,
+    quaternion: Vector4,
+    omega_body: Vector3,
     gains: DeployableGains,
     period: float,
 ) -> None:
-    """Correct by the moment [N m] of thrusters and weight, measured by the rates over a period [s], shape (3,)."""
-    # `by_current`, shape (3, 2), is the derivative of the modeled moment by the current [N s]; `rate_deviation`, shape
-    # (3,), the standard deviation [rad/s] of the rates.
-    row, x = estimate.row, estimate.state
-    k, middle, body = zeros(3), zeros(3), zeros(3)
-    k[0], k[1], k[2] = down_parts(quaternion)
-    for i in range(3):  # at the middle of the period
-        a, b = (i + 1) % 3, (i + 2) % 3
-        middle[i] = k[i] + 0.5 * period * (omega_body[a] * k[b] - omega_body[b] * k[a])
-        for axis in range(3):
-            body[i] += R[axis, i] * estimate.acceleration[axis]
+    """Correct by the moment [N m] of thrusters and weight, measured by the rates over a period [s]."""
+    # `by_current` is the derivative of the modeled moment by the current [N s]; `rate_deviation` the standard deviation
+    # [rad/s] of the rates.
+    row, x, m = estimate.row, estimate.state, thrusters.acting.size
+    effectiveness = x[EFFECTIVENESS : EFFECTIVENESS + m]
+    k = down_in_body(quaternion)
+    middle = k + 0.5 * period * cross(omega_body, k)  # at the middle of the period
+    body = R.T @ estimate.acceleration
     for i in range(3):
-        a, b = (i + 1) % 3, (i + 2) % 3
+        a, b, B = (i + 1) % 3, (i + 2) % 3, thrusters.matrix[3 + i]
         row[:] = 0.0
         row[MOMENTS + b] = -middle[a]  # moment = B (f e) - S(k) phi - m z e3 x a
         row[MOMENTS + a] = middle[b]
@@ -206,28 +175,23 @@ def correct_by_moment(
             row[HEIGHT] = dynamics.rigid_mass[0] * body[1]
         elif i == 1:
             row[HEIGHT] = -dynamics.rigid_mass[0] * body[0]
-        expected = row[MOMENTS + a] * x[MOMENTS + a] + row[MOMENTS + b] * x[MOMENTS + b] + row[HEIGHT] * x[HEIGHT]
-        row[CURRENT], row[CURRENT + 1] = by_current[i, 0], by_current[i, 1]
-        variance = square(_ANGULAR * dynamics.mass[3 + i, 3 + i]) / period
-        # of the difference of two rates
-        variance += 2.0 * square(rate_deviation[i] * dynamics.mass[3 + i, 3 + i] / period)
-        m = thrusters.acting.size
-        for j in range(m):
-            estimate.direct[m + j] = thrusters.matrix[3 + i, j] * estimate.missing[j]
-            given = thrusters.matrix[3 + i, j] * thrusters.acting[j]
-            row[EFFECTIVENESS + j] = given
-            by_ceiling = thrusters.matrix[3 + i, j] * estimate.by_ceiling[0, j]
-            row[EFFECTIVENESS + m + j] = by_ceiling * x[EFFECTIVENESS + j]
-            expected += given * x[EFFECTIVENESS + j]
-            row[LAG] += thrusters.matrix[3 + i, j] * estimate.by_lag[j] * x[EFFECTIVENESS + j]
-            variance += square(_RIPPLE * given)
-            variance += _CURVED / period * square(thrusters.matrix[3 + i, j] * estimate.curvature[j])
+        row[EFFECTIVENESS : EFFECTIVENESS + m] = B * thrusters.acting
+        expected = row @ x
+        row[CURRENT:NET_WEIGHT] = by_current[i]
+        row[EFFECTIVENESS + m : EFFECTIVENESS + m + m] = B * estimate.by_ceiling[0] * effectiveness
+        row[LAG] = B @ (estimate.by_lag * effectiveness)
+        estimate.direct[m : m + m] = B * estimate.missing
+        inertia = dynamics.mass[3 + i, 3 + i]
+        variance = square(_ANGULAR * inertia) / period
+        variance += 2.0 * square(rate_deviation[i] * inertia / period)  # of the difference of two rates
+        variance += np.sum((_RIPPLE * B * thrusters.acting) ** 2)
+        variance += _CURVED / period * np.sum((B * estimate.curvature) ** 2)
         _correct(estimate, moment[i] - expected, variance, 1.0, i, 0, row.size)
     estimate.direct[:] = 0.0
     project(estimate, gains)
 
 
-def correct(estimate: Estimate, first: int, measured: Array, noise: float, gains: DeployableGains) -> bool:
+def correct(estimate: Estimate, first: int, measured: Vector3, noise: float, gains: DeployableGains) -> bool:
     """Correct by a measured position or velocity; components that are NaN are skipped; measured (3,) [m]."""
     P, x, known = estimate.covariance, estimate.state, False
     for axis in range(3):
@@ -254,29 +218,20 @@ def _correct(
 ) -> None:
     """Correct by one number; add weighted evidence of each hypothesis, and propagate its deviation."""
     # Before the call, set the `row` of the number; it must be 0 outside `begin` to `end` (exclusive).
-    P, row, gain = estimate.covariance, estimate.row, estimate.gain
-    n, variance = row.size, noise
+    P, x, row, gain = estimate.covariance, estimate.state, estimate.row, estimate.gain
     gain[:] = 0.0
     for k in range(begin, end):
         if row[k] != 0.0:
-            for i in range(n):
-                gain[i] += P[k, i] * row[k]
-    for i in range(begin, end):
-        variance += gain[i] * row[i]
-    variance = max(variance, square(innovation / _OUTLIER))
+            gain += P[k] * row[k]
+    variance = max(noise + float(gain[begin:end] @ row[begin:end]), square(innovation / _OUTLIER))
     estimate.bias[channel] += _BIAS_SHARE * (innovation / np.sqrt(variance) - estimate.bias[channel])
-    for i in range(n):
+    for i in range(x.size):
         share = gain[i] / variance
-        estimate.state[i] += share * innovation
-        for k in range(n):
-            P[i, k] -= share * gain[k]
-    for k in range(n):
-        gain[k] /= variance
+        x[i] += share * innovation
+        P[i] -= share * gain
+    gain /= variance
     for j in range(estimate.direct.size):
-        expected = estimate.direct[j]
-        for k in range(begin, end):
-            expected += row[k] * estimate.deviation[j, k]
+        expected = estimate.direct[j] + row[begin:end] @ estimate.deviation[j, begin:end]
         estimate.evidence[0, j] += weight * expected * innovation / variance
         estimate.evidence[1, j] += weight * square(expected) / variance
-        for k in range(n):
-            estimate.deviation[j, k] -= gain[k] * expected
+        estimate.deviation[j] -= expected * gain

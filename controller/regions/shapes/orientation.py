@@ -10,7 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from controller.arithmetic import arctangent
-from controller.quaternion import error_parts, rotation_matrix
+from controller.linear_algebra import norm
+from controller.quaternion import error, rotation_matrix
 from controller.regions.entry import Entry, ViewCone
 from controller.regions.numbers import ANGLE, PART, Number
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector4, require, unit
@@ -54,8 +55,8 @@ class Orientation:
 
 def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Orientation` at the attitude `e`; the position does not matter."""
-    turn = error_parts(q[:4], e)
-    sine = math.sqrt(turn[1] * turn[1] + turn[2] * turn[2] + turn[3] * turn[3])
+    turn = error(q[:4], e)
+    sine = norm(turn[1:])
     g = 2.0 * arctangent(sine, turn[0]) - q[4]
     if sine == 0.0 or turn[0] == 0.0:
         return g, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

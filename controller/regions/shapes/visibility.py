@@ -8,7 +8,8 @@ from math import inf
 from typing import ClassVar
 
 from controller.arithmetic import arctangent
-from controller.quaternion import rotation_rows
+from controller.linear_algebra import cross, norm
+from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry, ViewCone
 from controller.regions.numbers import ANGLE, LENGTH, PART, Number, vector
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector3, require, require_finite, unit
@@ -68,39 +69,23 @@ class Visibility:
 def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Visibility` at the position `p` and the attitude `e`."""
     # the feature in the body frame: u from the origin, b from the camera
-    R = rotation_rows(e)
-    dx, dy, dz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
-    ux, uy, uz = (
-        R[0][0] * dx + R[1][0] * dy + R[2][0] * dz,
-        R[0][1] * dx + R[1][1] * dy + R[2][1] * dz,
-        R[0][2] * dx + R[1][2] * dy + R[2][2] * dz,
-    )
-    bx, by, bz = ux - q[6], uy - q[7], uz - q[8]
-    square = bx * bx + by * by + bz * bz
+    R, axis = rotation_matrix(e), q[3:6]
+    u = R.T @ (q[:3] - p)
+    b = u - q[6:9]
+    square = b @ b
     if square == 0.0:
         return math.pi - q[9], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
     # the angle to the axis a, and its derivative by b: ((a . b) b / |b|^2 - a) / |a x b|
-    ax, ay, az = q[3], q[4], q[5]
-    along = ax * bx + ay * by + az * bz
-    cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-    aside = math.sqrt(cx * cx + cy * cy + cz * cz)
+    along, aside = float(axis @ b), norm(cross(axis, b))
     g = arctangent(aside, along) - q[9]
     if aside == 0.0:
         return g, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    k = along / square
-    sx, sy, sz = (k * bx - ax) / aside, (k * by - ay) / aside, (k * bz - az) / aside
+    s = (along / square * b - axis) / aside
 
     # db = -R^T dp + u x theta
-    return (
-        g,
-        -(R[0][0] * sx + R[0][1] * sy + R[0][2] * sz),
-        -(R[1][0] * sx + R[1][1] * sy + R[1][2] * sz),
-        -(R[2][0] * sx + R[2][1] * sy + R[2][2] * sz),
-        sy * uz - sz * uy,
-        sz * ux - sx * uz,
-        sx * uy - sy * ux,
-    )
+    by_position, by_turn = -(R @ s), cross(s, u)
+    return g, by_position[0], by_position[1], by_position[2], by_turn[0], by_turn[1], by_turn[2]
 
 
 def field_of_view(shape: Visibility) -> ViewCone:

@@ -6,7 +6,9 @@ import math
 from collections.abc import Callable
 from functools import cached_property
 
-from controller.quaternion import rotation_rows
+import numpy as np
+
+from controller.quaternion import rotation_matrix
 from cosim.mavlink.vehicle.row_layout import RowLayout
 from cosim.scenario.region_tables import Vector3
 from cosim.simulation.commands.commands import MODES, Mode
@@ -92,9 +94,10 @@ class View:
     """Angular velocity, body frame [rad/s]."""
 
     @cached_property
-    def _rotation(self) -> tuple[Vector3, Vector3, Vector3]:
+    def _rotation(self) -> list[Vector3]:
         """R from body to world, (3), as floats, which are faster here than arrays."""
-        return rotation_rows(self.quaternion)
+        rows: list[Vector3] = rotation_matrix(np.array(self.quaternion)).tolist()
+        return rows
 
     def to_world(self, vector_body: Vector3) -> Vector3:
         """Rotate a vector from the body frame to the world, NED."""

@@ -57,10 +57,10 @@ class Sea:
         for _ in range(substeps):
             remains = np.exp(-h / self.lag) if self.lag else 0.0
             self.given = commanded + remains * (self.given - commanded)
-            R, free, pushed = rotation_matrix(self.quaternion), np.empty(6), np.empty(6)
+            R = rotation_matrix(self.quaternion)
             loads = Loads(self.current, np.array([self.net_weight]), RIGHTING)
-            free_acceleration(self.dynamics, R, self.velocity, self.omega, loads, free)
-            thrust_acceleration(self.dynamics, self.thrusters, R, self.given * self.left, pushed)
+            free = free_acceleration(self.dynamics, R, self.velocity, self.omega, loads)
+            pushed = thrust_acceleration(self.dynamics, self.thrusters, R, self.given * self.left)
             self.position += h * self.velocity
             self.velocity += h * (free + pushed)[:3]
             self.quaternion += h * rate(self.quaternion, self.omega)

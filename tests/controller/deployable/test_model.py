@@ -49,12 +49,12 @@ def test_model_acceleration_matches_the_plant(name):
                 plant[f"thrust[{j + 1}]"] = forces[j]
             plant.step(step)
             after = np.array([plant[name] for name in POSE])
-            R, free, pushed = rotation_matrix(e), np.empty(6), np.empty(6)
+            R = rotation_matrix(e)
             before = R @ nu[:3]
             there = np.r_[rotation_matrix(after[:4]) @ after[4:7] - before, after[7:] - nu[3:]] / step
-            free_acceleration(dynamics, R, before, nu[3:], Loads(current, np.array([restoring]), moments), free)
+            free = free_acceleration(dynamics, R, before, nu[3:], Loads(current, np.array([restoring]), moments))
             thrusters.effectiveness[:] = rng.uniform(0.3, 1.0, 8)
-            thrust_acceleration(dynamics, thrusters, R, forces / thrusters.effectiveness, pushed)
+            pushed = thrust_acceleration(dynamics, thrusters, R, forces / thrusters.effectiveness)
             # a step is a difference quotient: it is off by half a step times what the acceleration changes in a second
             assert (free + pushed)[:3] == pytest.approx(there[:3], abs=2e-3 * (0.1 + np.abs(there[:3]).max()))
             assert (free + pushed)[3:] == pytest.approx(there[3:], abs=2e-3 * (0.1 + np.abs(there[3:]).max()))

@@ -294,10 +294,9 @@ def test_prediction_follows_the_vehicle_model():
         estimate.covariance[CEILING:] = 0.0  # the limits are known
         publish(estimate)
         thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
-        free, pushed = np.empty(6), np.empty(6)
         loads = Loads(estimate.water_velocity, np.array([7.0]), estimate.moments)
-        free_acceleration(dynamics, R, estimate.velocity, omega, loads, free)
-        thrust_acceleration(dynamics, thrusters, R, thrusters.forces * x[EFFECTIVENESS:CEILING], pushed)
+        free = free_acceleration(dynamics, R, estimate.velocity, omega, loads)
+        pushed = thrust_acceleration(dynamics, thrusters, R, thrusters.forces * x[EFFECTIVENESS:CEILING])
         a, v, p = (free + pushed)[:3], estimate.velocity.copy(), estimate.position.copy()
         predict(estimate, dynamics, thrusters, R, omega)
         assert estimate.acceleration == pytest.approx(a, rel=1e-10)

@@ -29,30 +29,29 @@ def expected(memory, state, goal, regions, weights):
     thrusters, dynamics, seen = memory.thrusters, memory.dynamics, memory.state_estimate
     input_validation.process_measurement(memory, state, GAINS)
     R, omega, ahead = rotation_matrix(memory.quaternion), memory.omega, memory.predicted
-    wanted, acceleration, free, moment, pushing, against = (np.empty(n) for n in (3, 3, 6, 3, 6, 6))
     loads = model.Loads(seen.water_velocity, seen.net_weight, seen.moments)
-    model.free_acceleration(dynamics, R, seen.velocity, omega, loads, free)
-    model.thrust_acceleration(dynamics, thrusters, R, thrusters.acting_now, pushing)
+    free = model.free_acceleration(dynamics, R, seen.velocity, omega, loads)
+    pushing = model.thrust_acceleration(dynamics, thrusters, R, thrusters.acting_now)
     motion = seen.position, seen.velocity, memory.quaternion, omega, free + pushing
     actuator_lag.predict_state(ahead, *motion, seen.state[LAG])
     position, velocity, turn = ahead.position, ahead.velocity[:3], ahead.velocity[3:]
     R = rotation_matrix(ahead.quaternion)
-    model.free_acceleration(dynamics, R, velocity, turn, loads, free)
+    free = model.free_acceleration(dynamics, R, velocity, turn, loads)
     goal, regions = (r._replace(shifts=r.shifts + seen.state[LAG] * r.velocities) for r in (goal, regions))
     variance = np.diag(seen.covariance)[:3] + state.deviation[:3] ** 2
     wider = 3.0 * np.sqrt(variance.max())
     limits = PathLimits(GAINS.clearance + wider, GAINS.margin + wider, GAINS.speed, GAINS.depth)
     improve_path(memory.plan, position, goal, regions, limits, 0.02)
-    desired_velocity(memory.plan, position, goal.velocities[0], GAINS, wanted)
+    wanted = desired_velocity(memory.plan, position, goal.velocities[0], GAINS)
     wanted *= min(1.0, GAINS.speed / np.linalg.norm(wanted))
-    desired_acceleration(wanted, velocity, GAINS, acceleration)
+    acceleration = desired_acceleration(wanted, velocity, GAINS)
     barrier.observe_regions(memory.observation, regions, position, ahead.quaternion, ahead.velocity)
     pushed = memory.filtered_acceleration + 0.02 / (0.02 + GAINS.smoothing) * (
         acceleration - free[:3] - memory.filtered_acceleration
     )
     attitude.update_desired(memory.attitude, regions, position, GAINS, 0.02)
-    model.free_wrench(dynamics, R, velocity, turn, loads, against)
-    attitude.compute_moment(memory.attitude, dynamics, ahead.quaternion, turn, against, GAINS, moment)
+    against = model.free_wrench(dynamics, R, velocity, turn, loads)
+    moment = attitude.compute_moment(memory.attitude, dynamics, ahead.quaternion, turn, against, GAINS)
     wrench = np.r_[dynamics.mass[:3, :3] @ R.T @ pushed, moment]
     memory.program.nominal[:] = thrusters.allocator @ wrench
     lower, upper = thrusters.lower * thrusters.effectiveness, thrusters.upper * thrusters.effectiveness
@@ -123,12 +122,13 @@ def test_soft_region_pushes_back_by_the_depth_in_the_goal_relative_to_the_end_of
         own.memory = copy.deepcopy(memory)
         own.step(sea.measured(), goal, regions, np.array([weight]), forces)
         nominal.append(own.memory.program.nominal.copy())
-    plan, ahead, wanted, wrench = own.memory.plan, own.memory.predicted, np.empty(3), np.zeros(6)
-    desired_velocity(plan, ahead.position, goal.velocities[0], GAINS, wanted)
+    plan, ahead = own.memory.plan, own.memory.predicted
+    wanted = desired_velocity(plan, ahead.position, goal.velocities[0], GAINS)
     end = plan.path[plan.counts[0] - 1]
     entered = clearance_at(goal, 0, ahead.position) / min(clearance_at(goal, 0, end), GAINS.depth)
     R = rotation_matrix(ahead.quaternion)
-    law._soft_forces(own.memory.observation, regions, np.ones(1), wanted, entered, R, memory.dynamics, wrench)
+    force = law._soft_forces(own.memory.observation, regions, np.ones(1), wanted, entered, memory.dynamics)
+    wrench = np.r_[R.T @ force, 0.0, 0.0, 0.0]
     assert 0.3 < entered < 0.7 and np.linalg.norm(wanted) < 0.3 and np.abs(wrench).max() > 0.1
     assert nominal[0] - nominal[1] == pytest.approx(memory.thrusters.allocator @ wrench, rel=1e-9, abs=1e-9)
 

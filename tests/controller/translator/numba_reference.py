@@ -1,26 +1,60 @@
 """The Python text of translated functions compiled by Numba, as an independent translation."""
 
+import ast
 import dis
 import functools
+import inspect
+import textwrap
 import types
 
 import numba
 import numpy as np
 from numba.extending import overload
 
-from controller.stack_array import zeros
+from controller.stack_array import array, zeros
 
 
 @functools.cache
 def by_numba(function):
     """Return a function, and all that it calls, compiled by Numba."""
     names = {name: _of_numba(value) for name, value in function.__globals__.items() if name in _used(function.__code__)}
-    cells = tuple(types.CellType(_of_numba(cell.cell_contents)) for cell in function.__closure__ or ())
-    copy = types.FunctionType(
-        function.__code__, names | {"__name__": function.__module__, "__builtins__": __builtins__},
-        function.__name__, function.__defaults__, cells or None,
-    )  # fmt: skip
-    return numba.njit(error_model="numpy")(copy)
+    cells = inspect.getclosurevars(function).nonlocals
+    names |= {name: _of_numba(value) for name, value in cells.items()}
+    names |= {"__name__": function.__module__, "__builtins__": __builtins__, "abs": np.abs}
+    names |= {f.__name__: f for f in (_product, _replaced, _items)}
+    text = getattr(function, "source", None) or textwrap.dedent(inspect.getsource(function))
+    tree = ast.fix_missing_locations(_InOrder().visit(ast.parse(text)))
+    tree.body[0].decorator_list, tree.body[0].returns = [], None
+    for argument in tree.body[0].args.args:
+        argument.annotation = None
+    exec(compile(tree, f"<{function.__qualname__}>", "exec"), names)
+    return numba.njit(error_model="numpy")(names[function.__name__])
+
+
+class _InOrder(ast.NodeTransformer):
+    """Puts calls where Numba adds in another order, or knows no such operation."""
+
+    def visit_BinOp(self, node):
+        self.generic_visit(node)
+        if not isinstance(node.op, ast.MatMult):
+            return node
+        return ast.Call(ast.Name("_product", ast.Load()), [node.left, node.right], [])
+
+    def visit_Call(self, node):
+        self.generic_visit(node)
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
+            made = node.func.value
+            for keyword in node.keywords:
+                made = ast.Call(ast.Name("_replaced", ast.Load()), [made, ast.Constant(keyword.arg), keyword.value], [])
+            return made
+        return node
+
+    def visit_Assign(self, node):
+        self.generic_visit(node)
+        if isinstance(node.targets[0], ast.Tuple) and not isinstance(node.value, ast.Tuple):
+            n = ast.Constant(len(node.targets[0].elts))
+            node.value = ast.Call(ast.Name("_items", ast.Load()), [node.value, n], [])
+        return node
 
 
 def _used(code):
@@ -30,8 +64,8 @@ def _used(code):
 
 
 def _of_numba(value):
-    if value is zeros:
-        return zeros
+    if value in (zeros, array) if isinstance(value, types.FunctionType) else False:
+        return value
     if isinstance(value, types.FunctionType) and value.__module__.partition(".")[0] in ("controller", "cosim"):
         return by_numba(value)
     if isinstance(value, types.ModuleType) and value.__name__.startswith("controller."):
@@ -50,6 +84,74 @@ class _Module(types.ModuleType):
         return _of_numba(getattr(self._module, name))
 
 
+def _product(a, b):
+    raise NotImplementedError
+
+
+def _replaced(record, name, value):
+    raise NotImplementedError
+
+
+def _items(values, n):
+    raise NotImplementedError
+
+
 @overload(zeros)
 def _zeros(*shape):
     return lambda *shape: np.zeros(shape)
+
+
+@overload(array)
+def _array(*items):
+    return lambda *items: np.array(items)
+
+
+@overload(_product)
+def _product_in_order(a, b):
+    def vectors(a, b):
+        total = 0.0
+        for k in range(b.shape[0]):
+            total += a[k] * b[k]
+        return total
+
+    def matrix_vector(a, b):
+        total = np.zeros(a.shape[0])
+        for i in range(a.shape[0]):
+            for k in range(b.shape[0]):
+                total[i] += a[i, k] * b[k]
+        return total
+
+    def vector_matrix(a, b):
+        total = np.zeros(b.shape[1])
+        for j in range(b.shape[1]):
+            for k in range(b.shape[0]):
+                total[j] += a[k] * b[k, j]
+        return total
+
+    def matrices(a, b):
+        total = np.zeros((a.shape[0], b.shape[1]))
+        for i in range(a.shape[0]):
+            for j in range(b.shape[1]):
+                for k in range(b.shape[0]):
+                    total[i, j] += a[i, k] * b[k, j]
+        return total
+
+    return {(1, 1): vectors, (2, 1): matrix_vector, (1, 2): vector_matrix, (2, 2): matrices}[a.ndim, b.ndim]
+
+
+@overload(_replaced, prefer_literal=True)
+def _replaced_field(record, name, value):
+    fields = [f"record.{field}" if field != name.literal_value else "value" for field in record.fields]
+    names = {"kind": record.instance_class}
+    exec(f"def made(record, name, value):\n    return kind({', '.join(fields)})", names)
+    return names["made"]
+
+
+@overload(_items, prefer_literal=True)
+def _items_of(values, n):
+    if not isinstance(values, numba.types.Array):
+        return lambda values, n: values
+    names = {}
+    items = ", ".join(f"values[{i}]" for i in range(n.literal_value))
+    exec(f"def made(values, n):\n    return ({items})", names)
+    return names["made"]

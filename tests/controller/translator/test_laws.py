@@ -10,6 +10,7 @@ import pytest
 from controller import LAWS
 from controller.compiling.function import BoundCall, c_text
 from controller.compiling.library import library_of
+from controller.stack_array import interpret
 from tests.controller.translator.building import Called, compiled
 from tests.controller.translator.flights import Flight, same_bits
 from tests.controller.translator.numba_reference import by_numba
@@ -27,14 +28,14 @@ def library(request, tmp_path_factory):
     return request.param, text, compiled(text, tmp_path_factory.mktemp(request.param))
 
 
-def first_difference(law, library, steps, seed, compiled_by=lambda function: function):
+def first_difference(law, library, steps, seed, compiled_by=None):
     """Return the first step after which C and the Python text differ in forces or memory; None if none does.
 
     Without a library it is C as laws are flown.
     """
     own, other = Flight(law, seed), Flight(law, seed)
     call = Called(library, other.arguments) if library else BoundCall(other.function, other.arguments).call
-    plain = compiled_by(own.function)
+    plain = compiled_by(own.function) if compiled_by else lambda *given: interpret(own.function, given)
     with np.errstate(all="ignore"):
         for k in range(steps):
             own.advance()

@@ -6,15 +6,9 @@ from controller import VehicleState
 from controller.regions import pack
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.start_values import start_values
+from cosim.ssp.system import MOTION, WRENCH
 from fuzzy_arbiter import Arbiter, ramp
 from plant_fmu import Plant
-
-MOTION = (
-    *(f"position.{x}" for x in "xyz"),
-    *(f"quaternion.e{i}" for i in range(4)),
-    *(f"velocity.{v}" for v in "uvwpqr"),
-)
-WRENCH = tuple(f"wrench.{x}" for x in "XYZKMN")
 
 
 class Parts:

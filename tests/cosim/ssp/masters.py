@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.cosim.ssp.jacobi import MOTION
+from cosim.ssp.system import MOTION
 
 ROOT = Path(__file__).parents[3]
 COMES_IN = {"ecos": "ecospy", "libcosim": "libcosimpy", "oms": "OMSimulator"}

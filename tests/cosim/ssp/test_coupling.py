@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from cosim.ssp.system import MOTION
 from plant_fmu import Plant, load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.variables import variables
 from plant_fmu.vehicle_component import make_vehicle_component
-from tests.cosim.ssp.jacobi import MOTION
 from tests.cosim.ssp.masters import in_master
 from tests.plant_fmu.transcription import evaluate, rotation
 

@@ -19,9 +19,9 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.make_step import STREAM
 from cosim.simulation.master import Master
 from cosim.ssp import package_system
+from cosim.ssp.system import MOTION
 from plant_fmu.running.co_simulation_instance import CoSimulationInstance
 from tests.cosim.scenario.test_criteria import RULES, SCENARIO
-from tests.cosim.ssp.jacobi import MOTION
 from tests.cosim.ssp.masters import fmpy as run_in_fmpy
 from tests.cosim.ssp.masters import in_master
 from tests.cosim.ssp.noise import Noise

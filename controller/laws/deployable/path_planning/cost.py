@@ -11,15 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.arithmetic import length3, square
+from controller.arithmetic import square
 from controller.laws.deployable.path_planning.search import PathLimits, uncertainty
-from controller.linear_algebra import copy
+from controller.linear_algebra import norm
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at_position, clearance_of_sphere
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.stack_array import Array, Rows3, Vector3, Vector4, zeros
 
 # maximum number of evaluations of the regions along a path: in one call; in total, after which the rest is blocked
 _SAMPLES = (64, 512)
@@ -47,12 +45,12 @@ _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 class PathCost(NamedTuple):
     """The cost of a path, complete or not yet."""
 
-    start: Array  # (3,) m, NED: start of the path when the evaluation began
-    drift: Array  # (3,) m/s, NED: velocity of the path's end, which moves with the goal
+    start: Vector3  # m, NED: start of the path when the evaluation began
+    drift: Vector3  # m/s, NED: velocity of the path's end, which moves with the goal
     counts: NDArray[np.int64]  # (2,) index of the next leg to evaluate; number of evaluations so far
     waits: NDArray[np.bool_]  # (1,) True if the vehicle waits at the first corner until fast regions have passed
     traveled: Array  # (2,) m: length of the evaluated legs; evaluated length of the present leg
-    cost: Array  # (4,) m: cost so far; parts by hard regions and soft ones on the way; by fast ones at rest
+    cost: Vector4  # m: cost so far; parts by hard regions and soft ones on the way; by fast ones at rest
     clear_until: Array  # (n,) m: length of path before which each region needs no evaluation
 
 
@@ -64,22 +62,16 @@ def empty_cost(n_regions: int) -> PathCost:
     )  # fmt: skip
 
 
-def begin_cost(cost: PathCost, start: Array, drift: Array, waits: bool) -> None:
-    """Begin the evaluation of a path from a start [m, NED] to an end that drifts [m/s, NED], shape (3,) each."""
-    copy(start, cost.start)
-    copy(drift, cost.drift)
-    cost.waits[0] = waits
-    cost.counts[:] = 0
-    cost.traveled[:] = 0.0
-    cost.cost[:] = 0.0
-    cost.clear_until[:] = 0.0
+def begin_cost(cost: PathCost, start: Vector3, drift: Vector3, waits: bool) -> None:
+    """Begin the evaluation of a path from a start [m, NED] to an end that drifts [m/s, NED]."""
+    cost.start[:], cost.drift[:], cost.waits[0] = start, drift, waits
+    cost.counts[:], cost.traveled[:], cost.cost[:], cost.clear_until[:] = 0, 0.0, 0.0, 0.0
 
 
 def add_cost(
-    cost: PathCost, path: Array, count: int, regions: PackedRegions, limits: PathLimits, cost_limit: float
+    cost: PathCost, path: Rows3, count: int, regions: PackedRegions, limits: PathLimits, cost_limit: float
 ) -> bool:
     """Continue to evaluate a path [m, NED]; return True once it is complete, or the cost exceeds `cost_limit` [m]."""
-    point = zeros(3)
     for _ in range(_SAMPLES[0]):
         leg, s = cost.counts[0], cost.traveled[1]
         if cost.cost[0] > cost_limit:
@@ -90,7 +82,7 @@ def add_cost(
                 _add_rest_cost(cost, path[count - 1], regions, limits)
             return True
         begin = cost.start if leg == 0 else path[leg - 1]
-        length = length3(path[leg, 0] - begin[0], path[leg, 1] - begin[1], path[leg, 2] - begin[2])
+        length = norm(path[leg] - begin)
         if s >= length:
             cost.counts[0] += 1
             cost.traveled[0] += length
@@ -103,8 +95,7 @@ def add_cost(
             _add_stride(cost, length - s, 0.0, _INSIDE)
             continue
         cost.counts[1] += 1
-        for axis in range(3):
-            point[axis] = begin[axis] + (path[leg, axis] - begin[axis]) * (s / length)
+        point = begin + (path[leg] - begin) * (s / length)
         free, soft, reach = _evaluate_point(cost, point, regions, limits)
         spare = max(_TRUST * (free - limits.clearance), 0.5 * (free - limits.margin))  # m, no surface in between
         stride = min(max(spare, _STRIDE[0]), reach)
@@ -121,22 +112,20 @@ def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> N
 
 
 def _evaluate_point(
-    cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits
+    cost: PathCost, place: Vector3, regions: PackedRegions, limits: PathLimits
 ) -> tuple[float, float, float]:
     """Return the minimum clearance of hard regions [m], the penalty of soft ones per meter, the stride limit [m]."""
     traveled = cost.traveled[0] + cost.traveled[1]
     later = traveled / limits.speed  # s
     effect_distance = limits.clearance + _STRIDE[1] / _TRUST  # m, clearance beyond which a hard region has no effect
-    free, soft, reach, point, scratch = effect_distance, 0.0, _STRIDE[1], zeros(3), zeros(3)
+    free, soft, reach, scratch = effect_distance, 0.0, _STRIDE[1], zeros(3)
     for i in range(regions.kinds.size):
         if traveled < cost.clear_until[i] or regions.kinds[i] >= _ATTITUDE:
             continue
         if cost.waits[0] and cost.counts[0] > 0 and is_fast(regions, i, limits):
             continue  # it has passed by then
-        region_speed = 0.0  # m/s, speed of the region, summed over the axes
-        for axis in range(3):
-            point[axis] = place[axis] - regions.velocities[i, axis] * later
-            region_speed += abs(regions.velocities[i, axis])
+        point = place - regions.velocities[i] * later
+        region_speed = np.sum(abs(regions.velocities[i]))  # m/s, summed over the axes
         if regions.kinds[i] == _SPHERE:
             clearance = clearance_of_sphere(regions, i, point)
         else:
@@ -172,29 +161,26 @@ def _near_cost(free: float, limits: PathLimits) -> float:
     return cost
 
 
-def _drifts(drift: Array) -> bool:
-    return bool(drift[0] != 0.0 or drift[1] != 0.0 or drift[2] != 0.0)
+def _drifts(drift: Vector3) -> bool:
+    return bool(np.any(drift != 0.0))
 
 
 def is_fast(regions: PackedRegions, i: int, limits: PathLimits) -> bool:
     """Return True if region `i` is hard, has a position, and moves so fast that barriers alone may not avoid it."""
-    v = regions.velocities
-    speed = length3(v[i, 0], v[i, 1], v[i, 2])
+    speed = norm(regions.velocities[i])
     return bool(regions.hard[i] and regions.kinds[i] < _ATTITUDE and speed > _FAST * limits.speed)
 
 
-def _add_rest_cost(cost: PathCost, place: Array, regions: PackedRegions, limits: PathLimits) -> None:
+def _add_rest_cost(cost: PathCost, place: Vector3, regions: PackedRegions, limits: PathLimits) -> None:
     """Add the cost of fast regions that meet a vehicle at rest after the evaluated legs, at a position [m, NED]."""
-    free, point, scratch = limits.clearance, zeros(3), zeros(3)
+    free, scratch = limits.clearance, zeros(3)
     for i in range(regions.kinds.size):
         if not is_fast(regions, i, limits):
             continue
         v, later = regions.velocities[i], cost.traveled[0] / limits.speed
-        speed = length3(v[0], v[1], v[2])
+        speed = norm(v)
         while later < _HORIZON:
-            for axis in range(3):
-                point[axis] = place[axis] - v[axis] * later
-            clearance = clearance_at_position(regions, i, point, scratch) - uncertainty(regions, i)
+            clearance = clearance_at_position(regions, i, place - v * later, scratch) - uncertainty(regions, i)
             free = min(free, clearance)
             later += max((clearance - limits.clearance) / speed, _HORIZON / _PREDICTIONS)
     price = _STAY * _near_cost(free, limits)
@@ -202,19 +188,18 @@ def _add_rest_cost(cost: PathCost, place: Array, regions: PackedRegions, limits:
     cost.cost[3] += price
 
 
-def _stay_cost(end: Array, drift: Array, regions: PackedRegions, limits: PathLimits) -> float:
+def _stay_cost(end: Vector3, drift: Vector3, regions: PackedRegions, limits: PathLimits) -> float:
     """Return the cost per meter of a stay at the end of a path [m, NED]."""
     # An end that drifts [m/s, NED] with the goal is also evaluated at later positions, and against hard regions, which
     # it may meet there. The cost is the mean over these times.
     drifts = _drifts(drift)
-    samples, later, total, point, scratch = _STAY_SAMPLES if drifts else 1, 0.0, 0.0, zeros(3), zeros(3)
+    samples, later, total, scratch = _STAY_SAMPLES if drifts else 1, 0.0, 0.0, zeros(3)
     for _ in range(samples):
         free = limits.clearance
         for i in range(regions.kinds.size):
             if regions.kinds[i] >= _ATTITUDE or (regions.hard[i] and not drifts):
                 continue
-            for axis in range(3):
-                point[axis] = end[axis] + (drift[axis] - regions.velocities[i, axis]) * later
+            point = end + (drift - regions.velocities[i]) * later
             clearance = clearance_at_position(regions, i, point, scratch)
             if regions.hard[i]:
                 free = min(free, clearance - uncertainty(regions, i))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.arithmetic import exponential, length3
+from controller.arithmetic import exponential
 from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost, empty_cost, is_fast
 from controller.laws.deployable.path_planning.search import (
     SAMPLING_MARGIN,
@@ -24,12 +24,10 @@ from controller.laws.deployable.path_planning.search import (
     limits_along,
     look_for_path,
 )
-from controller.linear_algebra import copy, norm
+from controller.linear_algebra import norm
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at, clearance_at_position, evaluate_packed
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.stack_array import Array, Rows3, Vector3, Vector4, zeros
 
 _LN_30 = 3.4011973816621555
 CORNERS = 8  # maximum number of corners of a path
@@ -55,11 +53,11 @@ _LESS = 0.5  # m by which random corners stay closer to start and end than rando
 class PathPlan(NamedTuple):
     """State of the planner: the path, and a candidate."""
 
-    path: Array  # (CORNERS + 1, 3) m, NED: corners, then the end; the end moves with the goal
-    candidate: Array  # (CORNERS + 1, 3) m, NED: path that may replace it
-    found: Array  # (CORNERS + 1, 3) m, NED: path found by the search
+    path: Rows3  # (CORNERS + 1, 3) m, NED: corners, then the end; the end moves with the goal
+    candidate: Rows3  # (CORNERS + 1, 3) m, NED: path that may replace it
+    found: Rows3  # (CORNERS + 1, 3) m, NED: path found by the search
     counts: NDArray[np.int64]  # (3,) number of points of path, candidate and found, the end included; 0: none yet
-    cost: Array  # (4,) m: cost of the path and its parts, as in `PathCost`
+    cost: Vector4  # m: cost of the path and its parts, as in `PathCost`
     waits: NDArray[np.bool_]  # (2,) True if path, or candidate, waits at its first corner for fast regions to pass
     new_cost: PathCost  # evaluation under way, of path or candidate
     search: Search
@@ -108,11 +106,11 @@ def _bell_shaped(random: NDArray[np.uint64]) -> float:
     return (uniform(random) + uniform(random) + uniform(random) + uniform(random) - 2.0) * 1.7320508075688772
 
 
-def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: Array) -> None:
+def nearest_goal_point(goal: PackedRegions, position: Vector3, depth: float, end: Vector3) -> None:
     """Write the point of the goal region nearest to a position, `depth` [m] inside where the region is that deep."""
     # Ascends the gradient of the clearance, and halves the step wherever that gains little. In a shallower region it
     # ends near the center.
-    copy(position, end)
+    end[:] = position
     value, gradient, turning, clearance = zeros(1), zeros(1, 3), zeros(1, 3), zeros(1)
     level = zeros(4)  # a goal is a region of position: the attitude has no effect
     level[0] = 1.0
@@ -123,12 +121,11 @@ def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: 
         slope, lack = norm(gradient[0]), depth - clearance[0]
         if not (lack > _DEEP_ENOUGH and slope > 0.0):
             return
-        for axis in range(3):
-            candidate[axis] = end[axis] - gradient[0, axis] / slope * lack * part
+        candidate[:] = end - gradient[0] / slope * lack * part
         evaluate_packed(goal, candidate, level, value, other_gradient, turning, other_clearance)
         if other_clearance[0] > clearance[0] + _PAYS * lack * part:
-            copy(candidate, end)
-            copy(other_gradient[0], gradient[0])
+            end[:] = candidate
+            gradient[0] = other_gradient[0]
             clearance[0] = other_clearance[0]
             part = min(2.0 * part, 1.0)
         else:
@@ -136,7 +133,7 @@ def nearest_goal_point(goal: PackedRegions, position: Array, depth: float, end: 
 
 
 def improve_path(
-    plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, limits: PathLimits, period: float
+    plan: PathPlan, start: Vector3, goal: PackedRegions, regions: PackedRegions, limits: PathLimits, period: float
 ) -> None:
     """Update the path for vehicle and regions, and try a candidate; call it once a period [s]."""
     _follow(plan, start, goal, limits, period)
@@ -148,10 +145,7 @@ def improve_path(
     elif plan.counts[2] == 0:
         end, random_numbers = plan.path[plan.counts[0] - 1], plan.random_numbers
         _choose_closed(plan, blocked or looks_again, start, end, regions, limits.margin)
-        closed = PackedRegions(
-            regions.kinds, regions.signs, regions.offsets, regions.numbers, regions.shifts, regions.velocities,
-            regions.gains, plan.closed, regions.deviations, regions.crossing_costs,
-        )  # fmt: skip
+        closed = regions._replace(hard=plan.closed)
         for _ in range(_MORE_CALLS if looks_again or plan.blocked[0] * period > _BLOCKED_LONG else 1):
             for i in range(random_numbers.size):
                 random_numbers[i] = uniform(plan.random)
@@ -180,14 +174,14 @@ def _restart_trees(search: Search) -> None:
     search.sampling_margin[0] = SAMPLING_MARGIN[0]
 
 
-def go_straight(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
+def go_straight(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: PathLimits) -> None:
     """Set the path to a straight line to the nearest end in the goal region, without regard to regions."""
     plan.counts[0] = 1
     nearest_goal_point(goal, start, limits.depth, plan.path[0])
 
 
 def _choose_closed(
-    plan: PathPlan, blocked: bool, start: Array, end: Array, regions: PackedRegions, margin: float
+    plan: PathPlan, blocked: bool, start: Vector3, end: Vector3, regions: PackedRegions, margin: float
 ) -> None:
     """Choose the regions that the trees keep out of; a change of the choice restarts the trees."""
     # While hard regions block the path, only these are closed. Otherwise the costlier soft ones, or all, are closed
@@ -223,7 +217,7 @@ def _choose_closed(
                 plan.closed[i] = False
 
 
-def _follow(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits, period: float) -> None:
+def _follow(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: PathLimits, period: float) -> None:
     """Begin a path, or move its end with the goal and drop corners that the vehicle has passed."""
     path = plan.path
     if plan.counts[0] == 0:
@@ -231,19 +225,18 @@ def _follow(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimit
         nearest_goal_point(goal, start, limits.depth, path[0])
     else:
         end = plan.counts[0] - 1
-        for axis in range(3):  # the end moves with the goal, and is corrected if the goal moved otherwise
-            path[end, axis] += goal.velocities[0, axis] * period
+        path[end] += goal.velocities[0] * period  # the end moves with the goal; corrected if the goal moved otherwise
         if not clearance_at(goal, 0, path[end]) > 0.0:
             nearest_goal_point(goal, path[end], limits.depth, path[end])
-    while plan.counts[0] > 1 and not plan.waits[0] and _distance(path[0], start) < _PASSED:
+    while plan.counts[0] > 1 and not plan.waits[0] and norm(path[0] - start) < _PASSED:
         for i in range(plan.counts[0] - 1):
-            copy(path[i + 1], path[i])
+            path[i] = path[i + 1]
         plan.counts[0] -= 1
         if plan.phase[0] == _PATH:
             plan.phase[0] = _BEGIN
 
 
-def _evaluate(plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, limits: PathLimits) -> None:
+def _evaluate(plan: PathPlan, start: Vector3, goal: PackedRegions, regions: PackedRegions, limits: PathLimits) -> None:
     """Continue the evaluation of path or candidate, in turn; the candidate becomes the path if it costs less."""
     cost = plan.new_cost
     if plan.phase[0] == _BEGIN:
@@ -251,7 +244,7 @@ def _evaluate(plan: PathPlan, start: Array, goal: PackedRegions, regions: Packed
         plan.phase[0] = _PATH
     if plan.phase[0] == _PATH:
         if add_cost(cost, plan.path, plan.counts[0], regions, limits, np.inf):
-            copy(cost.cost, plan.cost)
+            plan.cost[:] = cost.cost
             _choose_candidate(plan, start, goal, regions, limits)
             begin_cost(cost, cost.start, goal.velocities[0], plan.waits[1])
             plan.phase[0] = _CANDIDATE
@@ -260,19 +253,19 @@ def _evaluate(plan: PathPlan, start: Array, goal: PackedRegions, regions: Packed
     if add_cost(cost, plan.candidate, plan.counts[1], regions, limits, most):
         plan.phase[0] = _BEGIN
         if cost.cost[0] < most:
-            _copy_path(plan.candidate, plan.path)
+            plan.path[:] = plan.candidate
             plan.counts[0], plan.waits[0] = plan.counts[1], plan.waits[1]
-            copy(cost.cost, plan.cost)
+            plan.cost[:] = cost.cost
 
 
-def is_blocked(plan: PathPlan, start: Array) -> bool:
+def is_blocked(plan: PathPlan, start: Vector3) -> bool:
     """Return True if the cost by hard regions is above `_BLOCKED` of the path's length."""
     return bool(plan.cost[1] > _BLOCKED * _length(plan.path, plan.counts[0], start))
 
 
 def search_path(
     plan: PathPlan,
-    start: Array,
+    start: Vector3,
     goal: PackedRegions,
     regions: PackedRegions,
     limits: PathLimits,
@@ -290,12 +283,12 @@ def search_path(
 
 
 def _choose_candidate(
-    plan: PathPlan, start: Array, goal: PackedRegions, regions: PackedRegions, limits: PathLimits
+    plan: PathPlan, start: Vector3, goal: PackedRegions, regions: PackedRegions, limits: PathLimits
 ) -> None:
     """Choose the next candidate: the path that the search found, once, or else a mutation of the path."""
     plan.waits[1] = False
     if plan.counts[2] > 0:
-        _copy_path(plan.found, plan.candidate)
+        plan.candidate[:] = plan.found
         plan.counts[1] = plan.counts[2]
         plan.counts[2] = _USED
         return
@@ -310,11 +303,11 @@ def _choose_candidate(
         _mutate_path(plan, start, goal, limits)
 
 
-def _choose_wait(plan: PathPlan, start: Array) -> None:
+def _choose_wait(plan: PathPlan, start: Vector3) -> None:
     """Write the path into `candidate`, with a wait at a random first corner."""
     added = 0 if plan.waits[0] or plan.counts[0] > CORNERS else 1
     for i in range(CORNERS, added - 1, -1):
-        copy(plan.path[i - added], plan.candidate[i])
+        plan.candidate[i] = plan.path[i - added]
     center = plan.path[0] if plan.waits[0] else start
     reach = 0.2 * exponential(_LN_30 * uniform(plan.random))
     for axis in range(3):
@@ -323,23 +316,14 @@ def _choose_wait(plan: PathPlan, start: Array) -> None:
     plan.counts[1], plan.waits[1] = plan.counts[0] + added, True
 
 
-def _copy_path(path: Array, out: Array) -> None:
-    for i in range(CORNERS + 1):
-        copy(path[i], out[i])
-
-
-def _length(path: Array, count: int, start: Array) -> float:
-    length = _distance(path[0], start)
+def _length(path: Rows3, count: int, start: Vector3) -> float:
+    length = norm(path[0] - start)
     for i in range(1, count):
-        length += _distance(path[i], path[i - 1])
-    return float(length)
+        length += norm(path[i] - path[i - 1])
+    return length
 
 
-def _distance(a: Array, b: Array) -> float:
-    return float(length3(a[0] - b[0], a[1] - b[1], a[2] - b[2]))
-
-
-def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, limits: PathLimits) -> None:
+def _mutate_path(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: PathLimits) -> None:
     """Write a mutation of the path into `candidate`."""
     path, candidate, random, sampling_margin = (
         plan.path,
@@ -347,14 +331,14 @@ def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, limits: Path
         plan.random,
         plan.search.sampling_margin[0] - _LESS,
     )
-    _copy_path(path, candidate)
+    candidate[:] = path
     count = plan.counts[0]
     last = count - 1
     choice = uniform(random)
     if choice < 0.1:  # straight to the nearest end
         nearest_goal_point(goal, start if count == 1 else path[count - 2], limits.depth, candidate[last])
         if uniform(random) < 0.5:
-            copy(candidate[last], candidate[0])
+            candidate[0] = candidate[last]
             count = 1
     elif choice < 0.2:  # another end, a little off or far
         reach = 0.02 * exponential(_LN_30 * uniform(random))
@@ -364,7 +348,7 @@ def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, limits: Path
     elif choice < 0.3 and count > 1:  # remove a corner
         drop = int(uniform(random) * last)
         for i in range(drop, last):
-            copy(candidate[i + 1], candidate[i])
+            candidate[i] = candidate[i + 1]
         count -= 1
     elif choice < 0.65 and count > 1:  # move a corner
         corner = int(uniform(random) * last)
@@ -374,13 +358,13 @@ def _mutate_path(plan: PathPlan, start: Array, goal: PackedRegions, limits: Path
     elif choice < 0.9 and count <= CORNERS:  # add a corner
         inserted = int(uniform(random) * count)
         for i in range(count, inserted, -1):
-            copy(candidate[i - 1], candidate[i])
+            candidate[i] = candidate[i - 1]
         for axis in range(3):
             low, high = limits_along(axis, start, path[last], sampling_margin)
             candidate[inserted, axis] = low + uniform(random) * (high - low)
         count += 1
     else:  # one corner alone, anywhere about
-        copy(path[last], candidate[1])
+        candidate[1] = path[last]
         for axis in range(3):
             low, high = limits_along(axis, start, path[last], sampling_margin)
             candidate[0, axis] = low + uniform(random) * (high - low)

@@ -12,15 +12,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controller.arithmetic import length3, square
 from controller.laws.deployable.gains import SPREADS
-from controller.linear_algebra import copy
+from controller.linear_algebra import norm
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at_position, clearance_of_sphere
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.stack_array import Array, Number, Rows3, Vector3, zeros
 
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
@@ -57,7 +54,7 @@ def line_margin(limits: PathLimits) -> float:
 class Tree(NamedTuple):
     """Nodes, each with its parent."""
 
-    nodes: Array  # (_NODES, 3) m, NED
+    nodes: Rows3  # (_NODES, 3) m, NED
     parents: NDArray[np.int64]  # (_NODES,) index of each node's parent; -1 for the root
     size: NDArray[np.int64]  # (1,) number of nodes
     root: NDArray[np.int64]  # (1,) index of the root
@@ -69,8 +66,8 @@ class Search(NamedTuple):
     of_goal: Tree  # root at the end of the path
     of_vehicle: Tree  # root at the vehicle
     turn: NDArray[np.int64]  # (1,) 0: the tree of the goal grows next, 1: that of the vehicle
-    sampling_margin: Array  # (1,) m beyond start and end within which random nodes lie
-    chain: Array  # (_CHAIN, 3) m, NED: the last path found, before it is shortened
+    sampling_margin: Number  # m beyond start and end within which random nodes lie
+    chain: Rows3  # (_CHAIN, 3) m, NED: the last path found, before it is shortened
 
 
 def empty_search() -> Search:
@@ -91,7 +88,7 @@ def uncertainty(regions: PackedRegions, i: int) -> float:
     return float(SPREADS * max(deviations[i, 0], deviations[i, 1], deviations[i, 2]))
 
 
-def clearance_of_all(point: Array, regions: PackedRegions, scratch: Array) -> float:
+def clearance_of_all(point: Vector3, regions: PackedRegions, scratch: Vector3) -> float:
     """Return the minimum clearance [m] of the hard regions of position at a point; `scratch` has shape (3,)."""
     min_clearance = np.inf
     for i in range(regions.kinds.size):
@@ -104,15 +101,13 @@ def clearance_of_all(point: Array, regions: PackedRegions, scratch: Array) -> fl
     return min_clearance
 
 
-def free_length(start: Array, end: Array, regions: PackedRegions, margin: float) -> float:
+def free_length(start: Vector3, end: Vector3, regions: PackedRegions, margin: float) -> float:
     """Return the length to which a line keeps a clearance of all hard regions at their present positions."""
     # with start, end [m, NED], margin [m], returns [m]
-    point, scratch = zeros(3), zeros(3)
-    length = length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
+    length, scratch = norm(end - start), zeros(3)
     s, free = 0.0, -1.0
     for _ in range(_LINE_SAMPLES):
-        for axis in range(3):
-            point[axis] = start[axis] + (end[axis] - start[axis]) * (s / length if length > 0.0 else 0.0)
+        point = start + (end - start) * (s / length if length > 0.0 else 0.0)
         clearance = clearance_of_all(point, regions, scratch)
         if not clearance >= margin:
             return float(free)
@@ -123,12 +118,12 @@ def free_length(start: Array, end: Array, regions: PackedRegions, margin: float)
     return float(min(free, s))
 
 
-def is_line_free(start: Array, end: Array, regions: PackedRegions, margin: float) -> bool:
+def is_line_free(start: Vector3, end: Vector3, regions: PackedRegions, margin: float) -> bool:
     """Return True if a straight line keeps a clearance over its whole length, by `free_length`."""
-    return free_length(start, end, regions, margin) >= length3(end[0] - start[0], end[1] - start[1], end[2] - start[2])
+    return free_length(start, end, regions, margin) >= norm(end - start)
 
 
-def limits_along(axis: int, start: Array, end: Array, margin: float) -> tuple[float, float]:
+def limits_along(axis: int, start: Vector3, end: Vector3, margin: float) -> tuple[float, float]:
     """Return the range of random points along an axis [m, NED]: `margin` beyond both ends, but below the surface."""
     low, high = min(start[axis], end[axis]), max(start[axis], end[axis])
     if axis == 2:
@@ -138,12 +133,12 @@ def limits_along(axis: int, start: Array, end: Array, margin: float) -> tuple[fl
 
 def look_for_path(
     search: Search,
-    start: Array,
-    end: Array,
+    start: Vector3,
+    end: Vector3,
     random_numbers: Array,
     regions: PackedRegions,
     limits: PathLimits,
-    path: Array,
+    path: Rows3,
 ) -> int:
     """Grow one of the trees by at most one node; return the number of points of a path if one is found, else 0."""
     # with start, end [m, NED]
@@ -153,7 +148,7 @@ def look_for_path(
     move_root(of_goal, end, regions, margin)
     move_root(of_vehicle, start, regions, margin)
     search.sampling_margin[0] = min(_GROWS * search.sampling_margin[0], SAMPLING_MARGIN[1])
-    reach = max(_REACH[0], _REACH[1] * length3(start[0] - end[0], start[1] - end[1], start[2] - end[2]))
+    reach = max(_REACH[0], _REACH[1] * norm(start - end))
     if search.turn[0] == 0:
         search.turn[0] = 1
         _draw_target(of_goal, start, end, start, search.sampling_margin[0], reach, random_numbers, target)
@@ -177,50 +172,43 @@ def look_for_path(
 
 def _draw_target(
     tree: Tree,
-    start: Array,
-    end: Array,
-    other: Array,
+    start: Vector3,
+    end: Vector3,
+    other: Vector3,
     sampling_margin: float,
     reach: float,
     random_numbers: Array,
-    target: Array,
+    target: Vector3,
 ) -> None:
     """Write the point towards which a tree grows: the other tree's root, a point near a node, or any point."""
     if random_numbers[3] < _TO_OTHER:
-        copy(other, target)
+        target[:] = other
     elif random_numbers[3] < _TO_OTHER + _NEAR_A_NODE:
         node = int(random_numbers[4] * tree.size[0])
-        for axis in range(3):
-            target[axis] = tree.nodes[node, axis] + reach * (2.0 * random_numbers[axis] - 1.0)
+        target[:] = tree.nodes[node] + reach * (2.0 * random_numbers[:3] - 1.0)
     else:
         for axis in range(3):
             low, high = limits_along(axis, start, end, sampling_margin)
             target[axis] = low + random_numbers[axis] * (high - low)
 
 
-def move_root(tree: Tree, point: Array, regions: PackedRegions, margin: float) -> None:
+def move_root(tree: Tree, point: Vector3, regions: PackedRegions, margin: float) -> None:
     """Set the root of a tree to a point: add it if its line to the old root is free, else restart the tree."""
     nodes, parents, root = tree.nodes, tree.parents, tree.root[0]
     if tree.size[0] > 0:
-        distance = length3(nodes[root, 0] - point[0], nodes[root, 1] - point[1], nodes[root, 2] - point[2])
+        distance = norm(nodes[root] - point)
         if tree.size[0] < _NODES and distance <= _MOVED:
             return
         root_margin = min(_margin_at(tree, root, regions, margin), clearance_of_all(point, regions, zeros(3)) - _SLACK)
         if tree.size[0] < _NODES and is_line_free(nodes[root], point, regions, root_margin):
             new = tree.size[0]
-            copy(point, nodes[new])
-            parents[new] = -1
-            parents[root] = new
+            nodes[new], parents[new], parents[root], tree.root[0] = point, -1, new, new
             tree.size[0] += 1
-            tree.root[0] = new
             return
-    copy(point, nodes[0])
-    parents[0] = -1
-    tree.size[0] = 1
-    tree.root[0] = 0
+    nodes[0], parents[0], tree.size[0], tree.root[0] = point, -1, 1, 0
 
 
-def _sees(tree: Tree, node: int, place: Array, regions: PackedRegions, margin: float) -> bool:
+def _sees(tree: Tree, node: int, place: Vector3, regions: PackedRegions, margin: float) -> bool:
     """Return True if the line from a node to a point keeps the clearance `_margin_at` of the node."""
     return is_line_free(tree.nodes[node], place, regions, _margin_at(tree, node, regions, margin))
 
@@ -232,37 +220,33 @@ def _margin_at(tree: Tree, node: int, regions: PackedRegions, margin: float) -> 
     return min(margin, clearance_of_all(tree.nodes[node], regions, zeros(3)) - _SLACK)
 
 
-def nearest_node(tree: Tree, place: Array) -> int:
+def nearest_node(tree: Tree, place: Vector3) -> int:
     """Return the index of a tree's node nearest to a point [m, NED]."""
     nearest, least = 0, np.inf
     for i in range(tree.size[0]):
-        squared = 0.0
-        for axis in range(3):
-            squared += square(tree.nodes[i, axis] - place[axis])
+        squared = np.sum((tree.nodes[i] - place) ** 2)
         if squared < least:
             nearest, least = i, squared
     return nearest
 
 
-def extend_tree(tree: Tree, target: Array, reach: float, regions: PackedRegions, margin: float) -> int:
+def extend_tree(tree: Tree, target: Vector3, reach: float, regions: PackedRegions, margin: float) -> int:
     """Add a node on the line from the nearest node to a target, and return its index; -1 if the line is blocked."""
     # `reach` is the longest edge, and `margin` the clearance of edges, both in m.
-    nodes, parents, new = tree.nodes, tree.parents, zeros(3)
+    nodes, parents = tree.nodes, tree.parents
     nearest = nearest_node(tree, target)
     before = nodes[nearest]
-    distance = length3(target[0] - before[0], target[1] - before[1], target[2] - before[2])
+    distance = norm(target - before)
     if distance < _STRIDE:
         return -1
     length = min(reach, distance)
-    for axis in range(3):
-        new[axis] = before[axis] + length / distance * (target[axis] - before[axis])
+    new = before + length / distance * (target - before)
     free = free_length(before, new, regions, _margin_at(tree, nearest, regions, margin))
     if free < _ALL * length:
         free *= _BEFORE_A_WALL
         if free < _MOVED:
             return -1
-        for axis in range(3):
-            new[axis] = before[axis] + free / distance * (target[axis] - before[axis])
+        new[:] = before + free / distance * (target - before)
     parent = nearest
     for _ in range(_ANCESTORS):
         ancestor = parents[parent]
@@ -270,14 +254,14 @@ def extend_tree(tree: Tree, target: Array, reach: float, regions: PackedRegions,
             break
         parent = ancestor
     index = tree.size[0]
-    copy(new, nodes[index])
+    nodes[index] = new
     parents[index] = parent
     tree.size[0] += 1
     return int(index)
 
 
 def _write_path(
-    search: Search, of_goal: int, of_vehicle: int, start: Array, regions: PackedRegions, margin: float, path: Array
+    search: Search, of_goal: int, of_vehicle: int, start: Vector3, regions: PackedRegions, margin: float, path: Rows3
 ) -> int:
     """Write the path through two nodes with a free line between them, without redundant corners."""
     # A corner is redundant if the line from the one before it, or from the `start`, to the one after it is free. Return
@@ -292,13 +276,13 @@ def _write_path(
     node = of_vehicle
     while count > 0:
         count -= 1
-        copy(tree.nodes[node], chain[count])
+        chain[count] = tree.nodes[node]
         node = tree.parents[node]
     node = of_goal
     while node >= 0:
         if length == _CHAIN:
             return 0
-        copy(search.of_goal.nodes[node], chain[length])
+        chain[length] = search.of_goal.nodes[node]
         length, node = length + 1, search.of_goal.parents[node]
     leg_margin = min(margin, clearance_of_all(start, regions, zeros(3)) - _SLACK)
     before, count = start, 0
@@ -307,6 +291,6 @@ def _write_path(
             continue
         if count == path.shape[0]:
             return 0
-        copy(chain[i], path[count])
+        path[count] = chain[i]
         before, leg_margin, count = path[count], margin, count + 1
     return count

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "instance.h"
-#include "rules.h"
+#include "rules.h" /* generated from the arbiter's definition */
 
 static void rewind_ticks(Model *m)
 {
@@ -49,7 +49,7 @@ static Status advance(Instance *instance, double end)
         instance_log(instance, LOG_WARNINGS, "the arbiter runs at t = %.9g s, %.3g s late: steps do not divide time.arbiter = %.9g s",
                       m->time, late, m->ticks.period);
     if (ticks_due(&m->ticks, m->time)) {
-        if (rules_evaluate(m->inputs, weights) != 0) {
+        if (EVALUATE_RULES(m->inputs, weights) != 0) {
             m->ticks = ticks;
             return instance_refuse(instance, "step from t = %.9g s not taken: no weights follow from these inputs",
                                    m->time);

@@ -26,6 +26,14 @@ enum { NOISE_STREAM = 64 }; /* and five more; the plant has those before it */
 
 /* ---- numbers ----------------------------------------------------------------------------------------------- */
 
+static bool is_finite(const double x[], int n)
+{
+    for (int i = 0; i < n; i++)
+        if (!isfinite(x[i]))
+            return false;
+    return true;
+}
+
 static bool is_unit(const double x[], int n)
 {
     double square = 0.0;
@@ -54,14 +62,10 @@ static bool holds(const double numbers[], const Constraint *c)
 
 /* ---- before the first step --------------------------------------------------------------------------------- */
 
-/* Puts all but what the importer sets to what it is at the beginning. */
 static void rewind_memory(Model *m)
 {
     memset(&m->control, 0, sizeof m->control);
-    memcpy(m->numbers + N_GIVEN, FIRST_NUMBERS + N_GIVEN, sizeof m->numbers - N_GIVEN * sizeof(double));
-    memcpy(m->integers, FIRST_INTEGERS, sizeof m->integers);
-    memcpy(m->words, FIRST_WORDS, sizeof m->words);
-    memcpy(m->flags, FIRST_FLAGS, sizeof m->flags);
+    control_rewind(m);
 }
 
 static Status prepare(Instance *instance)
@@ -96,23 +100,7 @@ static Status check_step_size(const Instance *instance, double step)
     return STATUS_OK;
 }
 
-/* Returns true if all outputs are numbers. */
-static bool outputs_finite(const Model *m)
-{
-    for (unsigned i = 0; i < N_VARIABLES; i++)
-        if (VARIABLES[i].role == OUTPUT && !isfinite(*variable_real((Model *)m, &VARIABLES[i])))
-            return false;
-    return true;
-}
-
 /* ---- a step ------------------------------------------------------------------------------------------------ */
-
-/* Runs the law, for the translated step, which calls it by address. */
-static int call_law(void *model)
-{
-    control_law(model);
-    return 0;
-}
 
 /* Draws the noise of position and velocity, which is constant until the law's next tick [m, m/s]. */
 static void draw_noise(Model *m)
@@ -140,7 +128,7 @@ static Status take_step(Instance *instance, double end)
     m->numbers[AT_END] = end;
     m->integers[AT_CONTROLS] = due;
     control_step(m);
-    if (!outputs_finite(m))
+    if (!is_finite(m->numbers + N_GIVEN, N_OUTPUTS))
         return instance_refuse(instance, "step from t = %.9g s not taken: a force, an estimate or a value of a region is no finite number",
                                m->time);
     m->time = end;
@@ -173,7 +161,7 @@ static bool valid_state(const Model *m)
     for (size_t i = 0; i < sizeof COUNTERS / sizeof COUNTERS[0]; i++)
         if (m->integers[COUNTERS[i].index] < 0 || m->integers[COUNTERS[i].index] > COUNTERS[i].most)
             return false;
-    return ticks_valid(&m->control) && outputs_finite(m);
+    return ticks_valid(&m->control) && is_finite(m->numbers + N_GIVEN, N_OUTPUTS);
 }
 
 const Component COMPONENT = {
