@@ -64,9 +64,17 @@ class _Sampled(Defuzzifier):
         self._places, self._samples = sampled(output, system.points)
         names = {c.term for rule in system.rules for c in rule.conclusions if c.variable == output.name}
         self._concluded = [name in names for name in output.term_names]
+        self._last: tuple[Sequence[float], float] = ((), 0.0)  # cuts and centroid: most samples change few outputs
 
     def value(self, cuts: Sequence[float], inputs: Sequence[float]) -> float:
         """Return the centroid for one sample."""
+        last, value = self._last
+        if last != cuts:
+            value = self._centroid(cuts)
+            self._last = cuts, value
+        return value
+
+    def _centroid(self, cuts: Sequence[float]) -> float:
         # scikit-fuzzy knows nothing of a term that no rule concludes, not even where it is 0
         every = zip(cuts, self._samples, self._concluded, strict=True)
         terms = [(cut, degrees) for cut, degrees, concluded in every if concluded or cut > 0.0]
