@@ -225,8 +225,6 @@ def test_free_parameters_are_selected_by_key(vehicle):
     for key in ("hydrodynamics.added_mass.7.7", "hull.radius", "mass"):
         with pytest.raises(IdentificationError, match="--free"):
             free_parameters(vehicle, (key,))
-    with pytest.raises(IdentificationError, match="--nuisance wind: is unknown"):
-        nuisances(("wind",), [])
 
 
 def test_fitted_values_are_applied_to_the_vehicle(vehicle):

@@ -21,3 +21,9 @@ def test_slow_servo_data_are_named_where_no_window_is_left(run, tmp_path, capsys
     assert "the hull is at the surface" in said and "Servo outputs of small are logged at 2 Hz" in said
     assert "not added mass, lag or delays" in said
     assert not (tmp_path / "a.toml").exists()
+
+
+def test_unknown_nuisance_is_rejected_by_name(run, tmp_path, capsys):
+    arguments = ["--vehicle", "bluerov2_heavy", "--nuisance", "wind", "--out", str(tmp_path / "a.toml")]
+    assert main(["identify", str(run), *arguments]) == 2
+    assert "--nuisance wind: is unknown" in capsys.readouterr().err
