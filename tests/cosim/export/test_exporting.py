@@ -94,6 +94,17 @@ def test_failed_writer_leaves_the_old_file(run, tmp_path, monkeypatch):
     assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
 
 
+def test_of_two_files_none_is_left_without_the_other(run, tmp_path, monkeypatch):
+    def one_of_two(excerpt, path):
+        path.touch()
+        return [path, path.with_name("absent")]
+
+    monkeypatch.setattr("cosim.export.csv_writer.write", one_of_two)
+    with pytest.raises(RunError, match="No such file"):
+        export_run(run, "csv", tmp_path / "out.csv")
+    assert not list(tmp_path.iterdir())
+
+
 @pytest.mark.parametrize(("to", "lacking", "brings"), [("mcap", "mcap", "mcap"), ("rrd", "rerun", "rerun-sdk")])
 def test_missing_library_is_named(run, tmp_path, monkeypatch, to, lacking, brings):
     plain = builtins.__import__

@@ -136,3 +136,8 @@ def test_scene_is_determined_by_its_point_and_valid(family):
         assert one["seed"] == i and one | {"seed": i + 100} == other
         assert family != "hard" or one["noise"]["seed"] == int(point[-1] * 2**31)
         assert scene_at(space, point, i).seed == i
+        if family in CONFLICTS:  # the last coordinate is of chance alone
+            other = json.loads(space.line(np.append(point[:-1], 1.0 - point[-1]), i))["scenario"]
+            assert one["scenario"]["sensing"].pop("seed") != other["sensing"].pop("seed")
+            del other["title"]
+            assert one["scenario"] == other
