@@ -107,5 +107,6 @@ def _text_lines(table: TelemetryTable, now: float) -> list[str]:
 
 def _enum(name: str, value: int) -> str:
     """Return the name of a value of an enumeration without its prefix; the number if unknown."""
-    entries: dict[int, Any] = dialect().enums[name]
-    return entries[value].name.removeprefix(f"{name}_") if value in entries else str(value)
+    entry = dialect().enums[name].get(value)
+    label = "ENUM_END" if entry is None else entry.name.removeprefix(f"{name}_")
+    return str(value) if label == "ENUM_END" else label

@@ -28,6 +28,7 @@ from cosim.mavlink.wire.thrust_body import get_thrust_body
 from cosim.simulation.commands.commands import ManualControl
 from plant_fmu import load_vehicle
 from tests.cosim.mavlink.station import Station, scenario
+from tests.cosim.mavlink.stubs import message
 from tests.cosim.sitl.stand_in import VECTORED_6DOF
 
 HEAVY = load_vehicle("bluerov2_heavy")
@@ -38,7 +39,7 @@ SHIFT = 0.9, -1.6, 1.9
 # ---- clocks ----
 
 
-def test_clock_offset_uses_the_fastest_answer():
+def test_clock_offset_uses_the_fastest_answer_since_the_autopilot_started():
     sync = ClockSync()
     assert math.isnan(sync.offset)
     for sent, took, skew in ((10.0, 0.100, 0.03), (11.0, 0.004, 0.0), (12.0, 0.060, -0.02)):
@@ -47,13 +48,8 @@ def test_clock_offset_uses_the_fastest_answer():
     assert sync.offset == pytest.approx(3.0, abs=1e-6) and sync.round_trip == pytest.approx(0.004)
     sync.add_answer(5_000_000_000, 123, 13.0)  # nobody asked for it
     assert sync.offset == pytest.approx(3.0, abs=1e-6)
-
-
-def test_autopilot_restart_resets_the_clock_offset():
-    sync = ClockSync()
-    for sent, boot in ((10.0, 500.0), (11.0, 501.0), (12.0, 0.5)):
-        sync.add_answer(round(boot * 1e9), sync.request(sent - 0.005), sent + 0.005)
-    assert sync.offset == pytest.approx(11.5, abs=1e-6)
+    sync.add_answer(round(0.5 * 1e9), sync.request(20.0 - 0.005), 20.0 + 0.005)  # it has started again
+    assert sync.offset == pytest.approx(19.5, abs=1e-6)
 
 
 # ---- the frame ----
@@ -62,17 +58,18 @@ def test_autopilot_restart_resets_the_clock_offset():
 def reported(position, geodetic=None, depth=None, heard=0.0, state=None):
     """Let a state receive position and, where they are given, latitude and longitude and the pressure of a depth."""
     state = state or ReportedState((255, 191))
+    x, y, z = map(float, position)
     messages = [
-        mavlink.MAVLink_heartbeat_message(12, 3, 1, 0, 4, 3),
-        mavlink.MAVLink_local_position_ned_message(round(heard * 1e3), *map(float, position), 0, 0, 0),
+        message("HEARTBEAT", type=12, autopilot=3, base_mode=1),
+        message("LOCAL_POSITION_NED", time_boot_ms=round(heard * 1e3), x=x, y=y, z=z),
     ]
     if depth is not None:
-        messages += [mavlink.MAVLink_scaled_pressure2_message(0, 1013.25 + 1000.0 * 9.80665 * depth / 100.0, 0, 0)]
+        messages += [message("SCALED_PRESSURE2", press_abs=1013.25 + 1000.0 * 9.80665 * depth / 100.0)]
     if geodetic is not None:
-        degrees = (round(angle * 1e7) for angle in geodetic[:2])
-        messages += [mavlink.MAVLink_global_position_int_message(0, *degrees, 0, 0, 0, 0, 0, 0)]
-    for message in messages:
-        state.receive(1, 1, message, heard)
+        lat, lon = (round(angle * 1e7) for angle in geodetic[:2])
+        messages += [message("GLOBAL_POSITION_INT", lat=lat, lon=lon)]
+    for one in messages:
+        state.receive(1, 1, one, heard)
     return state
 
 
@@ -121,8 +118,7 @@ def force_of_motors(motors):
 def test_full_surge_of_a_bluerov2_at_half_gain_is_28_newtons():
     """As a real ArduSub was measured to give; and no stick asks for more."""
     scale = make_stick_scale(HEAVY, ARDUSUB, 0.5, "manual-control")
-    sticks = scale.sticks(np.array([28.28, 0.0, 0.0, 0.0, 0.0, 0.0]))
-    assert sticks[0] == pytest.approx(1.0, abs=0.01)
+    assert scale.sticks(np.array([28.28, 0.0, 0.0, 0.0, 0.0, 0.0]))[0] == pytest.approx(1.0, abs=0.01)
     assert np.abs(scale.sticks(np.full(6, -1e3))).max() <= 1.0
     assert scale.sticks(np.array([math.nan, math.inf, 0, 0, 0, 0])) == pytest.approx(np.zeros(6), abs=1e-12)
 
@@ -155,10 +151,10 @@ def test_a_force_beyond_the_thrusters_leaves_the_moments_whole(force):
 def test_manual_control_realizes_the_desired_wrench(profile):
     """Through the vehicle's own service for sticks, whose parts of the greatest wrench the pilot's gain scales."""
     station = Station(profile, of=scenario("vehicle='bluerov2_heavy'", name="pipe-inspection"))
-    station.look(1.0, **{"commands.mode": 0.0})
     scale = make_stick_scale(HEAVY, PROFILES[profile], 0.5, "manual-control")
     wrench = np.array([10.0, -5.0, 8.0, 0.5, -0.8, 1.2])
-    station.send(make_manual_control(mavlink, 1, PROFILES[profile], scale.sticks(wrench), all_axes=True))
+    sent = make_manual_control(mavlink, 1, PROFILES[profile], scale.sticks(wrench), all_axes=True)
+    station.play({"commands.mode": 0.0}, sent)
     (command,) = station.commanded()
     assert isinstance(command, ManualControl)
     assert 0.5 * np.array(command.wrench) / np.diag(scale.efforts) == pytest.approx(wrench, rel=0.02)
@@ -197,12 +193,12 @@ def test_lean_sticks_realize_the_desired_angles_in_ardusub(parameters):
 
 
 def test_rc_override_follows_the_ardusub_order_and_zero_releases():
-    for message, first in (
+    for sent, first in (
         (override_channels(mavlink, 1, np.array([1.0, -1.0, 0.5, 0.25, -0.25, 0.1])),
          [1400, 1600, 1300, 1540, 1900, 1100]),  # pitch roll up yaw ahead right
         (release_channels(mavlink, 1), [0] * 6),
     ):  # fmt: skip
-        assert [getattr(decoded(message), f"chan{i}_raw") for i in range(1, 9)] == [*first, 0xFFFF, 0xFFFF]
+        assert [getattr(decoded(sent), f"chan{i}_raw") for i in range(1, 9)] == [*first, 0xFFFF, 0xFFFF]
 
 
 def test_state_is_predicted_over_its_age():
@@ -304,9 +300,8 @@ def test_distance_without_a_fix_is_accumulated():
     """Of 3 m north and 4 m down the horizontal part, and only while the estimate says that it is relative."""
     relative, absolute = 8, 24  # flags of EKF_STATUS_REPORT and ESTIMATOR_STATUS
     alignment, state = FrameAlignment(SceneOrigin(surveyed=SHIFT)), ReportedState((255, 191))
-    for k, (north, flags) in enumerate(
-        [(0.0, absolute), (1.0, absolute), (2.0, relative), (4.0, relative), (9.0, absolute)]
-    ):
+    way = [(0.0, absolute), (1.0, absolute), (2.0, relative), (4.0, relative), (9.0, absolute)]
+    for k, (north, flags) in enumerate(way):
         reported((north, 0.0, 4.0 * north / 3.0), heard=k * 0.02, state=state)
         state.receive(1, 1, mavlink.MAVLink_ekf_status_report_message(flags, *[0.0] * 5), k * 0.02)
         alignment.update(state, k * 0.02)
@@ -415,20 +410,19 @@ def sticks(x, z):
 
 
 @pytest.mark.parametrize(
-    ("system", "component", "message", "counts"),
+    ("sender", "sent", "counts"),
     [
-        (255, 191, sticks(900, 500), False),  # ours
-        (255, 190, sticks(20, 500), False),  # at rest, as an ArduSub's sticks are
-        (255, 190, sticks(0, 0), True),  # full down
-        (255, 190, sticks(0, 700), True),
-        (254, 1, sticks(300, 500), True),
-        (255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, 0, 0xFFFF, 1500, 1500, 1700, 0, 0, 0), True),
-        (255, 190, mavlink.MAVLink_rc_channels_override_message(1, 1, 0, 0xFFFF, 1500, 1500, 1510, 0, 0, 0), False),
+        ((255, 191), sticks(900, 500), False),  # ours
+        ((255, 190), sticks(20, 500), False),  # at rest, as an ArduSub's sticks are
+        ((255, 190), sticks(0, 0), True),  # full down
+        ((255, 190), sticks(0, 700), True), ((254, 1), sticks(300, 500), True),
+        *(((255, 190), mavlink.MAVLink_rc_channels_override_message(1, 1, 0, 65535, 1500, 1500, pwm, 0, 0, 0), counts)
+          for pwm, counts in ((1700, True), (1510, False))),
     ],
-)
-def test_deflected_foreign_sticks_count_as_a_pilot(system, component, message, counts):
+)  # fmt: skip
+def test_deflected_foreign_sticks_count_as_a_pilot(sender, sent, counts):
     state = reported((0.0, 0.0, 0.0))
-    state.receive(system, component, message, 5.0)
+    state.receive(*sender, sent, 5.0)
     assert (state.pilot_at == 5.0) == counts
 
 

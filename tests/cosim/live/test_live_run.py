@@ -46,10 +46,9 @@ def test_stalled_viewer_does_not_block_others(live, tmp_path):
     host, port = running.address
     with socket.create_connection(running.address) as lazy:
         lazy.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-        ask = f"GET /ws HTTP/1.1\r\nHost: {host}:{port}\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
-        lazy.sendall(
-            (ask + "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==\r\nSec-WebSocket-Version: 13\r\n\r\n").encode()
-        )
+        ask = [f"GET /ws HTTP/1.1\r\nHost: {host}:{port}", "Upgrade: websocket", "Connection: Upgrade",
+               "Sec-WebSocket-Key: MDEyMzQ1Njc4OWFiY2RlZg==", "Sec-WebSocket-Version: 13", "\r\n"]  # fmt: skip
+        lazy.sendall("\r\n".join(ask).encode())
         with running.viewer() as viewer:
             viewer.until("end")
         assert running.end().summary["status"] == "completed"

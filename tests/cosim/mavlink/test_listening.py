@@ -176,7 +176,8 @@ def test_values_rounded_to_zero_have_no_sign(shown):
     ("autopilot", "number", "told", "name"),
     [
         (12, 4 << 16 | 3 << 24, {}, "AUTO.LOITER"), (12, 6 << 16, {}, "OFFBOARD"), (3, 16, {}, "POSHOLD"),
-        (3, 21, {}, "SURFTRAK"), (3, 99, {}, "99"), (0, 7, {}, "7"), (0, 7, {7: "Region reaching"}, "Region reaching"),
+        (3, 21, {}, "SURFTRAK"), (3, 22, {}, "22"), (3, 99, {}, "99"), (0, 7, {}, "7"),
+        (0, 7, {7: "Region reaching"}, "Region reaching"),
     ],
 )  # fmt: skip
 def test_modes_have_their_names(autopilot, number, told, name):
