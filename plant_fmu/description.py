@@ -22,21 +22,11 @@ _ELEMENT = {  # XML element of a variable, by FMI version and type
     2: {"real": "Real", "integer": "Integer", "boolean": "Boolean"},
     3: {"real": "Float64", "integer": "Int32", "boolean": "Boolean"},
 }
-_INTERFACES = {  # capabilities, by FMI version
-    2: {
-        "canGetAndSetFMUstate": "true",
-        "canSerializeFMUstate": "true",
-        "providesDirectionalDerivative": "true",
-        "canNotUseMemoryManagementFunctions": "true",
-    },
-    3: {
-        "canGetAndSetFMUState": "true",
-        "canSerializeFMUState": "true",
-        "providesDirectionalDerivatives": "true",
-        "providesAdjointDerivatives": "true",
-    },
-}
-_NEEDS_STATES = ("providesDirectionalDerivative", "providesDirectionalDerivatives", "providesAdjointDerivatives")
+_CAPABILITIES = {  # by FMI version; derivatives are those of a component with states
+    2: ("canGetAndSetFMUstate", "canSerializeFMUstate", "providesDirectionalDerivative",
+        "canNotUseMemoryManagementFunctions"),
+    3: ("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives", "providesAdjointDerivatives"),
+}  # fmt: skip
 _LOG_CATEGORIES = {
     "logEvents": "Initialization, and samples in model exchange",
     "logStatusWarning": "Values that were mended, steps that do not fit; logged until switched off",
@@ -78,8 +68,8 @@ def model_description(component: Component, fmi: int, token: str) -> str:
     if fmi == 2:
         root.set("numberOfEventIndicators", "0")
     for interface in ("ModelExchange", "CoSimulation") if component.has_states else ("CoSimulation",):
-        offers = {k: v for k, v in _INTERFACES[fmi].items() if component.has_states or k not in _NEEDS_STATES}
-        element = ET.SubElement(root, interface, offers, modelIdentifier=component.name)
+        offers = [c for c in _CAPABILITIES[fmi] if component.has_states or not c.startswith("provides")]
+        element = ET.SubElement(root, interface, dict.fromkeys(offers, "true"), modelIdentifier=component.name)
         if interface == "CoSimulation":
             element.set("canHandleVariableCommunicationStepSize", "true")
         elif fmi == 2:

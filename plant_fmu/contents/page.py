@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import cache
 from importlib import metadata, resources
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from plant_fmu.contents.html_templates import make_environment
 from plant_fmu.variables import Variable, variables
@@ -22,14 +22,6 @@ _ROLES = {
     "parameter": ("Parameters", "All tunable: set before a run, or between steps."),
     "derivative": ("Derivatives of the states", ""),
 }
-
-
-class _Role(NamedTuple):
-    name: str
-    title: str
-    remark: str
-    variables: list[Variable]
-    has_start: bool
 
 
 def page(vehicle: Vehicle, fmi: int, rows: Sequence[Variable] | None = None) -> str:
@@ -54,14 +46,13 @@ def _environment() -> Environment:
     return make_environment(start=lambda v: _value(v, v.start), range=_range, number=_number)
 
 
-def _roles(rows: Sequence[Variable]) -> Iterator[_Role]:
-    shown = [v for v in rows if v.role != "time"]
-    for name in dict.fromkeys([*_ROLES, *(v.role for v in shown)]):
-        members = [v for v in shown if v.role == name]
+def _roles(rows: Sequence[Variable]) -> Iterator[dict[str, object]]:
+    """Yield the variables of each role, with title and remark."""
+    for name in dict.fromkeys([*_ROLES, *(v.role for v in rows if v.role != "time")]):
         title, remark = _ROLES.get(name, (name.capitalize(), ""))
-        if members:
-            has_start = any(v.role in ("input", "state", "parameter") for v in members)
-            yield _Role(name, title, remark, members, has_start)
+        if members := [v for v in rows if v.role == name]:
+            has_start = name in ("input", "state", "parameter")
+            yield {"name": name, "title": title, "remark": remark, "variables": members, "has_start": has_start}
 
 
 def _number(x: float) -> str:
