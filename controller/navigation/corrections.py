@@ -9,9 +9,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.arithmetic import arctangent, square
+from controller.linear_algebra import cross
 from controller.navigation.estimate import (
     ACCELERATION_BIAS,
     ATTITUDE,
@@ -22,6 +22,9 @@ from controller.navigation.estimate import (
     POSITION,
     VELOCITY,
     VELOCITY_SCALE,
+    ErrorMatrix,
+    ErrorRows,
+    Errors,
     NavigationMemory,
     set_first_covariance,
 )
@@ -29,10 +32,8 @@ from controller.navigation.inertial import estimate_at, rotate
 from controller.navigation.measurements import DEPTH, DEPTH_SENSOR, DVL, HEADING, USBL, Measurements, SensorModel
 from controller.navigation.measurements import POSITION as MEASURED_POSITION
 from controller.navigation.measurements import VELOCITY as MEASURED_VELOCITY
-from controller.quaternion import rotation_matrix
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.quaternion import rotation_matrix, skew
+from controller.stack_array import Matrix3, Vector3, array, zeros
 
 _GATE = 4.0  # number of standard deviations of an innovation beyond which a sample is rejected
 _UNKNOWN = 10.0  # ratio of the velocity's deviation to a sample's above which the sample is nearer to the truth
@@ -48,7 +49,7 @@ def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sens
     """Correct the estimate by the last sample of a sensor."""
     count = 3 if sensor in (DVL, USBL) else 1
     position, velocity, quaternion, innovation = zeros(3), zeros(3), zeros(4), zeros(3)
-    rows = zeros(3, 18)
+    rows = zeros(3, N_ERRORS)
     if not estimate_at(memory, measurements.times[sensor], position, velocity, quaternion):
         memory.innovations[sensor, 2] += 1.0
         return
@@ -58,7 +59,7 @@ def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sens
         return
     age = memory.time[0] - measurements.times[sensor]
     for i in range(count):
-        _age_row(rows, i, age, memory.acceleration, R, sensors.gravity)
+        _age_row(rows[i], age, memory.acceleration, R, sensors.gravity)
     if _is_outlier(memory.covariance, rows, innovation, noise, count):
         memory.innovations[sensor, 2] += 1.0
         memory.rejected[sensor] += 1.0
@@ -74,11 +75,9 @@ def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sens
     memory.accepted[sensor] += 1.0
     if memory.accepted[sensor] >= CONFIRMED:
         memory.resets[sensor] = 0.0
-    error = zeros(18)
+    error = zeros(N_ERRORS)
     for i in range(count):
-        for k in range(N_ERRORS):
-            memory.row[k] = rows[i, k]
-        _correct_number(memory, error, innovation[i], noise, sensor)
+        _correct_number(memory, error, rows[i], innovation[i], noise, sensor)
     _apply(memory, error)
 
 
@@ -87,11 +86,11 @@ def _predict_sample(
     measurements: Measurements,
     sensor: int,
     sensors: SensorModel,
-    position: Array,
-    velocity: Array,
-    R: Array,
-    innovation: Array,
-    rows: Array,
+    position: Vector3,
+    velocity: Vector3,
+    R: Matrix3,
+    innovation: Vector3,
+    rows: ErrorRows,
 ) -> float:
     """Write innovations and rows at the time of the sample; return its noise, or -1 for an unusable sample."""
     values = measurements.values
@@ -100,33 +99,21 @@ def _predict_sample(
         rows[0, POSITION + 2] = rows[0, DEPTH_BIAS] = 1.0
         return max(sensors.depth, _LEAST_SCALE)
     if sensor == USBL:
+        innovation[:] = values[MEASURED_POSITION : MEASURED_POSITION + 3] - position
         for i in range(3):
-            innovation[i] = values[MEASURED_POSITION + i] - position[i]
             rows[i, POSITION + i] = 1.0
         return max(sensors.position, _LEAST_SCALE)
     if sensor == DVL:
-        scale, world_velocity = 1.0 + memory.constants[VELOCITY_SCALE - GYRO_BIAS], zeros(3)
-        noise, unknown = max(sensors.velocity, _LEAST_SCALE), 0.0
-        for k in range(3):
-            unknown = max(unknown, memory.covariance[VELOCITY + k, VELOCITY + k])
-            world_velocity[k] = velocity[k]
+        scale = 1.0 + memory.constants[VELOCITY_SCALE - GYRO_BIAS]
+        sample = values[MEASURED_VELOCITY : MEASURED_VELOCITY + 3]
+        P, noise = memory.covariance, max(sensors.velocity, _LEAST_SCALE)
+        unknown = max(P[VELOCITY, VELOCITY], P[VELOCITY + 1, VELOCITY + 1], P[VELOCITY + 2, VELOCITY + 2])
         # an error of attitude acts on the true velocity, to which the sample is nearer
-        if unknown > square(_UNKNOWN * noise):
-            for k in range(3):
-                world_velocity[k] = 0.0
-                for i in range(3):
-                    world_velocity[k] += R[k, i] * values[MEASURED_VELOCITY + i] / scale
-        for i in range(3):
-            body = 0.0
-            for k in range(3):
-                body += R[k, i] * velocity[k]
-                rows[i, VELOCITY + k] = scale * R[k, i]
-                a, b = (k + 1) % 3, (k + 2) % 3  # R^T S(v) dtheta
-                rows[i, ATTITUDE + k] = scale * (R[a, i] * world_velocity[b] - R[b, i] * world_velocity[a])
-            rows[i, VELOCITY_SCALE] = (
-                R[0, i] * world_velocity[0] + R[1, i] * world_velocity[1] + R[2, i] * world_velocity[2]
-            )
-            innovation[i] = values[MEASURED_VELOCITY + i] - scale * body
+        world_velocity = R @ sample / scale if unknown > square(_UNKNOWN * noise) else velocity
+        innovation[:] = sample - scale * (R.T @ velocity)
+        rows[:, VELOCITY : VELOCITY + 3] = scale * R.T
+        rows[:, ATTITUDE : ATTITUDE + 3] = scale * (R.T @ skew(world_velocity))
+        rows[:, VELOCITY_SCALE] = R.T @ world_velocity
         return noise
     level = square(R[0, 0]) + square(R[1, 0])  # the bow, x of the body, seen from above
     if level < _STEEP:
@@ -143,31 +130,19 @@ def _predict_sample(
     return max(sensors.heading, _LEAST_SCALE)
 
 
-def _age_row(rows: Array, i: int, age: float, acceleration: Array, R: Array, gravity: float) -> None:
+def _age_row(row: Errors, age: float, acceleration: Vector3, R: Matrix3, gravity: float) -> None:
     """Transform a row for the errors at the sample's time to those of now, `age` [s] later, to first order in it."""
-    f, of_position, of_velocity, of_attitude = zeros(3), zeros(3), zeros(3), zeros(3)
-    for k in range(3):
-        f[k] = acceleration[k] - (gravity if k == 2 else 0.0)
-        of_position[k] = rows[i, POSITION + k]
-        of_velocity[k] = rows[i, VELOCITY + k]
-        of_attitude[k] = rows[i, ATTITUDE + k]
-    for k in range(3):
-        rows[i, VELOCITY + k] -= age * of_position[k]
-        a, b = (k + 1) % 3, (k + 2) % 3  # S(f)^T of the velocity's row
-        rows[i, ATTITUDE + k] -= age * (f[a] * of_velocity[b] - f[b] * of_velocity[a])
-        for j in range(3):
-            rows[i, ACCELERATION_BIAS + k] += age * of_velocity[j] * R[j, k]
-            rows[i, GYRO_BIAS + k] += age * of_attitude[j] * R[j, k]
+    by_velocity, by_attitude = row[VELOCITY : VELOCITY + 3].copy(), row[ATTITUDE : ATTITUDE + 3].copy()
+    row[VELOCITY : VELOCITY + 3] -= age * row[:3]
+    row[ATTITUDE : ATTITUDE + 3] -= age * cross(acceleration - array(0.0, 0.0, gravity), by_velocity)
+    row[ACCELERATION_BIAS : ACCELERATION_BIAS + 3] += age * (by_velocity @ R)
+    row[GYRO_BIAS : GYRO_BIAS + 3] += age * (by_attitude @ R)
 
 
-def _is_outlier(P: Array, rows: Array, innovation: Array, noise: float, count: int) -> bool:
+def _is_outlier(P: ErrorMatrix, rows: ErrorRows, innovation: Vector3, noise: float, count: int) -> bool:
     """Return True if an innovation is beyond the gate, or not a number."""
     for n in range(count):
-        variance = square(noise)
-        for i in range(N_ERRORS):
-            if rows[n, i] != 0.0:
-                for k in range(N_ERRORS):
-                    variance += rows[n, i] * P[i, k] * rows[n, k]
+        variance = square(noise) + rows[n] @ (P @ rows[n])
         if not abs(innovation[n]) <= _GATE * np.sqrt(variance):
             return True
     return False
@@ -179,50 +154,40 @@ def restart(memory: NavigationMemory) -> None:
     memory.previous_fix[:] = np.nan
 
 
-def _reset_covariance(memory: NavigationMemory, sensor: int, innovation: Array, sensors: SensorModel) -> None:
+def _reset_covariance(memory: NavigationMemory, sensor: int, innovation: Vector3, sensors: SensorModel) -> None:
     """Reset the covariance to the start's; that of the position stays, and grows by a fix's or depth's innovation."""
-    variances = zeros(3)
-    for i in range(3):
-        variances[i] = memory.covariance[POSITION + i, POSITION + i]
+    P = memory.covariance
+    variances = array(P[0, 0], P[1, 1], P[2, 2])
     if sensor == USBL:
-        for i in range(3):
-            variances[i] += square(innovation[i])
+        variances += innovation**2
     elif sensor == DEPTH_SENSOR:
         variances[2] += square(innovation[0])
     set_first_covariance(memory, sensors)
     memory.accepted[sensor] = 0.0
     for i in range(3):
-        memory.covariance[POSITION + i, POSITION + i] = variances[i]
+        P[POSITION + i, POSITION + i] = variances[i]
 
 
-def _correct_number(memory: NavigationMemory, error: Array, innovation: float, noise: float, sensor: int) -> None:
-    """Correct error, shape (18,), and covariance by one measured number, whose `row` is set."""
-    P, row, gain = memory.covariance, memory.row, memory.gain
-    variance = square(noise)
-    for i in range(N_ERRORS):
-        gain[i] = 0.0
-        for k in range(N_ERRORS):
-            gain[i] += P[i, k] * row[k]
-    for i in range(N_ERRORS):
-        variance += row[i] * gain[i]
-        innovation -= row[i] * error[i]
+def _correct_number(
+    memory: NavigationMemory, error: Errors, row: Errors, innovation: float, noise: float, sensor: int
+) -> None:
+    """Correct error and covariance by one measured number, whose derivative by the errors is `row`."""
+    P = memory.covariance
+    gain = P @ row
+    variance = square(noise) + gain @ row
+    innovation -= float(row @ error)
     memory.innovations[sensor, 0] += square(innovation) / variance
     memory.innovations[sensor, 1] += 1.0
     for i in range(N_ERRORS):
         share = gain[i] / variance
         error[i] += share * innovation
-        for k in range(N_ERRORS):
-            P[i, k] -= share * gain[k]
+        P[i] -= share * gain
 
 
-def _apply(memory: NavigationMemory, error: Array) -> None:
-    """Add an estimated error, shape (18,), to the estimate."""
-    R, turn = rotation_matrix(memory.quaternion), zeros(3)
-    for i in range(3):
-        memory.position[i] += error[POSITION + i]
-        memory.velocity[i] += error[VELOCITY + i]
-        for k in range(3):  # from world to body axes
-            turn[i] += R[k, i] * error[ATTITUDE + k]
+def _apply(memory: NavigationMemory, error: Errors) -> None:
+    """Add an estimated error to the estimate."""
+    memory.position[:] += error[:3]
+    memory.velocity[:] += error[VELOCITY : VELOCITY + 3]
+    turn = rotation_matrix(memory.quaternion).T @ error[ATTITUDE : ATTITUDE + 3]  # from world to body axes
     rotate(memory.quaternion, turn)
-    for i in range(N_ERRORS - GYRO_BIAS):
-        memory.constants[i] += error[GYRO_BIAS + i]
+    memory.constants[:] += error[GYRO_BIAS:]

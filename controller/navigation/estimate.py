@@ -5,15 +5,14 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
 from controller.navigation.measurements import N_SENSORS, SensorModel
-
-Array = NDArray[np.float64]
+from controller.stack_array import Array, Number, Shape, Vector3, Vector4
 
 # index of the first error of each kind
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCELERATION_BIAS = 0, 3, 6, 9, 12
@@ -24,30 +23,35 @@ _FIRST_POSITION, _FIRST_VELOCITY = 0.1, 0.3  # m in addition to the noise of a f
 _FIRST_TILT, _FIRST_HEADING = 0.05, 0.3  # rad; an acceleration looks like a tilt
 _REMEMBERED = 128  # number of IMU samples in the history, for late measurements
 
+Errors = Annotated[NDArray[np.float64], Shape(N_ERRORS)]
+ErrorMatrix = Annotated[NDArray[np.float64], Shape(N_ERRORS, N_ERRORS)]
+ErrorRows = Annotated[NDArray[np.float64], Shape(3, N_ERRORS)]
+Constants = Annotated[NDArray[np.float64], Shape(9)]
+ImuMotion = Annotated[NDArray[np.float64], Shape(10)]
+ImuHistory = Annotated[NDArray[np.float64], Shape(_REMEMBERED, 11)]
+
 
 class NavigationMemory(NamedTuple):
     """Estimate and covariance."""
 
-    position: Array  # (3,) m, NED
-    velocity: Array  # (3,) m/s over ground, NED
-    quaternion: Array  # (4,) from body to world
-    constants: Array  # (9,) errors of gyros [rad/s] (3), accelerometers [m/s2] (3), compass [rad], depth [m], DVL
-    covariance: Array  # (18, 18) covariance of the errors
-    time: Array  # (1,) s, time of the estimate: that of the last IMU sample; NaN before the first
-    acceleration: Array  # (3,) m/s2 over ground, NED, at the last IMU sample
-    omega: Array  # (3,) rad/s, body axes, at the last IMU sample
+    position: Vector3  # m, NED
+    velocity: Vector3  # m/s over ground, NED
+    quaternion: Vector4  # from body to world
+    constants: Constants  # errors of gyros [rad/s] (3), accelerometers [m/s2] (3), compass [rad], depth [m], DVL
+    covariance: ErrorMatrix  # covariance of the errors
+    time: Number  # s, time of the estimate: that of the last IMU sample; NaN before the first
+    acceleration: Vector3  # m/s2 over ground, NED, at the last IMU sample
+    omega: Vector3  # rad/s, body axes, at the last IMU sample
     sample_times: Array  # (5,) s, times of the last samples used
-    previous_fix: Array  # (3,) m, NED, the last fix before the start; NaN: none yet
+    previous_fix: Vector3  # m, NED, the last fix before the start; NaN: none yet
     rejected: Array  # (5,) samples rejected in a row
     resets: Array  # (5,) resets of the covariance by each sensor since it was confirmed
     accepted: Array  # (5,) samples accepted since the start, or since the sensor reset the covariance
     innovations: Array  # (5, 3) a row a sensor: sum of normalized squared innovations, their degrees, rejected samples
-    started: Array  # (1,) 1 once there is an estimate
-    imu_motion: Array  # (10,) change of position, velocity and attitude by the IMU alone, since the start
-    imu_history: Array  # (128, 11) time and `imu_motion` of the last IMU samples
+    started: Number  # 1 once there is an estimate
+    imu_motion: ImuMotion  # change of position, velocity and attitude by the IMU alone, since the start
+    imu_history: ImuHistory  # time and `imu_motion` of the last IMU samples
     recorded: NDArray[np.int64]  # (1,) number of recorded samples
-    row: Array  # (18,) derivative of a measured number by the errors
-    gain: Array  # (18,) covariance times `row`: Kalman gain before its division by the variance
 
 
 def empty_memory() -> NavigationMemory:
@@ -73,8 +77,6 @@ def empty_memory() -> NavigationMemory:
         imu_motion=motion,
         imu_history=np.zeros((_REMEMBERED, 11)),
         recorded=np.zeros(1, np.int64),
-        row=np.zeros(N_ERRORS),
-        gain=np.zeros(N_ERRORS),
     )
 
 

@@ -9,79 +9,69 @@
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from controller.arithmetic import square
+from controller.linear_algebra import norm
 from controller.navigation.estimate import (
     ACCELERATION_BIAS,
     ATTITUDE,
     GYRO_BIAS,
-    N_ERRORS,
-    POSITION,
+    HEADING_BIAS,
     VELOCITY,
+    ErrorMatrix,
     NavigationMemory,
 )
 from controller.navigation.measurements import SensorModel
-from controller.quaternion import rotation_matrix
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.quaternion import multiply, rotation_matrix, skew
+from controller.stack_array import Matrix3, Vector3, Vector4, array
 
 _DRIFT = 1e-3  # 1/sqrt(s), random walk of a constant error, as a fraction of its standard deviation
 
 
-def propagate(memory: NavigationMemory, force: Array, omega: Array, sensors: SensorModel, period: float) -> None:
-    """Propagate over a period [s] up to a sample of specific force [m/s2] and rates [rad/s], body axes, (3,) each."""
+def propagate(memory: NavigationMemory, force: Vector3, omega: Vector3, sensors: SensorModel, period: float) -> None:
+    """Propagate over a period [s] up to a sample of specific force [m/s2] and rates [rad/s], body axes."""
     # The force is that of the period before the sample; the rates change evenly within it.
-    turn, f = zeros(3), zeros(3)
-    for i in range(3):
-        turn[i] = 0.5 * period * (memory.omega[i] + omega[i])
-        f[i] = 0.5 * turn[i]
-    rotate(memory.quaternion, f)  # to the middle of the period
+    turn = 0.5 * period * (memory.omega + omega)
+    rotate(memory.quaternion, 0.5 * turn)  # to the middle of the period
     R = rotation_matrix(memory.quaternion)
-    rotate(memory.quaternion, f)
-    for axis in range(3):
-        f[axis] = 0.0
-        for k in range(3):
-            f[axis] += R[axis, k] * force[k]
-        acceleration = f[axis] + (sensors.gravity if axis == 2 else 0.0)
-        step = period * (memory.velocity[axis] + 0.5 * period * acceleration)
-        memory.position[axis] += step
-        memory.velocity[axis] += period * acceleration
-        memory.imu_motion[axis] += step
-        memory.imu_motion[3 + axis] += period * acceleration
-        memory.acceleration[axis] = acceleration
-        memory.omega[axis] = omega[axis]
+    rotate(memory.quaternion, 0.5 * turn)
+    f = R @ force
+    acceleration = f + array(0.0, 0.0, sensors.gravity)
+    step = period * (memory.velocity + 0.5 * period * acceleration)
+    memory.position[:] += step
+    memory.velocity[:] += period * acceleration
+    memory.imu_motion[:3] += step
+    memory.imu_motion[3:6] += period * acceleration
     rotate(memory.imu_motion[6:], turn)
+    memory.acceleration[:], memory.omega[:] = acceleration, omega
     memory.time[0] += period
-    _record(memory)
+    i = memory.recorded[0] % memory.imu_history.shape[0]  # the motion by the IMU alone
+    memory.imu_history[i, 0], memory.imu_history[i, 1:] = memory.time[0], memory.imu_motion
+    memory.recorded[0] += 1
     _propagate_covariance(memory.covariance, R, f, sensors, period)
 
 
-def rotate(quaternion: Array, turn: Array) -> None:
-    """Turn an attitude, shape (4,), by a small rotation vector [rad] in body axes, shape (3,); exact to 1e-7 at 0.5."""
-    s = square(turn[0]) + square(turn[1]) + square(turn[2])
-    scale = 0.5 - s / 48.0 + square(s) / 3840.0
-    _multiply_by(quaternion, 1.0 - s / 8.0 + square(s) / 384.0, scale * turn[0], scale * turn[1], scale * turn[2])
+def rotate(quaternion: Vector4, turn: Vector3) -> None:
+    """Turn an attitude by a small rotation vector [rad] in body axes; exact to 1e-7 at 0.5."""
+    s = turn @ turn
+    part = (0.5 - s / 48.0 + s * s / 3840.0) * turn
+    _multiply_by(quaternion, array(1.0 - s / 8.0 + s * s / 384.0, part[0], part[1], part[2]))
 
 
-def _propagate_covariance(P: Array, R: Array, force: Array, sensors: SensorModel, period: float) -> None:
-    """Propagate the covariance; the force [m/s2] is in world axes."""
-    T = period
-    for transposed in range(2):
-        for k in range(N_ERRORS):
-            for i in range(3):
-                _add(P, POSITION + i, VELOCITY + i, k, T, transposed)
-            for i in range(3):
-                a, b = (i + 1) % 3, (i + 2) % 3
-                _add(P, VELOCITY + i, ATTITUDE + b, k, -T * force[a], transposed)
-                _add(P, VELOCITY + i, ATTITUDE + a, k, T * force[b], transposed)
-                for j in range(3):
-                    _add(P, VELOCITY + i, ACCELERATION_BIAS + j, k, -T * R[i, j], transposed)
-            for i in range(3):
-                for j in range(3):
-                    _add(P, ATTITUDE + i, GYRO_BIAS + j, k, -T * R[i, j], transposed)
+def _multiply_by(quaternion: Vector4, other: Vector4) -> None:
+    """Multiply a quaternion by another from the right, and normalize it."""
+    e = multiply(quaternion, other)
+    quaternion[:] = e / norm(e)
+
+
+def _propagate_covariance(P: ErrorMatrix, R: Matrix3, force: Vector3, sensors: SensorModel, T: float) -> None:
+    """Propagate the covariance over a period [s]; the force [m/s2] is in world axes."""
+    S = skew(force)
+    P[:3] += T * P[VELOCITY:ATTITUDE]
+    P[VELOCITY:ATTITUDE] -= T * (S @ P[ATTITUDE:GYRO_BIAS] + R @ P[ACCELERATION_BIAS:HEADING_BIAS])
+    P[ATTITUDE:GYRO_BIAS] -= T * (R @ P[GYRO_BIAS:ACCELERATION_BIAS])
+    P[:, :3] += T * P[:, VELOCITY:ATTITUDE]
+    P[:, VELOCITY:ATTITUDE] -= T * (P[:, ATTITUDE:GYRO_BIAS] @ S.T + P[:, ACCELERATION_BIAS:HEADING_BIAS] @ R.T)
+    P[:, ATTITUDE:GYRO_BIAS] -= T * (P[:, GYRO_BIAS:ACCELERATION_BIAS] @ R.T)
     for i in range(3):
         P[VELOCITY + i, VELOCITY + i] += square(sensors.acceleration * T)
         P[ATTITUDE + i, ATTITUDE + i] += square(sensors.angular_velocity * T)
@@ -89,66 +79,30 @@ def _propagate_covariance(P: Array, R: Array, force: Array, sensors: SensorModel
         P[GYRO_BIAS + i, GYRO_BIAS + i] += square(_DRIFT * sensors.angular_velocity_bias) * T
 
 
-def _add(P: Array, to: int, source: int, k: int, share: float, transposed: int) -> None:
-    """Add a share of one row, or column if transposed, to another, in its element k."""
-    if transposed:
-        P[k, to] += share * P[k, source]
-    else:
-        P[to, k] += share * P[source, k]
-
-
-def _record(memory: NavigationMemory) -> None:
-    """Record the motion by the IMU alone."""
-    i = memory.recorded[0] % memory.imu_history.shape[0]
-    memory.imu_history[i, 0] = memory.time[0]
-    for k in range(10):
-        memory.imu_history[i, 1 + k] = memory.imu_motion[k]
-    memory.recorded[0] += 1
-
-
-def estimate_at(memory: NavigationMemory, time: float, position: Array, velocity: Array, quaternion: Array) -> bool:
+def estimate_at(
+    memory: NavigationMemory, time: float, position: Vector3, velocity: Vector3, quaternion: Vector4
+) -> bool:
     """Write position [m], velocity [m/s] and attitude at a time [s]; return False if the history does not reach it."""
-    later, n = time - memory.time[0], memory.imu_history.shape[0]
-    for i in range(4):
-        quaternion[i] = memory.quaternion[i]
+    later, history, n = time - memory.time[0], memory.imu_history, memory.imu_history.shape[0]
+    quaternion[:] = memory.quaternion
     if later >= 0.0:
-        for i in range(3):
-            position[i] = memory.position[i] + later * (memory.velocity[i] + 0.5 * later * memory.acceleration[i])
-            velocity[i] = memory.velocity[i] + later * memory.acceleration[i]
-        turn = zeros(3)
-        for i in range(3):
-            turn[i] = later * memory.omega[i]
-        rotate(quaternion, turn)
+        position[:] = memory.position + later * (memory.velocity + 0.5 * later * memory.acceleration)
+        velocity[:] = memory.velocity + later * memory.acceleration
+        rotate(quaternion, later * memory.omega)
         return True
     newest = memory.recorded[0] - 1
     oldest = max(memory.recorded[0] - n, 0)
     i = newest
-    while i > oldest and memory.imu_history[i % n, 0] > time:
+    while i > oldest and history[i % n, 0] > time:
         i -= 1
-    if memory.imu_history[i % n, 0] > time or i == newest:
+    if history[i % n, 0] > time or i == newest:
         return False
-    before, after, motion = i % n, (i + 1) % n, zeros(10)
-    share = (time - memory.imu_history[before, 0]) / (memory.imu_history[after, 0] - memory.imu_history[before, 0])
-    for k in range(10):
-        motion[k] = memory.imu_history[before, 1 + k] + share * (
-            memory.imu_history[after, 1 + k] - memory.imu_history[before, 1 + k]
-        )
-    for k in range(3):
-        position[k] = memory.position[k] - (memory.imu_motion[k] - motion[k])
-        velocity[k] = memory.velocity[k] - (memory.imu_motion[3 + k] - motion[3 + k])
+    before, after = history[i % n], history[(i + 1) % n]
+    motion = before[1:] + (time - before[0]) / (after[0] - before[0]) * (after[1:] - before[1:])
+    position[:] = memory.position - (memory.imu_motion[:3] - motion[:3])
+    velocity[:] = memory.velocity - (memory.imu_motion[3:6] - motion[3:6])
     # attitude * imu_motion^-1 * motion
-    _multiply_by(quaternion, memory.imu_motion[6], -memory.imu_motion[7], -memory.imu_motion[8], -memory.imu_motion[9])
-    _multiply_by(quaternion, motion[6], motion[7], motion[8], motion[9])
+    q = memory.imu_motion[6:]
+    _multiply_by(quaternion, array(q[0], -q[1], -q[2], -q[3]))
+    _multiply_by(quaternion, motion[6:])
     return True
-
-
-def _multiply_by(quaternion: Array, w: float, x: float, y: float, z: float) -> None:
-    """Multiply a quaternion by another from the right, and normalize it."""
-    e0, e1, e2, e3 = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
-    quaternion[0] = e0 * w - e1 * x - e2 * y - e3 * z
-    quaternion[1] = e0 * x + e1 * w + e2 * z - e3 * y
-    quaternion[2] = e0 * y - e1 * z + e2 * w + e3 * x
-    quaternion[3] = e0 * z + e1 * y - e2 * x + e3 * w
-    length = np.sqrt(square(quaternion[0]) + square(quaternion[1]) + square(quaternion[2]) + square(quaternion[3]))
-    for i in range(4):
-        quaternion[i] /= length

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.arithmetic import arctangent, cosine, hypotenuse, square
 from controller.compiling.function import CompiledFunction
@@ -38,9 +37,7 @@ from controller.navigation.measurements import (
 )
 from controller.navigation.measurements import POSITION as MEASURED_POSITION
 from controller.quaternion import rotation_matrix
-from controller.stack_array import zeros
-
-Array = NDArray[np.float64]
+from controller.stack_array import Array, Vector4, array, zeros
 
 _NEVER = -1e11  # s, time before any sample
 _UNEXPLAINED = 4.0  # number of standard deviations of a fix beyond which two fixes differ by more than noise
@@ -70,18 +67,16 @@ def navigate(
 
 def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory) -> None:
     """Propagate to the new sample of the IMU, or start at it."""
-    time, force, omega = measurements.times[IMU], zeros(3), zeros(3)
-    for i in range(3):
-        omega[i] = measurements.values[ANGULAR_VELOCITY + i] - memory.constants[i]
-        force[i] = measurements.values[ACCELERATION + i] - memory.constants[3 + i]
+    time = measurements.times[IMU]
+    omega = measurements.values[ANGULAR_VELOCITY : ANGULAR_VELOCITY + 3] - memory.constants[:3]
+    force = measurements.values[ACCELERATION : ACCELERATION + 3] - memory.constants[3:6]
     period = time - memory.time[0]
     if memory.started[0] > 0.0 and period <= _MAX_GAP:
         propagate(memory, force, omega, sensors, period)
     else:
         if memory.started[0] > 0.0:  # too long without a sample
             restart(memory)
-        for i in range(3):
-            memory.omega[i] = omega[i]
+        memory.omega[:] = omega
     memory.time[0] = memory.sample_times[IMU] = time
 
 
@@ -93,22 +88,16 @@ def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationM
     latest = min(times[IMU], times[COMPASS], times[DEPTH_SENSOR], times[USBL])
     if not latest > _NEVER or times[IMU] != memory.time[0] or not times[USBL] > memory.sample_times[USBL]:
         return
-    memory.sample_times[USBL], agree, apart = times[USBL], True, zeros(3)
-    for i in range(3):
-        fix = measurements.values[MEASURED_POSITION + i]
-        apart[i] = fix - memory.previous_fix[i]
-        agree = agree and abs(apart[i]) < _FIX_DEVIATIONS * sensors.position + _FIX_DISTANCE
-        memory.previous_fix[i] = fix
-    if not agree:
+    fix = measurements.values[MEASURED_POSITION : MEASURED_POSITION + 3]
+    apart = fix - memory.previous_fix
+    memory.sample_times[USBL], memory.previous_fix[:] = times[USBL], fix
+    if not np.all(abs(apart) < _FIX_DEVIATIONS * sensors.position + _FIX_DISTANCE):
         return
-    for i in range(9):
-        memory.constants[i] = 0.0
+    memory.constants[:] = 0.0
     f, memory.started[0] = measurements.values[ACCELERATION : ACCELERATION + 3], 1.0
     roll, pitch = arctangent(-f[1], -f[2]), arctangent(f[0], hypotenuse(f[1], f[2]))
-    _set_attitude(memory.quaternion, roll, pitch, measurements.values[HEADING])
-    for i in range(3):
-        memory.position[i] = measurements.values[MEASURED_POSITION + i] - 0.5 * apart[i]
-        memory.velocity[i] = memory.acceleration[i] = 0.0
+    memory.quaternion[:] = _from_euler(roll, pitch, measurements.values[HEADING])
+    memory.position[:], memory.velocity[:], memory.acceleration[:] = fix - 0.5 * apart, 0.0, 0.0
     memory.position[2] = measurements.values[DEPTH]
     memory.recorded[0] = 0
     set_first_covariance(memory, sensors)
@@ -116,48 +105,43 @@ def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationM
         memory.covariance[POSITION + i, POSITION + i] -= 0.5 * square(sensors.position)
         if abs(apart[i]) > _UNEXPLAINED * sensors.position:
             memory.covariance[POSITION + i, POSITION + i] += 0.25 * square(apart[i])
-    for sensor in range(N_SENSORS):
-        memory.rejected[sensor] = memory.accepted[sensor] = memory.resets[sensor] = 0.0
-        memory.sample_times[sensor] = times[sensor]
+    memory.rejected[:], memory.accepted[:], memory.resets[:], memory.sample_times[:] = 0.0, 0.0, 0.0, times
     memory.accepted[USBL] = CONFIRMED
 
 
-def _set_attitude(quaternion: Array, roll: float, pitch: float, yaw: float) -> None:
-    """Write the quaternion of Euler angles (zyx) [rad]."""
+def _from_euler(roll: float, pitch: float, yaw: float) -> Vector4:
+    """Return the quaternion of Euler angles (zyx) [rad]."""
     cr, sr = cosine(0.5 * roll), cosine(0.5 * roll - _QUARTER_TURN)
     cp, sp = cosine(0.5 * pitch), cosine(0.5 * pitch - _QUARTER_TURN)
     cy, sy = cosine(0.5 * yaw), cosine(0.5 * yaw - _QUARTER_TURN)
-    quaternion[0] = cr * cp * cy + sr * sp * sy
-    quaternion[1] = sr * cp * cy - cr * sp * sy
-    quaternion[2] = cr * sp * cy + sr * cp * sy
-    quaternion[3] = cr * cp * sy - sr * sp * cy
+    return array(
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
 
 
 def _write_state(memory: NavigationMemory, sensors: SensorModel, now: float, state: VehicleState) -> None:
     """Write the state at a time [s] with its standard deviations."""
-    velocity, P = zeros(3), memory.covariance
+    velocity, P, deviation = zeros(3), memory.covariance, state.deviation
     known = memory.started[0] > 0.0 and now - memory.time[0] <= _MAX_GAP
     if known:
         estimate_at(memory, now, state.position, velocity, state.quaternion)
-    R = rotation_matrix(state.quaternion)
-    fastest = 0.0
+    else:
+        state.quaternion[:] = np.nan
     for i in range(3):
-        fastest = max(fastest, P[VELOCITY + i, VELOCITY + i])
-    for i in range(3):
-        state.deviation[i] = np.sqrt(P[POSITION + i, POSITION + i])
-        state.deviation[3 + i] = np.sqrt(P[VELOCITY + i, VELOCITY + i])
-        state.deviation[6 + i] = np.sqrt(P[ATTITUDE + i, ATTITUDE + i])
-        state.deviation[9 + i] = np.sqrt(P[GYRO_BIAS + i, GYRO_BIAS + i] + square(sensors.angular_velocity))
-        if not known or state.deviation[i] > _FAR:
+        deviation[i] = np.sqrt(P[POSITION + i, POSITION + i])
+        deviation[3 + i] = np.sqrt(P[VELOCITY + i, VELOCITY + i])
+        deviation[6 + i] = np.sqrt(P[ATTITUDE + i, ATTITUDE + i])
+        deviation[9 + i] = np.sqrt(P[GYRO_BIAS + i, GYRO_BIAS + i] + square(sensors.angular_velocity))
+        if not known or deviation[i] > _FAR:
             state.position[i] = np.nan
-        state.velocity_body[i] = state.velocity_body[3 + i] = np.nan
-        if known:
-            state.velocity_body[3 + i] = memory.omega[i]
-            if fastest <= square(_FAST):
-                state.velocity_body[i] = R[0, i] * velocity[0] + R[1, i] * velocity[1] + R[2, i] * velocity[2]
-    if not known:
-        for i in range(4):
-            state.quaternion[i] = np.nan
+    state.velocity_body[:] = np.nan
+    if known:
+        state.velocity_body[3:] = memory.omega
+        if np.max(deviation[3:6]) <= _FAST:
+            state.velocity_body[:3] = rotation_matrix(state.quaternion).T @ velocity
 
 
 class Navigator:
