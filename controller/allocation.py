@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.errors import LawError
-
-Array = NDArray[np.float64]
+from controller.stack_array import Array, Vector6
 
 _ROUNDING = 1e-12  # force that counts as 0, as a fraction of the maximum force
 
@@ -45,19 +43,15 @@ def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
             scale = min(scale, upper[i] / forces[i])
         elif forces[i] < lower[i] and forces[i] < -negligible:
             scale = min(scale, lower[i] / forces[i])
-    for i in range(forces.size):
-        forces[i] *= scale
+    forces *= scale
     clip_each(forces, lower, upper)  # for rounding in the last bit
     return scale < 1.0
 
 
-def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: Array, forces: Array) -> bool:
+def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: Vector6, forces: Array) -> bool:
     """Write the least-squares thruster forces for a wrench, within limits, into `forces`; lower, upper [N]."""
     # with tau [N, N m], forces [N]
-    for i in range(forces.size):
-        forces[i] = 0.0
-        for j in range(6):
-            forces[i] += inverse[i, j] * tau[j]
+    forces[:] = inverse @ tau
     return keep_direction(forces, lower, upper) if direction else clip_each(forces, lower, upper)
 
 

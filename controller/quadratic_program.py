@@ -26,8 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-
-Array = NDArray[np.float64]
+from controller.stack_array import Array
 
 _TOLERANCE = 1e-11  # violation below which a row counts as kept, as a fraction of the greatest one at the start
 _DEPENDENT = 1e-12  # remainder of a row beside the other rows, as a fraction of G_ii, below which it depends on them
@@ -132,33 +131,20 @@ def _clip_to_limits(work: Workspace, lower: Array, upper: Array, forces: Array) 
             forces[j], finite = work.nominal[j], False
         forces[j] = min(max(forces[j], lower[j]), upper[j])  # rounding; more if the search was cut short
     if not finite:
-        for i in range(work.multipliers.size):
-            if not np.isfinite(work.multipliers[i]):
-                work.multipliers[i] = 0.0
+        work.multipliers[:] = np.where(np.isfinite(work.multipliers), work.multipliers, 0.0)
     return finite
 
 
 def _prepare(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array) -> float:
     """Prepare all rows, none of them passive, and return the greatest |d_i| / sqrt(G_ii)."""
     m, scale = lower.size, 0.0
-    for j in range(m):
-        if not np.isfinite(work.nominal[j]):
-            work.nominal[j] = 0.0
+    work.nominal[:] = np.where(np.isfinite(work.nominal), work.nominal, 0.0)
     for i in range(barriers):
-        finite = work.right[i] + work.price[i]
-        for j in range(m):
-            finite += work.rows[i, j]
-        if not np.isfinite(finite):
+        if not np.isfinite(work.right[i] + work.price[i] + np.sum(work.rows[i])):
             work.rows[i, :], work.right[i], work.price[i] = 0.0, 0.0, 1.0
-        squared_norm, nominal_value = 0.0, 0.0
-        for j in range(m):
-            total = 0.0
-            for q in range(m):
-                total += inverse[j, q] * work.rows[i, q]
-            work.mapped_rows[i, j] = total
-            squared_norm += work.rows[i, j] * total
-            nominal_value += work.rows[i, j] * work.nominal[j]
-        work.residual[i] = work.right[i] - nominal_value
+        work.mapped_rows[i] = inverse @ work.rows[i]
+        squared_norm = work.rows[i] @ work.mapped_rows[i]
+        work.residual[i] = work.right[i] - work.rows[i] @ work.nominal
         work.size[i] = np.sqrt(squared_norm + work.price[i])
         work.multipliers[i], work.row_state[i] = 0.0, _FREE
         if not squared_norm > 0.0:
@@ -168,9 +154,8 @@ def _prepare(work: Workspace, barriers: int, inverse: Array, lower: Array, upper
             scale = max(scale, abs(work.residual[i]) / work.size[i])
     for j in range(m):
         low, high = barriers + j, barriers + m + j
-        for q in range(m):
-            work.mapped_rows[low, q] = inverse[j, q]
-            work.mapped_rows[high, q] = -inverse[j, q]
+        work.mapped_rows[low] = inverse[j]
+        work.mapped_rows[high] = -inverse[j]
         work.residual[low], work.residual[high] = lower[j] - work.nominal[j], work.nominal[j] - upper[j]
         for i in (low, high):
             work.size[i] = np.sqrt(inverse[j, j])
@@ -236,8 +221,7 @@ def _refine(
 def _sum_dual_force(work: Workspace, barriers: int, count: int) -> None:
     """Write A^T y into `dual_force`, summed over the passive rows in twice the precision."""
     m, dual_force, remainders = work.nominal.size, work.dual_force, work.refined
-    for j in range(m):
-        dual_force[j], remainders[j] = 0.0, 0.0
+    dual_force[:], remainders[:] = 0.0, 0.0
     for a in range(count):
         i = work.passive[a]
         y = work.multipliers[i]
@@ -247,8 +231,7 @@ def _sum_dual_force(work: Workspace, barriers: int, count: int) -> None:
         else:
             j, sign = (i - barriers, 1.0) if i < barriers + m else (i - barriers - m, -1.0)
             dual_force[j], remainders[j] = _add_product(dual_force[j], remainders[j], sign, y)
-    for j in range(m):
-        dual_force[j] += remainders[j]
+    dual_force += remainders
 
 
 def _row_residual(work: Workspace, barriers: int, i: int, lower: Array, upper: Array, forces: Array) -> float:
@@ -282,10 +265,8 @@ def _append_factor_row(work: Workspace, barriers: int, a: int) -> bool:
     m, L, i = work.nominal.size, work.factor, work.passive[a]
     for b in range(a + 1):
         k = work.passive[b]
-        total = 0.0
         if i < barriers:
-            for j in range(m):
-                total += work.rows[i, j] * work.mapped_rows[k, j]
+            total = float(work.rows[i] @ work.mapped_rows[k])
         elif i < barriers + m:
             total = work.mapped_rows[k, i - barriers]
         else:
