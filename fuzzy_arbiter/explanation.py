@@ -146,16 +146,14 @@ def _decided(system: System, rules: Sequence[FiredRule], k: int, centroid: float
 
 def _ranking(names: Sequence[str], weights: Sequence[float]) -> tuple[str | None, str | None, float, tuple[str, ...]]:
     """Return the winner, the runner-up, the margin, and the outputs that tie."""
-    known = [(name, weight) for name, weight in zip(names, weights, strict=True) if weight == weight]
-    if all(abs(weight) <= TIE for _, weight in known):
+    known = sorted(((w, name) for name, w in zip(names, weights, strict=True) if w == w), key=lambda pair: -pair[0])
+    if all(abs(weight) <= TIE for weight, _ in known):
         return None, None, 0.0, ()
-    (winner, greatest), *others = sorted(known, key=lambda item: -item[1])
-    if not others:
-        return winner, None, greatest, ()
-    runner_up, second = others[0]
-    if greatest - second <= TIE:
-        return None, None, 0.0, tuple(name for name, weight in known if greatest - weight <= TIE)
-    return winner, runner_up, greatest - second, ()
+    top = tuple(name for weight, name in known if known[0][0] - weight <= TIE)
+    if len(top) > 1:
+        return None, None, 0.0, top
+    second, runner_up = known[1] if len(known) > 1 else (0.0, None)
+    return top[0], runner_up, known[0][0] - second, ()
 
 
 def _decision(output: OutputDecision) -> str:

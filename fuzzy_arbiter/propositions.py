@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
-from fuzzy_arbiter.checks import all_of, shown
+from fuzzy_arbiter.checks import all_of, require_choice, shown
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.shapes import Membership
 from fuzzy_arbiter.terms.norms import HEDGES
@@ -119,30 +119,6 @@ class Or(_Join):
 
 
 @dataclass(frozen=True, slots=True)
-class Not(Proposition):
-    """The part does not hold."""
-
-    part: Proposition
-    nesting: int = field(init=False, repr=False, compare=False)
-
-    def __post_init__(self) -> None:
-        if not isinstance(self.part, Proposition):
-            raise DefinitionError(f"not: got {shown(self.part)}, expected such as variable['term']")
-        _set_nesting(self, self.part.nesting + (1 if isinstance(self.part, Is) else 2))
-
-    @property
-    def inner(self) -> tuple[Proposition, ...]:
-        """The part."""
-        return (self.part,)
-
-    def __str__(self) -> str:
-        if not isinstance(self.part, Not) and _on_one(self.part):
-            variable, words = _said(self.part)
-            return f"{quoted(variable)} is not {words}"
-        return f"not ({self.part})"
-
-
-@dataclass(frozen=True, slots=True)
 class Anything(Proposition):
     """A variable is in any term: this always holds."""
 
@@ -156,8 +132,45 @@ class Anything(Proposition):
         return f"{quoted(self.variable)} is any"
 
 
+class _Modifier(Proposition):
+    """A proposition that changes another by a word in front."""
+
+    __slots__ = ()
+    part: Proposition
+
+    @property
+    def word(self) -> str:
+        """The word: *not*, or the hedge."""
+        return self.hedge if isinstance(self, Hedged) else "not"
+
+    @property
+    def inner(self) -> tuple[Proposition, ...]:
+        """The part."""
+        return (self.part,)
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.part, Proposition):
+            raise DefinitionError(f"{self.word}: got {shown(self.part)}, expected such as variable['term']")
+        simple = _on_one(self.part) if isinstance(self, Hedged) else isinstance(self.part, Is)
+        _set_nesting(self, self.part.nesting + (1 if simple else 2))
+
+    def __str__(self) -> str:
+        if not _on_one(self.part) or (isinstance(self, Not) and isinstance(self.part, Not)):
+            return f"{self.word} ({self.part})"
+        variable, words = _words(self)
+        return f"{quoted(variable)} is {words}"
+
+
 @dataclass(frozen=True, slots=True)
-class Hedged(Proposition):
+class Not(_Modifier):
+    """The part does not hold."""
+
+    part: Proposition
+    nesting: int = field(init=False, repr=False, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Hedged(_Modifier):
     """A statement or a whole condition, bent by a hedge: ``service is very poor``, ``very (a is b or c is d)``."""
 
     hedge: str  # name of the hedge, of `fuzzy_arbiter.terms.norms.HEDGES`
@@ -165,43 +178,34 @@ class Hedged(Proposition):
     nesting: int = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.hedge, str) or self.hedge not in HEDGES:
-            raise DefinitionError(f"hedge is {shown(self.hedge)}, expected one of {', '.join(HEDGES)}")
-        if not isinstance(self.part, Proposition):
-            raise DefinitionError(f"{self.hedge}: got {shown(self.part)}, expected such as variable['term']")
-        _set_nesting(self, self.part.nesting + (1 if _on_one(self.part) else 2))
+        require_choice(self.hedge, HEDGES, "hedge")
+        _Modifier.__post_init__(self)
 
-    @property
-    def inner(self) -> tuple[Proposition, ...]:
-        """The part."""
-        return (self.part,)
 
-    def __str__(self) -> str:
-        if not _on_one(self.part):
-            return f"{self.hedge} ({self.part})"
-        variable, words = _said(self)
-        return f"{quoted(variable)} is {words}"
+def bend(words: Sequence[str], proposition: Proposition) -> Proposition:
+    """Put hedges and *not* before a proposition, the last one next to it."""
+    for word in reversed(words):
+        proposition = Not(proposition) if word == "not" else Hedged(word, proposition)
+    return proposition
 
 
 def _on_one(p: Proposition) -> bool:
     """Return True if a proposition is a statement on one term, perhaps with hedges and negations."""
-    while isinstance(p, Not | Hedged):
+    while isinstance(p, _Modifier):
         p = p.part
     return isinstance(p, Is | Anything)
 
 
-def _said(p: Proposition) -> tuple[str, str]:
+def _words(p: Proposition) -> tuple[str, str]:
     """Return the variable of a statement on one term, and the text after *is*."""
-    if isinstance(p, Is):
-        return p.variable, quoted(p.term)
-    if isinstance(p, Anything):
-        return p.variable, "any"
-    assert isinstance(p, Hedged | Not)
-    variable, words = _said(p.part)
-    return variable, f"{p.hedge if isinstance(p, Hedged) else 'not'} {words}"
+    if isinstance(p, _Modifier):
+        variable, words = _words(p.part)
+        return variable, f"{p.word} {words}"
+    assert isinstance(p, Is | Anything)
+    return p.variable, quoted(p.term) if isinstance(p, Is) else "any"
 
 
-def _set_nesting(proposition: _Join | Not | Hedged, nesting: int) -> None:
+def _set_nesting(proposition: Proposition, nesting: int) -> None:
     # the nesting limit keeps recursion over a proposition well below Python's own stack limit
     if nesting > MAX_NESTING:
         raise DefinitionError(f"nested deeper than {MAX_NESTING} parentheses and negations")

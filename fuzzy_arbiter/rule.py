@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 from fuzzy_arbiter.checks import all_of, finite, require_choice, shown
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Anything, Hedged, Is, Not, Or, Proposition
+from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Anything, Hedged, Is, Not, Or, Proposition, bend
 from fuzzy_arbiter.terms.norms import HEDGES, S_NORMS, T_NORMS
 
 
@@ -125,10 +124,7 @@ def parse_rules(text: str) -> list[Rule]:
     """Parse a text whose conclusions may have hedges as rules, in the way of fuzzylite."""
     # A hedge in a conclusion bends the strength of that conclusion and of those after it, as one on the whole condition
     # does. So conclusions with other hedges become a rule of their own.
-    parser = _Parser(text)
-    condition, conclusions, weight = parser.parts(hedges=True)
-    if weight != 1.0 and any(hedges for hedges, _ in conclusions):
-        raise parser.fault("a hedge in a conclusion of a rule with a weight, expected the weight 1")
+    condition, conclusions, weight = _parsed(text, hedges=True)
     return bent_rules(condition, conclusions, weight)
 
 
@@ -137,37 +133,40 @@ def parse_rule(text: str) -> Rule:
     # Words of rules may be in any case. The hedges very, somewhat, extremely, seldom, cubed and cube_root are written
     # before a term. `&`, `|`, `~` are *and*, *or*, *not*; *not* binds before *and*, *and* before *or*. Names that are
     # no identifiers stand in double quotes.
-    condition, conclusions, weight = _Parser(text).parts(hedges=False)
+    condition, conclusions, weight = _parsed(text, hedges=False)
     return Rule(condition, tuple(conclusion for _, conclusion in conclusions), weight)
+
+
+Conclusions = list[tuple[tuple[str, ...], Is]]  # each with its hedges
+
+
+def _parsed(text: str, hedges: bool) -> tuple[Proposition, Conclusions, float]:
+    """Parse a rule's condition, its conclusions and its weight."""
+    if not isinstance(text, str):
+        raise DefinitionError(f"rule: got {shown(text)}, expected text")
+    try:
+        return _Parser(text).parts(hedges)
+    except DefinitionError as error:
+        raise DefinitionError(f"rule {text.strip()!r}: {error}") from None
 
 
 class _Parser:
     """Parse one text by recursive descent."""
 
     def __init__(self, text: str) -> None:
-        if not isinstance(text, str):
-            raise DefinitionError(f"rule: got {shown(text)}, expected text")
-        self.text = text
         self.tokens: list[tuple[str, str]] = []  # kind (keyword or sign itself, "name", "number", "end") and text
         for match in _TOKEN.finditer(text):
             kind, token = str(match.lastgroup), match.group(match.lastgroup or 0)
+            if kind == "other":
+                raise DefinitionError(f"{token!r} cannot stand in a rule")
             if kind == "quoted":
-                self.tokens.append(("name", token[1:-1]))
-            elif kind == "word":
-                self.tokens.append((token.lower() if token.lower() in KEYWORDS else "name", token))
-            elif kind == "sign":
-                self.tokens.append((_SIGNS.get(token, token), token))
-            elif kind == "number":
-                self.tokens.append(("number", token))
-            else:
-                raise self.fault(f"{token!r} cannot stand in a rule")
+                kind, token = "name", token[1:-1]
+            elif kind != "number":
+                word = _SIGNS.get(token, token).lower()
+                kind = word if word in KEYWORDS or kind == "sign" else "name"
+            self.tokens.append((kind, token))
         self.tokens.append(("end", "the end"))
-        self.at = 0
-        self.depth = 0
-
-    def fault(self, what: str) -> DefinitionError:
-        text = self.text.strip()
-        return DefinitionError(f"rule {text if len(text) <= 200 else text[:200] + '...'!r}: {what}")
+        self.at = self.depth = 0
 
     def accept(self, kind: str) -> bool:
         if self.tokens[self.at][0] != kind:
@@ -176,15 +175,14 @@ class _Parser:
         return True
 
     def take(self, kind: str, what: str) -> str:
-        found, token = self.tokens[self.at]
-        if found != kind:
+        received, token = self.tokens[self.at]
+        if received != kind:
             before = f" after {self.tokens[self.at - 1][1]!r}" if self.at else ""
-            raise self.fault(f"got {token if found == 'end' else repr(token)}{before}, expected {what}")
+            raise DefinitionError(f"got {token if received == 'end' else repr(token)}{before}, expected {what}")
         self.at += 1
         return token
 
-    def parts(self, hedges: bool) -> tuple[Proposition, list[tuple[tuple[str, ...], Is]], float]:
-        """Read the condition, the conclusions, each with its hedges, and the weight."""
+    def parts(self, hedges: bool) -> tuple[Proposition, Conclusions, float]:
         self.take("if", "'if'")
         condition = self.joined(Or)
         self.take("then", "'then', 'and' or 'or'")
@@ -193,6 +191,8 @@ class _Parser:
             conclusions.append(self.conclusion(hedges))
         weight = self.number() if self.accept("with") else 1.0
         self.take("end", "'and', 'with' or the end")
+        if weight != 1.0 and any(words for words, _ in conclusions):
+            raise DefinitionError("a hedge in a conclusion of a rule with a weight, expected the weight 1")
         return condition, conclusions, weight
 
     def conclusion(self, hedges: bool) -> tuple[tuple[str, ...], Is]:
@@ -207,7 +207,7 @@ class _Parser:
         """Read hedges, which stand before tokens of some kinds, and *not*."""
         words: list[str] = []
         while self.accept("not") or self.accept_hedge(*before):
-            kind, text = self.tokens[self.at - 1][:2]
+            kind, text = self.tokens[self.at - 1]
             words.append("not" if kind == "not" else text.lower())  # which may be written ~
         return tuple(words)
 
@@ -221,7 +221,7 @@ class _Parser:
         try:
             return float(token)
         except ValueError:
-            raise self.fault(f"{token!r} is not a number") from None
+            raise DefinitionError(f"{token!r} is not a number") from None
 
     def joined(self, kind: type[Or | And]) -> Proposition:
         """Read a disjunction, or a conjunction."""
@@ -230,29 +230,23 @@ class _Parser:
         parts = [part()]
         while self.accept(word):
             parts.append(part())
-        return self.made(kind, tuple(parts)) if len(parts) > 1 else parts[0]
-
-    def made(self, kind: Callable[[Any], Proposition], parts: Any) -> Proposition:
-        try:
-            return kind(parts)
-        except DefinitionError as error:
-            raise self.fault(str(error)) from None
+        return kind(tuple(parts)) if len(parts) > 1 else parts[0]
 
     def inner(self, parse: Callable[[], Proposition]) -> Proposition:
         """Parse what is nested in parentheses, or follows *not* or a hedge."""
         self.depth += 1
         if self.depth > MAX_NESTING:
-            raise self.fault(f"nested deeper than {MAX_NESTING} parentheses and negations")
+            raise DefinitionError(f"nested deeper than {MAX_NESTING} parentheses and negations")
         proposition = parse()
         self.depth -= 1
         return proposition
 
     def statement(self) -> Proposition:
         if self.accept("not"):
-            return self.made(Not, self.inner(self.statement))
+            return Not(self.inner(self.statement))
         if self.accept_hedge("("):
             word = self.tokens[self.at - 1][1].lower()
-            return self.made(partial(Hedged, word), self.inner(self.statement))
+            return Hedged(word, self.inner(self.statement))
         if self.accept("("):
             inner = self.inner(lambda: self.joined(Or))
             self.take(")", "')', 'and' or 'or'")
@@ -261,18 +255,11 @@ class _Parser:
         self.take("is", "'is'")
         words = self.hedges("name", "not", "any")
         if self.accept("any"):
-            return self.bent(words, Anything(variable))
-        return self.bent(words, Is(variable, self.take("name", "a term's name")))
-
-    def bent(self, words: Sequence[str], statement: Proposition) -> Proposition:
-        for word in reversed(words):
-            statement = self.made(Not if word == "not" else partial(Hedged, word), statement)
-        return statement
+            return bend(words, Anything(variable))
+        return bend(words, Is(variable, self.take("name", "a term's name")))
 
 
-def bent_rules(
-    condition: Proposition, conclusions: Sequence[tuple[tuple[str, ...], Is]], weight: float, carry: bool = True
-) -> list[Rule]:
+def bent_rules(condition: Proposition, conclusions: Conclusions, weight: float, carry: bool = True) -> list[Rule]:
     """Return a rule whose conclusions have hedges as rules whose conclusions have none."""
     rows: dict[tuple[tuple[str, ...], int], list[Is]] = {}
     carried: tuple[str, ...] = ()
@@ -281,10 +268,4 @@ def bent_rules(
         # a second conclusion on one output is another rule, too
         before = sum(c.variable == conclusion.variable for _, c in conclusions[:k])
         rows.setdefault((carried, before), []).append(conclusion)
-    rules = []
-    for (row, _), concluded in rows.items():
-        bent = condition
-        for word in reversed(row):
-            bent = Not(bent) if word == "not" else Hedged(word, bent)
-        rules.append(Rule(bent, tuple(concluded), weight))
-    return rules
+    return [Rule(bend(words, condition), tuple(concluded), weight) for (words, _), concluded in rows.items()]

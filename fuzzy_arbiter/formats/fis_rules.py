@@ -9,7 +9,7 @@ from dataclasses import replace
 from fuzzy_arbiter.definition import Output, Variable
 from fuzzy_arbiter.formats.fis_terms import complement
 from fuzzy_arbiter.formats.notation import located, read_number, refuse
-from fuzzy_arbiter.propositions import And, Anything, Hedged, Is, Not, Or, Proposition
+from fuzzy_arbiter.propositions import And, Anything, Is, Not, Or, Proposition, bend
 from fuzzy_arbiter.rule import Rule, bent_rules
 from fuzzy_arbiter.terms.term import Term
 
@@ -63,10 +63,7 @@ def _statement(index: int, hedges: tuple[str, ...], v: Variable) -> Proposition 
         return Anything(v.name)
     if not index:
         return None
-    statement: Proposition = Is(v.name, v.terms[index - 1].name)
-    for hedge in reversed(hedges):
-        statement = Hedged(hedge, statement)
-    return statement
+    return bend(hedges, Is(v.name, v.terms[index - 1].name))
 
 
 def _indices(

@@ -22,30 +22,29 @@ Node = float | str | tuple[Any, ...]  # a number, a name, or (function, argument
 
 def parsed(text: str) -> Node:
     """Parse a text as an expression's tree."""
-    return _Parser(text).all()
+    if not isinstance(text, str):
+        raise DefinitionError(f"expression: got {shown(text)}, expected text")
+    try:
+        return _Parser(text).all()
+    except DefinitionError as error:
+        raise DefinitionError(f"expression {shown(text.strip())}: {error}") from None
 
 
 class _Parser:
     """Parse one text by recursive descent."""
 
     def __init__(self, text: str) -> None:
-        if not isinstance(text, str):
-            raise DefinitionError(f"expression: got {shown(text)}, expected text")
-        self.text = text
         if len(text) > MAX_LENGTH:
-            raise self.fault(f"got {len(text)} characters, expected at most {MAX_LENGTH}")
+            raise DefinitionError(f"got {len(text)} characters, expected at most {MAX_LENGTH}")
         self.tokens = [match.groups(default="") for match in _TOKEN.finditer(text)]
         self.at = self.depth = 0
-
-    def fault(self, what: str) -> DefinitionError:
-        return DefinitionError(f"expression {shown(self.text.strip())}: {what}")
 
     @property
     def here(self) -> str:
         return "".join(self.tokens[self.at]) if self.at < len(self.tokens) else ""
 
     def unexpected(self, expected: str) -> DefinitionError:
-        return self.fault(f"got {repr(self.here) if self.here else 'the end'}, expected {expected}")
+        return DefinitionError(f"got {repr(self.here) if self.here else 'the end'}, expected {expected}")
 
     def accept(self, *signs: str) -> str:
         sign = self.here
@@ -62,14 +61,14 @@ class _Parser:
         while level := [part for node in level if isinstance(node, tuple) for part in node[1:]]:
             depth += 1
         if depth > MAX_DEPTH:
-            raise self.fault(f"has {depth} operators within each other, expected at most {MAX_DEPTH}")
+            raise DefinitionError(f"has {depth} operators within each other, expected at most {MAX_DEPTH}")
         return tree
 
     def inner(self, parse: Callable[[], Node]) -> Node:
         """Parse what is nested in parentheses, or follows a sign."""
         self.depth += 1
         if self.depth > MAX_NESTING:
-            raise self.fault(f"nested deeper than {MAX_NESTING} parentheses")
+            raise DefinitionError(f"nested deeper than {MAX_NESTING} parentheses")
         tree = parse()
         self.depth -= 1
         return tree
@@ -95,7 +94,7 @@ class _Parser:
         self.at += 1
         if number:
             if not math.isfinite(float(number)):
-                raise self.fault(f"got {number}, expected a finite number")
+                raise DefinitionError(f"got {number}, expected a finite number")
             return float(number)
         if name and self.here != "(":
             if name in WORDS - {"pi"}:
@@ -116,7 +115,7 @@ class _Parser:
                 raise self.unexpected("')' after 'pi('")
             return math.pi
         if word not in FUNCTIONS:
-            raise self.fault(f"no function {name!r}, expected one of {', '.join(sorted(WORDS))}")
+            raise DefinitionError(f"no function {name!r}, expected one of {', '.join(sorted(WORDS))}")
         self.at += 1
         arguments = [self.inner(self.sum)]
         while self.accept(","):
@@ -124,5 +123,5 @@ class _Parser:
         if not self.accept(")"):
             raise self.unexpected("')', ',' or an operator")
         if len(arguments) != FUNCTIONS[word].arguments:
-            raise self.fault(f"{name} of {len(arguments)} numbers, expected {FUNCTIONS[word].arguments}")
+            raise DefinitionError(f"{name} of {len(arguments)} numbers, expected {FUNCTIONS[word].arguments}")
         return (word, *arguments)
