@@ -103,7 +103,7 @@ class Arbiter:
     def __call__(self, inputs: Sample | None = None, /, **named: float) -> Result[float]:
         """Return the value of each output for one sample; inputs (inputs,)."""
         if named:
-            inputs = _one_of(inputs, named)
+            inputs = named if inputs is None else _one_of(inputs, named)
         if self._shortcut is not None:
             kind = type(inputs)
             plain = inputs if kind is list or kind is tuple else self._samples.plain(inputs)
