@@ -12,6 +12,13 @@ from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.propositions import KEYWORDS, MAX_NESTING, And, Anything, Hedged, Is, Not, Or, Proposition, bend
 from fuzzy_arbiter.terms.norms import HEDGES, S_NORMS, T_NORMS
 
+_TOKEN = re.compile(
+    r"""\s*(?: (?P<quoted>"[^"]*") | (?P<number>[0-9.]+(?:[eE][+-]?[0-9]+)?(?![A-Za-z_]))
+        | (?P<word>[^\W\d]\w*) | (?P<sign>[()&|~,]) | (?P<other>\S) )""",
+    re.VERBOSE,
+)
+_SIGNS = {"&": "and", "|": "or", "~": "not", ",": ","}
+
 
 @dataclass(frozen=True, slots=True)
 class Operators:
@@ -110,14 +117,6 @@ class Rule:
         conclusions = " and ".join(map(str, self.conclusions))
         weight = "" if self.weight == 1.0 else f" with {self.weight!r}"
         return f"if {self.condition} then {conclusions}{weight}"
-
-
-_TOKEN = re.compile(
-    r"""\s*(?: (?P<quoted>"[^"]*") | (?P<number>[0-9.]+(?:[eE][+-]?[0-9]+)?(?![A-Za-z_]))
-        | (?P<word>[^\W\d]\w*) | (?P<sign>[()&|~,]) | (?P<other>\S) )""",
-    re.VERBOSE,
-)
-_SIGNS = {"&": "and", "|": "or", "~": "not", ",": ","}
 
 
 def parse_rules(text: str) -> list[Rule]:

@@ -173,7 +173,7 @@ class _Degrees:
         self._names: dict[tuple[str, str], str] = {}
         self.statements: list[Statement] = []
 
-    def of(self, statement: Is) -> str:
+    def name_of(self, statement: Is) -> str:
         """Return the name of a degree."""
         key = (statement.variable, statement.term)
         if key not in self._names:
@@ -301,7 +301,7 @@ def _closed(engine: ClosedEngine) -> Iterator[Statement]:
 
 def _literal(literal: tuple[str, str, bool], degrees: _Degrees) -> str:
     variable, term, affirmed = literal
-    degree = degrees.of(Is(variable, term))
+    degree = degrees.name_of(Is(variable, term))
     return degree if affirmed else f"(1.0 - {degree})"
 
 
@@ -333,7 +333,7 @@ def _swept(engine: Engine) -> Iterator[Statement]:
             lambda word, degree: logic.said(f"{word}({{}})", degree),
             "1.0",
         )
-        degree = operators.degree(rule.condition, degrees.of)
+        degree = operators.degree(rule.condition, degrees.name_of)
         weighted = degree if rule.weight == 1.0 else f"{degree} * {rule.weight!r}"
         rules += logic.assign(f"r{i}", weighted, str(rule))
     yield from degrees.statements

@@ -49,6 +49,8 @@ _TYPES = {"mamdani": False, "sugeno": True, "tsukamoto": True, "hybrid": None}
 _FUZZYLITE_KEYS = ("Enabled", "Default", "LockRange", "LockPrevious")
 _FLAGS = {"1": True, "0": False}
 
+_SIGNS = "'=:,"  # characters at which MATLAB's reader splits lines
+MATLAB = ("gaussmf", "gauss2mf", "gbellmf", "sigmf", "dsigmf", "psigmf", "zmf", "smf", "pimf")  # not fuzzylite's alone
 _Parts = tuple[str, tuple[float, float], tuple[Term, ...]]
 
 
@@ -184,10 +186,6 @@ def _parts(section: Block, inputs: int | None) -> _Parts:
         with located(f"line {line}: term {term!r}"):
             terms.append(Term(term, read_function(function, places, line, term, inputs)))
     return section.name, (bounds[0], bounds[1]), with_unique_names(terms)
-
-
-_SIGNS = "'=:,"  # characters at which MATLAB's reader splits lines
-MATLAB = ("gaussmf", "gauss2mf", "gbellmf", "sigmf", "dsigmf", "psigmf", "zmf", "smf", "pimf")  # not fuzzylite's alone
 
 
 def write(system: System) -> str:

@@ -12,6 +12,12 @@ from fuzzy_arbiter.shapes import Membership, Shape, triangle
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.values import Formula, Value
 
+_NAMES = {
+    3: ("poor", "average", "good"),
+    5: ("poor", "mediocre", "average", "decent", "good"),
+    7: ("dismal", "poor", "mediocre", "average", "decent", "good", "excellent"),
+}
+
 
 @dataclass(frozen=True, slots=True)
 class Term:
@@ -67,13 +73,6 @@ class Term:
         if isinstance(self.shape, Curve):
             return f"a curve of the kind {self.shape.kind}"
         return "piecewise linear" if isinstance(self.shape, Shape) else f"a {type(self.shape).__name__.lower()}"
-
-
-_NAMES = {
-    3: ("poor", "average", "good"),
-    5: ("poor", "mediocre", "average", "decent", "good"),
-    7: ("dismal", "poor", "mediocre", "average", "decent", "good", "excellent"),
-}
 
 
 @dataclass(frozen=True, slots=True)

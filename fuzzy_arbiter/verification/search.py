@@ -121,7 +121,7 @@ class Search:
         n, depth = boxes.shape
         known: dict[Is, Bounds] = {}
 
-        def of(statement: Is) -> Bounds:
+        def bounds_of(statement: Is) -> Bounds:
             if statement not in known:
                 known[statement] = self._bounds[statement]
                 if (i := self._position[statement.variable]) < depth:
@@ -131,7 +131,7 @@ class Search:
 
         surely, maybe = np.zeros((2, self._groups, n), dtype=np.bool_)
         for condition, uses in self._uses.items():
-            lower, upper = self._logic.degree(condition, of)
+            lower, upper = self._logic.degree(condition, bounds_of)
             for g, threshold in uses:
                 surely[g] |= lower > threshold
                 maybe[g] |= upper > threshold

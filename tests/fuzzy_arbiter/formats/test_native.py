@@ -59,7 +59,7 @@ TWIN = Output("w", (0, 1), {"low": triangle(0, 0.5, 1), "high": trapezoid(0, 0.4
 APART = {"low": falling(-2, -1), "high": rising(0, 1)}
 
 
-def of(output):
+def folded_range(output):
     made = System((Variable("x", (0, 1), {"on": rising(0, 1)}),), (output,), ("if x is on then y is high",))
     return replace(made, normalization="range")
 
@@ -70,8 +70,11 @@ def of(output):
         *((prioritized(normalization=n), f"no universe can say the normalization '{n}'") for n in ("sum", "max")),
         (prioritized(weight=TWIN), r"output 'w_1': its terms have one centroid, 0\.5"),
         (prioritized(weight=NEAR), "too far apart, or too close"),
-        (of(Output("y", (0, 1), {"high": rising(0, 1)}, defuzzifier="bisector")), "'y' has the defuzzifier bisector"),
-        (of(Output("y", (0, 1), APART, defuzzifier="average")), "'y' has the defuzzifier average"),
+        (
+            folded_range(Output("y", (0, 1), {"high": rising(0, 1)}, defuzzifier="bisector")),
+            "'y' has the defuzzifier bisector",
+        ),
+        (folded_range(Output("y", (0, 1), APART, defuzzifier="average")), "'y' has the defuzzifier average"),
     ],
 )
 def test_what_no_universe_can_fold_is_refused(system, fault):
