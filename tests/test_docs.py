@@ -27,6 +27,15 @@ def test_paths_in_the_architecture_page_exist():
         assert not name or re.search(rf"\b(?:def|class) {name}\b", (ROOT / path).read_text()), (path, name)
 
 
+def test_lines_beside_equations_stand_in_their_files():
+    text = (ROOT / "docs" / "theory.md").read_text()
+    rows = re.findall(r"^\|.*\| `(.*)` \| `(\w+\.py)` \|$", text, re.M)
+    assert len(rows) > 20
+    for line, file in rows:
+        lines = (ROOT / "controller" / "laws" / "deployable" / file).read_text().splitlines()
+        assert line in {" ".join(known.partition("  #")[0].split()) for known in lines}, (line, file)
+
+
 def test_readme_names_the_shipped_scenarios():
     readme = " ".join((ROOT / "README.md").read_text().split())
     assert f"Shipped scenarios: {', '.join(list_scenarios())}." in readme
