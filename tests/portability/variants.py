@@ -10,7 +10,7 @@ import sys
 import time
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 ROOT = Path(__file__).parents[2]
@@ -126,7 +126,7 @@ class Result:
     seconds: float = 0.0
     remark: str = ""  # why it was not run, or what is not good
     run: bool = True
-    kernels: tuple[str, ...] = field(default=())  # that OpenBLAS was seen to take
+    kernels: tuple[str, ...] = ()  # that OpenBLAS was seen to take
 
     @property
     def good(self) -> bool:
