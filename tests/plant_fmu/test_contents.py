@@ -102,8 +102,8 @@ def test_page_documents_every_variable(vehicle, fmi):
     rows = {cells[0]: cells for cells in Page(page(vehicle, fmi)).rows if len(cells) >= 4}
     for v in described:
         if v.causality != "independent":
-            _, unit, *_, description = rows[v.name]
-            assert unit == (v.unit or "")
+            _, unit, *numbers, description = rows[v.name]
+            assert unit == (v.unit or "") and len(numbers) == 1 + (v.start is not None)  # a range, after the start
             assert description.startswith(v.description)
 
 
