@@ -8,7 +8,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Generator
 from types import FunctionType
 from typing import Any
 
@@ -52,6 +52,7 @@ class BoundCall:
 
     def __init__(self, function: Any, arguments: tuple[Any, ...], known: Described | None = None) -> None:
         self._raised: BaseException | None = None
+        self.on_error: Callable[[], None] | None = None  # called where a call by address raises an error
         if isinstance(function, FunctionType) and not os.environ.get(INTERPRETED):
             check_shapes(function, arguments)
             described = [_described(argument, {} if known is None else known) for argument in arguments]
@@ -63,20 +64,32 @@ class BoundCall:
             self.call: Callable[[], None] = call
         else:
             self.words, self.call = 0, functools.partial(interpret, function, arguments)
-            self._entry = _CALLBACK(self._called_back)
+            served = self._serve()
+            next(served)
+            self._entry = _CALLBACK(served.send)
         self.address: int = ctypes.cast(self._entry, ctypes.c_void_p).value or 0
 
-    def _called_back(self, _: int | None) -> None:
-        try:
-            if self._raised is None:
-                self.call()
-        except BaseException as error:  # noqa: BLE001 -- C cannot pass it on; `raise_error` does
-            self._raised = error
+    def _serve(self) -> Generator[None, int | None, None]:
+        """Call the function each time that the generator is resumed, until it raises an error."""
+        # a signal's error, such as that of Ctrl-C, arises as soon as Python resumes: C would lose it outside of `try`
+        while True:
+            try:
+                while True:
+                    yield
+                    if self._raised is None:
+                        self.call()
+            except GeneratorExit:
+                return
+            except BaseException as error:  # noqa: BLE001 -- C cannot pass it on; `raise_error` does
+                self._raised = error
+                if self.on_error is not None:
+                    self.on_error()
 
     def raise_error(self) -> None:
-        """Raise the error of the function's last call by address, if there was one."""
-        if self._raised is not None:
-            raise self._raised
+        """Raise the error of the function's last call by address, if there was one, once."""
+        error, self._raised = self._raised, None
+        if error is not None:
+            raise error
 
 
 class CompiledFunction:

@@ -6,6 +6,7 @@ import ctypes
 import dataclasses
 import functools
 import os
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -39,16 +40,22 @@ class BoundRules:
 
     def __init__(self, system: System, inputs: Array, outputs: Array) -> None:
         self._kept: Any
+        self.on_error: Callable[[], None] | None = None
         self.address: int
         self.words: int
         if os.environ.get(INTERPRETED):
             call = BoundCall(_Interpreted(system), (inputs, outputs))
+            call.on_error = self._end
             self._kept, self.address, self.words = call, call.address, call.words
         else:
             entry = library_of(rules_text(system)).entry
             words = np.array([inputs.ctypes.data, outputs.ctypes.data], np.uint64)
             self._kept, self.words = (entry, words, inputs, outputs), words.ctypes.data
             self.address = ctypes.cast(entry, ctypes.c_void_p).value or 0
+
+    def _end(self) -> None:
+        if self.on_error is not None:
+            self.on_error()
 
     def raise_error(self) -> None:
         """Raise the error of the last call by address, if the rules run in Python and raised one."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ _COMPILED = "closed"  # engine whose numbers C computes too, with the same bits
 
 def is_compiled(law: Law) -> bool:
     """Return True if C can call a law's function itself, and read its outputs from its memory."""
-    return type(law) in LAWS.values() and type(law).step is CompiledLaw.step
+    return type(law) in LAWS.values() and getattr(law.step, "__func__", None) is CompiledLaw.step
 
 
 def outputs_of(law: Law) -> LawOutputs:
@@ -52,7 +51,7 @@ class BoundLaw:
             assert isinstance(self.law, CompiledLaw)
             self._call = self.law.bound(*arguments)
         else:
-            self._call = BoundCall(ending(data, _PythonStep(self.law, data.law)), arguments)
+            self._call = BoundCall(_PythonStep(self.law, data.law), arguments)
         set_call(data, LAW, self._call)
 
     def restart(self, fresh: CompiledLaw) -> None:
@@ -93,26 +92,12 @@ class BoundArbiter:
             except CompilationError:  # no compiler for rules of one's own
                 pass
         if not self.compiled:
-            self._call = BoundCall(ending(data, _PythonRules(arbiter)), (data.signals.inputs, data.by_criterion))
+            self._call = BoundCall(_PythonRules(arbiter), (data.signals.inputs, data.by_criterion))
         set_call(data, ARBITER, self._call)
 
     def raise_error(self) -> None:
         """Raise the error of the last evaluation, if it raised one."""
         self._call.raise_error()
-
-
-def ending(data: StepData, function: Callable[..., None]) -> Callable[..., None]:
-    """Return a function whose errors end the block of steps that calls it."""
-
-    class Ending:  # no plain function, which would be translated
-        def __call__(self, *arguments: Any) -> None:
-            try:
-                function(*arguments)
-            except BaseException:
-                data.failed_step[0] = data.k[0]
-                raise
-
-    return Ending()
 
 
 class _PythonRules:

@@ -23,7 +23,7 @@ from cosim.simulation.columns import columns_of
 from cosim.simulation.commands.command_handler import CommandHandler
 from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.sources import CommandSource
-from cosim.simulation.decisions import BoundArbiter, BoundLaw, ending, outputs_of
+from cosim.simulation.decisions import BoundArbiter, BoundLaw, outputs_of
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.lyapunov_signals import LyapunovSignals
 from cosim.simulation.make_step import NoiseSource, make_data, make_model
@@ -122,13 +122,13 @@ class Master:
     def _bind(self, own_plant: bool) -> None:
         """Bind plant, law, arbiter and commands to the arrays of a step."""
         s, scenario = self.signals, self.scenario
-        self._plant = BoundPlant(scenario, self.plant, native=own_plant)
         inputs, outputs, flags = (c.names for c in (self.plant.inputs, self.plant.outputs, self.plant.flags))
         self._noise = NoiseSource(scenario, 1 + _BLOCK // scenario.control_every)
         self.model = make_model(scenario, full=True, law=self.law)
         self.data = make_data(
             scenario, self.model, outputs_of(self.law), s, inputs, outputs, self._noise.values, flags
         )  # fmt: skip
+        self._plant = BoundPlant(scenario, self.plant, self.data, native=own_plant)
         self.true_state, self.state = self.data.true_state, self.data.state
         self.environment = RegionEnvironment(scenario, self.data)
         self._law = BoundLaw(self.law, self.model, self.data)
@@ -146,13 +146,14 @@ class Master:
             )  # fmt: skip
         self.command_handler: CommandHandler | None = None
         self._commands: CommandSource | None = None  # of the present step
+        self._hooks: list[BoundCall] = []
         if scenario.commands.enabled:
             limits = ActuationLimits(scenario, self.plant, self.model, self.data)
             self.command_handler = CommandHandler(
                 scenario, self.environment, limits, self.data.state, s.view("commands.armed", 7)
             )
             self._locate = BoundCall(locate, (self.model, self.data))
-            self._hooks = [BoundCall(ending(self.data, f), ()) for f in (self._take_commands, self._continue_mission)]
+            self._hooks = [BoundCall(f, ()) for f in (self._take_commands, self._continue_mission)]
             for when, hook in zip((MEASURED, LOCATED), self._hooks, strict=True):
                 set_call(self.data, when, hook)
         # the caller of a plant of its own, and commands, change it between steps
@@ -257,24 +258,20 @@ class Master:
         """Do `n` steps from step `k` on; raise the error of plant, law, arbiter or command that ends one early."""
         step, span = self.scenario.time.step, self._span
         span[0], span[1], span[2] = k, n, 0
+        self.data.failed_step[0] = -1
         self._noise.draw(1 + (k + n - 1) // self.scenario.control_every)
         self._law.refresh()
-        self._plant.prepare_steps(step)
+        self._plant.prepare_steps()
         try:
             call.call()
         finally:
             done = int(span[2])
-            self._plant.count_steps(done - (k + done > self.scenario.steps))
+            self._plant.count_steps(min(k + done, self.scenario.steps) - min(k, self.scenario.steps))
             self._boundary = (k + done) * step
-        self._raise_errors()
+        for part in (self._law, self._arbiter, self._plant, *self._hooks):
+            part.raise_error()
         if self.data.failed_step[0] >= 0:
             self._plant.raise_failure()
-
-    def _raise_errors(self) -> None:
-        self._law.raise_error()
-        self._arbiter.raise_error()
-        for hook in self._hooks if self.command_handler is not None else ():
-            hook.raise_error()
 
     def measure_initial_state(self) -> None:
         """Fill the row with the initial state, which law and arbiter receive without noise; do not step the plant."""

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple, NoReturn, Protocol
 
 import numpy as np
 
+from controller.compiling.function import BoundCall
 from controller.navigation.measurements import SENSORS
 from cosim.errors import RunError
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 from cosim.step.plant_calls import PlantCalls
+from cosim.step.step_model import PLANT, StepData, set_call
 from plant_fmu import Plant, Vehicle
 from plant_fmu.running.channels import Channel, Channels
 from plant_fmu.running.native import Native
 from plant_fmu.variables import variables
 
+_NONE: Array = np.zeros(0)
+_NO_FLAGS, _NO_REFERENCES = np.zeros(0, np.bool_), np.zeros(0, np.uint32)
+
 LOSSES = tuple(f"{sensor}.loss_probability" for sensor in SENSORS)  # parameters of the plant
-_FATAL = 3  # FMI status
-_POINTER, _SIZE = ctypes.c_void_p, ctypes.c_size_t
-_TRANSFER = (_POINTER, _POINTER, _SIZE, _POINTER, _SIZE)  # arguments of fmi3SetFloat64
-_DO_STEP = (_POINTER, ctypes.c_double, ctypes.c_double, ctypes.c_bool, *(_POINTER,) * 4)  # of fmi3DoStep
 
 
 class SteppedPlant(Protocol):
@@ -54,84 +54,66 @@ class SteppedPlant(Protocol):
 
 
 class BoundPlant:
-    """The calls by which a step exchanges values with a plant: an FMU's own, or of Python functions."""
+    """The calls by which a step exchanges values with a plant: an FMU's own, or one of a Python function."""
 
-    def __init__(self, scenario: Scenario, plant: SteppedPlant, native: bool) -> None:
-        self._plant = plant
-        n = scenario.vehicle.n_thrusters
-        self._raised: BaseException | None = None
-        self._kept: list[Any] = []
-        effectiveness = tuple(f"thrust_effectiveness[{i + 1}]" for i in range(n))
+    def __init__(self, scenario: Scenario, plant: SteppedPlant, data: StepData, native: bool) -> None:
+        self._plant, self._step = plant, scenario.time.step
+        effectiveness = tuple(f"thrust_effectiveness[{i + 1}]" for i in range(scenario.vehicle.n_thrusters))
         self.native = native and isinstance(plant, Plant) and plant.fmi == 3
+        self._call: BoundCall | None = None
         if self.native:
             assert isinstance(plant, Plant)
             parts = plant.native_channels(), plant.native(effectiveness, ()), plant.native(LOSSES, ())
             self.calls = PlantCalls(*parts)
         else:
-            channels = plant.inputs.values, plant.outputs.values, np.zeros(len(plant.flags), np.bool_)
-            own = self._python(*channels, do_step=self._call(_DO_STEP, self._step))
-            self.calls = PlantCalls(own, self._setter(effectiveness, 1.0), self._setter(LOSSES, 0.0))
-        if isinstance(plant, Plant):
-            for call, names, needed in (
-                (self.calls.effectiveness, effectiveness, scenario.failures),
-                (self.calls.losses, LOSSES, scenario.outages),
-            ):
-                if needed:
-                    call.inputs[:] = [plant[name] for name in names]
+            own = _buffers(plant.inputs.values, plant.outputs.values, np.zeros(len(plant.flags), np.bool_))
+            self.calls = PlantCalls(own, _buffers(np.ones(len(effectiveness))), _buffers(np.zeros(len(LOSSES))))
+            self._call = BoundCall(self._step_in_python, ())
+            set_call(data, PLANT, self._call)
+        self._parameters = []  # names, present values, and those that a plant in Python has
+        for call, names, needed in (
+            (self.calls.effectiveness, effectiveness, scenario.failures),
+            (self.calls.losses, LOSSES, scenario.outages),
+        ):
+            if needed and isinstance(plant, Plant):
+                call.inputs[:] = [plant[name] for name in names]
+            self._parameters.append((names, call.inputs, call.inputs.copy()))
 
-    def _setter(self, names: Sequence[str], start: float) -> Native:
-        """Return calls that set parameters by name, one at a time as they change."""
-        values = np.full(len(names), start)
-        sent = values.copy()
-
-        def write(*_: object) -> None:
+    def _step_in_python(self) -> None:
+        """Set the parameters that have changed, and step."""
+        for names, values, sent in self._parameters:
             changed = np.flatnonzero(values != sent).tolist()
-            sent[:] = values
-            self._plant.set({names[i]: float(values[i]) for i in changed})
-
-        return self._python(values, np.zeros(0), np.zeros(0, np.bool_), set_values=self._call(_TRANSFER, write))
-
-    @staticmethod
-    def _python(inputs: Array, outputs: Array, flags: Any, set_values: int = 0, do_step: int = 0) -> Native:
-        none = np.zeros(0, np.uint32)
-        return Native(0, set_values, 0, do_step, none, inputs, none, outputs, np.zeros(4, np.int64), 0, none, flags)
-
-    def _call(self, kinds: tuple[Any, ...], function: Callable[..., None]) -> int:
-        """Return the address of a C function that calls a Python one, and reports its error as an FMU's."""
-
-        def guarded(*arguments: object) -> int:
-            try:
-                function(*arguments)
-            except BaseException as error:  # noqa: BLE001 -- C cannot pass it on; `raise_failure` does
-                self._raised = error
-                return _FATAL
-            return 0
-
-        callback = ctypes.PYFUNCTYPE(ctypes.c_int, *kinds)(guarded)
-        self._kept.append(callback)
-        return ctypes.cast(callback, ctypes.c_void_p).value or 0
-
-    def _step(self, _: object, __: object, step: float, *___: object) -> None:
-        self._plant.step(step)
+            if changed:
+                sent[:] = values
+                self._plant.set({names[i]: float(values[i]) for i in changed})
+        self._plant.step(self._step)
         if len(self._plant.flags):
             self.calls.native.flags[:] = self._plant.read_flags()
 
-    def prepare_steps(self, step: float) -> None:
-        """Raise an error if an FMU cannot make steps of `step` seconds, for example because it is closed."""
+    def prepare_steps(self) -> None:
+        """Raise an error if an FMU cannot make steps, for example because it is closed."""
         if self.native:
-            self._plant.prepare_steps(step)  # type: ignore[attr-defined]
+            self._plant.prepare_steps(self._step)  # type: ignore[attr-defined]
 
     def count_steps(self, n: int) -> None:
         """Tell an FMU how many steps were done."""
         if self.native:
             self._plant.count_steps(n)  # type: ignore[attr-defined]
 
+    def raise_error(self) -> None:
+        """Raise the error of a plant in Python, if it raised one."""
+        if self._call is not None:
+            self._call.raise_error()
+
     def raise_failure(self) -> NoReturn:
-        """Raise the error of the step that failed."""
-        if self._raised is not None:
-            raise self._raised
+        """Raise the error of an FMU's step that failed."""
         assert isinstance(self._plant, Plant)
         self._plant.raise_failure(ended=bool(self.calls.native.results[1]))
+
+
+def _buffers(inputs: Array, outputs: Array = _NONE, flags: Any = _NO_FLAGS) -> Native:
+    """Return buffers without C functions."""
+    return Native(0, 0, 0, 0, _NO_REFERENCES, inputs, _NO_REFERENCES, outputs, np.zeros(4, np.int64), flags=flags)
 
 
 _STATES = 13  # outputs of pose and velocity, the first ones

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -17,16 +19,18 @@ from cosim.step.placed_regions import RegionEvaluation
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# indices in `StepData.calls`: law, arbiter, and what a run does after measuring and after evaluating the regions
-LAW, ARBITER, MEASURED, LOCATED = 0, 2, 4, 6
-N_CALLS = 8
+# indices in `StepData.calls`: law, arbiter, what a run does after measuring and after evaluating the regions, and a
+# plant that Python steps
+LAW, ARBITER, MEASURED, LOCATED, PLANT = 0, 2, 4, 6, 8
+N_CALLS = 10
 
 
-class Callable(Protocol):
+class Call(Protocol):
     """A function that C can call: its address, and that of its argument."""
 
     address: int
     words: int
+    on_error: Callable[[], None] | None
 
 
 class StepModel(NamedTuple):
@@ -119,7 +123,7 @@ class StepData(NamedTuple):
     shown_inputs: Array  # (m,) the memberships as inputs of a file's rules; (0,) for others
     by_criterion: Array  # (criteria,) weight of each criterion
     weights: Array  # (n,) weight of each region's criterion
-    calls: Integers  # (8,) addresses of C functions and of their arguments; 0: none
+    calls: Integers  # (10,) addresses of C functions and of their arguments; 0: none
     manual: Integers  # (1,) 1: the command is given, and the law does not compute it
     law: LawOutputs
     expected: Array  # (6,) prediction that the arbiter uses; NaN: none
@@ -138,6 +142,11 @@ class StepData(NamedTuple):
     worst: Array  # (1,) s of the wall clock, longest time of law and allocation in a step
 
 
-def set_call(data: StepData, which: int, call: Callable) -> None:
-    """Let a step call a function at `LAW`, `ARBITER`, `MEASURED` or `LOCATED`; the caller keeps it alive."""
+def set_call(data: StepData, which: int, call: Call) -> None:
+    """Let a step call a function, such as at `LAW`, whose errors end it; the caller keeps it alive."""
     data.calls[which : which + 2] = call.address, call.words
+    call.on_error = functools.partial(_end_step, data)
+
+
+def _end_step(data: StepData) -> None:
+    data.failed_step[0] = data.k[0]

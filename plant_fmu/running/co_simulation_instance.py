@@ -198,6 +198,7 @@ class CoSimulationInstance:
 
     def raise_failure(self, ended: bool = False) -> NoReturn:
         """Raise the error of a step that the functions of `native_channels` failed in, or after which the FMU ends."""
+        self.count_steps(int(ended))
         reason = "the FMU requests the end of the simulation" if ended else self._failure_message()
         raise PlantError(f"t = {self.time:.6g} s: {reason}")
 

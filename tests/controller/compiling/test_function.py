@@ -1,7 +1,9 @@
 """Python functions compiled to C: equal numbers, argument lifetime, and plain callables."""
 
 import copy
+import ctypes
 import gc
+import signal
 import weakref
 from typing import NamedTuple
 
@@ -10,7 +12,7 @@ import pytest
 
 from controller.compiling.function import INTERPRETED, BoundCall, CompiledFunction, c_text
 from controller.errors import TranslationError
-from controller.translator.foreign import POINTER, call_c
+from controller.translator.foreign import INT, POINTER, call_c
 
 
 class Pair(NamedTuple):
@@ -31,6 +33,11 @@ def read(references, out):
 def call_twice(address, words):
     call_c(address, (POINTER,), words)
     call_c(address, (POINTER,), words)
+
+
+def interrupt_and_call(raise_signal, number, address, words):
+    call_c(raise_signal, (INT,), number)
+    call_twice(address, words)
 
 
 def grow(out):
@@ -127,8 +134,23 @@ class TestBoundCalls:
         assert out[0] == 3.0
         with pytest.raises(KeyError, match="too many"):
             bound.raise_error()
-        BoundCall(call_twice, (bound.address, bound.words)).call()
-        assert out[0] == 3.0  # what has failed is not called again
+        bound.raise_error()  # once
+
+    def test_a_signal_during_c_ends_the_call_that_follows(self):
+        class Grow:
+            def __call__(self, out):
+                out[0] += 1.0
+
+        out = np.zeros(1)
+        bound, ended = BoundCall(Grow(), (out,)), []
+        bound.on_error = lambda: ended.append(out[0])
+        raise_signal = ctypes.cast(ctypes.PyDLL(None)["raise"], ctypes.c_void_p).value
+        interrupted = BoundCall(interrupt_and_call, (raise_signal, int(signal.SIGINT), bound.address, bound.words))
+        for _ in range(3):
+            interrupted.call()
+            with pytest.raises(KeyboardInterrupt):
+                bound.raise_error()
+        assert ended == [0.0] * 3
 
     def test_interpreted_mode_runs_everything_in_python(self, monkeypatch):
         monkeypatch.setenv(INTERPRETED, "1")
