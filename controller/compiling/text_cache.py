@@ -12,8 +12,8 @@ from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType
 
-from controller.compiling.library import cache_folder, is_trusted, write_atomic
-from controller.translator.program import Program
+from controller.compiling.library import cache_folder, digest_of, is_trusted, write_atomic
+from controller.translator.program import Program, text_of_global
 from controller.translator.types import Type
 
 log = logging.getLogger(__name__)
@@ -24,7 +24,7 @@ _IMPORT = re.compile(r"^\s*(?:from|import) +([\w.]+)", re.M)
 def c_text_of(function: Callable[..., None], types: tuple[Type, ...]) -> str:
     """Translate a function to C for arguments of some types, or take the text from the cache."""
     module = getattr(function, "__module__", None) or ""
-    if not isinstance(function, FunctionType) or module.partition(".")[0] not in _OWN:
+    if not isinstance(function, FunctionType) or module.partition(".")[0] not in _OWN or function.__closure__:
         return _translated(function, types).text()
     key = hashlib.sha256(f"{module} {function.__qualname__} {types} {sys.version}".encode()).hexdigest()[:32]
     path = cache_folder() / f"{key}.json"
@@ -32,11 +32,12 @@ def c_text_of(function: Callable[..., None], types: tuple[Type, ...]) -> str:
     if text is None:
         program = _translated(function, types)
         text = program.text()
-        digests = {name: _digest(name) for name in sorted(_closure(program.modules))}
         try:
+            digests = {name: _digest(name) for name in sorted(_closure(program.modules))}
+            kept = json.dumps({"modules": digests, "globals": program.globals, "text": text}).encode()
             path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
             if is_trusted(path.parent):
-                write_atomic(path, json.dumps({"modules": digests, "text": text}).encode())
+                write_atomic(path, digest_of(kept).encode() + b"\n" + kept)
         except OSError as error:
             log.debug("%s: %s", path, error)
     return text
@@ -49,14 +50,23 @@ def _translated(function: Callable[..., None], types: tuple[Type, ...]) -> Progr
 
 
 def _kept(path: Path) -> str | None:
-    """Return a text from the cache; None unless all files that it was made from are as they were."""
+    """Return a text from the cache; None unless all files and values that it was made from are as they were."""
     try:
-        kept = json.loads(path.read_bytes()) if is_trusted(path.parent) else {}
-        if all(_digest(name) == digest for name, digest in kept["modules"].items()):
-            return str(kept["text"])
-    except (OSError, ValueError, KeyError, AttributeError, TypeError):
+        checksum, _, data = path.read_bytes().partition(b"\n") if is_trusted(path.parent) else (b"", b"", b"")
+        if checksum == digest_of(data).encode():
+            kept = json.loads(data)
+            same_files = all(_digest(name) == digest for name, digest in kept["modules"].items())
+            if same_files and all(_present(name) == text for name, text in kept["globals"].items()):
+                return str(kept["text"])
+    except (OSError, KeyError, AttributeError):  # a file or a value is not there
         pass
     return None
+
+
+def _present(name: str) -> str:
+    """Return the text of a value, which may have been set since its file was read, by "module:name"."""
+    module, _, attribute = name.partition(":")
+    return text_of_global(getattr(sys.modules[module], attribute))
 
 
 @functools.cache

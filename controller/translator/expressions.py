@@ -33,7 +33,7 @@ class Expressions(ArrayExpressions):
         if node.id in self.names:
             return self.held(self.names[node.id], self.variable(node.id), True, self.roots.get(node.id, frozenset()))
         if node.id in self.globals:
-            return Known(self.globals[node.id])
+            return Known(self.global_value(node.id))
         builtins: Any = self.globals["__builtins__"]
         builtin = builtins.get(node.id) if isinstance(builtins, dict) else getattr(builtins, node.id, None)
         if builtin is None:

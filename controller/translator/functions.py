@@ -43,6 +43,10 @@ class Functions(Protocol):
         """Return the C name of a type."""
         ...
 
+    def use_global(self, module: str, name: str, value: Any) -> None:
+        """Note a value that a function uses from its module."""
+        ...
+
 
 class Function(Statements):
     """One function for arguments of some types."""
@@ -73,6 +77,11 @@ class Function(Statements):
         """Refuse a construct, with its file and line."""
         line = self._first + getattr(node, "lineno", 1) - 1
         raise TranslationError(f"{self._file}:{line}: {what}, which is not translated to C")
+
+    def global_value(self, name: str) -> Any:
+        """Return what the function uses from its module, or has captured."""
+        self._program.use_global(self._function.__module__, name, self.globals[name])
+        return self.globals[name]
 
     def translate(self, name: str) -> str:
         """Return the function in C, under a name; afterwards the type of its result is known."""

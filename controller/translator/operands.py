@@ -77,6 +77,10 @@ class Operands:
         """Refuse a construct, with its file and line."""
         raise NotImplementedError
 
+    def global_value(self, name: str) -> Any:
+        """Return what the function uses from its module, or has captured."""
+        raise NotImplementedError
+
     def temporary(self, kind: Type, code: str) -> Value:
         """Assign a value to a new variable, and return that."""
         raise NotImplementedError

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from types import FunctionType
+from typing import Any
 
 from controller.errors import TranslationError
 from controller.translator.functions import Aliases, Function
@@ -48,6 +50,7 @@ class Program:
         self._types: dict[Type, str] = {}
         self._definitions: list[str] = []  # of types
         self._exports: list[str] = []
+        self.globals: dict[str, str] = {}  # what the functions use of their modules, by "module:name", as text
 
     def export(self, name: str, function: Callable[..., None], arguments: tuple[Type, ...]) -> None:
         """Translate a function, and make it callable by a name, with its arguments as words."""
@@ -98,6 +101,11 @@ class Program:
             self._functions.append(code)
         return self._instances[key]
 
+    def use_global(self, module: str, name: str, value: Any) -> None:
+        """Note a value that a function uses from its module."""
+        if getattr(sys.modules.get(module), name, None) is value:
+            self.globals[f"{module}:{name}"] = text_of_global(value)
+
     def name(self, kind: Type) -> str:
         """Return the C name of a type, which is defined before its first use."""
         match kind:
@@ -130,6 +138,12 @@ class Program:
         name = next(n for n in _numbered(stem) if n not in self._types.values())
         inside = "".join(f"    {field}\n" for field in fields)
         return name, f"typedef struct {{\n{inside}}} {name};\n"
+
+
+def text_of_global(value: Any) -> str:
+    """Return a text that differs for different values: of functions, classes and modules, their names."""
+    name = getattr(value, "__qualname__", None) or getattr(value, "__name__", None)
+    return f"{getattr(value, '__module__', '')}.{name}" if name else repr(value)
 
 
 def _numbered(stem: str) -> Iterator[str]:

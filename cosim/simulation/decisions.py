@@ -8,7 +8,8 @@ import numpy as np
 
 from controller import LAWS, CompiledLaw, Law
 from controller.compiling.function import BoundCall
-from controller.errors import CompilationError
+from controller.errors import CompilationError, LawError
+from controller.function_law import qualified_name
 from cosim.simulation.compiled_rules import BoundRules
 from cosim.simulation.signals import Array
 from cosim.step.step_model import ARBITER, LAW, LawOutputs, StepData, StepModel, set_call
@@ -23,11 +24,11 @@ def is_compiled(law: Law) -> bool:
 
 
 def outputs_of(law: Law) -> LawOutputs:
-    """Return arrays of a law's outputs: its own, or those that `BoundLaw` updates."""
+    """Return arrays of a law's outputs: its own, or those that a step in Python fills."""
     if is_compiled(law):
         assert isinstance(law, CompiledLaw)
         return LawOutputs(law.estimate, law.expected, law.report)
-    return LawOutputs(np.array(law.estimate, float), np.full(6, np.nan), np.array(law.report, float))
+    return LawOutputs(np.zeros(4), np.full(6, np.nan), np.zeros(len(law.diagnostics)))
 
 
 class BoundLaw:
@@ -37,12 +38,15 @@ class BoundLaw:
         self.law, self._data = law, data
         self._forces = data.command if model.law_gives_wrench else data.thrusts
         self._gains: Any = self  # no gains yet
+        self._memory = getattr(law, "memory", None)
         self.compiled = is_compiled(law)
         self.refresh()
 
     def refresh(self) -> None:
-        """Bind the law anew if its gains have changed."""
+        """Bind the law anew if its gains have changed, and copy another memory into the one that C is bound to."""
         gains, data = getattr(self.law, "gains", None), self._data
+        if self.compiled and self.law.memory is not self._memory:  # type: ignore[attr-defined]
+            self.restart(self.law)  # type: ignore[arg-type]
         if gains is self._gains:
             return
         self._gains = gains
@@ -51,14 +55,15 @@ class BoundLaw:
             assert isinstance(self.law, CompiledLaw)
             self._call = self.law.bound(*arguments)
         else:
-            self._call = BoundCall(_PythonStep(self.law, data.law), arguments)
+            self._call = BoundCall(_PythonStep(self.law, data), arguments)
         set_call(data, LAW, self._call)
 
     def restart(self, fresh: CompiledLaw) -> None:
-        """Return the law's memory to that of a new law."""
-        for old, new in zip(_arrays(self.law.memory), _arrays(fresh.memory), strict=True):  # type: ignore[attr-defined]
+        """Give the law the numbers of another law's memory."""
+        for old, new in zip(_arrays(self._memory), _arrays(fresh.memory), strict=True):
             if old.flags.writeable:
                 old[...] = new
+        self.law.memory = self._memory  # type: ignore[attr-defined]
 
     def raise_error(self) -> None:
         """Raise the error of the law's last step, if it raised one."""
@@ -68,15 +73,26 @@ class BoundLaw:
 class _PythonStep:
     """A step of a law that runs in Python."""
 
-    def __init__(self, law: Law, out: LawOutputs) -> None:
-        self._law, self._out = law, out
+    def __init__(self, law: Law, data: StepData) -> None:
+        self._law, self._estimate, self._out = law, data.estimate, data.law
 
     def __call__(self, *arguments: Any) -> None:
         law, out = self._law, self._out
+        self._write("estimate", self._estimate)
         law.step(*arguments)
-        out.estimate[:], out.report[:] = law.estimate, law.report
+        if law.diagnostics:
+            self._write("report", out.report)
         if isinstance(law, CompiledLaw):
             out.expected[:] = law.expected
+
+    def _write(self, name: str, out: Array) -> None:
+        """Write an output of the law into an array."""
+        given = getattr(self._law, name)
+        if np.shape(given) != out.shape:
+            raise LawError(
+                f"law {qualified_name(self._law)}: shape of {name} is {np.shape(given)}, expected {out.shape}"
+            )
+        out[:] = given
 
 
 class BoundArbiter:

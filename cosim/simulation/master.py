@@ -268,7 +268,8 @@ class Master:
             done = int(span[2])
             self._plant.count_steps(min(k + done, self.scenario.steps) - min(k, self.scenario.steps))
             self._boundary = (k + done) * step
-        for part in (self._law, self._arbiter, self._plant, *self._hooks):
+        parts: tuple[BoundLaw | BoundArbiter | BoundPlant | BoundCall, ...] = (self._law, self._arbiter, self._plant)
+        for part in (*parts, *self._hooks):
             part.raise_error()
         if self.data.failed_step[0] >= 0:
             self._plant.raise_failure()

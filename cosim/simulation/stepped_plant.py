@@ -13,7 +13,7 @@ from cosim.errors import RunError
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 from cosim.step.plant_calls import PlantCalls
-from cosim.step.step_model import PLANT, StepData, set_call
+from cosim.step.step_model import PLANT_SET, PLANT_STEP, StepData, set_call
 from plant_fmu import Plant, Vehicle
 from plant_fmu.running.channels import Channel, Channels
 from plant_fmu.running.native import Native
@@ -60,7 +60,7 @@ class BoundPlant:
         self._plant, self._step = plant, scenario.time.step
         effectiveness = tuple(f"thrust_effectiveness[{i + 1}]" for i in range(scenario.vehicle.n_thrusters))
         self.native = native and isinstance(plant, Plant) and plant.fmi == 3
-        self._call: BoundCall | None = None
+        self._calls: list[BoundCall] = []
         if self.native:
             assert isinstance(plant, Plant)
             parts = plant.native_channels(), plant.native(effectiveness, ()), plant.native(LOSSES, ())
@@ -68,8 +68,9 @@ class BoundPlant:
         else:
             own = _buffers(plant.inputs.values, plant.outputs.values, np.zeros(len(plant.flags), np.bool_))
             self.calls = PlantCalls(own, _buffers(np.ones(len(effectiveness))), _buffers(np.zeros(len(LOSSES))))
-            self._call = BoundCall(self._step_in_python, ())
-            set_call(data, PLANT, self._call)
+            self._calls = [BoundCall(self._send_parameters, ()), BoundCall(self._make_step, ())]
+            for which, bound in zip((PLANT_SET, PLANT_STEP), self._calls, strict=True):
+                set_call(data, which, bound)
         self._parameters = []  # names, present values, and those that a plant in Python has
         for call, names, needed in (
             (self.calls.effectiveness, effectiveness, scenario.failures),
@@ -79,13 +80,14 @@ class BoundPlant:
                 call.inputs[:] = [plant[name] for name in names]
             self._parameters.append((names, call.inputs, call.inputs.copy()))
 
-    def _step_in_python(self) -> None:
-        """Set the parameters that have changed, and step."""
+    def _send_parameters(self) -> None:
         for names, values, sent in self._parameters:
             changed = np.flatnonzero(values != sent).tolist()
             if changed:
                 sent[:] = values
                 self._plant.set({names[i]: float(values[i]) for i in changed})
+
+    def _make_step(self) -> None:
         self._plant.step(self._step)
         if len(self._plant.flags):
             self.calls.native.flags[:] = self._plant.read_flags()
@@ -102,8 +104,8 @@ class BoundPlant:
 
     def raise_error(self) -> None:
         """Raise the error of a plant in Python, if it raised one."""
-        if self._call is not None:
-            self._call.raise_error()
+        for call in self._calls:
+            call.raise_error()
 
     def raise_failure(self) -> NoReturn:
         """Raise the error of an FMU's step that failed."""

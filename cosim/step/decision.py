@@ -8,20 +8,12 @@ import numpy as np
 
 from controller.allocation import allocate
 from controller.linear_algebra import copy, product
-from controller.translator.foreign import POINTER, call_c
 from cosim.step.arbiter_inputs import compute_inputs
 from cosim.step.plant_calls import seconds
 from cosim.step.sensing import position_is_known
-from cosim.step.step_model import ARBITER, LAW, Array, StepData, StepModel
+from cosim.step.step_model import ARBITER, LAW, Array, StepData, StepModel, call_back
 
-_WORDS = (POINTER,)  # argument of the C functions of `StepData.calls`
 MAX_WRENCH = 1e5  # N, N m: bound of the wrench in runs with commands, as some laws ask for any force to a far target
-
-
-def call_back(data: StepData, call: int) -> None:
-    """Call a C function of `StepData.calls`, if there is one."""
-    if data.calls[call] != 0:
-        call_c(data.calls[call], _WORDS, data.calls[call + 1])
 
 
 def arbitrate(model: StepModel, data: StepData) -> None:

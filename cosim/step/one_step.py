@@ -6,11 +6,11 @@ import math
 
 from controller.linear_algebra import copy
 from cosim.step.arbiter_inputs import write_arbiter_state
-from cosim.step.decision import arbitrate, call_back, control, exchange_delayed
+from cosim.step.decision import arbitrate, control, exchange_delayed
 from cosim.step.placed_regions import advance_goal, evaluate, move_regions
 from cosim.step.plant_calls import PlantCalls, fmi_do_step, fmi_get, fmi_get_flags, fmi_set
 from cosim.step.sensing import fail_thrusters, measure
-from cosim.step.step_model import LOCATED, MEASURED, PLANT, Array, Integers, StepData, StepModel
+from cosim.step.step_model import LOCATED, MEASURED, PLANT_STEP, Array, Integers, StepData, StepModel, call_back
 
 
 def step(model: StepModel, data: StepData, plant: PlantCalls, k: int) -> None:
@@ -84,7 +84,7 @@ def step_plant(model: StepModel, data: StepData, plant: PlantCalls) -> None:
         native.inputs[j] = data.stuck[j] if math.isfinite(data.stuck[j]) else given
     copy(native.inputs[own:], data.inputs[own:])  # of a coupled plant: its caller sets them
     if fmi_set(native) and fmi_do_step(native, data.now[0], model.step) and fmi_get(native) and fmi_get_flags(native):
-        call_back(data, PLANT)
+        call_back(data, PLANT_STEP)
     else:
         data.failed_step[0] = data.k[0]
     if data.failed_step[0] < 0:

@@ -10,7 +10,7 @@ from controller.linear_algebra import copy
 from controller.navigation.navigator import navigate
 from cosim.step.placed_regions import completed_steps
 from cosim.step.plant_calls import PlantCalls, fmi_get, fmi_set
-from cosim.step.step_model import StepData, StepModel
+from cosim.step.step_model import PLANT_SET, StepData, StepModel, call_back
 
 
 def fail_thrusters(model: StepModel, data: StepData, plant: PlantCalls) -> None:
@@ -21,6 +21,7 @@ def fail_thrusters(model: StepModel, data: StepData, plant: PlantCalls) -> None:
         thruster, remaining = model.failed[i], model.remaining[i]
         if remaining >= 0.0:
             plant.effectiveness.inputs[thruster] = remaining
+            call_back(data, PLANT_SET)
             if not (fmi_set(plant.effectiveness) and fmi_get(plant.native)):
                 data.failed_step[0] = data.k[0]
         else:
@@ -59,6 +60,7 @@ def lose_samples(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     i = data.outages[0]
     while i < model.outage_steps.size and data.k[0] == model.outage_steps[i]:
         plant.losses.inputs[model.outage_sensors[i]] = model.outage_losses[i]
+        call_back(data, PLANT_SET)
         if not fmi_set(plant.losses):
             data.failed_step[0] = data.k[0]
         i += 1

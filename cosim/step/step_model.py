@@ -13,16 +13,19 @@ from controller import VehicleState
 from controller.navigation.estimate import NavigationMemory
 from controller.navigation.measurements import Measurements, SensorModel
 from controller.regions.region_set import PackedRegions
+from controller.translator.foreign import POINTER, call_c
 from cosim.step.arbiter_inputs import ArbiterSignals, PackedInputs
 from cosim.step.placed_regions import RegionEvaluation
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
-# indices in `StepData.calls`: law, arbiter, what a run does after measuring and after evaluating the regions, and a
-# plant that Python steps
-LAW, ARBITER, MEASURED, LOCATED, PLANT = 0, 2, 4, 6, 8
-N_CALLS = 10
+_WORDS = (POINTER,)  # argument of the C functions of `StepData.calls`
+
+# indices in `StepData.calls`: law, arbiter, what a run does after measuring and after evaluating the regions, and the
+# functions of a plant in Python, which send changed parameters and step it
+LAW, ARBITER, MEASURED, LOCATED, PLANT_SET, PLANT_STEP = 0, 2, 4, 6, 8, 10
+N_CALLS = 12
 
 
 class Call(Protocol):
@@ -123,7 +126,7 @@ class StepData(NamedTuple):
     shown_inputs: Array  # (m,) the memberships as inputs of a file's rules; (0,) for others
     by_criterion: Array  # (criteria,) weight of each criterion
     weights: Array  # (n,) weight of each region's criterion
-    calls: Integers  # (10,) addresses of C functions and of their arguments; 0: none
+    calls: Integers  # (12,) addresses of C functions and of their arguments; 0: none
     manual: Integers  # (1,) 1: the command is given, and the law does not compute it
     law: LawOutputs
     expected: Array  # (6,) prediction that the arbiter uses; NaN: none
@@ -146,6 +149,12 @@ def set_call(data: StepData, which: int, call: Call) -> None:
     """Let a step call a function, such as at `LAW`, whose errors end it; the caller keeps it alive."""
     data.calls[which : which + 2] = call.address, call.words
     call.on_error = functools.partial(_end_step, data)
+
+
+def call_back(data: StepData, call: int) -> None:
+    """Call a C function of `StepData.calls`, if there is one."""
+    if data.calls[call] != 0:
+        call_c(data.calls[call], _WORDS, data.calls[call + 1])
 
 
 def _end_step(data: StepData) -> None:

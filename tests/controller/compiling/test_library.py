@@ -7,11 +7,14 @@ import sys
 import time
 from pathlib import Path
 
+import numpy as np
 import pytest
 
-from controller.compiling import library
+from controller.compiling import library, text_cache
 from controller.compiling.library import library_name, library_of
 from controller.errors import CompilationError
+from controller.translator.types import type_of
+from cosim.step.decision import bound_wrench
 
 TEXT = "int answer(void);\nint answer(void) { return 42; }\n"
 
@@ -175,3 +178,31 @@ def test_temporary_folder_of_a_killed_process_is_removed_by_a_later_one(tmp_path
     for process in (first, second)[killed:]:
         process.communicate("\n", timeout=60)
     assert not own.exists() and not folder.exists()
+
+
+def test_a_kept_text_is_that_of_the_present_constants(cache, monkeypatch):
+    def text():
+        return text_cache.c_text_of(bound_wrench, (type_of(np.zeros(6)),))
+
+    plain = text()
+    with monkeypatch.context() as patch:
+        patch.setattr("cosim.step.decision.MAX_WRENCH", 12345.0)
+        assert "12345.0" in text() and "12345.0" not in plain
+    assert text() == plain
+
+
+@pytest.mark.parametrize("damage", ["half", "changed", "nested", "empty"])
+def test_a_damaged_text_is_made_anew(damage, cache):
+    kind = (type_of(np.zeros(6)),)
+    plain = text_cache.c_text_of(bound_wrench, kind)
+    (path,) = cache.glob("*.json")
+    whole = path.read_bytes()
+    damaged = {
+        "half": whole[: len(whole) // 2],
+        "changed": whole.replace(b"bound_wrench", b"bound_trench"),
+        "nested": b"[" * 100_000,
+        "empty": b'{"modules": {}, "text": "int x;"}',
+    }
+    path.write_bytes(damaged[damage])
+    assert text_cache.c_text_of(bound_wrench, kind) == plain
+    assert path.read_bytes() == whole

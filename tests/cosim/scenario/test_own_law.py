@@ -1,5 +1,6 @@
 """Custom laws: run, named in the run folder, and rejected where unsupported."""
 
+import copy
 import json
 import tomllib
 
@@ -7,6 +8,7 @@ import numpy as np
 import pytest
 
 from controller import FunctionLaw, LawError
+from controller.law import Diagnostic
 from cosim.errors import RunError, ScenarioError
 from cosim.precheck.precheck import check_scenario
 from cosim.results.record import load_record
@@ -15,6 +17,7 @@ from cosim.run.run import run_scenario
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
+from tests.cosim.simulation.keep import Keep
 
 SHORT = ("arbiter.engine=closed", "time.duration=0.2", "time.step=0.01", "time.control=0.02", "time.arbiter=0.01")
 NAME = "tests.cosim.scenario.test_own_law:ahead"
@@ -103,6 +106,61 @@ def test_invalid_law_is_rejected(law, scenario, tmp_path):
     with pytest.raises(LawError, match=r"law is .*:.*, expected a FunctionLaw"):
         run_scenario(scenario, tmp_path / "run", law=law)
     assert not (tmp_path / "run").exists()
+
+
+class Reporting:
+    """A law whose outputs change their shapes in step `due`."""
+
+    output, diagnostics = "wrench", (Diagnostic("share", "", "Share"),)
+
+    def __init__(self, due, estimate=(0.0,) * 4, report=(0.0,)):
+        self.due, self.k, self.given = due, 0, (estimate, report)
+
+    @property
+    def estimate(self):
+        return self.given[0] if self.k >= self.due else np.arange(4.0) + self.k
+
+    @property
+    def report(self):
+        return self.given[1] if self.k >= self.due else [0.5 * self.k]
+
+    def step(self, state, goal, regions, weights, forces):
+        self.k += 1
+        forces[:] = 0.0
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"report": [1.0, 2.0]}, r"report is \(2,\), expected \(1,\)"),
+        ({"report": None}, r"report is \(\), expected \(1,\)"),
+        ({"estimate": [1.0] * 3}, r"estimate is \(3,\), expected \(4,\)"),
+        ({"estimate": 2.0}, r"estimate is \(\), expected \(4,\)"),
+    ],
+)
+@pytest.mark.parametrize("due", [0, 3])
+def test_outputs_of_other_shapes_are_refused(given, words, due, scenario):
+    with Master(scenario, Reporting(due, **given)) as master:
+        kept = Keep(master)
+        with pytest.raises(LawError, match=words):
+            master.run([kept])
+    assert len(kept.rows) <= 2 * due
+
+
+def test_a_memory_that_replaces_a_laws_own_is_its_state_from_then_on():
+    scenario = load_scenario("docking", SHORT)
+    first, second = law_of(scenario), law_of(scenario)
+    with Master(scenario, first) as master, Master(scenario, second) as other:
+        for k in range(5):
+            master.step(k)
+            other.step(k)
+        second.memory = copy.deepcopy(second.memory)
+        second.memory.estimate[:] += 1.0
+        first.memory.estimate[:] += 1.0
+        for k in range(5, 12):
+            master.step(k)
+            other.step(k)
+        np.testing.assert_array_equal(master.row, other.row)
 
 
 def test_thruster_output_requires_thruster_actuation(scenario, tmp_path):

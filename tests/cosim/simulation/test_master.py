@@ -128,6 +128,15 @@ def test_blocks_hold_the_rows_of_single_steps(changes):
     np.testing.assert_array_equal(blocks.rows, kept_rows(scenario).rows)
 
 
+def test_a_plant_that_python_steps_gives_the_rows_of_one_that_c_steps():
+    failures = (
+        "failures=[{thruster=2,time=0.1},{thruster=1,time=0.2,effectiveness=0.4},{thruster=3,time=0.3,stuck=true}]"
+    )
+    scenario = load_scenario("sitl", ["time.duration=0.5", failures])
+    rows = kept_rows(scenario).rows
+    np.testing.assert_array_equal(kept_rows(scenario.replace({"plant.fmi": 2})).rows, rows)
+
+
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize(
     "changes",
