@@ -84,6 +84,13 @@ def test_servo_pulses_follow_the_vehicle_table():
     assert servos(scenario(), **{"thrust[1]": (13.5, -27.0, 0.0, 54.0)})[:4] == [1700, 1100, 1500, 1900]
 
 
+def test_estimator_flags_tell_whether_the_position_is_known(station):
+    for position, known in (((1.0, 2.0, -5.0), 8 | 16 | 32), ((1.0, math.nan, -5.0), 0)):
+        station.look(1.0, **{"position.x": position})
+        (status,) = station.request(230)
+        assert status.flags == 1 | 2 | 4 | known
+
+
 def test_times_wrap(station):
     station.look(5000.0)
     assert station.request(36)[0].time_usec == 5_000_000_000 % 2**32
