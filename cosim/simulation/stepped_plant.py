@@ -145,6 +145,9 @@ def validate_plant(plant: SteppedPlant, vehicle: Vehicle) -> None:
         given = getattr(getattr(plant, kind, None), "names", None)
         if given is None:
             raise RunError(f"plant is {type(plant).__name__} without {kind}, expected a plant such as plant_fmu.Plant")
+        values = getattr(plant, kind).values
+        if kind != "flags" and not (values.dtype == np.float64 and values.flags.c_contiguous):
+            raise RunError(f"plant.{kind}.values is a strided array or of {values.dtype}, expected contiguous float64")
         names, remaining = [channel.name for channel in expected], iter(given)
         first = {"inputs": len(names), "outputs": _STATES}.get(kind, 0)  # these stand side by side in the row
         for i, name in enumerate(names):

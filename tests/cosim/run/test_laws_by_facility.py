@@ -182,7 +182,9 @@ class Foreign:
     def __init__(self, change):
         with Plant("odin") as plant:
             for kind in ("inputs", "outputs", "flags"):
-                setattr(self, kind, SimpleNamespace(names=change.get(kind, list)(list(getattr(plant, kind).names))))
+                names = change.get(kind, list)(list(getattr(plant, kind).names))
+                values = change.get("values", np.zeros)(len(names))
+                setattr(self, kind, SimpleNamespace(names=names, values=values))
 
     def close(self):
         pass
@@ -206,6 +208,12 @@ class Foreign:
 def test_plant_of_other_channels_is_refused_by_the_first_that_is_missing(change, words):
     with pytest.raises(RunError, match=f"^{words}[^\n]*, expected those of vehicle 'odin'$"):
         Master(SCENARIO, plant=Foreign(change))
+
+
+@pytest.mark.parametrize("values", [lambda n: np.zeros(2 * n)[::2], lambda n: np.zeros(n, np.float32)])
+def test_plant_of_other_arrays_is_refused(values):
+    with pytest.raises(RunError, match=r"^plant.outputs.values is .*, expected contiguous float64$"):
+        Master(SCENARIO, plant=Foreign({"values": values}))
 
 
 @pytest.mark.parametrize("plant", [3, "odin", object()])
