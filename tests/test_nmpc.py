@@ -50,9 +50,9 @@ def test_planner_receives_law_inputs_at_10_hz_and_its_forces_are_held_between_pl
     scene = msgspec.convert(make_scene(7, "hard"), Scene)
     with SceneFlyer("nmpc", Conditions(duration=2.0)) as flyer:
         score, _ = flyer.fly(scene)
-    assert len(planner.given) == 20 and len(nmpc.NmpcLaw.function.times) == 20
-    assert [given["again"] for given in planner.given] == [True] + [False] * 19
-    first, last = planner.given[0], planner.given[-1]
+    assert len(planner.given) == 21 and len(nmpc.NmpcLaw.function.times) == 21  # the last one at the end
+    assert [given["again"] for given in planner.given] == [True] + [False] * 20
+    first, last = planner.given[0], planner.given[19]
     assert first["goal"] == pytest.approx(scene.goal.centre)
     shallowest, deepest = scene.depth_band
     assert first["hard"] == [
@@ -67,7 +67,7 @@ def test_planner_receives_law_inputs_at_10_hz_and_its_forces_are_held_between_pl
             assert ball[3:] == pytest.approx([obstacle.radius, *obstacle.velocity])
     assert first["position"] == pytest.approx(scene.start, abs=0.1)
     assert not {"weight_minus_buoyancy", "current", "failed_thruster"} & set(first)
-    assert nmpc.NmpcLaw.function.failures == 10
+    assert nmpc.NmpcLaw.function.failures == 11
     assert score.effort == pytest.approx(4 * 3.0 * 2.0) and score.thrust_variation == pytest.approx(4 * 3.0)
     mass = 187.5
     disturbance = last["disturbance"][2] * mass
@@ -86,15 +86,17 @@ def test_lag_and_munk_moment_are_compensated_as_the_plant_has_them(planner):
     scene = ScenarioScene(1, "mine", table)
     with SceneFlyer("nmpc", Conditions(), nmpc.NmpcGains(lag=lag)) as flyer:
         _, trace = flyer.fly(scene, trace=True)
-    assert len(planner.given) == 15
+    assert len(planner.given) == 16
     early = int(lag / 0.02)  # control steps
     for i in (6, 9, 12):
-        given, later = planner.given[i], (trace[5 * i + early] + trace[5 * i + early + 1]) / 2.0
-        assert given["position"] == pytest.approx(later[1:4], abs=0.02)
-        R = np.array(given["R"])
-        assert given["velocity"] == pytest.approx(R @ later[8:11], abs=0.06)
-    now, given = trace[60], planner.given[12]
-    surge, heave, pitch_rate = now[8], now[10], now[12]
+        given, k = planner.given[i], 5 * i + early
+        position, velocity = (
+            np.mean([trace[f"{group}.{axis}"][k : k + 2] for axis in axes], axis=1)
+            for group, axes in (("position", "xyz"), ("velocity", "uvw"))
+        )
+        assert given["position"] == pytest.approx(position, abs=0.02)
+        assert given["velocity"] == pytest.approx(np.array(given["R"]) @ velocity, abs=0.06)
+    given, (surge, heave, pitch_rate) = planner.given[12], (trace[f"velocity.{axis}"][60] for axis in "uwq")
     assert surge > 0.3 and heave > 0.15 and abs(pitch_rate) > 0.05  # no one controls the attitude here
     munk = (vehicle.mass_matrix[0, 0] - vehicle.mass_matrix[2, 2]) * surge * heave  # Fossen (2011), section 6.3
     assert given["hold"][1] == pytest.approx(munk, rel=0.3)  # the observer comes late
@@ -155,7 +157,7 @@ def test_tangents_follow_the_path_of_the_plan_before(monkeypatch, planner):
     with SceneFlyer("nmpc", Conditions(duration=0.3)) as flyer:
         flyer.fly(msgspec.convert(make_scene(7, "plain"), Scene))
     assert (paths[0] == paths[0][0]).all()
-    assert [path[0, 0] for path in paths[1:]] == [1.0, 2.0]
+    assert [path[0, 0] for path in paths[1:]] == [1.0, 2.0, 3.0]
 
 
 class Flown:
@@ -190,7 +192,7 @@ def test_flights_in_the_file_are_not_flown_again(monkeypatch, tmp_path, planner)
     flown = nmpc_search.Flights(None, path).fly(gains, "plain", 3, 0.4)
     assert started == [(12, True)] * 2  # not settled after 0.2 s
     again = nmpc_search.Flights(None, path)
-    assert again.fly(gains, "plain", 3, 0.4) == flown and len(flown.times) == 4
+    assert again.fly(gains, "plain", 3, 0.4) == flown and len(flown.times) == 5
     assert len(started) == 2 and len(path.read_text().splitlines()) == 2
     again.fly(gains._replace(margin=0.2), "plain", 3, 0.4)
     assert len(started) == 4

@@ -105,7 +105,9 @@ class Function(Statements):
         head = f"{self.signature(name)}\n{{\n"
         used = set(re.findall(r"\w+", " ".join(re.sub(r"^\w+ = ", "", line) for line in self.lines)))
         unused = [f"(void){code};" for code in map(self.variable, self.names) if code not in used]
-        body = [*variables, *unused, *self.declared.values(), *self.lines]
+        idle = {temporary for temporary in self.declared if temporary not in used}  # such as a length that nobody asks
+        unused += [f"(void){temporary};" for temporary in sorted(idle)]
+        body = [*variables, *self.declared.values(), *unused, *self.lines]
         return head + _indented(body) + "}\n"
 
     def signature(self, name: str) -> str:
