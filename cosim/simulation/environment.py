@@ -33,10 +33,9 @@ class _Target:
 
 
 class RegionEnvironment:
-    """Goal and regions, moved by their velocities, or by `move` where the scenario has ``streamed = true``.
+    """Goal and regions, moved by their velocities, or by `move` where the scenario has ``streamed = true``."""
 
-    It changes those of a step's `data` in place, or its own.
-    """
+    # It changes those of a step's `data` in place, or its own.
 
     def __init__(self, scenario: Scenario, data: StepData | None = None) -> None:
         secondary = [region.region for region in scenario.regions]

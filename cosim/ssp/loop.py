@@ -39,7 +39,7 @@ class Loop:
             thrusts=np.zeros(m), lost=np.zeros(m), outages=np.zeros(N_SENSORS), values=np.zeros(n),
             clearances=np.zeros(n), failures=np.zeros(1, np.int64), changes=np.zeros(1, np.int64),
         )  # fmt: skip
-        self.period: Array = self.law.memory.period
+        self.period: Array = self.law.memory.period  # (1,) s
         self.ramp = np.array([scenario.arbiter.ramp])
         self.memory = Memory()
         self.constants = self._place_arrays()

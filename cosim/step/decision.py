@@ -78,7 +78,7 @@ def controls(model: StepModel, data: StepData) -> bool:
 
 
 def bound_wrench(wrench: Array) -> bool:
-    """Scale force and moment of a wrench to at most `MAX_WRENCH`; set them to 0 if they are not finite."""
+    """Scale force and moment of a wrench [N, N m] to at most `MAX_WRENCH`, or to 0 if they are not finite."""
     changed = False
     for part in range(2):
         largest, finite = 0.0, True

@@ -107,5 +107,5 @@ def score_forces(model: StepModel, data: StepData, metrics: FlightMetrics[Array]
 
 
 def lesser(clearance: float, least: float) -> float:
-    """Return the lesser of two numbers, NaN if one of them is."""
+    """Return the lesser of two clearances [m] or [rad], NaN if one of them is."""
     return clearance if clearance < least or np.isnan(clearance) else least

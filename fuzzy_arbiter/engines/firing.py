@@ -81,10 +81,9 @@ def slots_of(system: System, output: Output) -> tuple[Slot, ...]:
 
 
 class Firing:
-    """The first half of every engine: degrees of input terms, strengths of rules, cuts of output terms.
+    """The first half of every engine: degrees of input terms, strengths of rules, cuts of output terms."""
 
-    Each function takes numbers of one sample, or arrays of many samples' numbers.
-    """
+    # Each function takes numbers of one sample, or arrays of many samples' numbers.
 
     def __init__(self, system: System, degrees: Degrees | None = None) -> None:
         self.system = system
