@@ -96,7 +96,8 @@ class View:
     @cached_property
     def _rotation(self) -> list[Vector3]:
         """R from body to world, (3), as floats, which are faster here than arrays."""
-        rows: list[Vector3] = rotation_matrix(np.array(self.quaternion)).tolist()
+        with np.errstate(all="ignore"):  # of any numbers
+            rows: list[Vector3] = rotation_matrix(np.array(self.quaternion)).tolist()
         return rows
 
     def to_world(self, vector_body: Vector3) -> Vector3:
