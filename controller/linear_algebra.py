@@ -9,16 +9,6 @@ import numpy as np
 from controller.stack_array import Array, Vector3, array
 
 
-def product(A: Array, x: Array, out: Array) -> None:
-    """Write A x into `out`."""
-    out[:] = A @ x
-
-
-def copy(values: Array, out: Array) -> None:
-    """Write the first of values, shape (n,), into `out`."""
-    out[:] = values[: out.size]
-
-
 def cross(a: Vector3, b: Vector3) -> Vector3:
     """Return a x b."""
     return array(a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])

@@ -14,6 +14,7 @@ from cosim.errors import CommandError, RunError
 from cosim.scenario.region_tables import PARKED_POSITION, Vector3
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
+from cosim.step.placed_regions import move_packed
 from cosim.step.step_model import StepData
 
 _SPHERE_NUMBERS = len(Sphere((0.0, 0.0, 0.0), 1.0).packed())
@@ -65,8 +66,7 @@ class RegionEnvironment:
         if not self._moving:
             return
         for packed, origins in ((self.goal, self._goal_origin), (self.regions, self._origins)):
-            packed.move_to(time)
-            packed.shifts[:] += origins
+            move_packed(packed, origins, time)
         for i, at in enumerate(self._moving):
             shifts[i] = self.regions.shifts[at - 1] if at else self.target - self._middle
 

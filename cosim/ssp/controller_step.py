@@ -7,7 +7,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from controller.linear_algebra import copy
 from cosim.step.decision import update_inputs, weigh
 from cosim.step.one_step import decide
 from cosim.step.placed_regions import completed_steps
@@ -48,8 +47,8 @@ def step_controller(model: StepModel, data: StepData, given: ControllerInputs, o
     data.now[0] = given.end[0]
     if position_is_known(model, data):
         update_inputs(model, data)
-        copy(data.true_evaluation.values if model.exact else data.given_evaluation.values, out.values)
-        copy(data.true_evaluation.clearances if model.exact else data.given_evaluation.clearances, out.clearances)
+        out.values[:] = data.true_evaluation.values if model.exact else data.given_evaluation.values
+        out.clearances[:] = data.true_evaluation.clearances if model.exact else data.given_evaluation.clearances
     schedule_failures(model, data, out)
     for j in range(out.thrusts.size):
         out.thrusts[j] = data.stuck[j] if math.isfinite(data.stuck[j]) else data.thrusts[j]
@@ -58,14 +57,12 @@ def step_controller(model: StepModel, data: StepData, given: ControllerInputs, o
 def read_inputs(data: StepData, given: ControllerInputs) -> None:
     """Write the vehicle's motion and the samples; inputs of zeros alone come before the plant's first outputs."""
     motion, state = given.start if is_zero(given.motion) else given.motion, data.true_state
-    copy(motion, state.position)
-    copy(motion[3:], state.quaternion)
-    copy(motion[7:], state.velocity_body)
+    state.position[:], state.quaternion[:], state.velocity_body[:] = motion[:3], motion[3:7], motion[7:]
     if is_zero(state.quaternion):
         state.quaternion[0] = 1.0
     if not is_zero(given.samples):
-        copy(given.samples, data.measurements.values)
-        copy(given.sample_times, data.measurements.times)
+        data.measurements.values[:] = given.samples
+        data.measurements.times[:] = given.sample_times
 
 
 def is_zero(values: Array) -> bool:

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from controller.allocation import allocate
-from controller.linear_algebra import copy, product
 from cosim.step.arbiter_inputs import compute_inputs
 from cosim.step.plant_calls import seconds
 from cosim.step.sensing import position_is_known
@@ -25,9 +24,9 @@ def arbitrate(model: StepModel, data: StepData) -> None:
 
 def update_inputs(model: StepModel, data: StepData) -> None:
     """Compute the memberships and the inputs of the arbiter's rules."""
-    found = data.true_evaluation.clearances if model.exact else data.given_evaluation.clearances
-    compute_inputs(model.inputs, data.goal, data.regions, data.arbiter_state, data.now, found[1:], data.signals)
-    copy(data.signals.memberships, data.shown_inputs)
+    clearances = data.true_evaluation.clearances if model.exact else data.given_evaluation.clearances
+    compute_inputs(model.inputs, data.goal, data.regions, data.arbiter_state, data.now, clearances[1:], data.signals)
+    data.shown_inputs[:] = data.signals.memberships[: data.shown_inputs.size]
 
 
 def weigh(model: StepModel, data: StepData) -> None:
@@ -50,13 +49,13 @@ def control(model: StepModel, data: StepData) -> None:
     started = seconds(model.clock, data.ticks) if model.clock.size > 0 else 0.0
     data.expected[:] = np.nan
     if controls(model, data):
-        copy(data.law.estimate, data.estimate)
+        data.estimate[:] = data.law.estimate
         call_back(data, LAW)
-        copy(data.law.report, data.report)
+        data.report[:] = data.law.report
         if not model.exact:
-            copy(data.law.expected, data.expected)
+            data.expected[:] = data.law.expected
         if not model.law_gives_wrench and model.full:
-            product(model.thruster_matrix, data.thrusts, data.command)
+            data.command[:] = model.thruster_matrix @ data.thrusts
     elif data.manual[0] == 0:
         data.command[:] = 0.0
     by_wrench = model.law_gives_wrench or not controls(model, data)
@@ -65,7 +64,7 @@ def control(model: StepModel, data: StepData) -> None:
         lower, upper, direction = allocator.lower[stage], allocator.upper[stage], allocator.direction
         data.saturated[0] = allocate(allocator.inverse[stage], lower, upper, direction, data.command, data.thrusts)
     elif by_wrench:
-        copy(data.command, data.wrench)
+        data.wrench[:] = data.command
         if model.commands:
             data.saturated[0] = bound_wrench(data.wrench)
     if model.clock.size > 0:

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 
-from controller.linear_algebra import copy
 from cosim.step.arbiter_inputs import write_arbiter_state
 from cosim.step.decision import arbitrate, control, exchange_delayed
 from cosim.step.placed_regions import advance_goal, evaluate, move_regions
 from cosim.step.plant_calls import PlantCalls, fmi_do_step, fmi_get, fmi_get_flags, fmi_set
-from cosim.step.sensing import fail_thrusters, measure
+from cosim.step.sensing import fail_thrusters, measure, read_outputs
 from cosim.step.step_model import LOCATED, MEASURED, PLANT_STEP, Array, Integers, StepData, StepModel, call_back
 
 
@@ -48,17 +47,17 @@ def advance(model: StepModel, data: StepData, plant: PlantCalls, span: Integers,
             break
         span[2] = i + 1
         if rows.shape[0] > 0:
-            copy(data.row, rows[i])
+            rows[i] = data.row
 
 
 def show_start(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     """Measure the initial state without noise, and evaluate the regions, as a run does that waits for its start."""
     data.k[0] = 0
     data.now[0] = 0.0
-    copy(plant.native.outputs, data.outputs[: data.applied[0]])
-    copy(data.true_state.position, data.state.position)
-    copy(data.true_state.quaternion, data.state.quaternion)
-    copy(data.true_state.velocity_body, data.state.velocity_body)
+    read_outputs(data, plant)
+    data.state.position[:] = data.true_state.position
+    data.state.quaternion[:] = data.true_state.quaternion
+    data.state.velocity_body[:] = data.true_state.velocity_body
     locate(model, data)
 
 
@@ -82,13 +81,13 @@ def step_plant(model: StepModel, data: StepData, plant: PlantCalls) -> None:
         given = data.delayed[j] if model.jacobi else data.inputs[j]
         data.delayed[j] = data.inputs[j]
         native.inputs[j] = data.stuck[j] if math.isfinite(data.stuck[j]) else given
-    copy(native.inputs[own:], data.inputs[own:])  # of a coupled plant: its caller sets them
+    data.inputs[own:] = native.inputs[own:]  # of a coupled plant: its caller sets them
     if fmi_set(native) and fmi_do_step(native, data.now[0], model.step) and fmi_get(native) and fmi_get_flags(native):
         call_back(data, PLANT_STEP)
     else:
         data.failed_step[0] = data.k[0]
     if data.failed_step[0] < 0:
         first = data.applied[0]
-        copy(native.outputs[first:], data.outputs[first:])
+        data.outputs[first:] = native.outputs[first:]
         for j in range(data.flags.size):
             data.flags[j] = native.flags[j]

@@ -59,19 +59,15 @@ def move_regions(model: StepModel, data: StepData) -> None:
     move_packed(data.regions, data.region_origins, data.now[0])
     for i in range(model.moving_regions.size):
         region = model.moving_regions[i]
-        for axis in range(3):
-            if region > 0:
-                data.shifts[i, axis] = data.regions.shifts[region - 1, axis]
-            else:
-                center = data.goal_center[axis] + data.goal.shifts[0, axis]
-                data.shifts[i, axis] = center - model.goal_center[axis]
+        if region > 0:
+            data.shifts[i] = data.regions.shifts[region - 1]
+        else:
+            data.shifts[i] = (data.goal_center + data.goal.shifts[0]) - model.goal_center
 
 
 def move_packed(regions: PackedRegions, origins: Array, now: float) -> None:
     """Move regions to their positions at a time [s]; origins (n, 3) [m, NED]."""
-    for i in range(regions.kinds.size):
-        for axis in range(3):
-            regions.shifts[i, axis] = regions.velocities[i, axis] * now + origins[i, axis]
+    regions.shifts[:] = regions.velocities * now + origins
 
 
 def advance_goal(model: StepModel, data: StepData) -> None:
@@ -83,8 +79,7 @@ def advance_goal(model: StepModel, data: StepData) -> None:
     now, since = data.now[0], data.inside_since
     since[0] = min(since[0], now) if data.true_evaluation.clearances[0] >= 0.0 else math.inf
     if completed_steps(model, now - since[0]) >= model.goal_stay:
-        for axis in range(3):
-            data.goal_origin[0, axis] = model.goal_places[index, axis]
+        data.goal_origin[0] = model.goal_places[index]
         data.goal_index[0], since[0] = index + 1, math.inf
 
 

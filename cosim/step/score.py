@@ -7,7 +7,7 @@ from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from controller.linear_algebra import copy
+from controller.linear_algebra import norm
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from cosim.step.decision import controls
 from cosim.step.one_step import step
@@ -61,7 +61,7 @@ def fly(
         if k < model.steps:
             score_forces(model, data, metrics, before)
             if rows.shape[0] > 0 and k % model.control_every == 0 and data.failed_step[0] < 0:
-                copy(data.row, rows[k // model.control_every])
+                rows[k // model.control_every] = data.row
     metrics.worst_step[0], metrics.failed_step[0] = data.worst[0], data.failed_step[0]
 
 
@@ -85,8 +85,7 @@ def score_state(model: StepModel, data: StepData, metrics: FlightMetrics[Array],
             if metrics.first_inside[0] < 0.0:
                 metrics.first_inside[0] = k
         metrics.inside[0] = goal_clearance >= 0.0
-    u, v, w = data.true_state.velocity_body[0], data.true_state.velocity_body[1], data.true_state.velocity_body[2]
-    metrics.max_speed[0] = max(metrics.max_speed[0], math.sqrt(u * u + v * v + w * w))
+    metrics.max_speed[0] = max(metrics.max_speed[0], norm(data.true_state.velocity_body[:3]))
     if model.bound >= 0 and k % model.control_every == 0 and controls(model, data):
         metrics.bound[0] = data.law.report[model.bound]
 
@@ -100,8 +99,7 @@ def score_forces(model: StepModel, data: StepData, metrics: FlightMetrics[Array]
         return
     for j in range(data.forces.size):
         metrics.thrust_effort[0] += abs(data.forces[j]) * model.step
-    x, y, z = data.force[0], data.force[1], data.force[2]
-    force = math.sqrt(x * x + y * y + z * z)
+    force = norm(data.force)
     metrics.effort[0] += force * model.step
     metrics.max_force[0] = max(metrics.max_force[0], force)
 

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
-from controller.linear_algebra import copy
 from controller.navigation.navigator import navigate
 from cosim.step.placed_regions import completed_steps
 from cosim.step.plant_calls import PlantCalls, fmi_get, fmi_set
@@ -41,10 +38,15 @@ def report_failures(model: StepModel, data: StepData) -> None:
 
 def measure(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     """Copy the plant's outputs, and write the state that law and arbiter receive."""
-    copy(plant.native.outputs, data.outputs[: data.applied[0]])
+    read_outputs(data, plant)
     if model.through_sensors:
         lose_samples(model, data, plant)
     estimate_state(model, data)
+
+
+def read_outputs(data: StepData, plant: PlantCalls) -> None:
+    """Copy the plant's outputs of the beginning of a step."""
+    data.outputs[: data.applied[0]] = plant.native.outputs[: data.applied[0]]
 
 
 def estimate_state(model: StepModel, data: StepData) -> None:
@@ -70,24 +72,22 @@ def lose_samples(model: StepModel, data: StepData, plant: PlantCalls) -> None:
 def sense(model: StepModel, data: StepData) -> None:
     """Write the measured state: with noise, held, or lost."""
     true_state, state, now = data.true_state, data.state, data.now[0]
-    copy(true_state.quaternion, state.quaternion)
-    copy(true_state.velocity_body[3:], state.velocity_body[3:])
+    state.quaternion[:] = true_state.quaternion
+    state.velocity_body[3:] = true_state.velocity_body[3:]
     lost = model.dead_from <= now < model.dead_until
     if lost and model.frozen and now > 0.0:
         return
-    control = data.k[0] // model.control_every
-    if data.noise.shape[0] > 0:
-        control %= data.noise.shape[0]
-    for i in range(3):
-        state.position[i], state.velocity_body[i] = true_state.position[i], true_state.velocity_body[i]
-        if lost and not model.frozen:
-            state.position[i] = state.velocity_body[i] = np.nan
-        elif not (lost or model.exact):
-            state.position[i] += data.noise[control, i]
-            state.velocity_body[i] += data.noise[control, 3 + i]
+    state.position[:] = true_state.position
+    state.velocity_body[:3] = true_state.velocity_body[:3]
+    if lost and not model.frozen:
+        state.position[:] = np.nan
+        state.velocity_body[:3] = np.nan
+    elif not (lost or model.exact):
+        noise = data.noise[data.k[0] // model.control_every % data.noise.shape[0]]
+        state.position[:] += noise[:3]
+        state.velocity_body[:3] += noise[3:]
 
 
 def position_is_known(model: StepModel, data: StepData) -> bool:
     """Return True if the measured position is finite."""
-    x = data.state.position
-    return bool(model.exact) or (math.isfinite(x[0]) and math.isfinite(x[1]) and math.isfinite(x[2]))
+    return bool(model.exact) or bool(np.all(np.isfinite(data.state.position)))
