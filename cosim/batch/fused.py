@@ -18,6 +18,7 @@ from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.compiled_rules import BoundRules
+from cosim.simulation.decisions import BoundLaw
 from cosim.simulation.make_step import (
     NO_CLOCK,
     exchanged_variables,
@@ -27,9 +28,9 @@ from cosim.simulation.make_step import (
     make_noise,
     step_signals,
 )
-from cosim.simulation.stepped_plant import LOSSES
+from cosim.simulation.stepped_plant import read_parameters
 from cosim.step.score import FlightMetrics, empty_metrics, fly
-from cosim.step.step_model import ARBITER, LAW, Array, Integers, LawOutputs, StepData, StepModel, set_call
+from cosim.step.step_model import ARBITER, Array, Integers, StepData, StepModel, set_call
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant, PlantError
 
@@ -115,24 +116,18 @@ def fly_scenario(
     plant.initialize()
     inputs, outputs = exchanged_variables(scenario)
     calls = make_calls(scenario, plant.native, inputs, outputs)
-    n = scenario.vehicle.n_thrusters
-    effectiveness = [f"thrust_effectiveness[{i + 1}]" for i in range(n)]
-    calls.effectiveness.inputs[:] = [plant[name] for name in effectiveness] if scenario.failures else 1.0
-    calls.losses.inputs[:] = [plant[name] for name in LOSSES] if scenario.outages else 0.0
-    model, signals = make_model(scenario, clock), step_signals(scenario, law, inputs, outputs)
-    given = LawOutputs(law.estimate, law.expected, law.report)
-    data = make_data(scenario, model, given, signals, inputs, outputs, make_noise(scenario))
-    forces = data.command if model.law_gives_wrench else data.thrusts
-    decide = law.bound(data.state, data.goal, data.regions, data.weights, forces)
-    weigh = BoundRules(scenario.rules.system, data.signals.inputs, data.by_criterion)
-    set_call(data, LAW, decide)
-    set_call(data, ARBITER, weigh)
+    read_parameters(scenario, plant, calls)
+    model, signals = make_model(scenario, law, clock), step_signals(scenario, law, inputs, outputs)
+    data = make_data(scenario, model, law, signals, inputs, outputs, make_noise(scenario))
+    bound_law = BoundLaw(law, model, data)
+    rules = BoundRules(scenario.rules.system, data.signals.inputs, data.by_criterion)
+    set_call(data, ARBITER, rules)
     decisions = -(-scenario.steps // scenario.control_every)
     rows = np.zeros((decisions, signals.row.size) if trace else (0, 0))
     values, metrics = empty_metrics()
     BoundCall(fly, (model, data, calls, metrics, np.zeros(len(inputs)), rows)).call()
-    decide.raise_error()
-    weigh.raise_error()
+    bound_law.raise_error()
+    rules.raise_error()
     names = tuple(column.name for column in signals.columns) if trace else ()
     return FlightMetrics(*values.tolist()), model, data, Trace(names, rows)
 

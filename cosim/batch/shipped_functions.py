@@ -34,7 +34,6 @@ from cosim.step.arbiter_inputs import compute_inputs, empty_signals, pack_inputs
 from cosim.step.one_step import advance, locate, show_start
 from cosim.step.plant_calls import Clock, PlantCalls
 from cosim.step.score import empty_metrics, fly
-from cosim.step.step_model import LawOutputs
 from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
@@ -73,14 +72,10 @@ def _law_arguments(
 def _step_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]:
     """Yield the functions of a step."""
     scenario = load_scenario("paper")
-    (inputs, outputs), law, model = (
-        exchanged_variables(scenario),
-        law_of(scenario),
-        make_model(scenario, Clock().numbers),
-    )
-    given = LawOutputs(law.estimate, law.expected, law.report)
+    (inputs, outputs), law = exchanged_variables(scenario), law_of(scenario)
+    model = make_model(scenario, law, Clock().numbers)
     signals = step_signals(scenario, law, inputs, outputs)
-    data = make_data(scenario, model, given, signals, inputs, outputs, make_noise(scenario))
+    data = make_data(scenario, model, law, signals, inputs, outputs, make_noise(scenario))
     references, rows = np.zeros(1, np.uint32), np.zeros((0, 0))
     calls = PlantCalls(*[Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)] * 3)
     yield fly, (model, data, calls, empty_metrics()[1], _FLAT, rows)

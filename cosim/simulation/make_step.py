@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from controller import LAWS, Law, VehicleState
+from controller import Law, VehicleState
 from controller.navigation.estimate import empty_memory
 from controller.navigation.measurements import SENSORS, VALUES, Measurements
 from controller.regions import pack
@@ -15,18 +15,19 @@ from cosim.scenario.scenario import Scenario
 from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model
 from cosim.simulation.actuation_limits import failure_stages
 from cosim.simulation.columns import columns_of_channels
+from cosim.simulation.decisions import outputs_of
 from cosim.simulation.environment import pack_target, shape_center, stay_steps
 from cosim.simulation.signals import Signals
-from cosim.simulation.stepped_plant import LOSSES
+from cosim.simulation.stepped_plant import LOSSES, effectiveness_names
 from cosim.step.arbiter_inputs import ArbiterSignals, empty_signals, empty_state, pack_inputs
 from cosim.step.placed_regions import RegionEvaluation
 from cosim.step.plant_calls import PlantCalls
-from cosim.step.step_model import N_CALLS, Array, Integers, LawOutputs, StepData, StepModel
+from cosim.step.step_model import N_CALLS, Array, Integers, StepData, StepModel
 from plant_fmu.running.channels import Channel
 from plant_fmu.running.native import Native
 
 STREAM = 1  # second part of the seed, as in scored scenes: a scene and a scenario of one seed have the same noise
-_ROUNDING = 1e-6  # tolerance of times, as a part of a step, as in the master
+_ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 NO_CLOCK: Integers = np.empty(0, np.int64)
 _MOTION = (
     *(f"position.{axis}" for axis in "xyz"),
@@ -50,14 +51,12 @@ def exchanged_variables(scenario: Scenario) -> tuple[tuple[str, ...], tuple[str,
 def make_calls(scenario: Scenario, native: Callable[[Sequence[str], Sequence[str]], Native],
                inputs: Sequence[str], outputs: Sequence[str]) -> PlantCalls:  # fmt: skip
     """Make the plant's calls by a function that makes those for some inputs and outputs."""
-    effectiveness = [f"thrust_effectiveness[{i + 1}]" for i in range(scenario.vehicle.n_thrusters)]
-    return PlantCalls(native(inputs, outputs), native(effectiveness, ()), native(LOSSES, ()))
+    return PlantCalls(native(inputs, outputs), native(effectiveness_names(scenario.vehicle), ()), native(LOSSES, ()))
 
 
-def make_model(scenario: Scenario, clock: Integers = NO_CLOCK, full: bool = False, law: Law | None = None) -> StepModel:
-    """Make the constants of a step, by the scenario's law unless another one is given."""
+def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, full: bool = False) -> StepModel:
+    """Make the constants of a step."""
     sensing, step = scenario.sensing, scenario.time.step
-    output, diagnostics = (law or LAWS[scenario.law.name]).output, (law or LAWS[scenario.law.name]).diagnostics
     sensors = scenario_sensors(scenario)
     outages = outage_schedule(scenario.outages, sensors, step)
     failures = sorted(
@@ -95,9 +94,9 @@ def make_model(scenario: Scenario, clock: Integers = NO_CLOCK, full: bool = Fals
         remaining=np.array([remaining for _, _, remaining in failures]),
         report_failures=scenario.report_failures,
         through_thrusters=scenario.actuation.through == "thrusters",
-        law_gives_wrench=output == "wrench",
+        law_gives_wrench=law.output == "wrench",
         thruster_matrix=scenario.vehicle.thruster_matrix,
-        bound=next((i for i, diagnostic in enumerate(diagnostics) if diagnostic.name == "bound"), -1),
+        bound=next((i for i, diagnostic in enumerate(law.diagnostics) if diagnostic.name == "bound"), -1),
         clock=clock,
     )
 
@@ -135,7 +134,7 @@ def step_signals(scenario: Scenario, law: Law, inputs: Sequence[str], outputs: S
     return Signals(columns_of_channels(scenario, read, (), sent, law.diagnostics))
 
 
-def make_data(scenario: Scenario, model: StepModel, law: LawOutputs, signals: Signals, inputs: Sequence[str],
+def make_data(scenario: Scenario, model: StepModel, law: Law, signals: Signals, inputs: Sequence[str],
               outputs: Sequence[str], noise: Array, flags: Sequence[str] = ()) -> StepData:  # fmt: skip
     """Make state and signals of a step; noise (control steps, 6)."""
     m, n, c = scenario.vehicle.n_thrusters, len(scenario.regions), len(scenario.criteria)
@@ -156,8 +155,7 @@ def make_data(scenario: Scenario, model: StepModel, law: LawOutputs, signals: Si
     wrench = plant_inputs[inputs.index("wrench.X") :][:6] if "wrench.X" in inputs else np.zeros(6)
     own, commands = min(len(inputs), m + 6), scenario.commands.enabled
     regions = pack([secondary.region for secondary in scenario.regions])
-    first_report = next((column.name for column in signals.columns if column.name.startswith("law.")), "")
-    report = view(first_report, law.report.size) if first_report else np.zeros(law.report.size)
+    out = outputs_of(law)
     return StepData(
         row=signals.row,
         k=np.zeros(1, np.int64),
@@ -197,10 +195,10 @@ def make_data(scenario: Scenario, model: StepModel, law: LawOutputs, signals: Si
         weights=np.zeros(n),
         calls=np.zeros(N_CALLS, np.int64),
         manual=np.zeros(1, np.int64),
-        law=law,
+        law=out,
         expected=np.full(6, np.nan),
         estimate=view("estimate.phi1", 4),
-        report=report,
+        report=view(f"law.{law.diagnostics[0].name}", out.report.size) if law.diagnostics else np.zeros(0),
         command=view("command.X", 6),
         saturated=view("allocation_saturated", 1),
         thrusts=plant_inputs[: m if model.through_thrusters else 0],

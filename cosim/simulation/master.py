@@ -23,7 +23,7 @@ from cosim.simulation.columns import columns_of
 from cosim.simulation.commands.command_handler import CommandHandler
 from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.sources import CommandSource
-from cosim.simulation.decisions import BoundArbiter, BoundLaw, outputs_of
+from cosim.simulation.decisions import BoundArbiter, BoundLaw
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.lyapunov_signals import LyapunovSignals
 from cosim.simulation.make_step import NoiseSource, make_data, make_model
@@ -124,10 +124,8 @@ class Master:
         s, scenario = self.signals, self.scenario
         inputs, outputs, flags = (c.names for c in (self.plant.inputs, self.plant.outputs, self.plant.flags))
         self._noise = NoiseSource(scenario, 1 + _BLOCK // scenario.control_every)
-        self.model = make_model(scenario, full=True, law=self.law)
-        self.data = make_data(
-            scenario, self.model, outputs_of(self.law), s, inputs, outputs, self._noise.values, flags
-        )  # fmt: skip
+        self.model = make_model(scenario, self.law, full=True)
+        self.data = make_data(scenario, self.model, self.law, s, inputs, outputs, self._noise.values, flags)
         self._plant = BoundPlant(scenario, self.plant, self.data, native=own_plant)
         self.true_state, self.state = self.data.true_state, self.data.state
         self.environment = RegionEnvironment(scenario, self.data)

@@ -28,9 +28,10 @@ LOSSES = tuple(f"{sensor}.loss_probability" for sensor in SENSORS)  # parameters
 class SteppedPlant(Protocol):
     """Plant with named variables that advances in steps."""
 
-    inputs: Channels  # buffers that change in place: `step` sends the inputs and updates the outputs
-    outputs: Channels  # buffers that change in place: `step` sends the inputs and updates the outputs
-    flags: Channels  # buffers that change in place: `step` sends the inputs and updates the outputs
+    # buffers that change in place
+    inputs: Channels  # `step` sends them
+    outputs: Channels  # `initialize` and `step` update them
+    flags: Channels  # `read_flags` updates them
 
     def set(self, values: Mapping[str, Any]) -> None:
         """Set parameters and start values by name."""
@@ -58,7 +59,7 @@ class BoundPlant:
 
     def __init__(self, scenario: Scenario, plant: SteppedPlant, data: StepData, native: bool) -> None:
         self._plant, self._step = plant, scenario.time.step
-        effectiveness = tuple(f"thrust_effectiveness[{i + 1}]" for i in range(scenario.vehicle.n_thrusters))
+        effectiveness = effectiveness_names(scenario.vehicle)
         self.native = native and isinstance(plant, Plant) and plant.fmi == 3
         self._calls: list[BoundCall] = []
         if self.native:
@@ -71,14 +72,11 @@ class BoundPlant:
             self._calls = [BoundCall(self._send_parameters, ()), BoundCall(self._make_step, ())]
             for which, bound in zip((PLANT_SET, PLANT_STEP), self._calls, strict=True):
                 set_call(data, which, bound)
-        self._parameters = []  # names, present values, and those that a plant in Python has
-        for call, names, needed in (
-            (self.calls.effectiveness, effectiveness, scenario.failures),
-            (self.calls.losses, LOSSES, scenario.outages),
-        ):
-            if needed and isinstance(plant, Plant):
-                call.inputs[:] = [plant[name] for name in names]
-            self._parameters.append((names, call.inputs, call.inputs.copy()))
+        if isinstance(plant, Plant):
+            read_parameters(scenario, plant, self.calls)
+        # names, present values, and those that a plant in Python has
+        values = (effectiveness, self.calls.effectiveness.inputs), (LOSSES, self.calls.losses.inputs)
+        self._parameters = [(names, present, present.copy()) for names, present in values]
 
     def _send_parameters(self) -> None:
         for names, values, sent in self._parameters:
@@ -111,6 +109,19 @@ class BoundPlant:
         """Raise the error of an FMU's step that failed."""
         assert isinstance(self._plant, Plant)
         self._plant.raise_failure(ended=bool(self.calls.native.results[1]))
+
+
+def effectiveness_names(vehicle: Vehicle) -> tuple[str, ...]:
+    """Return the names of the parameters that fail thrusters."""
+    return tuple(f"thrust_effectiveness[{i + 1}]" for i in range(vehicle.n_thrusters))
+
+
+def read_parameters(scenario: Scenario, plant: Plant, calls: PlantCalls) -> None:
+    """Read the parameters that failures and outages of a scenario change."""
+    if scenario.failures:
+        calls.effectiveness.inputs[:] = [plant[name] for name in effectiveness_names(scenario.vehicle)]
+    if scenario.outages:
+        calls.losses.inputs[:] = [plant[name] for name in LOSSES]
 
 
 def _buffers(inputs: Array, outputs: Array = _NONE, flags: Any = _NO_FLAGS) -> Native:

@@ -12,7 +12,7 @@ from cosim.simulation.make_step import exchanged_variables, make_data, make_mode
 from cosim.simulation.signals import Array, Column, Signals
 from cosim.ssp.controller_step import ControllerInputs, ControllerOutputs
 from cosim.ssp.memory import Memory, arrays_of
-from cosim.step.step_model import Integers, LawOutputs, StepData, StepModel
+from cosim.step.step_model import Integers, StepData, StepModel
 
 
 class Loop:
@@ -21,13 +21,12 @@ class Loop:
     def __init__(self, scenario: Scenario) -> None:
         self.law: CompiledLaw = law_of(scenario)
         nothing: Integers = np.empty(0, np.int64)
-        self.model: StepModel = make_model(scenario)._replace(
+        self.model: StepModel = make_model(scenario, self.law)._replace(
             full=True, jacobi=True, moving=True, moving_regions=nothing, control_every=1, arbiter_every=1
         )  # the importer sets velocities, and the C code counts the law's period
         inputs, outputs = exchanged_variables(scenario)
         signals, noise = Signals([Column("time", "s", "Simulated time")]), np.zeros((1, 6))
-        law = LawOutputs(self.law.estimate, self.law.expected, self.law.report)
-        data = make_data(scenario, self.model, law, signals, inputs, outputs, noise)
+        data = make_data(scenario, self.model, self.law, signals, inputs, outputs, noise)
         self.data: StepData = data._replace(measurements=empty_measurements())
         n_values, n_sensors = (N_VALUES, N_SENSORS) if self.model.through_sensors else (0, 0)
         self.inputs = ControllerInputs(

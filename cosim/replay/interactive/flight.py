@@ -19,7 +19,6 @@ from cosim.simulation.make_step import SENSED, exchanged_variables, make_calls, 
 from cosim.simulation.signals import Column, Signals
 from cosim.simulation.stepped_plant import vehicle_channels
 from cosim.step.score import empty_metrics
-from cosim.step.step_model import LawOutputs
 from plant_fmu.running.channels import Channel
 from plant_fmu.running.native import Native
 from plant_fmu.variables import variables
@@ -42,7 +41,7 @@ class Flight:
         flags = [channel.name for channel in channels.flags if is_drawn(channel.name)]
         signals = Signals(_columns(scenario, outputs, flags, self.law.diagnostics))
         self.columns = {column.name: i for i, column in enumerate(signals.columns)}
-        model = make_model(scenario, full=True)
+        model = make_model(scenario, self.law, full=True)
         self.model = model._replace(
             # the page can add noise to an exact state
             exact=Expression("m->exact") if through_state and not scenario.sensing.dead_for > 0.0 else model.exact,  # type: ignore[arg-type]
@@ -52,8 +51,7 @@ class Flight:
         )
         periods = scenario.steps // scenario.control_every
         self.noise = np.zeros((1 + periods if through_state else 0, 6))
-        of_law = LawOutputs(self.law.estimate, self.law.expected, self.law.report)
-        self.data = make_data(scenario, self.model, of_law, signals, inputs, outputs, self.noise, flags)
+        self.data = make_data(scenario, self.model, self.law, signals, inputs, outputs, self.noise, flags)
         calls = make_calls(scenario, self._native, inputs, outputs)
         self.plant = calls._replace(native=self._native(inputs, outputs, flags))
         _, self.metrics = empty_metrics()

@@ -1,13 +1,14 @@
 """Stepping: order, periods, actuation, and observers."""
 
 import time
+import tomllib
 
 import numpy as np
 import pytest
 
 from controller import FunctionLaw
 from controller.compiling.function import INTERPRETED
-from cosim.scenario.scenario import load_scenario
+from cosim.scenario.scenario import load_scenario, validate_scenario
 from cosim.simulation.master import Master
 from plant_fmu import PlantError
 from tests.cosim.simulation.keep import kept_rows
@@ -167,3 +168,12 @@ def test_an_error_of_a_python_law_ends_the_block_before_its_step(error):
     with Master(load_scenario("paper", SHORT), FunctionLaw(law)) as master, pytest.raises(error):
         master.run([blocks])
     assert len(calls) == 300 and len(blocks.rows) == 299 and max(blocks.sizes) > 1
+
+
+def test_a_region_may_be_called_law():
+    table = load_scenario("docking", ["arbiter.engine=closed", "time.duration=1.0"]).toml()
+    kept = kept_rows(validate_scenario(tomllib.loads(table.replace('"port wall"', '"law"')), "renamed"))
+    plain = kept_rows(validate_scenario(tomllib.loads(table), "plain"))
+    for other in ("law.clearance", "law.desired_speed"):
+        np.testing.assert_array_equal(kept[other], plain[other.replace("law.clearance", "port wall.clearance")])
+    assert kept["law.desired_speed"].any()
