@@ -32,9 +32,7 @@ class Memory:
 
     def keep(self, array: np.ndarray) -> int:
         """Give an array a place in the member for its type; return the index of its first item there."""
-        base = array
-        while isinstance(base.base, np.ndarray):
-            base = base.base
+        base = _base(array)
         if id(base) not in self._places:
             member = self._member(base)
             self._places[id(base)] = self._sizes[member]
@@ -46,7 +44,7 @@ class Memory:
     def fix(self, *values: Any) -> None:
         """Define all arrays of arguments as constants, except those that have a place already."""
         for array in (array for value in values for array in arrays_of(value)):
-            if array.size and id(array) not in self._places and id(array) not in self._constants:
+            if array.size and id(_base(array)) not in self._places and id(array) not in self._constants:
                 name = f"CONSTANT_{len(self._constants)}"
                 self._constants[id(array)] = name
                 self._kept.append(array)
@@ -106,6 +104,13 @@ class Named:
     def __init__(self, value: tuple[float, ...], member: str) -> None:
         self.value = value
         self.text = f"{{{', '.join(f'm->{member}[{i}]' for i in range(len(value)))}}}"
+
+
+def _base(array: np.ndarray) -> np.ndarray:
+    """Return the array that owns the memory of an array."""
+    while isinstance(array.base, np.ndarray):
+        array = array.base
+    return array
 
 
 def arrays_of(value: Any) -> Iterator[Numbers]:

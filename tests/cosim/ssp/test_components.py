@@ -10,8 +10,10 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 
+from controller import LAWS
 from cosim.scenario.scenario import load_scenario
 from cosim.ssp import arbiter_component, controller_component
+from cosim.ssp.loop import Loop
 from cosim.ssp.system import MOTION, WRENCH
 from fuzzy_arbiter import Arbiter
 from plant_fmu import PlantError
@@ -127,17 +129,27 @@ def test_numbers_of_the_scenario_are_parameters(controller):
     changes = [
         "law.gains.k_p1=30.0", "law.gains.gamma=1.0", "arbiter.ramp=0.3", "regions.ball.gain=77.0",
         "regions.ball.shape.radius=0.9", "regions.line.shape.radius=0.5", "initial.position=[1.0, 1.0, 2.0]",
+        "goal.velocity=[0.4, 0.0, 0.0]", "regions.ball.velocity=[0.5, 0.0, -0.05]",
     ]  # fmt: skip
     other = load_scenario(ALL_SHAPES, changes)
     controller.set({
         "law.gains.k_p1": 30.0, "law.gains.gamma": 1.0, "arbiter.ramp": 0.3, "regions.ball.gain": 77.0,
         "regions.ball.shape.radius": 0.9, "regions.line.shape.radius": 0.5,
         "initial.position.x": 1.0, "initial.position.y": 1.0, "initial.position.z": 2.0,
+        "goal.velocity.x": 0.4, "regions.ball.velocity.x": 0.5,
     })  # fmt: skip
     controller.initialize()
-    initial = other.initial
+    initial, parts = other.initial, Parts(other)
     start = np.array([*initial.position, *initial.quaternion, *initial.velocity])
-    assert_step(controller, Parts(other), 0, start, np.zeros(3))
+    for k in range(4):  # regions move from the second step on
+        assert_step(controller, parts, k, start, np.zeros(3))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_no_array_is_both_a_variable_and_a_constant(law):
+    memory = Loop(load_scenario("docking", [f"law.name={law}"])).memory
+    variables = [array for pool in memory._pools.values() for array in pool]
+    assert memory._kept and not [a for a in memory._kept for v in variables if np.shares_memory(a, v)]
 
 
 @pytest.mark.parametrize(
