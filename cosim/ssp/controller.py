@@ -177,7 +177,7 @@ def _parameters(scenario: Scenario, loop: Loop) -> Iterator[Variable]:
         yield _parameter(f"law.gains.{name}", f"gains[{i}]", quantity, description, start)
     for i, start in enumerate(scenario.law.desired_quaternion):
         description = f"Attitude to be kept, as unit quaternion from body to world, part {i}"
-        member = loop.member(loop.law.desired_quaternion, i)
+        member = loop.member(loop.desired_quaternion, i)
         yield _parameter(f"law.desired_quaternion.e{i}", member, q.QUATERNION, description, start)
     description = "Width over which a membership falls from 1 to 0 outside a region [m], rad for regions of attitude"
     ramp = Quantity("", 0.0, 1e6)

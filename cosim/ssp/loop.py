@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller import CompiledLaw
+from controller import CompiledLaw, LawError
 from controller.navigation.measurements import N_SENSORS, N_VALUES, empty_measurements
+from controller.quaternion import from_axis_angle
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.make_step import exchanged_variables, make_data, make_model
@@ -13,6 +14,8 @@ from cosim.simulation.signals import Array, Column, Signals
 from cosim.ssp.controller_step import ControllerInputs, ControllerOutputs
 from cosim.ssp.memory import Memory, arrays_of
 from cosim.step.step_model import Integers, StepData, StepModel
+
+_AXIS = np.array([0.48, 0.6, 0.64])  # rotation axis of an attitude that no law has initially
 
 
 class Loop:
@@ -38,7 +41,9 @@ class Loop:
             thrusts=np.zeros(m), lost=np.zeros(m), outages=np.zeros(N_SENSORS), values=np.zeros(n),
             clearances=np.zeros(n), failures=np.zeros(1, np.int64), changes=np.zeros(1, np.int64),
         )  # fmt: skip
-        self.period: Array = self.law.memory.period  # (1,) s
+        self.desired_quaternion = _find_attitude(self.law, law_of(scenario))
+        # (1,) s, that of the law if its memory has one
+        self.period: Array = getattr(self.law.memory, "period", np.array([scenario.time.control]))
         self.ramp = np.array([scenario.arbiter.ramp])
         self.memory = Memory()
         self.constants = self._place_arrays()
@@ -52,7 +57,7 @@ class Loop:
         memory, model, data, given, out = self.memory, self.model, self.data, self.inputs, self.out
         for array in (
             data.goal.numbers, data.goal.velocities, data.regions.numbers, data.regions.gains, data.regions.velocities,
-            self.law.desired_quaternion, self.period, self.ramp,
+            self.desired_quaternion, self.period, self.ramp,
             given.start, given.motion, given.samples, given.sample_times, data.by_criterion,
         ):  # fmt: skip
             memory.keep(array)
@@ -92,3 +97,13 @@ class Loop:
             (out.changes, model.outage_steps.size),
         )
         return {self.memory.keep(counter): most for counter, most in counters}
+
+
+def _find_attitude(law: CompiledLaw, other: CompiledLaw) -> Array:
+    """Return the array in a law's memory that `set_attitude` writes, found with another law of the scenario."""
+    before = [array.copy() for array in arrays_of(other.memory)]
+    other.set_attitude(from_axis_angle(_AXIS, 2.0))
+    for old, new, own in zip(before, arrays_of(other.memory), arrays_of(law.memory), strict=True):
+        if not np.array_equal(old, new, equal_nan=old.dtype == float):
+            return own
+    raise LawError(f"law {law.name} keeps no attitude that could be another, expected one that `set_attitude` sets")

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 from fmpy.fmi2 import FMU2Slave
 
-from controller import LAWS
+from controller import LAWS, LawError
 from cosim.scenario.scenario import load_scenario
 from cosim.ssp import arbiter_component, controller_component
 from cosim.ssp.loop import Loop
 from cosim.ssp.system import MOTION, WRENCH
+from examples.laws.sliding_mode import SlidingModeLaw
 from fuzzy_arbiter import Arbiter
 from plant_fmu import PlantError
 from plant_fmu.build import cached_fmu
@@ -143,6 +144,35 @@ def test_numbers_of_the_scenario_are_parameters(controller):
     start = np.array([*initial.position, *initial.quaternion, *initial.velocity])
     for k in range(4):  # regions move from the second step on
         assert_step(controller, parts, k, start, np.zeros(3))
+
+
+class FixedAttitude(SlidingModeLaw):
+    """A law whose memory is no attitude that can be set."""
+
+    def set_attitude(self, quaternion):
+        pass
+
+
+def with_law(monkeypatch, law):
+    monkeypatch.setattr(law, "name", "own", raising=False)
+    monkeypatch.setitem(LAWS, "own", law)
+    return load_scenario(ALL_SHAPES, ["law.name='own'", "law.gains={}"])
+
+
+def test_law_of_ones_own_needs_no_period_in_its_memory(fmi, monkeypatch):
+    own = with_law(monkeypatch, SlidingModeLaw)
+    rng, parts = np.random.default_rng(5), Parts(own)
+    with CoSimulationInstance(cached_fmu(controller_component(own), fmi)) as slave:
+        slave.initialize()
+        for k in range(9):
+            motion = random_motion(rng)
+            send(slave, MOTION, motion)
+            assert_step(slave, parts, k, motion, np.zeros(3))
+
+
+def test_law_without_a_changing_attitude_is_refused(monkeypatch):
+    with pytest.raises(LawError, match="law own keeps no attitude that could be another"):
+        controller_component(with_law(monkeypatch, FixedAttitude))
 
 
 @pytest.mark.parametrize("law", LAWS)
