@@ -109,11 +109,11 @@ def clearances_at(scenario: Scenario, record: Record, time: Array) -> Array:
     environment, shifts = RegionEnvironment(scenario), np.zeros((len(scenario.moving), 3))
     positions = np.stack([record[f"position.{axis}"] for axis in "xyz"], axis=1)
     quaternions = np.stack([record[f"quaternion.e{i}"] for i in range(4)], axis=1)
-    found = np.zeros((len(time), len(scenario.regions) + 1))
+    clearances = np.zeros((len(time), len(scenario.regions) + 1))
     for row, at in enumerate(time.tolist()):
         environment.update_positions(max(at, 0.0), shifts)
-        found[row] = environment.evaluate(positions[row], quaternions[row])[1]
-    return found
+        clearances[row] = environment.evaluate(positions[row], quaternions[row])[1]
+    return clearances
 
 
 def _after_fault(record: Record, at: Array, flown: Flown, scenario: Scenario, found: Array) -> dict[str, Any]:

@@ -81,10 +81,10 @@ def _digest(module: str) -> str:
 
 def _closure(modules: set[str]) -> set[str]:
     """Return modules with all modules of these packages that they import, from which their constants may come."""
-    found, new = set[str](), set(modules)
-    while new:
-        name = new.pop()
-        found.add(name)
+    closure, unread = set[str](), set(modules)
+    while unread:
+        name = unread.pop()
+        closure.add(name)
         parts = _IMPORT.findall(_source(name))
-        new |= {part for part in parts if part.partition(".")[0] in _OWN and part in sys.modules} - found
-    return found
+        unread |= {part for part in parts if part.partition(".")[0] in _OWN and part in sys.modules} - closure
+    return closure

@@ -177,7 +177,7 @@ def _log_facts(run: Run) -> LogFacts | None:
 
 
 def _log(run: Run) -> dict[str, Any] | None:
-    """Return what is said about the sources and the gaps of an imported run; None for other runs."""
+    """Return the sources and the gaps of an imported run; None for other runs."""
     facts = _log_facts(run)
     if facts is None:
         return None

@@ -316,8 +316,8 @@ class Samples:
                 add_minima(below, fires[i] & (top_slots != i).all(axis=1), scale)
         items, breaks = self._located(events, rows, positions)
         inside = (breaks > starts[items]) & (breaks < ends[items])
-        found = [(items[inside], breaks[inside]), *minima]
-        items, breaks = (np.concatenate(column) for column in zip(*found, strict=True))
+        parts = [(items[inside], breaks[inside]), *minima]
+        items, breaks = (np.concatenate(column) for column in zip(*parts, strict=True))
         return items, breaks, top_slots[:, 4]
 
     def _located(self, parts: Sequence[Events], rows: Indices, positions: Array) -> tuple[Indices, Array]:

@@ -61,17 +61,17 @@ def read(kind, table, folder):
 
 @cache
 def examples():
-    """Tables that are good, each with the kind of its file."""
+    """Valid tables, each with the kind of its file."""
     tipping = tomllib.loads((ROOT / "tests" / "data" / "fuzzy" / "tipping.toml").read_text())
     scene = json.loads((ROOT / "tests" / "data" / "scenes" / "hard.jsonl").read_text().splitlines()[0])
     scene |= {"noise": {"position": 0.1}, "failed_thruster": {"index": 1, "time": 2.0}}
     scenarios = ("paper", "docking", str(ROOT / "tests" / "cosim" / "ssp" / "all-shapes.toml"))
-    found = [("scenario", tomllib.loads(load_scenario(name).toml())) for name in scenarios]
-    found[1][1]["failures"] = [{"thruster": 1, "time": 3.0}]
+    valid = [("scenario", tomllib.loads(load_scenario(name).toml())) for name in scenarios]
+    valid[1][1]["failures"] = [{"thruster": 1, "time": 3.0}]
     vehicles = [(ROOT / f"plant_fmu/vehicles/{name}.toml").read_text() for name in shipped_vehicles()]
-    found += [("vehicle", tomllib.loads(text)) for text in vehicles]
-    found += [(kind, table) for kind in list(READERS)[-2:] for table in (tipping, CRITERIA)]
-    return found + [("scenes", scene)] + [("commands", {"step": 1, "command": order}) for order in COMMANDS_LOG]
+    valid += [("vehicle", tomllib.loads(text)) for text in vehicles]
+    valid += [(kind, table) for kind in list(READERS)[-2:] for table in (tipping, CRITERIA)]
+    return valid + [("scenes", scene)] + [("commands", {"step": 1, "command": order}) for order in COMMANDS_LOG]
 
 
 def tables(value, path=()):
@@ -113,9 +113,9 @@ def test_unknown_keys_are_rejected_by_name(file, table, path, tmp_path):
 
 @pytest.mark.parametrize("file", READERS)
 def test_example_tables_are_valid(file, tmp_path):
-    good = [table for kind, table in examples() if kind == file]
-    assert good
-    for table in good:
+    tables = [table for kind, table in examples() if kind == file]
+    assert tables
+    for table in tables:
         read(file, table, tmp_path)
 
 

@@ -38,13 +38,13 @@ def test_force_is_that_of_a_linear_program(count):
         directions = np.array([rng.normal(size=3), inside[:3], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
         directions = directions[directions.any(axis=1)]
         directions /= np.linalg.norm(directions, axis=1)[:, None]
-        found = max_forces(matrix, lower, upper, directions, wrench)
-        if np.isnan(found).any():  # outside of the limits, and then beside one ray and its opposite at least
-            assert np.isnan(found).all()
+        forces = max_forces(matrix, lower, upper, directions, wrench)
+        if np.isnan(forces).any():  # outside of the limits, and then beside one ray and its opposite at least
+            assert np.isnan(forces).all()
             u = linprog(np.zeros(count), A_eq=matrix, b_eq=wrench, bounds=list(zip(lower, upper, strict=True)))
             assert not u.success
             continue
-        for direction, force in zip(directions, found, strict=True):
+        for direction, force in zip(directions, forces, strict=True):
             assert force == pytest.approx(by_linear_program(matrix, lower, upper, direction, wrench), abs=1e-6)
             finite, flat = finite + (force > 1e-3), flat + (force < 1e-9)
     assert flat and (finite or count < 6)

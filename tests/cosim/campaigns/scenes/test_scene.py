@@ -58,8 +58,8 @@ def test_invalid_scene_line_is_rejected_by_key(tmp_path, text, words):
     file.write_bytes(f"{json.dumps(LINE)}\n{bad}".encode("latin-1"))
     with pytest.raises(ScenarioError, match=r"scenes\.jsonl, line 2: ") as refused:
         list(read_scenes(file))
-    said = str(refused.value)
-    assert "\n" not in said and all(word in said for word in words)
+    message = str(refused.value)
+    assert "\n" not in message and all(word in message for word in words)
 
 
 @pytest.mark.parametrize("name", ["nowhere.jsonl", "."])
