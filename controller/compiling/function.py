@@ -63,7 +63,11 @@ class BoundCall:
             call.kept = self._words, arguments  # so that `call` works without this object
             self.call: Callable[[], None] = call
         else:
-            self.words, self.call = 0, functools.partial(interpret, function, arguments)
+            plain = isinstance(function, FunctionType)  # others, such as a law of a user, get the arrays as they are
+            self.call = (
+                functools.partial(interpret, function, arguments) if plain else functools.partial(function, *arguments)
+            )
+            self.words = 0
             served = self._serve()
             next(served)
             self._entry = _CALLBACK(served.send)

@@ -18,7 +18,7 @@ from controller.translator.types import Type
 
 log = logging.getLogger(__name__)
 _OWN = ("controller", "cosim", "plant_fmu", "fuzzy_arbiter")  # others' functions may depend on more than on their files
-_IMPORT = re.compile(r"^\s*(?:from|import) +([\w.]+)", re.M)
+_IMPORT = re.compile(r"^\s*(?:from +([\w.]+) +)?import +([^\n#]*)", re.M)
 
 
 def c_text_of(function: Callable[..., None], types: tuple[Type, ...]) -> str:
@@ -28,7 +28,7 @@ def c_text_of(function: Callable[..., None], types: tuple[Type, ...]) -> str:
         return _translated(function, types).text()
     key = hashlib.sha256(f"{module} {function.__qualname__} {types} {sys.version}".encode()).hexdigest()[:32]
     path = cache_folder() / f"{key}.json"
-    text = _kept(path)
+    text = _read_cached(path)
     if text is None:
         program = _translated(function, types)
         text = program.text()
@@ -49,21 +49,21 @@ def _translated(function: Callable[..., None], types: tuple[Type, ...]) -> Progr
     return program
 
 
-def _kept(path: Path) -> str | None:
+def _read_cached(path: Path) -> str | None:
     """Return a text from the cache; None unless all files and values that it was made from are as they were."""
     try:
         checksum, _, data = path.read_bytes().partition(b"\n") if is_trusted(path.parent) else (b"", b"", b"")
         if checksum == digest_of(data).encode():
             kept = json.loads(data)
             same_files = all(_digest(name) == digest for name, digest in kept["modules"].items())
-            if same_files and all(_present(name) == text for name, text in kept["globals"].items()):
+            if same_files and all(_current_value(name) == text for name, text in kept["globals"].items()):
                 return str(kept["text"])
     except (OSError, KeyError, AttributeError):  # a file or a value is not there
         pass
     return None
 
 
-def _present(name: str) -> str:
+def _current_value(name: str) -> str:
     """Return the text of a value, which may have been set since its file was read, by "module:name"."""
     module, _, attribute = name.partition(":")
     return text_of_global(getattr(sys.modules[module], attribute))
@@ -85,6 +85,8 @@ def _closure(modules: set[str]) -> set[str]:
     while unread:
         name = unread.pop()
         closure.add(name)
-        parts = _IMPORT.findall(_source(name))
-        unread |= {part for part in parts if part.partition(".")[0] in _OWN and part in sys.modules} - closure
+        for package, names in _IMPORT.findall(_source(name)):
+            parts = re.findall(r"[\w.]+", names)
+            imported = {package, *(f"{package}.{part}" for part in parts)} if package else set(parts)
+            unread |= {one for one in imported if one.partition(".")[0] in _OWN and one in sys.modules} - closure
     return closure

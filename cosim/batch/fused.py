@@ -17,18 +17,17 @@ from cosim.results.spans import SETTLED_FOR
 from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
+from cosim.simulation.bindings import BoundLaw
 from cosim.simulation.compiled_rules import BoundRules
-from cosim.simulation.decisions import BoundLaw
 from cosim.simulation.make_step import (
     NO_CLOCK,
     exchanged_variables,
-    make_calls,
     make_data,
     make_model,
     make_noise,
     step_signals,
 )
-from cosim.simulation.stepped_plant import read_parameters
+from cosim.simulation.stepped_plant import plant_calls
 from cosim.step.score import FlightMetrics, empty_metrics, fly
 from cosim.step.step_model import ARBITER, Array, Integers, StepData, StepModel, set_call
 from fuzzy_arbiter import Arbiter
@@ -115,8 +114,7 @@ def fly_scenario(
     plant.set(start_values(scenario))
     plant.initialize()
     inputs, outputs = exchanged_variables(scenario)
-    calls = make_calls(scenario, plant.native, inputs, outputs)
-    read_parameters(scenario, plant, calls)
+    calls = plant_calls(scenario.vehicle, plant.native(inputs, outputs), plant.native)
     model, signals = make_model(scenario, law, clock), step_signals(scenario, law, inputs, outputs)
     data = make_data(scenario, model, law, signals, inputs, outputs, make_noise(scenario))
     bound_law = BoundLaw(law, model, data)
@@ -144,8 +142,8 @@ def _outcome(metrics: FlightMetrics[float], model: StepModel, data: StepData) ->
         "reach_time": when(metrics.first_inside),
         "settled": metrics.inside and stayed >= SETTLED_FOR,
         "settle_time": when(metrics.last_entered),
-        "violated": metrics.least_clearance < 0.0 or metrics.least_angle < 0.0,
-        "min_clearance": metrics.least_clearance,
+        "violated": metrics.min_clearance < 0.0 or metrics.min_angle < 0.0,
+        "min_clearance": metrics.min_clearance,
         "weighted_violation": metrics.weighted_violation,
         "closest_to_goal": -metrics.goal_clearance if metrics.goal_clearance > -math.inf else math.nan,
         "effort": metrics.effort,

@@ -73,7 +73,7 @@ class LiveView:
             self._due = now + PERIOD
             self._rows.append((self._run, row[self._picked]))
 
-    def take(self, first: int, rows: Array) -> None:
+    def observe_block(self, first: int, rows: Array) -> None:
         """Copy the last of the rows of the steps from `first` on, if a copy is due."""
         self.observe(first + len(rows) - 1, rows[-1])
 

@@ -66,9 +66,9 @@ class LinkThread:
 
     def observe(self, k: int, row: Array) -> None:
         """Queue a copy of the row of step `k`, if a snapshot is due."""
-        self.take(k, row[None])
+        self.observe_block(k, row[None])
 
-    def take(self, first: int, rows: Array) -> None:
+    def observe_block(self, first: int, rows: Array) -> None:
         """Queue copies of the rows of the steps from `first` on of which a snapshot is due."""
         for row in rows[-first % self._decimation :: self._decimation]:
             self.dropped += len(self._queue) == MAX_SNAPSHOTS

@@ -56,7 +56,7 @@ class Recorder:
         self._filled += 1
         self.rows += 1
 
-    def take(self, first: int, rows: Array) -> None:
+    def observe_block(self, first: int, rows: Array) -> None:
         """Record the rows of the steps from `first` on, shape (steps, columns) of float64."""
         self._transpose()
         size = self._columns.shape[1]

@@ -54,9 +54,9 @@ class _Progress:
         )  # fmt: skip
 
     def observe(self, k: int, row: Array) -> None:
-        self.take(k, row[None])
+        self.observe_block(k, row[None])
 
-    def take(self, first: int, rows: Array) -> None:
+    def observe_block(self, first: int, rows: Array) -> None:
         last = first + len(rows) - 1
         if last // self._every > (first - 1) // self._every:
             self._bar.update_to(last * self._step)

@@ -14,7 +14,7 @@ from cosim.errors import CommandError, RunError
 from cosim.scenario.region_tables import PARKED_POSITION, Vector3
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
-from cosim.step.placed_regions import move_packed
+from cosim.step.region_positions import move_packed
 from cosim.step.step_model import StepData
 
 _SPHERE_NUMBERS = len(Sphere((0.0, 0.0, 0.0), 1.0).packed())
@@ -99,7 +99,8 @@ class RegionEnvironment:
         else:
             self._store_target()
             self._reached.velocity, self._reached.origin = going, to - going * time
-            self._load_target()
+            if self._reached is self._target:
+                self._load_target(time)
 
     def _set_motion(self, i: int, displacement: Array, velocity: Array, time: float) -> None:
         self.regions.velocities[i] = velocity
@@ -152,29 +153,33 @@ class RegionEnvironment:
                 Sphere(position, radius), np.array(position), np.zeros(3), np.array(velocity), radius
             )
         self._target.origin -= np.multiply(velocity, time)
-        self._load_target()
+        self._load_target(time)
 
     def save_target(self) -> None:
         """Save the present target for `restore_target`."""
         self._reached = self._target
 
-    def restore_target(self) -> None:
-        """Restore the target that was saved last; the scenario's goal, if none was."""
+    def restore_target(self, time: float) -> None:
+        """Restore the target that was saved last, at a time [s]; the scenario's goal, if none was."""
         self._store_target()
         self._target = self._reached
-        self._load_target()
+        self._load_target(time)
 
     def _store_target(self) -> None:
         """Take over the origin of the target, which a step changes where the scenario has goals in turn."""
         self._target.origin = self._goal_origin[0].copy()
 
-    def _load_target(self) -> None:
-        """Write the target into the arrays of the goal."""
+    def _load_target(self, time: float) -> None:
+        """Write the target into the arrays of the goal, at its position at a time [s]."""
+        self._load_shape()
+        self.goal.velocities[0], self._goal_origin[0] = self._target.velocity, self._target.origin
+        self._goal_center[:] = self._target.middle
+        move_packed(self.goal, self._goal_origin, time)
+
+    def _load_shape(self) -> None:
         numbers = self._target.shape.packed()
         self.goal.kinds[0], self.goal.offsets[1] = self._target.shape.kind, len(numbers)
         self.goal.numbers[: len(numbers)] = numbers
-        self.goal.velocities[0], self._goal_origin[0] = self._target.velocity, self._target.origin
-        self.goal.shifts[0], self._goal_center[:] = self._target.origin, self._target.middle
 
     # ---- changed from outside ----
 
@@ -192,8 +197,7 @@ class RegionEnvironment:
         for target in (self._reached, self._target):
             if not target.radius:
                 target.shape = shape
-        self._store_target()
-        self._load_target()
+        self._load_shape()
 
     @staticmethod
     def _reshape(regions: PackedRegions, i: int, shape: Shape) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -14,17 +14,14 @@ from controller.regions import pack
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model
 from cosim.simulation.actuation_limits import failure_stages
+from cosim.simulation.bindings import outputs_of
 from cosim.simulation.columns import columns_of_channels
-from cosim.simulation.decisions import outputs_of
 from cosim.simulation.environment import pack_target, shape_center, stay_steps
 from cosim.simulation.signals import Signals
-from cosim.simulation.stepped_plant import LOSSES, effectiveness_names
 from cosim.step.arbiter_inputs import ArbiterSignals, empty_signals, empty_state, pack_inputs
-from cosim.step.placed_regions import RegionEvaluation
-from cosim.step.plant_calls import PlantCalls
+from cosim.step.region_positions import RegionEvaluation
 from cosim.step.step_model import N_CALLS, Array, Integers, StepData, StepModel
 from plant_fmu.running.channels import Channel
-from plant_fmu.running.native import Native
 
 STREAM = 1  # second part of the seed, as in scored scenes: a scene and a scenario of one seed have the same noise
 _ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
@@ -48,13 +45,7 @@ def exchanged_variables(scenario: Scenario) -> tuple[tuple[str, ...], tuple[str,
     return tuple(f"wrench.{axis}" for axis in "XYZKMN"), (*_MOTION, *sensed, *wrench)
 
 
-def make_calls(scenario: Scenario, native: Callable[[Sequence[str], Sequence[str]], Native],
-               inputs: Sequence[str], outputs: Sequence[str]) -> PlantCalls:  # fmt: skip
-    """Make the plant's calls by a function that makes those for some inputs and outputs."""
-    return PlantCalls(native(inputs, outputs), native(effectiveness_names(scenario.vehicle), ()), native(LOSSES, ()))
-
-
-def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, full: bool = False) -> StepModel:
+def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, for_record: bool = False) -> StepModel:
     """Make the constants of a step."""
     sensing, step = scenario.sensing, scenario.time.step
     sensors = scenario_sensors(scenario)
@@ -71,7 +62,7 @@ def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, full: b
         arbiter_every=scenario.arbiter_every,
         jacobi=scenario.master.order == "jacobi",
         commands=scenario.commands.enabled,
-        full=full,
+        for_record=for_record,
         criteria=np.array(scenario.criterion_places, np.int64),
         priorities=np.array([secondary.priority for secondary in scenario.regions]),
         inputs=pack_inputs(scenario.regions, scenario.criteria, scenario.rules, scenario.arbiter.ramp),
@@ -129,9 +120,13 @@ def make_noise(scenario: Scenario) -> Array:
 
 
 def step_signals(scenario: Scenario, law: Law, inputs: Sequence[str], outputs: Sequence[str]) -> Signals:
-    """Return the row of a step that exchanges some inputs and outputs with the plant."""
+    """Return the row of a step without a record, which exchanges some inputs and outputs with the plant."""
     sent, read = ([Channel(name, "", "") for name in names] for names in (inputs, outputs))
-    return Signals(columns_of_channels(scenario, read, (), sent, law.diagnostics))
+    columns = columns_of_channels(scenario, read, (), sent, law.diagnostics)
+    left_out = {f"{name}.value" for name in ("goal", *(secondary.region.name for secondary in scenario.regions))}
+    if law.output == "thrusters":
+        left_out |= {f"command.{axis}" for axis in "XYZKMN"}
+    return Signals([column for column in columns if column.name not in left_out])
 
 
 def make_data(scenario: Scenario, model: StepModel, law: Law, signals: Signals, inputs: Sequence[str],
@@ -161,7 +156,7 @@ def make_data(scenario: Scenario, model: StepModel, law: Law, signals: Signals, 
         k=np.zeros(1, np.int64),
         now=signals.row[:1],
         outputs=view(outputs[0], len(outputs)),
-        applied=np.array([first_force]),
+        first_applied=np.array([first_force]),
         forces=view("thruster_force[1]", m if model.through_thrusters else 0),
         force=view("actuation.X" if "actuation.X" in outputs else "actuator.wrench.X", 3),
         flags=view(flags[0], len(flags)) if flags else np.zeros(0),
@@ -186,7 +181,9 @@ def make_data(scenario: Scenario, model: StepModel, law: Law, signals: Signals, 
         measurements=Measurements(view(SENSED[0], len(VALUES)), view(SENSED[len(VALUES)], len(SENSORS))),
         navigation=empty_memory(),
         true_evaluation=RegionEvaluation(values, np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), clearances),
-        given_evaluation=RegionEvaluation(np.zeros(n + 1), np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1)),
+        arbiter_evaluation=RegionEvaluation(
+            np.zeros(n + 1), np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1)
+        ),
         signals=ArbiterSignals(memberships, of_rules, *made[2:]),
         shown_inputs=view(f"arbiter.{rules[0].name}", 0 if model.inputs.kinds.size else len(rules))
         if scenario.arbiter.file
@@ -209,5 +206,5 @@ def make_data(scenario: Scenario, model: StepModel, law: Law, signals: Signals, 
         outages=np.zeros(1, np.int64),
         failed_step=np.full(1, -1),
         ticks=np.zeros(2, np.int64),
-        worst=np.zeros(1),
+        max_duration=np.zeros(1),
     )

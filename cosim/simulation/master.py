@@ -19,11 +19,11 @@ from cosim.scenario.law_factory import law_of, with_custom_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.actuation_limits import ActuationLimits
+from cosim.simulation.bindings import BoundLaw, bind_arbiter
 from cosim.simulation.columns import columns_of
 from cosim.simulation.commands.command_handler import CommandHandler
 from cosim.simulation.commands.commands import Command
 from cosim.simulation.commands.sources import CommandSource
-from cosim.simulation.decisions import BoundArbiter, BoundLaw
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.lyapunov_signals import LyapunovSignals
 from cosim.simulation.make_step import NoiseSource, make_data, make_model
@@ -53,8 +53,14 @@ class Observer(Protocol):
 class BlockObserver(Observer, Protocol):
     """Receives the rows of several steps at once; it must not change the run."""
 
-    def take(self, first: int, rows: Array) -> None:
+    def observe_block(self, first: int, rows: Array) -> None:
         """Take the rows of the steps from `first` on, shape (steps, n). The next block overwrites them."""
+        ...
+
+
+class _Raising(Protocol):
+    def raise_error(self) -> None:
+        """Raise the error of the last call, if it raised one."""
         ...
 
 
@@ -105,8 +111,8 @@ class Master:
         if plant is not None:
             validate_plant(plant, scenario.vehicle)
         self.scenario = scenario
-        self.arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
-        self.law: Law = law_of(scenario) if law is None else law
+        self._arbiter = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)
+        self._law: Law = law_of(scenario) if law is None else law
         self._boundary = 0.0  # s, beginning of the next step
 
         self.plant: SteppedPlant = Plant(scenario.vehicle, scenario.plant.fmi) if plant is None else plant
@@ -121,21 +127,25 @@ class Master:
 
     def _bind(self, own_plant: bool) -> None:
         """Bind plant, law, arbiter and commands to the arrays of a step."""
+        # constants, and state and signals that are views of the row
         s, scenario = self.signals, self.scenario
         inputs, outputs, flags = (c.names for c in (self.plant.inputs, self.plant.outputs, self.plant.flags))
-        self._noise = NoiseSource(scenario, 1 + _BLOCK // scenario.control_every)
-        self.model = make_model(scenario, self.law, full=True)
+        self._noise = NoiseSource(scenario, 2 + _BLOCK // scenario.control_every)
+        self.model = make_model(scenario, self.law, for_record=True)
         self.data = make_data(scenario, self.model, self.law, s, inputs, outputs, self._noise.values, flags)
+        # what a step calls: the plant, the law, the arbiter
         self._plant = BoundPlant(scenario, self.plant, self.data, native=own_plant)
         self.true_state, self.state = self.data.true_state, self.data.state
         self.environment = RegionEnvironment(scenario, self.data)
-        self._law = BoundLaw(self.law, self.model, self.data)
-        self._arbiter = BoundArbiter(self.arbiter, self.data)
+        self._bound_law = BoundLaw(self.law, self.model, self.data)
+        self._parts: list[_Raising] = [self._bound_law, bind_arbiter(self.arbiter, self.data), self._plant]
         self._span = np.zeros(3, np.int64)
         self._rows: Array = np.zeros((_BLOCK, s.row.size))
         arguments = self.model, self.data, self._plant.calls
         self._advance_one = BoundCall(advance, (*arguments, self._span, self._rows[:0]))
         self._advance_block = BoundCall(advance, (*arguments, self._span, self._rows))
+        self._show_start = BoundCall(show_start, arguments)
+        # what a step does not do itself: the Lyapunov function after it, commands within it
         self._lyapunov: LyapunovSignals | None = None
         if scenario.record.lyapunov:
             self._lyapunov = LyapunovSignals(
@@ -144,18 +154,28 @@ class Master:
             )  # fmt: skip
         self.command_handler: CommandHandler | None = None
         self._commands: CommandSource | None = None  # of the present step
-        self._hooks: list[BoundCall] = []
         if scenario.commands.enabled:
             limits = ActuationLimits(scenario, self.plant, self.model, self.data)
             self.command_handler = CommandHandler(
                 scenario, self.environment, limits, self.data.state, s.view("commands.armed", 7)
             )
             self._locate = BoundCall(locate, (self.model, self.data))
-            self._hooks = [BoundCall(f, ()) for f in (self._take_commands, self._continue_mission)]
-            for when, hook in zip((MEASURED, LOCATED), self._hooks, strict=True):
+            for when, function in ((MEASURED, self._take_commands), (LOCATED, self._continue_mission)):
+                hook = BoundCall(function, ())
                 set_call(self.data, when, hook)
+                self._parts.append(hook)
         # the caller of a plant of its own, and commands, change it between steps
         self._in_blocks = own_plant and self._lyapunov is None and self.command_handler is None
+
+    @property
+    def law(self) -> Law:
+        """The law, which its run cannot exchange."""
+        return self._law
+
+    @property
+    def arbiter(self) -> Arbiter:
+        """The arbiter, which its run cannot exchange."""
+        return self._arbiter
 
     @property
     def row(self) -> Array:
@@ -178,7 +198,7 @@ class Master:
         Parameters
         ----------
         observers : sequence of Observer
-            Observers, called in this order after each step.
+            Observers, called in this order after each step, or after each block of steps.
         rate : float, optional
             Greatest number of simulated seconds per wall-clock second; default: no limit.
         commands : CommandSource, optional
@@ -191,6 +211,8 @@ class Master:
         ------
         PlantError
             If the FMU fails in a step.
+        LawError, CommandError
+            If a law in Python returns no forces; other errors of a law, an arbiter or a source of commands pass on.
         """
         if self._in_blocks and rate is None and all(isinstance(observer, BlockObserver) for observer in observers):
             self._run_blocks([observer for observer in observers if isinstance(observer, BlockObserver)])
@@ -202,13 +224,13 @@ class Master:
         k, size = 0, 1
         while k <= self.scenario.steps:
             started = time.perf_counter()
-            n = min(size, self.scenario.steps + 1 - k)
+            n, self._span[2] = min(size, self.scenario.steps + 1 - k), 0
             try:
                 self._advance(self._advance_block, k, n)
             finally:
                 done = int(self._span[2])
                 for observer in observers if done else ():
-                    observer.take(k, self._rows[:done])
+                    observer.observe_block(k, self._rows[:done])
             k += n
             size = max(1, min(_BLOCK, 4 * size, int(n * _BLOCK_TIME / (time.perf_counter() - started))))
 
@@ -258,7 +280,7 @@ class Master:
         span[0], span[1], span[2] = k, n, 0
         self.data.failed_step[0] = -1
         self._noise.draw(1 + (k + n - 1) // self.scenario.control_every)
-        self._law.refresh()
+        self._bound_law.refresh()
         self._plant.prepare_steps()
         try:
             call.call()
@@ -266,15 +288,14 @@ class Master:
             done = int(span[2])
             self._plant.count_steps(min(k + done, self.scenario.steps) - min(k, self.scenario.steps))
             self._boundary = (k + done) * step
-        parts: tuple[BoundLaw | BoundArbiter | BoundPlant | BoundCall, ...] = (self._law, self._arbiter, self._plant)
-        for part in (*parts, *self._hooks):
+        for part in self._parts:
             part.raise_error()
         if self.data.failed_step[0] >= 0:
             self._plant.raise_failure()
 
     def measure_initial_state(self) -> None:
         """Fill the row with the initial state, which law and arbiter receive without noise; do not step the plant."""
-        BoundCall(show_start, (self.model, self.data, self._plant.calls)).call()
+        self._show_start.call()
         if self.command_handler is not None:
             self.command_handler.update(0.0, self._goal_clearance)
 
@@ -314,7 +335,7 @@ class Master:
     @property
     def _goal_clearance(self) -> float:
         """Clearance of the goal at the pose that the arbiter uses [m]."""
-        evaluation = self.data.true_evaluation if self.model.exact else self.data.given_evaluation
+        evaluation = self.data.true_evaluation if self.model.exact else self.data.arbiter_evaluation
         return float(evaluation.clearances[0])
 
     def _apply_commands(self, command_handler: CommandHandler, commands: Sequence[Command]) -> None:
@@ -322,12 +343,12 @@ class Master:
         for command in commands:
             command_handler.apply(command, float(self.data.now[0]))
         if command_handler.control_regained:
-            self._law.restart(law_of(self.scenario))
+            self._bound_law.restart(law_of(self.scenario))
         if isinstance(self.law, CompiledLaw) and (
             command_handler.control_regained or command_handler.changed or command_handler.turned
         ):
             self.law.gains = command_handler.settings.gains
-            self._law.refresh()
+            self._bound_law.refresh()
             if command_handler.heading is not None:
                 self.law.set_attitude(from_axis_angle(_DOWN, command_handler.heading))
         if command_handler.changed:

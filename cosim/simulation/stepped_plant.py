@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, NoReturn, Protocol
 
 import numpy as np
@@ -55,35 +55,31 @@ class SteppedPlant(Protocol):
 
 
 class BoundPlant:
-    """The calls by which a step exchanges values with a plant: an FMU's own, or one of a Python function."""
+    """Binds a plant to the arrays of a step: an FMU by its C functions, any other plant by Python functions."""
 
     def __init__(self, scenario: Scenario, plant: SteppedPlant, data: StepData, native: bool) -> None:
         self._plant, self._step = plant, scenario.time.step
-        effectiveness = effectiveness_names(scenario.vehicle)
         self.native = native and isinstance(plant, Plant) and plant.fmi == 3
         self._calls: list[BoundCall] = []
         if self.native:
             assert isinstance(plant, Plant)
-            parts = plant.native_channels(), plant.native(effectiveness, ()), plant.native(LOSSES, ())
-            self.calls = PlantCalls(*parts)
+            self.calls = plant_calls(scenario.vehicle, plant.native_channels(), plant.native)
         else:
             own = _buffers(plant.inputs.values, plant.outputs.values, np.zeros(len(plant.flags), np.bool_))
-            self.calls = PlantCalls(own, _buffers(np.ones(len(effectiveness))), _buffers(np.zeros(len(LOSSES))))
+            self.calls = plant_calls(scenario.vehicle, own, lambda names, _: _buffers(np.full(len(names), np.nan)))
             self._calls = [BoundCall(self._send_parameters, ()), BoundCall(self._make_step, ())]
             for which, bound in zip((PLANT_SET, PLANT_STEP), self._calls, strict=True):
                 set_call(data, which, bound)
-        if isinstance(plant, Plant):
-            read_parameters(scenario, plant, self.calls)
-        # names, present values, and those that a plant in Python has
-        values = (effectiveness, self.calls.effectiveness.inputs), (LOSSES, self.calls.losses.inputs)
-        self._parameters = [(names, present, present.copy()) for names, present in values]
+        # names and values to be sent; NaN: none
+        names, calls = _effectiveness_names(scenario.vehicle), self.calls
+        self._parameters = (names, calls.effectiveness.inputs), (LOSSES, calls.losses.inputs)
 
     def _send_parameters(self) -> None:
-        for names, values, sent in self._parameters:
-            changed = np.flatnonzero(values != sent).tolist()
+        for names, values in self._parameters:
+            changed = {name: value for name, value in zip(names, values.tolist(), strict=True) if value == value}
             if changed:
-                sent[:] = values
-                self._plant.set({names[i]: float(values[i]) for i in changed})
+                values[:] = np.nan
+                self._plant.set(changed)
 
     def _make_step(self) -> None:
         self._plant.step(self._step)
@@ -111,17 +107,16 @@ class BoundPlant:
         self._plant.raise_failure(ended=bool(self.calls.native.results[1]))
 
 
-def effectiveness_names(vehicle: Vehicle) -> tuple[str, ...]:
-    """Return the names of the parameters that fail thrusters."""
+def plant_calls(
+    vehicle: Vehicle, channels: Native, native: Callable[[Sequence[str], Sequence[str]], Native]
+) -> PlantCalls:
+    """Return the calls of a plant by its channels, and by a function that makes calls for some inputs and outputs."""
+    return PlantCalls(channels, native(_effectiveness_names(vehicle), ()), native(LOSSES, ()))
+
+
+def _effectiveness_names(vehicle: Vehicle) -> tuple[str, ...]:
+    """Return the names of the parameters by which thrusters fail."""
     return tuple(f"thrust_effectiveness[{i + 1}]" for i in range(vehicle.n_thrusters))
-
-
-def read_parameters(scenario: Scenario, plant: Plant, calls: PlantCalls) -> None:
-    """Read the parameters that failures and outages of a scenario change."""
-    if scenario.failures:
-        calls.effectiveness.inputs[:] = [plant[name] for name in effectiveness_names(scenario.vehicle)]
-    if scenario.outages:
-        calls.losses.inputs[:] = [plant[name] for name in LOSSES]
 
 
 def _buffers(inputs: Array, outputs: Array = _NONE, flags: Any = _NO_FLAGS) -> Native:
@@ -158,7 +153,8 @@ def validate_plant(plant: SteppedPlant, vehicle: Vehicle) -> None:
             raise RunError(f"plant is {type(plant).__name__} without {kind}, expected a plant such as plant_fmu.Plant")
         values = getattr(plant, kind).values
         if kind != "flags" and not (values.dtype == np.float64 and values.flags.c_contiguous):
-            raise RunError(f"plant.{kind}.values is a strided array or of {values.dtype}, expected contiguous float64")
+            what = "strided" if values.dtype == np.float64 else f"of {values.dtype}"
+            raise RunError(f"plant.{kind}.values is {what}, expected a contiguous array of float64")
         names, remaining = [channel.name for channel in expected], iter(given)
         first = {"inputs": len(names), "outputs": _STATES}.get(kind, 0)  # these stand side by side in the row
         for i, name in enumerate(names):

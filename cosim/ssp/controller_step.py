@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from cosim.step.decision import update_inputs, weigh
 from cosim.step.one_step import decide
-from cosim.step.placed_regions import completed_steps
+from cosim.step.region_positions import completed_steps
 from cosim.step.sensing import estimate_state, position_is_known, report_failures
 from cosim.step.step_model import Array, Integers, StepData, StepModel
 
@@ -47,8 +47,8 @@ def step_controller(model: StepModel, data: StepData, given: ControllerInputs, o
     data.now[0] = given.end[0]
     if position_is_known(model, data):
         update_inputs(model, data)
-        out.values[:] = data.true_evaluation.values if model.exact else data.given_evaluation.values
-        out.clearances[:] = data.true_evaluation.clearances if model.exact else data.given_evaluation.clearances
+        out.values[:] = data.true_evaluation.values if model.exact else data.arbiter_evaluation.values
+        out.clearances[:] = data.true_evaluation.clearances if model.exact else data.arbiter_evaluation.clearances
     schedule_failures(model, data, out)
     for j in range(out.thrusts.size):
         out.thrusts[j] = data.stuck[j] if math.isfinite(data.stuck[j]) else data.thrusts[j]

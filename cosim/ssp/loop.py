@@ -25,7 +25,7 @@ class Loop:
         self.law: CompiledLaw = law_of(scenario)
         nothing: Integers = np.empty(0, np.int64)
         self.model: StepModel = make_model(scenario, self.law)._replace(
-            full=True, jacobi=True, moving=True, moving_regions=nothing, control_every=1, arbiter_every=1
+            for_record=True, jacobi=True, moving=True, moving_regions=nothing, control_every=1, arbiter_every=1
         )  # the importer sets velocities, and the C code counts the law's period
         inputs, outputs = exchanged_variables(scenario)
         signals, noise = Signals([Column("time", "s", "Simulated time")]), np.zeros((1, 6))

@@ -24,7 +24,7 @@ def arbitrate(model: StepModel, data: StepData) -> None:
 
 def update_inputs(model: StepModel, data: StepData) -> None:
     """Compute the memberships and the inputs of the arbiter's rules."""
-    clearances = data.true_evaluation.clearances if model.exact else data.given_evaluation.clearances
+    clearances = data.true_evaluation.clearances if model.exact else data.arbiter_evaluation.clearances
     compute_inputs(model.inputs, data.goal, data.regions, data.arbiter_state, data.now, clearances[1:], data.signals)
     data.shown_inputs[:] = data.signals.memberships[: data.shown_inputs.size]
 
@@ -36,7 +36,7 @@ def weigh(model: StepModel, data: StepData) -> None:
         data.weights[i] = data.by_criterion[model.criteria[i]]
 
 
-def exchange_delayed(model: StepModel, data: StepData) -> None:
+def update_delayed_weights(model: StepModel, data: StepData) -> None:
     """Take over the weights and the arbiter's inputs that follow from the step before (Jacobi)."""
     if (data.k[0] - 1) % model.arbiter_every == 0:
         weigh(model, data)
@@ -54,7 +54,7 @@ def control(model: StepModel, data: StepData) -> None:
         data.report[:] = data.law.report
         if not model.exact:
             data.expected[:] = data.law.expected
-        if not model.law_gives_wrench and model.full:
+        if not model.law_gives_wrench and model.for_record:
             data.command[:] = model.thruster_matrix @ data.thrusts
     elif data.manual[0] == 0:
         data.command[:] = 0.0
@@ -68,7 +68,7 @@ def control(model: StepModel, data: StepData) -> None:
         if model.commands:
             data.saturated[0] = bound_wrench(data.wrench)
     if model.clock.size > 0:
-        data.worst[0] = max(data.worst[0], seconds(model.clock, data.ticks) - started)
+        data.max_duration[0] = max(data.max_duration[0], seconds(model.clock, data.ticks) - started)
 
 
 def controls(model: StepModel, data: StepData) -> bool:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 
 from cosim.step.arbiter_inputs import write_arbiter_state
-from cosim.step.decision import arbitrate, control, exchange_delayed
-from cosim.step.placed_regions import advance_goal, evaluate, move_regions
+from cosim.step.decision import arbitrate, control, update_delayed_weights
 from cosim.step.plant_calls import PlantCalls, fmi_do_step, fmi_get, fmi_get_flags, fmi_set
+from cosim.step.region_positions import advance_goal, evaluate, move_regions
 from cosim.step.sensing import fail_thrusters, measure, read_outputs
 from cosim.step.step_model import LOCATED, MEASURED, PLANT_STEP, Array, Integers, StepData, StepModel, call_back
 
@@ -18,7 +18,7 @@ def step(model: StepModel, data: StepData, plant: PlantCalls, k: int) -> None:
     data.now[0] = k * model.step
     fail_thrusters(model, data, plant)
     if model.jacobi and k > 0:
-        exchange_delayed(model, data)
+        update_delayed_weights(model, data)
     measure(model, data, plant)
     decide(model, data, k % model.arbiter_every == 0, k % model.control_every == 0)
     if k < model.steps and data.failed_step[0] < 0:
@@ -28,6 +28,8 @@ def step(model: StepModel, data: StepData, plant: PlantCalls, k: int) -> None:
 def decide(model: StepModel, data: StepData, arbitrates: bool, controls: bool) -> None:
     """Evaluate the regions, and decide by the measured state."""
     call_back(data, MEASURED)
+    if data.calls[MEASURED] != 0 and data.failed_step[0] >= 0:
+        return
     locate(model, data)
     call_back(data, LOCATED)
     if data.failed_step[0] >= 0:
@@ -65,10 +67,10 @@ def locate(model: StepModel, data: StepData) -> None:
     """Move the regions, evaluate them at the arbiter's pose and at the true one, and advance the goal."""
     if model.moving:
         move_regions(model, data)
-    if model.full or data.k[0] % model.arbiter_every == 0:
+    if model.for_record or data.k[0] % model.arbiter_every == 0:
         write_arbiter_state(data.state, data.expected, data.arbiter_state)
         if not model.exact:
-            evaluate(model, data, data.arbiter_state, data.given_evaluation)
+            evaluate(model, data, data.arbiter_state, data.arbiter_evaluation)
     evaluate(model, data, data.true_state, data.true_evaluation)
     advance_goal(model, data)
 
@@ -87,7 +89,7 @@ def step_plant(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     else:
         data.failed_step[0] = data.k[0]
     if data.failed_step[0] < 0:
-        first = data.applied[0]
+        first = data.first_applied[0]
         data.outputs[first:] = native.outputs[first:]
         for j in range(data.flags.size):
             data.flags[j] = native.flags[j]

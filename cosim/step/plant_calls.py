@@ -37,6 +37,14 @@ def fmi_set(native: Native) -> bool:
     return call_c(native.set_values, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
 
 
+def fmi_set_one(native: Native, i: int) -> bool:
+    """Set one of the inputs; return True unless the FMU fails."""
+    references, values = native.input_references[i : i + 1], native.inputs[i : i + 1]
+    if native.set_values == 0:
+        return True
+    return call_c(native.set_values, _TRANSFER, native.instance, references, 1, values, 1) <= _WARNING
+
+
 def fmi_get(native: Native) -> bool:
     """Get the outputs; return True unless the FMU fails."""
     references, values, n = native.output_references, native.outputs, native.output_references.size

@@ -25,8 +25,8 @@ class FlightMetrics(NamedTuple, Generic[T]):
     first_inside: T  # first step inside the goal region at the last of its positions
     last_entered: T  # first step of the last visit of the goal
     inside: T  # 1 if inside at the end
-    least_clearance: T  # m, least over hard regions in space; negative: violated; inf: there is none
-    least_angle: T  # rad, the same for hard regions of attitude
+    min_clearance: T  # m, minimum over hard regions in space; negative: violated; inf: there is none
+    min_angle: T  # rad, the same for hard regions of attitude
     goal_clearance: T  # m, greatest; negative: the goal was never reached
     effort: T  # N s, integral of the magnitude of the force on the body
     thrust_effort: T  # N s, sum over thrusters of the integral of the given force's magnitude
@@ -62,7 +62,7 @@ def fly(
             score_forces(model, data, metrics, before)
             if rows.shape[0] > 0 and k % model.control_every == 0 and data.failed_step[0] < 0:
                 rows[k // model.control_every] = data.row
-    metrics.worst_step[0], metrics.failed_step[0] = data.worst[0], data.failed_step[0]
+    metrics.worst_step[0], metrics.failed_step[0] = data.max_duration[0], data.failed_step[0]
 
 
 def score_state(model: StepModel, data: StepData, metrics: FlightMetrics[Array], k: int) -> None:
@@ -71,11 +71,11 @@ def score_state(model: StepModel, data: StepData, metrics: FlightMetrics[Array],
     for i in range(clearances.size):
         if data.regions.hard[i]:
             if data.regions.kinds[i] < _ATTITUDE:
-                metrics.least_clearance[0] = lesser(clearances[i], metrics.least_clearance[0])
+                metrics.min_clearance[0] = minimum(clearances[i], metrics.min_clearance[0])
                 if not np.isnan(metrics.bound[0]):
                     metrics.bound_excess[0] = max(metrics.bound_excess[0], metrics.bound[0] - clearances[i])
             else:
-                metrics.least_angle[0] = lesser(clearances[i], metrics.least_angle[0])
+                metrics.min_angle[0] = minimum(clearances[i], metrics.min_angle[0])
         if k < model.steps and not clearances[i] >= 0.0:
             metrics.weighted_violation[0] -= model.priorities[i] * clearances[i] * model.step
     if data.shown_goal_index[0] == model.goal_places.shape[0]:
@@ -104,6 +104,6 @@ def score_forces(model: StepModel, data: StepData, metrics: FlightMetrics[Array]
     metrics.max_force[0] = max(metrics.max_force[0], force)
 
 
-def lesser(clearance: float, least: float) -> float:
+def minimum(clearance: float, other: float) -> float:
     """Return the lesser of two clearances [m] or [rad], NaN if one of them is."""
-    return clearance if clearance < least or np.isnan(clearance) else least
+    return clearance if clearance < other or np.isnan(clearance) else other

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from controller.navigation.navigator import navigate
-from cosim.step.placed_regions import completed_steps
-from cosim.step.plant_calls import PlantCalls, fmi_get, fmi_set
+from cosim.step.plant_calls import PlantCalls, fmi_get, fmi_set_one
+from cosim.step.region_positions import completed_steps
 from cosim.step.step_model import PLANT_SET, StepData, StepModel, call_back
 
 
@@ -19,7 +19,7 @@ def fail_thrusters(model: StepModel, data: StepData, plant: PlantCalls) -> None:
         if remaining >= 0.0:
             plant.effectiveness.inputs[thruster] = remaining
             call_back(data, PLANT_SET)
-            if not (fmi_set(plant.effectiveness) and fmi_get(plant.native)):
+            if not (fmi_set_one(plant.effectiveness, thruster) and fmi_get(plant.native)):
                 data.failed_step[0] = data.k[0]
         else:
             data.stuck[thruster] = plant.native.inputs[thruster]
@@ -40,13 +40,13 @@ def measure(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     """Copy the plant's outputs, and write the state that law and arbiter receive."""
     read_outputs(data, plant)
     if model.through_sensors:
-        lose_samples(model, data, plant)
+        apply_outages(model, data, plant)
     estimate_state(model, data)
 
 
 def read_outputs(data: StepData, plant: PlantCalls) -> None:
     """Copy the plant's outputs of the beginning of a step."""
-    data.outputs[: data.applied[0]] = plant.native.outputs[: data.applied[0]]
+    data.outputs[: data.first_applied[0]] = plant.native.outputs[: data.first_applied[0]]
 
 
 def estimate_state(model: StepModel, data: StepData) -> None:
@@ -57,13 +57,14 @@ def estimate_state(model: StepModel, data: StepData) -> None:
         sense(model, data)
 
 
-def lose_samples(model: StepModel, data: StepData, plant: PlantCalls) -> None:
+def apply_outages(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     """Change the sensors' loss probabilities where an outage begins or ends with this step."""
     i = data.outages[0]
     while i < model.outage_steps.size and data.k[0] == model.outage_steps[i]:
-        plant.losses.inputs[model.outage_sensors[i]] = model.outage_losses[i]
+        sensor = model.outage_sensors[i]
+        plant.losses.inputs[sensor] = model.outage_losses[i]
         call_back(data, PLANT_SET)
-        if not fmi_set(plant.losses):
+        if not fmi_set_one(plant.losses, sensor):
             data.failed_step[0] = data.k[0]
         i += 1
     data.outages[0] = i

@@ -15,7 +15,7 @@ from controller.navigation.measurements import Measurements, SensorModel
 from controller.regions.region_set import PackedRegions
 from controller.translator.foreign import POINTER, call_c
 from cosim.step.arbiter_inputs import ArbiterSignals, PackedInputs
-from cosim.step.placed_regions import RegionEvaluation
+from cosim.step.region_positions import RegionEvaluation
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -45,7 +45,7 @@ class StepModel(NamedTuple):
     arbiter_every: int  # steps between two evaluations of the arbiter
     jacobi: bool  # True: the plant and the arbiter's weights receive what the step before gave
     commands: bool  # True: a run with commands, which bound the wrench
-    full: bool  # True: values, gradients and the wrench of thrusters are computed too, for a record
+    for_record: bool  # True: values, gradients and the wrench of thrusters are computed too, for a record
     criteria: Integers  # (n,) index of each region's criterion
     priorities: Array  # (n,) factor of each region's violation in the score; laws do not receive it
     inputs: PackedInputs  # sources of the arbiter's inputs
@@ -84,7 +84,7 @@ class Allocator(NamedTuple):
 
 
 class LawOutputs(NamedTuple):
-    """What a law writes into its own memory, beside its forces."""
+    """Outputs of a law other than its forces, in its memory."""
 
     estimate: Array  # (4,) N, N m: estimate of phi (12)
     expected: Array  # (6,) prediction for the next step: m, NED, and m/s, body
@@ -97,8 +97,8 @@ class StepData(NamedTuple):
     row: Array  # (columns,)
     k: Integers  # (1,) number of the step
     now: Array  # (1,) s
-    outputs: Array  # (o,) the plant's outputs, from the beginning of the step, and from `applied` on from its end
-    applied: Integers  # (1,) index of the first output from the end of the step
+    outputs: Array  # (o,) the plant's outputs, from the beginning of the step, and from `first_applied` on from its end
+    first_applied: Integers  # (1,) index of the first output from the end of the step
     forces: Array  # (m,) N, given by the thrusters; (0,) without thrusters
     force: Array  # (3,) N, on the body
     flags: Array  # (f,) Boolean outputs of the plant, from the end of the step
@@ -121,7 +121,7 @@ class StepData(NamedTuple):
     measurements: Measurements
     navigation: NavigationMemory
     true_evaluation: RegionEvaluation
-    given_evaluation: RegionEvaluation  # at the arbiter's pose
+    arbiter_evaluation: RegionEvaluation  # at the arbiter's pose
     signals: ArbiterSignals
     shown_inputs: Array  # (m,) the memberships as inputs of a file's rules; (0,) for others
     by_criterion: Array  # (criteria,) weight of each criterion
@@ -142,7 +142,7 @@ class StepData(NamedTuple):
     outages: Integers  # (1,) number of changes of sensors so far
     failed_step: Integers  # (1,) step in which the FMU failed, -1 for none
     ticks: Integers  # (2,) for `plant_calls.seconds`
-    worst: Array  # (1,) s of the wall clock, longest time of law and allocation in a step
+    max_duration: Array  # (1,) s of the wall clock, longest time of law and allocation in a step
 
 
 def set_call(data: StepData, which: int, call: Call) -> None:

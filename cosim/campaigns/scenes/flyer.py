@@ -119,7 +119,7 @@ class SceneFlyer:
         return Score(
             reached=inside and scenario.steps - since >= math.ceil(self.conditions.settled / step - _ROUNDING),
             reach_time=since * step if inside else math.inf,
-            min_clearance=metrics.least_clearance,
+            min_clearance=metrics.min_clearance,
             effort=metrics.thrust_effort,
             thrust_variation=metrics.thrust_variation,
             worst_step=metrics.worst_step,

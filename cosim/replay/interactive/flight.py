@@ -15,9 +15,9 @@ from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.columns import columns_of_channels
-from cosim.simulation.make_step import SENSED, exchanged_variables, make_calls, make_data, make_model
+from cosim.simulation.make_step import SENSED, exchanged_variables, make_data, make_model
 from cosim.simulation.signals import Column, Signals
-from cosim.simulation.stepped_plant import vehicle_channels
+from cosim.simulation.stepped_plant import plant_calls, vehicle_channels
 from cosim.step.score import empty_metrics
 from plant_fmu.running.channels import Channel
 from plant_fmu.running.native import Native
@@ -41,7 +41,7 @@ class Flight:
         flags = [channel.name for channel in channels.flags if is_drawn(channel.name)]
         signals = Signals(_columns(scenario, outputs, flags, self.law.diagnostics))
         self.columns = {column.name: i for i, column in enumerate(signals.columns)}
-        model = make_model(scenario, self.law, full=True)
+        model = make_model(scenario, self.law, for_record=True)
         self.model = model._replace(
             # the page can add noise to an exact state
             exact=Expression("m->exact") if through_state and not scenario.sensing.dead_for > 0.0 else model.exact,  # type: ignore[arg-type]
@@ -52,8 +52,7 @@ class Flight:
         periods = scenario.steps // scenario.control_every
         self.noise = np.zeros((1 + periods if through_state else 0, 6))
         self.data = make_data(scenario, self.model, self.law, signals, inputs, outputs, self.noise, flags)
-        calls = make_calls(scenario, self._native, inputs, outputs)
-        self.plant = calls._replace(native=self._native(inputs, outputs, flags))
+        self.plant = plant_calls(scenario.vehicle, self._native(inputs, outputs, flags), self._native)
         _, self.metrics = empty_metrics()
         self.rows = np.zeros((-(-scenario.steps // scenario.control_every), len(self.columns)))
         self.fly = self.model, self.data, self.plant, self.metrics, np.zeros(len(inputs)), self.rows

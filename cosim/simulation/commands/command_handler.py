@@ -183,7 +183,7 @@ class CommandHandler:
             case "surface":
                 self._environment.set_target((north, east, self.settings["commands.surface_depth"]), radius)
             case "reach":
-                self._environment.restore_target()
+                self._environment.restore_target(time)
             case "mission":
                 self._mission.enter(max(self._mission.at, 0))
                 self._resume(time)

@@ -293,7 +293,7 @@ def test_blocks_and_single_rows_make_one_record(tmp_path, batch):
             for row in rows[done : done + size]:
                 recorder.observe(done, row)
         else:
-            recorder.take(done, rows[done : done + size])
+            recorder.observe_block(done, rows[done : done + size])
         done += size
     recorder.close()
     record = load_record(tmp_path)

@@ -212,7 +212,7 @@ def test_plant_of_other_channels_is_refused_by_the_first_that_is_missing(change,
 
 @pytest.mark.parametrize("values", [lambda n: np.zeros(2 * n)[::2], lambda n: np.zeros(n, np.float32)])
 def test_plant_of_other_arrays_is_refused(values):
-    with pytest.raises(RunError, match=r"^plant.outputs.values is .*, expected contiguous float64$"):
+    with pytest.raises(RunError, match=r"^plant.outputs.values is .*, expected a contiguous array of float64$"):
         Master(SCENARIO, plant=Foreign({"values": values}))
 
 

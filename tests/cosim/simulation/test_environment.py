@@ -108,3 +108,19 @@ def test_position_uncertainty_adds_in_quadrature():
     assert environment.regions.deviations[2] == pytest.approx([0.4] * 3)
     environment.inflate_position_uncertainty(0.0)
     assert environment.regions.deviations[:2] == pytest.approx(np.array([[0.0] * 3, [0.3] * 3]))
+
+
+def test_a_target_is_where_it_moves_also_between_steps():
+    scenario = load_scenario("paper", [*SHORT, "commands.enabled=true", "goal.streamed=true"])
+    with Master(scenario) as master:
+        environment = master.environment
+        environment.set_target((1.0, 2.0, 3.0), 0.5, (1.0, 0.0, 0.0), 0.0)
+        for k in range(6):
+            master.step(k)
+        assert environment.target == pytest.approx([1.05, 2.0, 3.0])
+        master.move_region("goal", [5.0, 0.0, 0.0], [0.0, 0.0, 0.0])  # of the scenario, which waits
+        assert environment.target == pytest.approx([1.05, 2.0, 3.0])
+        environment.set_target((1.0, 2.0, 3.0), 0.5, (1.0, 0.0, 0.0), 0.05)
+        assert environment.target == pytest.approx([1.0, 2.0, 3.0])
+        environment.restore_target(0.06)
+        assert environment.target == pytest.approx(np.add(scenario.goal.center, [5.0, 0.0, 0.0]))

@@ -110,15 +110,18 @@ class Blocks:
         self.sizes, self.rows = [], []
 
     def observe(self, k, row):
-        self.take(k, row[None])
+        self.observe_block(k, row[None])
 
-    def take(self, first, rows):
+    def observe_block(self, first, rows):
         assert first == len(self.rows)
         self.sizes.append(len(rows))
         self.rows.extend(rows.copy())
 
 
-@pytest.mark.parametrize("changes", [[], ["sensing.position_noise=0.02"], ["time.control=0.007"], ["plant.fmi=2"]])
+@pytest.mark.parametrize(
+    "changes",
+    [[], ["sensing.position_noise=0.02"], ["sensing.position_noise=0.02", "time.control=0.1"], ["plant.fmi=2"]],
+)
 def test_blocks_hold_the_rows_of_single_steps(changes):
     scenario = load_scenario("paper-limited", [*SHORT, *changes])
     blocks = Blocks()
@@ -177,3 +180,67 @@ def test_a_region_may_be_called_law():
     for other in ("law.clearance", "law.desired_speed"):
         np.testing.assert_array_equal(kept[other], plain[other.replace("law.clearance", "port wall.clearance")])
     assert kept["law.desired_speed"].any()
+
+
+def test_a_law_of_a_user_gets_plain_arrays_and_the_options_of_numpy():
+    seen = []
+
+    def law(state, goal, regions, weights):
+        seen.append((type(state.position), type(weights), type(goal.clearances), np.max(weights[:0], initial=5.0)))
+        return np.zeros(6)
+
+    with Master(load_scenario("paper", SHORT), FunctionLaw(law)) as master:
+        master.step(0)
+    assert seen == [(np.ndarray, np.ndarray, np.ndarray, 5.0)]
+
+
+def test_a_failure_changes_the_parameter_of_its_thruster_alone():
+    for fmi in (2, 3):
+        changes = ["failures=[{thruster=1,time=0.02}]", f"plant.fmi={fmi}", "time.duration=0.05"]
+        with Master(load_scenario("sitl", changes)) as master:
+            for k in range(master.scenario.steps):
+                if k == 1:
+                    master.plant.set({"thrust_effectiveness[2]": 0.3})
+                master.step(k)
+            assert [master.plant[f"thrust_effectiveness[{i}]"] for i in (1, 2, 3)] == [0.0, 0.3, 1.0]
+
+
+def test_an_interrupted_block_repeats_no_rows(monkeypatch):
+    blocks, calls = Blocks(), []
+    with Master(load_scenario("paper-limited", SHORT)) as master:
+        advance = master._advance
+
+        def interrupted(call, k, n):
+            calls.append(k)
+            if len(calls) == 4:
+                raise KeyboardInterrupt
+            advance(call, k, n)
+
+        monkeypatch.setattr(master, "_advance", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            master.run([blocks])
+    assert len(blocks.rows) == sum(blocks.sizes) == calls[-1]
+
+
+def test_an_error_of_a_command_source_ends_the_step_before_missions():
+    class Fails:
+        exhausted = False
+
+        def take(self, k):
+            if k == 3:
+                raise ZeroDivisionError
+            return ()
+
+    with Master(load_scenario("docking", ["commands.enabled=true", "time.duration=0.2"])) as master:
+        updated, update = [], master.command_handler.update
+        master.command_handler.update = lambda time, clearance: updated.append(time) or update(time, clearance)
+        with pytest.raises(ZeroDivisionError):
+            master.run(commands=Fails())
+    assert len(updated) == 3
+
+
+def test_law_and_arbiter_of_a_master_cannot_be_exchanged():
+    with Master(load_scenario("paper", SHORT)) as master:
+        for name in ("law", "arbiter"):
+            with pytest.raises(AttributeError, match=name):
+                setattr(master, name, None)

@@ -33,7 +33,7 @@ class RegionEvaluation(NamedTuple):
 
 def evaluate(model: StepModel, data: StepData, state: VehicleState, evaluation: RegionEvaluation) -> None:
     """Evaluate goal and regions at a pose: all values for a record, otherwise clearances alone."""
-    if model.full:
+    if model.for_record:
         p, e, g, c = state.position, state.quaternion, evaluation.values, evaluation.clearances
         slopes, turns = evaluation.gradients, evaluation.rotation_gradients
         evaluate_packed(data.goal, p, e, g[:1], slopes[:1], turns[:1], c[:1])

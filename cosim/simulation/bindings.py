@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 import numpy as np
@@ -95,25 +96,14 @@ class _PythonStep:
         out[:] = given
 
 
-class BoundArbiter:
-    """Binds an arbiter's rules to the arrays of a step."""
-
-    def __init__(self, arbiter: Arbiter, data: StepData) -> None:
-        self._call: BoundRules | BoundCall
-        self.compiled = False
-        if arbiter.engine == _COMPILED:
-            try:
-                self._call = BoundRules(arbiter.system, data.signals.inputs, data.by_criterion)
-                self.compiled = True
-            except CompilationError:  # no compiler for rules of one's own
-                pass
-        if not self.compiled:
-            self._call = BoundCall(_PythonRules(arbiter), (data.signals.inputs, data.by_criterion))
-        set_call(data, ARBITER, self._call)
-
-    def raise_error(self) -> None:
-        """Raise the error of the last evaluation, if it raised one."""
-        self._call.raise_error()
+def bind_arbiter(arbiter: Arbiter, data: StepData) -> BoundRules | BoundCall:
+    """Bind an arbiter's rules to the arrays of a step: in C if that has the same bits, else in Python."""
+    call: BoundRules | BoundCall = BoundCall(_PythonRules(arbiter), (data.signals.inputs, data.by_criterion))
+    if arbiter.engine == _COMPILED:
+        with contextlib.suppress(CompilationError):  # there is no compiler for rules of a user
+            call = BoundRules(arbiter.system, data.signals.inputs, data.by_criterion)
+    set_call(data, ARBITER, call)
+    return call
 
 
 class _PythonRules:
