@@ -27,6 +27,11 @@ def test_paths_in_the_architecture_page_exist():
         assert not name or re.search(rf"\b(?:def|class) {name}\b", (ROOT / path).read_text()), (path, name)
 
 
+def test_files_that_scripts_of_pages_name_exist():
+    text = "".join(path.read_text() for path in (ROOT / "cosim/replay/assets").glob("*.js"))
+    assert [ROOT / path for path in re.findall(r"\bcosim/[\w/]+\.py\b", text) if not (ROOT / path).exists()] == []
+
+
 def test_lines_beside_equations_stand_in_their_files():
     text = (ROOT / "docs" / "theory.md").read_text()
     rows = re.findall(r"^\|.*\| `(.*)` \| `(\w+\.py)` \|$", text, re.M)

@@ -45,7 +45,7 @@ class Flight {
   /** Add all failures in the order of their steps, and the allocator's numbers once they are reported. */
   _fail({ numbers, integers }, { thruster, time }) {
     const { offsets, own, stages } = this.data.failures;
-    const step = Math.ceil(time / this.data.step - 1e-6); // as in cosim/batch/make_step.py
+    const step = Math.ceil(time / this.data.step - 1e-6); // as in cosim/simulation/make_step.py
     const added = [step, thruster - 1, 0];
     const all = [...own, added];
     all.sort((a, b) => a[0] - b[0] || a[1] - b[1] || (a[2] ?? NaN) - (b[2] ?? NaN));
