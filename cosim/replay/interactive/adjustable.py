@@ -4,15 +4,20 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+from controller import LawError
 from controller.regions.region_set import shape_entry
 from controller.regions.shape import Shape
 from cosim.replay.interactive.flight import Flight
 from cosim.scenario.changes import value_at
 from cosim.scenario.key_names import PARAMETERS, key_name
-from cosim.ssp.memory import Memory
+from cosim.scenario.law_factory import law_of
+from cosim.scenario.scenario import Scenario
+from cosim.ssp.memory import Memory, arrays_of
 
 BUOYANCY = f"{PARAMETERS}buoyancy"
 _STARTS = {**{f"plant.current.{i}": f"current.{axis}" for i, axis in enumerate("xyz")}, BUOYANCY: "buoyancy"}
@@ -46,7 +51,9 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
     }
     if flight.noise.size:
         targets |= {key: ("noise", (i,)) for i, key in enumerate(_NOISE)}
-    targets |= {f"law.gains.{name}": ("gains", (i,)) for i, name in enumerate(scenario.law.gains._fields)}
+    for i, name in enumerate(scenario.law.gains._fields):
+        if _is_used_as_given(scenario, name):
+            targets[f"law.gains.{name}"] = "gains", (i,)
     moves: list[Axes | None] = []
     has_center = shape_entry(scenario.goal).center is not None
     shapes = [("goal", scenario.goal, data.goal, 0)]
@@ -69,6 +76,20 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
         name, value = key_name(key, scenario.table, scenario.vehicle), value_at(scenario.table, key, scenario.vehicle)
         slots.append(Slot(key, name.words, name.unit, float(value), *target))
     return slots, moves
+
+
+def _is_used_as_given(scenario: Scenario, gain: str) -> bool:
+    """Return True if a law's function receives a gain as it is, and no other number of the law depends on it."""
+    value, others = getattr(scenario.law.gains, gain), []
+    for x in (value, 0.5 * value, 2.0 * value + 1.0):
+        gains = scenario.law.gains._replace(**{gain: x})
+        with contextlib.suppress(LawError):  # the law refuses the value
+            law = law_of(dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, gains=gains)))
+            if getattr(law.gains, gain) != x:
+                return False
+            memory = [(array.shape, array.tobytes()) for array in arrays_of(law.memory)]
+            others.append((law.gains._replace(**{gain: value}), memory))
+    return all(other == others[0] for other in others)
 
 
 def _positions(path: str, shape: Shape) -> Iterator[tuple[int, int, tuple[str, ...]]]:

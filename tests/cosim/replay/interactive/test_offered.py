@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from controller import LAWS
+from controller.laws.pd import PdLaw
 from controller.regions.region_set import shape_entry
 from controller.regions.shapes import ENTRIES
 from cosim.command_line.cli import main
@@ -134,6 +135,25 @@ def test_gains_water_noise_and_positions_are_adjustable(docking):
     assert keys > {"plant.current.0", "plant.parameters.buoyancy", "sensing.position_noise", "sensing.velocity_noise"}
     names = ["goal", *(secondary.region.name for secondary in flight.scenario.regions)]
     assert [name for name, axes in zip(names, moves, strict=True) if axes is None] == ["heading"]
+
+
+def test_gains_that_a_memory_depends_on_are_not_offered(monkeypatch):
+    """A page would change the gain, and not the number that the law has computed from it."""
+
+    class Own(PdLaw):
+        def __init__(self, gains, *rest):
+            super().__init__(gains, *rest)
+            self.memory.estimate[0] = 1.0 / gains.k_p1
+
+    class Rescaled(PdLaw):
+        def __init__(self, gains, *rest):
+            super().__init__(gains._replace(k_p1=2.0 * gains.k_p1), *rest)
+
+    every = {f"law.gains.{name}" for name in PdLaw.gains_type._fields}
+    for law, offered in ((PdLaw, every), (Own, every - {"law.gains.k_p1"}), (Rescaled, every - {"law.gains.k_p1"})):
+        monkeypatch.setitem(LAWS, "pd", law)
+        slots, _ = find_slots(flight_of("docking", ["law.name=pd"]), Memory())
+        assert {slot.key for slot in slots if slot.target == "gains"} == offered
 
 
 def test_regions_of_every_shape_with_a_position_are_movable():
