@@ -103,7 +103,7 @@ lowest:
 		pyproject.toml fuzzy_arbiter/pyproject.toml $(LOWEST)/arbiter.in
 	$(LOWEST)/uv/bin/uv venv --quiet --clear --python 3.11 $(LOWEST)/env
 	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --requirement $(LOWEST)/requirements.txt \
-		hypothesis pytest pytest-timeout
+		hypothesis lief pytest pytest-timeout
 	VIRTUAL_ENV=$(LOWEST)/env $(LOWEST)/uv/bin/uv pip install --quiet --no-deps $(HERE) .
 	$(LOWEST)/env/bin/python -m pytest -q -o filterwarnings= $(LOWEST_TESTS) $(PYTEST_FLAGS) # old versions warn
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import atexit
 import functools
 import io
+import re
 from dataclasses import dataclass
 
 import pytest
@@ -48,8 +49,9 @@ def read_libraries(data: bytes) -> list[Library]:
     lief = pytest.importorskip("lief", reason="lief is not installed: nothing reads libraries of other systems")
     if data[:4] == b"\x7fELF":
         elf = lief.ELF.parse(io.BytesIO(data))
-        labels = [v.name for r in elf.symbols_version_requirement for v in r.get_auxiliary_symbols()]
-        minimum = max(tuple(map(int, label.removeprefix("GLIBC_").split("."))) for label in labels)
+        labels = " ".join(v.name for r in elf.symbols_version_requirement for v in r.get_auxiliary_symbols())
+        versions = re.findall(r"\bGLIBC_(\d[\d.]*)", labels)  # not GLIBC_PRIVATE; none with musl
+        minimum = max((tuple(map(int, version.split("."))) for version in versions), default=())
         exports = {symbol.name for symbol in elf.exported_symbols}
         return [Library(MACHINES[elf.header.machine_type.name], exports, set(elf.libraries), "", minimum)]
     if data[:2] == b"MZ":
