@@ -5,6 +5,7 @@ import re
 
 import pytest
 
+from tests.architecture.counts import GENERATED, words_by_hand
 from tests.architecture.modules import FILES, ROOT, tree_of
 
 MODULES = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib", "yaml", "telnetlib", "ftplib", "xmlrpc"}
@@ -65,3 +66,7 @@ def test_no_default_address_is_a_wildcard():
     for path in FILES.values():
         for node in ast.walk(tree_of(path)):
             assert not (isinstance(node, ast.Constant) and node.value in ("0.0.0.0", "::")), path
+
+
+def test_generated_pages_do_not_count_as_handwritten():
+    assert [words_by_hand(ROOT / page) > 0 for page in (*GENERATED, "README.md")] == [False, False, True]
