@@ -18,6 +18,8 @@ from plant_fmu import build_fmu, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.archive import write_atomic
 from plant_fmu.build import cached_fmu
+from plant_fmu.compiling.compiler import find_compiler
+from plant_fmu.compiling.platforms import native_platform
 from plant_fmu.errors import BuildError
 from plant_fmu.installing import install_hint
 from tests.plant_fmu.conftest import CoSimulationInstance
@@ -92,13 +94,15 @@ def test_package_exports_its_listed_names():
 
 @pytest.mark.slow
 @pytest.mark.skipif(shutil.which("cc") is None, reason="there is no cc; test_platforms has the compiler of ziglang")
-def test_builds_are_reproducible(tmp_path, fmi, monkeypatch):
+def test_builds_are_reproducible(tmp_path, fmi, monkeypatch, capsys):
     """In a folder of another name, which no library names; a build leaves the environment alone."""
     before = cached_fmu(load_vehicle("odin"), fmi)
     (tmp_path / "another place").mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "another place"))
     environment = dict(os.environ), os.getcwd()
-    again = build_fmu(load_vehicle("odin"), fmi, tmp_path / "again.fmu")
+    again = tmp_path / "again.fmu"
+    assert main(["build", "--vehicle", "odin", "--fmi", str(fmi), "--out", str(again)]) == 0
+    assert capsys.readouterr().out == f"{again}\n"
     assert (dict(os.environ), os.getcwd()) == environment
     assert again.read_bytes() == before.read_bytes()
     with zipfile.ZipFile(again) as archive:
@@ -112,6 +116,13 @@ def test_vehicles_are_listed_and_named_in_errors(build, capsys):
     assert "bluerov2_heavy, bluerov2_heavy_wu, odin, rexrov" in build(vehicle="odyn")
     assert main(["list"]) == 0
     assert "unsourced" in capsys.readouterr().out
+
+
+def test_ziglang_compiles_where_there_is_no_cc(tmp_path, monkeypatch):
+    monkeypatch.setenv("PATH", str(tmp_path))
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: name == "ziglang" or None)
+    assert find_compiler() == [sys.executable, "-m", "ziglang", "cc", "-target", native_platform().target]
 
 
 def test_missing_compiler_gives_one_line_error(build, tmp_path, monkeypatch):

@@ -86,6 +86,13 @@ def test_bottom_contact_is_stable(make_slave, substep, speed, time_constant):
     assert rows[:, 0].max() - 9.7 <= speed * max(time_constant, 4 * substep)
 
 
+def test_default_plant_has_no_bottom_and_no_force_limit(make_slave, fmi):
+    slave = make_slave(fmi=fmi).start(**{"position.z": 5e5, "hull_radius": 0.3})
+    slave.set_values({"wrench.X": 9e8})
+    assert slave.get("altitude", "actuation.X") == [5e5, 9e8]
+    assert not slave.flag("bottom_contact") and not slave.flag("wrench_saturated")
+
+
 def test_hull_starting_inside_the_bottom_is_pushed_out_slowly(make_slave, fmi):
     """However it got there: the bottom's spring is no catapult."""
     slave = make_slave(fmi=fmi, logging_on=True).start(**SINKING | NEUTRAL | {"position.z": 12.0})

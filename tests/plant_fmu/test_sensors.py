@@ -125,7 +125,10 @@ def test_samples_are_delayed_with_their_sampling_time(make_slave, fmi):
 
 
 def test_sample_loss_and_outliers_use_their_own_streams(make_slave, fmi):
-    """Sample k of sensor i has the chances at that place of stream 21 + i: of being lost, of being an outlier."""
+    """Sample k of sensor i has the chances at that place of stream 21 + i: of being lost, of being an outlier.
+
+    An outage may start and end during a run.
+    """
     slave = make_slave(fmi=fmi).start(
         weight=1228.25,
         outlier_scale=50.0,
@@ -137,7 +140,11 @@ def test_sample_loss_and_outliers_use_their_own_streams(make_slave, fmi):
     )  # fmt: skip
     told, lost, outliers = None, 0, 0
     for k in range(60):
-        is_lost, is_outlier = uniform(3, 21 + 4, k)[0] < 0.3, uniform(3, 21 + 4, k)[1] < 0.2
+        loss = 1.0 if 20 <= k < 30 else 0.3
+        if k > 0:
+            slave.set_values({"usbl.loss_probability": loss})
+            slave.step(0.1)
+        is_lost, is_outlier = uniform(3, 21 + 4, k)[0] < loss, uniform(3, 21 + 4, k)[1] < 0.2
         if not is_lost:
             told = 0.1 * (50.0 if is_outlier else 1.0) * normal(3, 12, k), pytest.approx(0.1 * k, abs=1e-9)
         if told is not None:
@@ -145,5 +152,4 @@ def test_sample_loss_and_outliers_use_their_own_streams(make_slave, fmi):
         scale = 0.05 if uniform(3, 21 + 3, k)[1] < 0.5 else 0.001
         assert slave.get("measured.heading")[0] == pytest.approx(scale * normal(3, 11, k), abs=1e-9)
         lost, outliers = lost + is_lost, outliers + (is_outlier and not is_lost)
-        slave.step(0.1)
-    assert lost > 5 and outliers > 5
+    assert lost > 15 and outliers > 5
