@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from controller.errors import LawError
 from controller.law import Array, Diagnostic, Output, VehicleState
-from controller.regions.region_set import PackedRegions
+from controller.regions.region_set import PackedRegions, RegionEvaluator
 
 _REAL = "biufO"  # kinds of NumPy's types of real numbers; O holds whole numbers too long for the others
 _LONGEST = 200  # maximum number of characters of a value in a message
@@ -85,7 +85,7 @@ class FunctionLaw:
         self.output: Output = output
         self.name = qualified_name(function)
         self._function = function
-        self._goal, self._regions = _Evaluator(), _Evaluator()
+        self._evaluators: dict[str, RegionEvaluator] = {}
 
     @property
     def estimate(self) -> Array:
@@ -115,7 +115,7 @@ class FunctionLaw:
             If the function returns anything but finite numbers of the right shape.
         """
         state_copy = VehicleState(*(part.copy() for part in state))
-        goal_seen, regions_seen = self._goal.evaluate(goal, state), self._regions.evaluate(regions, state)
+        goal_seen, regions_seen = self._seen("goal", goal, state), self._seen("regions", regions, state)
         received = self._function(state_copy, goal_seen, regions_seen, weights.copy())
         numbers = _real_numbers(received)
         if numbers.shape != forces.shape or not np.isfinite(numbers).all():
@@ -124,6 +124,14 @@ class FunctionLaw:
                 f"law {self.name} returned {_shown(received)}, expected {forces.size} finite numbers [{unit}]"
             )
         forces[:] = numbers
+
+    def _seen(self, name: str, regions: PackedRegions, state: VehicleState) -> RegionsSeen:
+        """Evaluate goal or regions at the measured pose."""
+        evaluator = self._evaluators.get(name)
+        if evaluator is None or evaluator.regions is not regions:
+            evaluator = self._evaluators[name] = RegionEvaluator(regions)
+        evaluation = evaluator.evaluate(state.position, state.quaternion)
+        return RegionsSeen(*evaluation, regions.velocities.copy(), regions.gains.copy(), regions.hard.copy())
 
 
 def _real_numbers(received: object) -> Array:
@@ -147,21 +155,3 @@ def qualified_name(law: object) -> str:
     module, name = str(named.__module__), str(named.__qualname__)
     script = getattr(sys.modules.get(module), "__file__", None) if module == "__main__" else None
     return f"{Path(script).name if script else module}:{name}"
-
-
-class _Evaluator:
-    """Evaluates regions into arrays of its own, the same ones each time: C is bound to arrays."""
-
-    def __init__(self) -> None:
-        self._position, self._quaternion = np.zeros(3), np.zeros(4)
-        self._out: tuple[Array, ...] = ()
-
-    def evaluate(self, regions: PackedRegions, state: VehicleState) -> RegionsSeen:
-        n = regions.kinds.size
-        if not self._out or len(self._out[0]) != n:
-            self._out = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
-        self._position[:], self._quaternion[:] = state.position, state.quaternion
-        regions.evaluate(self._position, self._quaternion, *self._out)
-        g, gradients, rotation_gradients, clearances = (part.copy() for part in self._out)
-        velocities, gains, hard = regions.velocities.copy(), regions.gains.copy(), regions.hard.copy()
-        return RegionsSeen(g, gradients, rotation_gradients, clearances, velocities, gains, hard)

@@ -302,11 +302,26 @@ def evaluate_at_pose(
     regions: Sequence[Region], position: Sequence[float] | Array, quaternion: Sequence[float]
 ) -> tuple[Array, Array, Array]:
     """Return values, gradients and clearances of regions at a pose, as they are at time 0; position [m, NED]."""
-    n = len(regions)
-    values, gradients, turning, clearances = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
-    pose = np.array(position, dtype=float), np.array(quaternion, dtype=float)
-    pack(regions).evaluate(*pose, values, gradients, turning, clearances)
+    values, gradients, _, clearances = RegionEvaluator(pack(regions)).evaluate(position, quaternion)
     return values, gradients, clearances
+
+
+class RegionEvaluator:
+    """Evaluates regions by arrays of its own, the same ones each time: C is bound to arrays."""
+
+    def __init__(self, regions: PackedRegions) -> None:
+        self.regions, n = regions, regions.kinds.size
+        self._pose = np.zeros(3), np.zeros(4)
+        self._out = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
+
+    def evaluate(
+        self, position: Sequence[float] | Array, quaternion: Sequence[float] | Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """Return values, gradients, gradients by rotation and clearances at a pose; position [m, NED]."""
+        self._pose[0][:], self._pose[1][:] = position, quaternion
+        self.regions.evaluate(*self._pose, *self._out)
+        values, gradients, rotation_gradients, clearances = (part.copy() for part in self._out)
+        return values, gradients, rotation_gradients, clearances
 
 
 def write_clearances(regions: PackedRegions, points: Array, scratch: Array, clearances: Array) -> None:

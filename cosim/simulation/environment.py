@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from controller.regions import Region, Sphere, pack
-from controller.regions.region_set import PackedRegions, shape_entry
+from controller.regions.region_set import PackedRegions, RegionEvaluator, shape_entry
 from controller.regions.shape import Shape
 from cosim.errors import CommandError, RunError
 from cosim.scenario.region_tables import PARKED_POSITION, Vector3
@@ -55,9 +55,7 @@ class RegionEnvironment:
         self._streamed += [
             region.region.name for region in scenario.regions if region.streamed and not region.is_dynamic
         ]
-        # the same arrays each time: C is bound to arrays
-        self._position, self._quaternion = np.zeros(3), np.zeros(4)
-        self._out = [(np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)) for n in (1, len(secondary))]
+        self._evaluators = RegionEvaluator(self.goal), RegionEvaluator(self.regions)
         self._moving = [self._names.index(name) for name in scenario.moving]
         self._dynamic = [i for i, region in enumerate(scenario.regions) if region.is_dynamic]
 
@@ -76,11 +74,8 @@ class RegionEnvironment:
 
     def evaluate(self, position: Array, quaternion: Array) -> tuple[Array, Array]:
         """Return values and clearances of goal and regions at a pose, shape (n + 1,) each; position [m, NED]."""
-        self._position[:], self._quaternion[:] = position, quaternion
-        for packed, out in zip((self.goal, self.regions), self._out, strict=True):
-            packed.evaluate(self._position, self._quaternion, *out)
-        values, _, _, clearances = (np.concatenate(parts) for parts in zip(*self._out, strict=True))
-        return values, clearances
+        goal, regions = (evaluator.evaluate(position, quaternion) for evaluator in self._evaluators)
+        return np.concatenate((goal[0], regions[0])), np.concatenate((goal[3], regions[3]))
 
     # ---- moved from outside ----
 
