@@ -34,10 +34,9 @@ def value_of(station, name):
 
 
 def put(station, name, value, kind=REAL32):
-    """Set a parameter; return the errors, and the value that is sent back, if any."""
-    replies = station.send(set_parameter(name, value, kind))
-    errors = [reply.error for reply in replies if reply.get_type() == "PARAM_ERROR"]
-    return errors, [reply.param_value for reply in replies if reply.get_type() == "PARAM_VALUE"]
+    """Set a parameter; return the replies in their order: the number of an error, the name and value sent back."""
+    replies = [r for r in station.send(set_parameter(name, value, kind)) if r.get_type() != "STATUSTEXT"]
+    return [r.error if r.get_type() == "PARAM_ERROR" else (r.param_id, r.param_value) for r in replies]
 
 
 def listed(station, seconds=0.1):
@@ -121,7 +120,7 @@ def test_qgroundcontrol_finds_its_parameters_without_setup(profile, names):
         assert values["SYS_AUTOSTART"] != 0 and values["CAL_ACC0_ID"] != 0 and values["CAL_GYRO0_ID"] != 0
         assert values["SYS_HAS_MAG"] == 0 and values["COM_RC_IN_MODE"] == 1
         assert values["NAV_DLL_ACT"] == 3  # land
-    assert put(station, names[0], 5.0)[0] == [mavlink.MAV_PARAM_ERROR_READ_ONLY]
+    assert put(station, names[0], 5.0)[0] == mavlink.MAV_PARAM_ERROR_READ_ONLY
 
 
 def test_the_frame_is_that_of_the_vehicle():
@@ -159,16 +158,39 @@ def test_missing_parameter_gives_param_error(station, name, index):
 
 
 def test_parameter_can_be_set(station):
-    errors, (value,) = put(station, "GOAL_RADIUS", 0.7)
-    assert not errors and value == pytest.approx(0.7, rel=1e-7)
+    ((name, value),) = put(station, "GOAL_RADIUS", 0.7)
+    assert (name, value) == ("GOAL_RADIUS", pytest.approx(0.7, rel=1e-7))
     assert station.commanded() == [ChangeSetting("goal.radius", 0.7)]  # with the digits that were meant
     assert value_of(station, "GOAL_RADIUS") == value
 
 
+def test_former_names_with_centre_are_read_and_set(station):
+    assert (read(station, "GOAL_CENTRE_X").param_id, value_of(station, "GOAL_CENTRE_X")) == ("GOAL_CENTRE_X", 8.0)
+    assert put(station, "SR1_CENTRE_Y", 0.5) == [("SR1_CENTRE_Y", 0.5)]
+    assert station.commanded() == [ChangeSetting("regions.SR1.shape.center.1", 0.5)]
+    assert value_of(station, "SR1_CENTER_Y") == 0.5
+    assert read(station, "SR1_CENTRE").error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
+
+
+def test_former_names_are_of_keys_not_of_regions():
+    """A name that exists is itself, and one that never was names no other region."""
+    rest = "criterion='obstacle',keep='out',gain=1.0,shape={type='sphere',center"
+    regions = {
+        name: f"{{name='{name}',{rest}=[{x},0,5],radius={x}}}}}" for name, x in (("centre", 1.0), ("center", 2.0))
+    }
+    names = ("CENTRE_RADIUS", "CENTRE_CENTRE_X", "CENTER_RADIUS", "CENTER_CENTRE_X")
+    both = Station("ardusub", of=scenario("intersection=[]", f"regions=[{','.join(regions.values())}]"))
+    assert [value_of(both, name) for name in names] == [1.0, 1.0, 2.0, 2.0]
+    assert put(both, "CENTRE_RADIUS", 3.0) == [("CENTRE_RADIUS", 3.0)]
+    assert both.commanded() == [ChangeSetting("regions.centre.shape.radius", 3.0)]
+    alone = Station("ardusub", of=scenario("intersection=[]", f"regions=[{regions['center']}]"))
+    assert [read(alone, name).get_type() for name in names] == ["PARAM_ERROR"] * 2 + ["PARAM_VALUE"] * 2
+
+
 def test_unchanged_value_submits_no_command(station):
     for value in listed(station):
-        errors, back = put(station, value.param_id, value.param_value)
-        assert back == [value.param_value] and set(errors) <= {mavlink.MAV_PARAM_ERROR_READ_ONLY}
+        *errors, back = put(station, value.param_id, value.param_value)
+        assert back == (value.param_id, value.param_value) and errors in ([], [mavlink.MAV_PARAM_ERROR_READ_ONLY])
     assert station.commanded() == []
 
 
@@ -182,14 +204,14 @@ def test_unchanged_value_submits_no_command(station):
     ],
 )  # fmt: skip
 def test_invalid_value_is_rejected_and_the_old_value_returned(station, name, value, error, words):
-    before = [read(station, name).param_value] if name != "NO_SUCH" else []
-    assert put(station, name, value) == ([getattr(mavlink, f"MAV_PARAM_ERROR_{error}")], before)
+    before = [(name, value_of(station, name))] if name != "NO_SUCH" else []
+    assert put(station, name, value) == [getattr(mavlink, f"MAV_PARAM_ERROR_{error}"), *before]
     station.play([], words)
 
 
 def test_read_only_rejects_parameter_changes():
     station = Station(commands=False)
-    assert put(station, "GOAL_RADIUS", 0.7) == ([mavlink.MAV_PARAM_ERROR_PERMISSION_DENIED], [0.5])
+    assert put(station, "GOAL_RADIUS", 0.7) == [mavlink.MAV_PARAM_ERROR_PERMISSION_DENIED, ("GOAL_RADIUS", 0.5)]
 
 
 def test_an_integer_is_cast_for_ardupilot_alone(each_station):
