@@ -87,19 +87,28 @@ class ModeCommands(Service):
     def _execute_override_goto(self, request: CommandRequest) -> Result:
         m = self.context.mavlink
         here = request.int_param(2) in (None, 0, m.MAV_GOTO_HOLD_AT_CURRENT_POSITION)
-        actions = {m.MAV_GOTO_DO_CONTINUE: False} | ({m.MAV_GOTO_DO_HOLD: True} if here else {})
-        pause = actions.get(request.int_param(1))
-        return Result.UNSUPPORTED if pause is None else self._pause(request.sender, pause)
+        if request.int_param(1) == m.MAV_GOTO_DO_HOLD and here:
+            return self._hold(request.sender)
+        if request.int_param(1) == m.MAV_GOTO_DO_CONTINUE:
+            return self._continue(request.sender)
+        return Result.UNSUPPORTED
 
     def _execute_do_pause_continue(self, request: CommandRequest) -> Result:
-        return Result.DENIED if request[1] not in (0.0, 1.0) else self._pause(request.sender, request[1] == 0.0)
+        if request[1] == 0.0:
+            return self._hold(request.sender)
+        if request[1] == 1.0:
+            return self._continue(request.sender)
+        return Result.DENIED
 
-    def _pause(self, sender: Sender, pause: bool) -> Result:
-        """Hold, or continue in the mode before."""
+    def _hold(self, sender: Sender) -> Result:
         mode = self.context.mode_ahead
-        if pause and mode != "hold":
+        if mode != "hold":
             self._paused_from = mode
-        return self._steer(sender, "hold" if pause else self._paused_from)
+        return self._steer(sender, "hold")
+
+    def _continue(self, sender: Sender) -> Result:
+        """Continue in the mode before the pause."""
+        return self._steer(sender, self._paused_from)
 
     # ---- restart ----
 
