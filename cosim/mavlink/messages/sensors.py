@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 from cosim.mavlink.messages.pose import to_lat_lon_alt
 from cosim.mavlink.vehicle.proximity import MAX_RANGE, SECTORS
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import Fields
+from cosim.mavlink.wire.encode import Fields, combine_flags
 from cosim.scenario.region_tables import Vector3
 
 SURFACE_PRESSURE = 1013.25  # hPa
@@ -97,14 +96,9 @@ def battery_status(context: VehicleContext) -> Iterator[Fields]:
 
 def _known_states(context: VehicleContext, prefix: str) -> int:
     """Return the flags of attitude and velocity, and those of the position if it is finite."""
-    is_placed = all(map(math.isfinite, context.view.position_ned))
-    names = "ATTITUDE VELOCITY_HORIZ VELOCITY_VERT" + is_placed * " POS_HORIZ_REL POS_HORIZ_ABS POS_VERT_ABS"
+    has_position = all(map(math.isfinite, context.view.position_ned))
+    names = "ATTITUDE VELOCITY_HORIZ VELOCITY_VERT" + has_position * " POS_HORIZ_REL POS_HORIZ_ABS POS_VERT_ABS"
     return combine_flags(context.mavlink, prefix, names)
-
-
-def combine_flags(mavlink: Any, prefix: str, names: str) -> int:
-    """Combine flags of an enumeration, whose names are given without their prefix."""
-    return sum(getattr(mavlink, prefix + name) for name in names.split())
 
 
 def estimator_status(context: VehicleContext) -> Iterator[Fields]:

@@ -8,10 +8,10 @@ from importlib import metadata
 
 from packaging.version import Version
 
-from cosim.mavlink.messages.sensors import combine_flags, has_bottom
+from cosim.mavlink.messages.sensors import has_bottom
 from cosim.mavlink.vehicle.profile import MODE_TABLE, SUBMARINE
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
-from cosim.mavlink.wire.encode import Fields
+from cosim.mavlink.wire.encode import Fields, combine_flags
 from cosim.simulation.commands.commands import MODES
 
 _PROTOCOL = 3  # value of HEARTBEAT.mavlink_version, for MAVLink 2 as for 1

@@ -41,6 +41,11 @@ def round_finite(x: float) -> int | None:
     return round(x) if math.isfinite(x) else None
 
 
+def combine_flags(mavlink: Any, prefix: str, names: str) -> int:
+    """Combine flags of an enumeration, whose names are given without their prefix."""
+    return sum(getattr(mavlink, prefix + name) for name in names.split())
+
+
 class Encoder:
     """Make messages of a dialect from any numbers."""
 
