@@ -88,7 +88,7 @@ class _Messages:
         self._rate_stamp = math.nan
 
     def add(self, name: str, m: Fields) -> None:
-        """Add one of the messages that are read, with its fields."""
+        """Add a message that the reader converts, with its fields."""
         try:
             self._add(name, m)
         except KeyError as error:
