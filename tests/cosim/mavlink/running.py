@@ -67,7 +67,7 @@ class GroundStation:
     def __init__(self) -> None:
         self.link = mavutil.mavlink_connection("udpin:127.0.0.1:0", 0, 255, 190, dialect="all")
         self.endpoint = Endpoint("udpout", "station", "127.0.0.1", self.link.port.getsockname()[1])
-        self.retries = 0  # requests that were sent again, also those of files
+        self.retries = self.file_retries = 0  # requests that were sent again, and those of files by mavftp's timers
         self.log = bytearray()  # a .tlog of all received messages
         self.link.message_hooks.append(
             lambda link, m: self.log.extend(struct.pack(">Q", time.time_ns() // 1000) + m.get_msgbuf())
@@ -150,7 +150,7 @@ class GroundStation:
         client = mavftp.MAVFTP(self.link, 1, 1)
         client.cmd_get([_FILE], callback=lambda file: files.append(file and file.read()))
         client.process_ftp_reply("OpenFileRO", timeout=30.0)
-        self.retries += client.open_retries + client.read_retries
+        self.file_retries += client.open_retries + client.read_retries
         assert mavftp.MAVFTP.ftp_param_decode(files[0]).params
 
     def parameters(self) -> dict[str, float]:
