@@ -73,7 +73,7 @@ class Wire:
     """A link that encodes and decodes what is sent."""
 
     def __init__(self, name: str = "wire") -> None:
-        self.name, self.room, self.got = name, True, []
+        self.name, self.room, self.got, self._n_read = name, True, [], 0
         self._coder = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         self._decoder = mavlink.MAVLink(None)
         self._decoder.robust_parsing = False
@@ -99,11 +99,17 @@ class Wire:
             whole[-1 if text.chunk_seq else len(whole) :] = [(whole[-1] if text.chunk_seq else "") + text.text]
         return whole
 
+    def new_texts(self) -> list[str]:
+        """Return the texts since the last call."""
+        texts, self._n_read = self.texts[self._n_read :], len(self.texts)
+        return texts
+
     def counts(self) -> Counter[str]:
         return Counter(message.get_type() for message in self.got)
 
     def clear(self) -> None:
         self.got.clear()
+        self._n_read = 0
 
 
 class Station:
@@ -115,7 +121,7 @@ class Station:
         self.commands, self.profile = CommandQueue(), PROFILES[profile]
         options = MavlinkOptions(profile=profile, commands=commands, **options)  # type: ignore[arg-type]
         self.autopilot = Autopilot(of or scenario(), COLUMNS, options, self.commands)  # type: ignore[arg-type]
-        self.wire, self.now, self.time, self.heard = Wire(), 100.0, 0.0, 0
+        self.wire, self.now, self.time = Wire(), 100.0, 0.0
         self.autopilot.attach(self.wire)
         self.autopilot.tick(self.now)
         self.wire.clear()
@@ -174,7 +180,7 @@ class Station:
                     commands = self.commanded()
                     assert close_to(commands, step, tolerance), commands
                 case str() | None:
-                    texts, self.heard = self.wire.texts[self.heard :], len(self.wire.texts)
+                    texts = self.wire.new_texts()
                     assert texts == [] if step is None else any(step in text for text in texts), (step, texts)
                 case (message, result):
                     assert self.acknowledged(message) == result, message

@@ -157,8 +157,7 @@ def test_every_message_of_the_dialect_is_displayed(shown):
     ],
 )  # fmt: skip
 def test_values_have_their_units(sent, text):
-    decoded = mavlink.MAVLink(None).decode(bytearray(sent.pack(mavlink.MAVLink(None)))) if "TEXT" in text else sent
-    assert format_values(decoded) == text
+    assert format_values(sent) == text
 
 
 def test_values_rounded_to_zero_have_no_sign(shown):

@@ -149,6 +149,8 @@ SCRIPTS = {
 @pytest.mark.parametrize("steps", SCRIPTS.values(), ids=SCRIPTS)
 def test_setpoints_obstacles_and_sticks_become_commands(station, steps):
     station.play({}, *steps)
+    waiting = [text for text in station.wire.of("STATUSTEXT") if text.text.startswith("Set-points wait")]
+    assert all(text.severity == mavlink.MAV_SEVERITY_NOTICE for text in waiting)
 
 
 GUIDED = mavlink.MAVLink_mission_item_message
@@ -160,20 +162,24 @@ def go_to(current=2, frame=3, place=(55.9098, -3.3202, -4.0), command=16):
 
 
 @pytest.mark.parametrize(
-    ("sent", "commands", "tolerance"),
+    ("sent", "replies", "commands", "tolerance"),
     [
-        *((globe(frame), [SetTarget(FAR)], 0.02) for frame in (0, 3, 5, 6)),
-        (command_int(REPOSITION, 0, (-1.0, 1.0, 0.0, 0.5), X, Y, Z), [SetTarget(FAR), SetHeading(0.5)], 0.02),
-        (long(REPOSITION, -1.0, 1.0, 0.0, NAN, X / 1e7, Y / 1e7, Z), [SetTarget(FAR)], 3.0),  # a float32 of degrees
-        (go_to(), [SetTarget((*GLOBE.to_local(55.9098, -3.3202, 0.0)[:2], 4.0))], 0.5),
-        (go_to(current=3), [SetTarget((8.0, 0.0, 4.0))], 0.0),  # the target's depth alone
-        (go_to(place=(55.9097, -3.3203, NAN)), [SetTarget((*GLOBE.to_local(55.9097, -3.3203, 0.0)[:2], 5.0))], 0.5),
+        *((globe(frame), [], [SetTarget(FAR)], 0.02) for frame in (0, 3, 5, 6)),
+        (command_int(REPOSITION, 0, (-1.0, 1.0, 0.0, 0.5), X, Y, Z), ["COMMAND_ACK"],
+         [SetTarget(FAR), SetHeading(0.5)], 0.02),
+        (long(REPOSITION, -1.0, 1.0, 0.0, NAN, X / 1e7, Y / 1e7, Z), ["COMMAND_ACK"],
+         [SetTarget(FAR)], 3.0),  # a float32 of degrees
+        (go_to(), ["MISSION_ACK"], [SetTarget((*GLOBE.to_local(55.9098, -3.3202, 0.0)[:2], 4.0))], 0.5),
+        (go_to(current=3), ["MISSION_ACK"], [SetTarget((8.0, 0.0, 4.0))], 0.0),  # the target's depth alone
+        (go_to(place=(55.9097, -3.3203, NAN)), ["MISSION_ACK"],
+         [SetTarget((*GLOBE.to_local(55.9097, -3.3203, 0.0)[:2], 5.0))], 0.5),
     ],
 )  # fmt: skip
-def test_positions_on_the_globe_are_reached(station, sent, commands, tolerance):
+def test_positions_on_the_globe_are_reached(station, sent, replies, commands, tolerance):
     station.play({})
-    replies = station.send(sent)
-    assert {reply.type if reply.get_type() == "MISSION_ACK" else reply.result for reply in replies} <= {ACCEPTED}
+    answers = station.send(sent)
+    assert [answer.get_type() for answer in answers] == replies
+    assert {answer.type if replies == ["MISSION_ACK"] else answer.result for answer in answers} <= {ACCEPTED}
     assert close_to(station.commanded(), commands, tolerance)
 
 
