@@ -1,7 +1,8 @@
-"""What both servers do alike: runs begin anew, silence ends them, and garbage is ignored."""
+"""Behavior that both servers share: runs begin anew, silence ends them, and garbage is ignored."""
 
 import random
 import struct
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -10,7 +11,8 @@ from cosim.errors import RunError
 from cosim.results.record import load_record
 from cosim.sitl.hil_server import LEFT, HilServer
 from cosim.sitl.json_server import JsonServer
-from cosim.sitl.sitl_session import RESTARTED
+from cosim.sitl.law import make_pwm_law
+from cosim.sitl.sitl_session import RESTARTED, FlightOptions, SitlSession
 from tests.cosim.sitl.stand_in import ARMED, Px4, StandIn, down, heave, packed
 
 
@@ -33,8 +35,8 @@ def garbage(draw, k):
     return {"json": datagrams, "hil": stream}
 
 
-def fly(kind, served, frames, spoils=None):
-    """Fly with a new autopilot, or with a restarted one; return the first answer."""
+def fly(kind, served, frames, spoils=False):
+    """Exchange frames with an autopilot of its own, perhaps among garbage; return the answers."""
     draw, answers = random.Random(1), []
     with {"json": StandIn, "hil": Px4}[kind](served.address) as pilot:
         for k in range(frames):
@@ -74,6 +76,8 @@ def test_a_new_connection_or_count_starts_a_new_run_from_the_initial_state(kind,
     one, two = served.outcome().runs
     assert (one.summary["status"], two.summary["status"]) == ({"json": RESTARTED, "hil": LEFT}[kind], "completed")
     assert two.folder.name == f"{one.folder.name}-2"
+    lengths = [len(load_record(run.folder)["time"]) for run in (one, two)]
+    assert kind == "hil" or lengths == [50, 121]
 
 
 @pytest.mark.medium
@@ -95,8 +99,9 @@ def test_without_an_autopilot_there_is_no_run(begin):
         begin(timeout=0.2).outcome()
 
 
-def test_occupied_port_is_reported(kind, begin):
-    served = begin(timeout=0.5)  # of which no run comes
+def test_occupied_port_is_reported(kind):
     server, name = {"json": (JsonServer, "UDP"), "hil": (HilServer, "TCP")}[kind]
-    with pytest.raises(RunError, match=rf"{name} 127.0.0.1:{served.address[1]}: Address already in use"):
-        server(served.server.flights, served.address)
+    session = SitlSession(FlightOptions(), "ardupilot", make_pwm_law)
+    with closing(server(session, ("127.0.0.1", 0))) as first:
+        with pytest.raises(RunError, match=rf"{name} 127.0.0.1:{first.address[1]}: Address already in use"):
+            server(session, first.address)
