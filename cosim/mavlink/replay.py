@@ -22,7 +22,6 @@ from cosim.simulation.columns import column_names
 from cosim.simulation.pace import Pace
 from cosim.simulation.signals import Array
 
-_POLL_PERIOD = 0.002  # s between two looks at the queue while the links send
 _MAX_QUEUED = MAX_SNAPSHOTS // 2
 
 
@@ -56,11 +55,9 @@ def replay(
             simulated = float(row[0])
             if pace is not None:
                 pace.wait()
-            while thread.waiting > _MAX_QUEUED:
-                time.sleep(_POLL_PERIOD)
+            thread.await_queue(_MAX_QUEUED)
             thread.observe(k, row)
-        while thread.waiting:
-            time.sleep(_POLL_PERIOD)
+        thread.await_queue(0)
     finally:
         thread.close()
     return ReplayResult(simulated, time.perf_counter() - started, thread.loss_reports())

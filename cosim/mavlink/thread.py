@@ -22,7 +22,7 @@ from cosim.simulation.signals import Array
 log = logging.getLogger(__name__)
 
 SNAPSHOT_PERIOD = 0.01  # s, simulated: the shortest period of a stream
-MAX_SNAPSHOTS = 8192  # in the queue; a full queue drops the oldest
+MAX_SNAPSHOTS = 8192  # in the queue; a full queue drops the oldest, unless the links include a log: then the run waits
 _IDLE_PERIOD = 0.02  # s, polling period while idle: each poll delays the stepper by 0.1 ms
 _FAST_RUN_PERIOD = 0.2  # s, polling period in a run much faster than real time, whose stepper hardly ever pauses
 _FAST_RUN_RATE = 2500  # snapshots per second of the wall clock that mark such a run: 25 times real time
@@ -35,6 +35,8 @@ _REST_SENDING = 3  # ratio of rest to sending
 _MAX_REST = 0.05  # s; long slices come from the stepper, which loads libraries before its first step
 _DRAINING = 2.0  # s for which closing waits for the queue
 _CLOSING = 4.0  # s for which closing waits in total
+_WAITING_PERIOD = 0.002  # s between two looks at the queue while waiting for it
+_STALLED = 2.0  # s after the start of a slice, after which the thread has stalled
 
 
 class LinkThread:
@@ -56,12 +58,15 @@ class LinkThread:
         self._last_poll = time.perf_counter()  # s, end of the last work
         self._snapshot_count = 0  # snapshots since then
         self._received_at = -math.inf  # s, monotonic, time of the last accepted message
+        self._slice_at = -math.inf  # s, monotonic, start of the last slice
+        self._is_awaited = False  # so that slices need no rest
         self.dropped = 0
         self.failures: dict[str, int] = Counter()
         self._thread = threading.Thread(target=self._run, name="mavlink", daemon=True)
 
     def start(self) -> None:
         """Start the thread."""
+        self._slice_at = time.monotonic()
         self._thread.start()
 
     def observe(self, k: int, row: Array) -> None:
@@ -71,18 +76,24 @@ class LinkThread:
     def observe_block(self, first: int, rows: Array) -> None:
         """Queue copies of the rows of the steps from `first` on of which a snapshot is due."""
         for row in rows[-first % self._decimation :: self._decimation]:
+            if self._logs:
+                self.await_queue(MAX_SNAPSHOTS - 1)
             self.dropped += len(self._queue) == MAX_SNAPSHOTS
             self._queue.append(row.copy())
 
-    @property
-    def waiting(self) -> int:
-        """Number of queued snapshots, at most `MAX_SNAPSHOTS`."""
-        return len(self._queue)
+    def await_queue(self, count: int) -> None:
+        """Wait until at most `count` snapshots are queued, unless the thread has stalled."""
+        self._is_awaited = True
+        while len(self._queue) > count and time.monotonic() < self._slice_at + _STALLED:
+            time.sleep(_WAITING_PERIOD)
+        self._is_awaited = False
 
     def close(self) -> None:
-        """Send queued snapshots within a bounded time, close vehicle and links, end the thread, and log losses."""
+        """Send queued snapshots (all to a log, else for a bounded time), close vehicle and links, and log losses."""
         if self._closing.is_set():
             return
+        if self._logs:
+            self.await_queue(0)
         self._closing.set()
         if self._thread.is_alive():
             self._thread.join(_CLOSING)
@@ -118,7 +129,7 @@ class LinkThread:
 
     def _run_slice(self) -> float:
         """Run a slice of each kind of work; return the time to rest [s]."""
-        start = time.perf_counter()
+        self._slice_at, start = time.monotonic(), time.perf_counter()
         for link in self._links:
             self._guard("receive", self._receive, link, time.perf_counter() + _RECEIVING / len(self._links))
         received = time.perf_counter()
@@ -132,7 +143,7 @@ class LinkThread:
         pause = max(_REST_RECEIVING * (received - start), _REST_SENDING * (sent - received))
         pause = min(pause, _MAX_REST)
         if has_more:
-            return pause
+            return 0.0 if self._is_awaited else pause
         if now - self._received_at < _ACTIVE_TIME:
             return max(pause, _ACTIVE_PERIOD)
         is_fast = self._snapshot_count > _FAST_RUN_RATE * (start - self._last_poll)

@@ -1,6 +1,7 @@
 """The thread of all links: isolation of the stepper, the vehicle and each peer."""
 
 import contextlib
+import itertools
 import socket
 import threading
 import time
@@ -89,6 +90,36 @@ def test_every_row_of_a_coarse_run_is_observed():
     links.start()
     links.close()
     assert len(vehicle.rows) == 5
+
+
+def test_blocks_of_rows_are_logged_whole_like_single_rows(tmp_path, monkeypatch):
+    for name, value in (("MAX_SNAPSHOTS", 16), ("_IDLE_PERIOD", 1e-3), ("_FAST_RUN_PERIOD", 1e-3), ("_STALLED", 60.0)):
+        monkeypatch.setattr(thread, name, value)
+    rows = np.stack([row(k * 0.003) for k in range(1000)])
+    vehicles, ends = [], np.cumsum([0, 1, 2, 5, 1, 400, 3, 3, 300, 285])
+    for name, bounds in (("rows", range(1001)), ("blocks", ends)):
+        vehicle, links = started(link_of(Tlog(str(tmp_path / f"{name}.tlog"))), step=0.003)
+        block = np.empty_like(rows)
+        for first, end in itertools.pairwise(bounds):
+            block[: end - first] = rows[first:end]
+            links.observe_block(first, block[: end - first])
+            block[:] = np.nan
+        links.close()
+        assert links.dropped == 0 and len(stubs.read_log(tmp_path / f"{name}.tlog")) == 335
+        vehicles.append(vehicle)
+    assert np.array_equal(vehicles[0].rows, rows[::3]) and np.array_equal(vehicles[1].rows, rows[::3])
+
+
+def test_a_stalled_thread_holds_up_a_logged_run_once(tmp_path, monkeypatch):
+    monkeypatch.setattr(thread, "MAX_SNAPSHOTS", 16)
+    monkeypatch.setattr(thread, "_STALLED", 0.2)
+    vehicle, going_on = StubVehicle(), threading.Event()
+    vehicle.observe = lambda row: going_on.wait(60.0)
+    _, links = started(link_of(Tlog(str(tmp_path / "dive.tlog"))), vehicle=vehicle)
+    observe(links, *range(1000))
+    assert links.dropped > 900
+    going_on.set()
+    links.close()
 
 
 def test_requests_are_answered_while_the_simulation_is_paused(ground):
