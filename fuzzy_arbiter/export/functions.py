@@ -27,8 +27,12 @@ def called(texts: Iterable[str]) -> list[str]:
 
 def in_python(name: str) -> str:
     """Return a function as a definition in Python."""
-    formula = _FORMULAS[name]
-    return f'def {name}({arguments_of(formula)}):\n    """Return {formula}."""\n    return {formula}'
+    lines = [f"def {name}({arguments_of(_FORMULAS[name])}):"]
+    node = ast.parse(_FORMULAS[name], mode="eval").body
+    while isinstance(node, ast.IfExp):
+        lines += [f"    if {ast.unparse(node.test)}:", f"        return {ast.unparse(node.body)}"]
+        node = node.orelse
+    return "\n".join([*lines, f"    return {ast.unparse(node)}"])
 
 
 def in_c(name: str) -> str:

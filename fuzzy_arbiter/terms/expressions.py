@@ -18,7 +18,7 @@ _BINDS = {"+": 1, "-": 1, "*": 2, "/": 2, "%": 2, "~": 3, "^": 4}  # precedence 
 
 # functions in exported code, where the word has another meaning
 EXPORTED = {
-    "/": "quotient", "%": "fmod", "^": "power", "pow": "power", "abs": "fabs", "min": "least", "max": "greatest",
+    "/": "quotient", "%": "fmod", "^": "power", "pow": "power", "abs": "fabs", "min": "minimum", "max": "maximum",
     "round": "rint",
 }  # fmt: skip
 

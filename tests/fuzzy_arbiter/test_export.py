@@ -109,6 +109,18 @@ SYSTEMS = {
 EVERY = " + ".join(
     f"{name}({', '.join(['a / 11', 'a / 7 + 1'][: function.arguments])})" for name, function in FUNCTIONS.items()
 )
+# each function of a / b and c / d, and its inverse, which tells infinity from NaN
+CALLS = [f"{name}({', '.join(['a / b', 'c / d'][: function.arguments])})" for name, function in FUNCTIONS.items()]
+ENDLESS = System(
+    tuple(Variable(name, (-1e20, 1e20), {"t": Shape(((0, 1), (1, 1)))}) for name in "abcd"),
+    tuple(
+        Output(f"o{i}", (-9, 9), {"v": Formula(text)}, default=-7.25, defuzzifier="average")
+        for i, text in enumerate(text for call in CALLS for text in (call, f"1 / {call}"))
+    ),
+    (Rule(Is("a", "t"), tuple(Is(f"o{i}", "v") for i in range(2 * len(CALLS)))),),
+    normalization="none",
+)
+EXTREMES = [(-2.5, 1.0), (3.0, 1.0), (1e20, 1.0), (-1.0, 0.0), (1.0, 0.0), (0.0, 0.0), (0.0, 1.0)]
 CURVED = System(
     (
         Variable(
@@ -249,6 +261,18 @@ def test_exported_code_matches_the_arbiter(make, name, tmp_path):
             values += [np.nextafter(variable.universe[0], -np.inf), variable.universe[1] + 1, float("inf")]
         for value in values:
             assert evaluate([*good[:i], value, *good[i + 1 :]])[0] == -i - 1
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("make", [in_c, in_python, pytest.param(in_numba, marks=pytest.mark.slow)])
+def test_functions_take_any_number(make, tmp_path):
+    """Of large and infinite numbers and of NaN, NumPy's value alone, in a batch and in exported code."""
+    x = np.array([(*first, *second) for first in EXTREMES for second in EXTREMES])
+    evaluate, arbiter = make(ENDLESS, tmp_path), Arbiter(system=ENDLESS)
+    for row, expected in zip(x.tolist(), arbiter.batch(x).tolist(), strict=True):
+        expected = pytest.approx(expected, rel=1e-11)
+        assert tuple(arbiter(row)) == expected
+        assert evaluate(row) == (0, expected)
 
 
 def test_systems_of_several_files_go_into_one_program(tmp_path):
