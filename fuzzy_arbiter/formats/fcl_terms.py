@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 from fuzzy_arbiter.errors import UnsupportedError
+from fuzzy_arbiter.formats.fcl_tokens import RESERVED
 from fuzzy_arbiter.formats.fll_terms import TYPES
 from fuzzy_arbiter.formats.fll_terms import read_shape as read_typed
 from fuzzy_arbiter.formats.notation import format_number, format_numbers, read_number, refuse
@@ -47,7 +48,7 @@ def read_shape(text: str, line: int, inputs: Sequence[str] | None) -> tuple[Memb
 
 
 def _number(text: str, line: int, what: str) -> float:
-    if text.isidentifier():
+    if text.isidentifier() and text.lower() not in {*RESERVED, "inf", "infinity", "nan"}:
         refuse(line, f"{what} is the variable {text!r}, which jFuzzyLogic allows; expected a number")
     return read_number(text, line, what)
 

@@ -28,11 +28,10 @@ SECTIONS: dict[str, tuple[tuple[str, ...], str]] = {
 _END = "END_FUNCTION_BLOCK"
 _LIMITS = {*SECTIONS, _END, *(end for _, end in SECTIONS.values())}  # words that stand in no statement
 _MANY = ("TERM", "RULE")
-# some texts of the standard leave out the sign of a range
+# some texts of the standard leave out the sign of a range; : and := count as one sign
 _STATEMENT = re.compile(
-    r"(?P<key>\w+)(?: (?P<label>[\w+.-]\S*))?? (?:(?P<sign>:=?) |(?<=RANGE )(?=\())(?P<value>.*)", re.IGNORECASE
+    r"(?P<key>\w+)(?: (?P<label>[\w+.-]\S*))?? (?::=? |(?<=RANGE )(?=\())(?P<value>.*)", re.IGNORECASE
 )
-_ASSIGNED = ("TERM", "DEFAULT", "RANGE")  # keys before :=, others before :
 
 _TOKEN = re.compile(
     r"""(?P<space>\s+) | (?P<comment>\(\*.*?\*\) | /\*.*?\*/ | //[^\n]*) | (?P<open>\(\*|/\*)
@@ -144,8 +143,7 @@ def _add(section: Block, statement: Sequence[Token]) -> None:
         section.many.append((line, text))
         return
     key, label = (match["key"].upper(), match["label"] or "") if match else ("", "")
-    misplaced = (label and key not in _MANY) or (match and match["sign"] == (":" if key in _ASSIGNED else ":="))
-    if not match or misplaced:
+    if not match or (label and key not in _MANY):
         refuse(line, f"{text!r}, expected a key, a colon and its value; known keys are {', '.join(keys)}")
     value = match["value"] if key in ("RULE", "DEFAULT", "TERM") else match["value"].upper()
     section.add(line, key, f"{label} {value}" if key == "TERM" else value, keys, _MANY)
