@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -27,7 +26,7 @@ if TYPE_CHECKING:
 class Arbiter:
     """Decide to what degree each of several prioritized criteria matters now, in the manner of a human pilot.
 
-    Nothing in it changes after it is made; threads may share it.
+    No decision depends on those before it; threads may share it.
 
     Parameters
     ----------
@@ -232,7 +231,7 @@ class Arbiter:
         return Arbiter(system=self._system, engine=engine)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return partial(Arbiter, system=self._system, engine=self.engine), ()
+        return _rebuilt, (self._system, self.engine)
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Arbiter) and (self._system, self.engine) == (other.system, other.engine)
@@ -272,6 +271,10 @@ def _with_defaults(system: System, default: float | Mapping[str, float] | None) 
         if name not in names:
             raise DefinitionError(f"default: no output {name!r}, expected one of {', '.join(names)}")
     return replace(system, outputs=tuple(replace(o, default=each.get(o.name, o.default)) for o in system.outputs))
+
+
+def _rebuilt(system: System, engine: str) -> Arbiter:  # a name that pickles hold
+    return Arbiter(system=system, engine=engine)
 
 
 _DEFAULTS = (SECTION_VI, "hierarchical", WEIGHT, "range", "refuse", 101)

@@ -152,7 +152,7 @@ def clipped(
 
 
 def scaled(
-    cuts: Numbers, breakpoints: Numbers, first: Numbers, term: Numbers, left: Numbers, right: Numbers, order: Numbers
+    cuts: Numbers, breakpoints: Numbers, first: Numbers, term: Numbers, left: Numbers, right: Numbers
 ) -> tuple[Any, Any]:
     """Return the area under the envelope of scaled terms, and its moment."""
     zero = cuts[0] * 0
@@ -192,15 +192,15 @@ def centroid(
     left: Numbers, right: Numbers, order: Numbers, scales: bool,
 ) -> Any:  # fmt: skip
     """Return the centroid of clipped (or scaled) terms, joined by their maximum."""
-    tables = breakpoints, first, term, left, right, order
+    tables = breakpoints, first, term, left, right
     largest = cuts[0]
     for cut in cuts:
         largest = max(largest, cut)
     if largest < TINY:
         larger = [cut * LARGER for cut in cuts]
-        area, moment = scaled(larger, *tables) if scales else clipped(larger, *tables)
+        area, moment = scaled(larger, *tables) if scales else clipped(larger, *tables, order)
     else:
-        area, moment = scaled(cuts, *tables) if scales else clipped(cuts, *tables)
+        area, moment = scaled(cuts, *tables) if scales else clipped(cuts, *tables, order)
     return breakpoints[0] + moment / area
 
 

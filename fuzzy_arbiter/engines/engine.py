@@ -36,7 +36,7 @@ class Defuzzifier:
 
 
 class Engine:
-    """A way to evaluate a system; it never changes, so that threads may share it."""
+    """A way to evaluate a system, which threads may share: no decision depends on those before it."""
 
     name: ClassVar[str]
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-# Sugeno's terms are values that may depend on the inputs. Tsukamoto's only rise or only fall, and their value is the
-# place where they have the rule's strength.
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from typing import Any, ClassVar
@@ -61,7 +59,7 @@ class ExactEngine(Engine):
 
 
 class GridEngine(ExactEngine):
-    """Evaluate any system as MATLAB and simpful do, from samples at `System.points` places of outputs."""
+    """Evaluate any system as MATLAB and simpful do, from `System.points` samples of each output."""
 
     name: ClassVar[str] = "grid"
 
@@ -104,7 +102,7 @@ class _Sampler(Defuzzifier):
 
 
 def sampled(output: Output, points: int) -> tuple[Array, Array]:
-    """Return the places at which an output is sampled, shape (points,), and its terms there, (terms, points)."""
+    """Return the sampled positions of an output, shape (points,), and its terms there, (terms, points)."""
     if points * len(output.terms) > 2**25:
         raise EngineError(f"output {output.name!r}: {points} points are too many to sample, expected fewer")
     positions = np.linspace(*output.universe, points)
@@ -122,6 +120,8 @@ def sampled(output: Output, points: int) -> tuple[Array, Array]:
 class Weighted(Defuzzifier):
     """The value of one output whose terms are values."""
 
+    # Sugeno's terms may depend on the inputs. Tsukamoto's only rise or only fall, and their value is the position at
+    # which they have the rule's strength.
     method = "weighted values, to rounding"
 
     def __init__(self, output: Output, inputs: Sequence[str], outputs: Sequence[str]) -> None:

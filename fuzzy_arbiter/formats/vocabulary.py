@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from fuzzy_arbiter.definition import System
-from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.rule import Operators
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, S_NORMS, T_NORMS
 
@@ -47,10 +46,7 @@ WORDS: dict[str, dict[str, dict[str, str]]] = {
 
 def word_of(format: str, kind: str, name: str) -> str:
     """Return a format's word for an operator or a defuzzifier."""
-    words = {known: word for word, known in reversed(WORDS[format][kind].items()) if word}
-    if name not in words:
-        raise UnsupportedError(f"{format} cannot say the {kind} {name!r}: expected one of {', '.join(words)}")
-    return words[name]
+    return next(word for word, known in WORDS[format][kind].items() if known == name)
 
 
 def operator_words(format: str, operators: Operators | System) -> list[str]:

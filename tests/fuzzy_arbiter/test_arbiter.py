@@ -131,6 +131,9 @@ def test_arbiter_is_immutable_and_copyable(arbiter):
         assert other == arbiter and hash(other) == hash(arbiter)
         assert other([0.3, 0.6, 0.2]) == arbiter([0.3, 0.6, 0.2])
     assert arbiter != Arbiter(normalization="max")
+    assert pickle.loads(b"cfuzzy_arbiter.arbiter\n_rebuilt\n(cfuzzy_arbiter.hierarchy\nprioritized\n(tRVgrid\ntR.") == (
+        Arbiter(engine="grid")
+    )  # of an installed version
 
 
 @pytest.mark.slow

@@ -131,6 +131,10 @@ def test_as_dict_is_json():
     data = json.loads(json.dumps(e.as_dict()))
     assert data == e.as_dict()
     assert (data["winner"], data["outputs"][1]["cuts"]) == ("shape", {"low": 0.4, "high": 0.6})
-    assert data["rules"][7] | {"text": ""} == {
-        "label": "R8", "text": "", "strength": 0.4, "conclusions": {"alpha_3": "high"}, "fired": True,
-    }  # fmt: skip
+    assert data["rules"][7] == {
+        "label": "R8",
+        "text": "if obstacle is not_exist and shape is simple and depth is not_maintain then alpha_3 is high",
+        "strength": 0.4,
+        "conclusions": {"alpha_3": "high"},
+        "fired": True,
+    }

@@ -34,8 +34,6 @@ from fuzzy_arbiter import (
 from fuzzy_arbiter.errors import DefinitionError, FormatError, InputError
 from fuzzy_arbiter.formats import FORMATS, reads, writes
 
-pd = pytest.importorskip("pandas")
-
 EXACT = float(Fraction(12118694, 610275))  # of the tip at service 9.8, food 6.5
 SERVICE = Variable("service", (0, 10), auto_terms(3))
 FOOD = Variable("food", (0, 10), auto_terms(3))
@@ -47,6 +45,10 @@ RULES = (
 )
 TIPPING = System((SERVICE, FOOD), (TIP,), RULES)
 ROWS = [[9.8, 6.5], [3.0, 8.0], [0.0, 0.0]]
+
+
+def pandas():
+    return pytest.importorskip("pandas")
 
 
 @pytest.fixture
@@ -140,7 +142,7 @@ def test_batch_columns_are_named_in_input_and_result(tipping, table):
 
 def test_data_frames_give_columns_by_name_and_their_rows_are_samples(tipping):
     service, food = zip(*ROWS, strict=True)
-    frame = pd.DataFrame({"who": ["a", "b", "c"], "food": food, "service": service}, index=[7, 5, 3])
+    frame = pandas().DataFrame({"who": ["a", "b", "c"], "food": food, "service": service}, index=[7, 5, 3])
     columns = tipping.batch(frame)
     assert isinstance(columns, Result) and columns["tip"].tolist() == tipping.batch(ROWS)[:, 0].tolist()
     assert frame.assign(**columns._asdict())["tip"].tolist() == columns["tip"].tolist()
@@ -178,8 +180,11 @@ def test_keyword_columns_broadcast_scalars(tipping):
         (lambda a: a(service=0.3), "food: input is missing, expected service, food"),
         (lambda a: a(service=0.3, food=0.4, fod=0.4), "fod: unknown input, expected service, food"),
         (lambda a: a(np.ma.array([0.3, 0.4], mask=[0, 1])), "food: input is masked, expected a number"),
-        (lambda a: a(pd.DataFrame({"service": [3], "food": [4]})), "service: input is .*; for columns there is batch"),
-        (lambda a: a(pd.Series([3.0, 4.0])), "service: input is missing"),
+        (
+            lambda a: a(pandas().DataFrame({"service": [3], "food": [4]})),
+            "service: input is .*; for columns there is batch",
+        ),
+        (lambda a: a(pandas().Series([3.0, 4.0])), "service: input is missing"),
         (lambda a: a.batch([0.1, 0.2]), r"shape \(2,\), expected \(n, 2\)"),
         (lambda a: a.batch([[0.1, 0.2], [0.1, math.nan]]), "row 1: food is nan"),
         (lambda a: a.batch([[0.1, 0.2], [0.1, 99]]), r"row 1: food is 99.0, expected a number in \[0, 10?\]"),
@@ -194,12 +199,15 @@ def test_keyword_columns_broadcast_scalars(tipping):
         (lambda a: a.batch(service=3, food=4), r"columns have the shapes service \(\), food \(\), expected"),
         (lambda a: a.batch(service=["3"], food=["4"]), "values of the type str"),
         (lambda a: a.batch({"service": [0.3, None], "food": [0.4, 0.5]}), "row 1: service is nan"),
-        (lambda a: a.batch(pd.DataFrame({"service": [1.0]})), "food: column is missing in service; expected"),
+        (lambda a: a.batch(pandas().DataFrame({"service": [1.0]})), "food: column is missing in service; expected"),
         (
-            lambda a: a.batch(pd.DataFrame([[1, 2, 3]], columns=["food", "food", "service"])),
+            lambda a: a.batch(pandas().DataFrame([[1, 2, 3]], columns=["food", "food", "service"])),
             "food: column stands twice",
         ),
-        (lambda a: a.batch(pd.DataFrame({"service": ["3"], "food": [4]})), "got a text among the values; expected row"),
+        (
+            lambda a: a.batch(pandas().DataFrame({"service": ["3"], "food": [4]})),
+            "got a text among the values; expected row",
+        ),
     ],
 )
 def test_invalid_inputs_are_rejected_by_name(arbiter, ask, fault):
