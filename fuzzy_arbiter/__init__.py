@@ -50,10 +50,11 @@ __all__ = [
     "triangle",
 ]
 
-# modules of these names, imported on first use, so that the command can report a dependency that is not installed
+# modules of these names, imported on first use, so that the command can report a dependency that is not installed;
+# each after those that it imports, so that a name is found before others are imported
 _MODULES = (
-    *("arbiter", "definition", "errors", "hierarchy", "membership", "result", "rule", "shapes"),
-    *("terms.curves", "terms.term", "terms.values", "hysteresis"),
+    *("membership", "errors", "result", "shapes", "terms.curves", "terms.values", "terms.term"),
+    *("rule", "definition", "hierarchy", "arbiter", "hysteresis"),
 )
 
 

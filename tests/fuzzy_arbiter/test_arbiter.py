@@ -1,11 +1,13 @@
 """The arbiter: section VI, normalization, definitions, threads, memory, imports."""
 
 import copy
+import gc
 import math
 import pickle
 import subprocess
 import sys
 import threading
+import tracemalloc
 from fractions import Fraction
 
 import numpy as np
@@ -153,6 +155,21 @@ def test_threads_do_not_disturb_each_other(arbiter):
     assert wrong == []
 
 
+@pytest.mark.medium
+def test_arbiters_leak_no_memory():
+    def memory_after(count):
+        for _ in range(count):
+            Arbiter()([0.3, 0.6, 0.2])
+        gc.collect()
+        return tracemalloc.get_traced_memory()[0]
+
+    tracemalloc.start()
+    try:
+        assert -memory_after(10) + memory_after(30) < 20_000  # bytes; one arbiter takes more
+    finally:
+        tracemalloc.stop()
+
+
 def test_ramp_is_one_up_to_the_boundary_and_falls_outside():
     assert [ramp(c, 0.2) for c in (-1.0, 0.0, 0.05, 0.2, 3.0)] == pytest.approx([1.0, 1.0, 0.75, 0.0, 0.0])
     assert [ramp(c, 0.0) for c in (-1e-9, 1e-9)] == [1.0, 0.0]
@@ -170,3 +187,9 @@ def test_arbiter_imports_no_optional_library():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
+
+
+def test_a_name_is_imported_without_those_that_it_does_not_need():
+    code = "import sys; from fuzzy_arbiter import ramp; print(*(m for m in sys.modules if m.startswith('fuzzy_ar')))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["fuzzy_arbiter", "fuzzy_arbiter.membership"]

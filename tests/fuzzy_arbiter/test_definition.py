@@ -107,6 +107,14 @@ def test_definition_copies_lists_and_generators():
         assert hash(other) == hash(made)
 
 
+def test_terms_are_listed_once_for_all_rules(monkeypatch):
+    """So that the work to build a system grows with the number of rules, not with its square."""
+    counts, names = [], Variable.term_names.fget
+    monkeypatch.setattr(Variable, "term_names", property(lambda v: (counts.append(v), names(v))[1]))
+    system(*("if wind is calm then sail is full", "if wind is strong then sail is reefed") * 200)
+    assert len(counts) < 10
+
+
 def test_writers_require_systems_and_readers_require_text():
     with pytest.raises(UnsupportedError, match="got 'x', expected a System"):
         writes("x", "json")

@@ -24,6 +24,7 @@ from fuzzy_arbiter import (
     triangle,
 )
 from fuzzy_arbiter.engines.closed import ClosedEngine
+from fuzzy_arbiter.engines.rational_pieces import pieces
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import And, Is, Or
 from tests.examples import examples
@@ -130,6 +131,19 @@ def test_pieces_are_exact_where_the_area_is_small_and_next_to_their_starts(low, 
     for h in [*small, *(1 - x for x in small), *starts]:
         exact = float(reference.centroid(output, [1 - Fraction(h), Fraction(h)]))
         assert engine.weights([h])[0] == pytest.approx(exact, abs=16 * EPS)
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "count"),
+    [
+        (falling(0, 1), rising(0, 1), 1),
+        (falling(0.3, 0.7), rising(0.3, 0.7), 1),
+        (falling(0.2, 0.55), rising(0.37, 0.83), 3),
+    ],
+)
+def test_number_of_cubic_pieces_is_minimal(low, high, count):
+    _, scaled = pieces(Output("y", (0, 1), {"low": low, "high": high}))
+    assert sum(piece.start < 1.0 for piece in scaled) == count  # beside them there may be one for h = 1 alone
 
 
 @pytest.mark.parametrize("n", range(1, 13))
@@ -242,6 +256,11 @@ def test_crisp_inputs_give_full_weight_to_the_first_active_criterion(engine, ask
     first = asks.index(True) if True in asks else None
     weights = Arbiter(criteria(len(asks)), engine=engine, points=50)(list(map(float, asks)))
     assert weights == tuple(float(k == first) for k in range(len(asks)))
+
+
+def test_weights_rise_smoothly():
+    h = np.linspace(0, 1, 1001)
+    assert Arbiter(criteria(1)).batch(h[:, None])[:, 0] == pytest.approx(h * h * (3 - 2 * h), abs=4 * EPS)
 
 
 @pytest.mark.slow

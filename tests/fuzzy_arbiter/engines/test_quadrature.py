@@ -63,6 +63,17 @@ def gaussians(*parameters, universe=(0, 25), **options):
     return Output("y", universe, {f"t{i}": curve("gaussian", *p) for i, p in enumerate(parameters)}, **options)
 
 
+@pytest.mark.parametrize("deviation", [6.0, 0.05, 1e-6])
+@pytest.mark.parametrize("implication", T_NORMS)
+def test_a_lone_gaussian_has_its_mean_for_all_values(deviation, implication):
+    for defuzzifier in ("centroid", "bisector", "mom"):
+        output = gaussians((9.7, deviation), universe=(9.7 - 10, 9.7 + 10), defuzzifier=defuzzifier)
+        # a drastic product with less than 1 is a single position, which has no area
+        cuts = (1.0,) if implication == "drastic_product" and defuzzifier != "mom" else (1.0, 0.6)
+        for cut in cuts:
+            assert value(output, [cut], implication) == pytest.approx(9.7, abs=1e-9), (defuzzifier, cut)
+
+
 @pytest.mark.parametrize(
     ("parameters", "cuts"),
     [
