@@ -108,12 +108,12 @@ def _power(value: float, _: object = None) -> str:
     return f"{'−' if value < 0.0 else ''}{number}"
 
 
-def limits_of(signals: Sequence[Array], *, least: float = 0.0) -> tuple[float, float]:
+def limits_of(signals: Sequence[Array], *, min_spread: float = 0.0) -> tuple[float, float]:
     """Return limits of an axis that contain all values of signals."""
     finite = [s[np.isfinite(s)] for s in map(np.asarray, signals)]
     shown = np.concatenate([f for f in finite if f.size] or [np.array([-1.0, 1.0])])
     low, high = float(shown.min()), float(shown.max())
-    spread = max(high - low, least, 1e-9 * max(abs(low), abs(high)), 1e-12)
+    spread = max(high - low, min_spread, 1e-9 * max(abs(low), abs(high)), 1e-12)
     extra = (spread - (high - low)) / 2.0 + _MARGIN * spread
     return low - extra, high + extra
 

@@ -51,11 +51,12 @@ class Column(NamedTuple):
 
 def overlap_columns(data: FigureData) -> list[Column]:
     """Return the spans around the first windows of overlap."""
-    columns = []
+    columns, time = [], data.record["time"]
     for start, end in data.summary["intersection_windows"][:_MAX_WINDOWS]:
-        room = max(0.5 * (end - start), 5 * data.scenario.time.step)
+        margin = max(0.5 * (end - start), 5 * data.scenario.time.step)
         title = f"{start:.3f} s to {end:.3f} s"
-        columns.append(Column(start - room, end + room, overlap=(start, end), title=title))
+        limits = max(start - margin, float(time[0])), min(end + margin, float(time[-1]) + 1e-9)
+        columns.append(Column(*limits, overlap=(start, end), title=title))
     return columns
 
 
@@ -118,19 +119,23 @@ def _draw_line(ax: Axes, data: FigureData, line: Line) -> Artist:
 # ---- scales ----
 
 
-def fit(signals: Sequence[Array], least: float = 0.0) -> Callable[[Axes], object]:
+def fit(signals: Sequence[Array], min_spread: float = 0.0) -> Callable[[Axes], object]:
     """Return a linear scale that contains all values."""
-    return lambda ax: ax.set_ylim(*limits_of(signals, least=least))
+    return lambda ax: ax.set_ylim(*limits_of(signals, min_spread=min_spread))
 
 
 def fit_spikes(
-    signals: Sequence[Array], typical: float, ratio: float = 20.0, least: float = 0.0
+    signals: Sequence[Array],
+    largest: float,
+    typical: float,
+    linear: float,
+    ratio: float = 20.0,
+    min_spread: float = 0.0,
 ) -> Callable[[Axes], object]:
-    """Return a scale that is linear, or logarithmic beyond typical values, where a spike would hide the rest."""
-    largest = max(float(np.abs(s[np.isfinite(s)]).max(initial=0.0)) for s in signals)
+    """Return a linear scale, or one that is logarithmic beyond `linear`, where a spike would hide typical values."""
     if largest > ratio * max(typical, 1.0):
-        return lambda ax: symlog_axis(ax, largest, max(typical, 1e-3 * largest))
-    return fit(signals, least)
+        return lambda ax: symlog_axis(ax, largest, linear)
+    return fit(signals, min_spread)
 
 
 def percentile(signal: Array, q: float) -> float:

@@ -65,9 +65,9 @@ def attitude(data: FigureData) -> list[Panel]:
 def velocities(data: FigureData) -> list[Panel]:
     """Show linear and angular velocity."""
     panels = []
-    for names, label, least in (("uvw", "velocity [m/s]", 0.1), ("pqr", "angular velocity [rad/s]", 0.05)):
+    for names, label, min_spread in (("uvw", "velocity [m/s]", 0.1), ("pqr", "angular velocity [rad/s]", 0.05)):
         signals = [data.record[f"velocity.{name}"] for name in names]
-        panels.append(Panel(label, 1.7, _lines(names, signals), fit(signals, least)))
+        panels.append(Panel(label, 1.7, _lines(names, signals), fit(signals, min_spread)))
     return panels
 
 
@@ -143,7 +143,8 @@ def forces(data: FigureData) -> list[Panel]:
     norms, acting = norms_of(data.record), [data.record[f"actuation.{a}"] for a in "XYZ"]
     sizes = list(norms.values())
     parts = _lines([f"{axis}, acting" for axis in "XYZ"], acting)
-    scale = fit_spikes(acting, percentile(norms["acting"], 90), least=1.0)
+    largest, typical = (percentile(norms["acting"], q) for q in (100, 90))
+    scale = fit_spikes(acting, largest, typical, max(typical, 1.0), min_spread=1.0)
     return [
         Panel("force, norm [N]", 1.7, _lines([f"norm, {which}" for which in norms], sizes, (BLACK, RED)),
               lambda ax: log_axis(ax, sizes)),
@@ -173,15 +174,16 @@ def thrusts_of(scenario: Scenario, record: Rows) -> Array:
 
 def thrusters(data: FigureData) -> list[Panel]:
     """Show the force of each thruster, or the one that the wrench would require."""
-    vehicle = data.scenario.vehicle
+    vehicle, acting = data.scenario.vehicle, thrusts_of(data.scenario, data.record)
     lines = [
         Line(f"thruster {i + 1}", force,
              {"color": CYCLE[i % len(CYCLE)], "linestyle": "-" if i < len(CYCLE) // 2 else "--", "linewidth": 1.0})
-        for i, force in enumerate(thrusts_of(data.scenario, data.record).T)
+        for i, force in enumerate(acting.T)
     ]  # fmt: skip
     bounds = np.array([vehicle.thrust_min.min(), vehicle.thrust_max.max()])
     levels = [Line("", bound, {"color": BLACK, "linestyle": "--", "linewidth": 0.8}) for bound in bounds.tolist()]
-    scale = fit_spikes([*(np.asarray(line.signal) for line in lines), bounds], float(np.abs(bounds).max()), 5.0)
+    limit = float(np.abs(bounds).max())
+    scale = fit_spikes([acting, bounds], percentile(acting, 100), limit, limit, 5.0)
     return [Panel("thrust [N]", 2.3, [*lines, *levels], scale)]
 
 
@@ -189,15 +191,15 @@ def estimates(data: FigureData) -> list[Panel]:
     """Show the estimates against the truth."""
     truth = data.scenario.true_restoring_parameters
     colors = (BLUE, *CYCLE[1:4])
-    lines = _lines(_ESTIMATES, [data.record[f"estimate.phi{i}"] for i in range(1, 5)], colors)
+    signals = [data.record[f"estimate.phi{i}"] for i in range(1, 5)]
     levels = [
         Line("truth", value, {"color": color, "linestyle": (0, (1, 3)), "linewidth": 1.2})
         for value, color in zip(truth.tolist(), colors, strict=True)
     ]
     panels = []
     for label, which in (("estimate [N]", slice(0, 1)), ("estimates [N m]", slice(1, 4))):
-        shown = [*(np.asarray(line.signal) for line in lines[which]), truth[which]]
-        panels.append(Panel(label, 1.6, [*lines[which], *levels[which]], fit(shown, 0.1)))
+        lines = _lines(_ESTIMATES[which], signals[which], colors[which])
+        panels.append(Panel(label, 1.6, [*lines, *levels[which]], fit([*signals[which], truth[which]], 0.1)))
     return panels
 
 
@@ -208,8 +210,10 @@ def lyapunov(data: FigureData) -> list[Panel]:
     )
     labels = ("V as printed", "V, potential of the force", "V, primary region alone")
     forms = _lines(labels, (printed, normalized, primary), (ORANGE, BLUE, BLACK))
-    zero = np.zeros(1)
-    scales = [fit_spikes([signal, zero], percentile(signal, 50)) for signal in (normalized, rate)]
+    scales = []
+    for signal in (normalized, rate):
+        largest, typical = (percentile(signal, q) for q in (100, 50))
+        scales.append(fit_spikes([signal, np.zeros(1)], largest, typical, max(typical, 1e-3 * largest)))
     return [
         Panel("V [N m]", 1.8, forms, scales[0], violated=-1.0),
         Panel("dV/dt = −W [W]", 1.8, [Line("", rate, {"color": BLUE})], scales[1], violated=1.0),

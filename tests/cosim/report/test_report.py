@@ -2,6 +2,7 @@
 
 import html
 import re
+from dataclasses import replace
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -9,10 +10,13 @@ import pytest
 
 from cosim.report.contents import contents_of
 from cosim.report.figures.figures import drawings
+from cosim.report.figures.panels import draw_panels
 from cosim.report.figures.sampled_rows import make_figure_data
 from cosim.report.figures.style import thin
+from cosim.report.figures.time_series import forces
 from cosim.report.inline_svg import contrast, dark_color
 from cosim.results.paper_claims import paper_claims
+from cosim.results.record import Rows
 from cosim.results.run_result import load_run
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
@@ -55,6 +59,21 @@ def test_every_figure_is_there_as_a_vector_file_numbered_and_with_a_caption(ship
         assert re.match(rf"Figure {i + 1}\. .{{20,}}", caption)
     for name in names:
         ET.parse(run.folder / "figures" / f"{name}.svg")
+
+
+def test_figures_over_time_show_recorded_times_and_what_a_spike_would_hide(shipped_run):
+    data = make_figure_data(load_run(shipped_run("paper", *SHORT, report=True).folder))
+    axes = {drawing.name: drawing.figure.axes for drawing in drawings(data)}
+    time = data.record["time"]
+    limits = np.array([ax.get_xlim() for ax in axes["weights-overlap"]])
+    assert time[0] <= limits.min() and limits.max() <= time[-1] + 1e-6
+    dotted = [line for ax in axes["estimates"] for line in ax.lines if line.get_linestyle() == ":"]
+    assert not dotted  # but the truth, of dashes of its own
+    spike = dict.fromkeys(("actuation.X", "actuation.Y", "actuation.Z"), np.where(time == time[3], 1e5, 3.0))
+    arrays = {name: spike.get(name, data.record[name]) for name in data.record.units}
+    _, ax = draw_panels(data, forces(replace(data, record=Rows(data.record.columns, arrays)))).axes
+    assert ax.yaxis.get_transform().linthresh == 10.0  # N, the next power of ten above 3 √3, which is the norm
+    assert ax.get_ylim()[1] == pytest.approx(1.5e5 * 3.0**0.5)
 
 
 def test_figures_follow_the_theme_and_are_described(shipped_run):
