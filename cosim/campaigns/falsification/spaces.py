@@ -18,6 +18,7 @@ _CONFLICTS = 64  # number of conflicts that are drawn to find the number of thei
 _OBSTACLE_COORDINATES = (
     5  # coordinates of an obstacle: radius, position along the straight line, three of its offset from it
 )
+_FINITE = 38.5  # standard deviations, beyond all quantiles of floats between 0 and 1; those of 0 and 1 are infinite
 
 Point = NDArray[np.float64]  # (dimension,) coordinates from 0 to 1
 
@@ -25,7 +26,7 @@ Point = NDArray[np.float64]  # (dimension,) coordinates from 0 to 1
 class Shares:
     """Replacement of a random number generator: each number is a given quantile of its distribution; shares (n,)."""
 
-    def __init__(self, shares: Point, rest: np.random.Generator, limit: float = np.inf) -> None:
+    def __init__(self, shares: Point, rest: np.random.Generator, limit: float = _FINITE) -> None:
         self._shares, self._rest, self._limit = shares, rest, limit
         self.drawn = 0  # count of numbers drawn so far
 
@@ -68,7 +69,7 @@ class SceneSpace:
     # number. An obstacle too close to start or goal is drawn again, as by the generator.
 
     def __init__(self, family: str, limit: float | None = None) -> None:
-        self.family, self._limit = family, np.inf if limit is None else limit
+        self.family, self._limit = family, _FINITE if limit is None else limit
         self._chance_in_point = limit is None
         rng = np.random.default_rng(0)
         if family in MAX_OBSTACLES:

@@ -192,7 +192,10 @@ class Design:
         """Return the values of some rows as fractions of their ranges, from 0 to 1, shape (n, keys)."""
         if self.kind == "lhs":
             return self._hypercube[rows]
-        first, n, keys = int(rows[0]), int(rows[-1] - rows[0]) + 1, len(self.vary)
+        keys = len(self.vary)
+        if not len(rows):
+            return np.empty((0, keys))
+        first, n = int(rows[0]), int(rows[-1] - rows[0]) + 1
         if self.kind == "random":
             bits = np.random.PCG64(self.seed)
             bits.advance(first * keys)

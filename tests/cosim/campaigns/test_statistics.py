@@ -52,12 +52,34 @@ def ishigami(x, a=7.0, b=0.1):
 @pytest.mark.parametrize(("n", "times", "within"), [(100, 100, 0.04), (1000, 10, 0.02), (20_000, 1, 0.01)])
 def test_effects_are_the_first_order_indices_of_ishigami(n, times, within):
     rng = np.random.default_rng(3)
-    found = []
+    found, detected = [], []
     for _ in range(times):
         x = rng.uniform(-math.pi, math.pi, (n, 3))
         y, known = ishigami(x)
-        found.append([effect(column, y)["share"] for column in x.T])
+        effects = [effect(column, y) for column in x.T]
+        found.append([each["share"] for each in effects])
+        detected.append(effects[1]["share"] > effects[1]["floor"])  # of sin², which a rank correlation misses
     assert np.mean(found, axis=0) == pytest.approx(known, abs=within)
+    assert np.mean(detected) > 0.97
+
+
+@pytest.mark.medium(fast=1)
+@pytest.mark.parametrize("values", [None, 4], ids=["range", "four values"])
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda rng: rng.exponential(size=100) ** 2,
+        lambda rng: (rng.random(100) < 0.05).astype(float),
+        lambda rng: 1e9 + rng.random(100),
+    ],
+    ids=["skewed", "rare", "far from 0"],
+)
+def test_noise_exceeds_the_floor_at_the_stated_rate(draw, values):
+    rng = np.random.default_rng(6)
+    found = [effect(rng.uniform(size=100) if values is None else rng.integers(0, values, 100) * 1.0, draw(rng))
+             for _ in range(500)]  # fmt: skip
+    assert np.mean([of["share"] > of["floor"] for of in found if of]) < 0.03
+    assert np.mean([of["share"] for of in found if of]) == pytest.approx(0.0, abs=0.01)
 
 
 @pytest.mark.medium

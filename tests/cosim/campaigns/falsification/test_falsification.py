@@ -8,7 +8,7 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from cosim.campaigns import vary_from
+from cosim.campaigns import run_campaign, vary_from
 from cosim.campaigns.falsification import falsification as module
 from cosim.campaigns.falsification.falsification import costs_of, run_falsification
 from cosim.campaigns.falsification.work import ScenarioSearch, SceneSearch, SearchSettings
@@ -141,6 +141,18 @@ def test_failure_rate_is_estimated_by_multilevel_splitting(tmp_path):
     page = check(write_falsification_page(tmp_path / "out", 0))
     assert sum(row[1].count("e-") == 1 for row in page.rows if len(row) == 2) >= len(estimate["levels"]) - 1
     assert run_falsification(search(200, Conditions(duration=8.0), rare_event=True), tmp_path / "out").flown == 0
+
+
+@pytest.mark.slow
+def test_large_failure_rate_equals_monte_carlo(tmp_path):
+    """A barrier that is off has a violation in some per cent of plain scenes."""
+    task = SceneTask("unarbitrated", gains_from("unarbitrated"), Conditions(duration=40.0))
+    settings = SearchSettings(budget=1000, rare_event=True)
+    estimate = run_falsification(SceneSearch("plain", task, settings), tmp_path / "rate").summary["estimate"]
+    (tmp_path / "s.jsonl").write_text("\n".join(generate_scenes(1000, 5000)))
+    campaign = run_campaign(tmp_path / "s.jsonl", "unarbitrated", tmp_path / "dice", task.conditions)
+    counted = campaign.summary["rates"]["violation"]
+    assert max(estimate["low"], counted["low"]) < min(estimate["high"], counted["high"])
 
 
 def test_costs_rank_outcomes_by_severity():

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import ks_2samp
 
 from controller import LAWS
-from cosim.campaigns.falsification.spaces import SceneSpace
+from cosim.campaigns.falsification.spaces import SceneSpace, Shares
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.conflicts import CONFLICTS, make_conflict
@@ -63,6 +63,11 @@ def test_no_point_leaves_the_family(kind):
         assert np.linalg.norm(scene.current) <= (0.4 if hard else 0.25) * (1.0 + 1e-12)
         assert abs(scene.weight_minus_buoyancy) <= 15.0 and 10.0 <= scene.righting_moment <= 62.0
         assert not hard or (1 <= scene.failed_thruster.index <= 8 and 5.0 <= scene.failed_thruster.time <= 30.0)
+
+
+def test_sampling_with_replacement_is_rejected():
+    with pytest.raises(NotImplementedError):
+        Shares(np.empty(0), np.random.default_rng(0)).choice(3, 2, replace=True)
 
 
 def test_redrawn_obstacle_leaves_others_unchanged():
@@ -128,7 +133,7 @@ def test_points_drawn_evenly_are_scenes_of_the_generator(family):
 @pytest.mark.parametrize("family", ["conflict", "hard", "plain", "tour"])
 def test_scene_is_determined_by_its_point_and_valid(family):
     space, rng = SceneSpace(family), np.random.default_rng(3)
-    corners = np.clip(rng.integers(0, 2, (20, space.dimension)), 1e-9, 1.0 - 1e-9)
+    corners = rng.integers(0, 2, (20, space.dimension)).astype(float)
     for i, point in enumerate([*corners, *rng.random((40, space.dimension))]):
         one, other = (json.loads(space.line(point, seed)) for seed in (i, i + 100))
         for scene in (one, other):
