@@ -41,7 +41,7 @@ class Workspace(NamedTuple):
     # Its rows are the barriers in use, then the lower limits, then the upper ones.
 
     rows: Array  # (r, m) a_i
-    right: Array  # (r,) b_i
+    rhs: Array  # (r,) b_i
     price: Array  # (r,) 1 / rho_i
     mapped_rows: Array  # (r + 2 m, m) H^-1 a_i
     size: Array  # (r + 2 m,) sqrt(G_ii)
@@ -61,7 +61,7 @@ def empty_workspace(barriers: int, thrusters: int) -> Workspace:
     n = barriers + 2 * thrusters
     return Workspace(
         rows=np.zeros((barriers, thrusters)),
-        right=np.zeros(barriers),
+        rhs=np.zeros(barriers),
         price=np.zeros(barriers),
         mapped_rows=np.zeros((n, thrusters)),
         size=np.zeros(n),
@@ -140,15 +140,15 @@ def _prepare(work: Workspace, barriers: int, inverse: Array, lower: Array, upper
     m, scale = lower.size, 0.0
     work.nominal[:] = np.where(np.isfinite(work.nominal), work.nominal, 0.0)
     for i in range(barriers):
-        if not np.isfinite(work.right[i] + work.price[i] + np.sum(work.rows[i])):
-            work.rows[i, :], work.right[i], work.price[i] = 0.0, 0.0, 1.0
+        if not np.isfinite(work.rhs[i] + work.price[i] + np.sum(work.rows[i])):
+            work.rows[i, :], work.rhs[i], work.price[i] = 0.0, 0.0, 1.0
         work.mapped_rows[i] = inverse @ work.rows[i]
         squared_norm = work.rows[i] @ work.mapped_rows[i]
-        work.residual[i] = work.right[i] - work.rows[i] @ work.nominal
+        work.residual[i] = work.rhs[i] - work.rows[i] @ work.nominal
         work.size[i] = np.sqrt(squared_norm + work.price[i])
         work.multipliers[i], work.row_state[i] = 0.0, _FREE
         if not squared_norm > 0.0:
-            work.multipliers[i] = max(work.right[i], 0.0) / work.price[i] if work.price[i] > 0.0 else 0.0
+            work.multipliers[i] = max(work.rhs[i], 0.0) / work.price[i] if work.price[i] > 0.0 else 0.0
             work.row_state[i] = _NOTHING
         else:
             scale = max(scale, abs(work.residual[i]) / work.size[i])
@@ -171,7 +171,7 @@ def _most_violated(work: Workspace, barriers: int, lower: Array, upper: Array, f
         if work.row_state[i] != _FREE:
             continue
         if i < barriers:
-            lack = work.right[i]
+            lack = work.rhs[i]
             for j in range(m):
                 lack -= work.rows[i, j] * forces[j]
         elif i < barriers + m:
@@ -241,7 +241,7 @@ def _row_residual(work: Workspace, barriers: int, i: int, lower: Array, upper: A
         return float(forces[i - barriers - m] - upper[i - barriers - m])
     if i >= barriers:
         return float(lower[i - barriers] - forces[i - barriers])
-    total, rest = _add_product(work.right[i], 0.0, -work.price[i], work.multipliers[i])
+    total, rest = _add_product(work.rhs[i], 0.0, -work.price[i], work.multipliers[i])
     for j in range(m):
         total, rest = _add_product(total, rest, -work.rows[i, j], forces[j])
     return total + rest

@@ -179,8 +179,8 @@ def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Vector6, gai
         if pose_gradient(observation.later_gradients, observation.later_rotation_gradients, i, of_attitude, later):
             turning = gradient_rate(regions.kinds[i], regions.signs[i], n, later, relative)
         h, rate, drift_term = observation.clearances[i] - gains.margin, float(n @ relative), float(n @ free)
-        right = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * h - drift_term - turning
-        rows = add_row(work, rows, n, memory.acceleration, right, price, lower, upper)
+        rhs = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * h - drift_term - turning
+        rows = add_row(work, rows, n, memory.acceleration, rhs, price, lower, upper)
     return rows
 
 

@@ -179,9 +179,9 @@ def _correct_number(
     memory.innovations[sensor, 0] += square(innovation) / variance
     memory.innovations[sensor, 1] += 1.0
     for i in range(N_ERRORS):
-        share = gain[i] / variance
-        error[i] += share * innovation
-        P[i] -= share * gain
+        fraction = gain[i] / variance
+        error[i] += fraction * innovation
+        P[i] -= fraction * gain
 
 
 def _apply(memory: NavigationMemory, error: Errors) -> None:

@@ -79,10 +79,10 @@ def test_step_is_its_equations(ball):
     # barrier
     relative = v[:3] - ball.velocity
     rate = n @ relative
-    right = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * (h - gains.margin)
-    right -= n @ (free + d)[:3] + (relative @ relative - rate**2) / np.linalg.norm(away)
+    rhs = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * (h - gains.margin)
+    rhs -= n @ (free + d)[:3] + (relative @ relative - rate**2) / np.linalg.norm(away)
     assert memory.program.rows[0] == pytest.approx(n @ pushes[:3], rel=1e-9, abs=1e-15)
-    assert memory.program.right[0] == pytest.approx(right, rel=2e-3)
+    assert memory.program.rhs[0] == pytest.approx(rhs, rel=2e-3)
 
 
 @pytest.mark.medium

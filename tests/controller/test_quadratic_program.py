@@ -36,36 +36,36 @@ def program(rng, kind):
         slopes[::2] = 0.0
     rows = slopes @ thrusters.matrix[:3] / mass
     reach = np.abs(rows) @ np.maximum(thrusters.upper, -thrusters.lower)
-    right = reach * rng.uniform(0.2, 3.0, count) if kind == "enclosed" else rng.normal(size=count) * (0.05 + reach)
+    rhs = reach * rng.uniform(0.2, 3.0, count) if kind == "enclosed" else rng.normal(size=count) * (0.05 + reach)
     price = 10.0 ** -rng.uniform(3.0, 6.0, count) / mass**2
     if kind == "firm":  # a hundred times more so than the law ever asks for
         price *= 0.01
     wanted = rng.normal(size=8) * (300.0 if kind == "saturated" else 15.0) * thrusters.health
-    return thrusters, rows, right, price, wanted
+    return thrusters, rows, rhs, price, wanted
 
 
 def _solve(work, count, inverse, lower, upper, forces, steps):
     steps[0] = solve(work, count, inverse, lower, upper, forces)
 
 
-def solve_program(thrusters, rows, right, price, wanted):
+def solve_program(thrusters, rows, rhs, price, wanted):
     """Return forces, multipliers and steps of our own solver."""
     count, m = rows.shape
     work, forces = empty_workspace(count + 2, m), np.full(m, np.nan)
-    work.rows[:count], work.right[:count], work.price[:count], work.nominal[:] = rows, right, price, wanted
+    work.rows[:count], work.rhs[:count], work.price[:count], work.nominal[:] = rows, rhs, price, wanted
     steps = np.zeros(1, np.int64)
     BoundCall(_solve, (work, count, thrusters.inverse, thrusters.lower, thrusters.upper, forces, steps)).call()
     return forces, work.multipliers[: count + 2 * m].copy(), steps[0]
 
 
-def by_quadprog(thrusters, rows, right, price, wanted):
+def by_quadprog(thrusters, rows, rhs, price, wanted):
     """Return its forces; each slack is counted in the measure in which it costs 1."""
     count, m = rows.shape
     H = np.linalg.inv(thrusters.inverse)
     G = np.block([[(H + H.T) / 2.0, np.zeros((m, count))], [np.zeros((count, m)), np.eye(count)]])
     rooms = np.hstack([np.vstack([np.eye(m), -np.eye(m)]), np.zeros((2 * m, count))])
     C = np.vstack([np.hstack([rows, np.diag(np.sqrt(price))]), rooms])
-    b = np.r_[right, thrusters.lower, -thrusters.upper]
+    b = np.r_[rhs, thrusters.lower, -thrusters.upper]
     return quadprog.solve_qp(G, np.r_[H @ wanted, np.zeros(count)], C.T, b)[0][:m]
 
 
@@ -87,8 +87,8 @@ def test_residual_and_dual_force_are_accurate_under_cancellation():
     for _ in range(100):
         forces, work.rows[0] = rng.normal(size=8) * 20.0, rng.normal(size=8)
         work.price[0], work.multipliers[0] = rng.uniform(0.0, 1e-6), rng.uniform(0.0, 1e6)
-        work.right[0] = work.rows[0] @ forces + work.price[0] * work.multipliers[0]
-        expected = Fraction(work.right[0]) - Fraction(work.price[0]) * Fraction(work.multipliers[0])
+        work.rhs[0] = work.rows[0] @ forces + work.price[0] * work.multipliers[0]
+        expected = Fraction(work.rhs[0]) - Fraction(work.price[0]) * Fraction(work.multipliers[0])
         expected -= sum(Fraction(a) * Fraction(u) for a, u in zip(work.rows[0], forces, strict=True))
         lack = _row_residual(work, 1, 0, forces, forces, forces)
         assert lack == pytest.approx(float(expected), rel=1e-9, abs=1e-28)
@@ -99,7 +99,7 @@ def test_residual_and_dual_force_are_accurate_under_cancellation():
 
 
 def test_uncontrollable_row_is_paid_by_slack():
-    """Of right - price y <= 0 with the least y: right / price, and forces as they were wanted."""
+    """Of rhs - price y <= 0 with the least y: rhs / price, and forces as they were wanted."""
     thrusters, wanted = make_thrusters(MODELS["odin"]), np.linspace(-3.0, 4.0, 8)
     forces, y, _ = solve_program(thrusters, np.zeros((1, 8)), np.array([0.5]), np.array([1e-6]), wanted)
     assert forces == pytest.approx(wanted)
@@ -107,7 +107,7 @@ def test_uncontrollable_row_is_paid_by_slack():
 
 
 def test_weakly_controllable_row_is_partly_paid_by_slack():
-    """(right - row u) = price y and u = wanted + H^-1 row y."""
+    """(rhs - row u) = price y and u = wanted + H^-1 row y."""
     thrusters, wanted, row = make_thrusters(MODELS["odin"]), np.linspace(-3.0, 4.0, 8), np.full((1, 8), 1e-3)
     forces, y, _ = solve_program(thrusters, row, np.array([0.5]), np.array([0.02]), wanted)
     shaped = thrusters.inverse @ row[0]
@@ -127,7 +127,7 @@ def test_solution_is_optimal_and_that_of_quadprog(kind, programs):
     """
     rng, tolerance = np.random.default_rng(100 + KINDS.index(kind)), 1e-9 if kind == "firm" else 1e-12
     for _ in range(programs):
-        thrusters, rows, right, price, nominal = given = program(rng, kind)
+        thrusters, rows, rhs, price, nominal = given = program(rng, kind)
         forces, y, steps = solve_program(*given)
         count, m = rows.shape
         scale = 1.0 + np.abs(nominal).max()
@@ -138,7 +138,7 @@ def test_solution_is_optimal_and_that_of_quadprog(kind, programs):
         A, inverse = np.vstack([rows, np.eye(m), -np.eye(m)]).astype(np.longdouble), thrusters.inverse
         sizes = np.abs(nominal) + np.abs(forces) + np.abs(inverse) @ np.abs(A.T) @ y
         assert np.all(np.abs(forces - nominal - inverse @ (A.T @ y)) <= 4.0 * ROUNDING * sizes)
-        residual = right - A[:count] @ forces - price.astype(np.longdouble) * barriers
+        residual = rhs - A[:count] @ forces - price.astype(np.longdouble) * barriers
         residual /= np.sqrt(np.sum(rows @ inverse * rows, axis=1) + price)
         assert np.all(np.where(barriers > 0.0, np.abs(residual), residual) <= tolerance * scale)
         assert np.array_equal(forces[low > 0.0], thrusters.lower[low > 0.0])
@@ -168,10 +168,10 @@ def test_the_barrier_of_greater_price_yields_less():
 @pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
 def test_non_finite_rows_are_ignored(bad):
     thrusters = make_thrusters(MODELS["odin"])
-    rows, right, price = np.ones((3, 8)) / 187.5, np.full(3, 0.3), np.full(3, 1e-8)
-    alone, _, _ = solve_program(thrusters, rows[:1], right[:1], price[:1], np.zeros(8))
-    rows[1, 3], right[2] = bad, bad
-    forces, _, steps = solve_program(thrusters, rows, right, price, np.r_[bad, np.zeros(7)])
+    rows, rhs, price = np.ones((3, 8)) / 187.5, np.full(3, 0.3), np.full(3, 1e-8)
+    alone, _, _ = solve_program(thrusters, rows[:1], rhs[:1], price[:1], np.zeros(8))
+    rows[1, 3], rhs[2] = bad, bad
+    forces, _, steps = solve_program(thrusters, rows, rhs, price, np.r_[bad, np.zeros(7)])
     assert steps > 0
     assert np.array_equal(forces, alone)
 
@@ -182,12 +182,12 @@ def test_forces_stay_within_limits_for_extreme_numbers():
     rng, far = np.random.default_rng(2), np.array([1.0, 1.0, 1.0, 1e-300, 1e-150, 1e-30, 1e30, 1e150, 1e300])
     ended = 0
     for _ in range(200):
-        thrusters, rows, right, price, wanted = program(rng, str(rng.choice(KINDS[:-1])))
-        n = len(right)
+        thrusters, rows, rhs, price, wanted = program(rng, str(rng.choice(KINDS[:-1])))
+        n = len(rhs)
         rows, wanted = rows * rng.choice(far, (n, 1)), wanted * rng.choice(far, 8)
         with np.errstate(over="ignore", invalid="ignore"):
-            right, price = right * rng.choice(far, n), price * rng.choice(far, n)
-            forces, y, steps = solve_program(thrusters, rows, right, price, wanted)
+            rhs, price = rhs * rng.choice(far, n), price * rng.choice(far, n)
+            forces, y, steps = solve_program(thrusters, rows, rhs, price, wanted)
         ended += steps < 0
         assert np.all(forces >= thrusters.lower) and np.all(forces <= thrusters.upper)
         assert np.all(y >= 0.0)
@@ -218,9 +218,9 @@ def test_steps_count_row_additions_and_removals(monkeypatch):
     monkeypatch.setitem(plain.__globals__, "_advance", counting)
     gone = 0
     for _ in range(40):
-        thrusters, rows, right, price, wanted = program(rng, "any")
+        thrusters, rows, rhs, price, wanted = program(rng, "any")
         work, forces = empty_workspace(len(rows), 8), np.empty(8)
-        work.rows[:], work.right[:], work.price[:], work.nominal[:] = rows, right, price, wanted
+        work.rows[:], work.rhs[:], work.price[:], work.nominal[:] = rows, rhs, price, wanted
         moves.clear()
         steps = plain(work, len(rows), thrusters.inverse, thrusters.lower, thrusters.upper, forces)
         assert steps >= len(moves)

@@ -68,8 +68,8 @@ def _between(least: float, middle: float, most: float, lags: Array, lag: float) 
     first, low, high = 1, middle, most
     if lag < lags[1]:
         first, low, high = 0, least, middle
-    share = (lag - lags[first]) / (lags[first + 1] - lags[first])
-    between: float = low + min(max(share, 0.0), 1.0) * (high - low)
+    fraction = (lag - lags[first]) / (lags[first + 1] - lags[first])
+    between: float = low + min(max(fraction, 0.0), 1.0) * (high - low)
     return between
 
 
@@ -107,5 +107,5 @@ def predict_state(
     predicted.position[:] = position + lag * velocity
     predicted.velocity[:] = np.concatenate((velocity, omega)) + lag * acceleration
     angle = lag * norm(omega)
-    share = lag if angle < _GREATEST_TURN else lag * _GREATEST_TURN / angle
-    predicted.quaternion[:] = integrate_attitude(quaternion, omega, share)
+    limited_lag = lag if angle < _GREATEST_TURN else lag * _GREATEST_TURN / angle
+    predicted.quaternion[:] = integrate_attitude(quaternion, omega, limited_lag)

@@ -10,7 +10,7 @@ from controller.laws.deployable.path_planning.planner import PathPlan
 from controller.linear_algebra import norm
 from controller.stack_array import Vector3, zeros
 
-_AHEAD = 0.4  # m, lookahead distance along the path
+_LOOKAHEAD = 0.4  # m, lookahead distance along the path
 _SLOWEST_CORNER = 0.25  # speed at corners of 120 degrees and more, as a fraction of the full speed
 
 
@@ -27,7 +27,7 @@ def desired_velocity(plan: PathPlan, position: Vector3, goal_velocity: Vector3, 
     """Return the velocity [m/s], NED, that follows the path from a position [m, NED]."""
     waits, path = plan.waits[0], plan.path
     count = 1 if waits else plan.counts[0]
-    speed, traveled, to_go = gains.speed, 0.0, _AHEAD
+    speed, traveled, to_go = gains.speed, 0.0, _LOOKAHEAD
     heading, before = zeros(3), zeros(3)
     for leg in range(count):
         direction = path[leg] - (position if leg == 0 else path[leg - 1])

@@ -36,28 +36,28 @@ from controller.stack_array import Array, Columns6, Number, Rows3, Vector3, Vect
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _IMPULSE = 0.5  # s, assumed duration of the desired acceleration in the search for faces ahead
 _LN_10 = 2.302585092994046
-_AHEAD = 1e-4  # s, step of the difference quotient of a gradient: relative error 1e-4, rounding included
+_FD_STEP = 1e-4  # s, step of the difference quotient of a gradient: relative error 1e-4, rounding included
 _FIRM = (3.0, 3.0)  # decades by which slack costs more than missing the desired force: at weight 0; added at weight 1
-_LEAP = 0.5  # cosine of a gradient's turn within `_AHEAD` below which the turn counts as a jump
+_LEAP = 0.5  # cosine of a gradient's turn within `_FD_STEP` below which the turn counts as a jump
 _MARGIN_OF_ATTITUDE = 0.02  # rad, margin of regions of attitude
 KEPT = 0.01  # m/s2, slack up to which a barrier counts as kept
 _BOUND_LEAP = 0.05  # m, fall of the bound in a step that counts as a jump: more than the vehicle's motion can cause
 
 
 class RegionObservation(NamedTuple):
-    """Regions evaluated at the estimated pose, now and `_AHEAD` later."""
+    """Regions evaluated at the estimated pose, now and `_FD_STEP` later."""
 
     values: Array  # (n,) g, above 0 where a region is violated
     gradients: Rows3  # derivative of g by the position, NED
     rotation_gradients: Rows3  # derivative of g by a rotation about the body axes
     clearances: Array  # (n,) m, or rad for regions of attitude
-    later_shifts: Rows3  # m, NED: shifts of the regions `_AHEAD` later
-    later_values: Array  # (n,) the same quantities `_AHEAD` later
+    later_shifts: Rows3  # m, NED: shifts of the regions `_FD_STEP` later
+    later_values: Array  # (n,) the same quantities `_FD_STEP` later
     later_gradients: Rows3
     later_rotation_gradients: Rows3
     later_clearances: Array  # (n,)
     bound: Number  # m: lower bound of the clearances by `write_rows`, if no barrier yields
-    asked: Array  # (n,) m/s2, rad/s2: last right side of the barrier of each region's nearest face
+    previous_rhs: Array  # (n,) m/s2, rad/s2: last right side of the barrier of each region's nearest face
 
 
 class Motion(NamedTuple):
@@ -91,14 +91,14 @@ def predict_shifts(regions: PackedRegions, time: float, out: Rows3) -> None:
 def observe_regions(
     observation: RegionObservation, regions: PackedRegions, position: Vector3, quaternion: Vector4, velocity: Vector6
 ) -> None:
-    """Evaluate the regions at a pose [m, NED], and at the pose `_AHEAD` later by a velocity as in `Motion`."""
+    """Evaluate the regions at a pose [m, NED], and at the pose `_FD_STEP` later by a velocity as in `Motion`."""
     s = observation
     evaluate_packed(regions, position, quaternion, s.values, s.gradients, s.rotation_gradients, s.clearances)
-    predict_shifts(regions, _AHEAD, s.later_shifts)
+    predict_shifts(regions, _FD_STEP, s.later_shifts)
     evaluate_packed(
         regions._replace(shifts=s.later_shifts),
-        position + _AHEAD * velocity[:3],
-        integrate_attitude(quaternion, velocity[3:], _AHEAD),
+        position + _FD_STEP * velocity[:3],
+        integrate_attitude(quaternion, velocity[3:], _FD_STEP),
         s.later_values,
         s.later_gradients,
         s.later_rotation_gradients,
@@ -122,7 +122,7 @@ def gradient_rate(kind: int, sign: float, n: Vector6, later: Vector6, velocity: 
     # The gradient of a flat face is constant, and jumps where another face becomes the nearest. So with flat faces only
     # a gradient that turns away applies, as round an edge; with others, jumps towards the vehicle are ignored. Inside a
     # region to stay in (`sign` above 0) a gradient that turns away is a jump, too.
-    turning = float(((later - n) / _AHEAD) @ velocity)
+    turning = float(((later - n) / _FD_STEP) @ velocity)
     if turning < 0.0 and kind < _ATTITUDE and (kind in FLAT or later @ n < _LEAP):
         return 0.0
     if turning > 0.0 and kind < _ATTITUDE and sign > 0.0:
@@ -148,7 +148,7 @@ def write_rows(
     motion: Motion,
     lower: Array,
     upper: Array,
-    share: float,
+    fraction: float,
     gains: DeployableGains,
 ) -> int:
     """Write the constraint of each hard region that the thrusters could violate; return the number of rows."""
@@ -199,13 +199,13 @@ def write_rows(
             if not of_attitude:
                 bound = min(bound, gains.margin + h, (rate + allowed) / gains.barrier_slope)
             slope = gains.barrier_slope if h <= 0.0 else braking / (allowed + braking / gains.barrier_slope)  # phi'
-            right = -gains.barrier_rate * (rate + allowed) - slope * rate - drift_term - turning
+            rhs = -gains.barrier_rate * (rate + allowed) - slope * rate - drift_term - turning
             if face == 0:
-                if share < 1.0:
-                    right = observation.asked[i] + share * (right - observation.asked[i])
-                observation.asked[i] = right
+                if fraction < 1.0:
+                    rhs = observation.previous_rhs[i] + fraction * (rhs - observation.previous_rhs[i])
+                observation.previous_rhs[i] = rhs
 
-            rows = add_row(work, rows, n, motion.thruster_acceleration, right, price, lower, upper)
+            rows = add_row(work, rows, n, motion.thruster_acceleration, rhs, price, lower, upper)
     observation.bound[0] = bound
     return rows
 
@@ -215,18 +215,18 @@ def add_row(
     rows: int,
     n: Vector6,
     thruster_acceleration: Columns6,
-    right: float,
+    rhs: float,
     price: float,
     lower: Array,
     upper: Array,
 ) -> int:
-    """Add the constraint n^T A u >= right, unless no forces within the limits violate it; return the number of rows."""
+    """Add the constraint n^T A u >= rhs, unless no forces within the limits violate it; return the number of rows."""
     # with thruster_acceleration [m/s2, rad/s2], lower, upper [N]
     row = work.rows[rows]
     row[:] = n @ thruster_acceleration
-    if not right > row @ np.where(row > 0.0, lower, upper):
+    if not rhs > row @ np.where(row > 0.0, lower, upper):
         return rows
-    work.right[rows], work.price[rows] = right, price
+    work.rhs[rows], work.price[rows] = rhs, price
     return rows + 1
 
 

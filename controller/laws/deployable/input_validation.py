@@ -27,16 +27,16 @@ _FASTEST = 100.0  # m/s, rad/s: bound of plausible velocities and body rates
 _RESTING, _PUSHED = 0.02, 0.05
 
 
-def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], share: float) -> None:
-    """Write the arbiter's weights, shape (2, n), those of hard regions low-pass filtered in two stages by a share."""
-    # The first stage follows the arbiter, the second one the first. The first weights are not filtered. The arbiter's
-    # weights are clipped to [0, 1]; NaN becomes 1, the cautious value.
+def smooth_weights(weights: Array, smoothed: Array, hard: NDArray[np.bool_], fraction: float) -> None:
+    """Write the arbiter's weights, shape (2, n), those of hard regions low-pass filtered in two stages."""
+    # The first stage follows the arbiter, the second one the first, each by a fraction of its difference in a step. The
+    # first weights are not filtered. The arbiter's weights are clipped to [0, 1]; NaN becomes 1, the cautious value.
     for i in range(weights.size):
         weight = 1.0 if np.isnan(weights[i]) else min(max(weights[i], 0.0), 1.0)
         if not hard[i] or np.isnan(smoothed[0, i]):
             smoothed[0, i] = smoothed[1, i] = weight
-        smoothed[0, i] += share * (weight - smoothed[0, i])
-        smoothed[1, i] += share * (smoothed[0, i] - smoothed[1, i])
+        smoothed[0, i] += fraction * (weight - smoothed[0, i])
+        smoothed[1, i] += fraction * (smoothed[0, i] - smoothed[1, i])
 
 
 def reports_change(reported: Array, before: Array, health: Array) -> bool:

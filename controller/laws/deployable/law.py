@@ -68,7 +68,7 @@ _SEED = 1  # seed of the path planner's random numbers
 _ON_THE_WAY = 0.3  # m/s, desired speed from which soft regions do not push the vehicle back at all
 _SHALLOWEST = 1e-3  # m, lower bound of the depth in the goal region at which they push back in full again
 _LEAST_EFFECTIVENESS = 0.5  # effectiveness below which the desired force of a thruster is reduced in proportion
-_LEAST_SHARE = 0.4  # least share of the desired force, so that a thruster is not kept within its dead band
+_MIN_FRACTION = 0.4  # minimum fraction of the desired force, so that a thruster is not kept within its dead band
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 
 
@@ -154,7 +154,7 @@ def step(
     wrench = np.concatenate((force + R_ahead.T @ pushed, moment))
     work = memory.program
     work.nominal[:] = thrusters.allocator @ wrench
-    work.nominal[:] *= np.clip(thrusters.effectiveness / _LEAST_EFFECTIVENESS, _LEAST_SHARE, 1.0)
+    work.nominal[:] *= np.clip(thrusters.effectiveness / _LEAST_EFFECTIVENESS, _MIN_FRACTION, 1.0)
     lower, upper = memory.given_limits[0], memory.given_limits[1]
     model.write_force_limits(thrusters, memory.given_limits)
 
@@ -246,7 +246,7 @@ def _soft_forces(
         force = -push * observation.gradients[i] / size
         along = force @ desired
         if along < 0.0:
-            spared = max(min(speed / _ON_THE_WAY, 1.0), 1.0 - entered)  # share of the push back
+            spared = max(min(speed / _ON_THE_WAY, 1.0), 1.0 - entered)  # fraction of the push back
             force -= spared * along * desired / square(speed)
         total += force
     return total

@@ -67,12 +67,12 @@ def predict(
     """Predict the estimate over a period [s] under the forces that acted in it."""
     # `thruster_acceleration` is the acceleration by one newton of each thruster.
     x, P, F = estimate.state, estimate.covariance, estimate.transition
-    T, m, B = period, thrusters.acting.size, thruster_acceleration[:3]
+    T, m, A = period, thrusters.acting.size, thruster_acceleration[:3]
     effectiveness = x[EFFECTIVENESS : EFFECTIVENESS + m]
     loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
     free = free_acceleration(dynamics, R, estimate.velocity, omega_body, loads)
-    acceleration = free[:3] + B @ (thrusters.acting * effectiveness)
-    curvature = T * (B @ (estimate.curvature * effectiveness))
+    acceleration = free[:3] + A @ (thrusters.acting * effectiveness)
+    curvature = T * (A @ (estimate.curvature * effectiveness))
     _update_misfit(estimate, T)
     # derivatives of the next velocity; drag is that of the mean axis, linearized
     linear, quadratic = np.sum(dynamics.linear_damping[:3]) / 3.0, np.sum(dynamics.quadratic_damping[:3]) / 3.0
@@ -83,9 +83,9 @@ def predict(
         F[axis, VELOCITY + axis] = 1.0 - slope[axis] * T
     F[0, CURRENT], F[1, CURRENT + 1] = slope[0] * T, slope[1] * T
     F[2, NET_WEIGHT] = T / dynamics.translational_mass[0]
-    F[:, LAG] = T * (B @ (estimate.by_lag * effectiveness))
-    F[:, EFFECTIVENESS : EFFECTIVENESS + m] = T * B * thrusters.acting
-    F[:, EFFECTIVENESS + m : EFFECTIVENESS + m + m] = T * B * estimate.by_ceiling[0] * effectiveness
+    F[:, LAG] = T * (A @ (estimate.by_lag * effectiveness))
+    F[:, EFFECTIVENESS : EFFECTIVENESS + m] = T * A * thrusters.acting
+    F[:, EFFECTIVENESS + m : EFFECTIVENESS + m + m] = T * A * estimate.by_ceiling[0] * effectiveness
     # the state and its covariance
     estimate.acceleration[:] = acceleration
     x[:3] += T * (estimate.velocity + 0.5 * T * acceleration)
@@ -226,9 +226,9 @@ def _correct(
     variance = max(noise + float(gain[begin:end] @ row[begin:end]), square(innovation / _OUTLIER))
     estimate.bias[channel] += _BIAS_SHARE * (innovation / np.sqrt(variance) - estimate.bias[channel])
     for i in range(x.size):
-        share = gain[i] / variance
-        x[i] += share * innovation
-        P[i] -= share * gain
+        fraction = gain[i] / variance
+        x[i] += fraction * innovation
+        P[i] -= fraction * gain
     gain /= variance
     for j in range(estimate.direct.size):
         expected = estimate.direct[j] + row[begin:end] @ estimate.deviation[j, begin:end]

@@ -49,8 +49,8 @@ def allowed(h, a, slope):
 def expected_row(n, distance, margin, relative, turning, braking, motion):
     h, rate = distance - margin, n @ relative
     phi, slope = allowed(h, braking, GAINS.barrier_slope)
-    right = -GAINS.barrier_rate * (rate + phi) - slope * rate - n @ motion.free_acceleration - turning
-    return n @ motion.thruster_acceleration, right
+    rhs = -GAINS.barrier_rate * (rate + phi) - slope * rate - n @ motion.free_acceleration - turning
+    return n @ motion.thruster_acceleration, rhs
 
 
 def moving(rng, velocity, position_spread=0.1):
@@ -72,7 +72,7 @@ def written(regions, motion, quaternion, weights, limits=(-30.0, 25.0), time=1.5
     barrier.observe_regions(sight, packed, motion.position, quaternion, motion.velocity)
     lower, upper = (np.full(8, limit) for limit in limits)
     count = barrier.write_rows(work, sight, packed, weights, motion, lower, upper, 1.0, GAINS)
-    return work.rows[:count].copy(), work.right[:count].copy(), work.price[:count].copy()
+    return work.rows[:count].copy(), work.rhs[:count].copy(), work.price[:count].copy()
 
 
 def test_barrier_rows_match_the_equations():
@@ -99,7 +99,7 @@ def test_barrier_rows_match_the_equations():
         weights = rng.uniform(size=len(regions))
         here, n = evaluated(regions, 1.5, motion.position, quaternion)
         _, later = evaluated(regions, 1.5 + AHEAD, *later_pose(motion.position, quaternion, motion.velocity))
-        rows, right, price = [], [], []
+        rows, rhs, price = [], [], []
         for i, region in enumerate(regions):
             if not region.hard:
                 continue
@@ -120,11 +120,11 @@ def test_barrier_rows_match_the_equations():
                 n_dropped += 1
                 continue
             rows.append(row)
-            right.append(bound)
+            rhs.append(bound)
             price.append(10.0 ** (-3.0 - 3.0 * weights[i]) / scale)
         n_rows += len(rows)
         ours = written(regions, motion, quaternion, weights)
-        for given, expected in zip(ours, (np.reshape(rows, (-1, 8)), right, price), strict=True):
+        for given, expected in zip(ours, (np.reshape(rows, (-1, 8)), rhs, price), strict=True):
             np.testing.assert_allclose(given, expected, rtol=1e-8, atol=1e-7)
     assert n_rows > 100 and n_dropped > 20 and n_inside > 10
 
@@ -181,17 +181,17 @@ def test_barrier_right_side_is_smoothed_while_violated():
         empty_workspace(1 + faces.FACES, 8),
         (np.full(8, -30.0), np.full(8, 25.0)),
     )
-    asked = None
+    previous = None
     for k in range(40):
-        motion, share = moving(rng, np.r_[1.0, rng.normal(size=5)]), 1.0 if k % 4 == 0 else 0.3
-        rights = []
-        for used in (1.0, share):
+        motion, fraction = moving(rng, np.r_[1.0, rng.normal(size=5)]), 1.0 if k % 4 == 0 else 0.3
+        rhs_values = []
+        for used in (1.0, fraction):
             own = copy.deepcopy(sight)
             barrier.observe_regions(own, packed, motion.position, np.array([1.0, 0.0, 0.0, 0.0]), motion.velocity)
             assert barrier.write_rows(work, own, packed, np.ones(1), motion, *limits, used, GAINS) == 1
-            rights.append(work.right[0])
-        asked = rights[0] if share == 1.0 else asked + 0.3 * (rights[0] - asked)
-        assert rights[1] == pytest.approx(asked, rel=1e-12)
+            rhs_values.append(work.rhs[0])
+        previous = rhs_values[0] if fraction == 1.0 else previous + 0.3 * (rhs_values[0] - previous)
+        assert rhs_values[1] == pytest.approx(previous, rel=1e-12)
         sight = own
 
 

@@ -197,8 +197,8 @@ def test_search_prefers_cheap_regions():
             improve_path(plan, start, goal, packed, GAINS, 0.02)
         points = np.array([start, *plan.path[: plan.counts[0]]])
         (leg,) = (i for i in range(len(points) - 1) if points[i, 0] <= 4.0 < points[i + 1, 0])
-        share = (4.0 - points[leg, 0]) / (points[leg + 1, 0] - points[leg, 0])
-        ends[costs] = points[leg, 1] + share * (points[leg + 1, 1] - points[leg, 1])
+        fraction = (4.0 - points[leg, 0]) / (points[leg + 1, 0] - points[leg, 0])
+        ends[costs] = points[leg, 1] + fraction * (points[leg + 1, 1] - points[leg, 1])
     assert 5.0 < ends[20.0, 0.2] < 8.0 and -1.0 < ends[0.2, 20.0] < 1.0
 
 

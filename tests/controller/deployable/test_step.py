@@ -65,8 +65,10 @@ def expected(memory, state, goal, regions, weights):
     rates = 0.02 / (0.02 + np.where(regions.hard, GAINS.price_smoothing, 0.0))
     stages = memory.weights[0] + rates * (weights - memory.weights[0])
     smoothed = memory.weights[1] + rates * (stages - memory.weights[1])
-    share = 0.02 / (0.02 + GAINS.smoothing) if memory.report[12] > barrier.KEPT else 1.0
-    rows = barrier.write_rows(memory.program, memory.observation, regions, smoothed, motion, lower, upper, share, GAINS)
+    fraction = 0.02 / (0.02 + GAINS.smoothing) if memory.report[12] > barrier.KEPT else 1.0
+    rows = barrier.write_rows(
+        memory.program, memory.observation, regions, smoothed, motion, lower, upper, fraction, GAINS
+    )
     forces, program = np.empty(8), copy.deepcopy(memory.program)
     solve(memory.program, rows, thrusters.inverse, lower, upper, forces)
     return pushed, rows, program, np.clip(forces / thrusters.effectiveness, thrusters.lower, thrusters.upper)
@@ -100,7 +102,7 @@ def test_step_is_the_sequence_of_its_stages():
         for ours, theirs in zip(own.memory.plan.new_cost, memory.plan.new_cost, strict=True):
             assert ours == pytest.approx(theirs, rel=1e-9, abs=1e-12)
         assert own.memory.filtered_acceleration == pytest.approx(pushed, rel=1e-10, abs=1e-12)
-        for part in ("rows", "right", "price"):
+        for part in ("rows", "rhs", "price"):
             ours, theirs = getattr(own.memory.program, part), getattr(program, part)
             np.testing.assert_allclose(ours[:rows], theirs[:rows], rtol=1e-8, atol=1e-14)
         assert own.memory.program.nominal == pytest.approx(program.nominal, rel=1e-8, abs=1e-9)
