@@ -38,8 +38,11 @@ class Ordered(np.ndarray):
 
     def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
         """Run a function of arrays; options as in NumPy."""
+        # In order only over all axes and without options; else, and where NumPy has an error to raise, as NumPy does.
         options = {name: _plain(value) for name, value in options.items()}
-        own = _IN_ORDER.get((ufunc.__name__, method)) if options.get("axis") is None and "out" not in options else None
+        is_default = all(name in _DEFAULTS and value is _DEFAULTS[name] for name, value in options.items())
+        applies = is_default and ("axis" in options) == (method == "reduce") and all(np.size(x) for x in inputs)
+        own = _IN_ORDER.get((ufunc.__name__, method)) if applies else None
         run = own or functools.partial(getattr(ufunc, method), **options)
         return ordered(run(*map(_plain, inputs)))
 
@@ -56,8 +59,8 @@ def _plain(value: Any) -> Any:
 
 def _product(one: Any, other: Any) -> Array:
     a, b = np.asarray(one), np.asarray(other)
-    if a.shape[-1] != b.shape[0]:
-        raise ValueError(f"product of shapes {a.shape} and {b.shape}")
+    if not (1 <= a.ndim <= 2 and 1 <= b.ndim <= 2) or a.shape[-1] != b.shape[0]:
+        return np.asarray(np.matmul(a, b))
     total = np.zeros(a.shape[:-1] + b.shape[1:])
     for k in range(b.shape[0]):
         total = total + np.multiply.outer(a[..., k], b[k])
@@ -79,6 +82,7 @@ def _maximum(a: Array, b: Array) -> Array:
     return np.where((b > a) | np.isnan(b), b, a)[()]
 
 
+_DEFAULTS = {"axis": None, "dtype": None, "keepdims": False, "where": True}
 _IN_ORDER: dict[tuple[str, str], Any] = {
     ("matmul", "__call__"): _product,
     ("minimum", "__call__"): _minimum,
