@@ -222,7 +222,7 @@ class ArrayExpressions(Operands):
         if name in ("sum", "any", "all"):
             kind, start = (BOOL, "true" if name == "all" else "false") if name != "sum" else (DOUBLE, "0.0")
         else:
-            kind, start = grid.item, grid.at(("0",) * len(grid.sizes)).code
+            kind, start = grid.item, self._extreme_start(name, grid, node)
         if name == "sum" and grid.item == BOOL:
             kind, start = INT, "0"
         total = self.temporary(kind, start)
@@ -236,6 +236,14 @@ class ArrayExpressions(Operands):
 
         self.each(grid.sizes, add)
         return total
+
+    def _extreme_start(self, name: str, grid: Grid, node: ast.AST) -> str:
+        """Return the C value from which a minimum or maximum is sought: infinite where there may be no element."""
+        if "0" in grid.sizes or (known_shape(grid.sizes) is None and grid.item != DOUBLE):
+            self.fail(node, f"{name} of no elements, or of integers of a length that is known only at run time")
+        if known_shape(grid.sizes) is None:
+            return "INFINITY" if name == "min" else "-INFINITY"
+        return grid.at(("0",) * len(grid.sizes)).code
 
     def _loop(self, length: str, body: Callable[[str], None]) -> None:
         k = self.new_name("i")

@@ -31,8 +31,10 @@ class Calls(Subscripts):
     """Translates calls."""
 
     def _call(self, node: ast.Call) -> Operand:
-        if isinstance(node.func, ast.Attribute) and node.func.attr == "copy":
-            return self.materialized(self.expression(node.func.value), node)
+        if isinstance(node.func, ast.Attribute) and node.func.attr == "copy" and not (node.args or node.keywords):
+            owner = self.expression(node.func.value)
+            if self.is_array(owner):
+                return self.grid(owner, node)
         if isinstance(node.func, ast.Attribute) and node.func.attr == "_replace":
             return self._replaced(node.func, node)
         called = self.expression(node.func)

@@ -77,6 +77,8 @@ class Statements(Calls):
             self.lines.append("return;")
             return
         operand = self.expression(node.value)
+        if isinstance(operand, View) and not self.is_local(operand.roots):
+            self.fail(node, "a view of an argument that is returned, instead of a copy")
         if self.is_array(operand):
             self._return_array(self.grid(operand, node), node)
             return

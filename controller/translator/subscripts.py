@@ -8,8 +8,8 @@ from dataclasses import replace
 
 from controller.translator.array_expressions import plus, times
 from controller.translator.expressions import Expressions
-from controller.translator.operands import Grid, Items, Known, Operand, Value, View
-from controller.translator.types import BOOL, INT, Array, Tuple, name_of
+from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed
+from controller.translator.types import INT, Array, Tuple, name_of
 
 
 class Subscripts(Expressions):
@@ -84,9 +84,9 @@ class Subscripts(Expressions):
 
     def _integer(self, operand: Operand, node: ast.AST) -> str:
         value = self.scalar(operand, node)
-        if value.type not in (INT, BOOL):
+        if value.type != INT:
             self.fail(node, f"an index of type {name_of(value.type)}")
-        return self.temporary(INT, value.code).code if "[" in value.code else value.code
+        return self.temporary(INT, value.code).code if "[" in value.code else bracketed(value)
 
     def _bounds(self, size: str, node: ast.Slice) -> tuple[str, str]:
         """Return the beginning and the length of a slice of an axis."""

@@ -1,6 +1,7 @@
 """Expressions of arrays as C against Python, bit by bit: random ones, those that overlap their target, refused ones."""
 
 import random
+from types import SimpleNamespace
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from controller.stack_array import (
     Vector6,
     array,
     interpret,
+    ordered,
     zeros,
 )
 from tests.controller.translator.building import Called, compiled
@@ -214,6 +216,13 @@ def multiply(A: Matrix6, x: Vector6, out: Vector6):
     out[:] = A @ x
 
 
+def halve(x, out):
+    out[:] = 0.5 * x
+
+
+NAMESPACE = SimpleNamespace(copy=halve)
+
+
 class Pair(NamedTuple):
     x: Vector6
     out: Vector6
@@ -284,6 +293,8 @@ def sums_of_zeros(r):
 def copied(r):
     x, y = r.v.copy(), r.A[:, 1].copy()
     r.v[:], r.A[:, :] = 0.0, 1.0
+    r.p[:] = r.q.copy()
+    NAMESPACE.copy(r.p, r.q)
     r.w[:6], r.a[:] = x, y
     grid = zeros(2, 3)
     grid[0], grid[1] = r.a, r.b
@@ -302,11 +313,19 @@ def branches(r):
     r.v[:] = r.K[:, :3] @ r.b if False else np.concatenate((r.K @ r.p, r.q @ r.N))
 
 
+def conditional_indices(r):
+    k = 3 if r.a[0] > 0.0 else 4
+    r.v[0 if r.b[0] > 0.0 else 3] = r.w[2 if r.b[1] > 0.0 else k] + r.H[1 if r.a[1] > 0.0 else 2, 3]
+    r.H[0 if r.a[2] > 0.0 else k, :3] = r.a
+    r.w[1 if r.a[2] > 0.0 else 2 : 4 if r.b[2] > 0.0 else 10] += r.A[1 if r.a[0] > 0.0 else 0, int(r.b[0] > 0.0)]
+    r.K[:, 2 if r.q[0] > 0.0 else 0] = r.H[int(r.a[0] > 0.0)][1:4]
+
+
 LOOP = "    for i in range(3):\n        "
 FUNCTIONS = [
     shifted, disjoint_parts, with_other_fields, read_elsewhere, scaled_by_an_element, same_argument_twice,
     argument_within_another, swapped, changed_while_computed, made_anew_in_a_loop, to_several_targets, sums_of_zeros,
-    copied, branches,
+    copied, branches, conditional_indices,
 ]  # fmt: skip
 
 
@@ -329,11 +348,14 @@ def test_arrays_that_overlap_have_the_bits_of_python(function, tmp_path):
         ("r.v[:3] = r.v", 2, r"shapes \(3\) and \(6\)"),
         ("r.a[:] = r.A", 2, "2 axes stored in 1"),
         ("r.a[3] = 1.0", 2, "index 3 of an axis of length 3"),
+        ("r.a[r.b[0] > 0.0] = 1.0", 2, "an index of type bool"),
         ("r.a[:] = r.a ** 3", 2, "a power of an array"),
         ("r.a[0] = r.a @ 2.0", 2, "no vectors"),
         ("turned(r.a, r.v)", 2, r"b has shape \(6,\), expected \(3,\)"),
         ("Pair(r.v, r.a)", 2, r"out has shape \(3,\), expected \(6,\)"),
         ("both(r.v)", 0, "a tuple of 2 that is returned"),
+        ("r.b[:2] = rest(r.a)", 0, "a view of an argument that is returned"),
+        ("r.a[0] = np.max(r.a[3:])", 2, "max of no elements"),
         ("doubled(r.p)", 0, "run time"),
         ("r.a[0] = np.array([1.0, 2.0])[0]", 2, "List"),
         (f"x = r.a + 0.0\n{LOOP}r.b[:] = x\n        y = x\n        x = x * 2.0\n        r.a[:] = y", 5, "alias"),
@@ -357,8 +379,48 @@ def both(x):
     return x, x
 
 
+def rest(a: Vector3):
+    part = a[1:]
+    part[0] = 1.0
+    return part
+
+
 def doubled(x):
     return x * 2.0
+
+
+def extremes(x, out: Vector3):
+    out[0], out[1], out[2] = np.min(x), np.max(x), np.sum(x)
+
+
+def test_extremes_of_an_empty_array_read_nothing(tmp_path):
+    given = np.full(3, 9.0)[3:], np.zeros(3)
+    Called(compiled(c_text(extremes, given), tmp_path), given)()
+    np.testing.assert_array_equal(given[1], [np.inf, -np.inf, 0.0])
+
+
+@pytest.mark.parametrize(
+    "function",
+    [
+        np.sum, np.min, np.mean, np.add.reduce, lambda x: np.sum(x, axis=0), lambda x: np.max(x, axis=(0, 1)),
+        lambda x: np.sum(x, keepdims=True), lambda x: np.sum(x, initial=3.0), lambda x: np.sum(x, dtype=int),
+        lambda x: np.min(x, where=x > 2.0, initial=9.0), lambda x: np.add.reduce(x, axis=None), lambda x: x @ x.T,
+        lambda x: x @ np.ones((1, 3, 2)), lambda x: np.maximum(x, 1.0, out=np.zeros(x.shape), where=x > 0.0),
+        lambda x: np.max(x[:0]), lambda x: x @ x, lambda x: x @ 2.0, lambda x: np.clip(x, None, 1.0),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("shape", [(2, 3), (1, 2, 3)])
+def test_ordered_arrays_do_what_those_of_numpy_do(function, shape):
+    x = np.arange(6.0).reshape(shape)
+    try:
+        expected = function(x)
+    except ValueError as error:
+        with pytest.raises(type(error)):
+            function(ordered(x))
+    else:
+        result = function(ordered(x))
+        assert (result.shape, result.dtype) == (expected.shape, expected.dtype)
+        np.testing.assert_allclose(result, expected)
 
 
 def of_vector(a: Vector3, out: Vector3):
