@@ -1,9 +1,7 @@
 """Translate expressions of arrays: computed element by element where they are stored or added up, in written order."""
 
-# An array is a view: its elements are data[offset + sum of index times stride]. Two arrays overlap only if they have a
-# root in common: a root is a parameter, with a field of it, or storage of this function. Parameters share a root where
-# a call passes them arrays that do. Where an expression reads what its target overlaps, other than at the same
-# indices, it is computed in storage on the stack first; that needs a shape that is known at translation.
+# Where an expression reads what its target overlaps, other than at the same indices, it is computed in storage on the
+# stack first; that needs a shape that is known at translation.
 
 from __future__ import annotations
 
@@ -13,115 +11,19 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
-from controller.translator.operands import Grid, Items, Known, Operand, Operands, Value, View, bracketed
+from controller.translator.array_views import ArrayViews, Index, known_shape
+from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed
 from controller.translator.types import BOOL, DOUBLE, INT, Array, Scalar, Type, unified
 
-ANY = "*"  # root of an array of which nothing is known
 _UNROLLED = 9  # maximum number of elements that are written out
 
-Index = tuple[str, ...]
 
-
-def times(a: str, b: str) -> str:
-    """Return the C product of two indices."""
-    if a.isdigit() and b.isdigit():
-        return str(int(a) * int(b))
-    if "0" in (a, b):
-        return "0"
-    return b if a == "1" else a if b == "1" else f"{_factor(a)} * {_factor(b)}"
-
-
-def plus(terms: Iterable[str]) -> str:
-    """Return the C sum of indices."""
-    known, codes = 0, []
-    for term in terms:
-        if term.isdigit():
-            known += int(term)
-        else:
-            codes.append(term)
-    return " + ".join([*codes, *([str(known)] if known or not codes else [])])
-
-
-def _factor(code: str) -> str:
-    return code if code.replace("_", "").replace(".", "").replace("->", "").isalnum() else f"({code})"
-
-
-def known_shape(sizes: Sequence[str]) -> tuple[int, ...] | None:
-    """Return the shape if all lengths are known at translation."""
-    return tuple(map(int, sizes)) if all(n.isdigit() for n in sizes) else None
-
-
-class ArrayExpressions(Operands):
+class ArrayExpressions(ArrayViews):
     """Translate array expressions of one function."""
-
-    aliases: frozenset[frozenset[str]]  # pairs of parameters that may overlap
-    roots: dict[str, frozenset[str]]  # roots of the arrays and records of each name
-    made: dict[str, frozenset[str]]  # roots of the fields of records that the function made, by path
-    writes_arguments: bool  # if the function writes into an array that it did not make
-    declared: dict[str, str]  # declarations of variables that Python does not have
-
-    def storage(self, stem: str, node: ast.AST, item: Scalar, size: int) -> str:
-        """Declare storage on the stack, one for each place in the text, and return its name."""
-        raise NotImplementedError
-
-    def new_name(self, stem: str) -> str:
-        """Return a name that no variable has."""
-        raise NotImplementedError
 
     def arithmetic(self, op: ast.operator, left: Operand, right: Operand, node: ast.AST) -> Operand:
         """Return the result of an operator."""
         raise NotImplementedError
-
-    def view(
-        self, item: Scalar, data: str, offset: str, sizes: Index, strides: Index, roots: frozenset[str], code: str = ""
-    ) -> View:
-        """Return an array by the place of its elements; code is that of a variable which holds it."""
-        whole = [self.product(sizes[k + 1 :]) for k in range(len(sizes))]
-        shape = tuple(int(n) if n.isdigit() else None for n in sizes)
-        kind = Array(item, len(sizes), list(strides) == whole, shape if any(n is not None for n in shape) else ())
-        view = View(kind, code, True, roots, data, offset, sizes, strides)
-        return view if code else replace(view, code=self.literal(view, kind), simple=False)
-
-    def literal(self, view: View, kind: Array) -> str:
-        """Return the C expression of an array's struct, of a type that holds it."""
-        assert isinstance(view.type, Array)
-        if view.code and view.type.c == kind.c:
-            return view.code
-        place = view.data if view.offset == "0" else f"{view.data} + {view.offset}"
-        return f"({self.c(kind)}){{{', '.join([place, *view.sizes, *(() if kind.contiguous else view.strides)])}}}"
-
-    def view_of(self, kind: Array, code: str, roots: frozenset[str]) -> View:
-        """Return the array of a variable, or of a field."""
-        sizes = tuple(f"{code}.n{i}" if n is None else str(n) for i, n in enumerate(kind.lengths))
-        if kind.contiguous:
-            strides = tuple(self.product(sizes[k + 1 :]) for k in range(kind.ndim))
-        else:
-            strides = tuple(f"{code}.s{i}" for i in range(kind.ndim))
-        box, axes = tuple(("0", n) for n in sizes), tuple(range(kind.ndim))
-        return View(kind, code, True, roots, f"{code}.data", "0", sizes, strides, False, box, axes)
-
-    def product(self, sizes: Iterable[str]) -> str:
-        """Return the C product of lengths."""
-        result = "1"
-        for n in sizes:
-            result = times(result, n)
-        return result
-
-    def stored(self, data: str, item: Scalar, shape: Sequence[int]) -> View:
-        """Return the array in storage on the stack."""
-        sizes = tuple(map(str, shape))
-        strides = tuple(self.product(sizes[k + 1 :]) for k in range(len(sizes)))
-        return replace(self.view(item, data, "0", sizes, strides, frozenset([data.partition(".")[0]])), fresh=True)
-
-    def element_of(self, view: View, index: Sequence[str]) -> Value:
-        """Return an element of an array."""
-        assert isinstance(view.type, Array)
-        place = plus([view.offset, *map(times, index, view.strides)])
-        return Value(view.type.item, f"{view.data}[{place}]")
-
-    def is_array(self, operand: Operand) -> bool:
-        """Return True for an array or an expression of arrays."""
-        return isinstance(operand, View | Grid)
 
     def grid(self, operand: Operand, node: ast.AST) -> Grid:
         """Return an operand as an array expression: a number as one without axes."""
@@ -303,10 +205,6 @@ class ArrayExpressions(Operands):
 
         self._loop(sizes[0], row)
 
-    def is_local(self, roots: frozenset[str]) -> bool:
-        """Return True if an array is storage of this function."""
-        return all(root in self.declared for root in roots)
-
     def _overlaps(self, target: View, grid: Grid) -> bool:
         """Return True if an element may be read after it was written."""
         own = target.data, target.offset, target.sizes, target.strides
@@ -314,16 +212,6 @@ class ArrayExpressions(Operands):
             same = same_index and (view.data, view.offset, view.sizes, view.strides) == own
             apart = view.data == target.data and any(map(_are_apart, view.box, target.box))
             if not same and not apart and self.may_overlap(view.roots, target.roots):
-                return True
-        return False
-
-    def may_overlap(self, some: frozenset[str], others: frozenset[str]) -> bool:
-        """Return True unless two arrays are known to have no element in common."""
-        for one, other in itertools.product(some, others):
-            if one == other or ANY in (one, other):
-                return True
-            owners = frozenset([one.partition(".")[0], other.partition(".")[0]])
-            if owners in self.aliases:
                 return True
         return False
 
@@ -378,12 +266,6 @@ class ArrayExpressions(Operands):
                 value = self.scalar(item, node)
                 apart.append(value if value.simple else self.temporary(value.type, value.code))
         return apart
-
-    def part(self, view: View, index: str) -> View:
-        """Return the part of an array at an index of its first axis."""
-        assert isinstance(view.type, Array)
-        offset = plus([view.offset, times(index, view.strides[0])])
-        return self.view(view.type.item, view.data, offset, view.sizes[1:], view.strides[1:], view.roots)
 
     def transposed(self, operand: Operand, node: ast.AST) -> View:
         """Return an array with its axes reversed."""

@@ -13,7 +13,7 @@ from types import FunctionType
 from typing import Any, NoReturn, Protocol
 
 from controller.errors import TranslationError
-from controller.translator.array_expressions import ANY
+from controller.translator.array_views import ANY
 from controller.translator.operands import Known, Operand, Value
 from controller.translator.statements import Statements
 from controller.translator.types import BOOL, DOUBLE, Array, Nothing, Record, Scalar, Tuple, Type, shaped

@@ -6,7 +6,7 @@ import ast
 import math
 from collections.abc import Sequence
 
-from controller.translator.array_expressions import known_shape
+from controller.translator.array_views import known_shape
 from controller.translator.calls import Calls
 from controller.translator.operands import Grid, Items, Known, Operand, Value, View
 from controller.translator.types import BOOL, DOUBLE, INT, Array, Nothing, Record, Scalar, Tuple, Type, name_of, unified

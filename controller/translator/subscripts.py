@@ -6,7 +6,7 @@ import ast
 from collections.abc import Sequence
 from dataclasses import replace
 
-from controller.translator.array_expressions import plus, times
+from controller.translator.array_views import plus, times
 from controller.translator.expressions import Expressions
 from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed
 from controller.translator.types import INT, Array, Tuple, name_of
