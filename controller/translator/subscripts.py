@@ -8,7 +8,7 @@ from dataclasses import replace
 
 from controller.translator.array_views import plus, times
 from controller.translator.expressions import Expressions
-from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed
+from controller.translator.operands import Grid, Items, Known, Operand, Value, View
 from controller.translator.types import INT, Array, Tuple, name_of
 
 
@@ -86,7 +86,8 @@ class Subscripts(Expressions):
         value = self.scalar(operand, node)
         if value.type != INT:
             self.fail(node, f"an index of type {name_of(value.type)}")
-        return self.temporary(INT, value.code).code if "[" in value.code else bracketed(value)
+        is_simple = not any(sign in value.code for sign in "[?")  # it is written where other operators stand beside it
+        return value.code if is_simple else self.temporary(INT, value.code).code
 
     def _bounds(self, size: str, node: ast.Slice) -> tuple[str, str]:
         """Return the beginning and the length of a slice of an axis."""
