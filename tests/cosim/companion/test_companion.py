@@ -117,8 +117,8 @@ def test_goal_is_reached_and_regions_satisfied_by_the_true_state(tmp_path, profi
         assert link.column(f"{region}.clearance").min() > 0.0
     session = flight.companion.session
     assert session.alignment.offset == pytest.approx([-s for s in SHIFT], abs=0.03)
-    told = session.alignment.to_scene(session.reported.position)
-    assert told == pytest.approx(true, abs=0.03)
+    position = session.alignment.to_scene(session.reported.position)
+    assert position == pytest.approx(true, abs=0.03)
 
 
 @pytest.mark.slow
@@ -148,7 +148,7 @@ def parameter(name, value):
     return mavlink.MAVLink_param_value_message(name, value, 9, 1, 0)
 
 
-# what a vehicle is like that is not steered, the companion's options, what the autopilot says, and the reason
+# what a vehicle is like that is not steered, the companion's options, a message of the autopilot, and the reason
 NOT_STEERED = {
     "no origin": ({}, {"origin": SceneOrigin()}, None, "waiting for the scene's origin"),
     "no global position": ({"silent": ["GLOBAL_POSITION_INT"]}, {}, None, "the autopilot has no global position"),
@@ -163,10 +163,10 @@ NOT_STEERED = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize(("kind", "options", "says", "words"), NOT_STEERED.values(), ids=NOT_STEERED)
-def test_no_setpoints_are_sent_to_a_vehicle_that_cannot_be_steered(tmp_path, kind, options, says, words):
+@pytest.mark.parametrize(("kind", "options", "event", "words"), NOT_STEERED.values(), ids=NOT_STEERED)
+def test_no_setpoints_are_sent_to_a_vehicle_that_cannot_be_steered(tmp_path, kind, options, event, words):
     link = StandIn(**{"profile": "generic", "shift": SHIFT} | kind)
-    link.events = [(0.5, lambda: link.hear(says, 1, 1))] if says else []
+    link.events = [(0.5, lambda: link.hear(event, 1, 1))] if event else []
     with pytest.raises(RunError, match=words):
         Flight(tmp_path, link=link, **options)
     assert not link.of_type(*STICKS) and 400 not in {m.command for m in link.of_type("COMMAND_LONG")}
@@ -411,8 +411,8 @@ def test_overridden_channels_rest_in_the_middle_and_are_then_given_back(tmp_path
 
 def test_conflicting_system_id_is_reported_once(tmp_path, caplog, link):
     beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
-    told = [lambda: link.hear(beat), lambda: link.hear(beat), lambda: link.hear(beat, 250)]
-    flight = Flight(tmp_path, 4.0, link=link, events=told)
+    events = [lambda: link.hear(beat), lambda: link.hear(beat), lambda: link.hear(beat, 250)]
+    flight = Flight(tmp_path, 4.0, link=link, events=events)
     assert flight.status == "completed"
     assert [r.getMessage() for r in caplog.records if "compete" in r.getMessage()] == [
         "component 190 has the companion's system id 255: its sticks compete; change its system id"

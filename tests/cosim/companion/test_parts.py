@@ -55,21 +55,21 @@ def test_clock_offset_uses_the_fastest_answer_since_the_autopilot_started():
 # ---- the frame ----
 
 
-def reported(position, geodetic=None, depth=None, heard=0.0, state=None):
+def reported(position, geodetic=None, depth=None, received_at=0.0, state=None):
     """Let a state receive position and, where they are given, latitude and longitude and the pressure of a depth."""
     state = state or ReportedState((255, 191))
     x, y, z = map(float, position)
     messages = [
         message("HEARTBEAT", type=12, autopilot=3, base_mode=1),
-        message("LOCAL_POSITION_NED", time_boot_ms=round(heard * 1e3), x=x, y=y, z=z),
+        message("LOCAL_POSITION_NED", time_boot_ms=round(received_at * 1e3), x=x, y=y, z=z),
     ]
     if depth is not None:
         messages += [message("SCALED_PRESSURE2", press_abs=1013.25 + 1000.0 * 9.80665 * depth / 100.0)]
     if geodetic is not None:
         lat, lon = (round(angle * 1e7) for angle in geodetic[:2])
         messages += [message("GLOBAL_POSITION_INT", lat=lat, lon=lon)]
-    for one in messages:
-        state.receive(1, 1, one, heard)
+    for sent in messages:
+        state.receive(1, 1, sent, received_at)
     return state
 
 
@@ -203,7 +203,7 @@ def test_rc_override_follows_the_ardusub_order_and_zero_releases():
 
 def test_state_is_predicted_over_its_age():
     """A steady motion, 40 ms after its messages came, and with a stamp no older than that; no further than 0.1 s."""
-    state = reported((1.0, 2.0, 3.0), heard=10.0)
+    state = reported((1.0, 2.0, 3.0), received_at=10.0)
     state.velocity[:], state.rates[:] = (0.5, 0.0, -0.25), (0.0, 0.0, 0.3)
     state.receive(1, 1, mavlink.MAVLink_attitude_quaternion_message(0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.3), 10.0)
     position, quaternion = state.predict(10.04)
@@ -302,7 +302,7 @@ def test_distance_without_a_fix_is_accumulated():
     alignment, state = FrameAlignment(SceneOrigin(surveyed=SHIFT)), ReportedState((255, 191))
     way = [(0.0, absolute), (1.0, absolute), (2.0, relative), (4.0, relative), (9.0, absolute)]
     for k, (north, flags) in enumerate(way):
-        reported((north, 0.0, 4.0 * north / 3.0), heard=k * 0.02, state=state)
+        reported((north, 0.0, 4.0 * north / 3.0), received_at=k * 0.02, state=state)
         state.receive(1, 1, mavlink.MAVLink_ekf_status_report_message(flags, *[0.0] * 5), k * 0.02)
         alignment.update(state, k * 0.02)
     assert alignment.reckoned == pytest.approx(3.0)
@@ -442,8 +442,8 @@ def decoded(message):
     return found
 
 
-def told(profile, failsafes=None, **values):
-    """Return failsafes that were told these parameters; PX4 sends the bits of an integer in a float."""
+def failsafes_of(profile, failsafes=None, **values):
+    """Return failsafes that received these parameters; PX4 sends the bits of an integer in a float."""
     failsafes = failsafes or Failsafes(profile)
     for name, value in values.items():
         bits = struct.unpack("<f", struct.pack("<i", value))[0] if isinstance(value, int) else value
@@ -458,7 +458,7 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     asked = [len(failsafes.names_to_request(0.25 * k)) for k in range(9)]
     assert asked == [22, 0, 22, 0, 22, 0, 22, 0, 22]
     values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": math.nan}
-    told("ardusub", failsafes, **values)
+    failsafes_of("ardusub", failsafes, **values)
     assert "FS_GCS_ENABLE" not in failsafes.names_to_request(2.5)
     assert not failsafes.is_read(3.0) and failsafes.is_read(3.1) and not failsafes.names_to_request(4.0)
     first, second, silent = failsafes.text()
@@ -468,16 +468,17 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
 
 
 def test_an_ardusub_that_ignores_the_companion_s_sticks_or_learns_the_magnetic_field_is_known():
-    assert told("ardusub").ignored_sticks(255) == "" and not told("ardusub").learns_magnetic_field()  # nobody knows
-    of_another = told("ardusub", SYSID_MYGCS=250.0)
+    unknown = failsafes_of("ardusub")
+    assert unknown.ignored_sticks(255) == "" and not unknown.learns_magnetic_field()
+    of_another = failsafes_of("ardusub", SYSID_MYGCS=250.0)
     assert of_another.ignored_sticks(250) == "" and "SYSID_MYGCS is 250" in of_another.ignored_sticks(255)
     for value, learns in ((3.0, True), (2.0, False)):
-        assert told("ardusub", EK3_MAG_CAL=value).learns_magnetic_field() == learns
+        assert failsafes_of("ardusub", EK3_MAG_CAL=value).learns_magnetic_field() == learns
 
 
 def test_px4_integer_parameters_are_decoded_from_bits():
-    assert told("px4", NAV_RCL_ACT=3).values == {"NAV_RCL_ACT": 3.0}
-    assert "COM_OBL_RC_ACT 0: on lost set-points it changes to Position" in told("px4", COM_OBL_RC_ACT=0).text()
+    assert failsafes_of("px4", NAV_RCL_ACT=3).values == {"NAV_RCL_ACT": 3.0}
+    assert "COM_OBL_RC_ACT 0: on lost set-points it changes to Position" in failsafes_of("px4", COM_OBL_RC_ACT=0).text()
 
 
 SAFE = {"ardusub": {"FS_GCS_ENABLE": 2.0}, "px4": {"COM_OF_LOSS_T": 1.0}}
@@ -502,7 +503,7 @@ FOR_EVER = "the last forces act for ever"
     ],
 )  # fmt: skip
 def test_parameters_that_leave_a_vehicle_without_a_failsafe_are_warned_of(profile, values, warning):
-    warnings = [line for line in told(profile, **SAFE[profile] | values).text() if line.startswith("WARNING: ")]
+    warnings = [line for line in failsafes_of(profile, **SAFE[profile] | values).text() if line.startswith("WARNING: ")]
     assert len(warnings) == (warning is not None) and all(warning in line for line in warnings)
 
 

@@ -167,8 +167,8 @@ class Station:
         """Play an exchange.
 
         A message is sent, with a number after it in a tuple as a command that this is the MAV_RESULT of; a float [s]
-        is waited for; values of columns are shown by a row; a list holds the commands since the last one; a text is
-        part of one of the texts since the last one, None says that there is none.
+        is waited for; values of columns are shown by a row; a list holds the commands since the one before; a text
+        is part of a text since the previous such step, None expects no text.
         """
         for step in steps:
             match step:

@@ -43,10 +43,10 @@ def fields(kind):
     """Return a strategy for each field of a message."""
     for field, type_name in zip(kind.fieldnames, kind.fieldtypes, strict=True):
         length = kind.array_lengths[kind.ordered_fieldnames.index(field)]
-        one = st.binary(max_size=length) if type_name == "char" else number(type_name)
-        several = st.lists(one, min_size=length, max_size=length) if length and type_name != "char" else one
+        value = st.binary(max_size=length) if type_name == "char" else number(type_name)
+        values = st.lists(value, min_size=length, max_size=length) if length and type_name != "char" else value
         yield {"target_system": st.sampled_from([0, 1, 1, 1, 7]), "target_component": st.sampled_from([0, 1])}.get(
-            field, several
+            field, values
         )
 
 
@@ -59,7 +59,7 @@ def messages(draw):
     try:
         sent.pack(mavlink.MAVLink(None))
     except (struct.error, OverflowError, TypeError):
-        return message("HEARTBEAT")  # it was no message at all
+        return message("HEARTBEAT")  # these fields cannot be packed
     return sent
 
 
@@ -154,8 +154,8 @@ def test_heartbeats_are_not_starved_by_other_messages(each_station):
     # Mission Planner gives up when 200 packets go by without one
     for k in range(500):
         each_station.look(0.01 * k, **{"goal.clearance": (-3.0, 2.0, 2.0, 2.0, 3.0, 3.0)})
-    at = [i for i, m in enumerate(each_station.wire.got) if m.get_type() == "HEARTBEAT"]
-    assert max(np.diff(at)) <= 150
+    indices = [i for i, m in enumerate(each_station.wire.got) if m.get_type() == "HEARTBEAT"]
+    assert max(np.diff(indices)) <= 150
 
 
 def test_heartbeat_identifies_the_emulated_autopilot(each_station):

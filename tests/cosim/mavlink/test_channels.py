@@ -34,9 +34,9 @@ def received(link):
 
 def collect(link, count):
     """Return the messages that a link receives until there are as many."""
-    found = []
-    assert until(lambda: found.extend(received(link)) or len(found) >= count)
-    return found
+    messages = []
+    assert until(lambda: messages.extend(received(link)) or len(messages) >= count)
+    return messages
 
 
 def works(link):
@@ -53,9 +53,9 @@ def send_now(link, message):
 
 
 def connected(channel, clients=1):
-    found = [closed_later(socket.create_connection((HERE, channel.port), 60.0)) for _ in range(clients)]
+    sockets = [closed_later(socket.create_connection((HERE, channel.port), 60.0)) for _ in range(clients)]
     assert until(lambda: channel.poll(time.monotonic()) or len(channel.clients) == clients)
-    return found
+    return sockets
 
 
 class Line:
@@ -93,14 +93,14 @@ def ends(kind):
     return link, peer
 
 
-def come_to(peer, count, parser=None):
-    """Return the messages that come to a peer until there are as many, none torn; and their first byte."""
-    parser, found, data = parser or v20.MAVLink(None), [], b""
-    while len(found) < count:
+def receive_messages(peer, count, parser=None):
+    """Receive messages at a peer, as many as `count` or more, none torn; return them and their first byte."""
+    parser, messages, data = parser or v20.MAVLink(None), [], b""
+    while len(messages) < count:
         assert select.select([peer], [], [], 60.0)[0]
         data += (chunk := os.read(peer.fileno(), 4096))
-        found += parser.parse_buffer(chunk) or ()
-    return found, data[0]
+        messages += parser.parse_buffer(chunk) or ()
+    return messages, data[0]
 
 
 @pytest.mark.parametrize("kind", ["udpout", "udpin", "tcp", "tcpin", pytest.param("serial", marks=pty)])
@@ -118,7 +118,7 @@ def test_any_bytes_pass_both_ways_and_a_peer_is_answered_in_its_version(kind):
         assert [m.get_type() for m in collect(link, 2)] == ["ENCAPSULATED_DATA", "HEARTBEAT"]
         for boot_ms in times:
             send_now(link, attitude(boot_ms))
-        messages, marker = come_to(peer, 2, dialect.MAVLink(None))
+        messages, marker = receive_messages(peer, 2, dialect.MAVLink(None))
         assert [m.time_boot_ms for m in messages] == times and marker == (0xFE if v1 else 0xFD)
 
 
@@ -140,7 +140,7 @@ def test_udpout_survives_absent_peer_and_late_peer_receives_frames():
         assert not received(link)
     late = stubs.udp_socket(port)
     send_now(link, attitude(7))
-    assert come_to(late, 1)[0][0].time_boot_ms == 7
+    assert receive_messages(late, 1)[0][0].time_boot_ms == 7
     link.channel.close()
     assert not link.loss_reports()
 
@@ -158,10 +158,10 @@ def test_udpin_answers_peers_with_accepted_frames_each_in_its_version():
     for message in (attitude(1), stubs.message("CURRENT_MODE", 4), stubs.message("SCALED_IMU2", 9)):
         link.send(message)
     works(link)
-    messages, _ = come_to(old, 2, v10.MAVLink(None))
+    messages, _ = receive_messages(old, 2, v10.MAVLink(None))
     assert [(m.get_type(), m.get_seq()) for m in messages] == [("ATTITUDE", 0), ("SCALED_IMU2", 1)]
     assert messages[0].time_boot_ms == 1 and messages[1].zmag == 9
-    assert [m.get_seq() for m in come_to(new, 3)[0]] == [1, 2, 3]
+    assert [m.get_seq() for m in receive_messages(new, 3)[0]] == [1, 2, 3]
     assert not select.select([bad], [], [], 0.0)[0]
 
 
@@ -180,8 +180,8 @@ def test_datagrams_of_both_versions_hold_at_most_1000_bytes(kind):
 
 def test_peer_count_is_bounded_and_silent_peers_expire():
     link, sockets = link_of(UdpIn(HERE, 0)), [stubs.udp_socket() for _ in range(udp.MAX_PEERS + 2)]
-    for one in sockets:
-        one.sendto(Codec().pack(heartbeat()), (HERE, link.channel.port))
+    for peer in sockets:
+        peer.sendto(Codec().pack(heartbeat()), (HERE, link.channel.port))
     assert len(received(link)) == len(sockets)  # all are accepted, though not all can be answered
     assert len(link.channel.peers) == udp.MAX_PEERS and link.loss_reports() == ["2 frames of peers beyond 8"]
     now = time.monotonic()
@@ -268,7 +268,7 @@ def test_tcp_client_waits_for_its_server_and_reconnects_after_a_restart(monkeypa
             assert until(is_connected)
             peer = closed_later(server.accept()[0])
             send_now(link, attitude(boot_ms))
-            assert come_to(peer, 1)[0][0].time_boot_ms == boot_ms
+            assert receive_messages(peer, 1)[0][0].time_boot_ms == boot_ms
         peer.close()
         assert until(lambda: not is_connected())
     assert link.loss_reports() == ["2 frames dropped while there was no server"]
@@ -324,11 +324,11 @@ def test_partially_sent_frames_arrive_complete():
 def test_blocked_serial_line_drops_whole_frames():
     link, peer = ends("serial")
     sent = [link.send(attitude(i)) for i in range(2000)]
-    parser, found = v20.MAVLink(None), []
-    while len(found) < sent.count(True):
+    parser, messages = v20.MAVLink(None), []
+    while len(messages) < sent.count(True):
         works(link)
-        found += come_to(peer, 1, parser)[0]
-    assert [m.time_boot_ms for m in found] == [i for i, went in enumerate(sent) if went]
+        messages += receive_messages(peer, 1, parser)[0]
+    assert [m.time_boot_ms for m in messages] == [i for i, went in enumerate(sent) if went]
     assert 0 < sent.count(True) < len(sent)
     link.channel.close()
     assert link.loss_reports() == [f"{sent.count(False)} frames dropped on a slow line"]
@@ -350,7 +350,7 @@ def test_serial_device_is_reopened_after_disconnection(tmp_path, caplog):
     path.symlink_to(line.path)
     link.channel.poll(now + 4.0)
     assert send_now(link, attitude(9))
-    assert come_to(line, 1)[0][0].time_boot_ms == 9
+    assert receive_messages(line, 1)[0][0].time_boot_ms == 9
     assert [record.message.split(" ", 2)[2] for record in caplog.records] == ["is gone", "is back"]
 
 
@@ -380,9 +380,9 @@ def test_tlog_timestamps_follow_simulation_time(tmp_path):
         assert link.send(attitude(1))
         link.channel.send(Codec().pack(heartbeat()))
     link.channel.close()
-    found = stubs.read_log(path)
-    assert [m.get_type() for m in found] == ["ATTITUDE", "HEARTBEAT"] * len(times)
-    stamps = [m._timestamp for m in found[::2]]
+    messages = stubs.read_log(path)
+    assert [m.get_type() for m in messages] == ["ATTITUDE", "HEARTBEAT"] * len(times)
+    stamps = [m._timestamp for m in messages[::2]]
     assert [s - stamps[0] for s in stamps] == pytest.approx([0.0, 0.5, 1.0, 1.0, 1.0, 1.0, 2.0], abs=1e-5)
     assert before - 0.01 <= stamps[0] <= time.time()
     assert path.read_bytes()[8] == 0xFD and not link.loss_reports()

@@ -12,7 +12,7 @@ def clearances(goal=-3.0, first=2.0, band=2.0):
     return {"goal.clearance": (goal, first, 2.0, band, 1e5, 1e5)}
 
 
-# rows, each 0.1 s after the one before, with what is heard between; the texts of them all with their severities
+# rows, each 0.1 s after the one before, with the messages received between; the texts of them all with their severities
 EVENTS = {
     "a region is entered and left, with hysteresis": (
         [clearances(first=-0.005), None, clearances(first=-0.02), "entered", clearances(first=0.005), None,

@@ -25,15 +25,15 @@ def read(rx, data):
     """Return the messages of a datagram, their names, and what was counted beside accepted ones."""
     pairs = list(rx.read_datagram(data))
     assert all(frame == m.get_msgbuf() and frame in data for frame, m in pairs)
-    found = [m for _, m in pairs]
+    messages = [m for _, m in pairs]
     counts = {name: n for name in rx.stats.__slots__ if name != "accepted" and (n := getattr(rx.stats, name))}
-    return found, [m.get_type() for m in found], counts
+    return messages, [m.get_type() for m in messages], counts
 
 
 def stream(data, size, reader=None):
     """Return the frames that a stream gives in pieces of a size, and their messages."""
     reader = reader or StreamReader(open_filter())
-    return [found for i in range(0, len(data), size) for found in reader.read(data[i : i + size])]
+    return [pair for i in range(0, len(data), size) for pair in reader.read(data[i : i + size])]
 
 
 def test_frames_of_mavlink_1_are_those_of_its_dialect():
@@ -57,11 +57,11 @@ def test_every_message_passes_only_if_addressed_to_the_vehicle(v1):
         if v1 and number > 255:
             continue
         frame = station.pack(message(name, 3), v1)
-        (found, _, counts), (foreign, _, others) = (read(open_filter(own=(system, 1)), frame) for system in (3, 4))
+        (messages, _, counts), (foreign, _, others) = (read(open_filter(own=(system, 1)), frame) for system in (3, 4))
         if name == "SETUP_SIGNING":
-            assert not found and counts == {"setup_signing": 1}
+            assert not messages and counts == {"setup_signing": 1}
             continue
-        assert [m.to_dict() for m in found] == [station.parse(frame)[0].to_dict()]
+        assert [m.to_dict() for m in messages] == [station.parse(frame)[0].to_dict()]
         meant = any(field in mavlink.mavlink_map[number].fieldnames for field in ("target_system", "target"))
         assert len(foreign) == (not meant) and others == ({"foreign": 1} if meant else {})
 
@@ -78,8 +78,8 @@ def test_every_message_passes_only_if_addressed_to_the_vehicle(v1):
 )  # fmt: skip
 def test_frames_are_accepted_by_target_and_sender(sent, sender, outcome):
     rx = open_filter(allowed=frozenset({1, 255}))
-    found, _, counts = read(rx, Codec(*sender).pack(sent))
-    assert len(found) == (not outcome) and counts == ({outcome: 1} if outcome else {})
+    messages, _, counts = read(rx, Codec(*sender).pack(sent))
+    assert len(messages) == (not outcome) and counts == ({outcome: 1} if outcome else {})
 
 
 def test_unknown_message_is_dropped_without_its_neighbors():
@@ -111,8 +111,8 @@ def test_corrupted_frame_is_rejected_and_the_stream_continues():
     for i in range(len(good) * 8):
         bad = bytearray(good)
         bad[i // 8] ^= 1 << i % 8
-        found, _, counts = read(open_filter(), bytes(bad))
-        assert not found and counts
+        messages, _, counts = read(open_filter(), bytes(bad))
+        assert not messages and counts
         after = b"".join(station.pack(attitude(t)) for t in range(8))
         assert [m.get_type() for _, m in stream(bytes(bad) + after, 4096)] == ["ATTITUDE"] * 8
 
@@ -127,8 +127,8 @@ def test_decoder_error_counts_as_malformed():
 def test_longer_payload_of_a_newer_dialect_is_truncated_in_mavlink_2():
     payload = struct.pack("<IBBBBB", 7, 12, 0, 0, 4, 3) + b"new"
     head = bytes([0xFD, len(payload), 0, 0, 0, 255, 190, 0, 0, 0])
-    ((found,), _, _) = read(open_filter(), with_checksum(head + payload, 0))
-    assert found.custom_mode == 7 and found.mavlink_version == 3
+    ((message,), _, _) = read(open_filter(), with_checksum(head + payload, 0))
+    assert message.custom_mode == 7 and message.mavlink_version == 3
     old = bytes([0xFE, len(payload), 0, 255, 190, 0])  # in MAVLink 1 no field may be added
     assert read(open_filter(), with_checksum(old + payload, 0)) == ([], [], {"checksum": 1})
 
@@ -144,13 +144,13 @@ def test_stream_buffer_holds_at_most_one_frame():
 def test_stream_reader_matches_pymavlink():
     station, rng = Codec(), random.Random(0)
     sent = [station.pack(message(name, 3)) for name in KINDS.values() if name != "SETUP_SIGNING"]
-    data, reader, found = b"".join(sent), StreamReader(open_filter(own=None)), []
+    data, reader, frames = b"".join(sent), StreamReader(open_filter(own=None)), []
     rest = data
     while rest:
         size = rng.randrange(1, 400)
-        found += [frame for frame, _ in reader.read(rest[:size])]
+        frames += [frame for frame, _ in reader.read(rest[:size])]
         rest = rest[size:]
-    assert found == sent == [m.get_msgbuf() for m in station.parse(data)]
+    assert frames == sent == [m.get_msgbuf() for m in station.parse(data)]
 
 
 frames = st.sampled_from(

@@ -35,7 +35,7 @@ class Client:
         replies = [reply for reply in self.station.send(sent, **who) if reply.get_type() == "FILE_TRANSFER_PROTOCOL"]
         return [self.parse(bytes(reply.payload)) for reply in replies]
 
-    def one(self, opcode, data=b"", **request):
+    def reply(self, opcode, data=b"", **request):
         """Return the one reply to a request."""
         (reply,) = self.request(opcode, data, **request)
         return reply
@@ -47,12 +47,12 @@ class Client:
 
     def error(self, opcode, data=b"", **request):
         """Return the error of a refused request."""
-        reply = self.one(opcode, data, **request)
+        reply = self.reply(opcode, data, **request)
         assert (reply.opcode, reply.req_opcode, len(reply.payload)) == (NAK, opcode, 1)
         return reply.payload[0]
 
     def whole(self, path=FILE):
-        opened, content = self.one(OPEN, path), b""
+        opened, content = self.reply(OPEN, path), b""
         (length,) = struct.unpack("<I", opened.payload)
         while len(content) < length:
             burst = self.request(BURST, session=opened.session, size=239, offset=len(content))
@@ -80,8 +80,8 @@ def test_parameter_file_equals_the_parameter_list_and_can_be_read_in_part(client
 
 
 def test_single_reads_return_data_until_end_of_file(client):
-    content, session = client.whole(), client.one(OPEN, FILE).session
-    part = client.one(READ, session=session, size=80, offset=40)
+    content, session = client.whole(), client.reply(OPEN, FILE).session
+    part = client.reply(READ, session=session, size=80, offset=40)
     assert (part.opcode, part.payload) == (ACK, content[40:120])
     assert client.error(READ, session=session, size=80, offset=len(content)) == EOF
     assert client.error(READ, session=session, size=240) == INVALID_SIZE
@@ -89,9 +89,9 @@ def test_single_reads_return_data_until_end_of_file(client):
 
 def test_file_crc_is_correct_and_folders_are_listed(client):
     content = client.whole()
-    assert client.one(CRC, FILE).payload == struct.pack("<I", crc_by_bits(content))
-    assert client.one(LISTING, b"/").payload == b"D@PARAM\0"
-    assert client.one(LISTING, b"@PARAM").payload == f"Fparam.pck\t{len(content)}\0".encode()
+    assert client.reply(CRC, FILE).payload == struct.pack("<I", crc_by_bits(content))
+    assert client.reply(LISTING, b"/").payload == b"D@PARAM\0"
+    assert client.reply(LISTING, b"@PARAM").payload == f"Fparam.pck\t{len(content)}\0".encode()
     assert client.error(LISTING, b"@PARAM", offset=1) == EOF
 
 
@@ -106,17 +106,17 @@ def test_other_paths_and_write_operations_are_refused(client):
 
 
 def test_terminated_session_is_invalid(client):
-    assert client.error(READ, session=client.one(OPEN, FILE).session + 1, size=10) == INVALID_SESSION
+    assert client.error(READ, session=client.reply(OPEN, FILE).session + 1, size=10) == INVALID_SESSION
     for end in (TERMINATE, RESET):
-        session = client.one(OPEN, FILE).session
-        assert client.one(end, session=session).opcode == ACK
+        session = client.reply(OPEN, FILE).session
+        assert client.reply(end, session=session).opcode == ACK
         assert client.error(READ, session=session, size=10) == INVALID_SESSION
 
 
 def test_a_file_that_is_open_does_not_change(client):
-    before, session = client.whole(), client.one(OPEN, FILE).session
+    before, session = client.whole(), client.reply(OPEN, FILE).session
     client.station.send(set_parameter("GOAL_RADIUS", 0.9))
-    assert client.one(READ, session=session, size=200).payload == before[:200]
+    assert client.reply(READ, session=session, size=200).payload == before[:200]
     assert client.whole() != before
 
 
@@ -135,11 +135,11 @@ def test_replies_echo_the_session_that_the_station_chose(client, session):
 
 def test_stations_do_not_share_a_session(client):
     for system in range(240, 248):  # all choose the same number
-        assert client.one(OPEN, FILE + b"?start=%d" % (system - 240), system=system).session == 0
-    assert len({client.one(READ, size=40, system=system).payload for system in range(240, 248)}) == 8
+        assert client.reply(OPEN, FILE + b"?start=%d" % (system - 240), system=system).session == 0
+    assert len({client.reply(READ, size=40, system=system).payload for system in range(240, 248)}) == 8
     for system in range(2, 200):  # many more: the oldest go
-        assert client.one(OPEN, FILE, system=system).opcode == ACK
-    assert client.one(READ, size=40, system=199).opcode == ACK
+        assert client.reply(OPEN, FILE, system=system).opcode == ACK
+    assert client.reply(READ, size=40, system=199).opcode == ACK
     assert client.error(READ, size=40, system=2) == INVALID_SESSION
 
 

@@ -74,8 +74,8 @@ def test_all_valid_frames_in_a_hostile_stream_are_accepted():
     """Also frames after half a frame, which may be taken for its other half until the checksum fails."""
     data = b"".join(interspersed(5000, 20, Codec())) + bytes(300)
     reader = StreamReader(open_filter())
-    found = [m for i in range(0, len(data), 512) for m in reader.read(data[i : i + 512])]
-    assert times_of(found) == list(range(0, 5000, 20))
+    messages = [m for i in range(0, len(data), 512) for m in reader.read(data[i : i + 512])]
+    assert times_of(messages) == list(range(0, 5000, 20))
 
 
 @pytest.mark.slow

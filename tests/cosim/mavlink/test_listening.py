@@ -47,8 +47,8 @@ def shown(link):
 
     def shown(*messages, now=1.0, **size):
         table = TelemetryTable()
-        for one in messages:
-            table.add(one if isinstance(one, ReceivedMessage) else received(one, 1.0))
+        for sent in messages:
+            table.add(sent if isinstance(sent, ReceivedMessage) else received(sent, 1.0))
         return format_table(link, table, now, **size), table
 
     return shown
@@ -172,27 +172,27 @@ def test_values_rounded_to_zero_have_no_sign(shown):
 
 
 @pytest.mark.parametrize(
-    ("autopilot", "number", "told", "name"),
+    ("autopilot", "number", "announced", "name"),
     [
         (12, 4 << 16 | 3 << 24, {}, "AUTO.LOITER"), (12, 6 << 16, {}, "OFFBOARD"), (3, 16, {}, "POSHOLD"),
         (3, 21, {}, "SURFTRAK"), (3, 22, {}, "22"), (3, 99, {}, "99"), (0, 7, {}, "7"),
         (0, 7, {7: "Region reaching"}, "Region reaching"),
     ],
 )  # fmt: skip
-def test_modes_have_their_names(autopilot, number, told, name):
-    assert mode_name(heartbeat(autopilot=autopilot, custom_mode=number), told) == name
+def test_modes_have_their_names(autopilot, number, announced, name):
+    assert mode_name(heartbeat(autopilot=autopilot, custom_mode=number), announced) == name
 
 
 def test_broken_frames_are_ignored_and_mavlink_1_is_received(link):
-    port, found = int(link.name.rpartition(":")[2]), []
+    port, messages = int(link.name.rpartition(":")[2]), []
     send, rubbish = vehicle(port), udp_socket()
     rubbish.sendto(b"\xfd\xff\x00" + bytes(30), (HERE, port))
     send(heartbeat(), v1=True)
     rubbish.sendto(b"rubbish", (HERE, port))
     send(message("ATTITUDE"))
-    while len(found) < 2:
-        found += link.receive(2.0)
-    assert [h.name for h in found] == ["HEARTBEAT", "ATTITUDE"]
+    while len(messages) < 2:
+        messages += link.receive(2.0)
+    assert [h.name for h in messages] == ["HEARTBEAT", "ATTITUDE"]
     assert link.v1_frames == 1 and link.stats.malformed == 2
 
 
@@ -203,8 +203,8 @@ def test_with_a_key_only_signed_frames_are_received():
         for key in (None, b"\1" * 32, bytes(32)):
             with GroundLink(speaker, key, identity=(1, 1)) as vehicle:
                 vehicle.send_heartbeat()
-        found = link.receive(2.0) + link.receive(0.1)
-    assert [h.name for h in found] == ["HEARTBEAT"]
+        messages = link.receive(2.0) + link.receive(0.1)
+    assert [h.name for h in messages] == ["HEARTBEAT"]
     assert (link.stats.unsigned, link.stats.forged, link.stats.accepted) == (1, 1, 1)
     assert "1 frames forged" in format_table(link, TelemetryTable(), 0.0)[0]
 

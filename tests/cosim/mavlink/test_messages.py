@@ -130,12 +130,12 @@ def test_obstacle_distances_are_relative_to_the_vehicle():
         "quaternion.e0": tuple(TURN), "attitude.roll": EULER, "seen 1.shift.x": tuple(there),
         "goal.clearance": (-3.0, distance, 2.0, 2.0, 3.0, 1e5),
     })  # fmt: skip
-    found = {m.obstacle_id: (m.x, m.y, m.z) for m in station.request(11037)}
-    assert set(found) == {1, 4}
+    vectors = {m.obstacle_id: (m.x, m.y, m.z) for m in station.request(11037)}
+    assert set(vectors) == {1, 4}
     back = rotation_matrix(TURN).T
     towards = np.array([2.0, 0.0, 1.8]) - [1.0, 2.0, 5.0]
-    assert found[1] == pytest.approx(back @ (towards * distance / np.linalg.norm(towards)), abs=1e-5)
-    assert found[4] == pytest.approx(back @ np.array([3.0, 0.0, 0.0]), abs=1e-5)
+    assert vectors[1] == pytest.approx(back @ (towards * distance / np.linalg.norm(towards)), abs=1e-5)
+    assert vectors[4] == pytest.approx(back @ np.array([3.0, 0.0, 0.0]), abs=1e-5)
 
 
 def test_rangefinder_is_reported_only_above_a_bottom(station):

@@ -86,12 +86,12 @@ def test_available_modes_list_settable_modes(each_station):
     assert [(m.number_modes, m.mode_index) for m in modes] == [(7, i) for i in range(1, 8)]
     upload(station, {})
     station.commanded()
-    for one in modes:
-        station.send(message("SET_MODE", 1, custom_mode=one.custom_mode))
+    for entry in modes:
+        station.send(message("SET_MODE", 1, custom_mode=entry.custom_mode))
         (command,) = station.commanded()
-        assert station.profile.custom_modes[command.mode] == one.custom_mode
+        assert station.profile.custom_modes[command.mode] == entry.custom_mode
     assert station.command(ONCE, 435, 8) == FAILED
-    assert [(one.mode_index, one.mode_name) for one in station.request(435, 3)] == [(3, "Region reaching")]
+    assert [(entry.mode_index, entry.mode_name) for entry in station.request(435, 3)] == [(3, "Region reaching")]
 
 
 @pytest.mark.parametrize("armed", [0.0, 1.0])

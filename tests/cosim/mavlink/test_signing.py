@@ -67,8 +67,8 @@ class Sender:
         self.frames.append(frame)
         return True
 
-    def sends(self, message):
-        """Send a message; return its frame and timestamp."""
+    def sign(self, message):
+        """Sign and send a message; return its frame and timestamp."""
         assert self.link.send(message)
         return self.frames[-1], int.from_bytes(self.frames[-1][-12:-6], "little")
 
@@ -80,7 +80,7 @@ def names(station, frame):
 def test_pymavlink_accepts_own_signatures_and_rejects_altered_frames():
     sender, station = Sender(SigningClock()), Codec(key=KEY)
     for i in range(20):
-        frame, _ = sender.sends(attitude(i))
+        frame, _ = sender.sign(attitude(i))
         assert names(station, frame) == ["ATTITUDE"]
     assert station.codec.signing.goodsig_count == 20
     assert frame[-13] == 3  # the link
@@ -91,11 +91,11 @@ def test_pymavlink_accepts_own_signatures_and_rejects_altered_frames():
 def test_timestamps_rise_on_all_links_and_over_a_restart(monkeypatch):
     clock, before = SigningClock(), now()
     a, b = Sender(clock, 0), Sender(clock, 1)
-    stamps = [sender.sends(attitude(i))[1] for i in range(100) for sender in (a, b)]
+    stamps = [sender.sign(attitude(i))[1] for i in range(100) for sender in (a, b)]
     assert stamps == sorted(set(stamps)) and before <= stamps[0] <= now()
     assert SigningClock().next() > stamps[-1] - 1000  # a new process begins at its wall clock
     monkeypatch.setattr(signing.time, "time", lambda: 1.6e9)  # the clock is set back while we run
-    assert a.sends(attitude(0))[1] > stamps[-1]
+    assert a.sign(attitude(0))[1] > stamps[-1]
 
 
 def test_frame_signed_by_pymavlink_is_accepted_once_on_any_link():
@@ -137,10 +137,10 @@ def test_new_stream_may_lag_at_most_one_minute(receiver):
 def test_sender_with_fast_clock_accepts_own_frames(receiver):
     sender, station = Sender(receiver.clock), Codec(key=KEY, stamp=now() + MINUTE - 200_000)
     station.codec.signing.timestamp += 6_100_000  # so far that ours look old to it
-    assert names(station, sender.sends(heartbeat())[0]) == ["BAD_DATA"]
+    assert names(station, sender.sign(heartbeat())[0]) == ["BAD_DATA"]
     station.codec.signing.timestamp -= 6_100_000
     assert receiver.accepts(station.pack(heartbeat()))
-    assert names(station, sender.sends(heartbeat())[0]) == ["HEARTBEAT"]
+    assert names(station, sender.sign(heartbeat())[0]) == ["HEARTBEAT"]
 
 
 def test_clock_one_hour_ahead_is_rejected_without_lockout(receiver):
@@ -238,11 +238,11 @@ class Restarts:
     def stamp(self, ahead=0.0):
         return round((self.wall + ahead - 1420070400) * 1e5)
 
-    def hears(self, stamp=None):
+    def accepts(self, stamp=None):
         return self.receiver.accepts_from(stamp=self.stamp() if stamp is None else stamp)
 
-    def sends(self):
-        return self.sender.sends(heartbeat())[1]
+    def sign(self):
+        return self.sender.sign(heartbeat())[1]
 
 
 @pytest.fixture
@@ -270,7 +270,7 @@ def test_no_frame_is_accepted_twice_and_no_timestamp_used_twice_over_any_restart
             if what == "restart":
                 vehicle.start()
             elif what == "send":
-                sent.append(vehicle.sends())
+                sent.append(vehicle.sign())
             else:
                 frame = signed(heartbeat(), link=link, stamp=vehicle.stamp(ahead))
                 captured += [frame] * vehicle.receiver.accepts(frame)
@@ -279,18 +279,18 @@ def test_no_frame_is_accepted_twice_and_no_timestamp_used_twice_over_any_restart
 
 
 def test_station_goes_on_within_two_seconds_of_a_restart_and_at_once_if_it_hears_the_vehicle(vehicle):
-    assert vehicle.hears()
+    assert vehicle.accepts()
     vehicle.start(after=0.3)
-    assert not vehicle.hears() and vehicle.receiver.rejected() == {"old": 1}
-    assert vehicle.hears(vehicle.sends() + 1)
+    assert not vehicle.accepts() and vehicle.receiver.rejected() == {"old": 1}
+    assert vehicle.accepts(vehicle.sign() + 1)
     vehicle.start(after=2.5)
-    assert vehicle.hears()
+    assert vehicle.accepts()
 
 
 def test_many_restarts_in_a_row_do_not_run_ahead_of_the_clock(vehicle):
     for _ in range(500):
         vehicle.start(after=0.3)
-        assert vehicle.sends() < vehicle.stamp(3.0)
+        assert vehicle.sign() < vehicle.stamp(3.0)
     assert vehicle.file.read_text().strip().isdigit()
 
 
@@ -299,13 +299,13 @@ def test_file_is_written_seldom(vehicle, monkeypatch):
     monkeypatch.setattr(signing, "write_atomic", lambda file, text: writes.append(text))
     for _ in range(1000):
         vehicle.wall += 0.01
-        vehicle.sends()
-        vehicle.hears()
+        vehicle.sign()
+        vehicle.accepts()
     assert 4 <= len(writes) <= 6  # in 10 s
 
 
 def test_clock_that_was_set_back_and_damaged_files_are_refused_by_name(vehicle):
-    vehicle.sends()
+    vehicle.sign()
     vehicle.wall -= 3600.0
     with pytest.raises(TelemetryError, match=r"name: is 36\d\d s ahead of the clock; set the clock, or remove"):
         vehicle.start()
@@ -321,8 +321,8 @@ def test_folder_that_cannot_be_written_is_refused_at_the_start_and_warned_of_lat
     vehicle.file.unlink()
     vehicle.file.mkdir()
     vehicle.wall += 10.0
-    assert vehicle.sends() and "can be replayed" in caplog.text
-    assert vehicle.sends() and len(caplog.records) == 1
+    assert vehicle.sign() and "can be replayed" in caplog.text
+    assert vehicle.sign() and len(caplog.records) == 1
     with pytest.raises(TelemetryError, match="name: timestamps cannot be saved: "):
         vehicle.start()
     (tmp_path / "file").touch()
@@ -338,12 +338,13 @@ def test_each_key_and_identity_has_a_file_that_shows_nothing_of_the_key():
 
 def test_frame_captured_from_a_link_is_refused_by_the_next_one(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
-    endpoint, frame, heard = Endpoint("udpin", "udpin:127.0.0.1:0", host="127.0.0.1", port=0), signed(attitude(5)), []
+    endpoint = Endpoint("udpin", "udpin:127.0.0.1:0", host="127.0.0.1", port=0)
+    frame, messages = signed(attitude(5)), []
     for _ in range(2):
         (link,) = open_links([endpoint], MavlinkOptions(key=KEY))
         closed_later(link.channel)
         udp_socket().sendto(frame, (endpoint.host, link.channel.port))
         while not (link.stats.accepted or link.stats.old):
-            heard += link.receive(time.perf_counter() + 60.0)
-    assert len(heard) == 1
+            messages += link.receive(time.perf_counter() + 60.0)
+    assert len(messages) == 1
     assert len(list(tmp_path.rglob("*-1-1"))) == 1

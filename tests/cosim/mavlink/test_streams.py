@@ -59,8 +59,8 @@ def test_message_interval_is_reported(station):
         ((GET, 9999), FAILED, 0),
     ):  # fmt: skip
         assert station.command(*number) == result
-        told = station.wire.of("MESSAGE_INTERVAL")[-1]
-        assert (told.message_id, told.interval_us) == (number[-1], interval)
+        reply = station.wire.of("MESSAGE_INTERVAL")[-1]
+        assert (reply.message_id, reply.interval_us) == (number[-1], interval)
 
 
 @pytest.mark.parametrize(

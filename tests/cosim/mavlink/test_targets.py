@@ -213,9 +213,9 @@ def test_every_rejection_reason_is_eventually_reported(station):
     station.play({}, *(local(frame=20 + k % 3) for k in range(6)))
     assert len(station.wire.texts) == 1
     station.wait(2.1)
-    said = station.wire.texts
-    assert [sum(f"frame {frame};" in text for text in said) for frame in (20, 21, 22)] == [2, 1, 1]
-    assert any("(2 times)" in text for text in said if "frame 21;" in text)
+    texts = station.wire.texts
+    assert [sum(f"frame {frame};" in text for text in texts) for frame in (20, 21, 22)] == [2, 1, 1]
+    assert any("(2 times)" in text for text in texts if "frame 21;" in text)
 
 
 def test_targets_above_water_or_outside_a_region_are_accepted_with_a_warning():
@@ -223,9 +223,9 @@ def test_targets_above_water_or_outside_a_region_are_accepted_with_a_warning():
     station = Station("ardusub", of=kept_in)
     (region,) = [r.region for r in kept_in.regions if r.region.keep == "in"][:1]
     station.play({}, local(place=(1000.0, 0.0, -1.5)), [SetTarget((1000.0, 0.0, -1.5))])
-    said = station.wire.texts
-    assert "Warning: target 1.5 m above the surface" in said
-    assert any(text.startswith("Warning: target ") and text.endswith(f"m outside {region.name}") for text in said)
+    texts = station.wire.texts
+    assert "Warning: target 1.5 m above the surface" in texts
+    assert any(text.startswith("Warning: target ") and text.endswith(f"m outside {region.name}") for text in texts)
     station.wire.clear()
     station.play(3.0, local(place=tuple(map(float, shape_center(region.shape)))))
     assert not any("outside" in text for text in station.wire.texts)

@@ -203,8 +203,8 @@ def test_unencodable_messages_are_counted_without_sequence_gap(ground, caplog):
     bad += [stubs.message("ATTITUDE", roll=1e300), stubs.message("ATTITUDE", roll=None), text]  # OverflowError
     bad += [stubs.message("ACTUATOR_OUTPUT_STATUS", actuator=[0.0] * 3)]  # IndexError
     link = stubs.udp_link(ground.port)
-    for one in bad:
-        assert not link.send(one)
+    for message in bad:
+        assert not link.send(message)
         assert link.send(attitude(1))
     link.channel.close()
     assert ground.sequence() == list(range(7)) and link.unencodable == 7

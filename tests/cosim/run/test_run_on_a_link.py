@@ -23,12 +23,12 @@ SHORT = ["time.duration=3"]
 class Station:
     """A ground station that sends its messages in sequence once it receives the vehicle."""
 
-    def __init__(self, *says):
+    def __init__(self, *messages):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.bind(("127.0.0.1", 0))
         self.socket.settimeout(0.05)
         self.endpoint = f"udpout:127.0.0.1:{self.socket.getsockname()[1]}"
-        self.says, self.heard, self.done = list(says), [], threading.Event()
+        self.queue, self.received, self.done = list(messages), [], threading.Event()
         self.codec = mavlink.MAVLink(None, 255, 190)
         self.thread = threading.Thread(target=self.live)
 
@@ -51,22 +51,22 @@ class Station:
                 if ends:  # and all that had come is read
                     return
                 continue
-            self.heard += parser.parse_buffer(data) or []
-            if self.says and time.monotonic() - last > 0.1:
+            self.received += parser.parse_buffer(data) or []
+            if self.queue and time.monotonic() - last > 0.1:
                 last = time.monotonic()
-                self.socket.sendto(self.says.pop(0).pack(self.codec), vehicle)
+                self.socket.sendto(self.queue.pop(0).pack(self.codec), vehicle)
 
     def of(self, name):
-        return [m for m in self.heard if m.get_type() == name]
+        return [m for m in self.received if m.get_type() == name]
 
 
 def logged(path, name):
     """Return the messages of a kind in a log."""
-    log, found = mavutil.mavlink_connection(str(path)), []
+    log, messages = mavutil.mavlink_connection(str(path)), []
     while (message := log.recv_match(type=name)) is not None:
-        found.append(message)
+        messages.append(message)
     log.close()
-    return found
+    return messages
 
 
 def command(number, *numbers):
@@ -95,12 +95,12 @@ def test_telemetry_does_not_change_the_record(tmp_path):
     alone = run_scenario(scenario, tmp_path / "alone", report=False)
     with Station(command(400, 0.0), command(512, 148.0)) as station:
         log = tmp_path / "run.tlog"
-        heard = run_scenario(scenario, tmp_path / "heard", on(station, str(log)), report=False)
-    assert same(load_record(alone.folder), load_record(heard.folder))
+        linked = run_scenario(scenario, tmp_path / "linked", on(station, str(log)), report=False)
+    assert same(load_record(alone.folder), load_record(linked.folder))
     assert {m.autopilot for m in station.of("HEARTBEAT")} == {mavlink.MAV_AUTOPILOT_GENERIC}
     positions = logged(log, "LOCAL_POSITION_NED")
     assert [m.time_boot_ms for m in positions] == list(range(0, 3001, 100))
-    record = load_record(heard.folder)
+    record = load_record(linked.folder)
     assert [m.x for m in positions] == pytest.approx(record["position.x"][::10].tolist(), abs=1e-6)
     # datagrams may be lost on the way to a station that does not look, but none comes twice or in another order
     places = {m.time_boot_ms: m.x for m in positions}
@@ -113,8 +113,8 @@ def test_telemetry_does_not_change_the_record(tmp_path):
 def test_commands_received_over_mavlink_replay_bit_for_bit(tmp_path):
     scenario = load_scenario("harbour", ["time.duration=2", "commands.enabled=true", "commands.await_arm=true"])
     target = mavlink.MAVLink_set_position_target_local_ned_message(0, 1, 1, 1, 0b110111111000, 2, -1, 2, *[0] * 8)
-    says = [command(400, 1.0), target, command(192, -1.0, 1.0, 0.0, 0.7), command(176, 1.0, 4.0, 3.0)]
-    with Station(*says) as station:
+    messages = [command(400, 1.0), target, command(192, -1.0, 1.0, 0.0, 0.7), command(176, 1.0, 4.0, 3.0)]
+    with Station(*messages) as station:
         live = run_scenario(
             scenario, tmp_path / "live", on(station, commands=True, origin=(0.0, 0.0)), rate=1.0, report=False
         )
@@ -133,8 +133,8 @@ def test_commands_received_over_mavlink_replay_bit_for_bit(tmp_path):
 @pytest.mark.slow
 def test_restart_starts_a_new_run_on_the_same_link(tmp_path):
     scenario = load_scenario("harbour", ["time.duration=1.5", "commands.enabled=true"])
-    says = [command(512, 1.0)] * 4  # some tenths of a second
-    with Station(*says, command(246, 1.0, 0.0, 0.0, 0.0, 0.0, 20190226.0)) as station:
+    messages = [command(512, 1.0)] * 4  # some tenths of a second
+    with Station(*messages, command(246, 1.0, 0.0, 0.0, 0.0, 0.0, 20190226.0)) as station:
         last = run_scenario(scenario, tmp_path / "run", on(station, commands=True), rate=1.0, report=False)
     assert last.folder == tmp_path / "run-2"
     assert last.summary["status"] == "completed"

@@ -41,13 +41,13 @@ def pulses(k):
 
 
 def test_each_frame_is_a_step_of_the_plant(serve, caplog):
-    said, outcome, record = fly(serve("time.duration=0.25"), 300, heave(0.5))
-    assert [s["timestamp"] for s in said] == [(k + 1) * DT for k in range(300)]
+    answers, outcome, record = fly(serve("time.duration=0.25"), 300, heave(0.5))
+    assert [s["timestamp"] for s in answers] == [(k + 1) * DT for k in range(300)]
     assert (outcome.counts.steps, outcome.counts.lost, outcome.counts.resent) == (300, 0, 0)
     summary = outcome.runs[0].summary
     assert (summary["status"], summary["law"], summary["steps"]) == ("completed", "ardupilot", 300)
     assert record["time"].tolist() == [k * DT for k in range(301)]
-    assert record.stack([f"position.{a}" for a in "xyz"])[1:].tolist() == [list(s["position"]) for s in said]
+    assert record.stack([f"position.{a}" for a in "xyz"])[1:].tolist() == [list(s["position"]) for s in answers]
     assert record["position.z"][-1] > 0.3
     assert set(record["law.pwm5"]) == {1700.0} and not record["law.lost"].any()
     assert set(record["thrust[5]"]) == {-10.0}
@@ -75,10 +75,10 @@ def test_first_answer_is_the_motion_at_the_start(serve, overrides, expected):
 def test_vehicle_is_held_until_a_thruster_is_driven(serve):
     """Rolled over and 1 N light it would move; time and the record's time begin apart."""
     served = serve("time.duration=0.1", f"initial.quaternion=[{HALF},{HALF},0,0]", "initial.position=[1,2,0]")
-    said, outcome, record = fly(served, 320, lambda k: (DISARMED, (0,) * 8)[k % 2] if k < 200 else NEUTRAL)
-    assert [s["timestamp"] for s in said] == pytest.approx([(k + 1) * DT for k in range(320)], abs=1e-12)
-    assert all(s["position"] == (1.0, 2.0, 0.0) and not any(s["velocity"] + s["gyro"]) for s in said[:200])
-    assert said[0]["accel_body"] == pytest.approx((0.0, -9.81, 0.0), abs=1e-9) and any(said[-1]["velocity"])
+    answers, outcome, record = fly(served, 320, lambda k: (DISARMED, (0,) * 8)[k % 2] if k < 200 else NEUTRAL)
+    assert [s["timestamp"] for s in answers] == pytest.approx([(k + 1) * DT for k in range(320)], abs=1e-12)
+    assert all(s["position"] == (1.0, 2.0, 0.0) and not any(s["velocity"] + s["gyro"]) for s in answers[:200])
+    assert answers[0]["accel_body"] == pytest.approx((0.0, -9.81, 0.0), abs=1e-9) and any(answers[-1]["velocity"])
     assert (outcome.counts.waited, outcome.counts.steps) == (200, 120)
     assert record["time"][-1] == pytest.approx(0.1)
 
@@ -88,11 +88,11 @@ def test_an_idle_autopilot_is_lowered_from_the_surface_and_starts_where_the_scen
     monkeypatch.setattr(motion, "_SURFACE_TIME", 0.02)
     monkeypatch.setattr(motion, "_MAX_DURATION", 0.04)
     served = serve("time.duration=0.02", "initial.position=[1,2,3]")
-    said, outcome, _ = fly(served, 96, lambda k: DISARMED if k < 36 else NEUTRAL)
-    depth = np.array([s["position"][2] for s in said])
+    answers, outcome, _ = fly(served, 96, lambda k: DISARMED if k < 36 else NEUTRAL)
+    depth = np.array([s["position"][2] for s in answers])
     assert not depth[:24].any() and depth[71] == pytest.approx(3.0) and depth[-1] == pytest.approx(3.0, abs=1e-3)
     assert all(np.diff(depth[:72]) >= 0.0)
-    assert all(s["position"][:2] == (1.0, 2.0) for s in said[:72])
+    assert all(s["position"][:2] == (1.0, 2.0) for s in answers[:72])
     assert (outcome.counts.waited, outcome.counts.steps) == (72, 24)
 
 
@@ -135,7 +135,7 @@ def test_a_resent_frame_gets_the_same_answer_and_makes_no_step(serve):
     served = serve("time.duration=0.1")
     with StandIn(served.address) as pilot:
         first = pilot.exchange(NEUTRAL)
-        for pwm in (NEUTRAL, heave(1.0), heave(-1.0)):  # whatever it says now
+        for pwm in (NEUTRAL, heave(1.0), heave(-1.0)):  # whatever its pulses are now
             assert pilot.exchange(pwm, count=0) == first
         for _ in range(119):
             last = pilot.exchange(NEUTRAL)
@@ -207,8 +207,8 @@ def test_autopilot_on_another_port_replaces_a_silent_one(serve, monkeypatch):
         time.sleep(0.1)
         with StandIn(served.address) as pilot:
             pilot.count = first
-            said = [pilot.fly(NEUTRAL)["timestamp"] for _ in range(steps)]
-            assert said[0] == (DT if first != 10 else 11 * DT)
+            answers = [pilot.fly(NEUTRAL)["timestamp"] for _ in range(steps)]
+            assert answers[0] == (DT if first != 10 else 11 * DT)
     one, two = served.outcome().runs
     assert (one.summary["status"], one.summary["steps"], two.summary["status"]) == (RESTARTED, 19, "completed")
 

@@ -29,19 +29,19 @@ def motion(time, velocity, gyro=STILL):
 def dvl_messages(options, seconds=10.0, rate=400):
     """Return the DVL messages of a vehicle with a surge of 0.5 m/s and a yaw rate of 0.1 rad/s."""
     dvl = Dvl(options)
-    found = []
+    messages = []
     for k in range(round(seconds * rate) + 1):
         time = k / rate
-        found += [(time, *one) for one in dvl.integrate(motion(time, (0.5, 0.0, 0.0), (0.0, 0.0, 0.1)))]
-    return found
+        messages += [(time, *message) for message in dvl.integrate(motion(time, (0.5, 0.0, 0.0), (0.0, 0.0, 0.1)))]
+    return messages
 
 
 def test_dvl_displacements_sum_to_the_motion():
-    found = dvl_messages(DvlOptions(rate=8.0, latency=0.0))
-    assert len(found) == 80
-    assert {interval for _, _, interval, _, _ in found} == {125_000}
-    assert np.sum([moved for *_, moved in found], axis=0) == pytest.approx((5.0, 0.0, 0.0))
-    assert np.sum([turned for *_, turned, _ in found], axis=0) == pytest.approx((0.0, 0.0, 1.0))
+    messages = dvl_messages(DvlOptions(rate=8.0, latency=0.0))
+    assert len(messages) == 80
+    assert {interval for _, _, interval, _, _ in messages} == {125_000}
+    assert np.sum([moved for *_, moved in messages], axis=0) == pytest.approx((5.0, 0.0, 0.0))
+    assert np.sum([turned for *_, turned, _ in messages], axis=0) == pytest.approx((0.0, 0.0, 1.0))
 
 
 @pytest.mark.medium
@@ -50,7 +50,7 @@ def test_dvl_has_its_configured_latency_and_dropout():
     assert [time - stamp / 1e6 for time, stamp, *_ in late] == pytest.approx([0.25] * len(late), abs=1e-6)
     lossy = dvl_messages(DvlOptions(rate=8.0, latency=0.0, dropout=0.3), seconds=100.0)
     assert 480 <= len(lossy) <= 640  # of 800
-    assert [one[1] for one in lossy] == [one[1] for one in dvl_messages(DvlOptions(8.0, 0.0, 0.3), seconds=100.0)]
+    assert [m[1] for m in lossy] == [m[1] for m in dvl_messages(DvlOptions(8.0, 0.0, 0.3), seconds=100.0)]
 
 
 def test_estimate_is_recorded_and_arming_releases_the_vehicle(tmp_path):
@@ -63,7 +63,7 @@ def test_estimate_is_recorded_and_arming_releases_the_vehicle(tmp_path):
     flights = SitlSession(options, "ardupilot", lambda vehicle: make_pwm_law(vehicle, link))
     served = Served(JsonServer(flights, ("127.0.0.1", 0), 60.0))
     served.start()
-    heard = []
+    messages = []
     with (
         StandIn(served.address) as pilot,
         GroundLink(parse_endpoint(f"udpout:127.0.0.1:{port}"), identity=(1, 1)) as autopilot,
@@ -78,7 +78,7 @@ def test_estimate_is_recorded_and_arming_releases_the_vehicle(tmp_path):
             pilot.fly(DISARMED)
         while served.is_alive():
             say(armed=128)
-            heard += [one.message for one in autopilot.receive(0.0)]
+            messages += [received.message for received in autopilot.receive(0.0)]
             pilot.send(frame(pilot.count, DISARMED))
             with contextlib.suppress(TimeoutError):
                 pilot.socket.settimeout(0.05)
@@ -87,10 +87,10 @@ def test_estimate_is_recorded_and_arming_releases_the_vehicle(tmp_path):
     outcome = served.outcome()
     link.close()
     assert outcome.counts.steps == STEPS and outcome.counts.waited >= 60
-    deltas = [one for one in heard if one.get_type() == "VISION_POSITION_DELTA"]
-    assert deltas and np.abs([one.position_delta for one in deltas]).max() < 1e-3
-    assert {one.time_delta_usec for one in deltas} == {10_000}  # the DVL's rate
-    asked = {one.param1 for one in heard if one.get_type() == "COMMAND_LONG"}
+    deltas = [m for m in messages if m.get_type() == "VISION_POSITION_DELTA"]
+    assert deltas and np.abs([m.position_delta for m in deltas]).max() < 1e-3
+    assert {m.time_delta_usec for m in deltas} == {10_000}  # the DVL's rate
+    asked = {m.param1 for m in messages if m.get_type() == "COMMAND_LONG"}
     assert asked == {0.0, 31.0, 32.0}
     record = load_record(outcome.runs[0].folder)
     assert [record[f"law.estimate.{name}"][-1] for name in ("x", "y", "z", "vz")] == pytest.approx([4, 5, 6, 0.3])

@@ -21,10 +21,10 @@ HERE = Path(__file__).parent
 
 
 @pytest.fixture(scope="session")
-def made_once(request):
-    """Return a function that makes a folder once, of several processes in one, by commands, or skips."""
+def make_once(request):
+    """Return a function that makes a folder by commands, in one process alone, or skips."""
 
-    def made_once(name, *commands):
+    def make_once(name, *commands):
         folder = request.config.cache.mkdir("mavlink-clients") / name
         with folder.with_suffix(".lock").open("w") as lock:
             fcntl.flock(lock, fcntl.LOCK_EX)
@@ -36,7 +36,7 @@ def made_once(request):
                 (folder / "made").touch()
         return folder
 
-    return made_once
+    return make_once
 
 
 def _install(command, folder):
@@ -50,13 +50,13 @@ def _install(command, folder):
 
 
 @pytest.fixture(scope="session")
-def environment(made_once):
+def environment(make_once):
     """Return a function that gives the Python of a virtual environment with some packages, or skips."""
 
     def make(name, *requirements):
         python = ("{folder}/bin/python", "install", "-q", "--no-compile", *requirements)
         venv, pip = (sys.executable, "-m", "venv", "--without-pip", "."), (sys.executable, "-m", "pip", "--python")
-        return made_once(name, venv, (*pip, *python)) / "bin" / "python"
+        return make_once(name, venv, (*pip, *python)) / "bin" / "python"
 
     return make
 
@@ -68,12 +68,12 @@ def ardupilots_tools(environment):
 
 
 @pytest.fixture(scope="session")
-def node_mavlink(made_once):
+def node_mavlink(make_once):
     """Return a folder in which node finds node-mavlink, or skip."""
     if not (shutil.which("node") and shutil.which("npm")):
         pytest.skip("node or npm is not here")
     init, install = ("npm", "init", "-y"), ("npm", "install", "--no-audit", "--no-fund", "node-mavlink@2")
-    return made_once("node", init, install)
+    return make_once("node", init, install)
 
 
 @contextlib.contextmanager
@@ -89,9 +89,9 @@ def cosim_run(folder, profile, *endpoints):
         yield process
     finally:
         process.send_signal(signal.SIGINT)
-        said, _ = process.communicate(timeout=ENDING)
-    assert process.returncode == INTERRUPTED, said
-    assert "Traceback" not in said and "times" not in said, said
+        output, _ = process.communicate(timeout=ENDING)
+    assert process.returncode == INTERRUPTED, output
+    assert "Traceback" not in output and "times" not in output, output
 
 
 def commands_of(folder):
