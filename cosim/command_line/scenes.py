@@ -23,7 +23,8 @@ def add_verbs(verbs: Any) -> None:
     flag(
         verb, "--kind", "hard: more obstacles, drift, a stronger current, noise, a thruster that fails; conflict: "
         "regions that exclude each other, on three vehicles; tour: the same with goals in turn; trial: scenes that "
-        "each test one part of a law", default="plain", choices=("plain", "hard", "conflict", "tour", "trial"),
+        "each test one part of a law; mismatch: the plant is not the vehicle of the file", default="plain",
+        choices=("plain", "hard", "conflict", "tour", "trial", "mismatch"),
     )  # fmt: skip
     flag(verb, "--out FILE", "file to write (default: standard output)", Path)
 

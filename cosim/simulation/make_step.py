@@ -87,7 +87,10 @@ def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, for_rec
         through_thrusters=scenario.actuation.through == "thrusters",
         law_gives_wrench=law.output == "wrench",
         thruster_matrix=scenario.vehicle.thruster_matrix,
-        bound=next((i for i, diagnostic in enumerate(law.diagnostics) if diagnostic.name == "bound"), -1),
+        **{
+            field: next((i for i, diagnostic in enumerate(law.diagnostics) if diagnostic.name == name), -1)
+            for field, name in (("bound", "bound"), ("isolated", "failed_thruster"), ("limit", "thrust_limit"))
+        },
         clock=clock,
     )
 

@@ -38,12 +38,18 @@ class FlightMetrics(NamedTuple, Generic[T]):
     bound_excess: T  # m, maximum excess of the law's bound over a clearance; -inf: no bound
     weighted_violation: T  # m s, rad s: sum over regions of priority times the integral of the violation depth
     bound: T  # m, the law's last bound of the clearances; NaN: none
+    calls: T  # number of calls of a law that gives bounds
+    promises: T  # number of those after which it gave one
+    healthy_isolated: T  # 1 if the law isolated a thruster that had not failed
+    thrust_limit: T  # least limit of a thruster that the law estimated, as a fraction of that in the vehicle's file
 
 
 def empty_metrics() -> tuple[Array, FlightMetrics[Array]]:
     """Return the metrics before a flight, as one array and as views of its elements."""
     inf, nan = math.inf, math.nan
-    values = np.array([-1.0, -1.0, 0.0, inf, inf, -inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, -inf, 0.0, nan])
+    values = np.array(
+        [-1.0, -1.0, 0.0, inf, inf, -inf, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, -inf, 0.0, nan] + [0.0] * 3 + [inf]
+    )
     return values, FlightMetrics(*(values[i : i + 1] for i in range(values.size)))
 
 
@@ -88,6 +94,15 @@ def score_state(model: StepModel, data: StepData, metrics: FlightMetrics[Array],
     metrics.max_speed[0] = max(metrics.max_speed[0], norm(data.true_state.velocity_body[:3]))
     if model.bound >= 0 and k % model.control_every == 0 and controls(model, data):
         metrics.bound[0] = data.law.report[model.bound]
+        metrics.calls[0] += 1.0
+        metrics.promises[0] += 0.0 if np.isnan(metrics.bound[0]) else 1.0
+        if model.isolated >= 0 and data.law.report[model.isolated] > 0.0:
+            failed = False
+            for i in range(data.failures[0]):
+                failed = failed or model.failed[i] + 1 == data.law.report[model.isolated]
+            metrics.healthy_isolated[0] = max(metrics.healthy_isolated[0], 0.0 if failed else 1.0)
+        if model.limit >= 0:
+            metrics.thrust_limit[0] = min(metrics.thrust_limit[0], data.law.report[model.limit])
 
 
 def score_forces(model: StepModel, data: StepData, metrics: FlightMetrics[Array], before: Array) -> None:

@@ -71,6 +71,8 @@ class StepModel(NamedTuple):
     law_gives_wrench: bool  # True: the law gives a wrench; False: thruster forces
     thruster_matrix: Array  # (6, m) body wrench of one newton of each thruster
     bound: int  # index in the law's report of its bound of the clearances; -1: it has none
+    isolated: int  # the same of the thruster that it isolated last
+    limit: int  # the same of the least limit of a thruster that it estimates
     clock: Integers  # (3,) numbers of a `Clock`; (0,) if the law is not timed
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from controller.law import Diagnostic
-from controller.laws.deployable.estimate import Estimate
+from controller.laws.deployable.estimate import EFFECTIVENESS, Estimate
 from controller.linear_algebra import norm
 from controller.stack_array import Array, Vector3
 
-NO_BOUND = -1e6  # m, reported bound without an estimate, or without barriers
+NO_BOUND = np.nan  # m, reported bound without an estimate, or without barriers
 
 DIAGNOSTICS = (
     Diagnostic("position.x", "m", "Estimated position, north"),
@@ -26,10 +28,11 @@ DIAGNOSTICS = (
     Diagnostic("qp_steps", "", "Steps of the quadratic program, negative if it was cut short"),
     Diagnostic("failed_thruster", "", "Thruster isolated last, from 1; 0 for none"),
     Diagnostic("time_since_measurement", "s", "Time since the last measurement that was accepted"),
-    Diagnostic("bound", "m", "What the clearance of a hard region may fall to from here; -1e6 without an estimate"),
+    Diagnostic("bound", "m", "What the clearance of a hard region may fall to from here; NaN: no promise"),
     Diagnostic("rejected", "", "Fraction of the position and velocity samples so far that the gate rejected"),
+    Diagnostic("thrust_limit", "", "Least estimated limit of a thruster, as a fraction of that in the vehicle's file"),
 )
-REJECTED = 17  # index of `rejected` in `DIAGNOSTICS`
+BOUND, REJECTED, THRUST_LIMIT = 16, 17, 18  # indices in `DIAGNOSTICS`
 
 
 def write_report(report: Array, estimate: Estimate, cost: float, points: int, health: Array, desired: Vector3) -> None:
@@ -47,6 +50,10 @@ def write_report(report: Array, estimate: Estimate, cost: float, points: int, he
             if health[j] == 0.0:
                 report[14] = j + 1
     report[15] = estimate.time_since_measurement[0]
+    report[THRUST_LIMIT] = np.inf
+    for j in range(health.size):
+        if health[j] > 0.0:
+            report[THRUST_LIMIT] = min(report[THRUST_LIMIT], estimate.state[EFFECTIVENESS + health.size + j])
 
 
 def write_program_report(report: Array, multipliers: Array, price: Array, rows: int, steps: int) -> None:

@@ -41,6 +41,8 @@ def summarize_campaign(plan: Mapping[str, Any], results: Results, folder: Path) 
         "least_clearance": _finite(np.min, results.number("min_clearance")),
         "mean_weighted_violation": _finite(np.mean, results.number("weighted_violation")),
         "bound_exceeded": int((results.number("bound_excess") > 0.0).sum()),
+        "mean_bound_promised": _finite(np.mean, results.number("bound_promised")),
+        "healthy_weakened": int(results.fact("healthy_weakened").sum()),
         "worst_step_time": _finite(np.max, results.number("worst_step_time")),
         "failed": {
             "not_reached": seeds[~reached].tolist(),

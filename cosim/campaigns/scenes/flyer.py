@@ -13,6 +13,7 @@ from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import law_named
 from cosim.campaigns.scenes.scenario_scene import AnyScene
 from cosim.scenario.scenario import Scenario
+from cosim.scenario.true_vehicle import true_vehicle
 from cosim.scenario.vehicle_model import vehicle_model
 from cosim.step.plant_calls import Clock
 from cosim.step.score import FlightMetrics
@@ -21,6 +22,7 @@ from plant_fmu.vehicle import Vehicle, load_vehicle
 
 _LEVEL = (1.0, 0.0, 0.0, 0.0)  # attitude without rotation, from body to world
 _ROUNDING = 1e-9  # tolerance of a count of steps
+_HALF = 0.5  # fraction of the least true limit of a thruster below which an estimated one is too low
 
 
 class Score(NamedTuple):
@@ -35,6 +37,14 @@ class Score(NamedTuple):
     failed_step: int  # plant step in which the FMU failed, -1 for none
     bound_excess: float = -math.inf  # m, maximum excess of the law's bound over a clearance; -inf: it has no bound
     weighted_violation: float = 0.0  # m s, sum over regions of priority times the integral of the violation depth
+    bound_promised: float = math.nan  # fraction of its steps in which the law gave a bound; NaN: it has none
+    healthy_weakened: bool = False  # a healthy thruster was isolated, or its limit lowered below half its true one
+
+
+def _least_limit(scenario: Scenario) -> float:
+    """Return the least true limit of a thruster, as a fraction of that in the vehicle's file."""
+    vehicle, true = scenario.vehicle, true_vehicle(scenario)
+    return float(np.min([true.thrust_min / vehicle.thrust_min, true.thrust_max / vehicle.thrust_max]))
 
 
 class SceneFlyer:
@@ -126,6 +136,8 @@ class SceneFlyer:
             failed_step=int(metrics.failed_step),
             bound_excess=metrics.bound_excess,
             weighted_violation=metrics.weighted_violation,
+            bound_promised=metrics.promises / metrics.calls if metrics.calls else math.nan,
+            healthy_weakened=bool(metrics.healthy_isolated or metrics.thrust_limit < _HALF * _least_limit(scenario)),
         )
 
     def close(self) -> None:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.campaigns.scenes.conflicts import make_conflict
+from cosim.campaigns.scenes.mismatches import make_mismatch
 from cosim.campaigns.scenes.trials import make_trial
 
 MAX_OBSTACLES = {"plain": 6, "hard": 14}  # maximum number of obstacles of each kind of scene
@@ -32,8 +33,8 @@ def generate_scenes(count: int, seed: int = 0, kind: str = "plain") -> Iterator[
         Number of scenes.
     seed : int
         Seed of the first scene, 0 or above.
-    kind : {"plain", "hard", "conflict", "tour", "trial"}
-        Kind of all scenes; the last three as in the modules `conflicts` and `trials`.
+    kind : {"plain", "hard", "conflict", "tour", "trial", "mismatch"}
+        Kind of all scenes; the last four as in the modules `conflicts`, `trials` and `mismatches`.
 
     Yields
     ------
@@ -98,4 +99,5 @@ MAKERS: dict[str, Callable[[int], dict[str, Any]]] = {
     "conflict": make_conflict,
     "tour": functools.partial(make_conflict, family="tour"),
     "trial": make_trial,
+    "mismatch": make_mismatch,
 }

@@ -19,6 +19,8 @@ _COLUMNS = (  # name, type, unit, description
     ("violation", _BOOL, "", "Beyond a region's surface at any instant, or the flight was not flown to its end"),
     ("min_clearance", _FLOAT, "m", "Least distance to any hard region's surface, negative where violated"),
     ("bound_excess", _FLOAT, "m", "Greatest excess of the law's last bound over a clearance; null: it has none"),
+    ("bound_promised", _FLOAT, "", "Fraction of the law's steps in which it gave a bound; null: it has none"),
+    ("healthy_weakened", _BOOL, "", "A healthy thruster was isolated, or its limit lowered below half its true one"),
     ("weighted_violation", _FLOAT, "m.s", "Integral of how deep each region is violated, times its priority, summed"),
     ("reach_time", _FLOAT, "s", "Since when it was in the goal region without a break; null if not reached"),
     ("effort", _FLOAT, "N.s", "Integral of the magnitudes of the thrusters' given forces, summed"),
@@ -49,7 +51,8 @@ def row_of(seed: int, score: Score, plant_step: float, scene: str = "") -> Row:
 
 def refused_row(seed: int, reason: str, scene: str = "") -> Row:
     """Make the row of a scene that was not flown."""
-    return {"seed": seed, "reached": False, "violation": True, "stopped_at": 0.0, "refused": reason, "scene": scene}
+    row = {"seed": seed, "reached": False, "violation": True, "healthy_weakened": False}
+    return row | {"stopped_at": 0.0, "refused": reason, "scene": scene}
 
 
 def table_of(rows: Sequence[Row]) -> Any:

@@ -31,8 +31,8 @@ def make_trial(seed: int) -> Table:
     vehicle = load_vehicle(VEHICLES[int(rng.integers(len(VEHICLES)))])
     kind = list(_KINDS)[int(rng.integers(len(_KINDS)))]
     regions = [
-        *(_region(f"obstacle {i + 1}", _sphere(rng)) for i in range(int(rng.integers(6, 12)))),
-        _region("depth band", {"type": "depth_band", "depth": 4.0, "tolerance": 2.5}, "depth", "in"),
+        *(hard_region(f"obstacle {i + 1}", obstacle(rng)) for i in range(int(rng.integers(6, 12)))),
+        hard_region("depth band", {"type": "depth_band", "depth": 4.0, "tolerance": 2.5}, "depth", "in"),
     ]
     table = scenario_table(
         f"Trial {seed}: {kind}, {vehicle.name}", seed, vehicle, 60.0, [0.0, 0.0, 0.0], thruster_lags(vehicle, 0.0),
@@ -42,11 +42,12 @@ def make_trial(seed: int) -> Table:
     return {"seed": seed, "kind": kind, "scenario": table}
 
 
-def _region(name: str, shape: Table, criterion: str = "obstacle", keep: str = "out") -> Table:
+def hard_region(name: str, shape: Table, criterion: str = "obstacle", keep: str = "out") -> Table:
+    """Return the table of a hard region."""
     return {"name": name, "criterion": criterion, "keep": keep, "gain": 100.0, "shape": shape}
 
 
-def _sphere(rng: Generator) -> Table:
+def obstacle(rng: Generator) -> Table:
     """Return a sphere near the path, at a distance from start and goal."""
     while True:
         radius = rng.uniform(0.3, 0.9)
@@ -106,7 +107,7 @@ def _pocket(rng: Generator, vehicle: Vehicle, table: Table) -> None:
         name: {"type": "box", "center": [sum(x) / 2.0, sum(y) / 2.0, 4.0], "size": [x[1] - x[0], y[1] - y[0], 8.0]}
         for name, (x, y) in walls.items()
     }
-    table["regions"] = [table["regions"][-1], *(_region(name, box) for name, box in boxes.items())]
+    table["regions"] = [table["regions"][-1], *(hard_region(name, box) for name, box in boxes.items())]
 
 
 _KINDS: dict[str, Callable[[Generator, Vehicle, Table], None]] = {

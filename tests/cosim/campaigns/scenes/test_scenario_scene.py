@@ -14,6 +14,7 @@ from cosim.campaigns.scenes.conflicts import make_conflict
 from cosim.campaigns.scenes.flyer import SceneFlyer
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.kinds import kind_of
+from cosim.campaigns.scenes.mismatches import make_mismatch
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.trials import make_trial
 from cosim.errors import ScenarioError
@@ -37,7 +38,7 @@ def made(make, wanted, count=1):
     return [scene for scene in scenes if scene["kind"].startswith(wanted)][:count]
 
 
-@pytest.mark.parametrize("kind", ["conflict", "tour", "trial"])
+@pytest.mark.parametrize("kind", ["conflict", "tour", "trial", "mismatch"])
 def test_scenes_are_determined_by_their_seed(kind):
     one, other = (list(generate_scenes(4, 7, kind)) for _ in range(2))
     assert one == other and list(generate_scenes(1, 9, kind)) == one[2:3]
@@ -61,6 +62,8 @@ def test_kinds_and_vehicles_are_evenly_distributed():
     assert len(kinds) == 18 and min(kinds.values()) > 25 and max(kinds.values()) < 80  # 50 expected
     trials = collections.Counter(make_trial(seed)["kind"] for seed in range(700))
     assert len(trials) == 7 and min(trials.values()) > 65 and max(trials.values()) < 140  # 100 expected
+    mismatches = collections.Counter(make_mismatch(seed)["kind"] for seed in range(300))
+    assert len(mismatches) == 12 and 0 < mismatches.pop("excluded") <= 30 and min(mismatches.values()) > 8
 
 
 @pytest.mark.medium
