@@ -106,7 +106,7 @@ class Variable:
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Ends of the universe and all places in it where a term bends or jumps, which increase."""
+        """Ends of the universe and all positions in it where a term bends or jumps, which increase."""
         low, high = self.universe
         shapes = [term.shape for term in self.terms if isinstance(term.shape, Membership)]
         return (low, *sorted({x for shape in shapes for x in shape.breaks((low, high))}), high)
@@ -121,8 +121,8 @@ class Output(Variable):
     default : float or None
         Value in the universe where no rule fires; with None that is NaN.
     defuzzifier : {"centroid", "bisector", "mom", "som", "lom", "average", "sum"}
-        Value of the joined terms: their centroid, the place that halves their area, or the mean, smallest or
-        largest of the places where they are greatest; for terms that are values (Sugeno), or that only rise or only
+        Value of the joined terms: their centroid, the position that halves their area, or the mean, smallest or
+        largest of the positions where they are greatest; for terms that are values (Sugeno), or that only rise or only
         fall (Tsukamoto), the mean of the values, weighted by strength, or their sum.
     aggregation : str
         Operator that joins the rules' conclusions, one of `fuzzy_arbiter.terms.norms.AGGREGATIONS`. For values, it
@@ -266,8 +266,8 @@ class System:
     def __post_init__(self) -> None:
         rules: tuple[Rule | str, ...] = all_of((Rule, str), self.rules, "rules", "a sequence of Rule or text")
         for key, kind in (("inputs", Variable), ("outputs", Output)):
-            found = all_of(kind, getattr(self, key), key, f"a sequence of {kind.__name__}")
-            object.__setattr__(self, key, found)
+            variables = all_of(kind, getattr(self, key), key, f"a sequence of {kind.__name__}")
+            object.__setattr__(self, key, variables)
         object.__setattr__(self, "rules", tuple(parse_rule(r) if isinstance(r, str) else r for r in rules))
         require_name(self.name, "system")
         for key, choices in CHOICES.items():

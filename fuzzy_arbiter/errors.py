@@ -23,7 +23,7 @@ class ArbiterError(Exception):
 
 
 class DefinitionError(ArbiterError):
-    """Raised for an invalid definition: an unknown term in a rule, two variables of one name, places that decrease."""
+    """Raised for an invalid definition: an unknown term in a rule, two variables of one name."""
 
 
 class EngineError(DefinitionError):

@@ -75,12 +75,12 @@ class Explanation:
 
     def as_dict(self) -> dict[str, Any]:
         """Convert the explanation to values that JSON can represent."""
-        whole = asdict(self)
-        for item in whole["outputs"]:
+        data = asdict(self)
+        for item in data["outputs"]:
             item |= {key: None for key in ("centroid", "weight") if item[key] != item[key]}
-        for rule, item in zip(self.rules, whole["rules"], strict=True):
+        for rule, item in zip(self.rules, data["rules"], strict=True):
             item["fired"] = rule.fired
-        return {key: list(item) if isinstance(item, tuple) else item for key, item in whole.items()}
+        return {key: list(item) if isinstance(item, tuple) else item for key, item in data.items()}
 
     def __str__(self) -> str:
         lines = ["inputs"]

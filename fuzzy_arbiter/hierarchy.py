@@ -35,7 +35,7 @@ class Criterion:
     on, off : str
         Term that asks for attention, and its complement.
     membership : Shape
-        Degree of the on-term at each place; by default the input is that degree itself, in [0, 1].
+        Degree of the on-term at each position; by default the input is that degree itself, in [0, 1].
 
     Raises
     ------

@@ -93,7 +93,7 @@ class HysteresisArbiter:
         shapes = {(v.name, term.name): term.straight for v in variables for term in v.terms}
         self._shapes = [shapes[pair] for pair in zip(self._names, self._on, strict=True)]
         pairs = list(zip(variables, self._shapes, strict=True))
-        self._on_places, self._off_places = ([_place(v, shape, x) for v, shape in pairs] for x in (1.0, 0.0))
+        self._on_positions, self._off_positions = ([_position(v, shape, x) for v, shape in pairs] for x in (1.0, 0.0))
         self.reset()
 
     def reset(self) -> None:
@@ -112,8 +112,8 @@ class HysteresisArbiter:
         now = self._time if time is None and not any(self._dwell) else _validate_time(time, self._time)
         values = self.arbiter.samples.one(inputs)
         degrees = [shape(x) for shape, x in zip(self._shapes, values, strict=True)]
-        since, places = self._next(self._since, values, degrees, now)
-        weights = self.arbiter(places)
+        since, adjusted_values = self._next(self._since, values, degrees, now)
+        weights = self.arbiter(adjusted_values)
         self._since, self._time = since, now
         return weights
 
@@ -140,10 +140,10 @@ class HysteresisArbiter:
             moments = _validate_times(times, len(values), self._time)
         degrees = np.column_stack([s.of_many(values[:, i]) for i, s in enumerate(self._shapes)])
         since = self._since
-        places = np.empty_like(values)
+        adjusted_values = np.empty_like(values)
         for i, (row, degree, now) in enumerate(zip(values.tolist(), degrees.tolist(), moments.tolist(), strict=True)):
-            since, places[i] = self._next(since, row, degree, now)
-        weights = self.arbiter.batch(places)
+            since, adjusted_values[i] = self._next(since, row, degree, now)
+        weights = self.arbiter.batch(adjusted_values)
         if len(moments):
             self._since, self._time = since, float(moments[-1])
         return weights
@@ -163,16 +163,16 @@ class HysteresisArbiter:
             elif since is not None and degree <= self._release[i] and (not dwell or now - since >= dwell):
                 result[i] = None
             if result[i] is not None:
-                adjusted[i] = self._on_places[i]
+                adjusted[i] = self._on_positions[i]
             elif not self._graded:
-                adjusted[i] = self._off_places[i]
+                adjusted[i] = self._off_positions[i]
         return result, adjusted
 
     def __repr__(self) -> str:
         settings = {"enter": self._enter, "release": self._release, "dwell": self._dwell}
-        said = ", ".join(f"{key}={dict(zip(self._names, x, strict=True))!r}" for key, x in settings.items())
+        arguments = ", ".join(f"{key}={dict(zip(self._names, x, strict=True))!r}" for key, x in settings.items())
         on = dict(zip(self._names, self._on, strict=True))
-        return f"HysteresisArbiter({self.arbiter!r}, {said}, graded={self._graded}, on={on!r})"
+        return f"HysteresisArbiter({self.arbiter!r}, {arguments}, graded={self._graded}, on={on!r})"
 
 
 _RANGES: dict[str, tuple[str, Callable[[float], bool]]] = {
@@ -223,17 +223,17 @@ def _on_terms(system: System, on: Mapping[str, str] | None) -> list[str]:
     ask = Questions.of_rows(system, Effort(EFFORT, 1))
     high = tuple(ask.above_half(Is(v.name, greatest_term(v))) for v in system.outputs)
     (answer,) = ask.ask([Goal(high, 0, 0)], 2)
-    if len(answer.boxes) != 1 or not answer.all_found or len(answer.boxes[0]) < len(system.inputs):
+    if len(answer.boxes) != 1 or not answer.is_complete or len(answer.boxes[0]) < len(system.inputs):
         raise DefinitionError(
             "on: the rules do not determine which terms ask for attention, as there is not one single row in which no "
             "output is high; expected a term for each input"
         )
-    rest = ask.places(answer.boxes[0])
-    return [next(term for term in v.term_names if term != rest[v.name]) for v in system.inputs]
+    resting_row = ask.places(answer.boxes[0])
+    return [next(term for term in v.term_names if term != resting_row[v.name]) for v in system.inputs]
 
 
-def _place(variable: Variable, shape: Shape, degree: float) -> float:
-    """Return a place in the universe where a shape has a degree."""
+def _position(variable: Variable, shape: Shape, degree: float) -> float:
+    """Return a position in the universe where a shape has a degree."""
     low, high = variable.universe
     for x in (low, *(x for x, _ in shape.points if low < x < high), high):
         if shape(x) == degree:

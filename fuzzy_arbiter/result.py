@@ -26,20 +26,20 @@ class Result(tuple[T, ...]):
 
     __slots__ = ()
     _fields: ClassVar[tuple[str, ...]] = ()
-    _places: ClassVar[dict[str, int]] = {}
+    _indices: ClassVar[dict[str, int]] = {}
 
     def __getitem__(self, key: Any) -> Any:
         """Return the value of an output."""
         if isinstance(key, str):
-            if key not in self._places:
+            if key not in self._indices:
                 raise DefinitionError(f"no output {key!r}, expected one of {', '.join(self._fields)}")
-            key = self._places[key]
+            key = self._indices[key]
         return super().__getitem__(key)
 
     def __getattr__(self, name: str) -> T:
-        if name not in self._places:
+        if name not in self._indices:
             raise AttributeError(f"no output {name!r}, expected one of {', '.join(self._fields)}")
-        return super().__getitem__(self._places[name])
+        return super().__getitem__(self._indices[name])
 
     def _asdict(self) -> dict[str, T]:
         """Return the values by name, as named tuples do."""
@@ -54,8 +54,8 @@ class Result(tuple[T, ...]):
 
 def result_class(names: Sequence[str]) -> type[Result[Any]]:
     """Return the class of results with these names, so that a result stores only its values."""
-    places = {name: k for k, name in enumerate(names)}
-    return type("Result", (Result,), {"__slots__": (), "_fields": tuple(names), "_places": places})
+    indices = {name: k for k, name in enumerate(names)}
+    return type("Result", (Result,), {"__slots__": (), "_fields": tuple(names), "_indices": indices})
 
 
 def _rebuilt(names: Sequence[str], values: tuple[T, ...]) -> Result[T]:

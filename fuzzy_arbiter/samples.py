@@ -90,9 +90,9 @@ class Samples:
         low, high = np.array(self._limits).T
         if values.size and low.max() <= values.min() and values.max() <= high.min():  # for NaN neither holds
             return values, masked
-        good = ~np.isnan(values) if self._clips else (low <= values) & (values <= high)
-        if not good.all():
-            row, i = np.argwhere(~good)[0]
+        valid = ~np.isnan(values) if self._clips else (low <= values) & (values <= high)
+        if not valid.all():
+            row, i = np.argwhere(~valid)[0]
             expected = f"expected a number in [{low[i]:g}, {high[i]:g}]"
             raise InputError(f"row {row}: {self._names[i]} is {float(values[row, i])!r}, {expected}")
         return np.clip(values, low, high) if self._clips else values, masked

@@ -21,7 +21,7 @@ Point = tuple[float, float]
 
 
 class Membership(ABC):
-    """A membership function: to what degree each place belongs to a term."""
+    """A membership function: to what degree each position belongs to a term."""
 
     __slots__ = ()
     # true if it is a polynomial between its breaks, so that it can be integrated exactly
@@ -30,18 +30,18 @@ class Membership(ABC):
 
     @abstractmethod
     def __call__(self, x: float) -> float:
-        """Return the degree at a place."""
+        """Return the degree at a position."""
 
     @abstractmethod
-    def of_many(self, places: Array) -> Array:
-        """Return the degrees at many places, each as a call gives it, to rounding."""
+    def of_many(self, positions: Array) -> Array:
+        """Return the degrees at many positions, each as a call gives it, to rounding."""
 
     @abstractmethod
     def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
-        """Return the places within a universe where it bends or jumps, in rising order; between them it is smooth."""
+        """Return the positions in a universe where it bends or jumps, in rising order; between them it is smooth."""
 
     def features(self, universe: tuple[float, float]) -> tuple[float, ...]:
-        """Return the places within a universe around which it changes, in rising order; by default its breaks."""
+        """Return the positions within a universe around which it changes, in rising order; by default its breaks."""
         return self.breaks(universe)
 
     def within(self, universe: tuple[float, float]) -> Membership:
@@ -51,9 +51,9 @@ class Membership(ABC):
     def area(self, universe: tuple[float, float]) -> float:
         """Return the integral of the degree over a universe, by quadrature."""
         low, high = universe
-        places = np.unique([*np.linspace(low, high, 65), *self.features(universe)])
+        positions = np.unique([*np.linspace(low, high, 65), *self.features(universe)])
         nodes, weights = np.polynomial.legendre.leggauss(8)
-        middle, half = (places[:-1] + places[1:]) / 2, np.diff(places) / 2
+        middle, half = (positions[:-1] + positions[1:]) / 2, np.diff(positions) / 2
         degrees = self.of_many((middle + nodes[:, None] * half).ravel()).reshape(len(nodes), -1)
         return float((weights @ degrees) @ half)
 
@@ -67,7 +67,7 @@ class Shape(Membership):
     Attributes
     ----------
     points : tuple of (float, float)
-        Places, which never decrease, and degrees in [0, 1]. Two points of one place make a jump, where the shape has
+        Positions, which never decrease, and degrees in [0, 1]. Two points of one position make a jump, where it has
         the greater of the two degrees.
 
     Raises
@@ -92,12 +92,12 @@ class Shape(Membership):
             raise DefinitionError("shape: got no points, expected at least one")
         for (a, _), (b, _) in zip(points, points[1:], strict=False):
             if b < a:
-                raise DefinitionError(f"shape: place {b} comes after {a}, expected places that never decrease")
+                raise DefinitionError(f"shape: position {b} comes after {a}, expected positions that never decrease")
         for (a, _), (b, _) in zip(points, points[2:], strict=False):
             if a == b:
                 raise DefinitionError(f"shape: more than two points at {a}, expected at most two, which make a jump")
         if finite(points[-1][0] - points[0][0]) is None:
-            raise DefinitionError(f"shape: places {points[0][0]} to {points[-1][0]}, expected a finite distance")
+            raise DefinitionError(f"shape: positions {points[0][0]} to {points[-1][0]}, expected a finite distance")
         while len(points) > 1 and points[0][1] == points[1][1]:
             del points[0]
         while len(points) > 1 and points[-1][1] == points[-2][1]:
@@ -108,17 +108,17 @@ class Shape(Membership):
         try:
             pairs = [(x, degree) for x, degree in self.points]
         except (TypeError, ValueError):
-            raise DefinitionError(f"shape {shown(self.points)}: expected pairs of numbers (place, degree)") from None
+            raise DefinitionError(f"shape {shown(self.points)}: expected pairs of numbers (position, degree)") from None
         for x, degree in pairs:
-            place, height = finite(x), finite(degree)
-            if place is None or height is None or not 0.0 <= height <= 1.0:
+            position, height = finite(x), finite(degree)
+            if position is None or height is None or not 0.0 <= height <= 1.0:
                 raise DefinitionError(
-                    f"shape: point ({shown(x)}, {shown(degree)}), expected a finite place and a degree in [0, 1]"
+                    f"shape: point ({shown(x)}, {shown(degree)}), expected a finite position and a degree in [0, 1]"
                 )
-            yield place, height
+            yield position, height
 
     def __call__(self, x: float) -> float:
-        """Return the degree at a place."""
+        """Return the degree at a position."""
         if x != x:
             return x
         points = self.points
@@ -133,34 +133,34 @@ class Shape(Membership):
         a, left = points[i - 1]
         return left + (right - left) * ((x - a) / (b - a))
 
-    def of_many(self, places: Array) -> Array:
-        """Return the degrees at many places, each as a call gives it; places (n,), returns (n,)."""
+    def of_many(self, positions: Array) -> Array:
+        """Return the degrees at many positions, each as a call gives it; positions (n,), returns (n,)."""
         x, y = np.array(self.points).T
         if len(x) == 1:
-            return np.full(len(places), y[0])
+            return np.full(len(positions), y[0])
         if len(x) == 2 and x[0] < x[1]:  # a ramp, which is met most often: nothing to look up
-            degrees: Array = np.asarray(places - x[0])
+            degrees: Array = np.asarray(positions - x[0])
             with np.errstate(over="ignore", invalid="ignore"):  # beyond its ends, which are set below
                 degrees /= x[1] - x[0]
                 degrees *= y[1] - y[0]
                 degrees += y[0]
-            np.copyto(degrees, y[0], where=places <= x[0])
-            np.copyto(degrees, y[1], where=places >= x[1])
+            np.copyto(degrees, y[0], where=positions <= x[0])
+            np.copyto(degrees, y[1], where=positions >= x[1])
             return degrees
-        right = np.clip(np.searchsorted(x, places), 1, len(x) - 1)  # index with x[right - 1] < place <= x[right]
+        right = np.clip(np.searchsorted(x, positions), 1, len(x) - 1)  # index with x[right - 1] < position <= x[right]
         left = right - 1
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):  # at jumps, which are set below
-            share = (places - x[left]) / (x[right] - x[left])
-            degrees = y[left] + (y[right] - y[left]) * share
-        degrees[places <= x[0]] = y[0]
-        degrees[places >= x[-1]] = y[-1]
+            fraction = (positions - x[left]) / (x[right] - x[left])
+            degrees = y[left] + (y[right] - y[left]) * fraction
+        degrees[positions <= x[0]] = y[0]
+        degrees[positions >= x[-1]] = y[-1]
         for i in range(len(x) - 1):
             if x[i] == x[i + 1]:
-                degrees[places == x[i]] = max(y[i], y[i + 1])
+                degrees[positions == x[i]] = max(y[i], y[i + 1])
         return np.asarray(degrees)
 
     def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
-        """Return the places of the points within a universe."""
+        """Return the positions of the points within a universe."""
         return tuple(sorted({x for x, _ in self.points if universe[0] < x < universe[1]}))
 
     @property
@@ -208,7 +208,7 @@ class Shape(Membership):
 
 
 def triangle(left: float, peak: float, right: float) -> Shape:
-    """Return a triangle of degree 0 at left, 1 at peak, 0 at right; two equal places make a vertical edge.
+    """Return a triangle of degree 0 at left, 1 at peak, 0 at right; two equal positions make a vertical edge.
 
     Examples
     --------
@@ -220,7 +220,7 @@ def triangle(left: float, peak: float, right: float) -> Shape:
 
 
 def trapezoid(left: float, rise: float, fall: float, right: float) -> Shape:
-    """Return a trapezoid of degree 0 at left, 1 from rise to fall, 0 at right; two equal places make a vertical edge.
+    """Return a trapezoid of degree 0 at left, 1 from rise to fall, 0 at right; equal positions make a vertical edge.
 
     Examples
     --------

@@ -26,7 +26,7 @@ _HALF_TURN = (0.0, math.sqrt(0.5), math.sqrt(0.5), 0.0)  # about north-east: (no
 _X, _Z = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 _LETTERS = 14.0  # pixels, font size
 _LINE = 2.0  # pixels, width
-_ARROW = 2.0  # hull radii, length of the arrow of the greatest thrust
+_ARROW = 2.0  # hull radii, length of the arrow of the largest thrust
 
 
 def timestamp(nanoseconds: int) -> Timestamp:
@@ -47,13 +47,13 @@ def frame_of(solid: Solid) -> str:
 
 
 def frame_transforms(
-    time: Timestamp, position: Sequence[float], quaternion: Sequence[float], moved: dict[str, Sequence[float]]
+    time: Timestamp, position: Sequence[float], quaternion: Sequence[float], shifts: dict[str, Sequence[float]]
 ) -> FrameTransforms:
-    """Return the transforms of the vehicle and of the moving regions; position, quaternion [m, NED], moved [m, NED]."""
+    """Return the transforms of the vehicle and of moving regions; position, quaternion [m, NED], shifts [m, NED]."""
     message = FrameTransforms()
     _add_transform(message, time, NED, PLACE, position, (1.0, 0.0, 0.0, 0.0))
     _add_transform(message, time, PLACE, BODY, (0.0, 0.0, 0.0), quaternion)
-    for frame, shift in moved.items():
+    for frame, shift in shifts.items():
         _add_transform(message, time, NED, frame, shift, (1.0, 0.0, 0.0, 0.0))
     return message
 
@@ -87,9 +87,9 @@ def vehicle(scene: Scene) -> SceneUpdate:
     _set_pose(ball.pose, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))
     _set_vector(ball.size, [2.0 * scene.hull_radius] * 3)
     _set_color(ball.color, HULL_COLOR, 0.6)
-    greatest = max((thruster.max_force for thruster in scene.thrusters), default=1.0) or 1.0
+    largest_force = max((thruster.max_force for thruster in scene.thrusters), default=1.0) or 1.0
     for thruster in scene.thrusters:
-        length = _ARROW * scene.hull_radius * thruster.max_force / greatest
+        length = _ARROW * scene.hull_radius * thruster.max_force / largest_force
         if length > 0.0 and np.linalg.norm(thruster.direction) > 0.0:
             arrow = entity.arrows.add(shaft_length=0.7 * length, head_length=0.3 * length)
             arrow.shaft_diameter, arrow.head_diameter = 0.05 * length, 0.15 * length

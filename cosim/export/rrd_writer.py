@@ -86,8 +86,8 @@ class _Sender:
         self._recording, self._excerpt, self._scene = recording, excerpt, Scene(excerpt)
         scene, names = self._scene, [column.name for column in excerpt.run.record.columns]
         self._forces = [f"thruster_force[{i + 1}]" for i in range(len(scene.thrusters))]
-        self._greatest = max((thruster.max_force for thruster in scene.thrusters), default=0.0)
-        if not self._greatest > 0.0 or not set(self._forces) <= set(names):
+        self._max_force = max((thruster.max_force for thruster in scene.thrusters), default=0.0)
+        if not self._max_force > 0.0 or not set(self._forces) <= set(names):
             self._forces = []
         self._series: dict[str, str] = {}  # signals by their paths
         self._lines: list[tuple[int, Solid, dict[str, Any]]] = []  # regions, by index, with their kinds of drawing
@@ -115,8 +115,8 @@ class _Sender:
         self._stay(f"{_FRAMES[BODY]}/hull", hull)
         self._stay(f"{WORLD}/way", rr.LineStrips3D([scene.trail()], colors=[TRAIL_COLOR], radii=[-_THIN]))
         if self._forces:
-            places = [thruster.position for thruster in scene.thrusters]
-            self._stay(f"{_FRAMES[BODY]}/thrusts", rr.Arrows3D.from_fields(origins=places, colors=[THRUST_COLOR]))
+            positions = [thruster.position for thruster in scene.thrusters]
+            self._stay(f"{_FRAMES[BODY]}/thrusts", rr.Arrows3D.from_fields(origins=positions, colors=[THRUST_COLOR]))
 
     def send_regions(self) -> None:
         """Send regions as lines."""
@@ -159,7 +159,7 @@ class _Sender:
         scene, n = self._scene, len(self._forces)
         force = np.nan_to_num(block.take(rows).stack(self._forces))
         directions = np.array([thruster.direction for thruster in scene.thrusters])
-        vectors = force[:, :, None] * directions * (_ARROW * scene.hull_radius / self._greatest)
+        vectors = force[:, :, None] * directions * (_ARROW * scene.hull_radius / self._max_force)
         arrows = rr.Arrows3D.columns(vectors=vectors.reshape(-1, 3)).partition([n] * len(rows))
         self._send(block["time"][rows], f"{_FRAMES[BODY]}/thrusts", arrows)
 

@@ -114,21 +114,21 @@ class _Violation:
     """Finds the time of a region's minimum clearance and the duration of its violations, block by block."""
 
     def __init__(self) -> None:
-        self._least, self.worst_at = math.inf, math.nan  # m or rad, s
+        self._min_clearance, self.worst_at = math.inf, math.nan  # m or rad, s
         self._spans, self._ended = Spans(), 0.0
 
     def add(self, time: Array, clearance: Array) -> None:
         """Add the next rows."""
         known = np.where(np.isnan(clearance), np.inf, clearance)
         i = int(np.argmin(known))
-        if known[i] < self._least:
-            self._least, self.worst_at = float(known[i]), float(time[i])
+        if known[i] < self._min_clearance:
+            self._min_clearance, self.worst_at = float(known[i]), float(time[i])
         self._ended += sum(span.end - span.start for span in self._spans.add(clearance < 0.0, time))
 
     def duration(self) -> float | None:
         """Return the total duration of violations of the region [s], None if there were none."""
         last = self._spans.open
-        return self._ended + (last.end - last.start if last else 0.0) if self._least < 0.0 else None
+        return self._ended + (last.end - last.start if last else 0.0) if self._min_clearance < 0.0 else None
 
 
 def _criteria(run: Run) -> Table | None:
@@ -151,8 +151,8 @@ def _criteria(run: Run) -> Table | None:
         shown = ", ".join(f"{start:.2f} to {stop:.2f} ({name})" for start, stop, name in spans[:_MAX_SPANS])
         more = f", and {len(spans) - _MAX_SPANS} more" if len(spans) > _MAX_SPANS else ""
         why = "; ".join(reason.words(scenario.arbiter.ramp) for reason in criterion.reasons)
-        lasting = sum(stop - start for start, stop, _ in spans)
-        row = (f"{i + 1} {criterion.name}", why, f"{lasting:.2f}" if spans else "never", f"{shown}{more}" or "–")
+        duration = sum(stop - start for start, stop, _ in spans)
+        row = (f"{i + 1} {criterion.name}", why, f"{duration:.2f}" if spans else "never", f"{shown}{more}" or "–")
         rows.append((*row, *([costs.get(criterion.name, "–")] if costs else [])))
     head = ["By priority", "Asks", "Led for [s]", "From and to [s]"]
     if costs:  # of a meter of path half a meter deep in its soft regions: they decide which way round the path goes
@@ -190,12 +190,12 @@ def _log(run: Run) -> dict[str, Any] | None:
     )  # fmt: skip
     topics = Table("Log", ("Quantity", "From", "Samples", "Rate [Hz]", "Gaps", "Longest [s]", "Mended"), rows)
     gaps = sorted((begin, end, t.quantity) for t in facts.topics for begin, end in t.longest_gaps)
-    listed = [(quantity, f"{begin:.2f} to {end:.2f}") for begin, end, quantity in gaps[:_NAMED]]
-    listed += [("and more", str(len(gaps) - _NAMED))] if len(gaps) > _NAMED else []
+    gap_rows = [(quantity, f"{begin:.2f} to {end:.2f}") for begin, end, quantity in gaps[:_NAMED]]
+    gap_rows += [("and more", str(len(gaps) - _NAMED))] if len(gaps) > _NAMED else []
     more = f" and {len(facts.unread) - _NAMED} more kinds" if len(facts.unread) > _NAMED else ""
     return {
         "topics": topics,
-        "gaps": Table("Gaps of the log", ("Quantity", "From and to [s]"), tuple(listed)) if gaps else None,
+        "gaps": Table("Gaps of the log", ("Quantity", "From and to [s]"), tuple(gap_rows)) if gaps else None,
         "commands": facts.commands or "none",
         "unread": f"{', '.join(list(facts.unread)[:_NAMED])}{more}" or "nothing",
     }

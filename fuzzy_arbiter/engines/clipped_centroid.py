@@ -1,6 +1,6 @@
 """The exact centroid of one output, piece by piece of its straight terms, clipped or scaled."""
 
-# Between two neighboring knots, or places where two terms' lines meet, the lines l_1, l_2, .. have one order, the
+# Between two neighboring knots, or positions where two terms' lines meet, the lines l_1, l_2, .. have one order, the
 # highest first. Clipped at their cuts c_1, c_2, .. and joined by the maximum they are a sum of single clipped lines:
 # with C_t the greatest of the first t cuts,
 #
@@ -91,11 +91,11 @@ def _lines(variable: Variable, knots: Numbers, number: Callable[[float], Any]) -
 def _passing(starts: Numbers, ends: Numbers, name: str) -> list[tuple[int, int]]:
     """Return the pairs of lines, the later first, of which one is higher at the start and the other at the end."""
     result: list[tuple[int, int]] = []
-    seen: list[tuple[Any, int]] = []  # ends of the lines that start lower, in rising order
+    earlier: list[tuple[Any, int]] = []  # ends of the lines that start lower, in rising order
     for t in sorted(range(len(starts)), key=lambda t: (starts[t], ends[t])):
-        passed = seen[bisect_right(seen, (ends[t], len(starts))) :]
+        passed = earlier[bisect_right(earlier, (ends[t], len(starts))) :]
         result += [(max(t, u), min(t, u)) for _, u in passed]
-        insort(seen, (ends[t], t))
+        insort(earlier, (ends[t], t))
         _require_few(len(result), name)
     return result
 

@@ -38,7 +38,7 @@ def _clipped_centroids(cuts: Array, shape: Outline) -> Array:
     for piece in range(len(shape.breakpoints) - 1):
         width = shape.breakpoints[piece + 1] - shape.breakpoints[piece]
         start = shape.breakpoints[piece] - shape.breakpoints[0]
-        below: Array | None = None  # the greatest cut of the lines above; None where there are none
+        below: Array | None = None  # the highest cut of the lines above; None where there are none
         for line in shape.order[shape.first[piece] : shape.first[piece + 1]]:
             t = shape.term[line]
             band, lever = _band(shape.left[line], shape.right[line], below, cuts[t])
@@ -61,9 +61,9 @@ def _band(a: float, b: float, below: Array | None, cut: Array) -> tuple[Array, A
             s1 = h1 / high
             band = s1 * h1 / 2
             lever = s1 * (s1 * (2 * h1)) / 6
-            rest = 1.0 - s1
-            band += rest * h1
-            lever += rest * (1.0 + s1) / 2 * h1
+            clipped_width = 1.0 - s1
+            band += clipped_width * h1
+            lever += clipped_width * (1.0 + s1) / 2 * h1
             return band, (lever if a < b else band - lever)
         h0 = y0 = np.minimum(cut, low)
         y1 = h1
@@ -74,22 +74,22 @@ def _band(a: float, b: float, below: Array | None, cut: Array) -> tuple[Array, A
         return h1, h1 / 2
     with np.errstate(over="ignore"):  # heights above a line that hardly rises may overflow, and are clipped
         s0, s1 = ((y - low) / (high - low) for y in (y0, y1))
-    for share in (s0, s1):
-        np.minimum(np.maximum(share, 0.0, out=share), 1.0, out=share)
-    rest, width = 1.0 - s1, s1 - s0
-    band = width * (h0 + h1) / 2 + rest * h1
-    lever = width * (s0 * (2 * h0 + h1) + s1 * (h0 + 2 * h1)) / 6 + rest * (1.0 + s1) / 2 * h1
+    for fraction in (s0, s1):
+        np.minimum(np.maximum(fraction, 0.0, out=fraction), 1.0, out=fraction)
+    clipped_width, width = 1.0 - s1, s1 - s0
+    band = width * (h0 + h1) / 2 + clipped_width * h1
+    lever = width * (s0 * (2 * h0 + h1) + s1 * (h0 + 2 * h1)) / 6 + clipped_width * (1.0 + s1) / 2 * h1
     return band, (lever if a <= b else band - lever)
 
 
 def _scaled_centroids(cuts: Array, shape: Outline) -> Array:
     """Return the centroids of scaled terms, joined by their maximum, for many samples."""
-    every, n = cuts, cuts.shape[1]
+    all_cuts, n = cuts, cuts.shape[1]
     area, moment = np.zeros(n), np.zeros(n)
     for piece in range(len(shape.breakpoints) - 1):
         lines = slice(shape.first[piece], shape.first[piece + 1])
         a, b = (np.reshape(side[lines], (-1, 1)) for side in (shape.left, shape.right))
-        cuts = every[list(shape.term[lines])]
+        cuts = all_cuts[list(shape.term[lines])]
         terms = len(cuts)
         start, width = (
             shape.breakpoints[piece] - shape.breakpoints[0],
@@ -105,9 +105,9 @@ def _scaled_centroids(cuts: Array, shape: Outline) -> Array:
         for t in range(terms):
             cut, rise = cuts[t], b[t] - a[t]
             degrees, lines = (a[t] + rise * middles) * cut, (a[t] + rise * breakpoints) * cut
-            greatest = degrees > heights
-            np.copyto(starts, lines[:-1], where=greatest)
-            np.copyto(ends, lines[1:], where=greatest)
+            highest = degrees > heights
+            np.copyto(starts, lines[:-1], where=highest)
+            np.copyto(ends, lines[1:], where=highest)
             np.maximum(heights, degrees, out=heights)
         x, w = start + breakpoints * width, np.diff(breakpoints, axis=0) * width
         for i, (width_i, y0, y1) in enumerate(zip(w, starts, ends, strict=True)):

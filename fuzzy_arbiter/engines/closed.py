@@ -104,8 +104,11 @@ class ClosedEngine(Engine):
         """Return a faster function for the weights where the inputs are the criteria's degrees; see `Engine`."""
         steps = [(*self._sources[step], step[2]) for step in self.ladder or ()]
         plain = steps == [(i, None, True) for i in range(len(self.system.inputs))]  # in the order of the inputs
-        whole = self.clips or self.system.normalization not in ("range", "none")  # more to be done with the weights
-        if plain and not whole and self._smooth:
+        has_steps_after = self.clips or self.system.normalization not in (
+            "range",
+            "none",
+        )  # more to be done with the weights
+        if plain and not has_steps_after and self._smooth:
             return _smooth_ladder(len(self.system.inputs), *self._smooth)
         return None
 
@@ -119,9 +122,9 @@ class ClosedEngine(Engine):
                 reduce(greater, (reduce(lesser, [known[x] for x in clause]) for clause in clauses))
                 for clauses in self.clauses
             ]
-        first, *rest = (self._degree(step, columns) for step in self.ladder)
+        first, *others = (self._degree(step, columns) for step in self.ladder)
         result, unclaimed = [first], 1.0 - first
-        for m in rest:
+        for m in others:
             result.append(lesser(m, unclaimed))
             unclaimed = lesser(unclaimed, 1.0 - m)
         return result

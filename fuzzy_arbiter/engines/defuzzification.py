@@ -1,4 +1,4 @@
-"""From the panels of joined terms to one value: the bisector, the places of the maximum height, and singletons."""
+"""From the panels of joined terms to one value: the bisector, the positions of the maximum height, and singletons."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from fuzzy_arbiter.engines.quadrature import Quadrature, Samples
 
 _EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
-_APART = 1e-9  # places count as one within this fraction of the universe
+_APART = 1e-9  # positions count as one within this fraction of the universe
 _CLOSER = 2  # times that many points narrow the search for a maximum
 _DENSE = np.linspace(-1.0 + 1e-12, 1.0 - 1e-12, 33)  # these points in a panel, on its side of a jump
 _LIKELY = 0.95  # least height at the points around a maximum, as a fraction of the greatest at any point
@@ -46,9 +46,9 @@ def bisectors(samples: Samples, panels: Panels, totals: Array) -> Array:
     half = sums[:, -1] / 2
     index = (sums < (half * (1.0 - 1e-14))[:, None]).sum(axis=1)
     index = np.minimum(index, counts - 1)
-    every = np.arange(samples.n)
+    all_rows = np.arange(samples.n)
     panel = first + index
-    missing = half - (sums[every, index] - areas[panel])
+    missing = half - (sums[all_rows, index] - areas[panel])
     result: Array = ends[panel].copy()
     at_end = np.abs(missing - areas[panel]) <= 1e-14 * half  # perhaps of a gap, whose end is the next start
     for row in np.flatnonzero(at_end).tolist():

@@ -95,8 +95,8 @@ class Engine:
             return tuple(weights)
         known = [w for w in weights if w == w] or [0.0]
         # not sum(), which newer Pythons round otherwise than exported code
-        whole = reduce(operator.add, known) if self.system.normalization == "sum" else max(known)
-        return tuple(w / whole if whole > 0.0 else w * 0.0 for w in weights)
+        total = reduce(operator.add, known) if self.system.normalization == "sum" else max(known)
+        return tuple(w / total if total > 0.0 else w * 0.0 for w in weights)
 
     def normalized_of_many(self, weights: Array) -> Array:
         """Apply a normalization over all outputs to range-normalized weights of many samples."""
@@ -104,8 +104,8 @@ class Engine:
             return weights
         known = np.where(np.isnan(weights), 0.0, weights)
         # not np.sum(), which adds in another order
-        whole = reduce(np.add if self.system.normalization == "sum" else np.maximum, known.T)[:, None]
-        return np.asarray(np.divide(weights, whole, out=weights * 0.0, where=whole > 0.0))
+        total = reduce(np.add if self.system.normalization == "sum" else np.maximum, known.T)[:, None]
+        return np.asarray(np.divide(weights, total, out=weights * 0.0, where=total > 0.0))
 
     def shortcut(self) -> Shortcut | None:
         """Return a faster function for `weights` that evaluates samples of plain numbers, if there is one."""

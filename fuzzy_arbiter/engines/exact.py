@@ -73,19 +73,19 @@ class _Sampler(Defuzzifier):
     def __init__(self, output: Output, system: System) -> None:
         self.method = f"sums over {system.points} samples"
         self._defuzzifier = output.defuzzifier
-        self._places, degrees = sampled(output, system.points)
+        self._positions, degrees = sampled(output, system.points)
         slots = slots_of(system, output)
         self._slots = [(T_NORMS[slot.implication].array, degrees[slot.term]) for slot in slots]
         self._join = AGGREGATIONS[output.aggregation].array
 
     def values(self, cuts: Array, inputs: Array) -> Array:
         """Return the values for many samples."""
-        size = max(1, _BLOCK // len(self._places))
+        size = max(1, _BLOCK // len(self._positions))
         parts = [self._defuzzified(cuts[:, i : i + size]) for i in range(0, cuts.shape[1], size)]
         return np.concatenate([np.empty(0), *parts])
 
     def _defuzzified(self, cuts: Array) -> Array:
-        x, heights = self._places, np.zeros((cuts.shape[1], len(self._places)))
+        x, heights = self._positions, np.zeros((cuts.shape[1], len(self._positions)))
         for cut, (implication, degrees) in zip(cuts, self._slots, strict=True):
             heights = self._join(heights, implication(cut[:, None], degrees))
         if self._defuzzifier == "bisector":
@@ -159,7 +159,7 @@ def _function(shape: Any, inputs: Sequence[str], outputs: Sequence[str]) -> Call
         )
 
     def position(cut: Any, columns: Any) -> Any:
-        if isinstance(cut, np.ndarray):  # a strength of 0 has no weight, so that its place does not matter
+        if isinstance(cut, np.ndarray):  # a strength of 0 has no weight, so that its position does not matter
             return np.array([place_of(shape, w) if w > 0.0 else 0.0 for w in cut.tolist()])
         return place_of(shape, cut)
 

@@ -115,10 +115,10 @@ def _joined(parts: Iterable[frozenset[Clause] | None], any_of: bool) -> frozense
 
 def _absorbed(clauses: Iterable[Clause]) -> frozenset[Clause]:
     """Drop each clause that contains another, which it cannot exceed; of too many, only some are looked at."""
-    kept: list[Clause] = []
+    minimal: list[Clause] = []
     for clause in sorted(set(clauses), key=len):
-        if len(kept) > MAX_CLAUSES:
+        if len(minimal) > MAX_CLAUSES:
             break
-        if not any(other <= clause for other in kept):
-            kept.append(clause)
-    return frozenset(kept)
+        if not any(other <= clause for other in minimal):
+            minimal.append(clause)
+    return frozenset(minimal)

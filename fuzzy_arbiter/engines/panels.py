@@ -150,8 +150,8 @@ def roots(
         result[active] = np.where(np.abs(f1) < np.abs(f2), x1, x2)
         with np.errstate(all="ignore"):
             min_fraction = tolerance / np.abs(x2 - x1)
-            place, value = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
-            quadratic = (1.0 - np.sqrt(1.0 - place) < value) & (value < np.sqrt(place))
+            position, value = (x1 - x2) / (x3 - x2), (f1 - f2) / (f3 - f2)
+            quadratic = (1.0 - np.sqrt(1.0 - position) < value) & (value < np.sqrt(position))
             fraction = f1 / (f2 - f1) * f3 / (f2 - f3) + (x3 - x1) / (x2 - x1) * f1 / (f3 - f1) * f2 / (f3 - f2)
         fraction = np.clip(np.where(quadratic, fraction, 0.5), min_fraction, 1.0 - min_fraction)
         go = (min_fraction < 0.5) & (f1 != 0.0)

@@ -223,7 +223,7 @@ class Samples:
 
     def panels(self) -> Panels:
         """Return panels in which the joined terms are smooth."""
-        quad, done, total = self.quad, [], np.zeros(self.n)
+        quad, finished_panels, total = self.quad, [], np.zeros(self.n)
         rows, base = np.divmod(np.arange(self.n * (len(quad.edges) - 1)), len(quad.edges) - 1)
         starts, ends = quad.edges[base], quad.edges[base + 1]
         narrowest = NARROWEST * max(abs(quad.low), abs(quad.low + quad.width), quad.width)
@@ -247,7 +247,7 @@ class Samples:
             finished = np.ones(len(rows), dtype=bool)
             finished[items] = False
             flat = quad.flat(joined, self.cuts[:, rows][..., None], base, top_slots)
-            done.append(Panels(rows, starts, ends, joined.height, flat, areas, moments).chosen(finished))
+            finished_panels.append(Panels(rows, starts, ends, joined.height, flat, areas, moments).chosen(finished))
             total = total + np.bincount(rows[finished], areas[finished], self.n)
             if len(items) == 0:
                 break
@@ -258,7 +258,7 @@ class Samples:
                 )
             parents, starts, ends = dividing(items, breaks, starts, ends)
             rows, base = rows[parents], base[parents]
-        return Panels(*map(np.concatenate, zip(*done, strict=True)))
+        return Panels(*map(np.concatenate, zip(*finished_panels, strict=True)))
 
     def _bends(
         self, joined: Joined, rows: Indices, starts: Array, ends: Array, positions: Array
@@ -301,9 +301,9 @@ class Samples:
                 # below a level other than its cut a slot is 0, so that none is the greatest
                 within = mine[:, 1:] & mine[:, :-1] if clips and not quad._jumps else mine[:, 1:] | mine[:, :-1]
             # above: not where it rounds to its cut, as a curve at its top does
-            others = add_changes(margin > 0.0, i, _LEVEL, event, within)
+            without_change = add_changes(margin > 0.0, i, _LEVEL, event, within)
             if quad._turning[event]:
-                add_minima(np.abs(margin), others, unit)
+                add_minima(np.abs(margin), without_change, unit)
         for i in range(1, len(joined.before)):
             before, one = joined.before[i], joined.implied[i]
             add_minima(np.abs(before + one - 1.0), add_changes(before + one - 1.0 >= 0.0, i, _FULL, i), unit)

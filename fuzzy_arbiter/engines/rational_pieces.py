@@ -1,6 +1,6 @@
 """The centroid of an output of two terms, cut at 1 - h and h, as a function of h: cubic over quadratic, in pieces."""
 
-# The places where the envelope of the two clipped terms breaks move linearly with h, so that its area is a quadratic
+# The positions where the envelope of the two clipped terms breaks move linearly with h, so that its area is a quadratic
 # and its moment a cubic of h as long as no two of them meet and none passes a knot. Between these values of h both
 # polynomials are fitted to exact values, in fractions.
 

@@ -23,7 +23,7 @@ from fuzzy_arbiter.terms.term import Term
 class ScikitEngine(Engine):
     """Fuzzify and defuzzify by scikit-fuzzy, one sample at a time."""
 
-    # Inputs are interpolated between the knots of their terms, which is exact, outputs at `System.points` places. For
+    # Inputs are interpolated between the knots of their terms, which is exact, outputs at `System.points`. For
     # the two triangles of section VI, with D the distance of two points as a part of the universe, the centroid is at
     # most D^2/6 of the universe off the exact one, and a range-normalized weight D^2/2: 5e-5 at 101 points.
 
@@ -61,7 +61,7 @@ class _Sampled(Defuzzifier):
     method = "scikit-fuzzy's own"
 
     def __init__(self, output: Output, system: System) -> None:
-        self._places, self._samples = sampled(output, system.points)
+        self._positions, self._samples = sampled(output, system.points)
         names = {c.term for rule in system.rules for c in rule.conclusions if c.variable == output.name}
         self._concluded = [name in names for name in output.term_names]
         self._last: tuple[Sequence[float], float] = ((), 0.0)  # cuts and centroid: most samples change few outputs
@@ -78,12 +78,12 @@ class _Sampled(Defuzzifier):
         # scikit-fuzzy knows nothing of a term that no rule concludes, not even where it is 0
         every = zip(cuts, self._samples, self._concluded, strict=True)
         terms = [(cut, degrees) for cut, degrees, concluded in every if concluded or cut > 0.0]
-        crossings = [x for cut, degrees in terms for x in _interp_universe_fast(self._places, degrees, cut)]
-        places = np.union1d(self._places, crossings)
-        outline = np.zeros_like(places)
+        crossings = [x for cut, degrees in terms for x in _interp_universe_fast(self._positions, degrees, cut)]
+        positions = np.union1d(self._positions, crossings)
+        outline = np.zeros_like(positions)
         for cut, degrees in terms:
-            np.maximum(outline, np.minimum(cut, interp_membership(self._places, degrees, places)), out=outline)
+            np.maximum(outline, np.minimum(cut, interp_membership(self._positions, degrees, positions)), out=outline)
         try:
-            return float(defuzz(places, outline, "centroid"))
+            return float(defuzz(positions, outline, "centroid"))
         except EmptyMembershipError:
             return float("nan")

@@ -19,9 +19,9 @@ def unsupported_reason(system: System, curved_inputs: bool = False) -> str:
     for i, rule in enumerate(system.rules):
         if rule.operators is not None:
             return f"R{i + 1} has operators of its own, expected those of the system"
-        asked = next((s.variable for s in rule.condition.terms() if s.variable in outputs), None)
-        if asked is not None:
-            return f"R{i + 1} asks for the output {asked!r}, expected conditions on inputs alone"
+        output_name = next((s.variable for s in rule.condition.terms() if s.variable in outputs), None)
+        if output_name is not None:
+            return f"R{i + 1} asks for the output {output_name!r}, expected conditions on inputs alone"
         if bent(rule.condition):
             return f"R{i + 1} has a hedge or 'any', expected 'not' alone"
     for output in system.outputs:

@@ -1,4 +1,4 @@
-"""Exported code as statements, before they are written in a language; C and Python share the expressions."""
+"""Exported code as statements, before they are written in a language; C and Python fraction the expressions."""
 
 from __future__ import annotations
 
@@ -115,8 +115,8 @@ def program(system: System) -> Program:
     closed = isinstance(engine, ClosedEngine)
     statements = (*_inputs(system), *(_closed(engine) if isinstance(engine, ClosedEngine) else _swept(engine)))
     outlines = () if closed else tuple(None if o.weighted else outline(o) for o in system.outputs)
-    whole = (*statements, *_shared(system))
-    return Program(system, whole, outlines, tuple(called(_texts(whole))))
+    total = (*statements, *_shared(system))
+    return Program(system, total, outlines, tuple(called(_texts(total))))
 
 
 def _texts(statements: Sequence[Statement]) -> Iterator[str]:
@@ -159,8 +159,8 @@ def _inputs(system: System) -> Iterator[Statement]:
     """Check each input, or clip it."""
     for i, variable in enumerate(system.inputs):
         x, (low, high) = f"x{i + 1}", variable.universe
-        good = f"{x} == {x}" if system.outside == "clip" else f"{low!r} <= {x} and {x} <= {high!r}"
-        yield Choose(((f"not ({good})", (Return(-i - 1),)),))  # NaN too
+        valid = f"{x} == {x}" if system.outside == "clip" else f"{low!r} <= {x} and {x} <= {high!r}"
+        yield Choose(((f"not ({valid})", (Return(-i - 1),)),))  # NaN too
         if system.outside == "clip":
             yield Assign(x, f"least(greatest({x}, {low!r}), {high!r})")
 
@@ -192,7 +192,7 @@ class _Expressions:
         self._names = 0
         self._waiting: list[Statement] = []
 
-    def said(self, template: str, *degrees: str) -> str:
+    def apply(self, template: str, *degrees: str) -> str:
         """Return the expression of an operator's value."""
         text = template.format(*degrees)
         depth = max(accumulate((sign == "(") - (sign == ")") for sign in text))
@@ -204,7 +204,7 @@ class _Expressions:
 
     def join(self, kind: str, degrees: Iterable[str]) -> str:
         """Return the expression that joins several degrees, from left to right."""
-        return reduce(partial(self.said, _JOINS[kind]), degrees)
+        return reduce(partial(self.apply, _JOINS[kind]), degrees)
 
     def assign(self, name: str, expression: str, words: str) -> Iterator[Statement]:
         """Assign a value to a name, after the assignments that it needs."""
@@ -244,7 +244,7 @@ def _degree(x: str, shape: Membership, universe: tuple[float, float]) -> list[tu
     assert isinstance(shape, Shape)
     if shape == DEGREE and universe == (0.0, 1.0):
         return [("", x)]
-    knots: list[tuple[float, float, float]] = []  # place, degree left and right of it
+    knots: list[tuple[float, float, float]] = []  # position, degree left and right of it
     for x0, degree in shape.points:
         if knots and knots[-1][0] == x0:
             knots[-1] = (x0, knots[-1][1], degree)
@@ -266,10 +266,10 @@ def _degree(x: str, shape: Membership, universe: tuple[float, float]) -> list[tu
 
 def _line(x: str, a: float, start: float, run: float, rise: float) -> str:
     """Format start + rise * ((x - a) / run), without operations that change no bit."""
-    share = (x if a == 0.0 else f"({x} - {a!r})") + ("" if run == 1.0 else f" / {run!r}")
+    fraction = (x if a == 0.0 else f"({x} - {a!r})") + ("" if run == 1.0 else f" / {run!r}")
     if rise == 0.0:
         return repr(start)
-    climb = share if rise == 1.0 else f"{rise!r} * ({share})" if " " in share else f"{rise!r} * {share}"
+    climb = fraction if rise == 1.0 else f"{rise!r} * ({fraction})" if " " in fraction else f"{rise!r} * {fraction}"
     return climb if start == 0.0 else f"{start!r} + {climb}"
 
 
@@ -327,10 +327,10 @@ def _swept(engine: Engine) -> Iterator[Statement]:
     for i, rule in enumerate(system.rules, 1):
         norms = rule.operators or system
         operators: Logic[str] = Logic(
-            partial(logic.said, _JOINS[norms.conjunction]),
-            partial(logic.said, _JOINS[norms.disjunction]),
-            partial(logic.said, "(1.0 - {})"),
-            lambda word, degree: logic.said(f"{word}({{}})", degree),
+            partial(logic.apply, _JOINS[norms.conjunction]),
+            partial(logic.apply, _JOINS[norms.disjunction]),
+            partial(logic.apply, "(1.0 - {})"),
+            lambda word, degree: logic.apply(f"{word}({{}})", degree),
             "1.0",
         )
         degree = operators.degree(rule.condition, degrees.name_of)
@@ -379,7 +379,7 @@ def _shared(system: System) -> Iterator[Statement]:
         return
     ys = [f"y{k}" for k in range(1, len(system.outputs) + 1)]
     logic = _Expressions()
-    whole = " + ".join(ys) if system.normalization == "sum" else logic.join("max", ys)
-    yield from logic.assign("whole", whole, "")
+    total = " + ".join(ys) if system.normalization == "sum" else logic.join("max", ys)
+    yield from logic.assign("total", total, "")
     # if all are 0, they stay 0
-    yield Choose((("whole > 0.0", tuple(Assign(y, f"{y} / whole") for y in ys)),))
+    yield Choose((("total > 0.0", tuple(Assign(y, f"{y} / total") for y in ys)),))

@@ -118,7 +118,7 @@ def _declared(sections: Sequence[Block], declaration: str, kind: str, taken: Col
 
 def _terms(section: Block, inputs: Sequence[str] | None) -> tuple[tuple[Term, ...], list[float]]:
     """Return the terms of a variable, and their points."""
-    terms, places = [], []
+    terms, positions = [], []
     for line, text in section.many:
         name, _, content = text.partition(" ")
         if not re.fullmatch(_NAME, name) or name.lower() in RESERVED:
@@ -126,16 +126,16 @@ def _terms(section: Block, inputs: Sequence[str] | None) -> tuple[tuple[Term, ..
         with located(f"line {line}: term {name!r}"):
             shape, extent = read_shape(content, line, inputs)
             terms.append(Term(name, shape))
-        places += extent
-    return tuple(terms), places
+        positions += extent
+    return tuple(terms), positions
 
 
 def _input(section: Block) -> Variable:
-    terms, places = _terms(section, None)
-    return section.build(Variable, section.name, _universe(section, places), terms)
+    terms, positions = _terms(section, None)
+    return section.build(Variable, section.name, _universe(section, positions), terms)
 
 
-def _universe(section: Block, places: Sequence[float], weighted: bool = False) -> tuple[float, float]:
+def _universe(section: Block, positions: Sequence[float], weighted: bool = False) -> tuple[float, float]:
     line, text = section.entry("RANGE")
     if text:
         limits = _RANGE.fullmatch(text)
@@ -143,16 +143,16 @@ def _universe(section: Block, places: Sequence[float], weighted: bool = False) -
             refuse(line, f"RANGE of {section.title} is {text}, expected (minimum .. maximum)")
         low, high = limits.groups()
         return read_number(low, line, "the minimum"), read_number(high, line, "the maximum")
-    universe = universe_of(places)
+    universe = universe_of(positions)
     if universe is None and weighted:  # values do not depend on the universe
-        return min(places, default=0.0) - 1.0, max(places, default=0.0) + 1.0
+        return min(positions, default=0.0) - 1.0, max(positions, default=0.0) + 1.0
     expected = "expected RANGE := (minimum .. maximum);"
     return universe or refuse(section.line, f"{section.name!r} has no range, and its points make none; {expected}")
 
 
 def _output(section: Block, inputs: Sequence[str], aggregations: dict[bool, str]) -> Output:
     """Return an output; these aggregations join its sets or values unless it has its own."""
-    terms, places = _terms(section, inputs)
+    terms, positions = _terms(section, inputs)
     values = any(isinstance(term.shape, Constant | Linear) for term in terms)
     sets = any(not isinstance(term.shape, Value) for term in terms)
     usual = "average" if values and not sets else "centroid"  # the default of jFuzzyLogic
@@ -168,7 +168,7 @@ def _output(section: Block, inputs: Sequence[str], aggregations: dict[bool, str]
     default = None if value.upper() in ("NC", "NAN") else read_number(value, line, "the default, or NC,")
     if other.upper() not in ("", "NC"):
         refuse(line, f"DEFAULT of {section.title} is {text}, expected NC after |")
-    universe, keeps = _universe(section, places, weighted), "PREVIOUS" in locks or bool(other)
+    universe, keeps = _universe(section, positions, weighted), "PREVIOUS" in locks or bool(other)
     return section.build(Output, section.name, universe, terms, default, method, own, "RANGE" in locks, keeps)
 
 

@@ -23,27 +23,27 @@ _POINT = re.compile(r"\( (\S+) , (\S+) \)(?: ,)?(?: |$)")  # examples of the sta
 
 def read_shape(text: str, line: int, inputs: Sequence[str] | None) -> tuple[Membership | Value, list[float]]:
     """Parse a term's shape, and return its lowest and highest point; the inputs are those before an output."""
-    word, _, rest = text.partition(" ")
+    word, _, arguments = text.partition(" ")
     if word == "FUNCTION":  # jFuzzyLogic's, whose LOG is that to the base of 10
-        formula = Formula(" ".join("log10" if part.upper() == "LOG" else part for part in rest.split(" ")))
+        formula = Formula(" ".join("log10" if part.upper() == "LOG" else part for part in arguments.split(" ")))
         linear = Linear.of(formula.expression(sorted(formula.names)).tree, inputs or ())
         return linear or formula, []
     if word in TYPES:
-        shape = read_typed(word, rest, line, None if inputs is None else len(inputs))
+        shape = read_typed(word, arguments, line, None if inputs is None else len(inputs))
         return shape, [shape.value] if isinstance(shape, Constant) else []
     if word.upper() in _COUNTS:
-        numbers = [_number(part, line, "a parameter") for part in rest.split()]
+        numbers = [_number(part, line, "a parameter") for part in arguments.split()]
         count = _COUNTS[word.upper()]
         if len(numbers) != count:
-            refuse(line, f"{word} has the numbers {rest!r}, expected {count}")
+            refuse(line, f"{word} has the numbers {arguments!r}, expected {count}")
         return _curve(word.upper(), numbers)
-    if word and not rest and (word[0] in "+-.0123456789" or word.isidentifier()):
+    if word and not arguments and (word[0] in "+-.0123456789" or word.isidentifier()):
         value = _number(word, line, "a value")
         return Constant(value) if inputs is not None else Curve("singleton", (value,)), [value]
     if not text or _POINT.sub("", text):
         expected = f"points such as (0, 0) (5, 1), a number, or one of {', '.join(('FUNCTION', *_COUNTS, *TYPES))}"
         refuse(line, f"{text!r} is no membership function, expected {expected}")
-    points = [(_number(x, line, "a place"), _number(y, line, "a degree")) for x, y in _POINT.findall(text)]
+    points = [(_number(x, line, "a position"), _number(y, line, "a degree")) for x, y in _POINT.findall(text)]
     return Shape(tuple(points)), [x for x, _ in points]
 
 
@@ -56,10 +56,10 @@ def _number(text: str, line: int, what: str) -> float:
 def _curve(word: str, numbers: Sequence[float]) -> tuple[Membership, list[float]]:
     """Return the shape of one of jFuzzyLogic's functions and its numbers, and its default universe."""
     if word in ("TRIAN", "TRAPE"):
-        places = [numbers[0], numbers[-1]]
+        positions = [numbers[0], numbers[-1]]
         if len(set(numbers)) == 1:
-            return Curve("singleton", (numbers[0],)), places
-        return (triangle if word == "TRIAN" else trapezoid)(*numbers), places
+            return Curve("singleton", (numbers[0],)), positions
+        return (triangle if word == "TRIAN" else trapezoid)(*numbers), positions
     if word == "COSINE":
         half, center = numbers
         return Curve("cosine", (center, 2.0 * half)), [center - half, center + half]
@@ -125,7 +125,7 @@ def format_shape(shape: Membership | Value, term: str, inputs: Sequence[str]) ->
     return f"{word} {format_numbers(numbers)}"
 
 
-def universe_of(places: Sequence[float]) -> tuple[float, float] | None:
+def universe_of(positions: Sequence[float]) -> tuple[float, float] | None:
     """Return the universe from a term's points, for a variable without RANGE."""
-    low, high = min(places, default=0.0), max(places, default=0.0)
+    low, high = min(positions, default=0.0), max(positions, default=0.0)
     return (low, high) if low < high else None

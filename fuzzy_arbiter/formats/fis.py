@@ -182,9 +182,9 @@ def _parts(section: Block, inputs: int | None) -> _Parts:
         match = _FUNCTION.fullmatch(value)
         if not match:
             refuse(line, f"{value}, expected a membership function such as 'low':'trimf',[-1 0 1]")
-        term, function, places = match.groups()
+        term, function, parameters = match.groups()
         with located(f"line {line}: term {term!r}"):
-            terms.append(Term(term, read_function(function, places, line, term, inputs)))
+            terms.append(Term(term, read_function(function, parameters, line, term, inputs)))
     return section.name, (bounds[0], bounds[1]), with_unique_names(terms)
 
 
@@ -235,7 +235,7 @@ def _method(system: System) -> tuple[str, str, str]:
 
 
 def _function(term: Term, v: Variable) -> str:
-    """Format a term's function and places."""
+    """Format a term's function and parameters."""
     shape = term.shape
     kind, numbers, _ = parts_of(shape)
     what = f"fis cannot say the term {term.name!r} of {v.name!r}"
@@ -259,7 +259,7 @@ def _function(term: Term, v: Variable) -> str:
 
 
 def _straight(shape: Shape, v: Variable) -> tuple[str, tuple[float, ...]] | None:
-    """Return the function and places of a shape; half a triangle gets its foot beyond the range, as Octave needs it."""
+    """Return the function and parameters of a shape; half a triangle has its foot beyond the range, for Octave."""
     low, high = v.universe
     width = high - low
 

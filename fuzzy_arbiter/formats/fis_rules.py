@@ -30,12 +30,12 @@ def read_rules(
     match = _RULE.fullmatch(row)
     if not match:
         refuse(line, f"{row!r}, expected a rule such as 1 -2, 1 (1) : 1")
-    asked, concluded, weight, connective = match.groups()
+    condition_text, concluded, weight, connective = match.groups()
     if connective not in ("1", "2"):
         refuse(line, f"{row!r} ends in {connective!r}, expected 1 for and, 2 for or")
     condition: list[Proposition] = []
     words = _FUZZYLITE if fuzzylite else _OCTAVE
-    for (index, negated, hedges), v in zip(_indices(asked, line, row, inputs, words), inputs, strict=True):
+    for (index, negated, hedges), v in zip(_indices(condition_text, line, row, inputs, words), inputs, strict=True):
         statement = _statement(index, hedges, v)
         if statement is not None:
             condition.append(Not(statement) if negated else statement)
@@ -52,10 +52,10 @@ def read_rules(
     if not condition or not conclusions:
         refuse(line, f"{row!r} has no {'conclusion' if condition else 'condition'}, expected one number that is not 0")
     joined = condition[0] if len(condition) == 1 else (And if connective == "1" else Or)(tuple(condition))
-    share = read_number(weight.strip(), line, "weight")
-    if share != 1.0 and any(hedges for hedges, _ in conclusions):
+    factor = read_number(weight.strip(), line, "weight")
+    if factor != 1.0 and any(hedges for hedges, _ in conclusions):
         refuse(line, f"{row!r} has a hedge in a conclusion and a weight, expected the weight 1")
-    return bent_rules(joined, conclusions, share, carry=fuzzylite)
+    return bent_rules(joined, conclusions, factor, carry=fuzzylite)
 
 
 def _statement(index: int, hedges: tuple[str, ...], v: Variable) -> Proposition | None:

@@ -41,11 +41,11 @@ def read_function(function: str, text: str, line: int, term: str, inputs: int | 
         return Formula(text)
     kind, order = _TYPES[function]
     count = len(order)
-    numbers = numbers_of(text, line, f"place of {term!r}")
+    numbers = numbers_of(text, line, f"apex of {term!r}")
     if len(numbers) == 4 > count and order and not any(numbers[count:]):
         del numbers[count:]  # the zeros with which MATLAB's old files fill all up to four
     if function in _WITHOUT_HEIGHT and len(numbers) != count:
-        refuse(line, f"term {term!r} has the places [{text}], expected {count} for {function}")
+        refuse(line, f"term {term!r} has the parameters [{text}], expected {count} for {function}")
     if function in _SHOULDERS:
         return _SHOULDERS[function](*numbers)
     if function == "trapmf" and numbers[1] > numbers[2]:
@@ -94,5 +94,5 @@ def _number(text: str, line: int, what: str) -> float:
 
 def _crossed(a: float, b: float, c: float, d: float) -> Shape:
     """Return the lesser of a rise from a to b and a fall from c to d that cross below 1."""
-    place = (a * (d - c) + d * (b - a)) / ((b - a) + (d - c))
-    return Shape(((a, 0.0), (place, (place - a) / (b - a)), (d, 0.0)))
+    apex = (a * (d - c) + d * (b - a)) / ((b - a) + (d - c))
+    return Shape(((a, 0.0), (apex, (apex - a) / (b - a)), (d, 0.0)))

@@ -116,8 +116,8 @@ def _output(block: Block, inputs: int) -> tuple[Output, int]:
     if locked and default is not None and not parts[1][0] <= default <= parts[1][1]:
         line, value = block.entry("default")
         refuse(line, f"default of {block.title} is {value}, outside the range that lock-range holds it to")
-    made = block.build(Output, *parts, default, defuzzifier, aggregation, locked, previous)
-    return made, points
+    read_output = block.build(Output, *parts, default, defuzzifier, aggregation, locked, previous)
+    return read_output, points
 
 
 def _defuzzifier(block: Block) -> tuple[Any, int]:

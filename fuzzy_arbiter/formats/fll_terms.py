@@ -18,7 +18,7 @@ _FUNCTIONS = "acosh asinh atanh gt lt le ge eq neq abs fabs"
 RESERVED = frozenset(
     (*(word for word, hedge in HEDGES.items() if hedge.fll), "any", "not", *WORDS, *_FUNCTIONS.split())
 )
-# number of places of each; a height may follow
+# number of positions of each; a height may follow
 _PLACES = {"Triangle": 3, "Trapezoid": 4, "Ramp": 2, "Rectangle": 2, "Binary": 2}
 _CURVES = {kind.fll: name for name, kind in KINDS.items() if kind.fll}
 VALUES = ("Constant", "Linear", "Function")
@@ -114,7 +114,7 @@ def _points(kind: str, numbers: Sequence[float], line: int) -> list[Point]:
     if kind == "Ramp":
         start, end = numbers
         if start == end:
-            refuse(line, f"Ramp begins and ends at {start!r}, expected two places")
+            refuse(line, f"Ramp begins and ends at {start!r}, expected two positions")
         return [(start, 0.0), (end, 1.0)] if start < end else [(end, 1.0), (start, 0.0)]
     if kind == "Rectangle":
         start, end = sorted(numbers)

@@ -17,7 +17,7 @@ def fold_normalization(system: System) -> System:
 
     Normalizing to the range maps the centroids of an output's least and greatest term, each alone, to 0 and 1. The same
     map of the output's universe, terms and default gives a system that needs no normalizing: low and high triangles on
-    [0, 1] become triangles on [-1, 2]. The ends of the map are exact, the places are rounded once.
+    [0, 1] become triangles on [-1, 2]. The ends of the map are exact, the positions are rounded once.
 
     Parameters
     ----------
@@ -75,13 +75,13 @@ def _mapped(output: Output) -> Output:
             f"output {output.name!r}: its terms have one centroid, {float(low):g}, which leaves no range to normalize"
         )
 
-    def place(x: float) -> float:
+    def scale(x: float) -> float:
         return float((Fraction(x) - low) / (high - low))
 
     try:
-        terms = tuple(Term(t.name, Shape(tuple((place(x), y) for x, y in t.straight.points))) for t in output.terms)
-        default = None if output.default is None else min(max(place(output.default), 0.0), 1.0)
-        low_end, high_end = map(place, output.universe)
+        terms = tuple(Term(t.name, Shape(tuple((scale(x), y) for x, y in t.straight.points))) for t in output.terms)
+        default = None if output.default is None else min(max(scale(output.default), 0.0), 1.0)
+        low_end, high_end = map(scale, output.universe)
         return replace(output, universe=(low_end, high_end), terms=terms, default=default)
     except (OverflowError, DefinitionError):
         raise UnsupportedError(

@@ -38,7 +38,7 @@ def system_of(data: object) -> System:
     """Build the system that the values of a file define."""
     # Either `inputs`, `outputs` and `rules` are given, with the keys of `System`; or, in short, `criteria` in order of
     # priority, with the keys of `prioritized`. Terms are given by their points; as one of `triangle`, `trapezoid`,
-    # `rising` and `falling` with its places; as a curve with its parameters, such as `gaussian`, and perhaps a
+    # `rising` and `falling` with its positions; as a curve with its parameters, such as `gaussian`, and perhaps a
     # `height`; or, of an output, as a `constant`, as `linear` with a coefficient for each input and a constant, or as a
     # `formula`. A rule is a text, or a table with the text and the operators of its block.
     if isinstance(data, dict) and "criteria" in data:

@@ -46,7 +46,7 @@ def format_settings(system: System, keys: Sequence[str] = tuple(PLAIN)) -> list[
 def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str] = tuple(PLAIN)) -> dict[str, Any]:
     """Parse the settings in the comments of a file."""
     settings = {**{key: PLAIN[key] for key in keys}, _NAMES: ()}
-    first, seen = 0, set[str]()
+    first, known_keys = 0, set[str]()
     for line, text in comments:
         if not text.strip().startswith(MARK):
             word = re.match(r"\s*([\w-]*)", text)
@@ -58,9 +58,9 @@ def read_settings(comments: Iterable[tuple[int, str]], keys: Sequence[str] = tup
         first = line
         for part in _PART.findall(text.strip().removeprefix(MARK)) or [""]:
             key, equals, value = (s.strip() for s in part.partition("="))
-            if key not in settings or not equals or key in seen:
+            if key not in settings or not equals or key in known_keys:
                 refuse(line, f"{part.strip()!r}, expected each once, with = and its value: {', '.join(settings)}")
-            seen.add(key)
+            known_keys.add(key)
             settings[key] = _value(key, value, line)
     return settings
 

@@ -137,7 +137,7 @@ def decisions(
         ahead = np.ma.masked_where(undefined, ranked_weights[..., k] - others)
         if ahead.count() == 0 or not ahead.max() > levels[0]:
             continue
-        shades = [_mixed(to_rgb(color(k)), share) for share in np.linspace(0.2, 0.85, _SHADES)]
+        shades = [_mixed(to_rgb(color(k)), fraction) for fraction in np.linspace(0.2, 0.85, _SHADES)]
         ax.contourf(x, y, ahead, levels=levels, colors=shades)
         hatching = ax.contourf(x, y, ahead, levels=levels[[0, -1]], colors="none", hatches=[hatch(k)])
         hatching.set(edgecolor=(1.0, 1.0, 1.0, 0.55), linewidth=0.0)
@@ -160,18 +160,18 @@ def decisions(
     return ax
 
 
-def _mixed(whole: tuple[float, float, float], share: float) -> str:
+def _mixed(whole: tuple[float, float, float], fraction: float) -> str:
     """Return a color mixed with white."""
     from matplotlib.colors import to_hex
 
-    red, green, blue = (1.0 - share * (1.0 - part) for part in whole)
+    red, green, blue = (1.0 - fraction * (1.0 - part) for part in whole)
     return to_hex((red, green, blue))
 
 
 def _field(
     arbiter: Arbiter, over: tuple[str, str], at: Mapping[str, float] | None, points: int
 ) -> tuple[Array, Array, Array, str]:
-    """Return places along both axes, the weights over them (rows along the second), and the fixed inputs in words."""
+    """Return positions along both axes, weights over them (rows along the second), and fixed inputs in words."""
     if isinstance(over, str) or len(over) != 2:
         raise DefinitionError(f"over is {over!r}, expected the names of two inputs")
     fixed = fixed_inputs(arbiter, over, at)

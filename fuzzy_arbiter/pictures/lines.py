@@ -61,7 +61,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     DefinitionError
         If there is no such variable.
     InputError
-        If the place is outside the universe.
+        If the position is outside the universe.
     UnsupportedError
         If the variable has no terms, or its terms are values.
 
@@ -73,14 +73,14 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
     'degree'
     """
     variables = (*arbiter.system.inputs, *arbiter.system.outputs)
-    shown = variables[index_of(variables, variable, "variable")]
-    low, high = shown.universe
+    selected = variables[index_of(variables, variable, "variable")]
+    low, high = selected.universe
     if at is not None and not low <= at <= high:
-        raise InputError(f"{variable}: place is {at!r}, expected a number in [{low:g}, {high:g}]")
-    if not shown.terms or (isinstance(shown, Output) and shown.weighted):
+        raise InputError(f"{variable}: position is {at!r}, expected a number in [{low:g}, {high:g}]")
+    if not selected.terms or (isinstance(selected, Output) and selected.weighted):
         raise UnsupportedError(f"terms of {variable!r}: it has values or none, which are not drawn; expected sets")
     ax = new_axes(6.0, 2.7) if ax is None else ax
-    for i, term in enumerate(shown.terms):
+    for i, term in enumerate(selected.terms):
         x, y = corners(term, (low, high))
         ax.plot(x, y, label=term.name, clip_on=False, **line_style(i))
         if at is not None:
@@ -89,7 +89,7 @@ def terms(arbiter: Arbiter, variable: str, at: float | None = None, ax: Axes | N
         ax.axvline(at, color=FAINT, linewidth=1.0, zorder=1)
     ax.set(xlim=(low, high), ylim=(0.0, 1.0), xlabel=variable, ylabel="degree")
     tidy(ax)
-    legend_above(ax, shown.term_names)
+    legend_above(ax, selected.term_names)
     return ax
 
 
@@ -97,8 +97,8 @@ def corners(term: Term, universe: tuple[float, float]) -> tuple[list[float], lis
     """Return the corners of a term's line, both ends of a jump among them."""
     low, high = universe
     if not isinstance(term.shape, Shape):  # as many corners as make it look smooth
-        places = np.unique([*np.linspace(low, high, 401), *term.membership.breaks((low, high))])
-        return places.tolist(), term.membership.of_many(places).tolist()
+        positions = np.unique([*np.linspace(low, high, 401), *term.membership.breaks((low, high))])
+        return positions.tolist(), term.membership.of_many(positions).tolist()
     inside = [(x, y) for x, y in term.straight.points if low < x < high]
     x, y = zip((low, term.straight(low)), *inside, (high, term.straight(high)), strict=True)
     return list(x), list(y)

@@ -45,7 +45,7 @@ def fixed_inputs(arbiter: Arbiter, over: Sequence[str], at: Mapping[str, float] 
 
 
 def weights_at(arbiter: Arbiter, fixed: Mapping[str, float], over: Mapping[str, Array]) -> Array:
-    """Return the weights at many places, NaN where an output is undefined; over (n,), returns (n, outputs)."""
+    """Return the weights at many positions, NaN where an output is undefined; over (n,), returns (n, outputs)."""
     system = arbiter.system
     n = len(next(iter(over.values())))
     samples = np.empty((n, len(system.inputs)))
@@ -60,7 +60,7 @@ def format_values(values: Mapping[str, float]) -> str:
 
 
 def points_along(variable: Variable, count: int) -> Array:
-    """Return places close enough for a line, with both sides of every break of the variable's terms."""
+    """Return positions close enough for a line, with both sides of every break of the variable's terms."""
     low, high = variable.universe
     knots = np.array(variable.knots)
     beside = (high - low) * 1e-9

@@ -90,7 +90,7 @@ class Curve(Membership):
         return self._numbers[i]({"x": x})
 
     def __call__(self, x: float) -> float:
-        """Return the degree at a place; of a jump the greater one; NaN for a place that is NaN."""
+        """Return the degree at a position; of a jump the greater one; NaN for a position that is NaN."""
         if x != x:
             return x
         i = bisect_left(self.ends, x)
@@ -99,23 +99,23 @@ class Curve(Membership):
             degree = max(degree, self._side(i + 1, x))
         return min(max(degree, 0.0), 1.0)
 
-    def of_many(self, places: Array) -> Array:
-        """Return the degrees at many places, each as a call gives it, to rounding."""
-        result = np.empty(len(places))
+    def of_many(self, positions: Array) -> Array:
+        """Return the degrees at many positions, each as a call gives it, to rounding."""
+        result = np.empty(len(positions))
         with np.errstate(all="ignore"):
             if len(self._arrays) == 1:
-                result[:] = self._arrays[0]({"x": places})
+                result[:] = self._arrays[0]({"x": positions})
             else:
-                piece = np.searchsorted(self.ends, places)
+                piece = np.searchsorted(self.ends, positions)
                 for i, degrees_of in enumerate(self._arrays):
                     inside = piece == i
                     if inside.any():
-                        result[inside] = degrees_of({"x": places[inside]})
+                        result[inside] = degrees_of({"x": positions[inside]})
         for end in self._jumps:
-            result[places == end] = self(end)
+            result[positions == end] = self(end)
         np.minimum(np.maximum(result, 0.0, out=result), 1.0, out=result)
         if len(self._arrays) > 1:
-            result[places != places] = np.nan
+            result[positions != positions] = np.nan
         return result
 
     def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
@@ -123,9 +123,9 @@ class Curve(Membership):
         return tuple(sorted({end for end in self.ends if universe[0] < end < universe[1]}))
 
     def features(self, universe: tuple[float, float]) -> tuple[float, ...]:
-        """Return its breaks and the places within a universe around which it changes."""
-        places = {*self.ends, *KINDS[self.kind].features(*self.parameters)}
-        return tuple(sorted(x for x in places if universe[0] < x < universe[1]))
+        """Return its breaks and the positions within a universe around which it changes."""
+        positions = {*self.ends, *KINDS[self.kind].features(*self.parameters)}
+        return tuple(sorted(x for x in positions if universe[0] < x < universe[1]))
 
     @property
     def monotonic(self) -> bool:  # type: ignore[override]  # depends on the kind
@@ -133,7 +133,7 @@ class Curve(Membership):
         return KINDS[self.kind].monotonic
 
     def place_of(self, degree: float) -> float:
-        """Return the place, perhaps infinite, where a monotonic curve has a degree, for Tsukamoto's method."""
+        """Return the position, perhaps infinite, where a monotonic curve has a degree, for Tsukamoto's method."""
         inverse = KINDS[self.kind].inverse
         assert inverse is not None, self.kind
         named = dict(zip(KINDS[self.kind].parameters, self.parameters, strict=True))
@@ -165,7 +165,7 @@ def curve(kind: str, *parameters: float, height: float = 1.0) -> Membership:
         width, slope), ``sigmoid`` (inflection, slope), ``sigmoid_difference`` and ``sigmoid_product`` (left, rising,
         falling, right), ``z_shape``, ``s_shape`` (start, end), ``pi_shape`` (foot1, top1, top2, foot2), ``cosine`` and
         ``spike`` (center, width), ``concave`` (inflection, end), ``arc`` and ``semi_ellipse`` (start, end), and
-        ``singleton`` (place), which is 1 there and 0 elsewhere.
+        ``singleton`` (position), which is 1 there and 0 elsewhere.
     *parameters : float
         Parameters of the kind, in its order.
     height : float
@@ -174,7 +174,7 @@ def curve(kind: str, *parameters: float, height: float = 1.0) -> Membership:
     Returns
     -------
     Membership
-        Membership function, which is called with a place and returns the degree.
+        Membership function, which is called with a position and returns the degree.
 
     Raises
     ------

@@ -28,12 +28,12 @@ class CurveKind:
     valid: Valid = (lambda *parameters: True, "finite numbers")
     polynomial: bool = False  # true if the pieces are polynomials
     # function for a kind that only rises or only falls: from the parameters to pieces over the degree ``w``, which
-    # give the place
+    # give the position
     inverse: Callable[..., Pieces] | None = None
-    # function from the parameters to places around which the curve changes: between these, and beyond the first and
-    # the last, it only rises or only falls, unless `monotonic` is False. Places that are not finite do not count
+    # function from the parameters to positions around which the curve changes: between these, and beyond the first and
+    # the last, it only rises or only falls, unless `monotonic` is False. Positions that are not finite do not count
     features: Callable[..., list[float]] = lambda *parameters: list(parameters)
-    monotonic: bool = True  # false if the curve may turn at places that `features` does not give
+    monotonic: bool = True  # false if the curve may turn at positions that `features` does not give
 
 
 def _multiplied(first: Pieces, second: Pieces) -> Pieces:
@@ -59,7 +59,7 @@ def _s(start: float, end: float, names: tuple[str, str] = ("start", "end")) -> P
 
 
 def _z(start: float, end: float, names: tuple[str, str] = ("start", "end")) -> Pieces:
-    return [(place, {"0": "1", "1": "0"}.get(text, f"1 - ({text})")) for place, text in _s(start, end, names)]
+    return [(position, {"0": "1", "1": "0"}.get(text, f"1 - ({text})")) for position, text in _s(start, end, names)]
 
 
 def _gaussian(mean: str, deviation: str) -> str:
@@ -109,8 +109,8 @@ def _nonzero(words: str, *indices: int) -> Valid:
 
 
 def _around(center: float, scale: float) -> list[float]:
-    """Return places on both sides of a center at which a curve of that scale has changed."""
-    return [center + share * scale for share in (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0)]
+    """Return positions on both sides of a center at which a curve of that scale has changed."""
+    return [center + fraction * scale for fraction in (-6.0, -4.0, -2.0, 0.0, 2.0, 4.0, 6.0)]
 
 
 def _inflection(inflection: float, slope: float) -> list[float]:
@@ -129,7 +129,7 @@ def _product_of_gaussians(mean1: float, deviation1: float, mean2: float, deviati
 
 
 _ORDERED: Valid = (lambda start, end: start <= end, "a start that is not above the end")
-_DISTINCT: Valid = (lambda start, end: start != end, "two places")
+_DISTINCT: Valid = (lambda start, end: start != end, "two positions")
 
 KINDS: dict[str, CurveKind] = {
     "gaussian": CurveKind(
@@ -219,7 +219,7 @@ KINDS: dict[str, CurveKind] = {
         ],
     ),
     "singleton": CurveKind(
-        ("place",), lambda place: [(place, "eq(x, place)"), (_END, "0")], fll="", fis=("", (0,))
+        ("position",), lambda position: [(position, "eq(x, position)"), (_END, "0")], fll="", fis=("", (0,))
     ),
     "semi_ellipse": CurveKind(
         ("start", "end"), _ellipse, fll="SemiEllipse", fis=("semiellipsemf", (0, 1)), valid=_DISTINCT,

@@ -21,7 +21,7 @@ _NAMES = {
 
 @dataclass(frozen=True, slots=True)
 class Term:
-    """A word for a part of a universe, and to what degree each place belongs to it; or, of an output, for a value.
+    """A word for a part of a universe, and to what degree each position belongs to it; or, of an output, for a value.
 
     Attributes
     ----------

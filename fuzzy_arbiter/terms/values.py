@@ -1,4 +1,4 @@
-"""Terms of outputs that are values, not sets of places: constant, linear in the inputs, or any expression of them."""
+"""Terms of outputs that are values, not sets: constant, linear in the inputs, or any expression of them."""
 
 from __future__ import annotations
 
@@ -83,10 +83,10 @@ class Linear(Value):
     constant: float = 0.0
 
     def __post_init__(self) -> None:
-        given = (*all_of(object, self.coefficients, "linear", "a sequence of numbers"), self.constant)
-        numbers = finite_numbers(given)
+        all_numbers = (*all_of(object, self.coefficients, "linear", "a sequence of numbers"), self.constant)
+        numbers = finite_numbers(all_numbers)
         if numbers is None:
-            raise DefinitionError(f"linear: got {shown(given)}, expected finite numbers")
+            raise DefinitionError(f"linear: got {shown(all_numbers)}, expected finite numbers")
         object.__setattr__(self, "coefficients", numbers[:-1])
         object.__setattr__(self, "constant", numbers[-1])
 
@@ -119,13 +119,13 @@ class Linear(Value):
                 coefficients[part[2]] = part[1]
             else:
                 return None
-        made = cls(tuple(coefficients.values()), constant)
-        return made if made.expression(inputs).tree == tree else None
+        linear_value = cls(tuple(coefficients.values()), constant)
+        return linear_value if linear_value.expression(inputs).tree == tree else None
 
 
 @dataclass(frozen=True, slots=True)
 class Formula(Value, Membership):
-    """An arithmetic expression: a term of an output on the inputs' names, or a membership function on the place ``x``.
+    """An arithmetic expression: a term of an output on the inputs' names, or a membership function of ``x``.
 
     Attributes
     ----------
@@ -145,57 +145,57 @@ class Formula(Value, Membership):
     """
 
     text: str
-    _whole: Expression = field(init=False, repr=False, compare=False)
+    _parsed: Expression = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        whole = Expression(self.text)
-        object.__setattr__(self, "text", whole.text)
-        object.__setattr__(self, "_whole", whole)
+        parsed = Expression(self.text)
+        object.__setattr__(self, "text", parsed.text)
+        object.__setattr__(self, "_parsed", parsed)
 
     @property
     def names(self) -> frozenset[str]:
         """Names of the numbers in the expression."""
-        return self._whole.names
+        return self._parsed.names
 
     def expression(self, inputs: Sequence[str], outputs: Sequence[str] = ()) -> Expression:
         """Return it, with arguments as `Value.expression`; raise `DefinitionError` for other names than these."""
-        whole, known = self._whole, (*inputs, *outputs)
-        unknown = sorted(whole.names - set(known))
+        parsed, known = self._parsed, (*inputs, *outputs)
+        unknown = sorted(parsed.names - set(known))
         if unknown:
             raise DefinitionError(
                 f"expression {shown(self.text)} asks for {', '.join(unknown)}, expected inputs, or outputs before its "
                 f"own: {', '.join(known)}"
             )
-        return whole
+        return parsed
 
     def __call__(self, x: float) -> float:
-        """Return the degree at a place, held within [0, 1]; NaN for a place that is NaN."""
-        return x if x != x else min(max(self._whole({"x": x}), 0.0), 1.0)
+        """Return the degree at a position, held within [0, 1]; NaN for a position that is NaN."""
+        return x if x != x else min(max(self._parsed({"x": x}), 0.0), 1.0)
 
-    def of_many(self, places: Array) -> Array:
-        """Return the degrees at many places, each as a call gives it, to rounding."""
-        values = self._whole.of_many({"x": places})
-        return np.clip(np.broadcast_to(np.asarray(values, dtype=np.float64), np.shape(places)), 0.0, 1.0)
+    def of_many(self, positions: Array) -> Array:
+        """Return the degrees at many positions, each as a call gives it, to rounding."""
+        values = self._parsed.of_many({"x": positions})
+        return np.clip(np.broadcast_to(np.asarray(values, dtype=np.float64), np.shape(positions)), 0.0, 1.0)
 
     def breaks(self, universe: tuple[float, float]) -> tuple[float, ...]:
         """Return (): where an expression bends in a universe is not known."""
         return ()
 
     def within(self, universe: tuple[float, float]) -> Formula:
-        """Return the formula itself; raise `DefinitionError` if it is NaN or above 1 in a universe, at 1001 places."""
-        places = np.linspace(*universe, 1001)
-        values = np.broadcast_to(self.expression(["x"]).of_many({"x": places}), places.shape)
+        """Return the formula itself; raise `DefinitionError` if it is NaN or above 1 at one of 1001 positions."""
+        positions = np.linspace(*universe, 1001)
+        values = np.broadcast_to(self.expression(["x"]).of_many({"x": positions}), positions.shape)
         bad = ~(values <= 1.0 + 1e-9) | ~np.isfinite(values)
         if bad.any():
             i = int(np.argmax(bad))
             raise DefinitionError(
-                f"expression {shown(self.text)} gives {float(values[i]):g} at x = {places[i]:g}, expected at most 1"
+                f"expression {shown(self.text)} gives {float(values[i]):g} at x = {positions[i]:g}, expected at most 1"
             )
         return self
 
 
 def invertible(shape: object) -> bool:
-    """Return True if a term only rises or only falls, so that each degree has a place, for Tsukamoto's method."""
+    """Return True if a term only rises or only falls, so that each degree has a position, for Tsukamoto's method."""
     return (isinstance(shape, Curve) and shape.invertible) or (isinstance(shape, Shape) and _is_ramp(shape))
 
 
@@ -204,7 +204,7 @@ def _is_ramp(shape: Shape) -> bool:
 
 
 def place_of(shape: Curve | Shape, degree: float) -> float:
-    """Return the place at which a monotonic term has a degree."""
+    """Return the position at which a monotonic term has a degree."""
     if isinstance(shape, Curve):
         return shape.place_of(degree)
     (a, left), (b, right) = shape.points

@@ -28,7 +28,7 @@ class Domain:
     variable: str  # name of the input
     terms: tuple[str, ...]  # names of its terms
     # one for each pattern: a place where it is found, or the term that is taken as a label
-    places: tuple[float | str, ...]
+    positions: tuple[float | str, ...]
     ranks: Ranks  # (patterns, terms) Degrees as ranks, see `rank`
 
 
@@ -91,15 +91,15 @@ def graded(variable: Variable, levels: Sequence[Fraction]) -> Domain:
 def stretches(variable: Variable) -> tuple[Stretch, ...]:
     """Return the stretches of an input's universe on which the degrees do not sum to 1."""
     terms = _exact(variable)
-    places = list(map(Fraction, variable.knots))
+    positions = list(map(Fraction, variable.knots))
 
     def part(place: Fraction) -> tuple[Fraction, Fraction, Fraction, Fraction]:
         total = _sum(max(limits(place)) for limits in terms)
         return place, place, total, total
 
-    # places and the open intervals between them by turns: start, end, and the sum at both ends
-    parts = [part(places[0])]
-    for a, b in pairwise(places):
+    # positions and the open intervals between them by turns: start, end, and the sum at both ends
+    parts = [part(positions[0])]
+    for a, b in pairwise(positions):
         left, right = _sum(limits(a)[1] for limits in terms), _sum(limits(b)[0] for limits in terms)
         if (left - 1) * (right - 1) < 0:
             one = a + (1 - left) * (b - a) / (right - left)
@@ -166,7 +166,7 @@ def _opposite(shape: Shape, other: Shape) -> bool:
 
 def _limits(shape: Shape) -> Limits:
     points = [(Fraction(x), Fraction(degree)) for x, degree in shape.points]
-    places = [x for x, _ in points]
+    positions = [x for x, _ in points]
 
     def degree(place: Fraction, i: int) -> Fraction:
         """Return the degree at a place by the line that ends at the i-th point."""
@@ -175,4 +175,4 @@ def _limits(shape: Shape) -> Limits:
         (a, left), (b, right) = points[i - 1], points[i]
         return left + (right - left) * (place - a) / (b - a)
 
-    return lambda place: (degree(place, bisect_left(places, place)), degree(place, bisect_right(places, place)))
+    return lambda place: (degree(place, bisect_left(positions, place)), degree(place, bisect_right(positions, place)))

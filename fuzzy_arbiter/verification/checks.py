@@ -125,11 +125,11 @@ class _Checks:
         self._decided("exclusive", [answer], _ROWS)
         if len(high) == 1:
             return
-        more = ": at most one is, not exactly one" if answer.all_found and not answer.boxes else ""
+        more = ": at most one is, not exactly one" if answer.is_complete and not answer.boxes else ""
         (answer,) = ask.ask([Goal(high, 0, 0)], NAMED_ROWS)
         for place in map(ask.places, answer.boxes):
             self._add("note", "exclusive", f"no output is {self._highs} where {_format_place(place)}{more}", place)
-        if not answer.all_found:
+        if not answer.is_complete:
             self._add("note", "exclusive", "there may be more rows like that, which were not looked for")
 
     def support(self) -> None:
@@ -139,7 +139,7 @@ class _Checks:
         conditions = labels(self.system)
         answers = ask.ask([Goal((((condition, FIRES),),), 1, ANY) for condition in conditions])
         for (condition, label), answer in zip(conditions.items(), answers, strict=True):
-            if answer.all_found and not answer.boxes:
+            if answer.is_complete and not answer.boxes:
                 self._add("warning", "rules", f"{label}: never fires, as '{condition}' holds for no real inputs")
 
     def halves(self) -> None:
@@ -167,7 +167,7 @@ class _Checks:
     ) -> tuple[bool | None, str, Place | None]:
         """Decide if no two of some terms are above 1/2 at once; return verdict, method, and counterexample."""
         reaches = reach(self.system, [rule.condition for term in terms for rule in rules_on(self.system, term)])
-        if answer.all_found and not answer.boxes and reaches != "samples":
+        if answer.is_complete and not answer.boxes and reaches != "samples":
             return True, _ALL + (", as for 'min', which 'prod' is never above" if reaches == "bound" else ""), None
         if answer.boxes and reaches == "exact":
             return False, "", ask.places(answer.boxes[0])
@@ -186,7 +186,7 @@ class _Checks:
         self._decided(name, answers, where)
 
     def _decided(self, name: str, answers: Sequence[Answer], where: str) -> None:
-        open_ones = [answer.combinations for answer in answers if not answer.all_found]
+        open_ones = [answer.combinations for answer in answers if not answer.is_complete]
         if any(answer.boxes for answer in answers):
             self._conclude(name, False, "by an example")
         elif open_ones:

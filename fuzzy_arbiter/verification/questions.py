@@ -107,23 +107,23 @@ class Questions:
         top = 2 * len(self._levels)
         for members in together.values():
             search = Search([goals[i] for i in members], self._domains, top)
-            found, used = search.run(share.share(), max_boxes)
+            results, used = search.run(share.share(), max_boxes)
             share.use(used)
             self._effort.use(used)
-            answers.update(zip(members, found, strict=True))
+            answers.update(zip(members, results, strict=True))
         return [answers[i] for i in range(len(goals))]
 
     def places(self, box: dict[str, int]) -> dict[str, float | str]:
         """Format a box as inputs: a number or a term for each one that matters."""
-        return {v.name: self._domains[v.name].places[box[v.name]] for v in self._system.inputs if v.name in box}
+        return {v.name: self._domains[v.name].positions[box[v.name]] for v in self._system.inputs if v.name in box}
 
     def combinations(self) -> int:
         """Return the number of combinations of patterns."""
-        return math.prod(len(domain.places) for domain in self._domains.values())
+        return math.prod(len(domain.positions) for domain in self._domains.values())
 
     def samples(self) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
         """Return combinations of the patterns' places, all of them or 4096 by a fixed seed."""
-        places = [np.array(self._domains[v.name].places, dtype=np.float64) for v in self._system.inputs]
+        places = [np.array(self._domains[v.name].positions, dtype=np.float64) for v in self._system.inputs]
         if self.combinations() <= SAMPLES:
             return np.stack(np.meshgrid(*places, indexing="ij"), axis=-1).reshape(-1, len(places))
         random = np.random.default_rng(0)

@@ -44,7 +44,7 @@ class Answer:
     """The result of a search."""
 
     boxes: tuple[Box, ...]  # pattern of each input that matters; the goal is met whatever the others are
-    all_found: bool  # true if the search went through all combinations, so that there are no more boxes
+    is_complete: bool  # true if the search went through all combinations, so that there are no more boxes
     combinations: int  # number of combinations of the goal's inputs
 
 
@@ -53,7 +53,7 @@ class Search:
 
     def __init__(self, goals: Sequence[Goal], domains: Mapping[str, Domain], top: int) -> None:
         self._goals = goals
-        self._logic: Logic[Bounds] = Logic(_least, _greatest, lambda a: _not(a, top))
+        self._logic: Logic[Bounds] = Logic(_min, _max, lambda a: _not(a, top))
         groups: dict[Group, int] = {}
         self._members = [[groups.setdefault(group, len(groups)) for group in goal.groups] for goal in goals]
         self._groups = len(groups)
@@ -109,8 +109,10 @@ class Search:
                 patterns = np.arange(len(self._patterns[boxes.shape[1]]), dtype=np.int32)
                 grown = np.repeat(boxes, len(patterns), axis=0)
                 stack.append(np.column_stack((grown, np.tile(patterns, len(boxes)))))
-        done = not stack  # for a goal that has max_boxes, others were left out
-        answers = [Answer(tuple(boxes), done and len(boxes) < max_boxes, self.combinations) for boxes in boxes_by_goal]
+        is_complete = not stack  # for a goal that has max_boxes, others were left out
+        answers = [
+            Answer(tuple(boxes), is_complete and len(boxes) < max_boxes, self.combinations) for boxes in boxes_by_goal
+        ]
         return answers, searched * self._cost
 
     def _box(self, row: NDArray[np.int32]) -> Box:
@@ -145,12 +147,12 @@ class Search:
 
 
 # bounds that are one array are known exactly, and need no second evaluation
-def _least(a: Bounds, b: Bounds) -> Bounds:
+def _min(a: Bounds, b: Bounds) -> Bounds:
     lower = np.minimum(a[0], b[0])
     return lower, lower if a[0] is a[1] and b[0] is b[1] else np.minimum(a[1], b[1])
 
 
-def _greatest(a: Bounds, b: Bounds) -> Bounds:
+def _max(a: Bounds, b: Bounds) -> Bounds:
     lower = np.maximum(a[0], b[0])
     return lower, lower if a[0] is a[1] and b[0] is b[1] else np.maximum(a[1], b[1])
 

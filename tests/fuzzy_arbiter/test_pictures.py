@@ -130,7 +130,7 @@ INPUTS, OUTPUTS = (
         (lambda a: pictures.surface(a, "alpha_1", AXES, {"shape": 0.2}), DefinitionError, "the picture goes over it"),
         (lambda a: pictures.surface(a, "alpha_1", AXES[:1]), DefinitionError, "names of two inputs"),
         (lambda a: pictures.profile(a, "obstacle", {"depth": 2.0}), InputError, r"depth: input is 2\.0"),
-        (lambda a: pictures.terms(a, "obstacle", at=2.0), InputError, r"obstacle: place is 2\.0"),
+        (lambda a: pictures.terms(a, "obstacle", at=2.0), InputError, r"obstacle: position is 2\.0"),
         (
             lambda a: pictures.normalizations(a, "obstacle", axes={"softmax": None}),
             DefinitionError,

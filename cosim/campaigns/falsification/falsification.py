@@ -85,12 +85,12 @@ def _summarize(
 
 
 def _counts(results: Results, costs: NDArray[np.float64]) -> dict[str, Any]:
-    """Return the number of rows of each kind, and the rows at which the least cost so far decreases."""
-    least, flown = np.minimum.accumulate(costs), results.is_null("refused")
-    falls = np.flatnonzero(np.diff(least, prepend=np.inf) < 0.0)
+    """Return the number of rows of each kind, and the rows at which the lowest cost so far decreases."""
+    min_cost, flown = np.minimum.accumulate(costs), results.is_null("refused")
+    falls = np.flatnonzero(np.diff(min_cost, prepend=np.inf) < 0.0)
     return {
         "flown": len(results),
-        "best": [[int(i) + 1, float(least[i])] for i in falls if least[i] < _REFUSED],
+        "best": [[int(i) + 1, float(min_cost[i])] for i in falls if min_cost[i] < _REFUSED],
         "violations": int((results.fact(violated_column(results)) & flown).sum()),
         "not_reached": int((~results.fact("reached") & flown).sum()),
         "refused": int((~flown).sum()),
@@ -101,11 +101,15 @@ def _worst(
     folder: Path, results: Results, costs: NDArray[np.float64], points: NDArray[np.float64] | None
 ) -> list[dict[str, Any]]:
     """Return the worst rows, at least `_APART` from each other."""
-    listed: list[int] = []
+    listed_rows: list[int] = []
     for i in np.argsort(costs, kind="stable").tolist():
-        if len(listed) == LISTED or costs[i] == _REFUSED:
+        if len(listed_rows) == LISTED or costs[i] == _REFUSED:
             break
-        if points is None or not listed or np.sqrt(np.mean((points[listed] - points[i]) ** 2, axis=1)).min() > _APART:
-            listed.append(i)
+        if (
+            points is None
+            or not listed_rows
+            or np.sqrt(np.mean((points[listed_rows] - points[i]) ** 2, axis=1)).min() > _APART
+        ):
+            listed_rows.append(i)
     keys = results[results.schema.names[0]].tolist()
-    return [{"row": keys[i], "cost": float(costs[i]), "command": rerun_command(folder, keys[i])} for i in listed]
+    return [{"row": keys[i], "cost": float(costs[i]), "command": rerun_command(folder, keys[i])} for i in listed_rows]

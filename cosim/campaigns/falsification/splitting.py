@@ -65,12 +65,12 @@ def estimate_probability(evaluate: Evaluate, dimension: int, budget: int, seed: 
         parents[copied] = rng.choice(np.flatnonzero(inside), len(copied))
         z, costs, families = z[parents], costs[parents], families[parents]
         for _ in range(_MOVES):
-            moved = math.sqrt(1.0 - step**2) * z[copied] + step * rng.standard_normal((len(copied), dimension))
-            moved = np.where(rng.random(moved.shape) < _CHANGED, moved, z[copied])
-            new = evaluate(ndtr(moved))
+            proposals = math.sqrt(1.0 - step**2) * z[copied] + step * rng.standard_normal((len(copied), dimension))
+            proposals = np.where(rng.random(proposals.shape) < _CHANGED, proposals, z[copied])
+            new = evaluate(ndtr(proposals))
             left -= len(copied)
             accepted = new <= level
-            z[copied[accepted]], costs[copied[accepted]] = moved[accepted], new[accepted]
+            z[copied[accepted]], costs[copied[accepted]] = proposals[accepted], new[accepted]
             step = float(np.clip(step * math.exp(_GAIN * (accepted.mean() - _ACCEPTED)), _SHORTEST, 1.0))
     event = costs < 0.0
     if not event.any():
@@ -90,6 +90,6 @@ def _factor(variance: float, several: int) -> float:
 
 def _relative_variance(inside: NDArray[np.bool_], families: NDArray[np.int64]) -> float:
     """Return the squared relative error of a fraction, between independent families."""
-    share, several = inside.mean(), len(np.unique(families))
-    sums = np.bincount(families, inside - share)
+    fraction, several = inside.mean(), len(np.unique(families))
+    sums = np.bincount(families, inside - fraction)
     return float((sums**2).sum() / inside.sum() ** 2 * several / max(1, several - 1))

@@ -47,9 +47,9 @@ class SearchSettings:
     def __post_init__(self) -> None:
         if self.objective not in OBJECTIVES:
             raise RunError(f"objective {self.objective!r} is unknown; {hint(self.objective, OBJECTIVES)}")
-        least = MIN_BUDGET if self.rare_event else 1
-        if not least <= self.budget <= _MAX_BUDGET:
-            raise RunError(f"budget is {self.budget}, expected {least} to {_MAX_BUDGET} flights")
+        min_budget = MIN_BUDGET if self.rare_event else 1
+        if not min_budget <= self.budget <= _MAX_BUDGET:
+            raise RunError(f"budget is {self.budget}, expected {min_budget} to {_MAX_BUDGET} flights")
         if not 0 <= self.seed < 2**31:
             raise RunError(f"seed is {self.seed}, expected a whole number from 0 to 2^31 - 1")
         if self.rare_event and self.objective != "clearance":

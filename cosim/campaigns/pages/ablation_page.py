@@ -41,7 +41,7 @@ def write_ablation_page(folder: Path, replays: int) -> Path:
 
 
 def _changed(results: Mapping[str, Results]) -> list[dict[str, Any]]:
-    """Return each scene with the variant that changes its weighted violation most, the greatest change first."""
+    """Return each scene with the variant that changes its weighted violation most, the largest change first."""
     whole = results[WHOLE].number("weighted_violation")
     seeds, kinds = results[WHOLE]["seed"].tolist(), scene_kinds(results[WHOLE]).kinds.tolist()
     changes = [
@@ -50,10 +50,10 @@ def _changed(results: Mapping[str, Results]) -> list[dict[str, Any]]:
         for i in np.flatnonzero(np.isfinite(other - whole) & (other != whole))
     ]
     changes.sort(key=lambda c: (-abs(c["violation"] - c["whole"]), c["seed"], c["variant"]))
-    greatest: dict[int, dict[str, Any]] = {}
+    largest: dict[int, dict[str, Any]] = {}
     for change in changes:
-        greatest.setdefault(change["seed"], change)
-    return list(greatest.values())
+        largest.setdefault(change["seed"], change)
+    return list(largest.values())
 
 
 def _drawings(numbers: dict[str, Any]) -> Iterator[NamedFigure]:

@@ -67,8 +67,8 @@ def _scale(vehicle: Vehicle) -> float:
 
 
 def _parameters(rng: Generator, vehicle: Vehicle) -> dict[str, float]:
-    most = max(_MAX_NET_WEIGHT, _WEIGHT_FRACTION * vehicle.weight)
-    parameters = {"buoyancy": float(vehicle.weight - rng.uniform(-most, most))}
+    max_net_weight = max(_MAX_NET_WEIGHT, _WEIGHT_FRACTION * vehicle.weight)
+    parameters = {"buoyancy": float(vehicle.weight - rng.uniform(-max_net_weight, max_net_weight))}
     lag = _LAGS[vehicle.name]
     if lag is not None:
         parameters |= thruster_lags(vehicle, lag)
@@ -103,14 +103,14 @@ def _closing(rng: Generator, axis: int, middle: float) -> tuple[Table, list[Tabl
     one, other = _two(rng)
     apart, overlap, duration = rng.uniform(3.0, 4.0), rng.uniform(0.2, 0.8), rng.uniform(35.0, 50.0)
     fast = (apart + overlap) / duration  # m/s, closing speed of both faces
-    share = rng.uniform()  # fraction of it by which the first face moves
+    fraction = rng.uniform()  # fraction of it by which the first face moves
     velocities = np.zeros((2, 3))
-    velocities[0, axis], velocities[1, axis] = share * fast, (share - 1.0) * fast
+    velocities[0, axis], velocities[1, axis] = fraction * fast, (fraction - 1.0) * fast
     regions = [
         _region("lower face", one, "out", True, _beyond(axis, middle - apart / 2.0), velocities[0]),
         _region("upper face", other, "out", True, _beyond(axis, middle + apart / 2.0, -1.0), velocities[1]),
     ]
-    meet = middle - apart / 2.0 + share * apart
+    meet = middle - apart / 2.0 + fraction * apart
     ahead = rng.uniform(6.0, 9.0)
     return sphere_table((ahead, meet if axis == 1 else 0.0, meet if axis == 2 else 4.0), 1.0), regions
 
@@ -163,10 +163,10 @@ def _view(rng: Generator) -> tuple[Table, list[Table]]:
     speed, drop = rng.uniform(0.1, 0.2), rng.uniform(0.0, 0.25)
     velocity = (speed, 0.0, drop * speed)
     end = 2.0 + 60.0 * speed
-    radius, place = rng.uniform(0.4, 0.7), rng.uniform(3.5, 0.5 * end + 2.0)
+    radius, position = rng.uniform(0.4, 0.7), rng.uniform(3.5, 0.5 * end + 2.0)
     clutter = rng.uniform(0.5 * end + 1.0, end - 1.0)
     goal = sphere_table((2.0, 1.4, 3.8), 1.5) | {"velocity": list(velocity)}
-    pillar = {"type": "cylinder", "start": [place, 2.6, 0.0], "end": [place, 2.6, 12.0], "radius": radius}
+    pillar = {"type": "cylinder", "start": [position, 2.6, 0.0], "end": [position, 2.6, 12.0], "radius": radius}
     risers = {"type": "cylinder", "start": [clutter, 2.2, 0.0], "end": [clutter, 2.2, 12.0], "radius": 1.0}
     cone = {"type": "cone", "feature": [2.0, 4.0, 4.2], "axis": [0.0, -1.0, -0.15], "half_angle": 0.35, "range": 2.6}
     return goal, [
@@ -177,9 +177,9 @@ def _view(rng: Generator) -> tuple[Table, list[Table]]:
     ]
 
 
-def _in_turn(goal: Table, *places: tuple[float, float, float]) -> Table:
-    """Return a goal with further places in turn."""
-    return goal | {"then": [[float(x) for x in place] for place in places], "stay": 3.0}
+def _in_turn(goal: Table, *positions: tuple[float, float, float]) -> Table:
+    """Return a goal with further positions in turn."""
+    return goal | {"then": [[float(x) for x in position] for position in positions], "stay": 3.0}
 
 
 def _sides_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
@@ -199,16 +199,16 @@ def _depths_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
 
 
 def _views_in_turn(rng: Generator) -> tuple[Table, list[Table]]:
-    """Make places from which a structure is viewed in turn, with a pillar between them."""
+    """Make positions from which a structure is viewed in turn, with a pillar between them."""
     # A path outside of the pillar loses the view; one inside of it violates the region around the structure. A greatest
-    # depth excludes the deeper places.
+    # depth excludes the deeper positions.
     x, y, z = 4.0, 4.0, 4.2  # m, NED: center of the structure
     off, pillar, radius = rng.uniform(1.7, 2.2), rng.uniform(1.8, 2.2), rng.uniform(0.5, 0.9)
     angles = rng.uniform(0.7, 1.0, 3) * [-1.0, 1.0, -1.0]  # rad, about the structure, from east
-    places = [(x + off * np.sin(a), y - off * np.cos(a), z + rng.uniform(-0.6, 0.4)) for a in angles]
+    positions = [(x + off * np.sin(a), y - off * np.cos(a), z + rng.uniform(-0.6, 0.4)) for a in angles]
     standing = {"type": "cylinder", "start": [x, y - pillar, 0.0], "end": [x, y - pillar, 12.0], "radius": radius}
     cone = {"type": "cone", "feature": [x, y, z], "axis": [0.0, -1.0, 0.0], "half_angle": 1.2, "range": 2.6}
-    return _in_turn(sphere_table(places[0], 0.4), *places[1:]), [
+    return _in_turn(sphere_table(positions[0], 0.4), *positions[1:]), [
         _region("pillar", "obstacle", "out", True, standing),
         _region("structure", "shape", "out", False, sphere_table((x, y, z), rng.uniform(1.2, 1.6))),
         _region("greatest depth", "depth", "in", False, _beyond(2, z + rng.uniform(-0.3, 0.1))),

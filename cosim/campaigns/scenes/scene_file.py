@@ -117,27 +117,27 @@ class SceneStore:
             raise
 
     def _read(self, file: IO[bytes], name: str) -> None:
-        self._places: dict[int, tuple[int, int]] = {}  # offset and length [bytes] of each scene's line, by seed
+        self._offsets: dict[int, tuple[int, int]] = {}  # offset and length [bytes] of each scene's line, by seed
         digest, offset = hashlib.sha256(), 0
         for scene, text in scenes_in(file, name):
-            if scene.seed in self._places:
+            if scene.seed in self._offsets:
                 raise ScenarioError(f"{name}: seed {scene.seed} comes twice, expected each once")
             line = encode_scene(scene, text) + b"\n"
             self._file.write(line)
             digest.update(line)
-            self._places[scene.seed] = offset, len(line)
+            self._offsets[scene.seed] = offset, len(line)
             offset += len(line)
-        if not self._places:
+        if not self._offsets:
             raise ScenarioError(f"{name}: holds no scene, expected one JSON object a line")
         self._file.flush()
         self.digest = digest.hexdigest()
-        self.seeds = sorted(self._places)
+        self.seeds = sorted(self._offsets)
 
     def lines(self, seeds: Iterable[int]) -> list[bytes]:
         """Return the lines of the scenes with given seeds, in this order."""
         lines = []
         for seed in seeds:
-            offset, length = self._places[seed]
+            offset, length = self._offsets[seed]
             self._file.seek(offset)
             lines.append(self._file.read(length))
         return lines

@@ -59,8 +59,8 @@ def obstacle(rng: Generator) -> Table:
 
 def _net_weight(rng: Generator, vehicle: Vehicle, table: Table) -> None:
     """Make the vehicle heavy or light by 25 to 50 N, or by 1.25 to 2.5 % of its weight if that is more."""
-    most = max(50.0, 0.025 * vehicle.weight)
-    net = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.0) * most
+    max_net_weight = max(50.0, 0.025 * vehicle.weight)
+    net = rng.choice([-1.0, 1.0]) * rng.uniform(0.5, 1.0) * max_net_weight
     table["plant"]["parameters"]["buoyancy"] = float(vehicle.weight - net)
 
 

@@ -37,8 +37,8 @@ class SweepBatch(NamedTuple):
 
 def schema_of(keys: tuple[str, ...]) -> Any:
     """Make the schema of the rows of a sweep."""
-    if taken := {"row", "seed", "refused", *FIELDS} & set(keys):
-        raise ValueError(f"{min(taken)!r} varies, expected keys of a scenario")
+    if reserved := {"row", "seed", "refused", *FIELDS} & set(keys):
+        raise ValueError(f"{min(reserved)!r} varies, expected keys of a scenario")
     return make_schema(
         [
             ("row", pa.int64(), "", "Number of the row, from 0", False),

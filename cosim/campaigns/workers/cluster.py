@@ -50,7 +50,7 @@ class Cluster(WorkerPool):
         self._workers = self._counted = self._last_present = 0.0
         self._has_crashed = False
         self._count_workers()
-        self._most = self._workers
+        self._max_workers = self._workers
 
     @property
     def width(self) -> int:  # type: ignore[override]
@@ -94,18 +94,18 @@ class Cluster(WorkerPool):
         if not self._wait(_WORKER_TIMEOUT / 3.0) and self._local:
             with block_interrupts():
                 self._client.cluster.scale(0)
-                self._client.cluster.scale(int(self._most))
+                self._client.cluster.scale(int(self._max_workers))
             self._wait(_WORKER_TIMEOUT)
         time.sleep(_SETTLING)
-        self._has_crashed, self._most = False, max(1.0, self._workers)
+        self._has_crashed, self._max_workers = False, max(1.0, self._workers)
         self.check()
 
     def _wait(self, patience: float) -> bool:
         until = time.monotonic() + patience
-        while self._workers < self._most and time.monotonic() < until:
+        while self._workers < self._max_workers and time.monotonic() < until:
             time.sleep(_SETTLING / 10.0)
             self._count_workers()
-        return self._workers >= self._most
+        return self._workers >= self._max_workers
 
     def close(self) -> None:
         """Free the flyers of the workers; the cluster stays open."""

@@ -16,7 +16,7 @@ from cosim.campaigns.workers.work import Flyer, Task
 
 
 @dataclass
-class _Held:
+class _FlyerSlot:
     """The flyer of this process, kept between batches: creating one loads the FMU and compiles the loop."""
 
     lock: threading.Lock = field(default_factory=threading.Lock)  # a flyer is not thread-safe
@@ -35,13 +35,13 @@ class _Held:
             flyer.close()
 
 
-_held = _Held()
+_slot = _FlyerSlot()
 
 
 def fly(task: Task, batch: Any) -> tuple[Any, float]:
     """Fly a batch; threads of one process take turns; returns [s]."""
-    with _held.lock:
-        flyer = _held.flyer_of(task)
+    with _slot.lock:
+        flyer = _slot.flyer_of(task)
         started = time.perf_counter()
         table = flyer.fly(batch)
         return table, time.perf_counter() - started
@@ -49,22 +49,22 @@ def fly(task: Task, batch: Any) -> tuple[Any, float]:
 
 def release(patience: float) -> None:
     """Free the flyer of this process; patience [s]."""
-    if _held.lock.acquire(timeout=patience):
+    if _slot.lock.acquire(timeout=patience):
         try:
-            _held.free()
+            _slot.free()
         finally:
-            _held.lock.release()
+            _slot.lock.release()
 
 
 @contextlib.contextmanager
 def hold_flyer(task: Task) -> Iterator[None]:
     """Hold a flyer in this process during a block: it raises errors of the task, and builds what is built once."""
-    with _held.lock:
-        _held.flyer_of(task)
+    with _slot.lock:
+        _slot.flyer_of(task)
     try:
         yield
     finally:
-        _held.free()
+        _slot.free()
 
 
 def begin_worker(task: Task) -> None:
@@ -75,7 +75,7 @@ def begin_worker(task: Task) -> None:
     signal.signal(signal.SIGTERM, _end_worker)
     threading.Thread(target=_follow_parent, name="follow-parent", daemon=True).start()
     with contextlib.suppress(Exception):  # after a failure the first batch raises the error
-        _held.flyer_of(task)
+        _slot.flyer_of(task)
 
 
 def _follow_parent() -> None:
@@ -87,5 +87,5 @@ def _follow_parent() -> None:
 
 def _end_worker(*_: object) -> None:
     """Free the flyer and its files, and exit without cleanup: another worker may have crashed holding a lock."""
-    _held.free()
+    _slot.free()
     os._exit(1)

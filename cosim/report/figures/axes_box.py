@@ -27,12 +27,12 @@ class Box:
         self.view = np.array([[*right, 0.0], [*(np.sin(_DOWN) * np.array(ahead)), -np.cos(_DOWN)]])
         corners = np.array([[(low, high)[i >> k & 1][k] for k in range(3)] for i in range(8)])
         self.outline = hull_of(corners, self.view)
-        self._least, self._most = self.outline.min(axis=0), self.outline.max(axis=0)
+        self._lower, self._upper = self.outline.min(axis=0), self.outline.max(axis=0)
         self._scale = 1.0  # inches a meter
 
     def scale_to(self, width: float, max_height: float) -> float:
         """Scale the box to a picture of a `width` and at most a `max_height`; return its height [inch]."""
-        across, up = self._most - self._least
+        across, up = self._upper - self._lower
         self._scale = min((width - _LEFT - _ROUND) / across, (max_height - _BOTTOM - _ROUND) / up)
         self._aside = (width - _LEFT - _ROUND - self._scale * across) / 2.0  # inches
         return float(self._scale * up + _BOTTOM + _ROUND)
@@ -41,8 +41,8 @@ class Box:
         """Draw the box into axes of that size, and return the placer of labels in it."""
         scale, low, high = self._scale, self._low, self._high
         left, right = (_LEFT + self._aside) / scale, (_ROUND + self._aside) / scale
-        ax.set_xlim(self._least[0] - left, self._most[0] + right)
-        ax.set_ylim(self._least[1] - _BOTTOM / scale, self._most[1] + _ROUND / scale)
+        ax.set_xlim(self._lower[0] - left, self._upper[0] + right)
+        ax.set_ylim(self._lower[1] - _BOTTOM / scale, self._upper[1] + _ROUND / scale)
         ax.set_axis_off()
         # floor, northern and western face
         for across, at in ((2, high[2]), (0, high[0]), (1, low[1])):

@@ -23,14 +23,14 @@ _TAIL = 0.15  # fraction of the axis that shows the time at rest
 def rests_from(record: Rows) -> float | None:
     """Return the time from which the vehicle stays at its final pose [s], by the rule of replays."""
     time = record["time"]
-    places = record.stack([f"position.{axis}" for axis in "xyz"])
+    positions = record.stack([f"position.{axis}" for axis in "xyz"])
     turns = record.stack([f"quaternion.e{i}" for i in range(4)])
-    if len(time) < 2 or not (np.isfinite(places).all() and np.isfinite(turns).all()):
+    if len(time) < 2 or not (np.isfinite(positions).all() and np.isfinite(turns).all()):
         return None
-    extent = float(np.linalg.norm(np.ptp(places, axis=0)))
-    moves = (np.abs(places - places[-1]) > _NEAR * extent).any(axis=1) | (np.abs(turns - turns[-1]) > _TURNED).any(
-        axis=1
-    )
+    extent = float(np.linalg.norm(np.ptp(positions, axis=0)))
+    moves = (np.abs(positions - positions[-1]) > _NEAR * extent).any(axis=1) | (
+        np.abs(turns - turns[-1]) > _TURNED
+    ).any(axis=1)
     rows = np.flatnonzero(moves)
     if not rows.size or rows[-1] + 1 == len(time):
         return None

@@ -66,8 +66,8 @@ def panel_grid(
 
 def plain_numbers(ax: Axes) -> None:
     """Set few ticks at round numbers, without exponents."""
-    for axis, most in ((ax.xaxis, 8), (ax.yaxis, 5)):
-        axis.set_major_locator(MaxNLocator(most, steps=[1, 2, 2.5, 5, 10]))
+    for axis, max_ticks in ((ax.xaxis, 8), (ax.yaxis, 5)):
+        axis.set_major_locator(MaxNLocator(max_ticks, steps=[1, 2, 2.5, 5, 10]))
         axis.set_major_formatter(FuncFormatter(format_tick))
 
 
@@ -126,14 +126,14 @@ def short(name: str) -> str:
 def _rows_of(labels: Sequence[str], across: float = _LETTERS) -> list[list[str]]:
     """Arrange labels in rows of about the same length that fit the width of a figure."""
     rows: list[list[str]] = []
-    room = 0.0
+    columns_left = 0.0
     for label in labels:
         letters = len(short(label)) + _MARK
-        if letters > room:
+        if letters > columns_left:
             rows.append([])
-            room = across
+            columns_left = across
         rows[-1].append(label)
-        room -= letters
+        columns_left -= letters
     even = 1.1 * sum(len(short(label)) + _MARK for label in labels) / max(1, len(rows))
     if len(rows) > 1 and even < across:
         evened = _rows_of(labels, even)
@@ -150,10 +150,10 @@ def legend(figure: Figure, entries: Mapping[str, Artist]) -> None:
     """Add a legend above all axes, also for names that begin with _, which Matplotlib would omit."""
     height = figure.bbox.height / figure.dpi
     for i, row in enumerate(_rows_of(list(entries))):
-        made = figure.legend(
+        row_legend = figure.legend(
             [entries[label] for label in row], ["x"] * len(row), ncols=len(row), loc="upper center", fontsize=8,
             bbox_to_anchor=(0.0, 1.0 - (0.04 + i * LEGEND_ROW) / height, 1.0, 0.0), borderpad=0.0, borderaxespad=0.0,
             handlelength=1.8, handletextpad=0.5, columnspacing=1.4,
         )  # fmt: skip
-        for text, label in zip(made.get_texts(), row, strict=True):
+        for text, label in zip(row_legend.get_texts(), row, strict=True):
             text.set_text(short(label))

@@ -62,9 +62,9 @@ def path_3d(data: FigureData) -> Figure:
     clip = Path(box.outline)
     few = len(data.scenario.regions) <= _NAMED  # labels of more regions could not be assigned
     for place in places_of(data):
-        seen = _region(ax, place, low, high, box.view, clip)
-        if seen and not place.faint and few:
-            labels.request(place.region.name, np.vstack(seen))
+        drawn_outline = _region(ax, place, low, high, box.view, clip)
+        if drawn_outline and not place.faint and few:
+            labels.request(place.region.name, np.vstack(drawn_outline))
     for name, color, feature in features_of(data):
         ax.plot(*(box.view @ feature), "*", color=color, markersize=9)
         labels.request(name, (box.view @ feature)[None])
@@ -86,8 +86,8 @@ def path_plane(data: FigureData) -> Figure:
     across = WIDTH - LEFT - RIGHT
     scale = min(across / along, _TALLEST / (side + above))  # inches a meter
     # a narrow picture shows more of the surroundings to fill the width
-    room = (across / scale - along) / 2.0
-    low, high = low - np.array([room, 0.0, 0.0]), high + np.array([room, 0.0, 0.0])
+    padding = (across / scale - along) / 2.0
+    low, high = low - np.array([padding, 0.0, 0.0]), high + np.array([padding, 0.0, 0.0])
     total = top + scale * (side + above) + _GAP + BOTTOM
     figure = new_figure(total)
     y = total - top
@@ -107,9 +107,9 @@ def path_plane(data: FigureData) -> Figure:
         ax.yaxis.set_label_coords((0.17 - LEFT) / across, 0.5)
         labels = Labels(ax, scale, _frame(view @ low, view @ high))
         for place in places_of(data):
-            seen = _region(ax, place, low, high, view)
-            if seen and not place.faint:
-                labels.request(place.region.name, np.vstack(seen))
+            drawn_outline = _region(ax, place, low, high, view)
+            if drawn_outline and not place.faint:
+                labels.request(place.region.name, np.vstack(drawn_outline))
         for name, color, feature in features_of(data):
             ax.plot(*(view @ feature), "*", color=color, markersize=9)
             labels.request(name, (view @ feature)[None])
@@ -157,7 +157,7 @@ def _path(ax: Axes, data: FigureData, sampled: SampledPath, view: Array) -> None
     flat = sampled.points @ view.T
     ax.plot(*flat.T, color=PATH_COLOR, linewidth=1.6)
     for i, criterion in enumerate(data.scenario.criteria):
-        there = sampled.given_way == i
+        there = sampled.active_criterion == i
         if there.any():
             there[:-1] |= there[1:]  # up to the beginning of the next piece
             ax.plot(*np.where(there[:, None], flat, np.nan).T, color=criterion.color, linewidth=2.4)
@@ -192,7 +192,7 @@ def _entries(data: FigureData, sampled: SampledPath) -> dict[str, Artist]:
     entries |= {c.name: Patch(color=c.color, alpha=0.4) for c in data.scenario.criteria if c.name in shown}
     entries["path"] = Line2D([], [], color=PATH_COLOR, linewidth=1.6)
     for i, criterion in enumerate(data.scenario.criteria):
-        if (sampled.given_way == i).any():
+        if (sampled.active_criterion == i).any():
             entries[f"gives way to {criterion.name}"] = Line2D([], [], color=criterion.color, linewidth=2.4)
     if sampled.overlap.any():
         entries["in the overlap"] = Line2D([], [], color=BLACK, linewidth=3)
@@ -230,5 +230,5 @@ def _extent(data: FigureData, sampled: SampledPath) -> tuple[Array, Array]:
             points = np.vstack([points, np.clip(bounds, low - near, high + near)])
     points = np.vstack([points, *(feature[None] for _, _, feature in features_of(data))])
     low, high = points.min(axis=0), points.max(axis=0)
-    room = np.maximum(0.06 * (high - low).max(), (1.2 - (high - low)) / 2.0)
-    return low - room, high + room
+    padding = np.maximum(0.06 * (high - low).max(), (1.2 - (high - low)) / 2.0)
+    return low - padding, high + padding

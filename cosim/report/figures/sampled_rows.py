@@ -67,8 +67,8 @@ def _signals_with_extremes(scenario: Scenario, rows: Rows) -> list[Array]:
 def _along(record: Rows) -> NDArray[np.intp]:
     """Return rows that are evenly spaced along the path of the vehicle."""
     chunks, total = [], 0.0
-    for wanted in (0, POINTS):  # the length first
-        marks, first, length, last_length = np.linspace(0.0, total, wanted), 0, 0.0, -1.0
+    for count in (0, POINTS):  # the length first
+        marks, first, length, last_length = np.linspace(0.0, total, count), 0, 0.0, -1.0
         before: Array | None = None
         for block in record.blocks(POSITION):
             path = block.stack(POSITION)
@@ -88,12 +88,12 @@ def _along(record: Rows) -> NDArray[np.intp]:
 def _commanded(record: Rows) -> NDArray[np.intp]:
     """Return the rows at which commands changed a signal, and the rows before them; thinned if there are many."""
     names = [name for name in record.units if name.startswith(("commands.", "target."))]
-    found, first, before = [np.empty(0, np.intp)], 0, np.full((1, len(names)), np.nan)
+    rows_of_blocks, first, before = [np.empty(0, np.intp)], 0, np.full((1, len(names)), np.nan)
     for block in record.blocks(names) if names else ():
         block_rows = block.to_array()
         changed = np.flatnonzero((np.diff(block_rows, axis=0, prepend=before) != 0.0).any(axis=1))
-        found.append(first + changed[:: max(1, len(changed) // _CHANGES)])
+        rows_of_blocks.append(first + changed[:: max(1, len(changed) // _CHANGES)])
         first, before = first + len(block_rows), block_rows[-1:]
-    rows = np.concatenate(found)
+    rows = np.concatenate(rows_of_blocks)
     rows = rows[:: max(1, len(rows) // (100 * _CHANGES))]
     return np.concatenate([rows, np.maximum(rows - 1, 0)])

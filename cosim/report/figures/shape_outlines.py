@@ -63,8 +63,8 @@ def cover(areas: Sequence[Array], low: Array, high: Array) -> bool:
     return bool(_within(points, areas).all())
 
 
-def _meet(least: Array, most: Array, low: Array, high: Array) -> bool:
-    return bool((least < high).all() and (most > low).all())
+def _meet(lower: Array, upper: Array, low: Array, high: Array) -> bool:
+    return bool((lower < high).all() and (upper > low).all())
 
 
 def _ellipsoid(center: Array, half_axes: Array, low: Array, high: Array, view: Array) -> ShapeLines | None:
@@ -146,11 +146,11 @@ def _silhouettes(mesh: Mesh, view: Array) -> list[Array]:
 
 def _seen_part(outline: Array, areas: Sequence[Array]) -> Array:
     """Return an outline with NaN where the shape is on both sides of it."""
-    share = np.linspace(0.0, 1.0, _PIECES, endpoint=False)[:, None]
-    starts = np.vstack([(1.0 - share) * a + share * b for a, b in zip(outline, outline[1:], strict=False)])
+    fraction = np.linspace(0.0, 1.0, _PIECES, endpoint=False)[:, None]
+    starts = np.vstack([(1.0 - fraction) * a + fraction * b for a, b in zip(outline, outline[1:], strict=False)])
     ends = np.roll(starts, -1, axis=0)
-    ways = ends - starts
-    right = np.column_stack([ways[:, 1], -ways[:, 0]]) / np.maximum(np.linalg.norm(ways, axis=1), 1e-12)[:, None]
+    steps = ends - starts
+    right = np.column_stack([steps[:, 1], -steps[:, 0]]) / np.maximum(np.linalg.norm(steps, axis=1), 1e-12)[:, None]
     beside = (starts + ends) / 2.0 + _BESIDE * np.ptp(outline, axis=0).max() * right
     hidden = _within(beside, areas)
     pieces = np.stack([starts, ends, np.full_like(starts, np.nan)], axis=1)

@@ -100,7 +100,7 @@ def clearance(data: FigureData) -> list[Panel]:
     named = _named(data, [region.name for region, _ in regions])
     panels = []
     for unit, height in (("m", 2.5), ("°", 1.5)):
-        lines, others = [], []
+        lines, faint_lines = [], []
         for region, color in regions:
             if of_attitude(region.shape) != (unit == "°"):
                 continue
@@ -112,13 +112,13 @@ def clearance(data: FigureData) -> list[Panel]:
                 lines.append(Line(region.name, signal, {"color": color, **style}))
             else:
                 label = f"{len(regions) - len(named)} others"
-                others.append(Line(label, signal, {"color": color, "alpha": 0.3, "linewidth": 0.6, "zorder": 1.9}))
-        if lines or others:
-            low, high = limits_of([np.asarray(line.signal) for line in (*lines, *others)])
+                faint_lines.append(Line(label, signal, {"color": color, "alpha": 0.3, "linewidth": 0.6, "zorder": 1.9}))
+        if lines or faint_lines:
+            low, high = limits_of([np.asarray(line.signal) for line in (*lines, *faint_lines)])
             low = min(low, -0.08 * (high - min(low, 0.0)))  # always shows some of the range below 0
             limits = low, max(high, -0.2 * low)
             scale = lambda ax, limits=limits: ax.set_ylim(limits)  # noqa: E731
-            panels.append(Panel(f"clearance [{unit}]", height, [*lines, *others], scale, violated=-1.0))
+            panels.append(Panel(f"clearance [{unit}]", height, [*lines, *faint_lines], scale, violated=-1.0))
     return panels
 
 
@@ -126,8 +126,8 @@ def _named(data: FigureData, names: list[str]) -> list[str]:
     """Return the names for the legend: all, or of many regions the goal and the nearest ones."""
     if len(names) <= _NAMED:
         return names
-    least = data.summary["min_clearance"]
-    nearest = sorted(names[1:], key=lambda name: np.nan_to_num(least[name], nan=np.inf))[:_NEAREST]
+    clearances = data.summary["min_clearance"]
+    nearest = sorted(names[1:], key=lambda name: np.nan_to_num(clearances[name], nan=np.inf))[:_NEAREST]
     return [name for name in names if name in (names[0], *nearest)]
 
 

@@ -20,7 +20,7 @@ class SampledPath:
     """Points of a path, evenly spaced along its length."""
 
     points: Array  # (n, 3) m, NED
-    given_way: NDArray[np.intp]  # (n,) index of the active region's criterion, -1 for the goal
+    active_criterion: NDArray[np.intp]  # (n,) index of the active region's criterion, -1 for the goal
     overlap: NDArray[np.bool_]  # (n,) True in the overlap of the scenario's regions
     targets: list[tuple[Array, float]]  # earlier targets: center [m, NED] and radius [m], 0 for that of the goal
 
@@ -35,9 +35,9 @@ def sample_path(data: FigureData) -> SampledPath:
     path = data.record.stack(POSITION)
     known = np.flatnonzero(np.isfinite(path).all(axis=1))
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[known], axis=0), axis=1))])
-    wanted = np.searchsorted(length, np.linspace(0.0, length[-1], POINTS))
-    at = known[np.unique(np.minimum(wanted, len(known) - 1))]
-    return SampledPath(path[at], _given_way(data, at), _overlap(data)[at], targets_of(data))
+    indices = np.searchsorted(length, np.linspace(0.0, length[-1], POINTS))
+    at = known[np.unique(np.minimum(indices, len(known) - 1))]
+    return SampledPath(path[at], _active_criterion(data, at), _overlap(data)[at], targets_of(data))
 
 
 def targets_of(data: FigureData) -> list[tuple[Array, float]]:
@@ -47,8 +47,8 @@ def targets_of(data: FigureData) -> list[tuple[Array, float]]:
     targets = data.record.stack([*(f"target.{axis}" for axis in "xyz"), "target.radius"])
     targets = targets[np.isfinite(targets).all(axis=1)]
     changes = np.flatnonzero((np.diff(targets, axis=0) != 0.0).any(axis=1))  # the last row of each
-    kept = changes[np.unique(np.linspace(0, len(changes) - 1, min(len(changes), _TARGETS)).round().astype(int))]
-    return [(targets[i, :3], float(targets[i, 3])) for i in kept]
+    selected = changes[np.unique(np.linspace(0, len(changes) - 1, min(len(changes), _TARGETS)).round().astype(int))]
+    return [(targets[i, :3], float(targets[i, 3])) for i in selected]
 
 
 def _overlap(data: FigureData) -> NDArray[np.bool_]:
@@ -59,10 +59,10 @@ def _overlap(data: FigureData) -> NDArray[np.bool_]:
     return inside
 
 
-def _given_way(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:
+def _active_criterion(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:
     """Return the index of the active region's criterion at rows `at`, -1 for the goal."""
     if not data.scenario.regions:
         return np.full(len(at), -1)
     active = active_at(data.scenario, data.record.take(at, activity_signals(data.scenario)))
-    given_way: NDArray[np.intp] = np.array([-1, *data.scenario.criterion_places])[active]
-    return given_way
+    active_criterion: NDArray[np.intp] = np.array([-1, *data.scenario.criterion_places])[active]
+    return active_criterion

@@ -94,7 +94,7 @@ def test_inverse_returns_a_position_of_the_degree(kind, parameters, share):
         ("s_shape", (2, 1), "expected a start that is not above the end"),
         ("pi_shape", (2, 1, 3, 4), "expected each foot on the outer side of its top"),
         ("cosine", (2, -1), "expected a width above 0"),
-        ("arc", (2, 2), "expected two places"),
+        ("arc", (2, 2), "expected two positions"),
     ],
 )
 def test_invalid_curve_parameters_are_rejected(kind, parameters, fault):
