@@ -62,10 +62,10 @@ def _inputs(scenario: Scenario) -> Iterator[Variable]:
 
 def _sources(system: System) -> dict[str, bytes]:
     code = to_c(system)
-    declared = _DECLARATION.search(code)
-    if declared is None:
+    declaration = _DECLARATION.search(code)
+    if declaration is None:
         raise AssertionError("the arbiter's C code declares no function that evaluates it")
-    header = f"/* The arbiter's rules: generated. */\n{declared[0]}\n#define EVALUATE_RULES {declared[1]}\n"
+    header = f"/* The arbiter's rules: generated. */\n{declaration[0]}\n#define EVALUATE_RULES {declaration[1]}\n"
     return {
         **c_files("cosim.ssp", "csrc/arbiter"),
         **under_own_names({"rules.c": code.encode(), "rules.h": header.encode()}),

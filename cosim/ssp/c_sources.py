@@ -9,8 +9,8 @@ _NAMED = b'#include "variables.h" /* names the functions */\n'
 
 def c_files(package: str, folder: str) -> dict[str, bytes]:
     """Return the C files and headers of a folder."""
-    found = resources.files(package).joinpath(*folder.split("/"))
-    return {file.name: file.read_bytes() for file in found.iterdir() if file.name.endswith((".c", ".h"))}
+    directory = resources.files(package).joinpath(*folder.split("/"))
+    return {file.name: file.read_bytes() for file in directory.iterdir() if file.name.endswith((".c", ".h"))}
 
 
 def under_own_names(files: dict[str, bytes]) -> dict[str, bytes]:

@@ -14,9 +14,9 @@ from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 from cosim.ssp.c_sources import c_files, under_own_names
+from cosim.ssp.controller_code import translate_controller
 from cosim.ssp.documentation import contents
 from cosim.ssp.loop import Loop
-from cosim.ssp.translated import translate_controller
 from plant_fmu import quantities as q
 from plant_fmu.compiling.sources import plant_sources
 from plant_fmu.component import Component
@@ -36,7 +36,7 @@ thrusters, are those of the scenario; they are no parameters.
 
 Numbers of shapes are those that the shape works with: unit vectors and rotation matrices must stay such."""
 
-_LEAST, _MOST = 1e-9, 1e9  # bounds of gains
+_MIN_GAIN, _MAX_GAIN = 1e-9, 1e9  # bounds of gains
 _PERIOD = Quantity("s", 1e-6, 1e6)  # period of the law
 # units of gains by the unit of the goal's g; the gains are documented for m2
 _UNITS_BY_GOAL = {
@@ -66,14 +66,14 @@ def controller_component(scenario: Scenario) -> Component:
 
 def prefixes(regions: Sequence[Region]) -> list[str]:
     """Return the prefix of each region's variables."""
-    found = ["goal"]
+    names = ["goal"]
     for region in regions[1:]:
         name = re.sub(r"\W", "_", region.name, flags=re.ASCII)
         name = f"regions.{name if not name[0].isdigit() else '_' + name}"
-        while name in found:
+        while name in names:
             name += "_"
-        found.append(name)
-    return found
+        names.append(name)
+    return names
 
 
 def _sources(files: Mapping[str, str]) -> dict[str, bytes]:
@@ -102,9 +102,9 @@ def _variables(scenario: Scenario, regions: Sequence[Region], loop: Loop) -> Ite
 
 def _samples(scenario: Scenario, loop: Loop) -> Iterator[Variable]:
     """Yield an input for each sensor output of the plant."""
-    found = [v for v in variables(scenario.vehicle) if v.name.startswith("measured.")]
-    values = [v for v in found if not v.name.startswith("measured.time.")]
-    for array, rows in ((loop.inputs.samples, values), (loop.inputs.sample_times, found[len(values) :])):
+    sensor_outputs = [v for v in variables(scenario.vehicle) if v.name.startswith("measured.")]
+    values = [v for v in sensor_outputs if not v.name.startswith("measured.time.")]
+    for array, rows in ((loop.inputs.samples, values), (loop.inputs.sample_times, sensor_outputs[len(values) :])):
         for i, v in enumerate(rows):
             quantity = Quantity(v.quantity.unit, -1e15, 1e15)
             yield Variable(v.name, "input", loop.member(array, i), quantity, v.description)
@@ -166,14 +166,14 @@ def _parameter(name: str, member: str, quantity: Quantity, description: str, sta
 
 
 def _parameters(scenario: Scenario, loop: Loop) -> Iterator[Variable]:
-    law, said = law_of(scenario), comments(scenario.law.name, scenario.vehicle)
+    law, key_comments = law_of(scenario), comments(scenario.law.name, scenario.vehicle)
     for i, (name, start) in enumerate(law.gains._asdict().items()):
         unit = unit_of_gain(law.name, name).replace(" ", ".")
         unit = _UNITS_BY_GOAL.get(unit, {}).get(scenario.goal.unit, unit)
-        minimum = 0.0 if _accepts(law, name, 0.0) else _LEAST
-        maximum = next((x for x in (_MOST, 1.0) if _accepts(law, name, x)), max(float(start), minimum))
+        minimum = 0.0 if _accepts(law, name, 0.0) else _MIN_GAIN
+        maximum = next((x for x in (_MAX_GAIN, 1.0) if _accepts(law, name, x)), max(float(start), minimum))
         quantity = Quantity(unit if unit in UNITS else "", minimum, maximum, is_gain=True)
-        description = _without_unit(said.get(f"law.gains.{name}", "")) or f"Gain {name} of the law"
+        description = _without_unit(key_comments.get(f"law.gains.{name}", "")) or f"Gain {name} of the law"
         yield _parameter(f"law.gains.{name}", f"gains[{i}]", quantity, description, start)
     for i, start in enumerate(scenario.law.desired_quaternion):
         description = f"Attitude to be kept, as unit quaternion from body to world, part {i}"
@@ -207,7 +207,7 @@ def _region_parameters(regions: Sequence[Region], loop: Loop) -> Iterator[Variab
     for i, (region, prefix) in enumerate(zip(regions, prefixes(regions), strict=True)):
         packed, k = (loop.data.regions, i - 1) if i else (loop.data.goal, 0)
         if i:
-            quantity = Quantity(_GAIN_UNITS[region.shape.unit], 0.0, _MOST)
+            quantity = Quantity(_GAIN_UNITS[region.shape.unit], 0.0, _MAX_GAIN)
             member = loop.member(packed.gains, k)
             yield _parameter(f"{prefix}.gain", member, quantity, f"Gain of {region.name}", region.gain)
         for j, axis in enumerate(AXES):

@@ -1,6 +1,6 @@
-"""A step of the packaged controller: the one step of the co-simulation, without plant and arbiter."""
+"""One step of the controller FMU: the co-simulation's step without plant and arbiter."""
 
-# Its order is Jacobi's: weights and motion are those of the step's beginning, and the outputs act from its end on.
+# It is of Jacobi type: weights and motion are those at the beginning of the step, and outputs act from its end on.
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from cosim.step.step_model import Array, Integers, StepData, StepModel
 
 
 class ControllerInputs(NamedTuple):
-    """What the importer gives, beside the weights."""
+    """Inputs and initial motion that the importer sets; the weights are in `StepData`."""
 
     motion: Array  # (13,) position, quaternion and velocity of the vehicle
     start: Array  # (13,) the same at the start, for masters that begin with zeros
@@ -26,25 +26,25 @@ class ControllerInputs(NamedTuple):
 
 
 class ControllerOutputs(NamedTuple):
-    """Outputs that are not in `StepData`, and the progress of what they schedule."""
+    """Outputs of the FMU that `StepData` lacks, and counters of the failures and outages sent to the plant."""
 
     thrusts: Array  # (m,) N; (0,) without thrusters
     lost: Array  # (m,) lost fraction of each thruster's force
     outages: Array  # (5,) probability that a sensor loses a sample by an outage
     values: Array  # (n + 1,) g of goal and regions at the last known position
     clearances: Array  # (n + 1,) m or rad
-    failures: Integers  # (1,) number of failures that the plant has received
-    changes: Integers  # (1,) number of changes of sensors that it has received
+    failures: Integers  # (1,) number of failures sent to the plant
+    changes: Integers  # (1,) number of sensor changes (outages and their ends) sent to the plant
 
 
-def step_controller(model: StepModel, data: StepData, given: ControllerInputs, out: ControllerOutputs) -> None:
-    """Decide by the inputs; the weights are given, and the rules' inputs are those of the step's end."""
-    read_inputs(data, given)
+def step_controller(model: StepModel, data: StepData, inputs: ControllerInputs, out: ControllerOutputs) -> None:
+    """Run one step: read the inputs, estimate, compute forces, and write the outputs at the end of the step."""
+    read_inputs(data, inputs)
     report_failures(model, data)
     weigh(model, data)
     estimate_state(model, data)
-    decide(model, data, True, given.controls[0] > 0)
-    data.now[0] = given.end[0]
+    decide(model, data, True, inputs.controls[0] > 0)
+    data.now[0] = inputs.end[0]
     if position_is_known(model, data):
         update_inputs(model, data)
         out.values[:] = data.true_evaluation.values if model.exact else data.arbiter_evaluation.values
@@ -54,15 +54,16 @@ def step_controller(model: StepModel, data: StepData, given: ControllerInputs, o
         out.thrusts[j] = data.stuck[j] if math.isfinite(data.stuck[j]) else data.thrusts[j]
 
 
-def read_inputs(data: StepData, given: ControllerInputs) -> None:
-    """Write the vehicle's motion and the samples; inputs of zeros alone come before the plant's first outputs."""
-    motion, state = given.start if is_zero(given.motion) else given.motion, data.true_state
+def read_inputs(data: StepData, inputs: ControllerInputs) -> None:
+    """Write the vehicle's motion and the sensor samples."""
+    # Inputs are all zero until the plant has given its first outputs.
+    motion, state = inputs.start if is_zero(inputs.motion) else inputs.motion, data.true_state
     state.position[:], state.quaternion[:], state.velocity_body[:] = motion[:3], motion[3:7], motion[7:]
     if is_zero(state.quaternion):
         state.quaternion[0] = 1.0
-    if not is_zero(given.samples):
-        data.measurements.values[:] = given.samples
-        data.measurements.times[:] = given.sample_times
+    if not is_zero(inputs.samples):
+        data.measurements.values[:] = inputs.samples
+        data.measurements.times[:] = inputs.sample_times
 
 
 def is_zero(values: Array) -> bool:
@@ -74,7 +75,7 @@ def is_zero(values: Array) -> bool:
 
 
 def schedule_failures(model: StepModel, data: StepData, out: ControllerOutputs) -> None:
-    """Give the plant the failures of thrusters and the outages of sensors that are due by the step's end."""
+    """Send the plant the thruster failures and sensor outages that are due by the end of the step."""
     i, k = out.failures[0], completed_steps(model, data.now[0])
     while i < model.failed.size and model.failure_steps[i] <= k:
         thruster, remaining = model.failed[i], model.remaining[i]

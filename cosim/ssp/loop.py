@@ -1,4 +1,4 @@
-"""A scenario's controller in its FMU: model and data of its step, and the places of their arrays."""
+"""A scenario's controller in its FMU: model and data of its step, and the layout of their arrays in its memory."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ _AXIS = np.array([0.48, 0.6, 0.64])  # rotation axis of an attitude that no law 
 
 
 class Loop:
-    """The arguments of `step_controller` for a scenario, placed in the model of an FMU."""
+    """The arguments of `step_controller` for a scenario, in the memory of an FMU."""
 
     def __init__(self, scenario: Scenario) -> None:
         self.law: CompiledLaw = law_of(scenario)
-        nothing: Integers = np.empty(0, np.int64)
+        no_regions: Integers = np.empty(0, np.int64)
         self.model: StepModel = make_model(scenario, self.law)._replace(
-            for_record=True, jacobi=True, moving=True, moving_regions=nothing, control_every=1, arbiter_every=1
+            for_record=True, jacobi=True, moving=True, moving_regions=no_regions, control_every=1, arbiter_every=1
         )  # the importer sets velocities, and the C code counts the law's period
         inputs, outputs = exchanged_variables(scenario)
         signals, noise = Signals([Column("time", "s", "Simulated time")]), np.zeros((1, 6))
@@ -46,28 +46,28 @@ class Loop:
         self.period: Array = getattr(self.law.memory, "period", np.array([scenario.time.control]))
         self.ramp = np.array([scenario.arbiter.ramp])
         self.memory = Memory()
-        self.constants = self._place_arrays()
+        self.constants = self._allocate_arrays()
 
     def member(self, array: Array, i: int = 0) -> str:
         """Return the member of the FMU's model that holds an item of an array."""
         return f"numbers[{self.memory.keep(array) + i}]"
 
-    def _place_arrays(self) -> dict[str, int]:
-        """Place what the importer sets, then outputs, then other variables; return the constants of the C header."""
-        memory, model, data, given, out = self.memory, self.model, self.data, self.inputs, self.out
+    def _allocate_arrays(self) -> dict[str, int]:
+        """Allocate what the importer sets, then outputs, then other variables; return the constants of the C header."""
+        memory, model, data, inputs, out = self.memory, self.model, self.data, self.inputs, self.out
         for array in (
             data.goal.numbers, data.goal.velocities, data.regions.numbers, data.regions.gains, data.regions.velocities,
             self.desired_quaternion, self.period, self.ramp,
-            given.start, given.motion, given.samples, given.sample_times, data.by_criterion,
+            inputs.start, inputs.motion, inputs.samples, inputs.sample_times, data.by_criterion,
         ):  # fmt: skip
             memory.keep(array)
-        given_size = memory.size
+        n_settable = memory.size
         for array in (
             data.command, out.thrusts, out.lost, out.outages, data.signals.memberships, data.signals.inputs,
             data.estimate, out.values, out.clearances,
         ):  # fmt: skip
             memory.keep(array)
-        output_size = memory.size - given_size
+        n_outputs = memory.size - n_settable
         memory.keep(model.inputs.memberships.ramps)
         for array in (data.goal.shifts, data.regions.shifts, *arrays_of(self.law.memory)):
             memory.keep(array)
@@ -75,14 +75,14 @@ class Loop:
         if not model.through_sensors:
             memory.fix(data.navigation, data.measurements)
         return {
-            "N_GIVEN": given_size,
-            "N_OUTPUTS": output_size,
-            "AT_PERIOD": memory.keep(self.period),
-            "AT_RAMP": memory.keep(self.ramp),
-            "AT_NOW": memory.keep(data.now),
-            "AT_END": memory.keep(given.end),
-            "AT_CONTROLS": memory.keep(given.controls),
-            "AT_NOISE": memory.keep(data.noise),
+            "N_SETTABLE": n_settable,
+            "N_OUTPUTS": n_outputs,
+            "PERIOD_INDEX": memory.keep(self.period),
+            "RAMP_INDEX": memory.keep(self.ramp),
+            "NOW_INDEX": memory.keep(data.now),
+            "END_INDEX": memory.keep(inputs.end),
+            "CONTROLS_INDEX": memory.keep(inputs.controls),
+            "NOISE_INDEX": memory.keep(data.noise),
             "N_GAINS": max(len(self.law.gains), 1),
         }
 
@@ -96,7 +96,7 @@ class Loop:
             (out.failures, model.failed.size),
             (out.changes, model.outage_steps.size),
         )
-        return {self.memory.keep(counter): most for counter, most in counters}
+        return {self.memory.keep(counter): maximum for counter, maximum in counters}
 
 
 def _find_attitude(law: CompiledLaw, other: CompiledLaw) -> Array:

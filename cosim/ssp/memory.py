@@ -17,43 +17,43 @@ _TYPES = {"numbers": np.float64, "integers": np.int64, "words": np.uint64, "flag
 
 
 class Memory:
-    """Places of arrays: variable ones in members of the C struct ``Model``, fixed ones in constants."""
+    """Layout of arrays: variable ones in members of the C struct ``Model``, fixed ones in constants."""
 
-    # Arrays that share memory have the same place. Parameters come first: the importer sets them, and a reset does not
+    # Arrays that share memory have the same index. Parameters come first: the importer sets them, and a reset does not
     # change them.
 
     def __init__(self) -> None:
         self._pools: dict[str, list[np.ndarray]] = {member: [] for member in POOLS.values()}
         self._sizes = dict.fromkeys(POOLS.values(), 0)
-        self._places: dict[int, int] = {}  # of base arrays, by id, which is unique while they are kept
+        self._indices: dict[int, int] = {}  # of base arrays, by id, which is unique while they are kept
         self._constants: dict[int, str] = {}
-        self._kept: list[np.ndarray] = []
+        self._constant_arrays: list[np.ndarray] = []
         self.definitions: list[str] = []  # C definitions of the constants
 
     def keep(self, array: np.ndarray) -> int:
-        """Give an array a place in the member for its type; return the index of its first item there."""
+        """Store an array in the member for its type; return the index of its first item there."""
         base = _base(array)
-        if id(base) not in self._places:
+        if id(base) not in self._indices:
             member = self._member(base)
-            self._places[id(base)] = self._sizes[member]
+            self._indices[id(base)] = self._sizes[member]
             self._sizes[member] += base.size
             self._pools[member].append(base)
-        between = array.ctypes.data - base.ctypes.data if array.size else 0
-        return self._places[id(base)] + between // array.itemsize
+        offset = array.ctypes.data - base.ctypes.data if array.size else 0
+        return self._indices[id(base)] + offset // array.itemsize
 
     def fix(self, *values: Any) -> None:
-        """Define all arrays of arguments as constants, except those that have a place already."""
+        """Define all arrays of arguments as constants, except those that are stored already."""
         for array in (array for value in values for array in arrays_of(value)):
-            if array.size and id(_base(array)) not in self._places and id(array) not in self._constants:
+            if array.size and id(_base(array)) not in self._indices and id(array) not in self._constants:
                 name = f"CONSTANT_{len(self._constants)}"
                 self._constants[id(array)] = name
-                self._kept.append(array)
+                self._constant_arrays.append(array)
                 self.definitions.append(array_data(array, name, "static const"))
 
     def name(self, array: np.ndarray, expression: str) -> None:
-        """Place an array at the address of a C expression."""
+        """Let a C expression stand for the address of an array."""
         self._constants[id(array)] = expression
-        self._kept.append(array)
+        self._constant_arrays.append(array)
 
     def call(self, program: Program, name: str, arguments: tuple[Any, ...]) -> str:
         """Return the C code of ``void control_name(Model *m)``, which calls a function of the program."""
@@ -89,7 +89,7 @@ class Memory:
 
     @property
     def size(self) -> int:
-        """Number of real numbers with a place."""
+        """Number of real numbers stored."""
         return self._sizes["numbers"]
 
     def _member(self, array: np.ndarray) -> str:

@@ -59,9 +59,9 @@ def structure(
     elements = ET.SubElement(system, "ssd:Elements")
     units: set[str] = set()
     for part in parts:
-        shown = [v for v in part.component.variables if v.name in part.connectors]
-        units |= {v.quantity.unit for v in shown}
-        _add_part(elements, part, shown)
+        connected = [v for v in part.component.variables if v.name in part.connectors]
+        units |= {v.quantity.unit for v in connected}
+        _add_part(elements, part, connected)
     connections = ET.SubElement(system, "ssd:Connections")
     for wire in wires:
         for signal in wire.names:
@@ -72,9 +72,9 @@ def structure(
 
     _annotate_for_omsimulator(system, step)
 
-    defined = ET.SubElement(root, "ssd:Units")
+    unit_list = ET.SubElement(root, "ssd:Units")
     for unit in (unit for unit in UNITS if unit in units):
-        ET.SubElement(ET.SubElement(defined, "ssc:Unit", name=unit), "ssc:BaseUnit", base_unit(unit))
+        ET.SubElement(ET.SubElement(unit_list, "ssc:Unit", name=unit), "ssc:BaseUnit", base_unit(unit))
     experiment = ET.SubElement(root, "ssd:DefaultExperiment", startTime="0.0", stopTime=repr(float(stop_time)))
     annotation = ET.SubElement(
         ET.SubElement(experiment, "ssd:Annotations"), "ssc:Annotation", type="com.opensimulationplatform"
@@ -100,14 +100,14 @@ def _annotate_for_omsimulator(system: ET.Element, step: float) -> None:
     )  # fmt: skip
 
 
-def _add_part(parent: ET.Element, part: Part, shown: Sequence[Variable]) -> None:
+def _add_part(parent: ET.Element, part: Part, variables: Sequence[Variable]) -> None:
     element = ET.SubElement(
         parent, "ssd:Component",
         name=part.name, type="application/x-fmu-sharedlibrary", source=part.source, implementation="CoSimulation",
         description=part.component.description,
     )  # fmt: skip
     connectors = ET.SubElement(element, "ssd:Connectors")
-    for v in shown:
+    for v in variables:
         kind = "input" if v.role == "input" else "output"
         connector = ET.SubElement(connectors, "ssd:Connector", name=v.name, kind=kind, description=v.description)
         ET.SubElement(connector, "ssc:Real", {"unit": v.quantity.unit} if v.quantity.unit else {})

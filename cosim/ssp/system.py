@@ -48,7 +48,7 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
     }
     wires = _wires(components)
     parts = [
-        Part(name, f"resources/{name}.fmu", component, _shown(name, component, wires))
+        Part(name, f"resources/{name}.fmu", component, _connectors(name, component, wires))
         for name, component in components.items()
     ]
     time = scenario.time
@@ -59,8 +59,8 @@ def package_system(scenario: Scenario, out: Path, fmi: int = 2, platforms: str =
         members[part.parameters] = parameter_set(part.name, f"{part.name} of {scenario.title}", values).encode()
         groups = osp_model_description(component, part.connectors)
         members[f"resources/{component.name}_OspModelDescription.xml"] = groups.encode()
-    described = structure(scenario.name, scenario.title, parts, wires, time.duration, time.step)
-    members["SystemStructure.ssd"] = described.encode()
+    description = structure(scenario.name, scenario.title, parts, wires, time.duration, time.step)
+    members["SystemStructure.ssd"] = description.encode()
     write_archive(out, members | _origin(scenario))
     return out
 
@@ -77,7 +77,7 @@ def _wires(components: Mapping[str, Component]) -> list[Wire]:
     ]  # fmt: skip
 
 
-def _shown(part: str, component: Component, wires: Sequence[Wire]) -> tuple[str, ...]:
+def _connectors(part: str, component: Component, wires: Sequence[Wire]) -> tuple[str, ...]:
     """Return the names of a component's real outputs, and of its inputs that are connected."""
     # FMPy sets inputs that have a connector but no connection to the value of another one.
     connected = {name for wire in wires if wire.end == part for name in wire.names}

@@ -15,17 +15,17 @@ _LAST = re.compile(r"(?:\.[^.\[\]]+|\[\d+\])$")  # last part of a structured nam
 
 def osp_model_description(component: Component, names: Iterable[str]) -> str:
     """Write the groups of variables that are connected together, such as a position or all thruster commands."""
-    shown = set(names)
+    connectors = set(names)
     groups: dict[tuple[str, bool], list[str]] = {}
     for v in component.variables:
-        if v.name in shown:
+        if v.name in connectors:
             groups.setdefault((_LAST.sub("", v.name), v.role == "input"), []).append(v.name)
     root = ET.Element("OspModelDescription", xmlns=_NAMESPACE, version="1.0")
-    listed = ET.SubElement(root, "VariableGroups")
+    group_list = ET.SubElement(root, "VariableGroups")
     for (name, is_input), members in groups.items():
         if len(members) > 1:
             both = (name, not is_input) in groups
-            group = ET.SubElement(listed, "Generic", name=f"{name}.{'in' if is_input else 'out'}" if both else name)
+            group = ET.SubElement(group_list, "Generic", name=f"{name}.{'in' if is_input else 'out'}" if both else name)
             for member in members:
                 ET.SubElement(group, "Variable", ref=member)
     return xml_text(root)

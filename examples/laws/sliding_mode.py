@@ -1,8 +1,8 @@
-"""Sliding mode: a velocity towards the goal and away from regions, kept by a force that saturates.
+"""Sliding-mode control of the velocity, with a reference from a potential field.
 
     s = nu - nu_ref,   tau = -K sat(s / layer)
 
-The velocity wanted is that of a potential field, so that the law needs no model of the vehicle.
+The reference velocity points towards the goal and away from regions. The law needs no model of the vehicle.
 """
 
 from __future__ import annotations
@@ -21,22 +21,22 @@ from controller.stack_array import Vector4
 class SlidingModeGains(NamedTuple):
     """Defaults: chosen by hand for ODIN."""
 
-    slope: float = 0.5  # 1/s, of the velocity wanted over the distance to go
-    speed: float = 0.5  # m/s, greatest velocity wanted towards the goal
-    turning: float = 0.5  # 1/s, of the angular velocity wanted over the attitude error
+    slope: float = 0.5  # 1/s, reference velocity per distance to the set point
+    speed: float = 0.5  # m/s, maximum reference velocity towards the goal
+    turning: float = 0.5  # 1/s, reference angular velocity per attitude error
     force: float = 400.0  # N, K
     moment: float = 200.0  # N m, K
-    layer: float = 0.2  # m/s or rad/s, within which the force is proportional
+    layer: float = 0.2  # m/s or rad/s, boundary layer: below it the force is proportional to s
     inset: float = 0.5  # m, clearance of the set point within the goal region
-    repulsion: float = 0.02  # 1/s, velocity away from a region of gain 1 over the depth in its reach
-    reach: float = 1.0  # m, clearance at which regions begin to push
+    repulsion: float = 0.02  # 1/s, velocity away from a region of gain 1 per depth within `reach`
+    reach: float = 1.0  # m, clearance below which regions repel
 
 
 class SlidingModeMemory(NamedTuple):
-    """Nothing that lasts; where it computes."""
+    """Desired attitude and work arrays; nothing else is kept between steps."""
 
     desired_quaternion: Vector4
-    estimate: Vector4  # zero: it estimates nothing
+    estimate: Vector4  # zeros: the law estimates nothing
     report: Array  # (0,)
     field: Field
 
@@ -50,13 +50,13 @@ def step(
     memory: SlidingModeMemory,
     forces: Array,
 ) -> None:
-    """Do what `CompiledLaw.step` says; all regions push in full, whatever their weights."""
+    """Compute the wrench as `CompiledLaw.step` does; all regions repel in full, whatever their weights."""
     R, field = rotation_matrix(state.quaternion), memory.field
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.speed / gains.slope)
     e_att = error(memory.desired_quaternion, state.quaternion)[1:]
-    wanted = np.concatenate((R.T @ (field.push - gains.slope * field.error), -gains.turning * e_att))
-    s = np.clip((state.velocity_body - wanted) / gains.layer, -1.0, 1.0)
+    nu_ref = np.concatenate((R.T @ (field.push - gains.slope * field.error), -gains.turning * e_att))
+    s = np.clip((state.velocity_body - nu_ref) / gains.layer, -1.0, 1.0)
     forces[:3], forces[3:] = -gains.force * s[:3], -gains.moment * s[3:]
 
 
@@ -66,7 +66,7 @@ def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> Sli
 
 
 class SlidingModeLaw(WrenchLaw):
-    """Sliding mode about a velocity field."""
+    """Sliding-mode law."""
 
     function = staticmethod(step)
     make_memory = staticmethod(make_memory)

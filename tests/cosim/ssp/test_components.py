@@ -179,7 +179,9 @@ def test_law_without_a_changing_attitude_is_refused(monkeypatch):
 def test_no_array_is_both_a_variable_and_a_constant(law):
     memory = Loop(load_scenario("docking", [f"law.name={law}"])).memory
     variables = [array for pool in memory._pools.values() for array in pool]
-    assert memory._kept and not [a for a in memory._kept for v in variables if np.shares_memory(a, v)]
+    assert memory._constant_arrays and not [
+        a for a in memory._constant_arrays for v in variables if np.shares_memory(a, v)
+    ]
 
 
 @pytest.mark.parametrize(

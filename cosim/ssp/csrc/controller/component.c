@@ -20,7 +20,7 @@ static const Constraint CONSTRAINTS[] = SCENE_CONSTRAINTS;
 static const int RAMPS[] = SCENE_RAMPS; /* memberships that decrease over arbiter.ramp; -1 ends the list */
 static const struct {
     int index;
-    int64_t most;
+    int64_t maximum;
 } COUNTERS[] = SCENE_COUNTERS;
 enum { NOISE_STREAM = 64 }; /* and five more; the plant has those before it */
 
@@ -76,8 +76,8 @@ static Status prepare(Instance *instance)
         if (!holds(m->numbers, c))
             return instance_refuse(instance, "%s", c->fault);
     for (const int *index = RAMPS; *index >= 0; index++)
-        m->numbers[*index] = m->numbers[AT_RAMP];
-    ticks_begin(&m->control, m->numbers[AT_PERIOD], m->time);
+        m->numbers[*index] = m->numbers[RAMP_INDEX];
+    ticks_begin(&m->control, m->numbers[PERIOD_INDEX], m->time);
     return STATUS_OK;
 }
 
@@ -109,7 +109,7 @@ static void draw_noise(Model *m)
 
     for (unsigned i = 0; i < 6; i++)
         if (DEVIATIONS[i] > 0.0)
-            m->numbers[AT_NOISE + i] =
+            m->numbers[NOISE_INDEX + i] =
                 DEVIATIONS[i] * random_normal(SCENE_SEED, NOISE_STREAM + i, (uint64_t)m->control.count - 1);
 }
 
@@ -124,11 +124,11 @@ static Status take_step(Instance *instance, double end)
     const bool due = ticks_due(&m->control, m->time);
     if (due)
         draw_noise(m);
-    m->numbers[AT_NOW] = m->time;
-    m->numbers[AT_END] = end;
-    m->integers[AT_CONTROLS] = due;
+    m->numbers[NOW_INDEX] = m->time;
+    m->numbers[END_INDEX] = end;
+    m->integers[CONTROLS_INDEX] = due;
     control_step(m);
-    if (!is_finite(m->numbers + N_GIVEN, N_OUTPUTS))
+    if (!is_finite(m->numbers + N_SETTABLE, N_OUTPUTS))
         return instance_refuse(instance, "step from t = %.9g s not taken: a force, an estimate or a value of a region is no finite number",
                                m->time);
     m->time = end;
@@ -159,9 +159,9 @@ static bool valid_state(const Model *m)
         if (flags[i] > 1)
             return false;
     for (size_t i = 0; i < sizeof COUNTERS / sizeof COUNTERS[0]; i++)
-        if (m->integers[COUNTERS[i].index] < 0 || m->integers[COUNTERS[i].index] > COUNTERS[i].most)
+        if (m->integers[COUNTERS[i].index] < 0 || m->integers[COUNTERS[i].index] > COUNTERS[i].maximum)
             return false;
-    return ticks_valid(&m->control) && is_finite(m->numbers + N_GIVEN, N_OUTPUTS);
+    return ticks_valid(&m->control) && is_finite(m->numbers + N_SETTABLE, N_OUTPUTS);
 }
 
 const Component COMPONENT = {

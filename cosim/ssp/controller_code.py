@@ -1,4 +1,4 @@
-"""C code of a scenario's controller: translated functions, their arguments, and constants of the scenario."""
+"""C code of the controller FMU: the translated law and step, their arguments, and the scenario's constants."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from cosim.step.step_model import N_CALLS
 _REWIND = """\
 void control_rewind(Model *m)
 {
-    memcpy(m->numbers + N_GIVEN, FIRST_NUMBERS + N_GIVEN, sizeof m->numbers - N_GIVEN * sizeof(double));
+    memcpy(m->numbers + N_SETTABLE, FIRST_NUMBERS + N_SETTABLE, sizeof m->numbers - N_SETTABLE * sizeof(double));
     memcpy(m->integers, FIRST_INTEGERS, sizeof m->integers);
     memcpy(m->words, FIRST_WORDS, sizeof m->words);
     memcpy(m->flags, FIRST_FLAGS, sizeof m->flags);
@@ -35,8 +35,8 @@ static int call_law(void *model)
 }
 """
 
-_DECLARED = """\
-/* Puts all but what the importer sets to what it is at the beginning. */
+_DECLARATIONS = """\
+/* Resets all but what the importer sets. */
 void control_rewind(Model *m);
 void control_law(Model *m);
 void control_step(Model *m);
@@ -51,15 +51,18 @@ def translate_controller(
     """Return the C files and headers of a controller, by name."""
     law, data, memory, program = loop.law, loop.data, loop.memory, Program()
     forces = data.command if loop.model.law_gives_wrench else data.thrusts
-    decided = data.state, data.goal, data.regions, data.weights, law.gains, law.memory, forces
-    # addresses are no part of the model, which FMU states copy
+    law_arguments = data.state, data.goal, data.regions, data.weights, law.gains, law.memory, forces
+    # addresses are not stored in the model, which FMU states copy
     memory.name(data.calls, f"(int64_t[{N_CALLS}]){{(intptr_t)call_law, (intptr_t)m}}")
-    stepped = loop.model, data, loop.inputs, loop.out
+    step_arguments = loop.model, data, loop.inputs, loop.out
     calls = []
-    for name, function, arguments in (("law", type(law).function, decided), ("step", step_controller, stepped)):
+    for name, function, arguments in (
+        ("law", type(law).function, law_arguments),
+        ("step", step_controller, step_arguments),
+    ):
         program.export(f"translated_{name}", function, tuple(map(type_of, arguments)))
-        given = tuple(Named(a, "gains") if a is law.gains else a for a in arguments)
-        calls.append(memory.call(program, name, given))
+        members = tuple(Named(a, "gains") if a is law.gains else a for a in arguments)
+        calls.append(memory.call(program, name, members))
     code = "\n".join([
         '#include "model.h"\n#include "loop.h"\n',
         program.text(),
@@ -77,7 +80,7 @@ def translate_controller(
         "",
         '#include "model.h"',
         "",
-        _DECLARED,
+        _DECLARATIONS,
         *(f"#define {key} {value}" for key, value in _scene(loop, scenario, regions, names).items()),
         "",
         "#endif",
