@@ -119,7 +119,7 @@ class Output(Variable):
     Attributes
     ----------
     default : float or None
-        Value in the universe where no rule fires; with None that is NaN.
+        Value where no rule fires; with None that is NaN.
     defuzzifier : {"centroid", "bisector", "mom", "som", "lom", "average", "sum"}
         Value of the joined terms: their centroid, the position that halves their area, or the mean, smallest or
         largest of the positions where they are greatest; for terms that are values (Sugeno), or that only rise or only
@@ -130,13 +130,14 @@ class Output(Variable):
     lock_range : bool
         True if the value is held within the universe.
     lock_previous : bool
-        True if, in a batch, an output for which no rule fires keeps the value of the row before.
+        True if, in a batch, an output for which no rule fires keeps the value of the row before. A call for one sample
+        is then refused where no rule fires.
 
     Raises
     ------
     DefinitionError
         If a term has no area in the universe, and so no centroid, unless it is a singleton, which counts where nothing
-        else fires; if the default lies outside the universe; if that is wider than 1e100 or narrower than 1e-100, so
+        else fires; if the default is outside a locked range; if the universe is wider than 1e100 or below 1e-100, so
         that floating point cannot hold its moments; or if the terms do not suit the defuzzifier.
 
     Examples
@@ -175,10 +176,11 @@ class Output(Variable):
                 )
         if self.default is not None:
             default = finite(self.default)
-            if default is None or not self.universe[0] <= default <= self.universe[1]:
-                raise DefinitionError(
-                    f"{what}: default is {shown(self.default)}, expected a number in [{_span(self)}], its universe"
-                )
+            if default is None:
+                raise DefinitionError(f"{what}: default is {shown(self.default)}, expected a finite number")
+            if self.lock_range and not self.universe[0] <= default <= self.universe[1]:
+                expected = f"a number in [{_span(self)}], in which lock_range holds it"
+                raise DefinitionError(f"{what}: default is {shown(self.default)}, expected {expected}")
             object.__setattr__(self, "default", default)
 
     def _joinable(self, term: Term) -> Term:

@@ -12,7 +12,7 @@ import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
 from fuzzy_arbiter.engines.firing import Degrees, Firing
-from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.errors import EngineError, InputError
 from fuzzy_arbiter.shapes import Array
 from fuzzy_arbiter.terms.values import Constant, Value
 
@@ -53,6 +53,11 @@ class Engine:
         for output, cut, defuzzifier in zip(self.system.outputs, cuts, self.defuzzifiers, strict=True):
             value = defuzzifier.value(cut, (*inputs, *result)) if any(cut) else math.nan
             if not math.isfinite(value):
+                if output.lock_previous:
+                    raise InputError(
+                        f"no rule fires for the output {output.name!r}, which keeps its previous value; expected a "
+                        "batch, whose rows have one before"
+                    )
                 value = default_of(output)
             result.append(min(max(value, output.universe[0]), output.universe[1]) if output.lock_range else value)
         return result

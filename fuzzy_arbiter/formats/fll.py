@@ -113,11 +113,7 @@ def _output(block: Block, inputs: int) -> tuple[Output, int]:
     aggregation = block.word("aggregation", _WORDS["aggregation"] | none)
     locked, previous = (block.word(key, _FLAGS, "false") for key in ("lock-range", "lock-previous"))
     default = block.number("default")
-    if locked and default is not None and not parts[1][0] <= default <= parts[1][1]:
-        line, value = block.entry("default")
-        refuse(line, f"default of {block.title} is {value}, outside the range that lock-range holds it to")
-    read_output = block.build(Output, *parts, default, defuzzifier, aggregation, locked, previous)
-    return read_output, points
+    return block.build(Output, *parts, default, defuzzifier, aggregation, locked, previous), points
 
 
 def _defuzzifier(block: Block) -> tuple[Any, int]:

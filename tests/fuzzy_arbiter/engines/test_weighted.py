@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fuzzy_arbiter import Arbiter, Output, Rule, System, Term, Variable, falling, rising, triangle
-from fuzzy_arbiter.errors import DefinitionError, EngineError, UnsupportedError
+from fuzzy_arbiter.errors import DefinitionError, EngineError, InputError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.propositions import Anything, Hedged, Is, Not
 from fuzzy_arbiter.terms.curves import curve
@@ -92,7 +92,9 @@ def test_locked_output_is_clipped_or_holds_its_previous_value():
     arbiter = Arbiter(system=system(kept, "if x is high and z is near then y is t0"))
     rows = [[0.0, 0.0], [4.0, 0.0], [0.0, 1.0], [6.0, 0.0], [0.0, 0.0]]
     assert arbiter.batch(rows)[:, 0].tolist() == [-1.0, 4.0, 4.0, 6.0, 6.0]
-    assert arbiter([0.0, 0.0]) == (-1.0,)  # a sample alone has none before it
+    assert arbiter([4.0, 0.0]) == (4.0,)
+    with pytest.raises(InputError, match="no rule fires for the output 'y', which keeps its previous value"):
+        arbiter([0.0, 0.0])  # a sample alone has none before it
     assert (arbiter.batch([*rows[:2], *rows[:1] * 10_000])[1:, 0] == 4.0).all()  # more rows than a block
     free = Arbiter(system=system(replace(kept, default=None), "if x is high and z is near then y is t0"))
     assert np.isnan(free.batch(rows)[:, 0]).tolist() == [True, False, False, False, False]

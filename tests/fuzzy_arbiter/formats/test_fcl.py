@@ -120,6 +120,11 @@ def test_names_that_differ_only_in_case_are_rejected():
 
 
 BLOCKS = FOREIGN["blocks.fcl"]
+DEFAULT = (
+    "FUNCTION_BLOCK b VAR_INPUT x : REAL; END_VAR VAR_OUTPUT y : REAL; END_VAR FUZZIFY x TERM on := (0, 0) (1, 1); "
+    "END_FUZZIFY DEFUZZIFY y {} END_DEFUZZIFY RULEBLOCK r RULE 1 : IF x IS on THEN y IS hi; END_RULEBLOCK "
+    "END_FUNCTION_BLOCK"
+)
 
 
 def test_one_of_several_blocks_is_chosen_by_name(tmp_path):
@@ -147,6 +152,16 @@ def test_strengths_are_joined_by_value_as_in_jfuzzylogic():
     assert Arbiter(system=reads(BLOCKS, "fcl"))([1.0]) == pytest.approx(((1.0 + 3.0) / 2.0,))  # not (1 + 1 + 3) / 3
     ours = BLOCKS.replace("TERM on := (0, 0) (1, 1)", "TERM on := Ramp 0.0 1.0")  # a word of fuzzylite, which adds them
     assert Arbiter(system=reads(ours, "fcl"))([1.0]) == pytest.approx(((1.0 + 1.0 + 3.0) / 3.0,))
+
+
+def test_a_default_may_lie_outside_the_values():
+    """A universe without RANGE is that of the terms: of singletons 10 and 100, or of sets."""
+    singletons = "TERM lo := 10; TERM hi := 100; METHOD : COGS; DEFAULT := 0;"
+    sets = "TERM lo := (10, 0) (20, 1) (30, 0); TERM hi := (30, 0) (90, 1) (100, 0); METHOD : COG; DEFAULT := 0;"
+    for terms in (singletons, sets):
+        arbiter = Arbiter(system=reads(DEFAULT.format(terms), "fcl"))
+        assert (arbiter([0.0])["y"], arbiter.batch([[0.0], [1.0]])[0, 0]) == (0.0, 0.0)
+        assert reads(writes(arbiter.system, "fcl"), "fcl").outputs[0].default == 0.0
 
 
 def test_duplicate_term_names_are_rejected():
