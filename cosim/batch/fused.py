@@ -17,8 +17,7 @@ from cosim.results.spans import SETTLED_FOR
 from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
-from cosim.simulation.bindings import BoundLaw
-from cosim.simulation.compiled_rules import BoundRules
+from cosim.simulation.bindings import BoundLaw, bind_rules
 from cosim.simulation.make_step import (
     NO_CLOCK,
     exchanged_variables,
@@ -29,7 +28,7 @@ from cosim.simulation.make_step import (
 )
 from cosim.simulation.stepped_plant import plant_calls
 from cosim.step.score import FlightMetrics, empty_metrics, fly
-from cosim.step.step_model import ARBITER, Array, Integers, StepData, StepModel, set_call
+from cosim.step.step_model import Array, Integers, StepData, StepModel
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant, PlantError
 
@@ -117,9 +116,7 @@ def fly_scenario(
     calls = plant_calls(scenario.vehicle, plant.native(inputs, outputs), plant.native)
     model, signals = make_model(scenario, law, clock), step_signals(scenario, law, inputs, outputs)
     data = make_data(scenario, model, law, signals, inputs, outputs, make_noise(scenario))
-    bound_law = BoundLaw(law, model, data)
-    rules = BoundRules(scenario.rules.system, data.signals.inputs, data.by_criterion)
-    set_call(data, ARBITER, rules)
+    bound_law, rules = BoundLaw(law, model, data), bind_rules(scenario.rules.system, data)
     decisions = -(-scenario.steps // scenario.control_every)
     rows = np.zeros((decisions, signals.row.size) if trace else (0, 0))
     values, metrics = empty_metrics()

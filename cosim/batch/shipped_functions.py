@@ -11,26 +11,22 @@ from typing import Any
 
 import numpy as np
 
-from controller import LAWS, CompiledLaw, VehicleState
+from controller import LAWS
 from controller.compiling.compiler import compile_file
 from controller.compiling.function import c_text
 from controller.compiling.library import checksum_path, digest_of, library_name
 from controller.laws.deployable.path_planning.planner import empty_plan, search_path
 from controller.laws.deployable.path_planning.search import PathLimits
-from controller.navigation import SensorModel, empty_measurements
-from controller.navigation.estimate import empty_memory
 from controller.navigation.navigator import navigate
-from controller.regions import Region, Sphere, pack
 from controller.regions.rays import ray_distances
-from controller.regions.region_set import PackedRegions, evaluate_packed, write_clearances
+from controller.regions.region_set import evaluate_packed, write_clearances
 from cosim.scenario.arbiter_rules import PAPER_RULES
-from cosim.scenario.criteria import PAPER
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.vehicle_model import vehicle_model
-from cosim.simulation.compiled_rules import rules_text
+from cosim.simulation.bindings import rules_text
 from cosim.simulation.make_step import exchanged_variables, make_data, make_model, make_noise, step_signals
-from cosim.step.arbiter_inputs import compute_inputs, empty_signals, pack_inputs
+from cosim.step.arbiter_inputs import compute_inputs
 from cosim.step.one_step import advance, locate, show_start
 from cosim.step.plant_calls import Clock, PlantCalls
 from cosim.step.score import empty_metrics, fly
@@ -38,44 +34,28 @@ from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
 from plant_fmu.running.native import Native
-from plant_fmu.vehicle import load_vehicle
 
-_VEHICLE = "bluerov2_heavy"  # the functions do not depend on the vehicle
-_PERIOD = 0.02  # s, control period of the laws
 _INTEGERS, _FLAT, _TABLE = np.zeros(1, np.int64), np.zeros(1), np.zeros((1, 3))
 
 
 def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]:
     """Yield each function with arguments of the types with which it is called."""
-    goal, regions = (pack([Region(name, Sphere((0.0, 0.0, 0.0), 1.0), "in")]) for name in ("goal", "region"))
-    state = VehicleState(np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0]), np.zeros(6), np.ones(1))
-    yield navigate, (empty_measurements(), _FLAT, SensorModel(), empty_memory(), state)
-    for law in LAWS.values():
-        yield law.function, _law_arguments(law, state, goal, regions)
-    yield evaluate_packed, (regions, state.position, state.quaternion, _FLAT, _TABLE, _TABLE, _FLAT)
-    yield write_clearances, (regions, _TABLE, _FLAT, _FLAT)
-    yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
-    yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, _INTEGERS)
-    inputs = pack_inputs((), PAPER, PAPER_RULES, 1.0)
-    yield compute_inputs, (inputs, goal, regions, state, _FLAT, _FLAT, empty_signals(inputs, 1, 3))
-    yield from _step_functions()
-
-
-def _law_arguments(
-    law: type[CompiledLaw], state: VehicleState, goal: PackedRegions, regions: PackedRegions
-) -> tuple[Any, ...]:
-    gains, level = law.gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
-    made = law.for_vehicle(vehicle_model(load_vehicle(_VEHICLE)), gains, level, _PERIOD, 1)
-    return state, goal, regions, _FLAT, gains, made.memory, np.zeros(made.n_forces)
-
-
-def _step_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]:
-    """Yield the functions of a step."""
-    scenario = load_scenario("paper")
+    scenario = load_scenario("paper")  # the functions do not depend on the scenario
     (inputs, outputs), law = exchanged_variables(scenario), law_of(scenario)
     model = make_model(scenario, law, Clock().numbers)
     signals = step_signals(scenario, law, inputs, outputs)
     data = make_data(scenario, model, law, signals, inputs, outputs, make_noise(scenario))
+    state, goal, regions = data.state, data.goal, data.regions
+    yield navigate, (data.measurements, data.now, model.sensors, data.navigation, state)
+    for kind in LAWS.values():
+        gains, level = kind.gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
+        made = kind.for_vehicle(vehicle_model(scenario.vehicle), gains, level, scenario.time.control, 1)
+        yield kind.function, (state, goal, regions, _FLAT, gains, made.memory, np.zeros(made.n_forces))
+    yield evaluate_packed, (regions, state.position, state.quaternion, _FLAT, _TABLE, _TABLE, _FLAT)
+    yield write_clearances, (regions, _TABLE, _FLAT, _FLAT)
+    yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
+    yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, _INTEGERS)
+    yield compute_inputs, (model.inputs, goal, regions, state, _FLAT, _FLAT, data.signals)
     references, rows = np.zeros(1, np.uint32), np.zeros((0, 0))
     calls = PlantCalls(*[Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)] * 3)
     yield fly, (model, data, calls, empty_metrics()[1], _FLAT, rows)

@@ -11,7 +11,7 @@ from cosim.results.record import Rows
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-RESTING_SIGNALS = ("goal.clearance", "velocity.u", "velocity.v", "velocity.w")  # signals that `is_resting` needs
+_RESTING_SIGNALS = ("goal.clearance", "velocity.u", "velocity.v", "velocity.w")  # signals that `is_resting` needs
 _SLOW = 0.02  # m/s over ground, below which the vehicle rests
 _MIN_ACTIVE_WEIGHT = 0.005  # weight below which a criterion is not active: it is shown as 0.00
 _DOMINANT_WEIGHT = 0.5  # weight from which a criterion is active even if the vehicle rests in the goal
@@ -47,7 +47,7 @@ def active_regions(
 def activity_signals(scenario: Scenario) -> list[str]:
     """Return the names of the signals that `active_at` needs."""
     names = [f"{kind}.{name}" for kind in ("membership", "weight") for name in scenario.criterion_names]
-    return [*RESTING_SIGNALS, *names, *(f"{secondary.region.name}.clearance" for secondary in scenario.regions)]
+    return [*_RESTING_SIGNALS, *names, *(f"{secondary.region.name}.clearance" for secondary in scenario.regions)]
 
 
 def active_at(scenario: Scenario, rows: Rows) -> NDArray[np.intp]:

@@ -6,7 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from cosim.replay.activity import RESTING_SIGNALS, active_regions, is_resting
+from cosim.replay.activity import active_at
+from cosim.results.record import Rows
 from cosim.results.required_columns import REGION_COLUMNS
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array, Column
@@ -24,34 +25,24 @@ class ViewColumns:
     """Select the columns that a view draws, and add the active region and the firing strength of each rule."""
 
     def __init__(self, scenario: Scenario, columns: Sequence[Column]) -> None:
-        names = [column.name for column in columns]
-        self.picked = [i for i, name in enumerate(names) if is_drawn(name)]
-        self._criteria, names_of_criteria = scenario.criterion_places, scenario.criterion_names
-        picked = [names[i] for i in self.picked]
-        self._memberships = [picked.index(f"membership.{name}") for name in names_of_criteria]
-        self._weights = [picked.index(f"weight.{name}") for name in names_of_criteria]
-        self._goal, *self._velocity = (picked.index(name) for name in RESTING_SIGNALS)
-        self._clearances = [picked.index(f"{secondary.region.name}.clearance") for secondary in scenario.regions]
+        self.picked = [i for i, column in enumerate(columns) if is_drawn(column.name)]
+        self._scenario, self._drawn = scenario, [columns[i] for i in self.picked]
         system = scenario.rules.system
-        self._inputs = self._memberships  # inputs of the rules
+        self._inputs = [f"membership.{name}" for name in scenario.criterion_names]  # inputs of the rules
         if scenario.arbiter.file:
-            self._inputs = [picked.index(f"arbiter.{signal.name}") for signal in scenario.rules.inputs]
+            self._inputs = [f"arbiter.{signal.name}" for signal in scenario.rules.inputs]
+        self._weights = [f"weight.{name}" for name in scenario.criterion_names]
         self._firing = Firing(system)
         self._low, self._high = np.array([variable.universe for variable in system.inputs]).T
-        self.columns = (
-            *(columns[i] for i in self.picked),
-            *added_columns(system),
-        )
+        self.columns = (*self._drawn, *added_columns(system))
 
     def compute_rows(self, picked: Array) -> Array:
         """Compute the rows of a view; picked (rows, picked columns), returns (rows, columns)."""
-        memberships = picked[:, self._memberships]
-        weights, clearances = picked[:, self._weights], picked[:, self._clearances]
-        resting = is_resting(picked[:, self._goal], picked[:, self._velocity])
-        active = active_regions(self._criteria, memberships, weights, clearances, resting)
-        inputs = picked[:, self._inputs]
+        rows = Rows(self._drawn, {column.name: values for column, values in zip(self._drawn, picked.T, strict=True)})
+        active = active_at(self._scenario, rows).astype(float)
+        active[np.isnan(rows.stack(self._weights)).all(axis=1)] = np.nan  # unknown without weights
+        inputs = rows.stack(self._inputs)
         numbers = np.isfinite(inputs).all(axis=1)
-        active[np.isnan(picked[:, self._weights]).all(axis=1)] = np.nan  # unknown without weights
         strengths = np.full((len(picked), len(self.columns) - len(self.picked) - 1), np.nan)
         if numbers.any():
             strengths[numbers] = np.column_stack(

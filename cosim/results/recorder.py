@@ -21,7 +21,7 @@ _BATCH = 10_000  # maximum number of rows of a batch
 _BATCH_VALUES = 2**21  # maximum number of values of a batch, 16 MiB
 _GROUPS = 100  # row groups of a long record: a reader needs a kilobyte per group and signal
 _GROUP_VALUES = 2**22  # maximum number of values of a row group
-_BLOCK = 250  # rows that are buffered before they are transposed to columns: they fit into processor caches
+_BLOCK = 250  # rows that are transposed to columns at once: they fit into processor caches
 # measured: float64 columns compress best with byte stream split; dictionaries only cost time
 _WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_split": True, "write_statistics": False}
 
@@ -29,75 +29,59 @@ _WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_spl
 class Recorder:
     """Observer that records each step's row; what it has flushed can be read even after a kill."""
 
-    # Ctrl-C may interrupt every call. So that the record has each row once, rows move from `_block` to `_columns` to
-    # `_message` to the file by single assignment statements, and an interrupted write is repeated from `_end`.
+    # Ctrl-C may interrupt every call. So that the record has each row once, rows move from `_buffer` to `_message` to
+    # the file by single assignment statements, and an interrupted write is repeated from `_end`.
 
     def __init__(self, folder: Path, columns: Sequence[Column], batch_rows: int | None = None) -> None:
         self._folder, self._schema = folder, _schema(columns)
         size = batch_rows or max(1, min(_BATCH, _BATCH_VALUES // len(columns)))
-        self._block: Array = np.empty((min(_BLOCK, size), len(columns)))
-        self._rows = [row.data for row in self._block]  # memoryviews: copying takes half the time of arrays
-        self._filled = 0  # rows of the block
-        self._columns: Array = np.empty((len(columns), size))
-        self._transposed = 0  # rows of the columns
+        self._buffer: Array = np.empty((size, len(columns)))
+        self._filled = self._flushed = 0  # rows of the buffer, and rows that it held before
         self._message = self._schema.serialize()  # bytes that the next write appends
         (folder / STREAM).touch(exist_ok=False)
         self._end = 0  # bytes of the complete messages in the file
         self._due = time.monotonic() + _PERIOD
-        self.rows = 0
+
+    @property
+    def rows(self) -> int:
+        """Number of recorded rows."""
+        return self._flushed + self._filled
 
     def observe(self, k: int, row: Array) -> None:
         """Record the row of step `k`, shape (columns,) of float64."""
-        if self._filled == len(self._rows) or time.monotonic() > self._due:
-            self._transpose()
-            if self._transposed == self._columns.shape[1] or time.monotonic() > self._due:
-                self._flush()
-        self._rows[self._filled][:] = row.data
-        self._filled += 1
-        self.rows += 1
+        self.observe_block(k, row[None])
 
     def observe_block(self, first: int, rows: Array) -> None:
         """Record the rows of the steps from `first` on, shape (steps, columns) of float64."""
-        self._transpose()
-        size = self._columns.shape[1]
+        size = len(self._buffer)
         for begin in range(0, len(rows), size):
             part = rows[begin : begin + size]
-            n = self._transposed + len(part)
-            if n > size or time.monotonic() > self._due:
+            if self._filled + len(part) > size or time.monotonic() > self._due:
                 self._flush()
-                n = len(part)
-            self._columns[:, self._transposed : n] = part.T
-            self._transposed = n
-        self.rows += len(rows)
+            n = self._filled + len(part)
+            self._buffer[self._filled : n] = part
+            self._filled = n
 
     def close(self) -> None:
         """Write the remaining rows, and replace the stream by a Parquet file."""
         # after an error the stream keeps all rows for which the disk had space, and it may be called again
         if not (self._folder / RECORD).exists():
-            self._transpose()
             self._flush()
             self._convert()
         (self._folder / STREAM).unlink(missing_ok=True)
 
-    def _transpose(self) -> None:
-        """Move the rows of the block to the columns."""
-        if self._transposed + self._filled > self._columns.shape[1]:
-            self._flush()
-        n = self._transposed + self._filled
-        self._columns[:, self._transposed : n] = self._block[: self._filled].T
-        self._transposed, self._filled = n, 0
-
     def _flush(self) -> None:
-        """Append the rows of the columns to the stream."""
+        """Append the rows of the buffer to the stream."""
         self._write()
-        if self._transposed:
+        if self._filled:
+            columns = np.empty((len(self._schema), self._filled))
+            for first in range(0, self._filled, _BLOCK):
+                block = slice(first, min(first + _BLOCK, self._filled))
+                columns[:, block] = self._buffer[block].T
             # not pa.array, which imports pandas where it is installed
-            arrays = [
-                pa.Array.from_buffers(pa.float64(), self._transposed, [None, pa.py_buffer(column)])
-                for column in self._columns[:, : self._transposed]
-            ]
+            arrays = [pa.Array.from_buffers(pa.float64(), self._filled, [None, pa.py_buffer(column)]) for column in columns]
             message = pa.RecordBatch.from_arrays(arrays, schema=self._schema).serialize()
-            self._message, self._transposed = message, 0
+            self._message, self._flushed, self._filled = message, self.rows, 0
             self._write()
         self._due = time.monotonic() + _PERIOD
 

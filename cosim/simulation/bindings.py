@@ -3,20 +3,36 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
+import dataclasses
+import functools
+import os
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from controller import LAWS, CompiledLaw, Law
-from controller.compiling.function import BoundCall
+from controller.compiling.function import INTERPRETED, BoundCall
+from controller.compiling.library import library_of
 from controller.errors import CompilationError, LawError
 from controller.function_law import qualified_name
-from cosim.simulation.compiled_rules import BoundRules
 from cosim.simulation.signals import Array
 from cosim.step.step_model import ARBITER, LAW, LawOutputs, StepData, StepModel, set_call
-from fuzzy_arbiter import Arbiter
+from fuzzy_arbiter import Arbiter, System
+from fuzzy_arbiter.export import to_c
 
 _COMPILED = "closed"  # engine whose numbers C computes too, with the same bits
+_ENTRY = """
+#include <stdint.h>
+
+/* The addresses of inputs and outputs are in words. */
+void entry(const void *words)
+{
+    const uint64_t *address = words;
+    rules_evaluate((const double *)(uintptr_t)address[0], (double *)(uintptr_t)address[1]);
+}
+"""
 
 
 def is_compiled(law: Law) -> bool:
@@ -96,14 +112,48 @@ class _PythonStep:
         out[:] = given
 
 
-def bind_arbiter(arbiter: Arbiter, data: StepData) -> BoundRules | BoundCall:
+def bind_arbiter(arbiter: Arbiter, data: StepData) -> CompiledRules | BoundCall:
     """Bind an arbiter's rules to the arrays of a step: in C if that has the same bits, else in Python."""
-    call: BoundRules | BoundCall = BoundCall(_PythonRules(arbiter), (data.signals.inputs, data.by_criterion))
     if arbiter.engine == _COMPILED:
         with contextlib.suppress(CompilationError):  # there is no compiler for rules of a user
-            call = BoundRules(arbiter.system, data.signals.inputs, data.by_criterion)
+            return bind_rules(arbiter.system, data)
+    call = BoundCall(_PythonRules(arbiter), (data.signals.inputs, data.by_criterion))
     set_call(data, ARBITER, call)
     return call
+
+
+def bind_rules(system: System, data: StepData) -> CompiledRules | BoundCall:
+    """Bind rules to the arrays of a step in C; in Python where that runs all functions."""
+    if os.environ.get(INTERPRETED):
+        call: CompiledRules | BoundCall = BoundCall(
+            _PythonRules(Arbiter(system=system)), (data.signals.inputs, data.by_criterion)
+        )
+    else:
+        call = CompiledRules(system, data.signals.inputs, data.by_criterion)
+    set_call(data, ARBITER, call)
+    return call
+
+
+class CompiledRules:
+    """Rules as a C function, with the arrays of their inputs and outputs, which it keeps alive."""
+
+    on_error: Callable[[], None] | None = None
+
+    def __init__(self, system: System, inputs: Array, outputs: Array) -> None:
+        entry = library_of(rules_text(system)).entry
+        words = np.array([inputs.ctypes.data, outputs.ctypes.data], np.uint64)
+        self._kept = entry, words, inputs, outputs
+        self.address: int = ctypes.cast(entry, ctypes.c_void_p).value or 0
+        self.words: int = words.ctypes.data
+
+    def raise_error(self) -> None:
+        """Raise no error, as C has none."""
+
+
+@functools.cache
+def rules_text(system: System) -> str:
+    """Return the C source of rules with the function ``entry``, from which their library is compiled."""
+    return to_c(dataclasses.replace(system, name="rules")) + _ENTRY
 
 
 class _PythonRules:

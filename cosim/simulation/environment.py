@@ -19,7 +19,6 @@ from cosim.step.step_model import StepData
 
 _SPHERE_NUMBERS = len(Sphere((0.0, 0.0, 0.0), 1.0).packed())
 _AT_REST = (0.0, 0.0, 0.0)
-_ROUNDING = 1e-6  # tolerance of times, as a fraction of a step
 
 
 @dataclass
@@ -203,11 +202,6 @@ def pack_target(goal: Region) -> PackedRegions:
     """Pack a goal with space for a sphere in its place."""
     packed = pack([goal])
     return packed._replace(numbers=np.resize(packed.numbers, max(packed.numbers.size, _SPHERE_NUMBERS)))
-
-
-def stay_steps(scenario: Scenario) -> int:
-    """Return the number of steps that the vehicle has to stay in the goal before the goal moves to its next place."""
-    return math.ceil(scenario.goal_stay / scenario.time.step - _ROUNDING)
 
 
 def shape_center(shape: Shape) -> Vector3:

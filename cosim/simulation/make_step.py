@@ -16,7 +16,7 @@ from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, senso
 from cosim.simulation.actuation_limits import failure_stages
 from cosim.simulation.bindings import outputs_of
 from cosim.simulation.columns import columns_of_channels
-from cosim.simulation.environment import pack_target, shape_center, stay_steps
+from cosim.simulation.environment import pack_target, shape_center
 from cosim.simulation.signals import Signals
 from cosim.step.arbiter_inputs import ArbiterSignals, empty_signals, empty_state, pack_inputs
 from cosim.step.region_positions import RegionEvaluation
@@ -70,7 +70,7 @@ def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, for_rec
         moving_regions=np.array([names.index(name) for name in scenario.moving], np.int64),
         goal_center=np.array(shape_center(scenario.goal)),
         goal_places=(np.reshape(scenario.goal_then, (-1, 3)) - shape_center(scenario.goal)).astype(float),
-        goal_stay=stay_steps(scenario),
+        goal_stay=math.ceil(scenario.goal_stay / step - _ROUNDING),
         exact=sensing.exact,
         dead_from=sensing.dead_from,
         dead_until=sensing.dead_from + sensing.dead_for,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import sys
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,34 +31,30 @@ class PlantCalls(NamedTuple):
 
 def fmi_set(native: Native) -> bool:
     """Set the inputs; return True unless the FMU fails."""
-    references, values, n = native.input_references, native.inputs, native.input_references.size
-    if native.set_values == 0:
-        return True
-    return call_c(native.set_values, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
+    return _transfer(native.set_values, native.instance, native.input_references, native.inputs)
 
 
 def fmi_set_one(native: Native, i: int) -> bool:
     """Set one of the inputs; return True unless the FMU fails."""
-    references, values = native.input_references[i : i + 1], native.inputs[i : i + 1]
-    if native.set_values == 0:
-        return True
-    return call_c(native.set_values, _TRANSFER, native.instance, references, 1, values, 1) <= _WARNING
+    return _transfer(native.set_values, native.instance, native.input_references[i : i + 1], native.inputs[i : i + 1])
 
 
 def fmi_get(native: Native) -> bool:
     """Get the outputs; return True unless the FMU fails."""
-    references, values, n = native.output_references, native.outputs, native.output_references.size
-    if native.get_values == 0:
-        return True
-    return call_c(native.get_values, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
+    return _transfer(native.get_values, native.instance, native.output_references, native.outputs)
 
 
 def fmi_get_flags(native: Native) -> bool:
     """Get the Boolean outputs; return True unless the FMU fails."""
-    references, values, n = native.flag_references, native.flags, native.flag_references.size
-    if native.get_flags == 0 or n == 0:
+    return native.flags.size == 0 or _transfer(native.get_flags, native.instance, native.flag_references, native.flags)
+
+
+def _transfer(function: int, instance: int, references: NDArray[np.uint32], values: NDArray[Any]) -> bool:
+    """Call a function that sets or gets variables; return True unless the FMU fails, or for a plant in Python."""
+    if function == 0:
         return True
-    return call_c(native.get_flags, _TRANSFER, native.instance, references, n, values, n) <= _WARNING
+    n = references.size
+    return call_c(function, _TRANSFER, instance, references, n, values, n) <= _WARNING
 
 
 def fmi_do_step(native: Native, now: float, step: float) -> bool:

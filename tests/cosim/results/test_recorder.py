@@ -142,7 +142,7 @@ def test_memory_and_batches_of_a_wide_run_are_bounded(tmp_path, endless):
             held.append(tracemalloc.get_traced_memory()[0])
     finally:
         tracemalloc.stop()
-    assert len(load_record(tmp_path)) == 3000  # blocks of a thousand rows, of which one fits into 2**21 values
+    assert len(load_record(tmp_path)) == 3 * 1048  # in batches of 2**21 values
     assert max(held) - held[1500] < 2e6
 
 
