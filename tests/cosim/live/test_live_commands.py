@@ -58,7 +58,7 @@ def test_invalid_commands_are_rejected_with_a_reason(live):
         "expected one of ship": {"command": "shift_region", "region": "shop", "by": [1, 0, 0]},
         "expected one of ship, quay": {"command": "shift_region", "region": "goal", "by": [1, 0, 0]},
         "no such obstacle has been added": {"command": "shift_region", "region": "seen 3", "by": [1, 0, 0]},
-        "finite numbers up to": {"command": "set_target", "position": [1e9, 0, 0]},
+        "Expected `float` <= 100000": {"command": "set_target", "position": [1e9, 0, 0]},
         "is no setting": {"command": "change_setting", "key": "time.duration", "value": 1.0},
         "commands.pilot_gain is 7": {"command": "change_setting", "key": "commands.pilot_gain", "value": 7.0},
         "Invalid value 'sail'": {"command": "sail", "to": "Ithaca"},
