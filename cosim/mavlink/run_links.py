@@ -11,7 +11,7 @@ from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.commands import CommandQueue
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Column
 
 

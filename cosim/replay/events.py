@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain, pairwise
 
@@ -15,11 +15,14 @@ from cosim.replay.activity import active_at, activity_signals
 from cosim.replay.command_words import command_events
 from cosim.replay.region_changes import Log
 from cosim.results.law_reports import ISOLATED, REJECTED, Isolations, rejects
+from cosim.results.record import Rows
 from cosim.results.run_result import Run
 from cosim.results.spans import Flags, Span, Spans
 from cosim.results.wording import IMPORTED, isolation_text
 from cosim.scenario.sensor_suite import SENSOR_NAMES
 from cosim.simulation.signals import Array
+
+Block = tuple[Array, Flags, Array | None]  # (rows,) times [s], where a condition holds, and a signal
 
 _MAX_EVENTS = 12  # maximum number of events of a kind; of more, the closest ones are joined
 
@@ -59,32 +62,28 @@ def events_of(run: Run, log: Log) -> list[Event]:
 
 
 def _goal(run: Run) -> Iterator[Event]:
-    inside, first = _JoinedSpans(_MAX_EVENTS // 2), math.inf
-    for block in run.record.blocks(["time", "goal.clearance"]):
-        known = np.isfinite(block["goal.clearance"])
-        time = block["time"][known]
-        first = min(first, *time[:1].tolist(), math.inf)
-        inside.add(block["goal.clearance"][known] >= 0.0, time)
-    for span in inside.found():
+    def known() -> Iterator[Rows]:
+        for block in run.record.blocks(["time", "goal.clearance"]):
+            yield block.take(np.flatnonzero(np.isfinite(block["goal.clearance"])))
+
+    first = next((float(block["time"][0]) for block in known() if len(block)), math.inf)
+    for span, is_open in joined_spans((block["time"], block["goal.clearance"] >= 0.0, None) for block in known()):
         begins = "Starts in" if span.start == first else "Enters"
         yield Event(span.start, "goal", f"{begins} the goal region")
-        if not inside.lasts(span):
+        if not is_open:
             yield Event(span.end, "goal", "Leaves the goal region")
 
 
 def _violations(run: Run) -> Iterator[Event]:
-    regions = run.scenario.regions
-    max_spans = max(1, _MAX_EVENTS // max(1, len(regions)))
-    violated = {f"{secondary.region.name}.clearance": _JoinedSpans(max_spans) for secondary in regions}
-    for block in run.record.blocks(["time", *violated]):
-        for name, spans in violated.items():
-            spans.add(block[name] < 0.0, block["time"], block[name])
-    for secondary, spans in zip(regions, violated.values(), strict=True):
-        for span in spans.found():
+    max_spans = max(1, _MAX_EVENTS // max(1, len(run.scenario.regions)))
+    for secondary in run.scenario.regions:
+        region, name = secondary.region, f"{secondary.region.name}.clearance"
+        blocks = ((block["time"], block[name] < 0.0, block[name]) for block in run.record.blocks(["time", name]))
+        for span, is_open in joined_spans(blocks, max_spans):
             depth = -span.least
-            by = f"{math.degrees(depth):.1f}°" if of_attitude(secondary.region.shape) else f"{depth:.3f} m"
-            soft = "" if secondary.region.hard else " (soft)"
-            text = f"Violates {secondary.region.name}{soft} {spans.lasting(span)}, by up to {by}"
+            by = f"{math.degrees(depth):.1f}°" if of_attitude(region.shape) else f"{depth:.3f} m"
+            soft = "" if region.hard else " (soft)"
+            text = f"Violates {region.name}{soft} {_until(span, is_open)}, by up to {by}"
             yield Event(span.start, "violation", text, span.end)
 
 
@@ -143,13 +142,16 @@ def _isolations(run: Run) -> Iterator[Event]:
 def _rejections(run: Run) -> Iterator[Event]:
     if REJECTED not in run.record.units:
         return
-    rejected, before = _JoinedSpans(_MAX_EVENTS // 2, _REJECTIONS_APART), 0.0
-    for block in run.record.blocks(["time", REJECTED]):
-        rejected.add(rejects(block[REJECTED], before), block["time"])
-        before = float(block[REJECTED][-1])
-    for span in rejected.found():
+
+    def blocks() -> Iterator[Block]:
+        before = 0.0
+        for block in run.record.blocks(["time", REJECTED]):
+            yield block["time"], rejects(block[REJECTED], before), None
+            before = float(block[REJECTED][-1])
+
+    for span, is_open in joined_spans(blocks(), apart=_REJECTIONS_APART):
         if span.end - span.start >= _REJECTIONS_APART:
-            text = f"The law rejects samples of position or velocity {rejected.lasting(span)}"
+            text = f"The law rejects samples of position or velocity {_until(span, is_open)}"
             yield Event(span.start, "failure", text, span.end)
 
 
@@ -159,11 +161,13 @@ def _goal_miss(run: Run) -> Iterator[Event]:
 
 
 def _saturation(run: Run) -> Iterator[Event]:
-    saturated, flags = _JoinedSpans(_MAX_EVENTS // 2), ("wrench_saturated", "allocation_saturated")
-    for block in run.record.blocks(["time", *flags]):
-        saturated.add(np.logical_or.reduce([block[name] > 0.0 for name in flags]), block["time"])
-    for span in saturated.found():
-        text = f"The commanded force exceeds the limits, {saturated.lasting(span)}"
+    flags = ("wrench_saturated", "allocation_saturated")
+    blocks = (
+        (block["time"], np.logical_or.reduce([block[name] > 0.0 for name in flags]), None)
+        for block in run.record.blocks(["time", *flags])
+    )
+    for span, is_open in joined_spans(blocks):
+        text = f"The commanded force exceeds the limits, {_until(span, is_open)}"
         yield Event(span.start, "saturation", text, span.end)
 
 
@@ -179,45 +183,35 @@ def _end(run: Run) -> Event:
     return Event(run.record.value("time", -1), "end", words.get(status, f"The run {status}"))
 
 
-class _JoinedSpans:
-    """Finds the spans in which a condition holds, and joins the closest ones while there are more than `max_spans`."""
+def _until(span: Span, is_open: bool) -> str:
+    """Format the end of a span as text."""
+    return "to the end" if is_open else f"until {span.end:.3f} s"
 
-    def __init__(self, max_spans: int, apart: float = -math.inf) -> None:
-        self._max_spans, self._apart = max_spans, apart  # s, spans at most this far apart are joined
-        self._all, self._joined = Spans(), list[Span]()
 
-    def add(self, flags: Flags, time: Array, signal: Array | None = None) -> None:
-        """Add the next rows, as in `Spans`."""
-        self._join(self._all.add(flags, time, signal))
+def joined_spans(
+    blocks: Iterable[Block], max_spans: int = _MAX_EVENTS // 2, apart: float = -math.inf
+) -> list[tuple[Span, bool]]:
+    """Find the spans in which a condition holds, and if they last to the end; join the closest ones; apart [s]."""
+    # spans at most `apart` from each other are joined; if more than `max_spans` are left, more of them
+    spans, joined = Spans(), list[Span]()
+    for time, flags, signal in blocks:
+        joined, apart = _join([*joined, *spans.add(flags, time, signal)], max_spans, apart)
+    joined, _ = _join([*joined, *([spans.open] if spans.open else [])], max_spans, apart)
+    return [(span, span is spans.open) for span in joined]
 
-    def found(self) -> list[Span]:
-        """Return the spans, after all rows were added."""
-        self._join([self._all.open] if self._all.open else [])
-        return self._joined
 
-    def lasts(self, span: Span) -> bool:
-        """Return True if a span lasts to the end of the run."""
-        return span is self._all.open
-
-    def lasting(self, span: Span) -> str:
-        """Format the end of a span as text."""
-        return "to the end" if self.lasts(span) else f"until {span.end:.3f} s"
-
-    def _join(self, more: list[Span]) -> None:
-        spans = [*self._joined, *more]
-        gaps = sorted(b.start - a.end for a, b in pairwise(spans))
-        gaps = [gap for gap in gaps if gap > self._apart]
-        if len(gaps) >= self._max_spans:
-            self._apart = gaps[len(gaps) - self._max_spans]
-        self._joined = spans[:1]
-        for span in spans[1:]:
-            last = self._joined[-1]
-            if span.start - last.end > self._apart:
-                self._joined.append(span)
-                continue
-            # the later one stays, so that the open one is found again
+def _join(spans: Sequence[Span], max_spans: int, apart: float) -> tuple[list[Span], float]:
+    """Join spans that are close to each other; return them, and the distance up to which they were joined [s]."""
+    gaps = sorted(gap for a, b in pairwise(spans) if (gap := b.start - a.end) > apart)
+    if len(gaps) >= max_spans:
+        apart = gaps[len(gaps) - max_spans]
+    joined: list[Span] = []
+    for span in spans:
+        if joined and span.start - joined[-1].end <= apart:
+            last = joined.pop()  # the later one stays, so that the open one is found again
             span.start, span.least = last.start, float(np.fmin(last.least, span.least))
-            self._joined[-1] = span
+        joined.append(span)
+    return joined, apart
 
 
 def _longest_changes(changes: Iterator[tuple[float, int]]) -> list[tuple[float, int]]:

@@ -79,7 +79,9 @@ class Recorder:
                 block = slice(first, min(first + _BLOCK, self._filled))
                 columns[:, block] = self._buffer[block].T
             # not pa.array, which imports pandas where it is installed
-            arrays = [pa.Array.from_buffers(pa.float64(), self._filled, [None, pa.py_buffer(column)]) for column in columns]
+            arrays = [
+                pa.Array.from_buffers(pa.float64(), self._filled, [None, pa.py_buffer(column)]) for column in columns
+            ]
             message = pa.RecordBatch.from_arrays(arrays, schema=self._schema).serialize()
             self._message, self._flushed, self._filled = message, self.rows, 0
             self._write()

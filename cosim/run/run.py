@@ -18,7 +18,7 @@ from cosim.run.progress import ProgressBar
 from cosim.run.run_folder import RunFolder, claim, conclude
 from cosim.scenario.law_factory import with_custom_law
 from cosim.scenario.scenario import Scenario, to_scenario
-from cosim.simulation.commands import CommandQueue, LoggedCommands, ReplayedCommands
+from cosim.simulation.commands.sources import CommandQueue, LoggedCommands, ReplayedCommands
 from cosim.simulation.master import Master, Observer
 from cosim.simulation.signals import Array
 from plant_fmu import PlantError

@@ -9,7 +9,7 @@ from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.live.command_desk import CommandDesk
 from cosim.logs.column_map import read_map
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import CommandQueue
+from cosim.simulation.commands.sources import CommandQueue
 from fuzzy_arbiter.formats import load
 from plant_fmu import load_vehicle
 from plant_fmu.compiling.compiler import find_compiler

@@ -12,34 +12,13 @@ from controller import VehicleState
 from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.actuation_limits import ActuationLimits
-from cosim.simulation.commands.commands import (
-    MODES,
-    STICK_MODES,
-    AddObstacle,
-    Arm,
-    ChangeSetting,
-    Command,
-    ManualControl,
-    MissionItem,
-    Mode,
-    RemoveObstacle,
-    Reset,
-    SetAttitude,
-    SetCurrentItem,
-    SetHeading,
-    SetMission,
-    SetMode,
-    SetTarget,
-    ShiftRegion,
-)
+from cosim.simulation.commands import commands as cmd
 from cosim.simulation.commands.mission_executor import MissionExecutor
 from cosim.simulation.commands.obstacle_slots import ObstacleSlots
 from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.stick_stabilizer import StickStabilizer
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array
-
-__all__ = ["MODES", "CommandHandler", "Mode"]
 
 log = logging.getLogger(__name__)
 
@@ -65,7 +44,7 @@ class CommandHandler:
         self._greatest_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
         self._manual: Array = np.zeros(6)
         self._by_gain = True  # True if the pilot's gain scales the sticks
-        self._attitude: SetAttitude | None = None
+        self._attitude: cmd.SetAttitude | None = None
         self._stabilizer = StickStabilizer(vehicle, state, scenario.time.control, self._greatest_wrench)
         self._mission = MissionExecutor()
         self._slots = ObstacleSlots(scenario.commands.obstacles)
@@ -73,7 +52,7 @@ class CommandHandler:
     @property
     def automatic_control(self) -> bool:
         """True if the law computes the forces; otherwise `wrench` does."""
-        return self.armed and self.mode not in STICK_MODES and not self._commanded_force
+        return self.armed and self.mode not in cmd.STICK_MODES and not self._commanded_force
 
     @property
     def _commanded_force(self) -> bool:
@@ -93,7 +72,7 @@ class CommandHandler:
             sticks, gain, rate = np.array([*attitude.force, 0.0, 0.0, 0.0]), 1.0, attitude.rate_down
         return self._stabilizer.wrench(sticks, gain, self.mode == "depth_hold", rate)
 
-    def apply(self, command: Command, time: float) -> None:
+    def apply(self, command: cmd.Command, time: float) -> None:
         """Apply a command at the beginning of a step; one that is invalid is logged and changes nothing; time [s]."""
         was_automatic = self.automatic_control
         try:
@@ -102,56 +81,56 @@ class CommandHandler:
             log.warning("%s: %s", type(command).__name__.lower(), error)
         self.control_regained |= self.automatic_control and not was_automatic
 
-    def _dispatch(self, command: Command, time: float) -> None:
+    def _dispatch(self, command: cmd.Command, time: float) -> None:
         match command:
-            case Arm():
+            case cmd.Arm():
                 self.armed = command.armed
                 self._release()
-            case SetMode():
+            case cmd.SetMode():
                 self._set_mode(command.mode, time)
-            case SetTarget():
+            case cmd.SetTarget():
                 self._environment.set_target(command.position, command.radius, command.velocity, time)
                 self._environment.save_target()
                 self.mode = "reach"
                 self._release()
-            case SetHeading():
+            case cmd.SetHeading():
                 self.heading, self.turned = command.heading, True
-            case ManualControl():
+            case cmd.ManualControl():
                 self._manual[:], self._by_gain = command.wrench, command.by_gain
-            case SetAttitude():
+            case cmd.SetAttitude():
                 if self._attitude is None:
                     self._stabilizer.begin()
                 self._attitude = command if command.quaternion is not None else None
                 self._stabilizer.attitude = None if command.quaternion is None else np.array(command.quaternion)
-            case AddObstacle() | RemoveObstacle() | ShiftRegion():
+            case cmd.AddObstacle() | cmd.RemoveObstacle() | cmd.ShiftRegion():
                 self._move_regions(command, time)
-            case ChangeSetting():
+            case cmd.ChangeSetting():
                 self.settings.change(command.key, command.value)
                 self.changed = True
                 self._apply_setting(command.key)
-            case SetMission():
+            case cmd.SetMission():
                 self._mission.set_items(command.items)
                 if self.mode == "mission":
                     self._set_mode("hold", time)
-            case SetCurrentItem():
+            case cmd.SetCurrentItem():
                 self._mission.begin(command.item)
                 if self.mode == "mission":
                     self._resume(time)
-            case Reset():
+            case cmd.Reset():
                 self.reset = True
             case _:
                 assert_never(command)
 
-    def _move_regions(self, command: AddObstacle | RemoveObstacle | ShiftRegion, time: float) -> None:
+    def _move_regions(self, command: cmd.AddObstacle | cmd.RemoveObstacle | cmd.ShiftRegion, time: float) -> None:
         match command:
-            case AddObstacle():
+            case cmd.AddObstacle():
                 slot = self._slots.assign(command.number)
                 self._environment.add_obstacle(slot, command.position, command.radius, command.velocity, time)
-            case RemoveObstacle():
+            case cmd.RemoveObstacle():
                 left = self._slots.release(command.number)
                 if left is not None:
                     self._environment.remove_obstacle(left)
-            case ShiftRegion():
+            case cmd.ShiftRegion():
                 self._environment.shift_region(command.region, command.by)
 
     def mark_applied(self) -> None:
@@ -168,7 +147,7 @@ class CommandHandler:
         elif key in settings.of_plant:
             self._limits.set(settings.of_plant[key], settings[key])
 
-    def _set_mode(self, mode: Mode, time: float) -> None:
+    def _set_mode(self, mode: cmd.Mode, time: float) -> None:
         north, east, down = (float(x) for x in self._state.position)
         radius = self.settings["commands.hold_radius"]
         if mode in ("hold", "surface") and not all(map(math.isfinite, (north, east, down))):
@@ -200,12 +179,12 @@ class CommandHandler:
             self._set_target_of(region)
         self._begin(item, time)
 
-    def _begin(self, item: MissionItem, time: float) -> None:
+    def _begin(self, item: cmd.MissionItem, time: float) -> None:
         self._set_target_of(item)
         for command in item.commands:
             self.apply(command, time)
 
-    def _set_target_of(self, item: MissionItem) -> None:
+    def _set_target_of(self, item: cmd.MissionItem) -> None:
         if item.position is not None:
             self._environment.set_target(item.position, item.radius)
 
@@ -216,7 +195,7 @@ class CommandHandler:
             following = self._mission.following(time, clearance)
         if following is not None:
             self._begin(self._mission.enter(following), time)
-        self._out[0], self._out[1], self._out[2] = self.armed, MODES.index(self.mode), self._mission.at
+        self._out[0], self._out[1], self._out[2] = self.armed, cmd.MODES.index(self.mode), self._mission.at
         self._out[3:6], self._out[6] = self._environment.target, self._environment.target_radius
         return following is not None
 

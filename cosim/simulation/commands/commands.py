@@ -126,10 +126,14 @@ class MissionItem(Table, frozen=True):
 
     position: _Position | None  # m, NED
     radius: _Radius | None = None  # m, of a sphere; None: the scenario's goal region, moved there
-    stay: Annotated[float, key("", "s", ge=0.0, le=1e9)] | None = 0.0  # s, within the region before the next item; None: forever
+    stay: Annotated[float, key("", "s", ge=0.0, le=1e9)] | None = (
+        0.0  # s, within the region before the next item; None: forever
+    )
     commands: tuple[SetHeading | ChangeSetting, ...] = ()  # applied when the item begins
     jump: Annotated[int, key("", ge=0)] | None = None  # index of the item that comes next instead, from 0
-    times: Annotated[int, key("", ge=0)] | None = None  # number of jumps, each time the mission is begun; None: no limit
+    times: Annotated[int, key("", ge=0)] | None = (
+        None  # number of jumps, each time the mission is begun; None: no limit
+    )
 
 
 class SetMission(_Command, frozen=True):

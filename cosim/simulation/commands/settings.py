@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from controller import LAWS, ControllerError
-from controller.regions import Region
 from controller.regions.shape import Shape
 from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
@@ -27,11 +27,13 @@ _COMMAND_SETTINGS = {  # unit, minimum, maximum
 
 @dataclass(frozen=True)
 class Setting:
-    """A setting and its present value."""
+    """A setting, its present value and its range."""
 
     key: str  # key of the scenario, as for `cosim run --set`
     unit: str
     value: float
+    minimum: float = -math.inf
+    maximum: float = math.inf
 
 
 class LiveSettings:
@@ -43,20 +45,20 @@ class LiveSettings:
         self._law = scenario.law.name
         self.gains: Any = scenario.law.gains  # none of a custom law
         known = [secondary.region for secondary in scenario.regions if not secondary.is_dynamic]
-        self._regions: dict[str, Region] = {region.name: region for region in known}
         self.shapes: dict[str, Shape] = {"goal": scenario.goal, **{region.name: region.shape for region in known}}
-        self._numbers: dict[str, float] = {f"regions.{region.name}.gain": region.gain for region in known}
-        self._units: dict[str, str] = {}
-        self._ranges: dict[str, tuple[float, float]] = {}
+        self._numbers: dict[str, Setting] = {}
+        for region in known:
+            self._add(f"regions.{region.name}.gain", "", region.gain, 0.0, math.inf)
         self._add("arbiter.ramp", "m", scenario.arbiter.ramp, 0.0, _GREATEST_RAMP)
         self._add_limits(scenario)
         if scenario.commands.enabled:
             for name, (unit, minimum, maximum) in _COMMAND_SETTINGS.items():
                 self._add(f"commands.{name}", unit, getattr(scenario.commands, name), minimum, maximum)
+        # region, field of its shape, and index in that field, None for a scalar, of each key of a shape
+        self._of_shapes = {key: item for name, shape in self.shapes.items() for key, item in _keys_of(name, shape)}
 
     def _add(self, key: str, unit: str, value: float, minimum: float, maximum: float) -> None:
-        self._numbers[key] = min(max(value, minimum), maximum)
-        self._units[key], self._ranges[key] = unit, (minimum, maximum)
+        self._numbers[key] = Setting(key, unit, min(max(value, minimum), maximum), minimum, maximum)
 
     def _add_limits(self, scenario: Scenario) -> None:
         """Add the limits of the actuation: of the direct wrench, or of each thruster."""
@@ -81,83 +83,62 @@ class LiveSettings:
         """Iterate over all settings, always in the same order."""
         for name in self.gains._fields:
             yield Setting(f"law.gains.{name}", "", float(getattr(self.gains, name)))
-        for key, value in self._numbers.items():
-            yield Setting(key, self._units.get(key, ""), value)
-        for name, shape in self.shapes.items():
-            where = "goal" if name == "goal" else f"regions.{name}.shape"
-            for field in dataclasses.fields(shape):  # type: ignore[arg-type]
-                value = getattr(shape, field.name)
-                if isinstance(value, tuple):
-                    for i, number in enumerate(value):
-                        if isinstance(number, float):
-                            yield Setting(f"{where}.{field.name}.{i}", "", number)
-                else:
-                    yield Setting(f"{where}.{field.name}", "", float(value))
+        yield from self._numbers.values()
+        for key, (name, field, index) in self._of_shapes.items():
+            value = getattr(self.shapes[name], field)
+            yield Setting(key, "", float(value if index is None else value[index]))
 
     def __getitem__(self, key: str) -> float:
         """Return the present value of a setting that is neither a law's gain nor part of a shape."""
-        return self._numbers[key]
+        return self._numbers[key].value
 
     def change(self, key: str, value: float) -> None:
         """Change the value of a setting."""
+        name = key.removeprefix("law.gains.")
         try:
-            if key.startswith("law.gains."):
-                name = key.removeprefix("law.gains.")
-                if name not in self.gains._fields:
-                    raise CommandError(f"{key} is no setting")
+            if name != key and name in self.gains._fields:
                 self.gains = LAWS[self._law].validate(self.gains._replace(**{name: value}))
             elif key in self._numbers:
-                self._change_number(key, value)
+                setting = self._numbers[key]
+                if not setting.minimum <= value <= setting.maximum:
+                    raise CommandError(f"{key} is {value:g}, expected {setting.minimum:g} to {setting.maximum:g}")
+                self._numbers[key] = dataclasses.replace(setting, value=value)
             else:
                 self._change_shape(key, value)
         except ControllerError as error:
             raise CommandError(f"{key}: {error}") from error
 
-    def _change_number(self, key: str, value: float) -> None:
-        if key in self._ranges:
-            minimum, maximum = self._ranges[key]
-            if not minimum <= value <= maximum:
-                raise CommandError(f"{key} is {value:g}, expected {minimum:g} to {maximum:g}")
-        else:  # regions.NAME.gain, which the region itself checks
-            name = key.removeprefix("regions.").removesuffix(".gain")
-            self._regions[name] = dataclasses.replace(self._regions[name], gain=value)
-        self._numbers[key] = value
-
     def _change_shape(self, key: str, value: float) -> None:
-        name, field, index = self._part(key)
-        shape = self.shapes[name]
+        item = self._item_of_shape(key)
+        if item is None:
+            raise CommandError(f"{key} is no setting")
+        name, field, index = item
         new: Any = value
         if index is not None:
-            numbers = list(getattr(shape, field))
-            numbers[index] = value
-            new = tuple(numbers)
-        self.shapes[name] = dataclasses.replace(shape, **{field: new})  # type: ignore[type-var]
+            numbers = getattr(self.shapes[name], field)
+            new = (*numbers[:index], value, *numbers[index + 1 :])
+        self.shapes[name] = dataclasses.replace(self.shapes[name], **{field: new})  # type: ignore[type-var]
 
     def region_of(self, key: str) -> str | None:
         """Return the region, or ``"goal"``, that the setting `key` belongs to; None if it belongs to none."""
-        if key.startswith("regions.") and key.endswith(".gain") and key in self._numbers:
+        if key.startswith("regions.") and key in self._numbers:
             return key.removeprefix("regions.").removesuffix(".gain")
-        try:
-            return self._part(key)[0]
-        except CommandError:
-            return None
+        item = self._item_of_shape(key)
+        return item[0] if item else None
 
-    def _part(self, key: str) -> tuple[str, str, int | None]:
-        """Split a key of a shape into region, field of the shape, and index in that field (None for a scalar)."""
-        for name, shape in self.shapes.items():
-            where = "goal." if name == "goal" else f"regions.{name}.shape."
-            if not key.startswith(where):
-                continue
-            field, _, rest = key.removeprefix(where).partition(".")
-            field = current_name(dict.fromkeys(_fields(shape)), field)
-            value = getattr(shape, field, None) if field in _fields(shape) else None
-            if isinstance(value, float) and not rest:
-                return name, field, None
-            numbers = value if isinstance(value, tuple) else ()
-            if rest in map(str, range(len(numbers))) and isinstance(numbers[int(rest)], float):
-                return name, field, int(rest)
-        raise CommandError(f"{key} is no setting")
+    def _item_of_shape(self, key: str) -> tuple[str, str, int | None] | None:
+        if key not in self._of_shapes:
+            key = ".".join(current_name({"center": None}, part) for part in key.split("."))
+        return self._of_shapes.get(key)
 
 
-def _fields(shape: Shape) -> set[str]:
-    return {field.name for field in dataclasses.fields(shape)}  # type: ignore[arg-type]
+def _keys_of(name: str, shape: Shape) -> Iterator[tuple[str, tuple[str, str, int | None]]]:
+    """Yield the key of each number of a region's shape, with the region, the field and the index in it."""
+    where = "goal" if name == "goal" else f"regions.{name}.shape"
+    for field in dataclasses.fields(shape):  # type: ignore[arg-type]
+        value = getattr(shape, field.name)
+        if isinstance(value, tuple):
+            numbers = (i for i, number in enumerate(value) if isinstance(number, float))
+            yield from ((f"{where}.{field.name}.{i}", (name, field.name, i)) for i in numbers)
+        else:
+            yield f"{where}.{field.name}", (name, field.name, None)

@@ -15,8 +15,8 @@ from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.wire.ground_end import ReceivedMessage
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import CommandQueue
 from cosim.simulation.commands.commands import Arm, SetMode
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.master import Master
 
 DOWN, UP = 0.012, 0.055  # s, from the autopilot and to it

@@ -17,8 +17,9 @@ from cosim.live.hub import Cursor, Hub
 from cosim.live.view_server import MAX_CONNECTIONS
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.columns import columns_without_plant
-from cosim.simulation.commands import CommandQueue, sources
+from cosim.simulation.commands import sources
 from cosim.simulation.commands.commands import ChangeSetting
+from cosim.simulation.commands.sources import CommandQueue
 from tests.cosim.live.conftest import WAIT, replayed, require_same_record
 
 

@@ -19,8 +19,8 @@ from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.link import open_links
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import CommandQueue
 from cosim.simulation.commands.commands import Reset
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.master import Master
 from cosim.simulation.signals import Array
 

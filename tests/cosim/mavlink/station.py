@@ -17,7 +17,7 @@ from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import Scenario, load_scenario
 from cosim.simulation.columns import column_names
-from cosim.simulation.commands import CommandQueue
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Column
 from tests.cosim.mavlink.stubs import message
 

@@ -7,7 +7,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from cosim.mavlink.autopilot import Autopilot
 from cosim.mavlink.wire.options import MavlinkOptions
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import CommandQueue
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.master import Master
 from tests.cosim.mavlink.station import ACCEPTED, Station, Wire, set_parameter
 from tests.cosim.mavlink.test_mission import upload

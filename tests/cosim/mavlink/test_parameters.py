@@ -13,8 +13,8 @@ from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.parameter_protocol import shorten_float32
 from cosim.mavlink.services.station_parameters import station_parameters
 from cosim.scenario.toml_file import list_scenarios
-from cosim.simulation.commands import LiveSettings
 from cosim.simulation.commands.commands import ChangeSetting
+from cosim.simulation.commands.settings import LiveSettings
 from tests.cosim.mavlink.station import NAN, Station, scenario, set_parameter
 from tests.cosim.mavlink.stubs import message
 from tests.examples import examples

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from benchmarks.long_record import write_long_run
 from cosim.export.excerpt import excerpt_of
 from cosim.io.strict_json import json_text
-from cosim.replay.events import _JoinedSpans
+from cosim.replay.events import joined_spans
 from cosim.replay.trace import trace_of
 from cosim.report.contents import contents_of
 from cosim.report.figures.sampled_rows import make_figure_data
@@ -151,11 +151,9 @@ def test_spans_do_not_depend_on_blocks(signal, data):
 def test_widest_gaps_do_not_depend_on_blocks(lengths, most, data):
     flags = np.array([i % 2 == 0 for i, length in enumerate(lengths) for _ in range(length)], bool)
     time = np.arange(len(flags)) * 1.0
-    few = _JoinedSpans(most)
     at = sorted(data.draw(st.lists(st.integers(0, len(flags)), max_size=6)))
-    for t, f in zip(np.split(time, at), np.split(flags, at), strict=True):
-        few.add(f, t)
-    found = [(span.start, span.end) for span in few.found()]
+    blocks = zip(np.split(time, at), np.split(flags, at), itertools.repeat(None))
+    found = [(span.start, span.end) for span, _ in joined_spans(blocks, most)]
     # all at once: close every gap that is no wider than the widest one that has to go
     whole = spans(flags, time)
     gaps = [b[0] - a[1] for a, b in itertools.pairwise(whole)]

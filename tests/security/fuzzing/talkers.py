@@ -27,7 +27,7 @@ from cosim.mavlink.wire.ground_end import ReceivedMessage
 from cosim.replay.header import header_of
 from cosim.replay.view_columns import ViewColumns
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import CommandQueue
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.sitl import json_protocol
 from cosim.sitl.hil_server import HilServer
 from cosim.sitl.law import make_control_law, make_pwm_law

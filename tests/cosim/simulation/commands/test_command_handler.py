@@ -8,9 +8,10 @@ from cosim.results.as_flown import scenario_as_flown
 from cosim.results.record import load_record
 from cosim.run.run import run_scenario
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import MODES, CommandQueue, LoggedCommands, ReplayedCommands
 from cosim.simulation.commands import commands as cmd
 from cosim.simulation.commands.command_handler import greatest_wrench
+from cosim.simulation.commands.commands import MODES
+from cosim.simulation.commands.sources import CommandQueue, LoggedCommands, ReplayedCommands
 from cosim.step.decision import MAX_WRENCH, bound_wrench
 from plant_fmu.vehicle import load_vehicle
 from tests.cosim.simulation.keep import kept_rows

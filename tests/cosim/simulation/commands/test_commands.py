@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 
 from cosim.errors import CommandError, RunError
 from cosim.scenario.scenario import load_scenario
-from cosim.simulation.commands import CommandQueue, LiveSettings, LoggedCommands, ReplayedCommands, sources
 from cosim.simulation.commands import commands as cmd
-from cosim.simulation.commands.sources import QUEUED
+from cosim.simulation.commands import sources
+from cosim.simulation.commands.settings import LiveSettings
+from cosim.simulation.commands.sources import QUEUED, CommandQueue, LoggedCommands, ReplayedCommands
 
 number = st.floats(-1e4, 1e4)
 place = st.tuples(number, number, number)
