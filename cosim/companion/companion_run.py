@@ -97,8 +97,7 @@ def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile:
 
 def _speed_with_reserve(vehicle: Vehicle) -> float:
     """Return the forward speed [m/s] whose drag takes 70 % of the thrusters' force; the rest is for moments."""
-    max_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
-    return drag_limited_speed(vehicle, 0, (1.0 - _RESERVE) * float(max_wrench[0]))
+    return drag_limited_speed(vehicle, 0, (1.0 - _RESERVE) * float(greatest_wrench(vehicle)[0]))
 
 
 class Companion:

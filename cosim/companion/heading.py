@@ -8,8 +8,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from controller.quaternion import from_axis_angle, multiply
-from cosim.companion.vehicle_state import ReportedState
+from controller.quaternion import multiply
+from cosim.companion.vehicle_state import ReportedState, turned
 from cosim.simulation.signals import Array
 
 log = logging.getLogger(__name__)
@@ -43,9 +43,7 @@ class HeadingWatch:
         self._before = time, state.quaternion.copy(), state.rates.copy()
         if before is None or not 0.0 < time - before[0] <= _MAX_GAP:
             return
-        rotation = 0.5 * (time - before[0]) * (before[2] + state.rates)
-        angle = float(np.linalg.norm(rotation))
-        expected = multiply(before[1], from_axis_angle(rotation / angle, angle)) if angle > 0.0 else before[1]
+        expected = turned(before[1], 0.5 * (time - before[0]) * (before[2] + state.rates))
         e0, _, _, e3 = multiply(state.quaternion, expected * (1.0, -1.0, -1.0, -1.0)).tolist()
         self.leap = max(self.leap, abs(2.0 * math.atan(e3 / e0)) if e0 else math.pi)
 

@@ -18,7 +18,7 @@ from cosim.companion.outputs import Output, steering_mode, uses_sticks
 from cosim.companion.safety import GAIN_TOLERANCE, Observation, State, Supervisor
 from cosim.companion.vehicle_state import RATES, ReportedState
 from cosim.mavlink.vehicle.profile import PROFILES
-from cosim.mavlink.wire.dialect import dialect, make_heartbeat
+from cosim.mavlink.wire.dialect import dialect, make_command, make_heartbeat, make_rate_requests
 from cosim.simulation.commands.commands import Arm, Command, Mode
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
@@ -219,8 +219,8 @@ class AutopilotSession:
         for name in self.failsafes.names_to_request(now) if is_up else ():
             self._link.send(m.MAVLink_param_request_read_message(self.reported.system, 1, name.encode(), -1))
         if self._is_due("rates", _RATES_PERIOD, now):
-            for name, rate in RATES.items():
-                self._command(m.MAV_CMD_SET_MESSAGE_INTERVAL, getattr(m, f"MAVLINK_MSG_ID_{name}"), 1e6 / rate)
+            for request in make_rate_requests(m, self.reported.system, RATES):
+                self._link.send(request)
 
     def _send_outputs(self, state: State, now: float, wrench: Array, period: float) -> None:
         output, messages = self.output, ()  # type: Output, Sequence[Any]
@@ -268,8 +268,7 @@ class AutopilotSession:
             self._command(self._mavlink.MAV_CMD_DO_SET_MODE, _CUSTOM_MODE_ENABLED, first, second)
 
     def _command(self, number: int, *parameters: float) -> None:
-        filled = [*parameters, *[0.0] * (7 - len(parameters))]
-        self._link.send(self._mavlink.MAVLink_command_long_message(self.reported.system or 0, 1, number, 0, *filled))
+        self._link.send(make_command(self._mavlink, self.reported.system or 0, number, *parameters))
 
     def _announce(self, state: State) -> None:
         """Log the new state, and send it as a STATUSTEXT."""

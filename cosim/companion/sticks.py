@@ -136,7 +136,7 @@ class StickScale:
 def make_stick_scale(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: SticksBy) -> StickScale:
     """Return the scale of the sticks of a vehicle."""
     gain = pilot_gain if sticks_by == "manual-control" else 1.0
-    max_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+    max_wrench = greatest_wrench(vehicle)
     if profile.name != "ardusub":  # the autopilot allocates the axes to the thrusters itself
         efforts = np.diag(np.divide(1.0, max_wrench, out=np.zeros(6), where=max_wrench > 0.0))
         return StickScale(efforts, np.diag(max_wrench), np.eye(6), gain, True, False, 0.0)

@@ -105,10 +105,7 @@ class ReportedState:
         lead = min(self.age(now), _MAX_PREDICTION)
         if not math.isfinite(lead):
             return self.position.copy(), self.quaternion.copy()
-        rotation = lead * self.rates
-        angle = float(np.linalg.norm(rotation))
-        turn = from_axis_angle(rotation / angle, angle) if angle > 0.0 else np.array([1.0, 0.0, 0.0, 0.0])
-        return self.position + lead * self.velocity, multiply(self.quaternion, turn)
+        return self.position + lead * self.velocity, turned(self.quaternion, lead * self.rates)
 
     @property
     def velocity_body(self) -> Array:
@@ -190,6 +187,12 @@ class ReportedState:
 
     def _receive_timesync(self, m: Any, now: float) -> None:
         self.sync.add_answer(m.tc1, m.ts1, now)
+
+
+def turned(quaternion: Array, rotation: Array) -> Array:
+    """Turn an attitude by a rotation vector [rad, body frame]."""
+    angle = float(np.linalg.norm(rotation))
+    return multiply(quaternion, from_axis_angle(rotation / angle, angle)) if angle > 0.0 else quaternion.copy()
 
 
 def _is_deflected(message: Any, autopilot: int) -> bool:

@@ -132,7 +132,7 @@ def design(
     count = math.floor((duration - BEGIN + RETURN) / (SECONDS + RETURN))
     _require_possible(box, depth, duration, current, vehicle)
     trial = excitation_scenario(start, vehicle, depth, _SETTLE + SECONDS)
-    axes = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max) > 0.0
+    axes = greatest_wrench(vehicle) > 0.0
     candidates = list(candidate_segments(axes, np.random.default_rng(seed)))
     usable: list[tuple[Segment, Array]] = []  # with the information of each
     parameters: list[Parameter] = []

@@ -50,7 +50,7 @@ def command_forces(
     if not n:
         raise ImportLogError(f"vehicle {vehicle.name!r} has no thrusters, expected a log with a body wrench")
     if topic.quantity == "sticks":
-        full = PILOT_GAIN * greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+        full = PILOT_GAIN * greatest_wrench(vehicle)
         summary = f"sticks of {topic.name}, full ones as {PILOT_GAIN:g} of the greatest wrench, without servo outputs"
         return CommandForces(topic.quantity, "wrench", lambda values, _: values * full, summary)
     if topic.quantity == "pulses":

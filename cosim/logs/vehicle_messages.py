@@ -8,12 +8,12 @@ from typing import Any
 from cosim.logs.frames import ReadComponents, attitude_of_angles, attitude_of_quaternion, scale_fields
 from cosim.logs.spool import LogContents, handled_names
 from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.manual_control import decode_sticks
 
 AUTOPILOT = 1  # component id of an autopilot
 NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID, of ground stations and other components
 DOWNWARD = 25  # MAV_SENSOR_ROTATION_PITCH_270
 _LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
-_INVALID_STICK = 0x7FFF  # value of an unused stick
 _MARINE_TYPES = (0, 11, 12)  # MAV_TYPE of generic, surface boat and submarine
 _FROM_OTHERS = ("MANUAL_CONTROL", "VISION_POSITION_DELTA")  # messages of the pilot's station and of a DVL's driver
 _ARDUPILOT, _PX4 = 3, 12  # MAV_AUTOPILOT
@@ -74,7 +74,9 @@ class VehicleMessages:
             read(message, written)
 
     def _read_manual_control(self, m: Any, written: float) -> None:
-        self._contents.put("sticks", "MANUAL_CONTROL", math.nan, written, self._sticks(m))
+        center = 500.0 if self._autopilot in _RESTS_IN_THE_MIDDLE else 0.0
+        sticks = decode_sticks(m, center, 400.0 if self._autopilot == _ARDUPILOT else 1000.0)
+        self._contents.put("sticks", "MANUAL_CONTROL", math.nan, written, sticks)
 
     def _read_sys_status(self, m: Any, written: float) -> None:
         if 0 < m.voltage_battery < 0xFFFF:
@@ -106,28 +108,12 @@ class VehicleMessages:
         # ArduPilot's are scaled to mG and mrad/s; others are in units of the chip
         return " in units of the chip" if name == "RAW_IMU" and self._autopilot != _ARDUPILOT else ""
 
-    def _sticks(self, m: Any) -> tuple[float, ...]:
-        """Return the sticks X Y Z K M N, -1 to 1, of MANUAL_CONTROL."""
-        center = 500.0 if self._autopilot in _RESTS_IN_THE_MIDDLE else 0.0
-        up = 0.0 if m.z == _INVALID_STICK else (m.z - center) / (1000.0 - center)
-        roll = _stick(m.t) if m.enabled_extensions & 2 else 0.0
-        pitch = _stick(m.s) if m.enabled_extensions & 1 else 0.0
-        return _stick(m.x), _stick(m.y), -_limit(up) + 0.0, roll, pitch, _stick(m.r)
-
 
 MESSAGES = _SAMPLES.keys() | handled_names(VehicleMessages)  # that are read
 
 
 def _text(text: str | bytes) -> str:
     return text if isinstance(text, str) else text.decode("ascii", "replace")
-
-
-def _stick(value: int) -> float:
-    return 0.0 if value == _INVALID_STICK else _limit(value / 1000.0)
-
-
-def _limit(value: float) -> float:
-    return max(-1.0, min(1.0, value))
 
 
 def vehicle_kind(number: int) -> str:

@@ -14,7 +14,7 @@ from controller.law import Diagnostic
 from cosim.companion.vehicle_state import ReportedState
 from cosim.errors import TelemetryError
 from cosim.mavlink.vehicle.row_layout import quaternion_to_euler
-from cosim.mavlink.wire.dialect import dialect, make_heartbeat
+from cosim.mavlink.wire.dialect import dialect, make_heartbeat, make_rate_requests
 from cosim.mavlink.wire.endpoint import Endpoint
 from cosim.mavlink.wire.ground_end import GroundLink, Identity
 from cosim.simulation.signals import Array
@@ -121,7 +121,5 @@ class SitlLink:
             self._link.send(make_heartbeat(m, m.MAV_TYPE_ONBOARD_CONTROLLER, m.MAV_STATE_ACTIVE))
         if system is not None and now - self._requested_at >= _REQUEST_PERIOD:
             self._requested_at = now
-            for name, rate in _RATES.items():
-                interval = getattr(m, f"MAVLINK_MSG_ID_{name}"), 1e6 / rate, 0, 0, 0, 0, 0
-                command = system, 1, m.MAV_CMD_SET_MESSAGE_INTERVAL, 0, *interval
-                self._link.send(m.MAVLink_command_long_message(*command))
+            for request in make_rate_requests(m, system, _RATES):
+                self._link.send(request)

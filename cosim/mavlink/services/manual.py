@@ -16,15 +16,13 @@ from cosim.mavlink.vehicle.ardusub_sticks import (
     apply_dead_zone,
 )
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
+from cosim.mavlink.wire.manual_control import clip_stick, decode_sticks
 from cosim.scenario.region_tables import Vector6
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.commands import STICK_MODES, ManualControl, Mode
 from cosim.simulation.commands.stick_stabilizer import GREATEST_TILT
 
-_FULL = 1000.0
-_INVALID = 0x7FFF
 _TIMEOUT = 3.0  # s of the wall clock
-_PITCH, _ROLL = 1, 2  # enabled_extensions
 _CENTER, _SWING = 1500, 400  # us of a channel
 _CHANNELS = 6  # pitch, roll, up, yaw, forward, right, as ArduSub has them
 _RELEASED, _IGNORED = 0, 0xFFFF  # values of a channel that is released, and of one that stays unchanged
@@ -39,7 +37,7 @@ class ManualControlService(Service):
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
         vehicle = context.scenario.vehicle
-        max_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+        max_wrench = greatest_wrench(vehicle)
         self._mixer = None if vehicle.autopilot is None else MotorMixer(vehicle)
         self._reciprocal = np.divide(1.0, max_wrench, out=np.zeros(6), where=max_wrench > 0.0)
         self._received_at: float | None = None
@@ -67,14 +65,15 @@ class ManualControlService(Service):
 
     def _receive_manual_control(self, sender: Sender, message: Any) -> None:
         if message.target == self.context.options.system_id:
-            self._apply(sender, self._wrench(message), by_gain=True)
+            profile = self.context.profile
+            self._apply(sender, decode_sticks(message, profile.centered_stick, profile.full_tilt_stick), by_gain=True)
 
     def _receive_rc_channels_override(self, sender: Sender, message: Any) -> None:
         pulses = [getattr(message, f"chan{i}_raw") for i in range(1, _CHANNELS + 1)]
         surge, sway, heave, roll, pitch, yaw = self.context.sticks
         before = pitch, roll, -heave, yaw, surge, sway
         pitch, roll, up, yaw, surge, sway = (
-            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else _clip((pulse - _CENTER) / _SWING)
+            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else clip_stick((pulse - _CENTER) / _SWING)
             for pulse, old in zip(pulses, before, strict=True)
         )
         self._apply(sender, (surge, sway, -up + 0.0, roll, pitch, yaw), by_gain=False)
@@ -119,20 +118,3 @@ class ManualControlService(Service):
             parts[2] = apply_dead_zone(scaled[2], gain * CLIMB_DEAD_ZONE)
         x, y, z, k, m, n = np.clip(parts, -1.0, 1.0).tolist()
         return x, y, z, k, m, n
-
-    def _wrench(self, message: Any) -> Vector6:
-        """Return X Y Z K M N from -1 to 1; the vertical stick is positive up, Z is positive down."""
-        center = self.context.profile.centered_stick
-        up = 0.0 if message.z == _INVALID else _clip((message.z - center) / (_FULL - center))
-        full = self.context.profile.full_tilt_stick
-        roll = _axis(message.t, full) if message.enabled_extensions & _ROLL else 0.0
-        pitch = _axis(message.s, full) if message.enabled_extensions & _PITCH else 0.0
-        return _axis(message.x), _axis(message.y), -up + 0.0, roll, pitch, _axis(message.r)
-
-
-def _axis(value: int, full: float = _FULL) -> float:
-    return 0.0 if value == _INVALID else _clip(value / full)
-
-
-def _clip(value: float) -> float:
-    return max(-1.0, min(1.0, value))

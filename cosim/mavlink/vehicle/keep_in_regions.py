@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-
-import numpy as np
 
 from controller.regions import pack
-from controller.regions.region_set import of_attitude
-from controller.regions.shape import Shape
+from controller.regions.region_set import RegionEvaluator, of_attitude
 from cosim.mavlink.vehicle.view import View
 from cosim.scenario.region_tables import Vector3
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.settings import LiveSettings
 
-_LEVEL = np.array([1.0, 0.0, 0.0, 0.0])
+_LEVEL = (1.0, 0.0, 0.0, 0.0)
 
 
 class KeepInRegions:
@@ -26,26 +22,16 @@ class KeepInRegions:
     def __init__(self, scenario: Scenario) -> None:
         every = [secondary.region for secondary in scenario.regions if not secondary.is_dynamic]
         self._regions = [region for region in every if region.keep == "in" and not of_attitude(region.shape)]
-        self._clearances_at((0.0, 0.0, 0.0), {}, [])
+        RegionEvaluator(pack(self._regions)).evaluate((0.0, 0.0, 0.0), _LEVEL)
 
     def objections(self, position_ned: Vector3, view: View, settings: LiveSettings) -> list[str]:
         """Return a text for each violated region of a target, and for one above the surface; position_ned [m]."""
-        shifts = [view.shift(region.name) for region in self._regions]
-        clearances = self._clearances_at(position_ned, settings.shapes, shifts)
-        pairs = zip(self._regions, clearances, strict=True)
+        packed = pack([dataclasses.replace(region, shape=settings.shapes[region.name]) for region in self._regions])
+        for k, region in enumerate(self._regions):
+            packed.shifts[k] = view.shift(region.name)
+        *_, clearances = RegionEvaluator(packed).evaluate(position_ned, _LEVEL)
+        pairs = zip(self._regions, clearances.tolist(), strict=True)
         words = [f"{-clearance:.2g} m outside {region.name}" for region, clearance in pairs if clearance < 0.0]
         if position_ned[2] < 0.0:
             words.append(f"{-position_ned[2]:.2g} m above the surface")
         return words
-
-    def _clearances_at(self, position: Vector3, shapes: Mapping[str, Shape], shifts: list[Vector3]) -> list[float]:
-        n = len(self._regions)
-        if not n:
-            return []
-        packed = pack([dataclasses.replace(r, shape=shapes.get(r.name, r.shape)) for r in self._regions])
-        if shifts:
-            packed.shifts[:] = shifts
-        values, gradients, rotation_gradients, clearances = np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n)
-        packed.evaluate(np.array(position), _LEVEL, values, gradients, rotation_gradients, clearances)
-        result: list[float] = clearances.tolist()
-        return result

@@ -9,7 +9,7 @@ import numpy as np
 from controller.compiling.function import CompiledFunction
 from controller.regions import pack
 from controller.regions.rays import ray_distances
-from controller.regions.region_set import of_attitude
+from controller.regions.region_set import RegionEvaluator, of_attitude
 from controller.regions.shape import Shape
 from cosim.mavlink.vehicle.view import View
 from cosim.scenario.region_tables import PARKED_POSITION, SecondaryRegion, Vector3
@@ -19,7 +19,7 @@ from cosim.simulation.commands.settings import LiveSettings
 SECTORS = 72  # number of sectors of a scan
 MAX_RANGE = 20.0  # m, range of a scan
 _RAYS = 3  # number of rays in a sector: at full range the scan detects anything wider than 0.6 m
-_NO_SHIFT = (0.0, 0.0, 0.0)
+_NO_SHIFT, _LEVEL = (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
 
 
 class Proximity:
@@ -35,12 +35,10 @@ class Proximity:
         self._shapes: list[Shape] = [secondary.region.shape for _, secondary in obstacles]
         self._shifts: list[Vector3] = [_NO_SHIFT] * len(obstacles)
         self._regions = pack([secondary.region for _, secondary in obstacles])
-        n = len(obstacles)
-        self._values, self._clearances = np.zeros(n), np.zeros(n)
-        self._gradients, self._rotation_gradients = np.zeros((n, 3)), np.zeros((n, 3))
+        self._evaluator = RegionEvaluator(self._regions)
         self._angles = (np.arange(SECTORS * _RAYS) - _RAYS // 2) * (2.0 * math.pi / (SECTORS * _RAYS))
         self._directions, self._distances = np.zeros((SECTORS * _RAYS, 3)), np.zeros(SECTORS * _RAYS)
-        self._position, self._level = np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
+        self._position = np.zeros(3)
         self._ray_distances = CompiledFunction(ray_distances)
         self.inward_directions(_NO_SHIFT)
         self.scan(_NO_SHIFT, 0.0)
@@ -63,11 +61,8 @@ class Proximity:
 
     def inward_directions(self, position_ned: Vector3) -> list[list[float]]:
         """Return the direction in which the clearance of each obstacle decreases; position_ned [m]."""
-        self._position[:] = position_ned
-        self._regions.evaluate(
-            self._position, self._level, self._values, self._gradients, self._rotation_gradients, self._clearances
-        )
-        directions: list[list[float]] = self._gradients.tolist()
+        _, gradients, _, _ = self._evaluator.evaluate(position_ned, _LEVEL)
+        directions: list[list[float]] = gradients.tolist()
         return directions
 
     def scan(self, position_ned: Vector3, heading: float) -> list[float]:

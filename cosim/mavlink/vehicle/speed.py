@@ -28,8 +28,7 @@ def resolve_speed(context: VehicleContext, speed: float) -> float | None:
 
 def terminal_speed(vehicle: Vehicle) -> float:
     """Return the maximum speed in still water at full thrust along a body axis, where drag equals thrust [m/s]."""
-    thrust = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)[:3].tolist()
-    return max(drag_limited_speed(vehicle, axis, force) for axis, force in enumerate(thrust))
+    return max(drag_limited_speed(vehicle, i, force) for i, force in enumerate(greatest_wrench(vehicle)[:3].tolist()))
 
 
 def drag_limited_speed(vehicle: Vehicle, axis: int, force: float) -> float:

@@ -19,6 +19,7 @@ from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.stick_stabilizer import StickStabilizer
 from cosim.simulation.environment import RegionEnvironment
 from cosim.simulation.signals import Array
+from plant_fmu import Vehicle
 
 log = logging.getLogger(__name__)
 
@@ -41,7 +42,7 @@ class CommandHandler:
         self._environment, self._limits, self._state, self._out = environment, limits, state, out
         vehicle = scenario.vehicle
         # maximum wrench along and about each axis, which a full stick commands
-        self._greatest_wrench = greatest_wrench(vehicle.thruster_matrix, vehicle.thrust_min, vehicle.thrust_max)
+        self._greatest_wrench = greatest_wrench(vehicle)
         self._manual: Array = np.zeros(6)
         self._by_gain = True  # True if the pilot's gain scales the sticks
         self._attitude: cmd.SetAttitude | None = None
@@ -200,11 +201,10 @@ class CommandHandler:
         return following is not None
 
 
-def greatest_wrench(matrix: Array, lower: Array, upper: Array) -> Array:
-    """Return the maximum wrench along and about each single axis, in both directions, by least-norm allocation."""
-    # with matrix [-, m], lower, upper [N], returns [N, N m]
-    inverse = np.linalg.pinv(matrix)
-    limit = np.minimum(-lower, upper)
+def greatest_wrench(vehicle: Vehicle) -> Array:
+    """Return the maximum wrench along and about each axis, in both directions, by least-norm allocation [N, N m]."""
+    inverse = np.linalg.pinv(vehicle.thruster_matrix)
+    limit = np.minimum(-vehicle.thrust_min, vehicle.thrust_max)
     result = np.zeros(6)
     for axis in range(6):
         share = np.abs(inverse[:, axis])

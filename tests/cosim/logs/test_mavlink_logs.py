@@ -180,12 +180,13 @@ def test_sticks_replace_missing_servo_outputs(tmp_path, imported):
         for k in range(400):
             stamp = struct.pack(">Q", START + k * 50_000)
             file.write(stamp + SUB.attitude_encode(k * 50, 0.0, 0.0, math.radians(30.0), 0.0, 0.0, 0.0).pack(SUB))
-            # half ahead; the vertical stick rests at 500
-            file.write(stamp + PILOT.manual_control_encode(1, 500, 0, 500, 0, 0).pack(PILOT))
+            # half ahead; the vertical stick rests at 500; half a pitch, as 400 is a full one
+            file.write(stamp + PILOT.manual_control_encode(1, 500, 0, 500, 0, 0, 0, 1, 200).pack(PILOT))
     run = imported(tmp_path / "it.tlog")
     assert run.scenario.actuation.through == "wrench"
     assert load_log_facts(run.folder).commands.startswith("sticks of MANUAL_CONTROL")
     wrench = {"wrench.X": 0.5 * 0.5 * 4.0 * 40.0 * math.sqrt(0.5), "wrench.Z": 0.0, "attitude.yaw": math.radians(30.0)}
+    wrench["wrench.M"] = 0.5 * 0.5 * 4.0 * 40.0 * np.abs(run.scenario.vehicle.thruster_matrix[4, 4:]).mean()
     for name, expected in wrench.items():
         np.testing.assert_allclose(run.record[name][20:-20], expected, rtol=1e-6)
 
