@@ -31,8 +31,7 @@ from benchmarks.autopilot.simulated_link import FAULTS
 from benchmarks.machine import description
 from benchmarks.peer_environment import Environment
 from benchmarks.table import Table, as_json, print_tables, write_json
-from cosim.companion.outputs import SteerBy
-from cosim.companion.sticks import SticksBy
+from cosim.companion.companion_options import SteerBy, SticksBy
 from cosim.errors import ScenarioError
 
 BENCHMARKS = {"step": step, "law": law, "fmu": fmu, "fuzzy": fuzzy, "mavlink": mavlink, "sitl": sitl, "view": view}

@@ -10,7 +10,7 @@ import pytest
 
 from controller.regions.shapes import ENTRIES
 from cosim.campaigns.ablation import VARIANTS
-from cosim.companion.outputs import SteerBy
+from cosim.companion.companion_options import SteerBy
 from cosim.export.formats import FORMATS
 from cosim.logs.column_map import MAPPED
 from cosim.mavlink.messages.message_table import message_specs

@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from cosim.companion.frame_alignment import SceneOrigin
-from cosim.companion.outputs import SteerBy
-from cosim.companion.sticks import SticksBy
 from cosim.mavlink.wire.options import ProfileName
+from cosim.simulation.commands.commands import Mode
+
+SteerBy = Literal["sticks", "wrench", "velocity", "attitude"]
+SticksBy = Literal["manual-control", "rc-override"]
+_STEERING_MODES: dict[SteerBy, Mode] = {
+    "sticks": "stabilize", "wrench": "manual", "velocity": "reach", "attitude": "reach",
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -35,3 +41,14 @@ class CompanionOptions:
     level_dive: float = 0.6  # m, depth of an ArduSub's dive after arming, before it is steered; 0 for none
     least_battery: float = 0.0  # percent, remaining charge below which the vehicle is held
     timeout: float | None = None  # s, longest wait until steering begins; None: no limit
+
+    @property
+    def uses_sticks(self) -> bool:
+        """True if sticks are sent: to an ArduSub also with attitudes, whose set-points have no horizontal force."""
+        return self.steer_by in ("sticks", "wrench") or (self.steer_by == "attitude" and self.profile == "ardusub")
+
+    @property
+    def steering_mode(self) -> Mode:
+        """Mode in which the autopilot accepts the output."""
+        with_depth = self.steer_by == "attitude" and self.profile == "ardusub"
+        return "depth_hold" if with_depth else _STEERING_MODES[self.steer_by]

@@ -11,8 +11,7 @@ import numpy as np
 
 from controller.laws.deployable.gains import SPREADS
 from cosim.companion.autopilot_link import AutopilotLink
-from cosim.companion.companion_options import CompanionOptions
-from cosim.companion.outputs import SteerBy
+from cosim.companion.companion_options import CompanionOptions, SteerBy
 from cosim.companion.placement import MAX_DISTANCE, Placement, format_distance
 from cosim.companion.remote_vehicle import RemoteVehicle
 from cosim.companion.safety import State

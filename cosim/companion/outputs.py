@@ -3,27 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
+from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.set_points import LevelLead, TurnLead, VelocityLead, make_attitude_message, make_velocity_target
-from cosim.companion.sticks import SticksBy, make_manual_control, make_stick_scale, override_channels, release_channels
+from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels, release_channels
 from cosim.companion.vehicle_state import ReportedState
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.profile import PROFILES, Profile
-from cosim.mavlink.wire.options import ProfileName
-from cosim.simulation.commands.commands import Mode
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
-
-SteerBy = Literal["sticks", "wrench", "velocity", "attitude"]
-_STEERING_MODES: dict[SteerBy, Mode] = {
-    "sticks": "stabilize",
-    "wrench": "manual",
-    "velocity": "reach",
-    "attitude": "reach",
-}
 
 _PX4_REJECTIONS: dict[str, str] = {
     "sticks": "its Stabilized takes the forward stick for heave or pitch; expected attitude",
@@ -35,45 +26,28 @@ _YAW_FRACTION = 0.75  # fraction of the law's yaw rate that the stick commands
 _CENTERING_TIME = 0.2  # s, during which overridden channels are centered before their release
 
 
-def require_supported(profile: ProfileName, steer_by: SteerBy, sticks_by: SticksBy) -> None:
+def _require_supported(options: CompanionOptions) -> None:
     """Raise an error if an autopilot does not accept an output."""
-    if profile == "px4" and steer_by in _PX4_REJECTIONS:
+    steer_by, sticks_by = options.steer_by, options.sticks_by
+    if options.profile == "px4" and steer_by in _PX4_REJECTIONS:
         raise RunError(f"--steer-by {steer_by}: not supported by PX4: {_PX4_REJECTIONS[steer_by]}")
-    if sticks_by == "rc-override" and not uses_sticks(profile, steer_by):
+    if sticks_by == "rc-override" and not options.uses_sticks:
         raise RunError(f"--sticks-by {sticks_by}: no sticks are sent with --steer-by {steer_by}, expected none")
 
 
-def uses_sticks(profile: ProfileName, steer_by: SteerBy) -> bool:
-    """Return True if sticks are sent: to an ArduSub also with attitudes, whose set-points have no horizontal force."""
-    return steer_by in ("sticks", "wrench") or (steer_by == "attitude" and profile == "ardusub")
-
-
-def steering_mode(profile: ProfileName, steer_by: SteerBy) -> Mode:
-    """Return the mode in which an autopilot accepts an output."""
-    return "depth_hold" if steer_by == "attitude" and profile == "ardusub" else _STEERING_MODES[steer_by]
-
-
 class Output:
-    """Make the messages that command a wrench, and keep their values for the record; lags [s]."""
+    """Make the messages that command a wrench, and keep their values for the record."""
 
-    def __init__(
-        self,
-        mavlink: Any,
-        vehicle: Vehicle,
-        profile: ProfileName,
-        steer_by: SteerBy,
-        sticks_by: SticksBy,
-        pilot_gain: float,
-        lags: tuple[float, float],
-    ) -> None:
-        require_supported(profile, steer_by, sticks_by)
-        self._mavlink, self._steer_by, self._sticks_by = mavlink, steer_by, sticks_by
-        self._profile: Profile = PROFILES[profile]
-        self._uses_sticks = uses_sticks(profile, steer_by)
-        self._scale = make_stick_scale(vehicle, self._profile, pilot_gain, sticks_by)
-        self._yaw_fraction = _YAW_FRACTION if profile == "ardusub" else 1.0
-        self._all_axes = steer_by == "wrench" or (steer_by == "sticks" and profile == "ardusub")
-        self._turn, self._lead, self._level_lead = TurnLead(vehicle), VelocityLead(vehicle, *lags), LevelLead(vehicle)
+    def __init__(self, mavlink: Any, vehicle: Vehicle, options: CompanionOptions) -> None:
+        _require_supported(options)
+        self._mavlink, self._steer_by, self._sticks_by = mavlink, options.steer_by, options.sticks_by
+        self._profile: Profile = PROFILES[options.profile]
+        self._uses_sticks, is_ardusub = options.uses_sticks, options.profile == "ardusub"
+        self._scale = make_stick_scale(vehicle, self._profile, options.pilot_gain, options.sticks_by)
+        self._yaw_fraction = _YAW_FRACTION if is_ardusub else 1.0
+        self._all_axes = options.steer_by == "wrench" or (options.steer_by == "sticks" and is_ardusub)
+        self._turn, self._level_lead = TurnLead(vehicle), LevelLead(vehicle)
+        self._lead = VelocityLead(vehicle, options.velocity_lag, options.vertical_lag)
         self._overridden = False  # True while overridden channels are not released
         # last commands: sticks X Y Z K M N, -1 to 1; velocity [m/s, NED]; quaternion from body to world, scalar first;
         # unused ones are zero

@@ -14,7 +14,7 @@ from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment
 from cosim.companion.heading import HeadingWatch, LevelDive
-from cosim.companion.outputs import Output, steering_mode, uses_sticks
+from cosim.companion.outputs import Output
 from cosim.companion.safety import GAIN_TOLERANCE, Observation, State, Supervisor
 from cosim.companion.vehicle_state import RATES, ReportedState
 from cosim.mavlink.vehicle.profile import PROFILES
@@ -42,13 +42,9 @@ class AutopilotSession:
         self._link, self._options = link, options
         self._mavlink: Any = dialect()
         self.profile = PROFILES[options.profile]
-        self.output = Output(
-            self._mavlink, vehicle, options.profile, options.steer_by, options.sticks_by, options.pilot_gain,
-            (options.velocity_lag, options.vertical_lag),
-        )  # fmt: skip
-        self._steering_mode = steering_mode(options.profile, options.steer_by)
-        self._dive_mode: Mode = self._steering_mode if options.steer_by == "velocity" else "hold"
-        self._mode = self.profile.custom_modes[self._steering_mode]
+        self.output = Output(self._mavlink, vehicle, options)
+        self._dive_mode: Mode = options.steering_mode if options.steer_by == "velocity" else "hold"
+        self._mode = self.profile.custom_modes[options.steering_mode]
         self.reported = ReportedState(link.identity)
         self.alignment = FrameAlignment(options.origin)
         self.heading = HeadingWatch()
@@ -143,7 +139,7 @@ class AutopilotSession:
     def stick_rejection(self) -> str:
         """Return the reason why the autopilot would ignore or misread the sticks; empty if none is known."""
         o = self._options
-        if o.dry_run or not uses_sticks(o.profile, o.steer_by):
+        if o.dry_run or not o.uses_sticks:
             return ""
         ignored = self.failsafes.ignored_sticks(self._link.identity[0])
         if ignored:
@@ -194,7 +190,7 @@ class AutopilotSession:
                 "disarmed": float(not reported.is_armed),
                 "mode taken": float(not is_in_mode and is_ours),
                 "refused mode": self.supervisor.mode_wait_time(now),
-                "pilot gain": self._gain_error() if uses_sticks(self._options.profile, self._options.steer_by) else 0.0,
+                "pilot gain": self._gain_error() if self._options.uses_sticks else 0.0,
             }
         return Observation(now, has_state, is_known, reported.is_armed, is_in_mode, values, needs_dive)
 
@@ -242,7 +238,7 @@ class AutopilotSession:
                 messages = output.descend(self.reported, speed, back, period)
         elif state == "engaging":
             self.supervisor.record_mode_request(now)
-            self._send_mode(self._steering_mode, now)
+            self._send_mode(self._options.steering_mode, now)
             messages = output.hold_still(self.reported)
         elif state == "held" and self.reported.system is not None and not self._options.dry_run:
             messages = self._request_hold(now)

@@ -6,10 +6,11 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
+from cosim.companion.companion_options import SticksBy
 from cosim.mavlink.vehicle.ardusub_sticks import (
     CLIMB_DEAD_ZONE,
     LEAN_DEAD_ZONE,
@@ -23,8 +24,6 @@ from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.stick_stabilizer import YAW_RATE
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
-
-SticksBy = Literal["manual-control", "rc-override"]
 
 PILOT_SPEED = 0.5  # m/s, depth rate of a full vertical stick in ALT_HOLD, if PILOT_SPEED_UP is not known
 _FULL_YAW = math.radians(45.0)  # rad/s, yaw rate of a full stick at ACRO_YAW_P 1

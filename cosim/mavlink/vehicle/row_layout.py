@@ -9,6 +9,7 @@ import numpy as np
 
 from cosim.scenario.region_tables import Vector3
 from cosim.scenario.scenario import Scenario
+from cosim.scenario.start_values import start_values
 from cosim.simulation.commands.commands import MODES
 from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Array, Column
@@ -32,30 +33,18 @@ class RowLayout:
 
     def make_first_row(self, scenario: Scenario) -> Array:
         """Return the row before the first step: start values of the plant's variables, 0 elsewhere; returns (n,)."""
-        starts = {v.name: v.start for v in variables(scenario.vehicle)}
-        row = np.array([starts.get(name, 0.0) for name in self.index])
-        initial, commands = scenario.initial, scenario.commands
-        euler = quaternion_to_euler(initial.quaternion)
-        depth = initial.position[2]
-        values: dict[str, Sequence[float]] = {  # by the first of their columns
-            "position.x": initial.position,
-            "quaternion.e0": initial.quaternion,
-            "velocity.u": initial.velocity,
-            "attitude.roll": euler,
-            "measured.depth": (depth,),
-            "measured.heading": (euler[2],),
-            "measured.acceleration.z": (-9.81,),
-            "altitude": (_bottom(scenario) - depth,),
-            "measured.altitude": (_bottom(scenario) - depth,),
-            "commands.armed": (float(not commands.await_arm),),
-            "commands.mode": (float(MODES.index("reach")),),
-            "commands.item": (-1.0,),
-            "target.x": self.goal_center,
-        }
-        for first, numbers in values.items():
-            if first in self.index:
-                row[self.index[first] : self.index[first] + len(numbers)] = numbers
-        return row
+        starts = {v.name: v.start for v in variables(scenario.vehicle)} | start_values(scenario)
+        euler, depth = quaternion_to_euler(scenario.initial.quaternion), scenario.initial.position[2]
+        altitude = float(scenario.plant.parameters.get("bottom_depth", math.inf)) - depth
+        starts |= {
+            **dict(zip(("attitude.roll", "attitude.pitch", "attitude.yaw"), euler, strict=True)),
+            "measured.depth": depth, "measured.heading": euler[2], "measured.acceleration.z": -9.81,
+            "altitude": altitude, "measured.altitude": altitude,
+            "commands.armed": float(not scenario.commands.await_arm), "commands.mode": float(MODES.index("reach")),
+            "commands.item": -1.0,
+            **dict(zip(("target.x", "target.y", "target.z"), self.goal_center, strict=True)),
+        }  # fmt: skip
+        return np.array([starts.get(name, 0.0) for name in self.index])
 
 
 def quaternion_to_euler(quaternion: Sequence[float]) -> Vector3:
@@ -65,7 +54,3 @@ def quaternion_to_euler(quaternion: Sequence[float]) -> Vector3:
     roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
     yaw = math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
     return roll, math.asin(sine), yaw
-
-
-def _bottom(scenario: Scenario) -> float:
-    return float(scenario.plant.parameters.get("bottom_depth", math.inf))

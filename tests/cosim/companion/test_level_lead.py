@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
+from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.companion_run import scenario_to_steer
 from cosim.companion.outputs import Output
 from cosim.companion.set_points import LevelLead
@@ -24,7 +25,7 @@ def greatest_tilt(forces, leaning=True):
 
     As AC_AttitudeControl has it, with its default gains; a body with the published inertia and moments.
     """
-    output = Output(mavlink, HEAVY, "ardusub", "sticks", "manual-control", 1.0, (2.0, 0.5))
+    output = Output(mavlink, HEAVY, CompanionOptions(pilot_gain=1.0))
     state, period, tilt = reported((0.0, 0.0, 0.0)), 0.02, 0.0
     inertia = (np.diag(HEAVY.inertia) + np.diag(HEAVY.added_mass)[3:])[:2]
     angle, rate, integral = np.zeros(2), np.zeros(2), np.zeros(2)
@@ -63,7 +64,7 @@ def test_leans_depend_on_neither_the_attitude_nor_the_law_s_moments(moment):
     tilted.receive(1, 1, mavlink.MAVLink_attitude_quaternion_message(0, 0.98, 0.2, 0.0, 0.0, 0.5, -0.4, 0.0), 0.0)
     leans = []
     for state, given in ((level, np.array([20.0, -10.0, 5.0, 0.0, 0.0, 0.0])), (tilted, wrench)):
-        output = Output(mavlink, HEAVY, "ardusub", "sticks", "rc-override", 1.0, (2.0, 0.5))
+        output = Output(mavlink, HEAVY, CompanionOptions(sticks_by="rc-override", pilot_gain=1.0))
         output.make_messages(given, state, 0.02)
         leans.append(output.sticks[3:5].copy())
     assert leans[0] == pytest.approx(leans[1]) and np.abs(leans[0]).min() > 0.1
