@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import functools
 import os
+import re
 from collections.abc import Callable, Generator
 from types import FunctionType
 from typing import Any
@@ -34,10 +35,11 @@ def c_text(function: Callable[..., None], arguments: tuple[Any, ...]) -> str:
 
 
 @functools.cache
-def _entry(function: FunctionType, types: tuple[Type, ...]) -> Any:
-    entry = library_of(c_text_of(function, types)).entry
-    entry.argtypes, entry.restype = [ctypes.c_void_p], None
-    return entry
+def _library(function: FunctionType, types: tuple[Type, ...]) -> Any:
+    library = library_of(c_text_of(function, types))
+    library.entry.argtypes, library.entry.restype = [ctypes.c_void_p], None
+    library.entry_misfit.argtypes, library.entry_misfit.restype = [ctypes.c_void_p], ctypes.c_char_p
+    return library
 
 
 def _described(argument: Any, known: Described) -> tuple[Any, Type, list[int]]:
@@ -45,6 +47,18 @@ def _described(argument: Any, known: Described) -> tuple[Any, Type, list[int]]:
     if description is None:
         description = known[id(argument)] = argument, type_of(argument), words_of(argument)
     return description
+
+
+def _with_lengths(misfit: str, function: FunctionType, arguments: tuple[Any, ...]) -> str:
+    """Add the lengths of arguments to a message that names them."""
+    named = dict(zip(function.__code__.co_varnames, arguments, strict=False))
+    lengths = []
+    for path, axis in re.findall(r"([\w.]+)\.n(\d)", misfit):
+        name, *fields = path.split(".")
+        array = functools.reduce(getattr, fields, named[name])
+        lengths.append(f"{path}.shape[{axis}] is {array.shape[int(axis)]}")
+    expected = re.sub(r"\.n(\d)", r".shape[\1]", misfit)
+    return f"{' and '.join(lengths)}, expected {expected}"
 
 
 class BoundCall:
@@ -56,9 +70,13 @@ class BoundCall:
         if isinstance(function, FunctionType) and not os.environ.get(INTERPRETED):
             check_shapes(function, arguments)
             described = [_described(argument, {} if known is None else known) for argument in arguments]
-            self._entry = _entry(function, tuple(kind for _, kind, _ in described))
+            library = _library(function, tuple(kind for _, kind, _ in described))
+            self._entry = library.entry
             self._words = np.array([word for _, _, words in described for word in words], dtype=np.uint64)
             self.words: int = self._words.ctypes.data
+            misfit = library.entry_misfit(self.words)
+            if misfit is not None:
+                raise TypeError(f"{function.__name__}: {_with_lengths(misfit.decode(), function, arguments)}")
             call: Any = functools.partial(self._entry, self.words)
             call.kept = self._words, arguments  # so that `call` works without this object
             self.call: Callable[[], None] = call

@@ -6,12 +6,14 @@
 from __future__ import annotations
 
 import ast
+import functools
 import itertools
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
-from controller.translator.array_views import ArrayViews, Index, known_shape
+from controller.translator.array_lengths import Index
+from controller.translator.array_views import ArrayViews, known_shape, plus
 from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed
 from controller.translator.types import BOOL, DOUBLE, INT, Array, Scalar, Type, unified
 
@@ -46,7 +48,7 @@ class ArrayExpressions(ArrayViews):
         for k, n in enumerate(other, len(one) - len(other)):
             if n.isdigit() and sizes[k].isdigit() and n != sizes[k]:
                 self.fail(node, f"shapes ({', '.join(one)}) and ({', '.join(other)}) in one expression")
-            sizes[k] = n if n.isdigit() else sizes[k]
+            sizes[k] = self.common_length(sizes[k], n, node)
         return tuple(sizes)
 
     def elementwise(
@@ -103,7 +105,7 @@ class ArrayExpressions(ArrayViews):
         return Grid(DOUBLE, (*a.sizes[:rows], *b.sizes[1:]), at, (*_elsewhere(a), *_elsewhere(b)), True, factors)
 
     def _for_reuse(self, operand: Operand, grid: Grid, node: ast.AST) -> Grid:
-        if isinstance(operand, Grid) and known_shape(grid.sizes):
+        if isinstance(operand, Grid) and all(self.max_length(n) < math.inf for n in grid.sizes):
             return self.grid(self.materialized(operand, node), node)
         if grid.adds:
             self.fail(node, "a product of a length that is known only at run time within a product")
@@ -149,6 +151,7 @@ class ArrayExpressions(ArrayViews):
 
     def _loop(self, length: str, body: Callable[[str], None]) -> None:
         k = self.new_name("i")
+        length = self.temporary(INT, length).code if "(" in length else length
         self.lines.append(f"for (int64_t {k} = 0; {k} < {length}; {k}++) {{")
         body(k)
         self.lines.append("}")
@@ -195,7 +198,7 @@ class ArrayExpressions(ArrayViews):
 
         def row(i: str) -> None:
             self._loop(sizes[1], lambda j: self.lines.append(f"{at(i, j)} = 0.0;"))
-            self._loop(b.sizes[0], lambda k: add(i, k))
+            self._loop(self.common_length(a.sizes[1], b.sizes[0], node), lambda k: add(i, k))
 
         def at(*index: str) -> str:
             return self.element_of(target, index).code
@@ -218,24 +221,32 @@ class ArrayExpressions(ArrayViews):
     def materialized(self, operand: Operand, node: ast.AST, stem: str = "a") -> View:
         """Compute an array expression into storage on the stack."""
         grid = self.grid(operand, node)
-        shape = known_shape(grid.sizes)
-        if shape is None:
-            self.fail(node, "an array of a length that is known only at run time, and no target")
-        view = self.stored(self.storage(stem, node, grid.item, math.prod(shape)), grid.item, shape)
-        self.store(view, grid, node)
+        view = self._new_array(stem, node, grid.item, grid.sizes)
+        self.store(view, replace(grid, sizes=view.sizes), node)
         return view
+
+    def _new_array(self, stem: str, node: ast.AST, item: Scalar, sizes: Index) -> View:
+        """Return a new array in storage for its maximum lengths."""
+        size = math.prod(map(self.max_length, sizes))
+        if not size < math.inf:
+            self.fail(node, "an array of a length that is known only at run time, and no target")
+        sizes = tuple(
+            n if n.isdigit() else self.bounded(self.temporary(INT, n).code, self.max_length(n)) for n in sizes
+        )
+        name = self.storage(stem, node, item, int(size))
+        if known_shape(sizes) is None:  # so that no number is undefined where the array is shorter
+            self.declared[name] = self.declared[name].replace(";", " = {0};")
+        return self.stored(name, item, sizes)
 
     def array_of(self, items: Sequence[Operand], node: ast.AST) -> View:
         """Return a new array of numbers or rows."""
         if any(isinstance(item, Items) for item in items):
             items = [self.array_of(self.items_of(item, node), node) for item in items]
-        shapes = {known_shape(item.sizes if isinstance(item, View | Grid) else ()) for item in items}
-        shape = shapes.pop() if len(shapes) == 1 else None
-        if shape is None:
-            self.fail(node, "an array of rows whose lengths are unknown or unequal")
-        target = self.stored(
-            self.storage("a", node, DOUBLE, len(items) * math.prod(shape)), DOUBLE, (len(items), *shape)
-        )
+        shapes = [item.sizes if isinstance(item, View | Grid) else () for item in items]
+        if len(set(map(len, shapes))) != 1:
+            self.fail(node, "an array of numbers and rows")
+        shape = functools.reduce(lambda one, other: self.common(one, other, node), shapes)
+        target = self._new_array("a", node, DOUBLE, (str(len(items)), *shape))
         for i, item in enumerate(self._apart(items, target, node)):
             if shape:
                 self.store(self.part(target, str(i)), item, node)
@@ -245,13 +256,14 @@ class ArrayExpressions(ArrayViews):
 
     def concatenated(self, parts: Sequence[Operand], node: ast.AST) -> View:
         """Return a new vector of vectors, one after the other."""
-        lengths = [known_shape(self.grid(part, node).sizes) for part in parts]
-        if any(shape is None or len(shape) != 1 for shape in lengths):
-            self.fail(node, "arrays of unknown length, or of several dimensions, in one")
-        ends = list(itertools.accumulate([shape[0] for shape in lengths if shape], initial=0))
-        target = self.stored(self.storage("a", node, DOUBLE, ends[-1]), DOUBLE, (ends[-1],))
-        for part, begin, end in zip(self._apart(parts, target, node), ends, ends[1:], strict=False):
-            piece = self.view(DOUBLE, target.data, str(begin), (str(end - begin),), ("1",), target.roots)
+        shapes = [self.grid(part, node).sizes for part in parts]
+        if any(len(shape) != 1 for shape in shapes):
+            self.fail(node, "arrays of several dimensions, or numbers, in one")
+        ends = list(itertools.accumulate([n for (n,) in shapes], lambda *terms: plus(terms), initial="0"))
+        total = self.bounded(ends[-1], sum(self.max_length(n) for (n,) in shapes))
+        target = self._new_array("a", node, DOUBLE, (total,))
+        for part, begin, (n,) in zip(self._apart(parts, target, node), ends, shapes, strict=False):
+            piece = self.view(DOUBLE, target.data, begin, (n,), ("1",), target.roots)
             self.store(piece, part, node)
         return target
 

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import ast
 import itertools
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from controller.translator.operands import Grid, Operand, Operands, Value, View
-from controller.translator.types import Array, Scalar
+from controller.translator.array_lengths import ArrayLengths, Index, path_of
+from controller.translator.operands import Grid, Operand, Value, View
+from controller.translator.types import Array, Scalar, array_type
 
 ANY = "*"  # root of an array of which nothing is known
-
-Index = tuple[str, ...]
 
 
 def times(a: str, b: str) -> str:
@@ -48,7 +48,7 @@ def known_shape(sizes: Sequence[str]) -> tuple[int, ...] | None:
     return tuple(map(int, sizes)) if all(n.isdigit() for n in sizes) else None
 
 
-class ArrayViews(Operands):
+class ArrayViews(ArrayLengths):
     """Arrays of one function."""
 
     aliases: frozenset[frozenset[str]]  # pairs of parameters that may overlap
@@ -70,8 +70,8 @@ class ArrayViews(Operands):
     ) -> View:
         """Return an array by the place of its elements; code is that of a variable which holds it."""
         whole = [self.product(sizes[k + 1 :]) for k in range(len(sizes))]
-        shape = tuple(int(n) if n.isdigit() else None for n in sizes)
-        kind = Array(item, len(sizes), list(strides) == whole, shape if any(n is not None for n in shape) else ())
+        lengths = tuple(int(n) if n.isdigit() else None for n in sizes)
+        kind = array_type(item, list(strides) == whole, lengths, tuple(map(self.bound, sizes)))
         view = View(kind, code, True, roots, data, offset, sizes, strides)
         return view if code else replace(view, code=self.literal(view, kind), simple=False)
 
@@ -86,6 +86,13 @@ class ArrayViews(Operands):
     def view_of(self, kind: Array, code: str, roots: frozenset[str]) -> View:
         """Return the array of a variable, or of a field."""
         sizes = tuple(f"{code}.n{i}" if n is None else str(n) for i, n in enumerate(kind.lengths))
+        for i, (size, bound) in enumerate(zip(sizes, kind.max_lengths, strict=True)):
+            length = self.axis_length(path_of(code), i) if bound is None else None
+            if length is None:
+                self.bounded(size, math.inf if bound is None else bound)
+            elif not size.isdigit():
+                self.fixed[size] = length
+        kind = array_type(kind.item, kind.contiguous, kind.lengths, tuple(map(self.bound, sizes)))
         if kind.contiguous:
             strides = tuple(self.product(sizes[k + 1 :]) for k in range(kind.ndim))
         else:
@@ -100,7 +107,7 @@ class ArrayViews(Operands):
             result = times(result, n)
         return result
 
-    def stored(self, data: str, item: Scalar, shape: Sequence[int]) -> View:
+    def stored(self, data: str, item: Scalar, shape: Sequence[int | str]) -> View:
         """Return the array in storage on the stack."""
         sizes = tuple(map(str, shape))
         strides = tuple(self.product(sizes[k + 1 :]) for k in range(len(sizes)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import operator
 from typing import Any
 
 from controller.translator.array_expressions import ArrayExpressions
@@ -10,6 +11,7 @@ from controller.translator.operands import Grid, Items, Known, Operand, Value, V
 from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Record, name_of, unified
 
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
+_FOLDED = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul}  # of integers that are known
 _BITS = {ast.BitXor: "^", ast.BitAnd: "&", ast.BitOr: "|", ast.LShift: "<<", ast.RShift: ">>"}
 _COMPARED = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
 _LARGEST_POWER = 8  # greatest exponent that is multiplied out
@@ -85,6 +87,14 @@ class Expressions(ArrayExpressions):
 
     def _binop(self, node: ast.BinOp) -> Operand:
         left, right = self.in_order([node.left, node.right])
+        fold = _FOLDED.get(type(node.op))
+        if (
+            fold
+            and isinstance(left, Known)
+            and isinstance(right, Known)
+            and type(left.value) is type(right.value) is int
+        ):
+            return Known(fold(left.value, right.value))
         return self.arithmetic(node.op, left, right, node)
 
     def arithmetic(self, op: ast.operator, left: Operand, right: Operand, node: ast.AST) -> Operand:
@@ -151,7 +161,9 @@ class Expressions(ArrayExpressions):
         result = self.condition(node.values[0])
         for other in node.values[1:]:
             mark = len(self.lines)
+            self.branches += 1
             value = self.condition(other)
+            self.branches -= 1
             if len(self.lines) == mark:
                 result = Value(BOOL, f"{bracketed(result)} {sign} {bracketed(value)}")
                 continue
@@ -172,8 +184,10 @@ class Expressions(ArrayExpressions):
         branches = []
         for branch in (node.body, node.orelse):
             mark = len(self.lines)
+            self.branches += 1
             operand = self.expression(branch)
             operand = self.materialized(operand, branch) if isinstance(operand, Grid) else operand
+            self.branches -= 1
             needed, self.lines[mark:] = self.lines[mark:], []
             branches.append((needed, operand))
         (first, a), (second, b) = branches
@@ -184,10 +198,10 @@ class Expressions(ArrayExpressions):
             return self._chosen(condition, a, b, node)
         x, y = self.value(a, node), self.value(b, node)
         kind = unified(x.type, y.type)
-        result = self.temporary(kind, "")
+        result = self.new_variable(kind, "", x, y)
         self.lines += [f"if ({condition.code}) {{", *first, f"{result.code} = {self.converted(x, kind)};", "} else {"]
         self.lines += [*second, f"{result.code} = {self.converted(y, kind)};", "}"]
-        return self.held(kind, result.code, True, x.roots | y.roots)
+        return result
 
     def _chosen(self, condition: Value, a: Operand, b: Operand, node: ast.AST) -> Value:
         x, y = self.value(a, node), self.value(b, node)
@@ -197,11 +211,10 @@ class Expressions(ArrayExpressions):
             self.fail(node, str(error))
         if isinstance(kind, Array):
             codes = [self.converted(v, kind) for v in (x, y)]
-            chosen = self.temporary(kind, f"{bracketed(condition)} ? {codes[0]} : {codes[1]}")
-            return self.held(kind, chosen.code, True, x.roots | y.roots)
+            return self.new_variable(kind, f"{bracketed(condition)} ? {codes[0]} : {codes[1]}", x, y)
         roots = x.roots | y.roots
         return Value(kind, f"{bracketed(condition)} ? {bracketed(x, kind)} : {bracketed(y, kind)}", False, roots)
 
 
 def _length(code: str) -> Operand:
-    return Known(int(code)) if code.isdigit() else Value(INT, code, "*" not in code)
+    return Known(int(code)) if code.isdigit() else Value(INT, code, "*" not in code and "(" not in code)

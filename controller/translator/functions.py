@@ -13,8 +13,9 @@ from types import FunctionType
 from typing import Any, NoReturn, Protocol
 
 from controller.errors import TranslationError
+from controller.translator.array_lengths import Length, Requirement
 from controller.translator.array_views import ANY
-from controller.translator.operands import Known, Operand, Value
+from controller.translator.operands import Known, Operand, Value, View
 from controller.translator.statements import Statements
 from controller.translator.types import BOOL, DOUBLE, Array, Nothing, Record, Scalar, Tuple, Type, shaped
 
@@ -30,13 +31,15 @@ _MAX_PASSES = 6  # maximum number of passes until the types of variables are fix
 
 
 Aliases = frozenset[frozenset[str]]  # pairs of parameters that may overlap
+# the C name of a function, the type of what it returns, if it writes arrays, and what it requires of their lengths
+Instance = tuple[str, Type, bool, tuple[Requirement, ...]]
 
 
 class Functions(Protocol):
     """The program's interface for a function that is translated."""
 
-    def instance(self, function: FunctionType, arguments: tuple[Type, ...], aliases: Aliases) -> tuple[str, Type, bool]:
-        """Return the C name of a function for some arguments, the type of what it returns, and if it writes arrays."""
+    def instance(self, function: FunctionType, arguments: tuple[Type, ...], aliases: Aliases) -> Instance:
+        """Return a function in C for some arguments."""
         ...
 
     def name(self, kind: Type) -> str:
@@ -72,6 +75,9 @@ class Function(Statements):
         self.made: dict[str, frozenset[str]] = {}
         self.made_at: dict[str, ast.AST] = {}
         self.writes_arguments, self.result = False, Nothing()
+        self.fixed_lengths: dict[str, tuple[Length | None, ...]] = {}
+        self.record_paths: dict[str, str] = {}
+        self.where = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
 
     def fail(self, node: ast.AST, what: str) -> NoReturn:
         """Refuse a construct, with its file and line."""
@@ -86,14 +92,17 @@ class Function(Statements):
     def translate(self, name: str) -> str:
         """Return the function in C, under a name; afterwards the type of its result is known."""
         for _ in range(_MAX_PASSES):
-            known = dict(self.names), dict(self.roots), dict(self.made), self.result
+            known = self._state()
             self.lines: list[str] = []
             self.declared: dict[str, str] = {}
-            self.loops, self.later = [], []
+            self.bounds: dict[str, float] = {}
+            self.fixed: dict[str, Length] = {}
+            self.requirements: dict[Requirement, None] = {}
+            self.loops, self.later, self.branches = [], [], 0
             self._count = self.n_writes = 0
             self._sites: dict[str, int] = {}
             self._block(self._tree.body)
-            if known == (self.names, self.roots, self.made, self.result):
+            if known == self._state():
                 break
         else:
             self.fail(self._tree, "types that do not settle")
@@ -109,6 +118,11 @@ class Function(Statements):
         unused += [f"(void){temporary};" for temporary in sorted(idle)]
         body = [*variables, *self.declared.values(), *unused, *self.lines]
         return head + _indented(body) + "}\n"
+
+    def _state(self) -> tuple[Any, ...]:
+        """Return what is known of variables."""
+        lengths, paths = dict(self.fixed_lengths), dict(self.record_paths)
+        return dict(self.names), dict(self.roots), dict(self.made), lengths, paths, self.result
 
     def signature(self, name: str) -> str:
         """Return the head of the function."""
@@ -136,6 +150,13 @@ class Function(Statements):
         if code:
             self.lines.append(f"{name} = {code};")
         return self.held(kind, name, True, frozenset([ANY]))
+
+    def new_variable(self, kind: Type, code: str, *values: Value) -> Value:
+        """Assign one of some values to a new variable, and return that."""
+        name = self.temporary(kind, code).code
+        for i, value in enumerate(values):
+            self.note_lengths(name, value, again=i > 0)
+        return self.held(kind, name, True, frozenset().union(*(value.roots for value in values)))
 
     def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str]) -> Value:
         """Return what a C variable or member holds."""
@@ -172,7 +193,7 @@ class Function(Statements):
         """Return a new named tuple on the stack."""
         fields: tuple[str, ...] = kind._fields  # type: ignore[attr-defined]
         try:
-            types = tuple(shaped(kind, field, item.type) for field, item in zip(fields, items, strict=True))
+            types = tuple(self._shaped(kind, field, item, node) for field, item in zip(fields, items, strict=True))
         except TypeError as error:
             self.fail(node, str(error))
         record, name = Record(kind, types), self._site("record", node)
@@ -181,6 +202,7 @@ class Function(Statements):
             code = f"*{item.code}" if isinstance(of, Record) else self.converted(item, of)
             self.lines.append(f"{name}.{field} = {code};")
             self.made[f"{name}.{field}"] = item.roots
+            self.note_lengths(f"{name}.{field}", item)
         return Value(record, f"(&{name})", False, frozenset([name]))
 
     def call_translated(self, function: Callable[..., Any], arguments: Sequence[Operand], node: ast.AST) -> Operand:
@@ -190,7 +212,7 @@ class Function(Statements):
         values = [self.value(argument, node) for argument in arguments]
         names = function.__code__.co_varnames
         try:
-            kinds = tuple(shaped(function, name, value.type) for name, value in zip(names, values, strict=False))
+            kinds = tuple(self._shaped(function, name, value, node) for name, value in zip(names, values, strict=False))
         except TypeError as error:
             self.fail(node, str(error))
         roots = [self._all_roots(value) for value in values]
@@ -201,7 +223,9 @@ class Function(Statements):
             or self.may_overlap(roots[i], roots[k])
         )
         aliases |= {frozenset([name]) for name, value in zip(names, values, strict=False) if self._is_aliased(value)}
-        name, result, writes = self._program.instance(function, kinds, aliases)
+        name, result, writes, requirements = self._program.instance(function, kinds, aliases)
+        for requirement in requirements:
+            self.require_of_call(requirement, values, node)
         code = f"{name}({', '.join(self.converted(v, k) for v, k in zip(values, kinds, strict=True))})"
         if writes:
             self.n_writes += 1
@@ -215,6 +239,18 @@ class Function(Statements):
         self.declared[name] = f"{self.c(self.returned(result))} {name};"
         self.lines.append(f"{name} = {code};")
         return self.stored(f"{name}.f", DOUBLE, [n or 0 for n in result.shape])
+
+    def _shaped(self, owner: Any, name: str, value: Value, node: ast.AST) -> Type:
+        """Return the type of a parameter or field; require the lengths of its annotation."""
+        kind = shaped(owner, name, value.type)
+        if isinstance(kind, Array) and isinstance(value, View):
+            for n, size in zip(kind.lengths, value.sizes, strict=True):
+                length = self.length(size)
+                if n is not None and length is None and self.max_length(size) != n:
+                    self.fail(node, f"{name} of a length that is known only at run time, expected {n}")
+                if n is not None and length is not None:
+                    self.require(length, "==", Length("", n), node)
+        return kind
 
     def _is_aliased(self, record: Value) -> bool:
         """Return True if arrays of one record may overlap."""

@@ -85,6 +85,10 @@ class Operands:
         """Assign a value to a new variable, and return that."""
         raise NotImplementedError
 
+    def new_variable(self, kind: Type, code: str, *values: Value) -> Value:
+        """Assign one of some values to a new variable, and return that."""
+        raise NotImplementedError
+
     def call_translated(self, function: Callable[..., Any], arguments: Sequence[Operand], node: ast.AST) -> Operand:
         """Call a function of Python that is translated too."""
         raise NotImplementedError

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -9,7 +10,8 @@ from types import FunctionType
 from typing import Any
 
 from controller.errors import TranslationError
-from controller.translator.functions import Aliases, Function
+from controller.translator.array_lengths import Requirement
+from controller.translator.functions import Aliases, Function, Instance
 from controller.translator.types import Array, Nothing, Record, Scalar, Tuple, Type, shaped
 
 _HEAD = """\
@@ -43,7 +45,7 @@ class Program:
     """Functions in C, each for the argument types of its calls."""
 
     def __init__(self) -> None:
-        self._instances: dict[tuple[FunctionType, tuple[Type, ...], Aliases], tuple[str, Type, bool]] = {}
+        self._instances: dict[tuple[FunctionType, tuple[Type, ...], Aliases], Instance] = {}
         self._under_way: set[FunctionType] = set()
         self._reserved: set[str] = set()
         self._functions: list[str] = []
@@ -59,7 +61,7 @@ class Program:
             raise TranslationError(f"{function!r} is no plain function, which is not translated to C")
         names = function.__code__.co_varnames
         arguments = tuple(shaped(function, name, kind) for name, kind in zip(names, arguments, strict=False))
-        called, _, _ = self.instance(function, arguments, frozenset())
+        called, _, _, requirements = self.instance(function, arguments, frozenset())
         fields = "".join(f"    {self.name(kind)} a{i};\n" for i, kind in enumerate(arguments))
         arguments_text = ", ".join(
             f"{'&' if isinstance(kind, Record) else ''}w->a{i}" for i, kind in enumerate(arguments)
@@ -68,6 +70,7 @@ class Program:
             f"typedef struct {{\n{fields}}} {name}_arguments;\n\n"
             f"void {name}(const void *words);\nvoid {name}(const void *words)\n{{\n"
             f"    const {name}_arguments *w = words;\n    {called}({arguments_text});\n}}\n"
+            + _check(name, requirements, names)
         )
 
     def text(self) -> str:
@@ -84,8 +87,8 @@ class Program:
         """Names of the modules of all translated functions."""
         return {function.__module__ for function, *_ in self._instances}
 
-    def instance(self, function: FunctionType, arguments: tuple[Type, ...], aliases: Aliases) -> tuple[str, Type, bool]:
-        """Return the C name of a function for some arguments, the type of what it returns, and if it writes arrays."""
+    def instance(self, function: FunctionType, arguments: tuple[Type, ...], aliases: Aliases) -> Instance:
+        """Return a function in C for some arguments."""
         key = (function, arguments, aliases)
         if key not in self._instances:
             if function in self._under_way:
@@ -97,7 +100,12 @@ class Program:
             translation = Function(self, function, arguments, aliases)
             code = translation.translate(name)
             self._under_way.discard(function)
-            self._instances[key] = (name, translation.result, translation.writes_arguments)
+            self._instances[key] = (
+                name,
+                translation.result,
+                translation.writes_arguments,
+                tuple(translation.requirements),
+            )
             self._functions.append(code)
         return self._instances[key]
 
@@ -114,7 +122,7 @@ class Program:
             case Nothing():
                 return "void"
             case Array():
-                kind = replace(kind, shape=())
+                kind = replace(kind, shape=(), bounds=())
         if kind not in self._types:
             name, text = self._defined(kind)
             self._types[kind] = name
@@ -138,6 +146,21 @@ class Program:
         name = next(n for n in _numbered(stem) if n not in self._types.values())
         inside = "".join(f"    {field}\n" for field in fields)
         return name, f"typedef struct {{\n{inside}}} {name};\n"
+
+
+def _check(name: str, requirements: Sequence[Requirement], parameters: Sequence[str]) -> str:
+    """Return a C function that checks lengths of arguments; it returns the first requirement that they do not meet."""
+    lines = []
+    for requirement in requirements:
+        left, right = requirement.left, requirement.right
+        code = f"{left.text('w->a')} {requirement.sign} {right.text('w->a')}"
+        lengths = [length.path for length in (left, right) if length.path and requirement.is_conditional]
+        unused = "".join(f" || w->a{path} == 0" for path in lengths)
+        told = re.sub(r"w->a(\d+)", lambda m: parameters[int(m[1])], code)
+        lines.append(f'    if (!({code}{unused}))\n        return "{told} (in {requirement.where})";\n')
+    head = f"const char *{name}_misfit(const void *words)"
+    arguments = f"    const {name}_arguments *w = words;\n" if lines else "    (void)words;\n"
+    return f"\n{head};\n{head}\n{{\n{arguments}{''.join(lines)}    return NULL;\n}}\n"
 
 
 def text_of_global(value: Any) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from controller.translator.array_views import known_shape
 from controller.translator.calls import Calls
@@ -73,6 +74,7 @@ class Statements(Calls):
         self.lines.append("continue;")
 
     def _do_return(self, node: ast.Return) -> None:
+        self.branches += self.branches > 0  # of what follows in the text
         if node.value is None:
             self.lines.append("return;")
             return
@@ -128,7 +130,7 @@ class Statements(Calls):
         if len(node.targets) > 1 and isinstance(value, Grid):
             value = self.materialized(value, node)
         elif len(node.targets) > 1 and isinstance(value, Value) and not value.simple:
-            value = self.held(value.type, self.temporary(value.type, value.code).code, True, value.roots)
+            value = self.new_variable(value.type, value.code, value)
         for target in node.targets:
             self._assign(target, value, node)
 
@@ -154,7 +156,7 @@ class Statements(Calls):
         if isinstance(operand, Grid):
             return self.materialized(operand, target)
         if isinstance(operand, Value) and isinstance(operand.type, Scalar | Array | Record):
-            return self.held(operand.type, self.temporary(operand.type, operand.code).code, True, operand.roots)
+            return self.new_variable(operand.type, operand.code, operand)
         return operand
 
     def _name_it(self, name: str, operand: Operand, node: ast.AST) -> None:
@@ -162,8 +164,13 @@ class Statements(Calls):
             return
         value = self.materialized(operand, node, name) if isinstance(operand, Grid) else self.value(operand, node)
         kind = self._unified(self.names[name], value.type, node) if name in self.names else value.type
-        if name in self.parameters and kind != self.names[name]:
-            self.fail(node, f"another type for the parameter {name}")
+        if name in self.parameters:
+            own = self.names[name]
+            if isinstance(kind, Array) and isinstance(own, Array):
+                kind = replace(kind, bounds=own.bounds)
+            if kind != own:
+                self.fail(node, f"another type for the parameter {name}")
+        self.note_lengths(self.variable(name), value, again=name in self.names)
         self.names[name] = kind
         self.roots[name] = self.roots.get(name, frozenset()) | value.roots
         if isinstance(value, View) and not value.fresh:
@@ -230,10 +237,12 @@ class Statements(Calls):
             self._block(node.body if test.value else node.orelse)
             return
         self.lines.append(f"if ({self._truth_of(test, node)}) {{")
+        self.branches += 1
         self._block(node.body)
         if node.orelse:
             self.lines.append("} else {")
             self._block(node.orelse)
+        self.branches -= 1
         self.lines.append("}")
 
     def _truth_of(self, operand: Operand, node: ast.AST) -> str:
@@ -251,7 +260,9 @@ class Statements(Calls):
             needed, self.lines[mark:] = self.lines[mark:], []
             self.lines += ["for (;;) {", *needed, f"if (!({condition})) {{", "break;", "}"]
         self.loops.append(node)
+        self.branches += 1
         self._block(node.body)
+        self.branches -= 1
         self.loops.pop()
         self.lines.append("}")
 
@@ -301,7 +312,9 @@ class Statements(Calls):
         self.lines.append(f"for ({variable} = {first}; {variable} {sign} {end}; {change}) {{")
         if counter and name != "_":
             self.lines.append(f"{self.variable(name)} = {counter};")
+        self.branches += 1
         self._block(node.body)
+        self.branches -= 1
         self.lines.append("}")
 
     def _end(self, last: Value) -> str:

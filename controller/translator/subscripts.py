@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import ast
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from controller.translator.array_lengths import Length
 from controller.translator.array_views import plus, times
 from controller.translator.expressions import Expressions
 from controller.translator.operands import Grid, Items, Known, Operand, Value, View
@@ -66,7 +68,8 @@ class Subscripts(Expressions):
                 begin, size = self.index(array.sizes[axis], place), "1"
             terms.append(times(begin, stride))
             for k in array.axes[axis : axis + 1]:
-                box[k] = plus([box[k][0], begin]), size
+                limit = self.max_length(size)
+                box[k] = plus([box[k][0], begin]), str(limit) if limit < math.inf else size
         if not sizes:
             return Value(array.type.item, f"{array.data}[{plus(terms)}]")
         view = self.view(array.type.item, array.data, plus(terms), tuple(sizes), tuple(strides), array.roots)
@@ -91,38 +94,47 @@ class Subscripts(Expressions):
 
     def _bounds(self, size: str, node: ast.Slice) -> tuple[str, str]:
         """Return the beginning and the length of a slice of an axis."""
-        # Python clips bounds to the axis. So does C, but for a slice of constant length whose axis has an unknown one:
-        # there Python's result has another shape if it does not fit.
+        # Python clips bounds to the axis, and so does C where it computes a bound or the axis' length. Constant bounds
+        # of a fixed length must lie within it, which is checked when a call is bound.
         if node.step is not None:
             self.fail(node, "a slice with a step")
-        if node.lower is None and node.upper is None:
-            return "0", size
-        low, high = (Known(None) if bound is None else self.expression(bound) for bound in (node.lower, node.upper))
+        operands = iter(self.in_order([bound for bound in (node.lower, node.upper) if bound is not None]))
+        low, high = (Known(None) if bound is None else next(operands) for bound in (node.lower, node.upper))
         if isinstance(low, Known) and isinstance(high, Known):
             if size.isdigit():
-                first, end, _ = slice(low.value, high.value).indices(int(size))
-                return str(first), str(max(end - first, 0))
-            first, end = low.value or 0, high.value
-            if first >= 0 and end is not None and end >= 0:
-                return str(first), str(max(end - first, 0))
-        length = self._length_of(node)
-        if length is not None:
-            begin = str(low.value) if isinstance(low, Known) else self._integer(low, node)
-            return begin, str(length.value) if isinstance(length, Known) else self._integer(length, node)
-        bounds = []
-        for bound, default in ((low, "0"), (high, size)):
-            if isinstance(bound, Known) and bound.value is None:
-                bounds.append(default)
-            else:
-                bounds.append(self.temporary(INT, f"clipped({self._integer(bound, node)}, {size})").code)
-        return bounds[0], self.temporary(INT, f"max_i64({bounds[1]} - {bounds[0]}, 0)").code
+                first, last, _ = slice(low.value, high.value).indices(int(size))
+                return str(first), str(max(last - first, 0))
+            length, start = self.length(size), low.value or 0
+            if length and not (start < 0 and high.value is not None and high.value >= 0):
+                return self._constant_bounds(size, length, start, high.value, node)
+        begin = "0" if low == Known(None) else self._clipped(low, size, node)
+        end = size if high == Known(None) else self._clipped(high, size, node)
+        max_length = min(self.max_length(size), self._constant_length(node))
+        return begin, self.bounded(end if begin == "0" else f"max_i64({end} - {begin}, 0)", max_length)
 
-    def _length_of(self, node: ast.Slice) -> Operand | None:
-        """Return n of a slice [i : i + n], else None."""
-        low, high = node.lower, node.upper
-        if low is None or not isinstance(high, ast.BinOp) or not isinstance(high.op, ast.Add):
-            return None
-        return self.expression(high.right) if ast.dump(high.left) == ast.dump(low) else None
+    def _constant_bounds(self, size: str, length: Length, low: int, high: int | None, node: ast.AST) -> tuple[str, str]:
+        """Return the beginning and the length of a slice of an axis of fixed length, which has to be long enough."""
+        end = high or 0
+        if low >= 0 and (high is None or high < 0):
+            self.require(length, ">=", Length("", low - end), node)
+            return str(low), self.longer(size, end - low)
+        number = max(end - low, 0)
+        self.require(length, ">=", Length("", max(end, -low) if number else 0), node)
+        return "0" if not number else str(low) if low >= 0 else self.longer(size, low), str(number)
+
+    def _clipped(self, operand: Operand, size: str, node: ast.AST) -> str:
+        """Return a bound of a slice in C, within the axis."""
+        index = str(operand.value) if isinstance(operand, Known) else self._integer(operand, node)
+        return self.temporary(INT, f"clipped({index}, {size})").code
+
+    def _constant_length(self, node: ast.Slice) -> float:
+        """Return n of a slice [i : i + n] or [i : n + i], else infinity."""
+        if node.lower is not None and isinstance(node.upper, ast.BinOp) and isinstance(node.upper.op, ast.Add):
+            for same, other in ((node.upper.left, node.upper.right), (node.upper.right, node.upper.left)):
+                if ast.dump(same) == ast.dump(node.lower) and isinstance(other, ast.Constant | ast.Name):
+                    length = self.expression(other)
+                    return max(length.value, 0) if isinstance(length, Known) else math.inf
+        return math.inf
 
 
 def _is_whole(node: ast.expr) -> bool:

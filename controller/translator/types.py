@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -34,11 +35,17 @@ class Array:
     ndim: int
     contiguous: bool = True
     shape: tuple[int | None, ...] = ()  # lengths that are known at translation; () if none is
+    bounds: tuple[float | None, ...] = ()  # maximum of those that C computes, or inf; () if none is
 
     @property
     def lengths(self) -> tuple[int | None, ...]:
         """Length of each axis, or None."""
         return self.shape or (None,) * self.ndim
+
+    @property
+    def max_lengths(self) -> tuple[float | None, ...]:
+        """Maximum of each length that C computes, or None."""
+        return self.bounds or (None,) * self.ndim
 
     @property
     def c(self) -> str:
@@ -102,7 +109,9 @@ def shaped(owner: Any, name: str, kind: Type) -> Type:
     """Return the type of a parameter or field for a value: with the shape of the annotation, which it has to have."""
     if not isinstance(kind, Array):
         return kind
-    return _array(kind.item, kind.ndim, kind.contiguous, _annotated(owner, name, kind.lengths))
+    lengths = _annotated(owner, name, kind.lengths) or (None,) * kind.ndim
+    bounds = (bound if n is None else None for n, bound in zip(lengths, kind.max_lengths, strict=True))
+    return array_type(kind.item, kind.contiguous, lengths, tuple(bounds))
 
 
 def _annotated(owner: Any, name: str, lengths: Sequence[int | None]) -> tuple[int | None, ...]:
@@ -166,9 +175,31 @@ def unified(one: Type, other: Type) -> Type:
         return Tuple(tuple(map(unified, one.items, other.items)))
     if isinstance(one, Array) and isinstance(other, Array) and (one.item, one.ndim) == (other.item, other.ndim):
         lengths = tuple(a if a == b else None for a, b in zip(one.lengths, other.lengths, strict=True))
-        known = lengths if any(n is not None for n in lengths) else ()
-        return Array(one.item, one.ndim, one.contiguous and other.contiguous, known)
+        bounds = tuple(
+            map(
+                _unified_bound,
+                lengths,
+                zip(one.lengths, one.max_lengths, strict=True),
+                zip(other.lengths, other.max_lengths, strict=True),
+            )
+        )
+        return array_type(one.item, one.contiguous and other.contiguous, lengths, bounds)
     raise TypeError(f"{name_of(one)} and {name_of(other)} in the same place")
+
+
+def _unified_bound(length: int | None, one: tuple[float | None, ...], other: tuple[float | None, ...]) -> float | None:
+    if length is not None or (one == other == (None, None)):
+        return None
+    return max(next((n for n in lengths if n is not None), math.inf) for lengths in (one, other))
+
+
+@functools.cache
+def array_type(
+    item: Scalar, contiguous: bool, lengths: tuple[int | None, ...], bounds: tuple[float | None, ...]
+) -> Array:
+    """Return the type of an array."""
+    known, computed = (any(n is not None for n in values) for values in (lengths, bounds))
+    return Array(item, len(lengths), contiguous, lengths if known else (), bounds if computed else ())
 
 
 def name_of(kind: Type) -> str:

@@ -15,6 +15,7 @@ from controller.quaternion import error, rotation_matrix
 from controller.regions.entry import Entry, ViewCone
 from controller.regions.numbers import ANGLE, PART, Number
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector4, require, unit
+from controller.stack_array import array
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class Orientation:
 
 def orientation(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Orientation` at the attitude `e`; the position does not matter."""
-    turn = error(q[:4], e)
+    turn = error(array(q[0], q[1], q[2], q[3]), e)
     sine = norm(turn[1:])
     g = 2.0 * arctangent(sine, turn[0]) - q[4]
     if sine == 0.0 or turn[0] == 0.0:

@@ -13,6 +13,7 @@ from controller.quaternion import rotation_matrix
 from controller.regions.entry import Entry, ViewCone
 from controller.regions.numbers import ANGLE, LENGTH, PART, Number, vector
 from controller.regions.shape import Array, Bounds, EvaluationOfAttitude, Vector3, require, require_finite, unit
+from controller.stack_array import array
 
 
 @dataclass(frozen=True)
@@ -69,9 +70,9 @@ class Visibility:
 def visibility(p: Array, e: Array, q: Array) -> EvaluationOfAttitude:
     """Evaluate a packed `Visibility` at the position `p` and the attitude `e`."""
     # the feature in the body frame: u from the origin, b from the camera
-    R, axis = rotation_matrix(e), q[3:6]
-    u = R.T @ (q[:3] - p)
-    b = u - q[6:9]
+    R, axis = rotation_matrix(e), array(q[3], q[4], q[5])
+    u = R.T @ (array(q[0], q[1], q[2]) - p)
+    b = u - array(q[6], q[7], q[8])
     square = b @ b
     if square == 0.0:
         return math.pi - q[9], 0.0, 0.0, 0.0, 0.0, 0.0, 0.0

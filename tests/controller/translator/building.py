@@ -38,6 +38,9 @@ class Called:
         self._entry, self._words = self._library.entry, np.array(words_of(arguments), dtype=np.uint64)
         self._entry.argtypes, self._entry.restype = [ctypes.c_void_p], None
         self._at = self._words.ctypes.data
+        check = self._library.entry_misfit
+        check.argtypes, check.restype = [ctypes.c_void_p], ctypes.c_char_p
+        assert check(self._at) is None
 
     def __call__(self):
         """Call it: numbers in the arguments' arrays change."""

@@ -81,9 +81,11 @@ def differences(function, tmp_path, runs=20):
 
 
 LEAVES = {
-    "": "r.a[0] r.v[-1] r.p[i] r.A[1,2] 2.0 -0.5 s",
-    "3": "r.a r.b r.v[:3] r.v[3:] r.w[4:7] r.A[1] r.B[:,2] r.H[2,3:] r.w[i:i+3] x",
-    "6": "r.v r.w[:6] r.w[i:i+6] r.H[0] r.H[:,4]",
+    "": "r.a[0] r.v[-1] r.p[i] r.A[1,2] 2.0 -0.5 s "
+    "r.w[2_if_s<1.0_else_5] np.sum(r.v[i:i+3]) np.sum(r.q[3:i+9]) r.p[1:-1].size",
+    "3": "r.a r.b r.v[:3] r.v[3:] r.w[4:7] r.A[1] r.B[:,2] r.H[2,3:] r.w[i:i+3] "
+    "r.w[i+5:i+8] r.p[:3] r.q[-3:] r.N[i] r.H[1_if_r.a[0]>0.0_else_4,:3] x",
+    "6": "r.v r.w[:6] r.w[i:i+6] r.w[6:15] r.H[0] r.H[:,4]",
     "33": "r.A r.B r.A.T r.H[:3,3:] r.H[2:5,:3].T",
     "66": "r.H r.H.T",
     "n": "r.p r.q r.K[1] r.N[:,0]",
@@ -98,12 +100,12 @@ PRODUCTS = {
     "66": [("66", "66")],
 }
 TARGETS = {
-    "3": "r.a[:] r.v[:3] r.v[2:5] r.A[:,1] r.B[2] r.w[i:i+3] x",
+    "3": "r.a[:] r.v[:3] r.v[2:5] r.A[:,1] r.B[2] r.w[i:i+3] r.w[i+5:i+8] r.p[2:] r.H[0_if_s<1.0_else_5,2:5] x",
     "6": "r.v[:] r.w[3:9] r.H[:,2]",
     "33": "r.A[:,:] r.H[:3,2:5] r.B[:]",
     "66": "r.H[:,:]",
-    "n": "r.p[:] r.K[2]",
-    "": "r.a[2] r.v[1:4] s r.q[:]",
+    "n": "r.p[:] r.K[2] r.p[:i+5]",
+    "": "r.a[2] r.v[1:4] s r.q[:] r.v[i:i+3] r.q[3:i+8] r.w[1_if_s>1.0_else_11]",
 }
 
 
@@ -116,7 +118,7 @@ class Writer:
     def write(self, shape, depth):
         pick = self.random.choice
         if depth == 0 or shape in ("K", "N"):
-            return pick(LEAVES[shape].split())
+            return pick(LEAVES[shape].split()).replace("_", " ")
         one, other = self.write(shape, depth - 1), self.write(pick([shape, shape, ""]), depth - 1)
         forms = [f"({one} {pick('+-*/')} {other})"] * 4 + [f"-{one}", f"abs({one})"]
         if shape:
@@ -149,7 +151,7 @@ class Writer:
         expression = self.write(shape, 1 if shape == "n" else depth)
         if shape == "n":  # of run-time length it must read other arrays, or its target at the same places
             expression = f"({pick(['r.q', 'r.N[:, 1]'])} * s + abs({pick(['r.q', '2.0'])}))"
-        target = pick(TARGETS[shape].split())
+        target = pick(TARGETS[shape].split()).replace("_", " ")
         return f"{target} {'=' if target == 's' else pick(['=', '+=', '-=', '*='])} {expression}"
 
 
@@ -161,7 +163,7 @@ def turned(a: Vector3, b: Vector3) -> Vector3:
 @pytest.mark.parametrize("seed", range(8))
 def test_random_expressions_have_the_bits_of_python(seed, tmp_path):
     writer = Writer(seed)
-    lines = ["def chosen(r):", "    s = 0.5", "    x = r.a + r.b", "    for i in range(2):"]
+    lines = ["def chosen(r):", "    s = 0.5", "    x = r.a + r.b", "    for i in range(0, 5, 4):"]
     lines += [f"        {writer.statement()}" for _ in range(24)]
     names, path = {**globals()}, tmp_path / "chosen.py"
     path.write_text("\n".join(lines))
