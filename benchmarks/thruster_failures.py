@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from cosim.batch.fused import FusedFlyer, Trace
+from cosim.batch.fused import FusedFlyer
 from cosim.batch.variation import Variation
+from cosim.results.record import Rows
 from cosim.scenario.scenario import validate_scenario
 from cosim.scenario.tables import Failure
 from cosim.scenario.vehicle_model import vehicle_model
@@ -115,7 +116,7 @@ def through_sensors(table: dict[str, Any], lost: list[str], slow: bool) -> dict[
     }
 
 
-def since_it_matters(trace: Trace, failure: Failure, limit: float) -> float:
+def since_it_matters(trace: Rows, failure: Failure, limit: float) -> float:
     """Return the time [s] from which a thruster lacks a tenth of its limit [N], averaged over 0.5 s; inf if never."""
     times, commands = trace["time"], trace[f"thrust[{failure.thruster}]"]
     after = times >= failure.time

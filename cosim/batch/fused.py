@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,37 +12,18 @@ from controller.compiling.function import BoundCall
 from cosim.batch.outcome import OUTCOME, BatchResult, empty_outcomes
 from cosim.batch.variation import Variation
 from cosim.errors import RunError, ScenarioError
+from cosim.results.record import Rows
 from cosim.results.spans import SETTLED_FOR
 from cosim.scenario.law_factory import law_of, require_builtin_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.bindings import BoundLaw, bind_rules
-from cosim.simulation.make_step import (
-    NO_CLOCK,
-    exchanged_variables,
-    make_data,
-    make_model,
-    make_noise,
-    step_signals,
-)
+from cosim.simulation.make_step import NO_CLOCK, exchanged_variables, make_data, make_model, make_noise, step_signals
 from cosim.simulation.stepped_plant import plant_calls
 from cosim.step.score import FlightMetrics, empty_metrics, fly
 from cosim.step.step_model import Array, Integers, StepData, StepModel
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant, PlantError
-
-
-@dataclass(frozen=True)
-class Trace:
-    """The signals of a flight at each control step; none where they were not asked for."""
-
-    columns: tuple[str, ...]
-    rows: Array  # (control steps, columns), or (0, 0)
-
-    def __getitem__(self, column: str) -> Array:
-        """Return one signal, shape (control steps,)."""
-        values: Array = self.rows[:, self.columns.index(column)]
-        return values
 
 
 class FusedFlyer:
@@ -70,8 +50,8 @@ class FusedFlyer:
                 refused[row] = str(error)
         return BatchResult(outcomes, refused)
 
-    def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Trace]:
-        """Fly one scenario of the variation; return its outcome, shape (), and its trace."""
+    def fly_one(self, scenario: Scenario, trace: bool = False) -> tuple[NDArray[np.void], Rows]:
+        """Fly one scenario of the variation; return its outcome, shape (), and its signals at each control step."""
         metrics, model, data, signals = fly_scenario(self._plant, scenario, trace)
         return _outcome(metrics, model, data), signals
 
@@ -106,8 +86,8 @@ def _fixed_keys(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
 
 def fly_scenario(
     plant: Plant, scenario: Scenario, trace: bool = False, clock: Integers = NO_CLOCK
-) -> tuple[FlightMetrics[float], StepModel, StepData, Trace]:
-    """Reset a plant, and fly a scenario with it."""
+) -> tuple[FlightMetrics[float], StepModel, StepData, Rows]:
+    """Reset a plant, and fly a scenario with it; return its signals at each control step if a trace is wanted."""
     law = law_of(scenario)
     plant.reset()
     plant.set(start_values(scenario))
@@ -123,8 +103,9 @@ def fly_scenario(
     BoundCall(fly, (model, data, calls, metrics, np.zeros(len(inputs)), rows)).call()
     bound_law.raise_error()
     rules.raise_error()
-    names = tuple(column.name for column in signals.columns) if trace else ()
-    return FlightMetrics(*values.tolist()), model, data, Trace(names, rows)
+    columns = signals.columns if trace else ()
+    flown = Rows(columns, {column.name: values for column, values in zip(columns, rows.T, strict=True)})
+    return FlightMetrics(*values.tolist()), model, data, flown
 
 
 def _outcome(metrics: FlightMetrics[float], model: StepModel, data: StepData) -> NDArray[np.void]:

@@ -26,12 +26,7 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     flag(verb, "--law NAME", "law such as pd; instead of a scenario's own")
     flag(verb, "--vary KEY=LOW:HIGH[:log]", "a key of the scenario and the range to search; or KEY=A,B,C", **LIST)
-    flag(
-        verb,
-        "--objective clearance|violation|arrival",
-        "clearance, weighted violation, or time",
-        default="clearance",
-    )
+    flag(verb, "--objective clearance|violation|arrival", "clearance, weighted violation, or time", default="clearance")
     flag(verb, "--budget N", "number of flights", int, 2000)
     flag(verb, "--rare-event", "estimate the probability of a violation, instead of searching for the worst flight")
     flag(verb, "--seed S", "seed of the search", int, 0)

@@ -124,23 +124,20 @@ def _vehicle(vehicle: Vehicle) -> dict[str, Any]:
     # A vehicle's file has the wrench of each thruster, but no position: an arrow is at the point of its line of action
     # that is nearest to the body origin.
     radius = vehicle.hull_radius or (0.75 * vehicle.buoyancy / (_SEA_WATER * np.pi)) ** (1.0 / 3.0)
-    thrusters = []
-    for i, (line, min_force, max_force) in enumerate(
-        zip(thruster_lines(vehicle), vehicle.thrust_min, vehicle.thrust_max, strict=True)
-    ):
-        thrusters.append(
-            {
-                "name": str(i + 1),
-                "position": [float(x) for x in line.nearest],
-                "direction": [float(x) for x in line.force],
-                "min": float(min_force),
-                "max": float(max_force),
-            }
-        )
+    thrusters = zip(thruster_lines(vehicle), vehicle.thrust_min.tolist(), vehicle.thrust_max.tolist(), strict=True)
     return {
         "name": vehicle.name,
         "title": vehicle.title,
         "hull": vehicle.hull_shape,
         "radius": float(radius),
-        "thrusters": thrusters,
+        "thrusters": [
+            {
+                "name": str(i),
+                "position": line.nearest.tolist(),
+                "direction": line.force.tolist(),
+                "min": low,
+                "max": high,
+            }
+            for i, (line, low, high) in enumerate(thrusters, 1)
+        ],
     }

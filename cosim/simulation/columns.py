@@ -69,11 +69,7 @@ def columns_of_channels(
         ),
         Column("allocation_saturated", "", "Commanded wrench clipped by the thrusters' limits"),
         *_as_columns(inputs),
-        *(
-            Column(f"{name}.shift.{axis}", "m", f"Displacement of {name}, {where}")
-            for name in scenario.moving
-            for axis, where in zip("xyz", ("north", "east", "down"), strict=True)
-        ),
+        *(column for name in scenario.moving for column in _along(f"{name}.shift", "m", f"Displacement of {name}")),
         *([Column("goal.place", "", "Index of the goal's present place, from 0")] if scenario.goal_then else []),
         *_sensing_columns(scenario),
         *_command_columns(scenario),
@@ -93,8 +89,7 @@ def _arbiter_input_columns(scenario: Scenario) -> Iterator[Column]:
 def _sensing_columns(scenario: Scenario) -> Iterator[Column]:
     if scenario.sensing.exact:
         return
-    for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
-        yield Column(f"sensed.{axis}", "m", f"Sensed position, {where}")
+    yield from _along("sensed", "m", "Sensed position")
     for i, name in enumerate("uvwpqr"):
         yield Column(f"sensed.{name}", "m/s" if i < 3 else "rad/s", f"Sensed velocity {name}, body frame")
     if scenario.sensing.through == "state":
@@ -102,8 +97,7 @@ def _sensing_columns(scenario: Scenario) -> Iterator[Column]:
     for i in range(4):
         yield Column(f"sensed.e{i}", "", f"Sensed attitude, unit quaternion, component {i}")
     for name, unit in (("position", "m"), ("velocity", "m/s"), ("attitude", "rad")):
-        for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
-            yield Column(f"deviation.{name}.{axis}", unit, f"Standard deviation of the sensed {name}, {where}")
+        yield from _along(f"deviation.{name}", unit, f"Standard deviation of the sensed {name}")
     for name in "pqr":
         yield Column(f"deviation.rate.{name}", "rad/s", f"Standard deviation of the sensed rate {name}, body frame")
 
@@ -114,9 +108,14 @@ def _command_columns(scenario: Scenario) -> Iterator[Column]:
     yield Column("commands.armed", "", "Armed: the thrusters may give force")
     yield Column("commands.mode", "", f"Control mode: {', '.join(f'{i} {mode}' for i, mode in enumerate(MODES))}")
     yield Column("commands.item", "", "Item of the mission, from 0; -1 for none")
-    for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
-        yield Column(f"target.{axis}", "m", f"Center of the target region, {where}")
+    yield from _along("target", "m", "Center of the target region")
     yield Column("target.radius", "m", "Radius of the target region if it is a sphere of its own, 0 if it is the goal")
+
+
+def _along(name: str, unit: str, what: str) -> Iterator[Column]:
+    """Yield the columns of a vector's components north, east and down."""
+    for axis, where in zip("xyz", ("north", "east", "down"), strict=True):
+        yield Column(f"{name}.{axis}", unit, f"{what}, {where}")
 
 
 def _as_columns(channels: Sequence[Channel]) -> list[Column]:

@@ -91,7 +91,6 @@ class RegionEnvironment:
         if at:
             self._set_motion(at - 1, to, going, time)
         else:
-            self._store_target()
             self._reached.velocity, self._reached.origin = going, to - going * time
             if self._reached is self._target:
                 self._load_target(time)
@@ -138,7 +137,6 @@ class RegionEnvironment:
     ) -> None:
         """Set position, shape and velocity of the target region; position [m, NED], radius [m], velocity [m/s, NED]."""
         # with time [s]
-        self._store_target()
         if radius is None:
             origin = np.subtract(position, self._middle)
             self._target = _Target(self._goal_shape, self._middle, origin, np.array(velocity))
@@ -155,13 +153,8 @@ class RegionEnvironment:
 
     def restore_target(self, time: float) -> None:
         """Restore the target that was saved last, at a time [s]; the scenario's goal, if none was."""
-        self._store_target()
         self._target = self._reached
         self._load_target(time)
-
-    def _store_target(self) -> None:
-        """Take over the origin of the target, which a step changes where the scenario has goals in turn."""
-        self._target.origin = self._goal_origin[0].copy()
 
     def _load_target(self, time: float) -> None:
         """Write the target into the arrays of the goal, at its position at a time [s]."""

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller import VehicleState
 from controller.paper_law import primary_error, secondary_error
 from controller.quaternion import error, rotation_matrix
-from controller.regions.region_set import PackedRegions
 from controller.theory import (
     mapped_error,
     mapped_error_rate,
@@ -19,6 +17,7 @@ from controller.theory import (
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_model
 from cosim.simulation.signals import Array, Column
+from cosim.step.step_model import StepData
 
 FORMS = ("printed", "normalized", "primary")  # forms of V, in the order of the columns
 
@@ -38,30 +37,24 @@ def lyapunov_columns(scenario: Scenario) -> list[Column]:
 
 
 class LyapunovSignals:
-    """Writes V and its rate into the row of a step; weights (n,), estimate (4,) [N, N m], out (4,)."""
+    """Writes V and its rate into the row of a step; out (4,)."""
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        state: VehicleState,
-        goal: PackedRegions,
-        regions: PackedRegions,
-        weights: Array,
-        estimate: Array,
-        out: Array,
-    ) -> None:
+    def __init__(self, scenario: Scenario, data: StepData, out: Array) -> None:
         self._model, self._gains = true_model(scenario), scenario.law.gains
         self._desired = np.array(scenario.law.desired_quaternion)
-        self._state, self._goal, self._regions = state, goal, regions
-        self._weights, self._estimate, self._out = weights, estimate, out
-        n = len(weights)
+        self._state, self._goal, self._regions, self._data = data.true_state, data.goal, data.regions, data
+        self._out, n = out, data.weights.size
         self._goal_buffers = np.empty(1), np.empty((1, 3)), np.empty((1, 3)), np.empty(1)
         self._region_buffers = np.empty(n), np.empty((n, 3)), np.empty((n, 3)), np.empty(n)
 
     def write(self) -> None:
         """Write V in its three forms, and its rate."""
         model, gains, state, out = self._model, self._gains, self._state, self._out
-        velocity, estimate, betas = state.velocity_body, self._estimate, self._regions.gains * self._weights / gains.k_q
+        velocity, estimate, betas = (
+            state.velocity_body,
+            self._data.estimate,
+            self._regions.gains * self._data.weights / gains.k_q,
+        )
         R, turned = rotation_matrix(state.quaternion), error(self._desired, state.quaternion)
         region_rate = self._region_rate(R @ velocity[:3], betas)
         e_p, e_s = self._region_errors(state.position, betas)

@@ -148,10 +148,7 @@ class Master:
         # what a step does not do itself: the Lyapunov function after it, commands within it
         self._lyapunov: LyapunovSignals | None = None
         if scenario.record.lyapunov:
-            self._lyapunov = LyapunovSignals(
-                scenario, self.data.true_state, self.data.goal, self.data.regions, self.data.weights,
-                self.data.estimate, s.view("lyapunov.printed", 4),
-            )  # fmt: skip
+            self._lyapunov = LyapunovSignals(scenario, self.data, s.view("lyapunov.printed", 4))
         self.command_handler: CommandHandler | None = None
         self._commands: CommandSource | None = None  # of the present step
         if scenario.commands.enabled:

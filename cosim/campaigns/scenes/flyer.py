@@ -7,11 +7,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cosim.batch.fused import Trace, fly_scenario
+from cosim.batch.fused import fly_scenario
 from cosim.campaigns.scenes.as_scenario import VEHICLE, scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import law_named
 from cosim.campaigns.scenes.scenario_scene import AnyScene
+from cosim.results.record import Rows
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_vehicle
 from cosim.scenario.vehicle_model import vehicle_model
@@ -92,7 +93,7 @@ class SceneFlyer:
         self._clock = Clock()
         self._plants = {VEHICLE: Plant(vehicle)}
 
-    def fly(self, scene: AnyScene, trace: bool = False) -> tuple[Score, Trace]:
+    def fly(self, scene: AnyScene, trace: bool = False) -> tuple[Score, Rows]:
         """Fly one scene.
 
         Parameters
@@ -104,7 +105,7 @@ class SceneFlyer:
 
         Returns
         -------
-        Score, Trace
+        Score, Rows
             Score of the flight, and its signals by name, such as ``trace["position.x"]``.
 
         Raises

@@ -53,7 +53,7 @@ def flight_data(run: Run) -> dict[str, Any]:
         "goal_center": list(shape_center(scenario.goal)),
         "restoring": _restoring(scenario),
         "failures": _failures(flight, memory),
-        "toml": dataclasses.asdict(scenario_template(scenario, slots)),
+        "toml": scenario_template(scenario, slots),
     })  # fmt: skip
     return data
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 from cosim.replay.interactive.adjustable import Slot
 from cosim.scenario.changes import with_values
@@ -15,16 +14,9 @@ _MARK = 730000000.5  # first of a row of placeholders for the page's numbers, of
 _TITLE = "title-of-what-if"
 
 
-@dataclass(frozen=True)
-class ScenarioTemplate:
-    """Parts of a text, and the keys of the values between them: numbers, and ``title``."""
-
-    parts: tuple[str, ...]
-    keys: tuple[str, ...]
-
-
-def scenario_template(scenario: Scenario, slots: Sequence[Slot]) -> ScenarioTemplate:
-    """Return the file of a scenario with gaps for its title and some numbers; failures can be added at its end."""
+def scenario_template(scenario: Scenario, slots: Sequence[Slot]) -> dict[str, list[str]]:
+    """Return the parts of a scenario's file, and the keys of the values between them: ``title``, and some numbers."""
+    # Failures can be added at its end.
     marks = {repr(_MARK + i): slot.key for i, slot in enumerate(slots)}
     table = with_values(scenario.table, {key: float(mark) for mark, key in marks.items()})
     if not table["failures"]:
@@ -34,4 +26,4 @@ def scenario_template(scenario: Scenario, slots: Sequence[Slot]) -> ScenarioTemp
     table["title"] = _TITLE
     marks[f'"{_TITLE}"'] = "title"
     parts = re.split(f"({'|'.join(map(re.escape, marks))})", scenario_text(table, {}))
-    return ScenarioTemplate(tuple(parts[::2]), tuple(marks[mark] for mark in parts[1::2]))
+    return {"parts": parts[::2], "keys": [marks[mark] for mark in parts[1::2]]}

@@ -23,9 +23,9 @@ typedef struct {
     void (*rewind)(Model *model);
     /* Updates constants and clocks from the parameters; refuses contradictory parameters. */
     Status (*prepare)(Instance *instance);
-    /* Ends initialization: corrects or refuses the start values, and executes the clocks that are due. */
+    /* Ends initialization: corrects or refuses the start values, and executes the clocks that are due. NULL: nothing. */
     Status (*begin)(Instance *instance);
-    /* Computes the outputs. */
+    /* Computes the outputs. NULL: steps alone change them. */
     void (*evaluate)(Instance *instance);
     /* Refuses a step [s] that is too long. */
     Status (*check_step_size)(const Instance *instance, double step);

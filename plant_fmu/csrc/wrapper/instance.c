@@ -199,7 +199,8 @@ Status instance_update(Instance *instance)
     }
     if (instance_prepare(instance) != STATUS_OK)
         return STATUS_ERROR;
-    COMPONENT.evaluate(instance);
+    if (COMPONENT.evaluate)
+        COMPONENT.evaluate(instance);
     instance->outdated = false;
     return STATUS_OK;
 }
@@ -244,7 +245,7 @@ Status instance_exit_initialization(Instance *instance)
         return STATUS_ERROR;
     COMPONENT.rewind(&instance->model); /* the clocks start now */
     instance->unprepared = true;
-    if (instance_prepare(instance) != STATUS_OK || COMPONENT.begin(instance) != STATUS_OK)
+    if (instance_prepare(instance) != STATUS_OK || (COMPONENT.begin && COMPONENT.begin(instance) != STATUS_OK))
         return STATUS_ERROR;
     instance->mode = instance->kind == CO_SIMULATION ? MODE_STEPPING : MODE_EVENT;
     instance->outdated = true;

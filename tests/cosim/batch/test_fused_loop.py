@@ -85,7 +85,7 @@ def test_reused_plant_gives_the_same_run_as_a_new_one(flyer):
     again, trace = flyer.fly(HARD[0], trace=True)
     with SceneFlyer("ismail_dunnigan", SHORT) as new:
         fresh, expected = new.fly(HARD[0], trace=True)
-    np.testing.assert_array_equal(trace.rows, expected.rows)
+    np.testing.assert_array_equal(trace.to_array(), expected.to_array())
     assert again._replace(worst_step=0.0) == fresh._replace(worst_step=0.0)
 
 
@@ -145,7 +145,7 @@ def loose(monkeypatch):
 def test_nan_command_stops_one_run_and_not_the_next(loose, monkeypatch):
     failed, trace = loose.fly(PLAIN[0], trace=True)
     assert failed.failed_step == 100 and not failed.reached and failed.reach_time == math.inf
-    assert trace["time"][49] == pytest.approx(0.98) and not trace.rows[51:].any()
+    assert trace["time"][49] == pytest.approx(0.98) and not trace.to_array()[51:].any()
     monkeypatch.setattr(_Loose, "calls", -1000)
     assert loose.fly(PLAIN[1])[0].failed_step == -1
     monkeypatch.setattr(_Loose, "calls", 50)

@@ -19,16 +19,6 @@ static Status prepare(Instance *instance)
     return STATUS_OK;
 }
 
-static Status begin(Instance *instance)
-{
-    return (void)instance, STATUS_OK;
-}
-
-static void evaluate(Instance *instance)
-{
-    (void)instance;
-}
-
 static Status check_step_size(const Instance *instance, double step)
 {
     const Ticks *ticks = &instance->model.ticks;
@@ -69,5 +59,5 @@ static bool valid_state(const Model *m)
 }
 
 const Component COMPONENT = {
-    "the arbiter", rewind_ticks, prepare, begin, evaluate, check_step_size, advance, valid_state, NULL, NULL, NULL, NULL,
+    "the arbiter", rewind_ticks, prepare, NULL, NULL, check_step_size, advance, valid_state, NULL, NULL, NULL, NULL,
 };

@@ -81,16 +81,6 @@ static Status prepare(Instance *instance)
     return STATUS_OK;
 }
 
-static Status begin(Instance *instance)
-{
-    return (void)instance, STATUS_OK;
-}
-
-static void evaluate(Instance *instance)
-{
-    (void)instance;
-}
-
 static Status check_step_size(const Instance *instance, double step)
 {
     const Ticks *control = &instance->model.control;
@@ -165,5 +155,5 @@ static bool valid_state(const Model *m)
 }
 
 const Component COMPONENT = {
-    "the controller", rewind_memory, prepare, begin, evaluate, check_step_size, advance, valid_state, NULL, NULL, NULL, NULL,
+    "the controller", rewind_memory, prepare, NULL, NULL, check_step_size, advance, valid_state, NULL, NULL, NULL, NULL,
 };

@@ -183,8 +183,8 @@ def test_added_failure_is_that_of_a_scenario_with_it(law, time, asked):
 def test_filled_template_equals_the_scenario(docking, tmp_path):
     flight, slots = docking[0], find_slots(*docking)[0]
     template, values = scenario_template(flight.scenario, slots), {slot.key: repr(slot.value) for slot in slots}
-    filled = [values.get(key, '"Again"') for key in template.keys]
-    parts = [part for pair in zip(template.parts, [*filled, ""], strict=True) for part in pair]
+    filled = [values.get(key, '"Again"') for key in template["keys"]]
+    parts = [part for pair in zip(template["parts"], [*filled, ""], strict=True) for part in pair]
     (tmp_path / "again.toml").write_text("".join(parts))
     again = load_scenario(tmp_path / "again.toml")
     assert again.title == "Again"
