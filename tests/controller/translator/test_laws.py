@@ -74,7 +74,8 @@ def test_forces_and_memory_are_those_of_another_reference_for_long(library):
 def test_any_optimization_gives_the_same_bits(library, flags, tmp_path):
     law, text, built = library
     other = compiled(text, tmp_path, *flags)
-    assert first_difference(law, other, 3000, 6, by_library(built)) is None
+    steps = 20_000 if law == "deployable" else 3000  # others are held against Numba for as long
+    assert first_difference(law, other, steps, 6, by_library(built)) is None
 
 
 @pytest.mark.slow
