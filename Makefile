@@ -47,9 +47,9 @@ cover = COVERAGE_FILE=build/coverage $(BIN)/python -m coverage run --include='$(
 	-m pytest -q --medium $(3) && COVERAGE_FILE=build/coverage $(BIN)/python -m coverage report --fail-under=$(1)
 csv = $(subst $(subst ,, ),$(comma),$(1))
 MATHEMATICS := $(call csv,$(patsubst %,controller/%.py,allocation quadratic_program paper_law quaternion restoring \
-	theory/conditions theory/model))
+	theory/conditions theory/equations_of_motion))
 MATHEMATICS_TESTS := $(patsubst %,tests/controller/test_%.py,quadratic_program allocation paper_law quaternion) \
-	tests/controller/theory/test_conditions.py tests/controller/theory/test_model.py
+	tests/controller/theory/test_conditions.py tests/controller/theory/test_equations_of_motion.py
 MAVLINK := $(call csv,$(addprefix cosim/mavlink/,wire/encode.py wire/framing.py wire/signing.py vehicle/row_layout.py \
 	messages/* services/*))
 

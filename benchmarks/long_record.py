@@ -16,7 +16,7 @@ from cosim.results.record import load_record
 from cosim.results.recorder import Recorder
 from cosim.results.run_result import SCENARIO as SCENARIO_FILE
 from cosim.results.run_result import SUMMARY
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 ROWS = (1_000_000, 10_000_000)

@@ -15,7 +15,7 @@ from benchmarks.table import Row
 from benchmarks.timing import Timing
 from cosim.replay.pages import write_replay
 from cosim.results.run_result import load_run
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 STEPS = 120_000

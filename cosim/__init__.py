@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from cosim.precheck.precheck import Check, check_scenario
     from cosim.results.record import Record
     from cosim.results.run_result import Run, load_run
-    from cosim.run.run import run_scenario
+    from cosim.run.run_scenario import run_scenario
     from cosim.scenario.scenario import Scenario, load_scenario
     from cosim.scenario.toml_file import list_scenarios
     from cosim.simulation.master import Master
@@ -93,7 +93,7 @@ _EXPORTS = {
     "precheck.precheck": {"Check", "check_scenario"},
     "results.record": {"Record"},
     "results.run_result": {"Run", "load_run"},
-    "run.run": {"run_scenario"},
+    "run.run_scenario": {"run_scenario"},
     "scenario.scenario": {"Scenario", "load_scenario"},
     "scenario.toml_file": {"list_scenarios"},
     "simulation.master": {"Master"},

@@ -38,7 +38,7 @@ def on_post_build(config: MkDocsConfig) -> None:
     if not _can_build():
         return
     from cosim.replay.pages import replay
-    from cosim.run.run import run_scenario
+    from cosim.run.run_scenario import run_scenario
     from cosim.scenario.scenario import load_scenario
 
     with tempfile.TemporaryDirectory() as scratch:

@@ -139,7 +139,7 @@ def prebuilt_of_eight(once):
 @pytest.fixture(scope="session")
 def shipped_run(tmp_path_factory):
     """Return a function that runs a shipped scenario once a session, with a report where one is asked for."""
-    from cosim.run.run import run_scenario
+    from cosim.run.run_scenario import run_scenario
     from cosim.scenario.scenario import load_scenario
 
     done = {}

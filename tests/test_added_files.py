@@ -44,7 +44,7 @@ import numpy as np
 from controller import FunctionLaw
 from cosim.precheck.precheck import check_scenario
 from cosim.results.record import load_record
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 def steer(state, goal, regions, weights):

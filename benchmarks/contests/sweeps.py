@@ -59,7 +59,7 @@ class _Sweep:
 
     def seconds(self, count: int) -> float:
         """Fly `count` rows, and return the time [s]."""
-        from cosim.campaigns.sweep import run_sweep
+        from cosim.campaigns.parameter_sweep import run_sweep
         from cosim.campaigns.sweeps.design import Design, vary_from
 
         design = Design(vary_from(_VARIED), "random", count, 0)

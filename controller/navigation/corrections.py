@@ -12,7 +12,11 @@ import numpy as np
 
 from controller.arithmetic import arctangent, square
 from controller.linear_algebra import cross
-from controller.navigation.estimate import (
+from controller.navigation.inertial import estimate_at, rotate
+from controller.navigation.measurements import DEPTH, DEPTH_SENSOR, DVL, HEADING, USBL, Measurements, SensorModel
+from controller.navigation.measurements import POSITION as MEASURED_POSITION
+from controller.navigation.measurements import VELOCITY as MEASURED_VELOCITY
+from controller.navigation.navigation_memory import (
     ACCELERATION_BIAS,
     ATTITUDE,
     DEPTH_BIAS,
@@ -28,10 +32,6 @@ from controller.navigation.estimate import (
     NavigationMemory,
     set_first_covariance,
 )
-from controller.navigation.inertial import estimate_at, rotate
-from controller.navigation.measurements import DEPTH, DEPTH_SENSOR, DVL, HEADING, USBL, Measurements, SensorModel
-from controller.navigation.measurements import POSITION as MEASURED_POSITION
-from controller.navigation.measurements import VELOCITY as MEASURED_VELOCITY
 from controller.quaternion import rotation_matrix, skew
 from controller.stack_array import Matrix3, Vector3, array, zeros
 

@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from controller.arithmetic import square
 from controller.linear_algebra import norm
-from controller.navigation.estimate import (
+from controller.navigation.measurements import SensorModel
+from controller.navigation.navigation_memory import (
     ACCELERATION_BIAS,
     ATTITUDE,
     GYRO_BIAS,
@@ -20,7 +21,6 @@ from controller.navigation.estimate import (
     ErrorMatrix,
     NavigationMemory,
 )
-from controller.navigation.measurements import SensorModel
 from controller.quaternion import multiply, rotation_matrix, skew
 from controller.stack_array import Matrix3, Vector3, Vector4, array
 

@@ -11,15 +11,6 @@ from controller.arithmetic import arctangent, cosine, hypotenuse, square
 from controller.compiling.function import CompiledFunction
 from controller.law import VehicleState
 from controller.navigation.corrections import CONFIRMED, correct_by_sensor, restart
-from controller.navigation.estimate import (
-    ATTITUDE,
-    GYRO_BIAS,
-    POSITION,
-    VELOCITY,
-    NavigationMemory,
-    empty_memory,
-    set_first_covariance,
-)
 from controller.navigation.inertial import estimate_at, propagate
 from controller.navigation.measurements import (
     ACCELERATION,
@@ -36,6 +27,15 @@ from controller.navigation.measurements import (
     empty_measurements,
 )
 from controller.navigation.measurements import POSITION as MEASURED_POSITION
+from controller.navigation.navigation_memory import (
+    ATTITUDE,
+    GYRO_BIAS,
+    POSITION,
+    VELOCITY,
+    NavigationMemory,
+    empty_memory,
+    set_first_covariance,
+)
 from controller.quaternion import rotation_matrix
 from controller.stack_array import Array, Vector4, array, zeros
 

@@ -13,6 +13,7 @@ from controller.theory.conditions import (
     secondary_fit,
     sphere_radii,
 )
+from controller.theory.equations_of_motion import Model, coriolis, damping
 from controller.theory.lyapunov import (
     bracket,
     lower_bound,
@@ -24,7 +25,6 @@ from controller.theory.lyapunov import (
     unit_gradient_secondary,
     value_rate,
 )
-from controller.theory.model import Model, coriolis, damping
 
 __all__ = [
     "Fit",

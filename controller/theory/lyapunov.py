@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from controller.paper_law import Gains, positive_part
 from controller.quaternion import rate, skew
-from controller.theory.model import Model, coriolis, damping
+from controller.theory.equations_of_motion import Model, coriolis, damping
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from cosim.campaigns.campaign import run_campaign
     from cosim.campaigns.comparison import Comparison, compare
+    from cosim.campaigns.parameter_sweep import run_sweep
     from cosim.campaigns.runner import Campaign
-    from cosim.campaigns.sweep import run_sweep
     from cosim.campaigns.sweeps.design import Design, Vary, vary_from
 
 __all__ = ["Campaign", "Comparison", "Design", "Vary", "compare", "run_campaign", "run_sweep", "vary_from"]
@@ -23,7 +23,7 @@ _EXPORTS = {
     "campaign": {"run_campaign"},
     "comparison": {"Comparison", "compare"},
     "runner": {"Campaign"},
-    "sweep": {"run_sweep"},
+    "parameter_sweep": {"run_sweep"},
     "sweeps.design": {"Design", "Vary", "vary_from"},
 }
 

@@ -9,14 +9,14 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
+from cosim.campaigns.analysis.campaign_summary import rates_of
 from cosim.campaigns.analysis.statistics import Facts, mean_ratio, median_difference, paired, rate
-from cosim.campaigns.analysis.summary import rates_of
 from cosim.campaigns.comparison import Comparison, completed, fly_each, refuse_other_files
 from cosim.campaigns.runner import Campaign
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.kinds import scene_kinds
 from cosim.campaigns.scenes.law_gains import gains_from
-from cosim.campaigns.scenes.work import SceneTask
+from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 from cosim.scenario.tables import RuleVariant

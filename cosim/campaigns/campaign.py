@@ -7,12 +7,12 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
-from cosim.campaigns.analysis.summary import summarize_campaign
+from cosim.campaigns.analysis.campaign_summary import summarize_campaign
 from cosim.campaigns.runner import Campaign, carry_out
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import gains_from
 from cosim.campaigns.scenes.scene_file import SceneStore
-from cosim.campaigns.scenes.work import SceneTask, SceneWork
+from cosim.campaigns.scenes.scene_work import SceneTask, SceneWork
 
 
 def run_campaign(

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from controller import LAWS
+from cosim.campaigns.analysis.campaign_summary import median, rates_of
 from cosim.campaigns.analysis.statistics import Facts, median_difference, paired
-from cosim.campaigns.analysis.summary import median, rates_of
 from cosim.campaigns.campaign import run_campaign
 from cosim.campaigns.pages.comparison_page import NUMBERS, PAGE
 from cosim.campaigns.pages.replays import WORST
@@ -20,7 +20,7 @@ from cosim.campaigns.runner import Campaign
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import gains_from, law_named
 from cosim.campaigns.scenes.scene_file import SceneStore
-from cosim.campaigns.scenes.work import SceneTask
+from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 from cosim.io.atomic_file import write_atomic

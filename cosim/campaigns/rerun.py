@@ -17,21 +17,21 @@ from controller.regions.region_set import of_attitude
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.law_gains import law_named
-from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.scenes.scene_file import decode_scene
-from cosim.campaigns.scenes.work import SceneTask
+from cosim.campaigns.scenes.scene_rows import SCHEMA
+from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.folder import PLAN, RESULTS, read_plan
 from cosim.campaigns.store.plan import SCENES, SWEEP, code_digest, difference
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.design import design_of
-from cosim.campaigns.sweeps.rows import SweepWork, schema_of
+from cosim.campaigns.sweeps.sweep_rows import SweepWork, schema_of
 from cosim.campaigns.workers.dispatch import KILLED
 from cosim.campaigns.workers.work import Task
 from cosim.errors import CosimError, RunError
 from cosim.io.strict_json import understood
 from cosim.results.run_result import SCENARIO, Run
 from cosim.results.spans import spans
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario, load_scenario
 from cosim.scenario.toml_file import rename_former_keys
 from plant_fmu import PlantError, PlantFmuError

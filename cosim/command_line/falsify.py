@@ -49,11 +49,11 @@ def falsify(options: argparse.Namespace) -> int:
 
 
 def _search(options: argparse.Namespace) -> Any:
+    from cosim.campaigns.falsification.search_work import ScenarioSearch, SceneSearch, SearchSettings
     from cosim.campaigns.falsification.spaces import FAMILIES
-    from cosim.campaigns.falsification.work import ScenarioSearch, SceneSearch, SearchSettings
     from cosim.campaigns.scenes.conditions import Conditions
     from cosim.campaigns.scenes.law_gains import gains_from
-    from cosim.campaigns.scenes.work import SceneTask
+    from cosim.campaigns.scenes.scene_work import SceneTask
     from cosim.campaigns.sweeps.design import vary_from
     from cosim.scenario.scenario import load_scenario
 

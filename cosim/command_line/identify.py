@@ -76,7 +76,7 @@ def _fit(
 ) -> list[str]:
     """Identify the vehicle and write it; return what to print."""
     from cosim.identification import findings
-    from cosim.identification.identify import identify, write_results
+    from cosim.identification.identification import identify, write_results
     from cosim.identification.vehicle_file import name_of_file
 
     refuse_flags(options, [*_EXCITATION], "--excite with it")

@@ -37,7 +37,7 @@ def add_verbs(verbs: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run ``cosim run``."""
-    from cosim.run.run import run_scenario
+    from cosim.run.run_scenario import run_scenario
     from cosim.scenario.scenario import load_scenario
 
     overrides = [*options.set]

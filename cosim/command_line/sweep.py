@@ -44,7 +44,7 @@ def add_verbs(verbs: Any) -> None:
 def sweep(options: argparse.Namespace) -> int:
     """Run ``cosim sweep``."""
     from cosim.campaigns.pages.sweep_page import sweep_lines, write_sweep_page
-    from cosim.campaigns.sweep import run_sweep
+    from cosim.campaigns.parameter_sweep import run_sweep
     from cosim.campaigns.sweeps.design import Design, vary_from, vary_vehicles
     from cosim.scenario.scenario import load_scenario
 

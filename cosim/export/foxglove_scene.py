@@ -17,7 +17,7 @@ from google.protobuf.timestamp_pb2 import Timestamp
 
 from controller.regions import Box, Cylinder, Ellipsoid, Sphere
 from controller.regions.region_set import of_attitude
-from cosim.export.scene import BODY, HULL_COLOR, NED, OPAQUE, PLACE, THRUST_COLOR, TRAIL_COLOR, Scene, Solid
+from cosim.export.viewer_scene import BODY, HULL_COLOR, NED, OPAQUE, PLACE, THRUST_COLOR, TRAIL_COLOR, Scene, Solid
 from cosim.replay.events import Event
 from cosim.simulation.signals import Array
 

@@ -21,7 +21,7 @@ from cosim.export import foxglove_scene as foxglove
 from cosim.export.excerpt import Excerpt
 from cosim.export.names import group_columns, valid_names
 from cosim.export.protobuf_table import numbers_messages, numbers_schema
-from cosim.export.scene import POSITION, QUATERNION, Scene
+from cosim.export.viewer_scene import POSITION, QUATERNION, Scene
 from cosim.replay.activity import active_at
 from cosim.replay.events import events_of
 from cosim.results.record import Rows

@@ -16,7 +16,7 @@ from controller.regions import Box, Ellipsoid, Sphere
 from cosim.errors import ExportError
 from cosim.export.excerpt import Excerpt
 from cosim.export.names import group_columns
-from cosim.export.scene import (
+from cosim.export.viewer_scene import (
     BODY,
     HULL_COLOR,
     NED,

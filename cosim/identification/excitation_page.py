@@ -107,7 +107,7 @@ def _prior_ratios(design: Design) -> NDArray[np.float64]:
 
 
 def _page(design: Design, out: Path) -> str:
-    from cosim.identification.figures import inline_figures, rehearsal_figures
+    from cosim.identification.identification_figures import inline_figures, rehearsal_figures
 
     segments = [
         (f"{BEGIN + k * (SECONDS + RETURN):g}", segment.title, segment.mode,

@@ -26,7 +26,7 @@ from controller.theory import (
     sphere_radii,
 )
 from controller.theory.conditions import least_of_potential_test
-from controller.theory.model import asymmetry, damping, least_inertia, restoring_defect, skew_defect
+from controller.theory.equations_of_motion import asymmetry, damping, least_inertia, restoring_defect, skew_defect
 from cosim.precheck.finding import Finding, status
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.true_vehicle import true_model, true_vehicle

@@ -16,7 +16,7 @@ from cosim.errors import RunError
 from cosim.io.atomic_file import reason, write_atomic
 from cosim.io.strict_json import json_text
 from cosim.replay.pages import write_replay
-from cosim.report.report import write_report
+from cosim.report.report_files import write_report
 from cosim.report.web_page import FIGURES
 from cosim.results.log_facts import IMPORT
 from cosim.results.record import RECORD, STREAM, load_record, require_utf8

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from controller import Law, VehicleState
-from controller.navigation.estimate import empty_memory
 from controller.navigation.measurements import SENSORS, VALUES, Measurements
+from controller.navigation.navigation_memory import empty_memory
 from controller.regions import pack
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.sensor_suite import outage_schedule, scenario_sensors, sensor_model

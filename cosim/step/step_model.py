@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller import VehicleState
-from controller.navigation.estimate import NavigationMemory
 from controller.navigation.measurements import Measurements, SensorModel
+from controller.navigation.navigation_memory import NavigationMemory
 from controller.regions.region_set import PackedRegions
 from controller.translator.foreign import POINTER, call_c
 from cosim.step.arbiter_inputs import ArbiterSignals, PackedInputs

@@ -12,7 +12,7 @@ from matplotlib.patches import Circle
 from small import write
 
 from cosim.results.run_result import Run
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.colors import GOAL_COLOR
 from cosim.scenario.scenario import load_scenario
 

@@ -6,8 +6,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from cosim.run.run import run_scenario
 from cosim.run.run_folder import report_again
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 PATHS = {"path-plane.png": "paper", "path-deployable.png": "paper-deployable"}

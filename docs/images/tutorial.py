@@ -7,8 +7,8 @@ import shutil
 import tempfile
 from pathlib import Path
 
-from cosim.run.run import run_scenario
 from cosim.run.run_folder import report_again
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 PAGE = Path(__file__).parents[1] / "tutorial.md"

@@ -133,7 +133,7 @@ def test_base_install_imports_all_modules_without_extras():
         ("plant_fmu", {"numba", "scipy", "matplotlib", "pyarrow"}),
         ("plant_fmu.__main__", {"matplotlib"}),
         ("cosim.scenario.scenario", {"matplotlib", "pandas", "skfuzzy", *OF_SHOWING}),
-        ("cosim.run.run", OF_SHOWING),
+        ("cosim.run.run_scenario", OF_SHOWING),
     ],
 )
 def test_heavy_libraries_are_imported_lazily(what, without):

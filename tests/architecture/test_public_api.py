@@ -60,6 +60,7 @@ def test_public_functions_take_paths_as_text_and_scenarios_by_name():
                     if not {"str", "Path"} <= kinds:
                         narrow.append(f"{function.path}({parameter.name}: {parameter.annotation})")
     assert narrow == []
-    assert {"cosim.run.run.run_scenario(scenario)", "cosim.results.run_result.load_run(path)"} <= found and len(
-        found
-    ) > 20
+    assert {
+        "cosim.run.run_scenario.run_scenario(scenario)",
+        "cosim.results.run_result.load_run(path)",
+    } <= found and len(found) > 20

@@ -14,7 +14,7 @@ from cosim.live.live_view import LiveView
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GroundLink
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 _ARM = 400  # MAV_CMD_COMPONENT_ARM_DISARM

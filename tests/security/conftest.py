@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 COMMANDS_LOG = (

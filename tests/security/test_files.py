@@ -18,8 +18,8 @@ from cosim.replay.page import write_page
 from cosim.replay.pages import replay
 from cosim.results.record import RECORD, Record, load_record
 from cosim.results.run_result import SUMMARY, load_run
-from cosim.run.run import run_scenario
 from cosim.run.run_folder import claim, report_again
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 ROWS = {"time": [0.0, 1.0], "position.x": [1.0, 2.0]}

@@ -11,7 +11,7 @@ import pytest
 
 from cosim.errors import RunError
 from cosim.results.run_result import COMMANDS_LOG, SCENARIO, load_run
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.commands import ManualControl, SetTarget
 from cosim.simulation.commands.sources import ScheduledCommands, read_log
@@ -94,7 +94,7 @@ def fly(out, commands, report):
     own = scenario().replace({"commands.enabled": True}) if commands else scenario()
     with contextlib.ExitStack() as stack:
         if commands:  # as a pilot sends them
-            stack.enter_context(mock.patch("cosim.run.run.CommandQueue", return_value=Pilot(COMMANDS)))
+            stack.enter_context(mock.patch("cosim.run.run_scenario.CommandQueue", return_value=Pilot(COMMANDS)))
         return run_scenario(own, out, report=report)
 
 

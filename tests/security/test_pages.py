@@ -11,8 +11,8 @@ import tomli_w
 
 from cosim.replay.page import replay_page
 from cosim.results.run_result import load_run
-from cosim.run.run import run_scenario
 from cosim.run.run_folder import report_again
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter.__main__ import main as fuzzy_main
 from plant_fmu import load_vehicle

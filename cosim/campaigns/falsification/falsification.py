@@ -11,10 +11,10 @@ import pyarrow as pa
 import pyarrow.compute as pc
 from numpy.typing import NDArray
 
-from cosim.campaigns.analysis.summary import LISTED, rerun_command, violated_column
+from cosim.campaigns.analysis.campaign_summary import LISTED, rerun_command, violated_column
 from cosim.campaigns.falsification.search import minimize
+from cosim.campaigns.falsification.search_work import Objective, ScenarioSearch, SceneSearch
 from cosim.campaigns.falsification.splitting import estimate_probability
-from cosim.campaigns.falsification.work import Objective, ScenarioSearch, SceneSearch
 from cosim.campaigns.runner import Campaign, open_flights
 from cosim.campaigns.store.results import Results, to_array, to_column
 

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.campaigns.ablation import NUMBERS, PAGE, VARIANTS, WHOLE
-from cosim.campaigns.analysis.summary import LISTED
+from cosim.campaigns.analysis.campaign_summary import LISTED
 from cosim.campaigns.pages.replays import PageContents, write_page_with_replays
 from cosim.campaigns.rerun import complete_results
 from cosim.campaigns.scenes.kinds import scene_kinds
-from cosim.campaigns.scenes.rows import SCHEMA
+from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 
@@ -57,7 +57,7 @@ def _changed(results: Mapping[str, Results]) -> list[dict[str, Any]]:
 
 
 def _drawings(numbers: dict[str, Any]) -> Iterator[NamedFigure]:
-    from cosim.campaigns.pages.figures import Rated, forest
+    from cosim.campaigns.pages.campaign_figures import Rated, forest
     from cosim.report.figures.style import NamedFigure
 
     variants = numbers["variants"].items()

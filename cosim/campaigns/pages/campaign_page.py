@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cosim.campaigns.analysis.summary import LISTED, OF_ALL, SPREADS, rates_of, worst_table
+from cosim.campaigns.analysis.campaign_summary import LISTED, OF_ALL, SPREADS, rates_of, worst_table
 from cosim.campaigns.pages.replays import PageContents, write_page_with_replays
 from cosim.campaigns.pages.sections import LABELS
 from cosim.campaigns.rerun import complete_results
 from cosim.campaigns.scenes.kinds import FEATURES, SceneKinds, scene_kinds
-from cosim.campaigns.scenes.rows import SCHEMA
+from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.store.folder import SUMMARY
 from cosim.campaigns.store.plan import SCENES
 from cosim.campaigns.store.results import Results
@@ -68,7 +68,7 @@ def spreads_of(results: Results, groups: Mapping[str, Any]) -> dict[str, dict[st
 
 
 def _drawings(results: Results, kinds: SceneKinds, groups: Mapping[str, Any]) -> Iterator[NamedFigure]:
-    from cosim.campaigns.pages.figures import Key, Rated, binned_rates, distributions, forest, scatter
+    from cosim.campaigns.pages.campaign_figures import Key, Rated, binned_rates, distributions, forest, scatter
     from cosim.report.figures.style import NamedFigure
 
     labeled = {name if len(groups) > 1 else "": numbers for name, numbers in groups.items()}

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from controller import LAWS
-from cosim.campaigns.analysis.summary import SPREADS, worst_table
+from cosim.campaigns.analysis.campaign_summary import SPREADS, worst_table
 from cosim.campaigns.pages.campaign_page import FACTS, spreads_of
 from cosim.campaigns.pages.replays import PageContents, write_page_with_replays
 from cosim.campaigns.pages.sections import LABELS
 from cosim.campaigns.rerun import complete_results
-from cosim.campaigns.scenes.rows import SCHEMA
+from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.store.results import Results
 from cosim.errors import RunError
 
@@ -50,7 +50,7 @@ def write_comparison_page(folder: Path, replays: int) -> Path:
 
 
 def _drawings(results: Mapping[str, Results], numbers: dict[str, Any]) -> Iterator[NamedFigure]:
-    from cosim.campaigns.pages.figures import Rated, distributions, forest, side_by_side
+    from cosim.campaigns.pages.campaign_figures import Rated, distributions, forest, side_by_side
     from cosim.report.figures.style import NamedFigure
 
     laws = numbers["laws"]

@@ -55,7 +55,7 @@ def falsification_lines(summary: dict[str, Any]) -> Iterator[str]:
 def _drawings(s: dict[str, Any]) -> Iterator[NamedFigure]:
     from matplotlib.figure import Figure
 
-    from cosim.campaigns.pages.figures import WIDTH
+    from cosim.campaigns.pages.campaign_figures import WIDTH
     from cosim.report.figures.style import BLUE, ORANGE, NamedFigure
 
     figure = Figure(figsize=(WIDTH, 3.0), layout="constrained")

@@ -19,7 +19,7 @@ from cosim.replay.page import write_page
 from cosim.replay.trace import trace_of
 from cosim.report.web_page import render_page, write_figures
 from cosim.results.run_result import REPLAY, load_run
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from plant_fmu import PlantError
 from plant_fmu.archive import temporary_folder
 

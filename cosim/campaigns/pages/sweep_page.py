@@ -9,16 +9,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cosim.batch.outcome import FIELDS
+from cosim.campaigns.analysis.campaign_summary import LISTED, worst_table
 from cosim.campaigns.analysis.statistics import CHANCE
-from cosim.campaigns.analysis.summary import LISTED, worst_table
 from cosim.campaigns.pages.replays import PageContents, write_page_with_replays
 from cosim.campaigns.pages.sections import LABELS
+from cosim.campaigns.parameter_sweep import FACTS
 from cosim.campaigns.rerun import complete_results
 from cosim.campaigns.store.folder import SUMMARY
 from cosim.campaigns.store.plan import SWEEP
 from cosim.campaigns.store.results import Results
-from cosim.campaigns.sweep import FACTS
-from cosim.campaigns.sweeps.rows import schema_of
+from cosim.campaigns.sweeps.sweep_rows import schema_of
 from cosim.errors import RunError
 from cosim.report.web_page import interval
 
@@ -68,7 +68,7 @@ def sweep_lines(summary: dict[str, Any]) -> Iterator[str]:
 
 
 def _drawings(results: Results, s: dict[str, Any]) -> Iterator[NamedFigure]:
-    from cosim.campaigns.pages.figures import Key, Rated, binned_rates, distributions, forest, scatter
+    from cosim.campaigns.pages.campaign_figures import Key, Rated, binned_rates, distributions, forest, scatter
     from cosim.report.figures.style import NamedFigure
 
     is_flown = results.is_null("refused")

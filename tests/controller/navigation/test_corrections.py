@@ -7,9 +7,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controller.navigation.corrections import correct_by_sensor
-from controller.navigation.estimate import N_ERRORS, empty_memory, set_first_covariance
 from controller.navigation.inertial import propagate
 from controller.navigation.measurements import COMPASS, DEPTH_SENSOR, DVL, USBL, SensorModel, empty_measurements
+from controller.navigation.navigation_memory import N_ERRORS, empty_memory, set_first_covariance
 from tests.controller.navigation.test_inertial import rotation
 
 SENSORS = SensorModel()

@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from controller.navigation.estimate import N_ERRORS, empty_memory
 from controller.navigation.inertial import estimate_at, propagate, rotate
 from controller.navigation.measurements import SensorModel
+from controller.navigation.navigation_memory import N_ERRORS, empty_memory
 
 SENSORS = SensorModel()
 GRAVITY = np.array([0.0, 0.0, 9.81])

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from controller import VehicleState
 from controller.navigation import Navigator, SensorModel
-from controller.navigation.estimate import empty_memory
 from controller.navigation.measurements import COMPASS, DEPTH_SENSOR, DVL, IMU, SENSORS, USBL
+from controller.navigation.navigation_memory import empty_memory
 from controller.navigation.navigator import _write_state
 
 MODEL = SensorModel()

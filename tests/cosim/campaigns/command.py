@@ -19,7 +19,7 @@ needs_posix = pytest.mark.skipif(sys.platform != "linux", reason="looks into /pr
 _MAIN = """
 import sys
 from cosim.run import progress
-from cosim.campaigns.sweeps import rows
+from cosim.campaigns.sweeps import sweep_rows
 from cosim.command_line.cli import main
 from tests.cosim.campaigns.fake import Slow
 rows.FusedFlyer = Slow

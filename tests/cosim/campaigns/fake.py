@@ -9,7 +9,7 @@ import pytest
 
 from cosim.batch.outcome import FIELDS, BatchResult, empty_outcomes
 from cosim.campaigns import Design, vary_from
-from cosim.campaigns.sweeps import rows
+from cosim.campaigns.sweeps import sweep_rows
 from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
 
@@ -75,7 +75,7 @@ def fakes(monkeypatch):
     """Let sweeps fly by `Fake`; return a function that chooses another class of this file."""
 
     def choose(engine):
-        monkeypatch.setattr(rows, "FusedFlyer", engine)
+        monkeypatch.setattr(sweep_rows, "FusedFlyer", engine)
 
     choose(Fake)
     return choose

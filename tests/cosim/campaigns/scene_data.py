@@ -6,7 +6,7 @@ from pathlib import Path
 import pyarrow.parquet as pq
 
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.rows import SCHEMA, table_of
+from cosim.campaigns.scenes.scene_rows import SCHEMA, table_of
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.workers import dispatch
 

@@ -12,13 +12,13 @@ from msgspec.structs import replace
 
 from controller.paper_law import Gains
 from cosim.campaigns import run_campaign
-from cosim.campaigns.analysis.summary import summarize_campaign
+from cosim.campaigns.analysis.campaign_summary import summarize_campaign
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer, Score
 from cosim.campaigns.scenes.law_gains import gains_by_law, gains_from
-from cosim.campaigns.scenes.rows import SCHEMA, row_of
 from cosim.campaigns.scenes.scene_file import SceneStore, decode_scene
-from cosim.campaigns.scenes.work import SceneTask
+from cosim.campaigns.scenes.scene_rows import SCHEMA, row_of
+from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.folder import PARTS, RESULTS, SUMMARY, CampaignFolder, lock_folder
 from cosim.campaigns.store.plan import difference
 from cosim.campaigns.store.results import Results
@@ -128,7 +128,7 @@ def test_the_folder_of_another_campaign_is_refused(tmp_path, brief, monkeypatch,
     if "scenes" in change:
         scenes = write(tmp_path / "s.jsonl", change.pop("scenes"))
     if change.pop("code", False):
-        monkeypatch.setattr("cosim.campaigns.scenes.work.code_digest", lambda: "other")
+        monkeypatch.setattr("cosim.campaigns.scenes.scene_work.code_digest", lambda: "other")
     with pytest.raises(RunError, match=f"holds another campaign .*{words}"):
         run_campaign(scenes, **{"law": "ismail_dunnigan", "out": out, "conditions": BRIEF} | change)
     assert {p: p.read_bytes() for p in out.iterdir() if p.name != PARTS} == before

@@ -7,8 +7,8 @@ import pytest
 from cosim.batch.outcome import FIELDS
 from cosim.campaigns import vary_from
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.rows import SCHEMA
 from cosim.campaigns.scenes.scene import Scene
+from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.sweeps.design import KINDS
 from plant_fmu.toml_tables import fields_of, table_in
 from tests.test_reference_tables import DOCS, rows
@@ -29,7 +29,7 @@ def test_every_key_of_a_scene_is_documented():
     ("table", "units"),
     [
         (
-            "columns of cosim/campaigns/scenes/rows.py",
+            "columns of cosim/campaigns/scenes/scene_rows.py",
             {f.name: f.metadata[b"unit"].decode() for f in SCHEMA},
         ),
         ("outcomes of cosim/batch/outcome.py", {name: unit for name, (_, unit, _) in FIELDS.items()}),

@@ -11,7 +11,7 @@ from cosim.campaigns import compare
 from cosim.campaigns.comparison import medians_where_completed, paired_differences
 from cosim.campaigns.pages.comparison_page import write_comparison_page
 from cosim.campaigns.scenes.flyer import Score
-from cosim.campaigns.scenes.rows import row_of
+from cosim.campaigns.scenes.scene_rows import row_of
 from cosim.errors import RunError
 from tests.cosim.campaigns.scene_data import BRIEF, HARD, results_of, write
 

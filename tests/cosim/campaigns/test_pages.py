@@ -10,9 +10,9 @@ import pytest
 
 from cosim.campaigns import compare, run_campaign, run_sweep
 from cosim.campaigns.analysis.statistics import quantiles
+from cosim.campaigns.pages.campaign_figures import distributions, shares_up_to
 from cosim.campaigns.pages.campaign_page import write_campaign_page
 from cosim.campaigns.pages.comparison_page import write_comparison_page
-from cosim.campaigns.pages.figures import distributions, shares_up_to
 from cosim.campaigns.pages.sections import SECTIONS
 from cosim.campaigns.pages.sweep_page import write_sweep_page
 from cosim.command_line.cli import main
@@ -109,7 +109,7 @@ def test_ctrl_c_during_replays_leaves_a_page_without_them(tmp_path, monkeypatch)
     out = tmp_path / "out"
     run_campaign(write(tmp_path / "s.jsonl", PLAIN[:2]), "ismail_dunnigan", out, BRIEF)
     with monkeypatch.context() as patch:
-        patch.setattr("cosim.run.run.Master.run", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
+        patch.setattr("cosim.run.run_scenario.Master.run", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             write_campaign_page(out, 2)
     assert check(out / "campaign.html").asked == [] and list((out / "worst").iterdir()) == []

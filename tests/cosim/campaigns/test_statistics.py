@@ -8,10 +8,10 @@ import pytest
 from scipy.stats import f as f_test
 from scipy.stats import f_oneway
 
+from cosim.campaigns.analysis.campaign_summary import worst_table
 from cosim.campaigns.analysis.statistics import bins, effect, median_difference, paired, rate
-from cosim.campaigns.analysis.summary import worst_table
 from cosim.campaigns.scenes.flyer import Score
-from cosim.campaigns.scenes.rows import row_of
+from cosim.campaigns.scenes.scene_rows import row_of
 from tests.cosim.campaigns.scene_data import results_of
 
 

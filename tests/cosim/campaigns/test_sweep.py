@@ -17,11 +17,11 @@ from scipy.stats import norm
 
 from cosim.batch.outcome import FIELDS
 from cosim.campaigns import run_sweep
-from cosim.campaigns.scenes.rows import SCHEMA
+from cosim.campaigns.scenes.scene_rows import SCHEMA
 from cosim.campaigns.store.folder import RESULTS
 from cosim.campaigns.store.results import make_table, to_array
 from cosim.campaigns.sweeps.design import design_of
-from cosim.campaigns.sweeps.rows import schema_of
+from cosim.campaigns.sweeps.sweep_rows import schema_of
 from cosim.command_line.cli import main
 from cosim.errors import RunError, ScenarioError
 from cosim.scenario.scenario import load_scenario
@@ -38,7 +38,7 @@ __all__ = ["fakes"]
 def swept(tmp_path_factory):
     """Return a sweep of fifty rows by the fake."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("cosim.campaigns.sweeps.rows.FusedFlyer", Fake)
+        patch.setattr("cosim.campaigns.sweeps.sweep_rows.FusedFlyer", Fake)
         return run_sweep(
             load_scenario("paper", ["limit.force=900"]), design(), tmp_path_factory.mktemp("swept") / "out"
         )
@@ -256,10 +256,10 @@ _WITHOUT_PANDAS = """
 import sys
 from pathlib import Path
 from cosim.campaigns import run_sweep
-from cosim.campaigns.scenes.rows import refused_row, table_of
-from cosim.campaigns.sweeps import rows
+from cosim.campaigns.scenes.scene_rows import refused_row, table_of
+from cosim.campaigns.sweeps import sweep_rows
 from tests.cosim.campaigns.fake import Fake, design, paper
-rows.FusedFlyer = Fake
+sweep_rows.FusedFlyer = Fake
 done = run_sweep(paper(), design(), Path(sys.argv[1]))
 sys.exit(f"{done.flown} {len(table_of([refused_row(1, 'why', 'scene')]))} {'pandas' in sys.modules}")
 """
@@ -295,10 +295,10 @@ import sys
 from pathlib import Path
 from cosim.campaigns import run_sweep
 from cosim.campaigns.store import row_log
-from cosim.campaigns.sweeps import rows
+from cosim.campaigns.sweeps import sweep_rows
 from cosim.campaigns.workers import dispatch
 from tests.cosim.campaigns.fake import Fake, design, paper
-rows.FusedFlyer = Fake
+sweep_rows.FusedFlyer = Fake
 dispatch.FIRST = dispatch.MAX_ROWS = 48
 
 def resident():

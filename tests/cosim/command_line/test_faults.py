@@ -10,7 +10,7 @@ import pytest
 
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.command_line.cli import _parser, all_verbs, main
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from tests.faults import FAIL_ON, INTERRUPT, arm, call_with_faults, count, needs_faults
 

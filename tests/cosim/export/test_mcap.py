@@ -11,7 +11,7 @@ from cosim.export import export_run
 from cosim.export.names import valid_names
 from cosim.results.record import load_record
 from cosim.results.run_result import load_run
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.commands import AddObstacle, ChangeSetting, SetTarget
 from tests.cosim.export.conftest import assert_same_bits

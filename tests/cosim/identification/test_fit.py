@@ -13,8 +13,8 @@ from cosim.identification.findings import require_apart, slow_commands, warnings
 from cosim.identification.fit import Problem, fit, integration_step
 from cosim.identification.log import TOPICS, Log, make_topic
 from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisances, with_mean_nuisances, with_values
+from cosim.identification.prediction import validate
 from cosim.identification.residuals import Residuals
-from cosim.identification.validation import validate
 from cosim.identification.windows import cut_windows
 from plant_fmu import load_vehicle
 from tests.cosim.identification.pool import WRENCH, fly

@@ -9,7 +9,7 @@ from unittest import mock
 import pytest
 
 from cosim.errors import IdentificationError
-from cosim.identification import identify
+from cosim.identification import identification
 from tests.faults import FAIL_ON, FAIL_ONCE, INTERRUPT, KILL, arm, call_with_faults, count, needs_faults
 
 NAMES = ("mine.toml", "mine.posterior.jsonl", "mine.html")
@@ -20,11 +20,11 @@ def write(out, generation):
     vehicle = (resources.files("plant_fmu") / "vehicles" / "odin.toml").read_text()
     done = SimpleNamespace(fit=None, vehicle=None)
     with (
-        mock.patch.object(identify, "vehicle_contents", return_value=f"# {generation}\n{vehicle}"),
-        mock.patch.object(identify, "posterior_lines", return_value=[f"# {generation}"] * 9000),
-        mock.patch.object(identify, "page_contents", return_value=f"# {generation}\n" * 9000),
+        mock.patch.object(identification, "vehicle_contents", return_value=f"# {generation}\n{vehicle}"),
+        mock.patch.object(identification, "posterior_lines", return_value=[f"# {generation}"] * 9000),
+        mock.patch.object(identification, "page_contents", return_value=f"# {generation}\n" * 9000),
     ):
-        identify.write_results(done, out)
+        identification.write_results(done, out)
 
 
 def generations(folder):

@@ -11,7 +11,7 @@ from websockets.sync.client import connect
 from cosim.live.address import parse_live
 from cosim.live.live_view import LiveView
 from cosim.results.record import load_record
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from tests.threads import ended
 

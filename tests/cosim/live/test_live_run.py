@@ -9,7 +9,7 @@ import pytest
 from cosim.live.hub import Hub
 from cosim.results.record import load_record
 from cosim.results.wording import verdict
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from tests.cosim.live.conftest import require_same_record
 

@@ -14,7 +14,7 @@ from cosim.replay.page import write_page
 from cosim.replay.pages import replay
 from cosim.replay.trace import trace_of
 from cosim.results.run_result import load_run
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import commands as cmd
 from tests.cosim.replay.browser import CHROMEDRIVER, CHROMIUM, Browser

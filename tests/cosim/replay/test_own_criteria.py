@@ -7,14 +7,14 @@ import pytest
 from rich.console import Console
 
 from cosim.export.excerpt import Excerpt
-from cosim.export.scene import Scene
+from cosim.export.viewer_scene import Scene
 from cosim.live.watching import snapshot_table, snapshots
 from cosim.replay.events import events_of
 from cosim.replay.header import header_of
 from cosim.replay.view_columns import ViewColumns
 from cosim.report.contents import contents_of
 from cosim.results.run_result import load_run
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from fuzzy_arbiter import Arbiter
 from tests.cosim.scenario.test_criteria import RULES, SCENARIO

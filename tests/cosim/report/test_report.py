@@ -18,7 +18,7 @@ from cosim.report.inline_svg import contrast, dark_color
 from cosim.results.paper_claims import paper_claims
 from cosim.results.record import Rows
 from cosim.results.run_result import load_run
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from tests.page_checker import Checker
 

@@ -12,7 +12,7 @@ from cosim.report.figures.figures import drawings
 from cosim.report.figures.style import FigureData, features_of, legend_columns, places_of, shifts_of
 from cosim.results.record import load_record
 from cosim.results.wording import verdict
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 

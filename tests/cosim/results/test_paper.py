@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from cosim.results.record import load_record
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 BOTH = pytest.mark.parametrize("engine", ["closed", pytest.param("skfuzzy", marks=pytest.mark.slow)])

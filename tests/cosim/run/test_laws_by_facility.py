@@ -15,8 +15,8 @@ from cosim.mavlink.run_links import Mavlink
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.options import PROFILES, MavlinkOptions
 from cosim.results.record import load_record
-from cosim.run.run import run_scenario
 from cosim.run.run_folder import report_again
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master
 from plant_fmu import Plant, load_vehicle

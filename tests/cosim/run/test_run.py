@@ -14,8 +14,8 @@ from cosim.results.record import load_record
 from cosim.results.recorder import Recorder
 from cosim.results.spans import spans
 from cosim.results.wording import verdict
-from cosim.run.run import run_scenario
 from cosim.run.run_folder import claim, report_again
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from plant_fmu import PlantError
 
@@ -176,7 +176,7 @@ def test_run_that_is_cut_off_keeps_its_rows(tmp_path, monkeypatch, last, error):
             if k == last:
                 raise error
 
-    monkeypatch.setattr("cosim.run.run.Recorder", Interrupting)
+    monkeypatch.setattr("cosim.run.run_scenario.Recorder", Interrupting)
     out, scenario = tmp_path / "run", load_scenario("paper", SHORT)
     if last == 0 or error is ZeroDivisionError:
         with pytest.raises(error):

@@ -15,8 +15,8 @@ from cosim.precheck.precheck import check_scenario
 from cosim.replay.header import header_of
 from cosim.replay.pages import joint_title
 from cosim.results.run_result import load_run
-from cosim.run.run import run_scenario
 from cosim.run.run_folder import report_again
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.law_factory import with_custom_law
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios

@@ -13,7 +13,7 @@ from cosim.errors import RunError, ScenarioError
 from cosim.precheck.precheck import check_scenario
 from cosim.results.record import load_record
 from cosim.results.run_result import load_run
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.master import Master

@@ -4,7 +4,7 @@ import pytest
 
 from cosim.results.record import load_record
 from cosim.results.wording import verdict
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios
 

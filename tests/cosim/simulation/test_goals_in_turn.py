@@ -9,7 +9,7 @@ from cosim.batch.fused import FusedFlyer
 from cosim.batch.variation import Variation
 from cosim.errors import ScenarioError
 from cosim.results.record import load_record
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from plant_fmu import load_vehicle
 

@@ -6,7 +6,7 @@ import pytest
 from cosim.errors import ScenarioError
 from cosim.results.lyapunov_summary import summarize_lyapunov
 from cosim.results.record import Rows, load_record
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.lyapunov_signals import FORMS
 from cosim.simulation.signals import Column

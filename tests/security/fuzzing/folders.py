@@ -15,15 +15,15 @@ import pyarrow.parquet as pq
 import pytest
 
 from controller import LAWS
-from cosim.campaigns.analysis.summary import summarize_campaign
+from cosim.campaigns.analysis.campaign_summary import summarize_campaign
 from cosim.campaigns.pages.campaign_page import write_campaign_page
 from cosim.campaigns.pages.comparison_page import NUMBERS, write_comparison_page
 from cosim.campaigns.pages.replays import replay_of
 from cosim.campaigns.pages.sweep_page import write_sweep_page
 from cosim.campaigns.rerun import repeat_of
 from cosim.campaigns.scenes.conditions import Conditions
-from cosim.campaigns.scenes.rows import SCHEMA
-from cosim.campaigns.scenes.work import SceneTask
+from cosim.campaigns.scenes.scene_rows import SCHEMA
+from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.folder import PLAN, RESULTS, SUMMARY
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.store.row_log import RowLog
@@ -154,7 +154,7 @@ def _with_its_scenario(seeds: Seeds, name: str) -> Case:
     return replace(case, read=read)
 
 
-@reader("plan of a sweep", "json", "cosim.io.strict_json:read_json", "cosim.campaigns.sweeps.rows:_files")
+@reader("plan of a sweep", "json", "cosim.io.strict_json:read_json", "cosim.campaigns.sweeps.sweep_rows:_files")
 def plan_of_sweep(seeds: Seeds) -> Case:
     return _with_its_scenario(seeds, PLAN)
 

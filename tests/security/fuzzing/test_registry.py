@@ -22,12 +22,13 @@ METHODS = {
     "ParquetFile", "read_table", "read_metadata", "read_schema", "fromstring", "iterparse", "unpack", "unpack_from",
 }  # fmt: skip
 ITS_OWN = {  # what parses nothing that comes from outside: why
-    "controller.compiling.text_cache:_kept": "a file of its own cache, in a folder that nobody else can write to",
+    "controller.force_limits:_cached": "an array in memory",
+    "controller.compiling.text_cache:_read_cached": "a file of its own cache, in a folder that it alone can write to",
     "cosim.mavlink.wire.framing:encode_v1": "a frame that pymavlink has just encoded",
     "cosim.companion.failsafes:Failsafes.receive": "the four bytes of a number of a message",
     "cosim.campaigns.rerun:_of_sweep": "a copy of the plan, which was read",
     "cosim.campaigns.store.folder:CampaignFolder.__init__": "a copy of its own plan",
-    "cosim.campaigns.sweeps.rows:_for_json": "a copy of its own plan",
+    "cosim.campaigns.sweeps.sweep_rows:_for_json": "a copy of its own plan",
     "cosim.mavlink.services.parameter_protocol:ParameterProtocol._send_hash": "its own hash",
     "cosim.mavlink.services.parameter_protocol:_as_float32": "its own number",
     "cosim.mavlink.wire.thrust_body:get_thrust_body": "twelve bytes of a message with a valid checksum, padded",

@@ -11,15 +11,15 @@ import pytest
 from cosim.campaigns import run_campaign, vary_from
 from cosim.campaigns.falsification import falsification as module
 from cosim.campaigns.falsification.falsification import costs_of, run_falsification
-from cosim.campaigns.falsification.work import ScenarioSearch, SceneSearch, SearchSettings
+from cosim.campaigns.falsification.search_work import ScenarioSearch, SceneSearch, SearchSettings
 from cosim.campaigns.pages.falsification_page import write_falsification_page
 from cosim.campaigns.rerun import rerun
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import Score
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.law_gains import gains_from
-from cosim.campaigns.scenes.rows import refused_row, row_of, table_of
-from cosim.campaigns.scenes.work import SceneTask
+from cosim.campaigns.scenes.scene_rows import refused_row, row_of, table_of
+from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.folder import PARTS
 from cosim.command_line.cli import main
 from cosim.scenario.scenario import load_scenario

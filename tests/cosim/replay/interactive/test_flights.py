@@ -12,7 +12,7 @@ from cosim.campaigns.scenes.scene_file import read_scenes
 from cosim.replay.view_columns import ViewColumns
 from cosim.results.run_result import load_run
 from cosim.results.wording import verdict
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(1800)]  # the first build compiles a C library too

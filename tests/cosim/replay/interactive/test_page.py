@@ -3,7 +3,7 @@
 import pytest
 
 from cosim.replay.pages import replay
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from tests.cosim.replay.browser import ARTEFACTS
 from tests.cosim.replay.firefox import FIREFOX, Firefox

@@ -8,7 +8,7 @@ import pytest
 from controller import quaternion
 from cosim.results.as_flown import scenario_as_flown
 from cosim.results.record import load_record
-from cosim.run.run import run_scenario
+from cosim.run.run_scenario import run_scenario
 from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import commands as cmd
 from cosim.simulation.commands.command_handler import greatest_wrench

@@ -20,7 +20,7 @@ from cosim.identification.parameters import (
     nuisances,
     with_mean_nuisances,
 )
-from cosim.identification.validation import Prediction, validate
+from cosim.identification.prediction import Prediction, validate
 from cosim.identification.vehicle_file import name_of_file, posterior_lines, vehicle_text
 from cosim.io.atomic_file import reason, write_together
 from cosim.report.web_page import render_page
@@ -100,7 +100,7 @@ def write_results(result: Identification, out: Path) -> tuple[Path, Path]:
 
 def page_contents(result: Identification, out: Path) -> str:
     """Return the page of an identification whose vehicle's file is `out`."""
-    from cosim.identification.figures import figures_of, inline_figures
+    from cosim.identification.identification_figures import figures_of, inline_figures
 
     fit, logs = result.fit, result.logs
     return render_page(

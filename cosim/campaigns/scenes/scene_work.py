@@ -10,8 +10,8 @@ import numpy as np
 
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.flyer import SceneFlyer
-from cosim.campaigns.scenes.rows import SCHEMA, refused_row, row_of, table_of
 from cosim.campaigns.scenes.scene_file import SceneStore, decode_scene
+from cosim.campaigns.scenes.scene_rows import SCHEMA, refused_row, row_of, table_of
 from cosim.campaigns.store.plan import SCENES, code_digest, versions
 from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import ScenarioError

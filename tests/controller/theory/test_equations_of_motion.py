@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from controller.theory.model import asymmetry, coriolis, damping, least_inertia, restoring_defect, skew_defect
+from controller.theory.equations_of_motion import (
+    asymmetry,
+    coriolis,
+    damping,
+    least_inertia,
+    restoring_defect,
+    skew_defect,
+)
 from plant_fmu import load_vehicle, shipped_vehicles
 
 rng = np.random.default_rng(5)

@@ -14,13 +14,13 @@ from cosim.campaigns.campaign import run_campaign
 from cosim.campaigns.falsification.search import import_cma
 from cosim.campaigns.falsification.spaces import FAMILIES, SceneSpace
 from cosim.campaigns.falsification.splitting import MIN_BUDGET
+from cosim.campaigns.parameter_sweep import run_sweep
 from cosim.campaigns.scenes.generator import generate_scenes
-from cosim.campaigns.scenes.rows import SCHEMA, refused_row, table_of
-from cosim.campaigns.scenes.work import SceneTask
+from cosim.campaigns.scenes.scene_rows import SCHEMA, refused_row, table_of
+from cosim.campaigns.scenes.scene_work import SceneTask
 from cosim.campaigns.store.results import Results
-from cosim.campaigns.sweep import run_sweep
 from cosim.campaigns.sweeps.design import Design, Vary
-from cosim.campaigns.sweeps.rows import SweepBatch, SweepWork
+from cosim.campaigns.sweeps.sweep_rows import SweepBatch, SweepWork
 from cosim.campaigns.workers.work import Rows, Work
 from cosim.errors import RunError
 from cosim.scenario.scenario import Scenario

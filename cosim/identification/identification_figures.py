@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from cosim.identification.excitation import BEGIN, RETURN, SECONDS, Design
 from cosim.identification.fit import Fit
 from cosim.identification.log import AXES, UNITS
-from cosim.identification.validation import Prediction
+from cosim.identification.prediction import Prediction
 from cosim.report.figures.style import BLACK, BLUE, ORANGE, SKY, STYLE, NamedFigure
 from cosim.report.web_page import InlineFigure, inline_figure
 from plant_fmu.archive import temporary_folder

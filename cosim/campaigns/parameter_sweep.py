@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from cosim.batch.outcome import FIELDS
+from cosim.campaigns.analysis.campaign_summary import refusal_reasons, worst_table
 from cosim.campaigns.analysis.statistics import Facts, effect, quantiles, rate
-from cosim.campaigns.analysis.summary import refusal_reasons, worst_table
 from cosim.campaigns.runner import Campaign, carry_out
 from cosim.campaigns.store.results import Results
 from cosim.campaigns.sweeps.design import Design
-from cosim.campaigns.sweeps.rows import SweepWork
+from cosim.campaigns.sweeps.sweep_rows import SweepWork
 from cosim.scenario.key_names import key_name
 from cosim.scenario.scenario import Scenario, to_scenario
 from cosim.simulation.signals import Array
