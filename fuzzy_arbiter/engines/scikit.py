@@ -7,8 +7,7 @@ from functools import partial
 from typing import Any, ClassVar
 
 import numpy as np
-from skfuzzy import defuzz
-from skfuzzy.defuzzify import EmptyMembershipError
+from skfuzzy import centroid
 from skfuzzy.fuzzymath.fuzzy_ops import _interp_universe_fast, interp_membership
 
 from fuzzy_arbiter.definition import Output, System, Variable
@@ -83,7 +82,6 @@ class _Sampled(Defuzzifier):
         outline = np.zeros_like(positions)
         for cut, degrees in terms:
             np.maximum(outline, np.minimum(cut, interp_membership(self._positions, degrees, positions)), out=outline)
-        try:
-            return float(defuzz(positions, outline, "centroid"))
-        except EmptyMembershipError:
+        if not outline.any():
             return float("nan")
+        return float(centroid(positions.tolist(), outline.tolist()))  # its loop is slow with NumPy's numbers
