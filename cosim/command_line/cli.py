@@ -5,7 +5,9 @@
 from __future__ import annotations
 
 import argparse
+import atexit
 import contextlib
+import gc
 import importlib
 import logging
 import re
@@ -124,6 +126,8 @@ def all_verbs(parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse.A
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
+    gc.set_threshold(200_000)  # a run keeps nearly all it makes: modules, figures
+    atexit.register(gc.freeze)  # nothing is collected again at exit
     return run_guarded(lambda: _run(sys.argv[1:] if arguments is None else arguments))
 
 
