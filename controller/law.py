@@ -268,7 +268,13 @@ class CompiledLaw:
         self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
     ) -> BoundCall:
         """Return the step with these arguments, those of `step`, as a call that C code can make."""
-        return BoundCall(type(self).function, (state, goal, regions, weights, self.gains, self.memory, forces))
+        return BoundCall(*self.step_call(state, goal, regions, weights, forces))
+
+    def step_call(
+        self, state: VehicleState, goal: PackedRegions, regions: PackedRegions, weights: Array, forces: Array
+    ) -> tuple[Callable[..., None], tuple[Any, ...]]:
+        """Return the function of `step`, and its arguments for these of `step`."""
+        return type(self).function, (state, goal, regions, weights, self.gains, self.memory, forces)
 
     @functools.cached_property
     def _step(self) -> CompiledFunction:

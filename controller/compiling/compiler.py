@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import os
 import shlex
 import shutil
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 from controller.errors import CompilationError
@@ -37,14 +38,30 @@ def compiler_command() -> list[str]:
 
 def compile_file(source: Path, library: Path, compiler: Sequence[str] | None = None) -> None:
     """Compile one C file into a shared library."""
+    with compiling(source, library, compiler) as finish:
+        finish()
+
+
+@contextlib.contextmanager
+def compiling(source: Path, library: Path, compiler: Sequence[str] | None = None) -> Iterator[Callable[[], None]]:
+    """Run the compiler beside a block, at whose end it is stopped; the block receives a function that waits for it."""
     # named, for Apple's linker else writes the build folder into the library; for others without a table of names
     link = f"-Wl,-install_name,@rpath/{library.name}" if library.suffix == ".dylib" else "-s"
     command = [*(compiler or compiler_command()), *FLAGS, link, str(source), "-o", str(library), "-lm"]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, check=False)  # noqa: S603
+        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)  # noqa: S603
     except OSError as error:
         raise CompilationError(f"C compiler {command[0]}: {error.strerror or error}") from error
-    if done.returncode != 0 or not library.is_file():
-        lines = done.stderr.splitlines()
-        messages = [line for line in lines if "error" in line] or lines or ["it wrote neither a library nor a message"]
-        raise CompilationError(f"C compiler {command[0]} failed: {messages[0].strip()}")
+
+    def finish() -> None:
+        lines = process.communicate()[1].splitlines()
+        if process.returncode != 0 or not library.is_file():
+            errors = [line for line in lines if "error" in line] or lines
+            message = errors[0].strip() if errors else "it wrote neither a library nor a message"
+            raise CompilationError(f"C compiler {command[0]} failed: {message}")
+
+    with process:
+        try:
+            yield finish
+        finally:
+            process.terminate()

@@ -9,13 +9,13 @@ import ctypes
 import functools
 import os
 import re
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterable
 from types import FunctionType
 from typing import Any
 
 import numpy as np
 
-from controller.compiling.library import library_of
+from controller.compiling.library import load_libraries
 from controller.compiling.text_cache import c_text_of
 from controller.stack_array import interpret
 from controller.translator.arguments import words_of
@@ -26,6 +26,8 @@ Described = dict[int, tuple[Any, Type, list[int]]]  # arguments with their types
 
 _MAX_CACHED = 8  # maximum number of sets of arguments in the cache
 _NONE = (None,) * 7
+_Key = tuple[FunctionType, tuple[Type, ...]]  # a function, and the types of its arguments
+_libraries: dict[_Key, Any] = {}  # libraries of functions that have been loaded
 _CALLBACK = ctypes.PYFUNCTYPE(None, ctypes.c_void_p)
 
 
@@ -34,12 +36,18 @@ def c_text(function: Callable[..., None], arguments: tuple[Any, ...]) -> str:
     return c_text_of(function, tuple(map(type_of, arguments)))
 
 
-@functools.cache
-def _library(function: FunctionType, types: tuple[Type, ...]) -> Any:
-    library = library_of(c_text_of(function, types))
-    library.entry.argtypes, library.entry.restype = [ctypes.c_void_p], None
-    library.entry_misfit.argtypes, library.entry_misfit.restype = [ctypes.c_void_p], ctypes.c_char_p
-    return library
+def load_functions(*calls: tuple[Callable[..., None], tuple[Any, ...]]) -> None:
+    """Translate and load plain functions for some arguments; missing libraries are compiled at the same time."""
+    if not os.environ.get(INTERPRETED):
+        _load([(f, tuple(map(type_of, arguments))) for f, arguments in calls if isinstance(f, FunctionType)])
+
+
+def _load(keys: Iterable[_Key]) -> None:
+    missing = [key for key in keys if key not in _libraries]
+    for key, library in zip(missing, load_libraries(c_text_of(*key) for key in missing), strict=True):
+        library.entry.argtypes, library.entry.restype = [ctypes.c_void_p], None
+        library.entry_misfit.argtypes, library.entry_misfit.restype = [ctypes.c_void_p], ctypes.c_char_p
+        _libraries[key] = library
 
 
 def _described(argument: Any, known: Described) -> tuple[Any, Type, list[int]]:
@@ -70,7 +78,9 @@ class BoundCall:
         if isinstance(function, FunctionType) and not os.environ.get(INTERPRETED):
             check_shapes(function, arguments)
             described = [_described(argument, {} if known is None else known) for argument in arguments]
-            library = _library(function, tuple(kind for _, kind, _ in described))
+            key = function, tuple(kind for _, kind, _ in described)
+            _load([key])
+            library = _libraries[key]
             self._entry = library.entry
             self._words = np.array([word for _, _, words in described for word in words], dtype=np.uint64)
             self.words: int = self._words.ctypes.data

@@ -18,11 +18,12 @@ import stat
 import sys
 import tempfile
 import time
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 
 import platformdirs
 
-from controller.compiling.compiler import FLAGS, compile_file
+from controller.compiling.compiler import FLAGS, compiling
 
 try:
     import fcntl
@@ -44,13 +45,24 @@ _SUFFIX = {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 @functools.cache
 def library_of(text: str) -> ctypes.PyDLL:
     """Return the library of a C text, loaded; it is compiled where neither the package nor the cache has it."""
-    name = library_name(text)
+    return load_libraries([text])[0]
+
+
+def load_libraries(texts: Iterable[str]) -> list[ctypes.PyDLL]:
+    """Return the libraries of C texts, loaded; missing ones are compiled at the same time, while texts are made."""
+    with contextlib.ExitStack() as compilers:
+        libraries = [_find(text) or compilers.enter_context(_compiling(text)) for text in texts]
+        return [library if isinstance(library, ctypes.PyDLL) else library() for library in libraries]
+
+
+def _find(text: str) -> ctypes.PyDLL | None:
+    """Return the library of a text from the package or the cache."""
     for folder in (PREBUILT / _platform(), cache_folder()):
-        path = folder / f"{name}{_SUFFIX}"
+        path = folder / f"{library_name(text)}{_SUFFIX}"
         if is_trusted(folder) and is_whole(path):
             with contextlib.suppress(OSError):  # the library may be for another C library
                 return ctypes.PyDLL(str(path))
-    return ctypes.PyDLL(str(_compiled(text, name)))
+    return None
 
 
 def library_name(text: str) -> str:
@@ -111,16 +123,23 @@ def _warn_of_others(folder: Path) -> None:
     log.warning("%s: others can write there; compiled for this process alone", folder)
 
 
-def _compiled(text: str, name: str) -> Path:
-    """Compile a library now, into the cache if that can be written; return its path."""
+@contextlib.contextmanager
+def _compiling(text: str) -> Iterator[Callable[[], ctypes.PyDLL]]:
+    """Compile a library while a block runs, which receives the function that waits for it, keeps it and loads it."""
+    name = library_name(text)
     first_use.info("compiling %s", name)
     started = time.perf_counter()
     own = Path(tempfile.mkdtemp(dir=_own_folder()))
     source, built = own / f"{name}.c", own / f"{name}{_SUFFIX}"
     source.write_text(text, encoding="utf-8")
-    compile_file(source, built)
-    log.debug("%s: compiled in %.2f s", name, time.perf_counter() - started)
-    return keep(built, cache_folder())
+    with compiling(source, built) as finish:
+
+        def load() -> ctypes.PyDLL:
+            finish()
+            log.debug("%s: compiled in %.2f s", name, time.perf_counter() - started)
+            return ctypes.PyDLL(str(keep(built, cache_folder())))
+
+        yield load
 
 
 def keep(built: Path, folder: Path) -> Path:

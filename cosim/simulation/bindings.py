@@ -8,7 +8,7 @@ import dataclasses
 import functools
 import os
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -35,7 +35,7 @@ void entry(const void *words)
 """
 
 
-def is_compiled(law: Law) -> bool:
+def is_compiled(law: Law) -> TypeGuard[CompiledLaw]:
     """Return True if C can call a law's function itself, and read its outputs from its memory."""
     return type(law) in LAWS.values() and getattr(law.step, "__func__", None) is CompiledLaw.step
 
@@ -43,17 +43,21 @@ def is_compiled(law: Law) -> bool:
 def outputs_of(law: Law) -> LawOutputs:
     """Return arrays of a law's outputs: its own, or those that a step in Python fills."""
     if is_compiled(law):
-        assert isinstance(law, CompiledLaw)
         return LawOutputs(law.estimate, law.expected, law.report)
     return LawOutputs(np.zeros(4), np.full(6, np.nan), np.zeros(len(law.diagnostics)))
+
+
+def law_arguments(model: StepModel, data: StepData) -> tuple[Any, ...]:
+    """Return the arguments of a law's step in the arrays of a step."""
+    forces = data.command if model.law_gives_wrench else data.thrusts
+    return data.state, data.goal, data.regions, data.weights, forces
 
 
 class BoundLaw:
     """Binds a law to the arrays of a step."""
 
     def __init__(self, law: Law, model: StepModel, data: StepData) -> None:
-        self.law, self._data = law, data
-        self._forces = data.command if model.law_gives_wrench else data.thrusts
+        self.law, self._data, self._arguments = law, data, law_arguments(model, data)
         self._gains: Any = self  # no gains yet
         self._memory = getattr(law, "memory", None)
         self.compiled = is_compiled(law)
@@ -67,12 +71,11 @@ class BoundLaw:
         if gains is self._gains:
             return
         self._gains = gains
-        arguments = data.state, data.goal, data.regions, data.weights, self._forces
         if self.compiled:
             assert isinstance(self.law, CompiledLaw)
-            self._call = self.law.bound(*arguments)
+            self._call = self.law.bound(*self._arguments)
         else:
-            self._call = BoundCall(_PythonStep(self.law, data), arguments)
+            self._call = BoundCall(_PythonStep(self.law, data), self._arguments)
         set_call(data, LAW, self._call)
 
     def restart(self, fresh: CompiledLaw) -> None:

@@ -13,13 +13,13 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from controller import CompiledLaw, Law
-from controller.compiling.function import BoundCall
+from controller.compiling.function import BoundCall, load_functions
 from controller.quaternion import from_axis_angle
 from cosim.scenario.law_factory import law_of, with_custom_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.actuation_limits import ActuationLimits
-from cosim.simulation.bindings import BoundLaw, bind_arbiter
+from cosim.simulation.bindings import BoundLaw, bind_arbiter, is_compiled, law_arguments
 from cosim.simulation.columns import columns_of
 from cosim.simulation.commands.command_handler import CommandHandler
 from cosim.simulation.commands.commands import Command
@@ -137,13 +137,16 @@ class Master:
         self._plant = BoundPlant(scenario, self.plant, self.data, native=own_plant)
         self.true_state, self.state = self.data.true_state, self.data.state
         self.environment = RegionEnvironment(scenario, self.data)
-        self._bound_law = BoundLaw(self.law, self.model, self.data)
-        self._parts: list[_Raising] = [self._bound_law, bind_arbiter(self.arbiter, self.data), self._plant]
         self._span = np.zeros(3, np.int64)
         self._rows: Array = np.zeros((_BLOCK, s.row.size))
         arguments = self.model, self.data, self._plant.calls
+        block = *arguments, self._span, self._rows
+        law_calls = [self.law.step_call(*law_arguments(self.model, self.data))] if is_compiled(self.law) else []
+        load_functions(*law_calls, (advance, block), (show_start, arguments))
+        self._bound_law = BoundLaw(self.law, self.model, self.data)
+        self._parts: list[_Raising] = [self._bound_law, bind_arbiter(self.arbiter, self.data), self._plant]
         self._advance_one = BoundCall(advance, (*arguments, self._span, self._rows[:0]))
-        self._advance_block = BoundCall(advance, (*arguments, self._span, self._rows))
+        self._advance_block = BoundCall(advance, block)
         self._show_start = BoundCall(show_start, arguments)
         # what a step does not do itself: the Lyapunov function after it, commands within it
         self._lyapunov: LyapunovSignals | None = None

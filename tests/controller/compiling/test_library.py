@@ -2,6 +2,7 @@
 
 import ctypes
 import os
+import shlex
 import subprocess
 import sys
 import time
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 from controller.compiling import library, text_cache
-from controller.compiling.library import digest_of, library_name, library_of
+from controller.compiling.library import digest_of, library_name, library_of, load_libraries
 from controller.errors import CompilationError
 from controller.translator.types import type_of
 from cosim.step.decision import bound_wrench
@@ -31,13 +32,13 @@ def cache(tmp_path, monkeypatch):
 @pytest.fixture
 def compiled(monkeypatch):
     """Names of what is compiled."""
-    names, real = [], library._compiled
+    names, real = [], library._compiling
 
-    def noted(text, name):
-        names.append(name)
-        return real(text, name)
+    def noted(text):
+        names.append(library_name(text))
+        return real(text)
 
-    monkeypatch.setattr(library, "_compiled", noted)
+    monkeypatch.setattr(library, "_compiling", noted)
     return names
 
 
@@ -124,6 +125,73 @@ def test_missing_compiler_error_names_alternatives(monkeypatch):
 def test_compilation_error_quotes_first_compiler_error(cache):
     with pytest.raises(CompilationError, match=r"error: .*unknown"):
         library_of("unknown answer;\n")
+
+
+COMPILER = """
+import os, pathlib, sys, time
+folder = pathlib.Path(__file__).parent
+(folder / f"{os.getpid()}.pid").touch()
+source = next(word for word in sys.argv if word.endswith(".c"))
+if "broken" in pathlib.Path(source).read_text():
+    sys.exit("error: broken")
+until = time.monotonic() + 60.0
+while len(list(folder.glob("*.pid"))) < COUNT and time.monotonic() < until:
+    time.sleep(0.01)
+os.execvp("cc", ["cc", *sys.argv[1:]])
+"""
+
+
+def compilers(folder):
+    return sorted(int(path.stem) for path in folder.glob("*.pid"))
+
+
+def wait_for(condition):
+    until = time.monotonic() + 60.0
+    while not condition() and time.monotonic() < until:
+        time.sleep(0.01)
+    assert condition()
+
+
+@pytest.fixture
+def waiting_compiler(tmp_path, monkeypatch):
+    """A compiler that works only when COUNT of it run."""
+
+    def make(count):
+        script = tmp_path / "compiler.py"
+        script.write_text(COMPILER.replace("COUNT", str(count)))
+        monkeypatch.setenv("CC", shlex.join([sys.executable, str(script)]))
+
+    return make
+
+
+def test_several_libraries_are_compiled_at_once_while_texts_are_made(cache, tmp_path, waiting_compiler):
+    waiting_compiler(3)
+
+    def texts():
+        for n in range(3):
+            wait_for(lambda n=n: len(compilers(tmp_path)) == n)
+            yield TEXT.replace("42", str(n))
+
+    assert [loaded.answer() for loaded in load_libraries(texts())] == [0, 1, 2]
+
+
+@pytest.mark.parametrize("error", [CompilationError, KeyboardInterrupt])
+def test_an_error_stops_all_compilers(cache, tmp_path, waiting_compiler, error):
+    waiting_compiler(9)
+
+    def texts():
+        yield "broken"
+        yield TEXT
+        wait_for(lambda: len(compilers(tmp_path)) == 2)
+        if error is KeyboardInterrupt:
+            raise KeyboardInterrupt
+
+    with pytest.raises(error):
+        load_libraries(texts())
+    for process in compilers(tmp_path):
+        with pytest.raises(ProcessLookupError):
+            os.kill(process, 0)
+    assert not cache.exists()
 
 
 @pytest.mark.medium
