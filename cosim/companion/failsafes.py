@@ -46,6 +46,7 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
         Parameter("BATT_FS_LOW_ACT", "on a low battery", {0: "does nothing", 2: "disarms", 3: "surfaces"}),
         Parameter("SYSID_MYGCS", "system whose sticks are accepted"),
         Parameter("MAV_GCS_SYSID", "system whose sticks are accepted, from 4.7 on"),
+        Parameter("MAV_GCS_SYSID_HI", "last system of a range of such systems, 0 for none"),
         Parameter("JS_GAIN_DEFAULT", "pilot gain"),
         Parameter("EK3_MAG_CAL", "when it learns the magnetic field, 2: never"),
         Parameter("ACRO_YAW_P", "yaw rate of a full stick, in 45 deg/s"),
@@ -71,8 +72,9 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
 }
 # parameters of the reaction to a lost companion; at least one of them must be nonzero
 _REACTIONS = {"ardusub": ("FS_PILOT_INPUT", "FS_GCS_ENABLE"), "px4": ("COM_OF_LOSS_T",)}
-_STICK_SYSTEM = ("SYSID_MYGCS", "MAV_GCS_SYSID")
-_OPTIONAL = (*_STICK_SYSTEM, "ATC_ANGLE_MAX", "ANGLE_MAX")  # absent in some versions: no warning without them
+# absent in some versions: no warning without them
+_OPTIONAL = ("SYSID_MYGCS", "MAV_GCS_SYSID", "MAV_GCS_SYSID_HI", "FS_GCS_TIMEOUT", "ATC_ANGLE_MAX", "ANGLE_MAX")
+_GCS_TIMEOUT = 2.5  # s, of an ArduSub without FS_GCS_TIMEOUT, as 4.5
 _HOLD_TIMES = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # times [s] the last sticks act: with a radio, and without one
 _MAX_HOLD_TIME = 1.0  # s
 _NEVER = 2.0  # value of EK3_MAG_CAL: never learn the magnetic field
@@ -112,6 +114,8 @@ class Failsafes:
     def text(self) -> list[str]:
         """Return the received parameters as lines of text; the last ones are warnings."""
         lines = [self._line(parameter) for parameter in PARAMETERS[self._profile] if parameter.name in self.values]
+        if self.values.get("FS_GCS_ENABLE") and "FS_GCS_TIMEOUT" not in self.values:
+            lines.append(f"no FS_GCS_TIMEOUT: a ground station is lost after {_GCS_TIMEOUT:g} s")
         silent = [name for name in self._missing() if name not in _OPTIONAL]
         if silent:
             lines.append(f"not answered by the autopilot: {', '.join(silent)}")
@@ -130,17 +134,24 @@ class Failsafes:
         saturation = values.get(_SATURATION, 1.0)
         if saturation < 1.0:
             yield f"{_SATURATION} is {saturation:g}, but the law counts on the thrusters' full force; expected 1"
-        hold_times = {name: values[name] for name in _HOLD_TIMES if name in values}
-        if any(not 0.0 <= time <= _MAX_HOLD_TIME for time in hold_times.values()):
-            listed = ", ".join(f"{name} is {time:g}" for name, time in hold_times.items())
-            yield f"the last sticks outlast a lost link: {listed}; expected {_MAX_HOLD_TIME:g} s or less"
+        if lasting := self.lasting_sticks():
+            yield lasting
+
+    def lasting_sticks(self) -> str:
+        """Return the parameters by which the last sticks act for long after a lost link; empty if none is known."""
+        hold_times = {name: self.values[name] for name in _HOLD_TIMES if name in self.values}
+        if all(0.0 <= time <= _MAX_HOLD_TIME for time in hold_times.values()):
+            return ""
+        listed = ", ".join(f"{name} is {time:g}" for name, time in hold_times.items())
+        return f"the last sticks outlast a lost link: {listed}; expected {_MAX_HOLD_TIME:g} s or less"
 
     def ignored_sticks(self, system: int) -> str:
-        """Return the reason why the autopilot ignores sticks of a system id; empty if none is known."""
-        for name in _STICK_SYSTEM:
-            accepted = self.values.get(name)
-            if accepted is not None and accepted != system:
-                return f"{name} is {accepted:g}, and the companion's system id {system}: its sticks would be ignored"
+        """Return the parameters by which the autopilot ignores sticks of a system id; empty if none is known."""
+        for name in ("SYSID_MYGCS", "MAV_GCS_SYSID"):
+            first = self.values.get(name, system)
+            last = max(first, self.values.get(f"{name}_HI", first))
+            if not first <= system <= last:
+                return f"{name} is {first:g}" + (f", {name}_HI {last:g}" if last > first else "")
         return ""
 
     def learns_magnetic_field(self) -> bool:

@@ -16,7 +16,7 @@ from cosim.companion.frame_alignment import FrameAlignment
 from cosim.companion.heading import HeadingWatch, LevelDive
 from cosim.companion.outputs import Output
 from cosim.companion.safety import GAIN_TOLERANCE, Observation, State, Supervisor
-from cosim.companion.vehicle_state import RATES, ReportedState
+from cosim.companion.vehicle_state import ReportedState, requested_rates
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.wire.dialect import dialect, make_command, make_heartbeat, make_rate_requests
 from cosim.simulation.commands.commands import Arm, Command, Mode
@@ -57,7 +57,7 @@ class AutopilotSession:
         self._is_law_active = False  # value of the last `Arm` for the master
         self._sent_at: dict[str, float] = {}
         self._held_at, self._release_until = 0.0, -math.inf
-        self._shared_ids: set[int] = set()  # components of other stations with our system id
+        self._stations, self._noted_stations = set[int](), set[int]()  # system ids of other stations; those warned of
 
     def clock(self) -> float:
         """Return the link's time [s]."""
@@ -76,6 +76,7 @@ class AutopilotSession:
         now = self._link.clock()
         self.lateness = max(0.0, now - due)
         self._receive(0.0)
+        self._warn_of_stations(now)
         before = self.supervisor.state
         state = self.supervisor.update(self._observation(now))
         if state != before:
@@ -141,9 +142,12 @@ class AutopilotSession:
         o = self._options
         if o.dry_run or not o.uses_sticks:
             return ""
-        ignored = self.failsafes.ignored_sticks(self._link.identity[0])
-        if ignored:
-            return f"{ignored}; expected the same number, or --steer-by velocity"
+        system = self._link.identity[0]
+        if ignored := self.failsafes.ignored_sticks(system):
+            text = f"{ignored}, and the companion's system id {system}: its sticks would be ignored"
+            return f"{text}; expected the same number, or --steer-by velocity"
+        if o.steer_by == "wrench" and (lasting := self.failsafes.lasting_sticks()):
+            return f"{lasting}; with --steer-by wrench they would turn the vehicle over"
         if self._gain_error() > GAIN_TOLERANCE:
             return f"the autopilot's pilot gain is {self._gain():g}, expected {o.pilot_gain:g} of --pilot-gain"
         return ""
@@ -215,7 +219,7 @@ class AutopilotSession:
         for name in self.failsafes.names_to_request(now) if is_up else ():
             self._link.send(m.MAVLink_param_request_read_message(self.reported.system, 1, name.encode(), -1))
         if self._is_due("rates", _RATES_PERIOD, now):
-            for request in make_rate_requests(m, self.reported.system, RATES):
+            for request in make_rate_requests(m, self.reported.system, requested_rates(self.profile.name)):
                 self._link.send(request)
 
     def _send_outputs(self, state: State, now: float, wrench: Array, period: float) -> None:
@@ -284,8 +288,8 @@ class AutopilotSession:
         if message.get_type() == "COMMAND_LONG":
             self._handle_command(system, component, message)
             return
-        if message.get_type() == "HEARTBEAT" and system == self._link.identity[0]:
-            self._warn_of_shared_id(component)
+        if message.get_type() == "HEARTBEAT" and self._is_station(system, component, message):
+            self._stations.add(system)
         if message.get_type() == "PARAM_VALUE" and (system, component) == (self.reported.system, 1):
             self.failsafes.receive(message)
         self.reported.receive(system, component, message, time)
@@ -293,14 +297,26 @@ class AutopilotSession:
         self.heading.update(self.reported)
         self.dive.update(self.reported, time)
 
-    def _warn_of_shared_id(self, component: int) -> None:
-        """Warn once of another station that shares our system id: an ArduSub accepts its sticks as well as ours."""
-        system, ours = self._link.identity
-        if component != ours and component not in self._shared_ids:
-            self._shared_ids.add(component)
-            text = "component %d has the companion's system id %d: its sticks compete; change its system id"
-            log.warning(text, component, system)
-            self._send_text(f"Companion: component {component} shares system id {system}", is_warning=True)
+    def _is_station(self, system: int, component: int, heartbeat: Any) -> bool:
+        """Return True for another ground station, or anything else that shares our system id."""
+        ours = self._link.identity
+        is_one = heartbeat.type == self._mavlink.MAV_TYPE_GCS or system == ours[0]
+        return is_one and (system, component) != ours
+
+    def _warn_of_stations(self, now: float) -> None:
+        """Warn once of each ground station whose sticks compete with ours, or whose pilot cannot take over by stick."""
+        if not self.failsafes.is_read(now):
+            return
+        for system in self._stations - self._noted_stations:
+            self._noted_stations.add(system)
+            if ignored := self.failsafes.ignored_sticks(system):
+                text, more = f"station {system} has no sticks", f"also after a takeover: {ignored}"
+            elif system == self._link.identity[0] and self._options.uses_sticks:
+                text, more = f"station {system} has our system id", "its sticks compete until its pilot takes over"
+            else:
+                continue
+            log.warning("%s, %s", text, more)
+            self._send_text(f"Companion: {text}", is_warning=True)
 
     def _handle_command(self, system: int, component: int, message: Any) -> None:
         """Apply a DO_PAUSE_CONTINUE that is addressed to the companion: 0 ends steering, 1 resumes it."""

@@ -10,11 +10,12 @@ import numpy as np
 
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.clock_sync import ClockSync
+from cosim.mavlink.wire.options import ProfileName
 from cosim.simulation.signals import Array
 
-RATES = {  # Hz, requested rates of messages
+_RATES = {  # Hz, requested rates of messages
     "HEARTBEAT": 5.0,  # mode and arming; a PX4 refuses, and sends one per second
-    "CURRENT_MODE": 10.0,  # PX4 only
+    "CURRENT_MODE": 10.0,
     "ATTITUDE_QUATERNION": 50.0,
     "LOCAL_POSITION_NED": 50.0,
     "GLOBAL_POSITION_INT": 5.0,
@@ -23,9 +24,11 @@ RATES = {  # Hz, requested rates of messages
     "SCALED_PRESSURE": 10.0,
     "SCALED_PRESSURE2": 10.0,
     "DISTANCE_SENSOR": 5.0,
-    "EKF_STATUS_REPORT": 2.0,  # ArduPilot only
-    "ESTIMATOR_STATUS": 2.0,  # PX4 only
+    "EKF_STATUS_REPORT": 2.0,
+    "ESTIMATOR_STATUS": 2.0,
 }
+# messages of one autopilot: another one may answer a request for them with a text on every station
+_OF_ONE: dict[str, ProfileName] = {"CURRENT_MODE": "px4", "EKF_STATUS_REPORT": "ardusub", "ESTIMATOR_STATUS": "px4"}
 _ARMED, _CRITICAL = 128, 5  # bit of HEARTBEAT.base_mode; MAV_STATE_CRITICAL: from it on a failsafe is active
 _LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
 _RELATIVE, _ABSOLUTE = 8, 16  # estimator flags: horizontal position is relative, absolute
@@ -187,6 +190,11 @@ class ReportedState:
 
     def _receive_timesync(self, m: Any, now: float) -> None:
         self.sync.add_answer(m.tc1, m.ts1, now)
+
+
+def requested_rates(profile: ProfileName) -> dict[str, float]:
+    """Return the rates [Hz] of the messages to request from an autopilot, by name."""
+    return {name: rate for name, rate in _RATES.items() if profile in (_OF_ONE.get(name, profile), "generic")}
 
 
 def turned(quaternion: Array, rotation: Array) -> Array:

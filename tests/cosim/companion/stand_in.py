@@ -30,8 +30,9 @@ class StandIn:
     identity = IDENTITY
 
     def __init__(
-        self, scenario="pipe-inspection", profile="ardusub", shift=(0.0, 0.0, 0.0), overrides=(), armed=True, silent=()
-    ):
+        self, scenario="pipe-inspection", profile="ardusub", shift=(0.0, 0.0, 0.0), overrides=(), armed=True, silent=(),
+        obeys=None,
+    ):  # fmt: skip
         enabled = ["commands.enabled=true", "commands.await_arm=true", "commands.obstacles=0", "time.duration=3600"]
         self.master = Master(load_scenario(scenario, [*enabled, *overrides]))
         self.step, self.k = self.master.scenario.time.step, 0
@@ -42,6 +43,7 @@ class StandIn:
         self.shift = np.array(shift)  # m: of the scene's origin in the autopilot's own frame
         self.cut = False  # True: no link at all
         self.refused_commands, self.silent = set(), set(silent)  # commands and messages that go nowhere
+        self.obeys = obeys  # the one system whose sticks reach the vehicle, as an ArduSub's SYSID_MYGCS; None: any
         self.tamper = {}  # what is done to a message of a kind on its way
         self.events = []  # times, and what happens then
         self.stall = 0.0  # s, for which the companion's computer does nothing
@@ -107,7 +109,8 @@ class StandIn:
     def hear(self, message, system=255, component=190):
         """Let somebody else say something, to the vehicle and to whoever listens."""
         (decoded,) = mavlink.MAVLink(None).parse_buffer(message.pack(mavlink.MAVLink(None, system, component)))
-        self._up.append((self.clock(), decoded))
+        if self.obeys in (None, system) or message.get_type() != "MANUAL_CONTROL":
+            self._up.append((self.clock(), decoded))
         self._down.append((self.clock(), decoded))
 
     # ---- time ----

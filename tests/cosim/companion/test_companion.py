@@ -156,6 +156,9 @@ NOT_STEERED = {
     "an ArduSub that would ignore sticks": (
         {"profile": "ardusub"}, {"profile": "ardusub"}, parameter(b"SYSID_MYGCS", 250.0),
         r"SYSID_MYGCS is 250, and the companion's system id 255"),
+    "an ArduSub whose last sticks of all axes would act on": (
+        {"profile": "ardusub"}, {"profile": "ardusub", "steer_by": "wrench"}, parameter(b"RC_OVERRIDE_TIME", 3.0),
+        r"RC_OVERRIDE_TIME is 3; expected 1 s or less; with --steer-by wrench they would turn the vehicle over"),
     "an ArduSub that would misread sticks": (
         {"profile": "ardusub"}, {"profile": "ardusub"},
         mavlink.MAVLink_named_value_float_message(0, b"PilotGain", 0.25),
@@ -409,14 +412,41 @@ def test_overridden_channels_rest_in_the_middle_and_are_then_given_back(tmp_path
     assert link.autopilot._context.sticks == (0.0,) * 6
 
 
+BEAT = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
+COMPETES = "station 255 has our system id, its sticks compete until its pilot takes over"
+POWERLESS = "station 250 has no sticks, also after a takeover: SYSID_MYGCS is 255"
+
+
 def test_conflicting_system_id_is_reported_once(tmp_path, caplog, link):
-    beat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
-    events = [lambda: link.hear(beat), lambda: link.hear(beat), lambda: link.hear(beat, 250)]
+    events = [lambda: link.hear(BEAT), lambda: link.hear(BEAT), lambda: link.hear(BEAT, 250)]
     flight = Flight(tmp_path, 4.0, link=link, events=events)
     assert flight.status == "completed"
-    assert [r.getMessage() for r in caplog.records if "compete" in r.getMessage()] == [
-        "component 190 has the companion's system id 255: its sticks compete; change its system id"
-    ]
+    assert [r.getMessage() for r in caplog.records if "station" in r.getMessage()] == [COMPETES]
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize(
+    ("station", "warned", "least", "most"), [(255, COMPETES, 3.0, 10.0), (250, POWERLESS, 0.0, 1.5)]
+)
+def test_a_pilot_drives_away_by_sticks_of_the_system_that_the_autopilot_obeys(
+    tmp_path, caplog, station, warned, least, most
+):
+    """One of another system, whose sticks an ArduSub ignores, is warned of before the vehicle is armed."""
+    link, begun = StandIn(profile="ardusub", shift=SHIFT, armed=False, obeys=255), 6.0
+
+    def drive():
+        link.hear(mavlink.MAVLink_manual_control_message(1, 1000, 0, 500, 0, 0), station)
+
+    link.events = [(0.5, lambda: link.hear(parameter(b"SYSID_MYGCS", 255.0), 1, 1)),
+                   (0.6, lambda: link.hear(BEAT, station)),
+                   *((begun + 0.04 * k, drive) for k in range(300))]  # fmt: skip
+    flight = Flight(tmp_path, 10.0, link=link, profile="ardusub", arm=True, level_dive=0.0)
+    assert flight.status == "pilot: pilot's sticks" and flight.time_of("pilot") - begun <= 0.2
+    assert [r.getMessage() for r in caplog.records if "station" in r.getMessage()] == [warned]
+    (told,) = [k for k, (_, m) in enumerate(link.sent) if m.get_type() == "STATUSTEXT" and "station" in m.text]
+    (armed, *_) = [k for k, (_, m) in enumerate(link.sent) if m.get_type() == "COMMAND_LONG" and m.command == 400]
+    way = np.array([link.column(f"position.{axis}")[round(begun / link.step) :] for axis in "xyz"])
+    assert told < armed and least < np.linalg.norm(way[:, -1] - way[:, 0]) < most
 
 
 @pytest.mark.medium

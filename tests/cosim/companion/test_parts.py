@@ -18,7 +18,7 @@ from cosim.companion.heading import HeadingWatch, LevelDive
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
 from cosim.companion.set_points import TurnLead, VelocityLead, make_attitude_message, make_velocity_target
 from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels, release_channels
-from cosim.companion.vehicle_state import RATES, ReportedState
+from cosim.companion.vehicle_state import ReportedState, requested_rates
 from cosim.errors import RunError
 from cosim.mavlink.vehicle.geodesy import LocalFrame
 from cosim.mavlink.vehicle.profile import PROFILES
@@ -431,7 +431,16 @@ def test_a_px4_mode_is_known_before_its_next_heartbeat():
     state, offboard = reported((0.0, 0.0, 0.0)), PROFILES["px4"].custom_modes["reach"]
     state.receive(1, 1, mavlink.MAVLink_current_mode_message(0, offboard, offboard), 5.0)
     assert state.mode == offboard
-    assert RATES["CURRENT_MODE"] >= 5.0
+    assert requested_rates("px4")["CURRENT_MODE"] >= 5.0
+
+
+def test_no_message_is_requested_that_the_autopilot_does_not_have():
+    """An ArduSub answers each such request with a text on every station."""
+    reports = {"px4": {"CURRENT_MODE", "ESTIMATOR_STATUS"}, "ardusub": {"EKF_STATUS_REPORT"}}
+    reports["generic"] = reports["px4"] | reports["ardusub"]
+    for profile, names in reports.items():
+        assert set(requested_rates(profile)) & reports["generic"] == names
+        assert len(requested_rates(profile)) == 9 + len(names)
 
 
 # ---- the autopilot's own failsafes ----
@@ -456,7 +465,7 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     failsafes = Failsafes("ardusub")
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.names_to_request(0.25 * k)) for k in range(9)]
-    assert asked == [22, 0, 22, 0, 22, 0, 22, 0, 22]
+    assert asked == [23, 0, 23, 0, 23, 0, 23, 0, 23]
     values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": math.nan}
     failsafes_of("ardusub", failsafes, **values)
     assert "FS_GCS_ENABLE" not in failsafes.names_to_request(2.5)
@@ -465,13 +474,22 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     assert first == "FS_GCS_ENABLE 2: on a ground station that falls silent it disarms"
     assert second == "FS_GCS_TIMEOUT 5: s until then"
     assert silent.startswith("not answered by the autopilot: FS_PILOT_INPUT,")
+    without_timeout = "no FS_GCS_TIMEOUT: a ground station is lost after 2.5 s"
+    assert without_timeout in failsafes_of("ardusub", FS_GCS_ENABLE=3.0).text()
+    assert without_timeout not in failsafes_of("ardusub", FS_GCS_ENABLE=0.0).text()
 
 
 def test_an_ardusub_that_ignores_the_companion_s_sticks_or_learns_the_magnetic_field_is_known():
     unknown = failsafes_of("ardusub")
     assert unknown.ignored_sticks(255) == "" and not unknown.learns_magnetic_field()
     of_another = failsafes_of("ardusub", SYSID_MYGCS=250.0)
-    assert of_another.ignored_sticks(250) == "" and "SYSID_MYGCS is 250" in of_another.ignored_sticks(255)
+    assert of_another.ignored_sticks(250) == "" and of_another.ignored_sticks(255) == "SYSID_MYGCS is 250"
+    for last, accepted, words in ((252.0, (250, 252), "MAV_GCS_SYSID is 250, MAV_GCS_SYSID_HI 252"),
+                                  (0.0, (250,), "MAV_GCS_SYSID is 250")):  # fmt: skip
+        newer = failsafes_of("ardusub", MAV_GCS_SYSID=250.0, MAV_GCS_SYSID_HI=last)
+        for system in (249, 250, 251, 252, 253):
+            inside = accepted[0] <= system <= accepted[-1]
+            assert newer.ignored_sticks(system) == ("" if inside else words)
     for value, learns in ((3.0, True), (2.0, False)):
         assert failsafes_of("ardusub", EK3_MAG_CAL=value).learns_magnetic_field() == learns
 
