@@ -1,15 +1,22 @@
 """The benchmark that flies a real ArduSub, as far as it goes without one."""
 
 import json
+import os
+import signal
+import subprocess
+import time
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from benchmarks.autopilot import flights
 from benchmarks.autopilot.flights import Task
 from benchmarks.autopilot.judgement import clearances_at
 from benchmarks.autopilot.scenes import random_scene
+from cosim.errors import RunError
 from cosim.scenario.scenario import load_scenario
+from tests.cosim.companion.stand_in import StandIn
 
 
 def test_random_scenes_leave_start_dive_and_goal_free_and_are_repeatable():
@@ -31,16 +38,55 @@ def test_random_scenes_leave_start_dive_and_goal_free_and_are_repeatable():
 
 
 def test_flights_that_the_file_has_are_not_flown_again(tmp_path, monkeypatch, capsys):
-    tasks, flown = [Task("random-1", "wrench"), Task("docking"), Task("docking", level_dive=0.0)], []
-    monkeypatch.setattr(
-        flights, "fly", lambda task, *rest: flown.append(task) or {"key": task.key, "reached": True, "violated": []}
-    )
+    """Except for those that failed, or whose plant ended."""
+    tasks, flown = [Task("random-1", "wrench"), Task("docking"), Task("docking", level_dive=0.0), Task("harbour")], []
+    statuses = ["completed", "failed: 90 s have passed", "", "held: lost link", "completed", "completed", "interrupted"]
+
+    def fly(task, *rest):
+        flown.append(task)
+        return {"key": task.key, "status": statuses[len(flown) - 1], "reached": True, "violated": []}
+
+    monkeypatch.setattr(flights, "fly", fly)
     out = tmp_path / "flights.jsonl"
-    flights.make_flights(tasks[:2], Path("ardusub"), 0, out)
+    flights.make_flights(tasks[:3], Path("ardusub"), 0, out)
     flights.make_flights(tasks, Path("ardusub"), 0, out)
-    assert flown == tasks
+    assert flown == [*tasks[:3], *tasks[1:]]
     assert [json.loads(line)["key"] for line in out.read_text().splitlines()] == [task.key for task in tasks]
-    assert "3 flights: 3 reached" in capsys.readouterr().err
+    assert "4 flights: 4 reached" in capsys.readouterr().err
+    with pytest.raises(KeyboardInterrupt):
+        flights.make_flights([Task("docking", "wrench"), *tasks], Path("ardusub"), 0, out)
+    assert len(flown) == 7 and len(out.read_text().splitlines()) == 4
+
+
+@pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs signals")
+def test_a_kill_ends_the_autopilot(tmp_path, monkeypatch):
+    program, running = tmp_path / "ardusub", flights._running
+    program.write_text("#!/bin/sh\nexec sleep 100\n")
+    program.chmod(0o700)
+    processes, popen = [], subprocess.Popen
+    monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: processes.append(popen(*a, **k)) or processes[-1])
+
+    def fly(task, ardusub, instance, folder):
+        with running(ardusub, instance, 1, folder, task):
+            os.kill(os.getpid(), signal.SIGTERM)
+            time.sleep(10.0)
+
+    monkeypatch.setattr(flights, "fly", fly)
+    with pytest.raises(KeyboardInterrupt):
+        flights.make_flights([Task("docking")], program, 0, None)
+    assert [process.poll() for process in processes] == [-signal.SIGKILL]
+
+
+@pytest.mark.medium
+def test_the_origin_is_sent_each_second_until_the_autopilot_has_a_position(monkeypatch):
+    link = StandIn(profile="ardusub", silent={"GLOBAL_POSITION_INT"})
+    link.events = [(2.5, link.silent.clear)]
+    flights.set_origin(link)
+    assert 3 <= len(link.of_type("SET_GPS_GLOBAL_ORIGIN")) <= 4
+    monkeypatch.setattr(flights, "_ORIGIN_PATIENCE", 2.0)
+    link.silent.add("GLOBAL_POSITION_INT")
+    with pytest.raises(RunError, match="not accepted the global origin for 2 s"):
+        flights.set_origin(link)
 
 
 def test_parameters_of_the_autopilot_are_numbers():

@@ -22,11 +22,13 @@ from typing import Any
 from benchmarks.autopilot.judgement import Flown, judge
 from benchmarks.autopilot.scenes import random_scene
 from benchmarks.autopilot.simulated_link import FAULTS, SimulatedLink
+from cosim.command_line.process import kills_interrupt
+from cosim.companion.autopilot_link import AutopilotLink
 from cosim.companion.companion_options import CompanionOptions
 from cosim.companion.companion_run import Companion
 from cosim.companion.frame_alignment import SceneOrigin
 from cosim.errors import CosimError, RunError
-from cosim.mavlink.wire.dialect import dialect
+from cosim.mavlink.wire.dialect import dialect, make_rate_requests
 from cosim.mavlink.wire.endpoint import parse_endpoint
 from cosim.mavlink.wire.ground_end import GROUND_STATION, GroundLink
 from cosim.mavlink.wire.options import ORIGIN
@@ -46,6 +48,7 @@ RANDOM_DURATION = 45.0  # s, duration of a flight in a random scene
 _LOWERED = 12.0  # s, time of the plant at which the vehicle is at its start
 _LONGEST = 400.0  # s, duration of the plant's scenario
 _PATIENCE = 120.0  # s of the wall clock without a frame, after which a flight ends
+_ORIGIN_PATIENCE = 60.0  # s, during which the global origin is sent each second until the autopilot accepts it
 # parameters of ArduSub for a DVL in place of GPS
 _WITHOUT_GPS = {"VISO_TYPE": 1, "EK3_SRC1_VELXY": 6, "EK3_SRC1_POSXY": 0, "EK3_SRC1_VELZ": 0, "GPS1_TYPE": 0}
 _WATER = 1023.6  # kg/m3, density of the water in ArduPilot's simulator
@@ -151,12 +154,8 @@ def _running(ardusub: Path, instance: int, port: int, folder: Path, task: Task) 
 
 def _steer(task: Task, scenario: Scenario, link: SimulatedLink, flown: Flown, folder: Path) -> str:
     """Wait until the vehicle is at its start, fly it with the companion, and return the status of the plant's run."""
-    m = dialect()
     while link.clock() < _LOWERED:
         link.advance()
-    if task.is_random:
-        place = [round(1e7 * angle) for angle in ORIGIN]
-        link.send(m.MAVLink_set_gps_global_origin_message(1, *place, 0))
     options = CompanionOptions(
         steer_by=task.steer_by, sticks_by=task.sticks_by, origin=SceneOrigin(geodetic=ORIGIN, density=_WATER),  # type: ignore[arg-type]
         arm=True, pilot_gain=1.0, level_dive=task.level_dive, timeout=90.0,
@@ -174,17 +173,37 @@ def _steer(task: Task, scenario: Scenario, link: SimulatedLink, flown: Flown, fo
             link.events.append((flown.failed_at, lambda: FAULTS[task.fault](link)))
 
     try:
+        if task.is_random:
+            set_origin(link)
         flown.status = companion.run(folder / "companion", report=False, on_state=note).summary["status"]
     except CosimError as error:
         flown.status = f"failed: {error}"
+    except KeyboardInterrupt:
+        flown.status = "interrupted"
+        raise
     flown.begun = link.waited()
     return "completed"
+
+
+def set_origin(link: AutopilotLink) -> None:
+    """Send the global origin of an autopilot without GPS until it is accepted; RunError if it never is."""
+    m, until, sent = dialect(), link.clock() + _ORIGIN_PATIENCE, -math.inf
+    origin = m.MAVLink_set_gps_global_origin_message(1, *(round(1e7 * angle) for angle in ORIGIN), 0)
+    while (now := link.clock()) < until:
+        if now - sent >= 1.0:
+            sent = now
+            for message in (origin, *make_rate_requests(m, 1, {"GLOBAL_POSITION_INT": 5.0})):
+                link.send(message)
+        for one in link.receive(0.1):
+            if one.name == "GLOBAL_POSITION_INT" and (one.message.lat or one.message.lon):
+                return
+    raise RunError(f"the autopilot has not accepted the global origin for {_ORIGIN_PATIENCE:g} s")
 
 
 def make_flights(
     tasks: Sequence[Task], ardusub: Path, instance: int, out: Path | None, keep: Path | None = None
 ) -> None:
-    """Make flights, print a line of JSON for each, and their summary.
+    """Make flights, print a line of JSON for each, and their summary. A signal that ends it ends ArduSub too.
 
     Parameters
     ----------
@@ -195,7 +214,8 @@ def make_flights(
     instance : int
         Number of the ArduSub instance, for its ports.
     out : Path, optional
-        File of results, one line per flight; flights in it are not repeated, new ones are appended.
+        File of results, one line per flight; flights in it are not repeated. New ones are appended, without those that
+        have failed: they are flown again the next time.
     keep : Path, optional
         Folder in which each flight's files are kept.
     """
@@ -206,12 +226,14 @@ def make_flights(
     for task in tasks:
         result = known.get(task.key)
         if result is None:
-            with tempfile.TemporaryDirectory() as folder:
+            with tempfile.TemporaryDirectory() as folder, kills_interrupt():
                 name = "-".join(filter(None, (task.scenario, task.steer_by, task.sticks_by[:2], task.fault)))
                 result = fly(task, ardusub, instance, Path(folder) if keep is None else keep / name.replace(" ", "_"))
+            if result["status"] == "interrupted":
+                raise KeyboardInterrupt
             line = json.dumps(result)
             print(line, flush=True)
-            if out is not None:
+            if out is not None and result["status"] and not result["status"].startswith("failed"):
                 with out.open("a", encoding="utf-8") as file:
                     file.write(line + "\n")
         flown.append(result)
