@@ -12,6 +12,7 @@ from cosim.command_line.link_flags import add_live_flag, network_endpoint, open_
 from cosim.command_line.process import INTERRUPTED, print_run, print_status
 from cosim.mavlink.wire.options import PROFILES
 
+_DECIMALS = 7  # of degrees, for centimeters
 _COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 _STEER_BY, _STICKS_BY = ("sticks", "wrench", "velocity", "attitude"), ("manual-control", "rc-override")
 
@@ -37,7 +38,7 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     flag(verb, "--sticks-by", "message that carries sticks", default="manual-control", choices=_STICKS_BY)
     where = verb.add_mutually_exclusive_group()
-    flag(where, "--scene-origin LAT,LON", "coordinates of the scene's origin: seven decimals are 1 cm", origin)
+    flag(where, "--scene-origin LAT,LON", "coordinates of the scene's origin: seven decimals are 1 cm", _scene_origin)
     flag(where, "--surveyed-origin N,E,D", "position of the autopilot's local origin in the scene [m]", _position)
     flag(verb, "--surface-pressure HPA", "pressure of the air at the surface", number(500.0, 1200.0), 1013.25)
     flag(verb, "--water-density KG/M3", "sea: 1025", number(900.0, 1200.0), 1000.0)
@@ -91,6 +92,16 @@ def companion(options: argparse.Namespace) -> int:
         run = companion.run(options.out, not options.no_report, show, live)
     print_run(options, run, not options.no_report)
     return INTERRUPTED if run.summary["status"] == "interrupted" else 0
+
+
+def _scene_origin(text: str) -> tuple[float, float]:
+    """Parse the flag; warn if its digits are too few for a vehicle among obstacles."""
+    place = origin(text)
+    decimals = min(len(part.strip().partition(".")[2]) for part in text.split(","))
+    if decimals < _DECIMALS:
+        error = float(f"{1.1e5 * 0.1**decimals:.2g}")
+        print_status(f"--scene-origin {text}: {decimals} decimals are {error:g} m, expected {_DECIMALS} decimals")
+    return place
 
 
 def _position(text: str) -> tuple[float, float, float]:

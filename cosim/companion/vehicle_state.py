@@ -59,7 +59,7 @@ class ReportedState:
         # absolute pressure [hPa], of the second sensor if there is one; NaN if none is reported
         self.pressure = self.altitude = self.battery = self.pilot_gain = math.nan
         self.pulses: tuple[int, ...] = ()
-        self.is_leaking = self.is_reckoned = False
+        self.is_leaking = self.is_reckoned = self._is_absolute = False
         self.resets = 0  # ODOMETRY.reset_counter of the autopilot's estimate
         # our times [s] of the autopilot's last processed message, and of the last deflected sticks of another station
         self.received_at = self.pilot_at = -math.inf
@@ -151,7 +151,7 @@ class ReportedState:
         self.resets = m.reset_counter
 
     def _receive_global_position_int(self, m: Any, now: float) -> None:
-        if m.lat or m.lon:
+        if m.lat or m.lon or self._is_absolute:  # an ArduSub without a position sends zeros
             self.global_position = m.lat * 1e-7, m.lon * 1e-7, m.relative_alt * _MILLI
 
     def _receive_scaled_pressure(self, m: Any, now: float) -> None:
@@ -177,7 +177,8 @@ class ReportedState:
             self.pilot_gain = m.value
 
     def _receive_ekf_status_report(self, m: Any, now: float) -> None:
-        self.is_reckoned = bool(m.flags & _RELATIVE) and not m.flags & _ABSOLUTE
+        self._is_absolute = bool(m.flags & _ABSOLUTE)
+        self.is_reckoned = bool(m.flags & _RELATIVE) and not self._is_absolute
 
     _receive_estimator_status = _receive_ekf_status_report
 

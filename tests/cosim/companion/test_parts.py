@@ -94,6 +94,13 @@ def test_frame_offset_is_derived_from_global_position_and_pressure():
     assert alignment.to_scene(state.position) == pytest.approx(true, abs=0.02)
 
 
+def test_zero_latitude_and_longitude_are_a_position_of_an_absolute_estimate():
+    state = reported((0.0, 0.0, 0.0), (0.0, 0.0))
+    assert state.global_position is None  # what an ArduSub without one sends
+    state.receive(1, 1, message("EKF_STATUS_REPORT", flags=16), 0.0)
+    assert reported((0.0, 0.0, 0.0), (0.0, 0.0), state=state).global_position == (0.0, 0.0, 0.0)
+
+
 def test_depth_that_drifts_from_the_second_pressure_is_seen_in_a_surveyed_frame():
     """SCALED_PRESSURE2 may be the only pressure."""
     positions = [(0.0, 0.0, 2.0 + min(0.01 * k, 2.0)) for k in range(600)]
