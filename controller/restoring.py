@@ -24,4 +24,4 @@ def regressor(e: Vector4) -> Regressor:
 
 def parameters(weight: float, buoyancy: float, r_G: Array, r_B: Array) -> Array:
     """Return phi (12), shape (4,) [N, N m], from `weight` and `buoyancy` [N], their centers `r_G` and `r_B` [m]."""
-    return np.concatenate(([weight - buoyancy], weight * r_G - buoyancy * r_B))
+    return np.concatenate(([weight - buoyancy], weight * np.asarray(r_G) - buoyancy * np.asarray(r_B)))

@@ -92,7 +92,7 @@ def test_regressor_times_parameters_is_weight_and_buoyancy(e, r_G, r_B):
     R = scipy_of(e).as_matrix()
     down = R.T @ [0.0, 0.0, 1.0]
     wrench = np.r_[(W - B) * down, np.cross(r_G, W * down) - np.cross(r_B, B * down)]
-    assert regressor(e) @ parameters(W, B, r_G, r_B) == pytest.approx(-wrench, abs=1e-11)
+    assert regressor(e) @ parameters(W, B, tuple(r_G), r_B) == pytest.approx(-wrench, abs=1e-11)
 
 
 @pytest.mark.medium
