@@ -21,9 +21,9 @@ import numpy as np
 
 from benchmarks.peer_environment import Environment
 from benchmarks.peer_process import PeerProcess, peer
-from controller import LAWS, VehicleModel, VehicleState
+from controller import LAWS, VehicleState
 from controller.compiling.function import CompiledFunction
-from controller.law import Array, CompiledLaw, Output, validate_gains
+from controller.law import Array, CompiledLaw, Output, VehicleModel, validate_gains
 from controller.laws.pid_cbf import PidCbfGains, PidCbfLaw, observe
 from controller.quaternion import error, rotation_matrix
 from controller.regions import DepthBand, Sphere

@@ -1,8 +1,11 @@
 """Region-reaching control: state, regions and weights in, forces out."""
 
-from controller.errors import CompilationError, ControllerError, LawError, TranslationError
+import warnings
+from importlib import import_module
+
+from controller.errors import ControllerError, LawError
 from controller.function_law import FunctionLaw, RegionsSeen
-from controller.law import CompiledLaw, Law, VehicleModel, VehicleState
+from controller.law import CompiledLaw, Law, VehicleState
 from controller.law_in_c import translate_law
 from controller.laws import LAWS
 from controller.laws.ismail_dunnigan import IsmailDunniganLaw
@@ -10,7 +13,6 @@ from controller.paper_law import Gains
 
 __all__ = [
     "LAWS",
-    "CompilationError",
     "CompiledLaw",
     "ControllerError",
     "FunctionLaw",
@@ -19,8 +21,15 @@ __all__ = [
     "Law",
     "LawError",
     "RegionsSeen",
-    "TranslationError",
-    "VehicleModel",
     "VehicleState",
     "translate_law",
 ]
+
+_FORMER = {"CompilationError": "errors", "TranslationError": "errors", "VehicleModel": "law"}  # no longer public
+
+
+def __getattr__(name: str) -> object:
+    if name not in _FORMER:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn(f"controller.{name} is no longer public", DeprecationWarning, stacklevel=2)
+    return getattr(import_module(f"{__name__}.{_FORMER[name]}"), name)

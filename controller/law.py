@@ -52,21 +52,14 @@ class VehicleState(NamedTuple):
 
 
 class VehicleModel(NamedTuple):
-    """The numbers of a vehicle that a law may use: no weight, buoyancy, nor their centers, nor the current.
-
-    Examples
-    --------
-    >>> from controller import VehicleModel
-    >>> VehicleModel._fields[-3:]
-    ('thrust_min', 'thrust_max', 'thrust_time_constant')
-    """
+    """Nominal numbers of a vehicle for a law, without weight, buoyancy, their centers, and the current."""
 
     rigid_mass: Matrix6  # kg, kg m2, with the center of gravity taken to be the origin
     added_mass: Matrix6  # kg, kg m, kg m2
     linear_damping: Vector6  # N s/m, N m s/rad
     quadratic_damping: Vector6  # N s2/m2, N m s2/rad2
     thruster_matrix: Columns6  # body wrench of one newton of each thruster
-    thrust_min: Array  # (m,) N, least force of each thruster, 0 or negative
+    thrust_min: Array  # (m,) N, minimum force of each thruster, 0 or negative
     thrust_max: Array  # (m,) N, maximum force of each thruster
     thrust_time_constant: Array  # (m,) s, time constant of each thruster's lag
 

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from cosim.campaigns import Campaign, Comparison, Design, compare, run_campaign, run_sweep, vary_from
     from cosim.campaigns.scenes.flyer import SceneFlyer
     from cosim.campaigns.scenes.generator import generate_scenes
-    from cosim.campaigns.scenes.scene import Scene
     from cosim.campaigns.scenes.scene_file import read_scenes
     from cosim.companion.autopilot_link import NetworkLink
     from cosim.companion.companion_options import CompanionOptions
@@ -55,7 +54,6 @@ __all__ = [
     "Run",
     "RunError",
     "Scenario",
-    "Scene",
     "SceneFlyer",
     "SceneOrigin",
     "check_scenario",
@@ -104,6 +102,8 @@ def __getattr__(name: str) -> object:
     if name == "Sweep":
         warnings.warn("cosim.Sweep is now cosim.Campaign", DeprecationWarning, stacklevel=2)
         name = "Campaign"
+    if name == "Scene":
+        warnings.warn("cosim.Scene is no longer public", DeprecationWarning, stacklevel=2)
     for module, names in _EXPORTS.items():
         if name in names:
             return getattr(importlib.import_module(f"{__name__}.{module}"), name)

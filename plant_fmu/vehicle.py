@@ -171,14 +171,7 @@ class Vehicle:
 
 
 def shipped_vehicles() -> list[str]:
-    """Return the names of the vehicles that come with the package.
-
-    Examples
-    --------
-    >>> from plant_fmu import shipped_vehicles
-    >>> shipped_vehicles()[:2]
-    ['bluerov2_heavy', 'bluerov2_heavy_wu']
-    """
+    """Return the names of the vehicles that come with the package."""
     return sorted(f.name.removesuffix(".toml") for f in _folder().iterdir() if f.name.endswith(".toml"))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from controller import VehicleModel
+from controller.law import VehicleModel
 from plant_fmu.vehicle import Vehicle
 
 

@@ -22,7 +22,6 @@ PUBLIC = {
     "fuzzy_arbiter.export": "",
     "fuzzy_arbiter.formats": "fold_normalization load reads save writes",
     "fuzzy_arbiter.pictures": "",
-    "fuzzy_arbiter.terms": "",
     "fuzzy_arbiter.verification": "",
     "plant_fmu": "",
 }

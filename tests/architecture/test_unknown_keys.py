@@ -19,7 +19,8 @@ from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.sources import read_log
 from fuzzy_arbiter import ArbiterError
 from fuzzy_arbiter.formats import load
-from plant_fmu import PlantFmuError, load_vehicle, shipped_vehicles
+from plant_fmu import PlantFmuError, load_vehicle
+from plant_fmu.vehicle import shipped_vehicles
 from tests.architecture.modules import ROOT
 
 LIKE_NONE = "brandnew"

@@ -11,7 +11,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
+import controller
 import cosim
+import plant_fmu
 from cosim.errors import RunError, ScenarioError
 from tests.architecture.modules import FILES, ROOT
 
@@ -90,6 +92,9 @@ def test_paths_may_be_texts_and_scenarios_names(tmp_path, monkeypatch):
         cosim.run_sweep("short.toml", design, "sweep", "fused", 2)
     with pytest.warns(DeprecationWarning, match=r"cosim\.Sweep is now cosim\.Campaign"):
         assert cosim.Sweep is cosim.Campaign
+    for package, name in ((cosim, "Scene"), (controller, "VehicleModel"), (plant_fmu, "shipped_vehicles")):
+        with pytest.warns(DeprecationWarning, match=f"{name} is no longer public"):
+            assert getattr(package, name).__name__ == name
     assert len(list(cosim.read_scenes("scenes.jsonl"))) == 1
     assert cosim.run_campaign("scenes.jsonl", "pd", "campaign").folder == Path("campaign")
     assert cosim.compare("scenes.jsonl", ["pd", "sun_cheah"], "comparison").folder == Path("comparison")

@@ -14,10 +14,11 @@ from fmpy.validation import validate_fmu
 
 from controller.compiling.library import library_name
 from cosim.batch.shipped_functions import shipped_texts
-from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
+from plant_fmu import build_fmu, load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling import prebuilt
 from plant_fmu.compiling.platforms import PLATFORMS, native_platform
+from plant_fmu.vehicle import shipped_vehicles
 from tests.packaging.conftest import ROOT
 from tests.plant_fmu.test_sources import trajectory
 

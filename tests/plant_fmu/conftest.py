@@ -17,8 +17,9 @@ from fmpy.fmi2 import FMU2Model, FMU2Slave, fmi2CallbackFunctions, fmi2CallbackL
 from fmpy.fmi2 import defaultCallbacks as defaults
 from fmpy.fmi3 import FMU3Model, FMU3Slave
 
-from plant_fmu import Plant, build_fmu, load_vehicle, shipped_vehicles
+from plant_fmu import Plant, build_fmu, load_vehicle
 from plant_fmu.build import cached_fmu
+from plant_fmu.vehicle import shipped_vehicles
 from plant_fmu.vehicle_component import make_vehicle_component
 
 STATES = [

@@ -8,11 +8,12 @@ import pytest
 from fmpy import read_model_description
 from fmpy.validation import validate_fmu
 
-from plant_fmu import load_vehicle, shipped_vehicles
+from plant_fmu import load_vehicle
 from plant_fmu.build import cached_fmu
 from plant_fmu.description import documentation, model_description
 from plant_fmu.quantities import UNITS
 from plant_fmu.variables import variables
+from plant_fmu.vehicle import shipped_vehicles
 from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.conftest import EACH_FMI, EACH_VEHICLE
 

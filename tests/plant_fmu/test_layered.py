@@ -12,11 +12,12 @@ from fmpy.ssp.ssd import read_ssv
 from fmpy.util import read_csv
 from lxml import etree
 
-from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
+from plant_fmu import build_fmu, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.build import cached_fmu
 from plant_fmu.contents.layered import FOLDER, layered_files, reference_files
 from plant_fmu.contents.reference import COLUMNS, reference
+from plant_fmu.vehicle import shipped_vehicles
 from tests.plant_fmu.conftest import EACH_VEHICLE
 
 XSD = Path(fmpy.__file__).parent / "schema" / "fmi3" / "fmi3LayeredStandardManifest.xsd"

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from plant_fmu import load_vehicle, shipped_vehicles
+from plant_fmu import load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.pictures import PICTURES, image
 from plant_fmu.pictures.variable_map import FAMILIES, family_members, group_rows
 from plant_fmu.thruster_lines import thruster_lines
 from plant_fmu.variables import variables
+from plant_fmu.vehicle import shipped_vehicles
 
 VEHICLES = shipped_vehicles()
 

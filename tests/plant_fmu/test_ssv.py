@@ -5,9 +5,10 @@ import pytest
 from fmpy import read_model_description, simulate_fmu
 from fmpy.ssp.ssd import read_ssv
 
-from plant_fmu import load_vehicle, shipped_vehicles
+from plant_fmu import load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.build import cached_fmu
+from plant_fmu.vehicle import shipped_vehicles
 from tests.plant_fmu.conftest import STATES
 
 TYPES = {"Real": ("Real", "Float64"), "Integer": ("Integer", "Int32"), "Boolean": ("Boolean", "Boolean")}

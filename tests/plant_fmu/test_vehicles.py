@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from plant_fmu import build_fmu, load_vehicle, shipped_vehicles
+from plant_fmu import build_fmu, load_vehicle
 from plant_fmu.__main__ import main
 from plant_fmu.autopilot import Autopilot, effort_of_pulse, pulse_of_effort
 from plant_fmu.build import neutral_members
 from plant_fmu.errors import VehicleError
+from plant_fmu.vehicle import shipped_vehicles
 from tests.plant_fmu.conftest import EACH_VEHICLE
 from tests.plant_fmu.test_build import ODIN, written
 

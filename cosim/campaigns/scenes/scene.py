@@ -52,17 +52,7 @@ class Failure(Table, frozen=True):
 
 
 class Scene(Table, frozen=True):
-    r"""One scene of a file.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> import cosim
-    >>> _ = Path("scenes.jsonl").write_text("\n".join(cosim.generate_scenes(2)))
-    >>> scene = next(cosim.read_scenes(Path("scenes.jsonl")))
-    >>> scene.seed, scene.goal.radius
-    (0, 0.5)
-    """
+    """One scene of a file."""
 
     seed: Seed
     start: Vector3  # m, NED

@@ -12,7 +12,8 @@ from controller.theory.equations_of_motion import (
     restoring_defect,
     skew_defect,
 )
-from plant_fmu import load_vehicle, shipped_vehicles
+from plant_fmu import load_vehicle
+from plant_fmu.vehicle import shipped_vehicles
 
 rng = np.random.default_rng(5)
 EACH = pytest.mark.parametrize("name", shipped_vehicles())
