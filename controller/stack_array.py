@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, init=False)
 class Shape:
-    """The lengths of an array, as an annotation of its type; None is any."""
+    """The lengths of an array, as an annotation of its type: a number, a name where it varies, or None for any."""
 
-    lengths: tuple[int | None, ...]
+    lengths: tuple[int | str | None, ...]
 
-    def __init__(self, *lengths: int | None) -> None:
+    def __init__(self, *lengths: int | str | None) -> None:
         object.__setattr__(self, "lengths", lengths)
 
 

@@ -161,7 +161,7 @@ class Function(Statements):
     def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str]) -> Value:
         """Return what a C variable or member holds."""
         if isinstance(kind, Array):
-            return self.view_of(kind, code, roots)
+            return self.view_of(kind, code, roots) if kind.ndim else Value(kind.item, f"{code}.data[0]")
         return Value(kind, code, simple, frozenset() if isinstance(kind, Scalar) else roots)
 
     def storage(self, stem: str, node: ast.AST, item: Scalar, size: int) -> str:
@@ -197,6 +197,8 @@ class Function(Statements):
         except TypeError as error:
             self.fail(node, str(error))
         record, name = Record(kind, types), self._site("record", node)
+        if record.mutable:
+            self.fail(node, f"a new {kind.__name__}, whose numbers are stored")
         self.declared[name] = f"{self.c(record)} {name};"
         for field, item, of in zip(fields, items, types, strict=True):
             code = f"*{item.code}" if isinstance(of, Record) else self.converted(item, of)

@@ -145,7 +145,7 @@ class Statements(Calls):
                 self._assign(element, item, node)
         elif isinstance(target, ast.Name):
             self._name_it(target.id, operand, node)
-        elif isinstance(target, ast.Subscript):
+        elif isinstance(target, ast.Subscript | ast.Attribute):
             self._write(target, operand, node)
         else:
             self.fail(node, f"a value for {type(target).__name__}")
@@ -177,7 +177,10 @@ class Statements(Calls):
             self.check_alias(name, value, node)
         self.lines.append(f"{self.variable(name)} = {self._as(value, kind, node)};")
 
-    def _place(self, target: ast.Subscript) -> Value:
+    def _place(self, target: ast.Subscript | ast.Attribute) -> Value:
+        """Return the element, array or field that is written."""
+        if isinstance(target, ast.Attribute):
+            return self._field_place(target)
         array = self.expression(target.value)
         if isinstance(array, Value) and not isinstance(array, View):
             self.fail(target, f"an item of {name_of(array.type)} that is written")
@@ -187,7 +190,19 @@ class Statements(Calls):
         places = list(target.slice.elts) if isinstance(target.slice, ast.Tuple) else [target.slice]
         return self.element(array, places, target)
 
-    def _write(self, target: ast.Subscript, operand: Operand, node: ast.AST) -> None:
+    def _field_place(self, target: ast.Attribute) -> Value:
+        owner = self.expression(target.value)
+        if not isinstance(owner, Value) or not isinstance(owner.type, Record) or not owner.type.mutable:
+            self.fail(target, f"a value for attribute {target.attr} of what is no State")
+        if target.attr not in owner.type.fields:
+            self.fail(target, f"{target.attr}, which {name_of(owner.type)} does not have")
+        self.writes_arguments = True
+        field = self.field(owner, target.attr)
+        if not isinstance(field.type, Scalar | Array):
+            self.fail(target, f"a value for {target.attr}, which is {name_of(field.type)}")
+        return field
+
+    def _write(self, target: ast.Subscript | ast.Attribute, operand: Operand, node: ast.AST) -> None:
         value = operand if self.is_array(operand) else self.value(operand, node)
         mark, n_writes = len(self.lines), self.n_writes
         lvalue = self._place(target)
@@ -215,8 +230,7 @@ class Statements(Calls):
             else:
                 self._name_it(node.target.id, self.arithmetic(node.op, old, other, node), node)
             return
-        if not isinstance(node.target, ast.Subscript):
-            self.fail(node, "an operation on what is no name and no item")
+        assert isinstance(node.target, ast.Subscript | ast.Attribute)
         lvalue = self._place(node.target)
         if isinstance(lvalue, View):
             self.store(lvalue, self.expression(node.value), node, node.op)

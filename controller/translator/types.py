@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from controller.stack_array import Shape
+from controller.state import State
 
 
 @dataclass(frozen=True)
@@ -71,7 +72,7 @@ class Tuple:
 
 @dataclass(frozen=True)
 class Record:
-    """A named tuple; passed by pointer, and never written."""
+    """A named tuple, or a `State` whose fields can be set; passed by pointer."""
 
     python: type
     items: tuple[Type, ...]
@@ -81,6 +82,11 @@ class Record:
         """Names of the items."""
         names: tuple[str, ...] = self.python._fields  # type: ignore[attr-defined]
         return names
+
+    @property
+    def mutable(self) -> bool:
+        """True if its fields can be set."""
+        return issubclass(self.python, State)
 
 
 @dataclass(frozen=True)
@@ -93,15 +99,16 @@ Type = Scalar | Array | Tuple | Record | Nothing
 
 @functools.cache
 def annotated_shapes(owner: Any) -> dict[str, tuple[int | None, ...]]:
-    """Return the shapes that annotations of a function's parameters, or of a named tuple's fields, state."""
+    """Return the shapes that annotations of a function's parameters, or of a record's fields, state."""
     shapes: dict[str, tuple[int | None, ...]] = {}
-    names = getattr(owner, "__globals__", None) or vars(sys.modules[owner.__module__])
-    for name, annotation in owner.__annotations__.items():
-        text = getattr(annotation, "__forward_arg__", annotation)
-        kind = names.get(text) if isinstance(text, str) else annotation
-        for extra in getattr(kind, "__metadata__", ()):
-            if isinstance(extra, Shape):
-                shapes[name] = extra.lengths
+    for part in reversed(owner.__mro__) if isinstance(owner, type) else [owner]:
+        names = getattr(part, "__globals__", None) or vars(sys.modules[part.__module__])
+        for name, annotation in getattr(part, "__annotations__", {}).items():
+            text = getattr(annotation, "__forward_arg__", annotation)
+            kind = names.get(text) if isinstance(text, str) else annotation
+            for extra in getattr(kind, "__metadata__", ()):
+                if isinstance(extra, Shape):
+                    shapes[name] = tuple(n if isinstance(n, int) else None for n in extra.lengths)
     return shapes
 
 

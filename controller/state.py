@@ -1,0 +1,115 @@
+"""Records of numbers and arrays that functions read and set as attributes: what a law remembers between two steps."""
+
+# Each number has an array of its own, without axes. All arrays stay where they are: C is bound to them once, and a
+# value that is set is copied into them.
+
+from __future__ import annotations
+
+import functools
+import math
+from typing import Any, ClassVar, Self, get_args, get_type_hints
+
+import numpy as np
+
+from controller.stack_array import Array, Shape
+
+_NUMBERS: dict[Any, Any] = {float: np.float64, int: np.int64, bool: np.bool_, np.uint64: np.uint64}
+
+
+class State(tuple[Any, ...]):
+    """A record of the fields that a subclass annotates: numbers, arrays, and other records.
+
+    Parameters
+    ----------
+    **given : Any
+        Values of fields, and lengths by the names that `Shape` has. Arrays are kept, not copied. A field that is not
+        given has the default of the class, else 0, in each element.
+
+    Raises
+    ------
+    TypeError
+        If an array is not given whose shape is not known, or a name is neither a field nor a length.
+
+    Examples
+    --------
+    >>> from controller.stack_array import Vector3
+    >>> class Filter(State):
+    ...     gain: float = 0.5
+    ...     mean: Vector3  # m
+    >>> memory = Filter(gain=0.25)
+    >>> memory.mean = memory.mean + memory.gain
+    >>> memory.mean
+    array([0.25, 0.25, 0.25])
+    """
+
+    _fields: ClassVar[tuple[str, ...]] = ()
+    _defaults: ClassVar[dict[str, Any]] = {}
+
+    def __init_subclass__(cls) -> None:
+        names = [name for name in cls.__annotations__ if not name.startswith("_")]
+        cls._defaults = cls._defaults | {name: vars(cls)[name] for name in names if name in vars(cls)}
+        for i, name in enumerate(names, len(cls._fields)):
+            setattr(cls, name, property(functools.partial(_get, i)))
+        cls._fields = (*cls._fields, *names)
+
+    def __new__(cls, *items: Any, **given: Any) -> Self:
+        """Make the record; `items` are those of another one, in order."""
+        lengths = {name: value for name, value in given.items() if name not in cls._fields}
+        for name, value in lengths.items():
+            if not isinstance(value, int):
+                raise TypeError(f"{cls.__name__}: {name} is no field, and no length")
+        if not items:
+            kinds = _kinds(cls).items()
+            items = tuple(_item(kind, given.get(name), cls._defaults.get(name, 0), lengths) for name, kind in kinds)
+        if missing := [name for name, item in zip(cls._fields, items, strict=True) if item is None]:
+            raise TypeError(f"{cls.__name__}: {', '.join(missing)} not given")
+        return super().__new__(cls, items)
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        """Copy a value into the array of a field."""
+        if name not in self._fields:
+            raise AttributeError(f"{type(self).__name__} has no field {name}")
+        self[self._fields.index(name)][...] = value
+
+    def __getnewargs__(self) -> tuple[Any, ...]:
+        """Make a copy from all items."""
+        return tuple(self)
+
+    @classmethod
+    def over(cls, block: Array) -> Self:
+        """Make the record of the parts of an array, one behind the other."""
+        shapes = [shape for _, shape in _kinds(cls).values()]
+        ends = np.cumsum([math.prod(shape) for shape in shapes])
+        return cls(*(part.reshape(shape) for part, shape in zip(np.split(block, ends[:-1]), shapes, strict=True)))
+
+
+def _get(i: int, state: State) -> Any:
+    item = state[i]
+    return item[()] if isinstance(item, np.ndarray) and item.ndim == 0 else item
+
+
+@functools.cache
+def _kinds(state: type[State]) -> dict[str, tuple[Any, Any]]:
+    """Return the type of each field's numbers and its shape, which is None where it is not known."""
+    hints = get_type_hints(state, include_extras=True)
+    return {name: _kind(hints[name]) for name in state._fields}
+
+
+def _kind(hint: Any) -> tuple[Any, Any]:
+    if isinstance(hint, type):
+        return _NUMBERS.get(hint, hint), () if hint in _NUMBERS else None
+    shape = next((extra.lengths for extra in getattr(hint, "__metadata__", ()) if isinstance(extra, Shape)), None)
+    return (get_args(get_args(hint.__origin__)[1])[0], shape) if shape is not None else (None, None)
+
+
+def _item(kind: tuple[Any, Any], given: Any, default: Any, lengths: dict[str, int]) -> Any:
+    """Return the array or record of a field; None if it has to be given."""
+    numbers, shape = kind
+    if isinstance(given, np.ndarray) and shape == ():
+        return given.reshape(())
+    if given is not None:
+        return np.array(given, numbers) if shape == () else given
+    if isinstance(numbers, type) and issubclass(numbers, State):
+        return numbers(**lengths)
+    sizes = [lengths.get(n) if isinstance(n, str) else n for n in shape or ()]
+    return None if shape is None or None in sizes else np.full(sizes, default, numbers)
