@@ -64,7 +64,7 @@ def flight(seed: int, duration: float) -> tuple[Array, Array]:
                 before = master.data.navigation.innovations.copy()
             master.step(k)
             for i, time in enumerate(TIMES):
-                if abs(k * scenario.time.step - time) < 0.5 * scenario.time.step and master.data.navigation.started[0]:
+                if abs(k * scenario.time.step - time) < 0.5 * scenario.time.step and master.data.navigation.started:
                     error = error_of(master, constants)
                     errors[i] = error @ np.linalg.solve(master.data.navigation.covariance, error) / error.size
         return errors, master.data.navigation.innovations - before

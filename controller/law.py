@@ -1,8 +1,8 @@
 """The interface of every law: state, regions and weights in; a body wrench or thruster forces out."""
 
 # A law's mathematics is one compiled function `step(state, goal, regions, weights, gains, memory, forces)`. Its state
-# between steps is its `memory`, a named tuple of arrays, so that the same function serves the readable master, which
-# calls `CompiledLaw.step`, and compiled loops, which call the function itself.
+# between steps is its `memory`, a record of numbers and arrays, so that the same function serves the readable master,
+# which calls `CompiledLaw.step`, and compiled loops, which call the function itself.
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import functools
 import math
 from collections.abc import Callable, Container
 from dataclasses import dataclass
-from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 from controller.compiling.function import BoundCall, CompiledFunction
 from controller.errors import LawError
 from controller.regions.region_set import PackedRegions
-from controller.stack_array import Columns6, Matrix6, Vector3, Vector4, Vector6
+from controller.stack_array import Columns6, Matrix6, Shape, Vector3, Vector4, Vector6
+from controller.state import State
 
 Array = NDArray[np.float64]
+Nothing = Annotated[Array, Shape(0)]
 Output = Literal["wrench", "thrusters"]
 G = TypeVar("G", bound=tuple[float, ...])
 
@@ -118,7 +120,7 @@ class CompiledLaw:
     ----------
     gains : NamedTuple
         Constant numbers of the law.
-    memory : NamedTuple of ndarray
+    memory : State, or NamedTuple of ndarray
         State between steps; it has at least ``estimate`` and ``report``.
     n_regions, n_forces : int
         Number of secondary regions, and of forces.
@@ -274,11 +276,20 @@ class CompiledLaw:
         return CompiledFunction(type(self).function)
 
 
+class LawMemory(State):
+    """What a law remembers at least; fields of its own are those of a subclass."""
+
+    desired_quaternion: Vector4
+    period: float  # s
+    estimate: Vector4  # phi-hat [N, N m]; zeros of a law that estimates nothing
+    report: Nothing
+
+
 class WrenchLaw(CompiledLaw):
     """A law that gives a wrench, and uses no numbers of the vehicle; desired_quaternion (4,), period [s]."""
 
     output: ClassVar[Output] = "wrench"
-    make_memory: ClassVar[Callable[..., Any]]  # takes attitude (4,), period (1,) [s], and number of regions
+    memory_type: ClassVar[type[LawMemory]] = LawMemory
 
     @classmethod
     def for_vehicle(
@@ -287,10 +298,15 @@ class WrenchLaw(CompiledLaw):
         """Return the law, as `CompiledLaw.for_vehicle`; the vehicle is not used."""
         return cls(gains, desired_quaternion, period, n_regions)
 
+    @classmethod
+    def make_memory(cls, desired_quaternion: Array, period: Array, n_regions: int) -> Any:
+        """Return the memory before the first step; `period` [s] has shape (1,)."""
+        return cls.memory_type(n=n_regions, desired_quaternion=desired_quaternion, period=period)
+
     def __init__(self, gains: Any, desired_quaternion: Array, period: float, n_regions: int) -> None:
         self.gains, self.n_regions = self.validate(gains), n_regions
         desired, lasting = validate_quaternion(desired_quaternion), np.array([validate_period(period)])
-        self.memory = type(self).make_memory(desired, lasting, n_regions)
+        self.memory = self.make_memory(desired, lasting, n_regions)
 
 
 def validate_period(period: float) -> float:

@@ -6,69 +6,45 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import numpy as np
 
-from controller.law import Array, VehicleState
+from controller.law import Array, LawMemory, VehicleState
 from controller.linear_algebra import norm
 from controller.paper_law import positive_part
 from controller.quaternion import error
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, evaluate_packed
-from controller.stack_array import Matrix3, Number, Rows3, Shape, Vector3, Vector4, Vector6
+from controller.stack_array import Matrix3, Number, Rows3, Shape, Vector3, Vector6, VectorN
+from controller.state import State
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
+GoalRow = Annotated[Array, Shape(1, 3)]
 Parameters9 = Annotated[Array, Shape(9)]
 
 
-class Field(NamedTuple):
-    """Work arrays for the evaluation of regions, and the results."""
+class Field(State):
+    """Work arrays for the evaluation of n regions, and the results."""
 
     goal_value: Number  # g of the goal
-    goal_gradient: Rows3  # (1, 3) dg/dp, NED
-    goal_turning: Rows3  # (1, 3) dg/dtheta, body frame
+    goal_gradient: GoalRow  # dg/dp, NED
+    goal_turning: GoalRow  # dg/dtheta, body frame
     goal_clearance: Number  # m
-    values: Array  # (n,) g of the other regions
+    values: VectorN  # g of the other regions
     gradients: Rows3  # dg/dp, NED
     rotation_gradients: Rows3  # dg/dtheta, body frame
-    clearances: Array  # (n,) m or rad
+    clearances: VectorN  # m or rad
     error: Vector3  # position error towards the goal, NED
     push: Vector3  # N, NED, sum of the forces of all other regions
 
 
-def empty_field(n_regions: int) -> Field:
-    """Return the arrays for `n_regions` secondary regions."""
-    return Field(
-        goal_value=np.zeros(1),
-        goal_gradient=np.zeros((1, 3)),
-        goal_turning=np.zeros((1, 3)),
-        goal_clearance=np.zeros(1),
-        values=np.zeros(n_regions),
-        gradients=np.zeros((n_regions, 3)),
-        rotation_gradients=np.zeros((n_regions, 3)),
-        clearances=np.zeros(n_regions),
-        error=np.zeros(3),
-        push=np.zeros(3),
-    )
-
-
-class PotentialMemory(NamedTuple):
+class PotentialMemory(LawMemory):
     """State between steps, and work arrays, of a law for comparison."""
 
-    desired_quaternion: Vector4
-    period: Number  # s
-    estimate: Vector4  # phi-hat [N, N m]; zeros of a law that estimates nothing
-    report: Array  # (0,)
     theta: Parameters9  # parameters of a law with other ones than phi
     drive: Vector6  # what drives the adaptation
     field: Field
-
-
-def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> PotentialMemory:
-    """Return the memory before the first step; `period` [s] has shape (1,)."""
-    field = empty_field(n_regions)
-    return PotentialMemory(desired_quaternion, period, np.zeros(4), np.zeros(0), np.zeros(9), np.zeros(6), field)
 
 
 def write_set_point_wrench(
@@ -92,7 +68,7 @@ def write_drive(
 ) -> None:
     """Write nu + [sigma_p R^T e; sigma_a e_att], which drives an adaptation, into `memory.drive`."""
     off = np.concatenate((sigma_p * (R.T @ memory.field.error), sigma_a * e_att))
-    memory.drive[:] = state.velocity_body + off
+    memory.drive = state.velocity_body + off
 
 
 def evaluate_field(

@@ -20,13 +20,21 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.stack_array import Array
+from controller.stack_array import Array, Shape, VectorM
+from controller.state import State
+
+Barriers = Annotated[Array, Shape("r")]
+BarrierRows = Annotated[Array, Shape("r", "m")]
+VectorK = Annotated[Array, Shape("k")]
+Indices = Annotated[NDArray[np.int64], Shape("k")]
+MappedRows = Annotated[Array, Shape("k", "m")]
+Factor = Annotated[Array, Shape("k", "k")]
 
 _TOLERANCE = 1e-11  # violation below which a row counts as kept, as a fraction of the greatest one at the start
 _DEPENDENT = 1e-12  # remainder of a row beside the other rows, as a fraction of G_ii, below which it depends on them
@@ -35,46 +43,30 @@ _HALF = 2.0**27 + 1.0  # splits the 53 bits of a number into two exact halves
 _FREE, _PASSIVE, _ASIDE, _NOTHING = 0, 1, 2, 3  # state of a row: may be added, is passive, is set aside, moves no force
 
 
-class Workspace(NamedTuple):
-    """Arrays for a program of up to r barriers and m thrusters."""
+class Workspace(State):
+    """Arrays for a program of up to r barriers and m thrusters, which has k = r + 2 m rows."""
 
-    # Its rows are the barriers in use, then the lower limits, then the upper ones.
+    # The rows are the barriers in use, then the lower limits, then the upper ones.
 
-    rows: Array  # (r, m) a_i
-    rhs: Array  # (r,) b_i
-    price: Array  # (r,) 1 / rho_i
-    mapped_rows: Array  # (r + 2 m, m) H^-1 a_i
-    size: Array  # (r + 2 m,) sqrt(G_ii)
-    residual: Array  # (r + 2 m,) d
-    multipliers: Array  # (r + 2 m,) y
-    trial: Array  # (r + 2 m,) multipliers that minimize over the passive rows, in their order
-    row_state: NDArray[np.int64]  # (r + 2 m,) state of each row
-    passive: NDArray[np.int64]  # (r + 2 m,) rows whose multiplier is free, in order of addition
-    factor: Array  # (r + 2 m, r + 2 m) Cholesky factor of G over the passive rows
-    nominal: Array  # (m,) u0
-    dual_force: Array  # (m,) A^T y
-    refined: Array  # (m,) u after refinement
+    rows: BarrierRows  # a_i
+    rhs: Barriers  # b_i
+    price: Barriers  # 1 / rho_i
+    mapped_rows: MappedRows  # H^-1 a_i
+    size: VectorK  # sqrt(G_ii)
+    residual: VectorK  # d
+    multipliers: VectorK  # y
+    trial: VectorK  # multipliers that minimize over the passive rows, in their order
+    row_state: Indices  # state of each row
+    passive: Indices  # rows whose multiplier is free, in order of addition
+    factor: Factor  # Cholesky factor of G over the passive rows
+    nominal: VectorM  # u0
+    dual_force: VectorM  # A^T y
+    refined: VectorM  # u after refinement
 
 
 def empty_workspace(barriers: int, thrusters: int) -> Workspace:
     """Return a workspace for programs of a size."""
-    n = barriers + 2 * thrusters
-    return Workspace(
-        rows=np.zeros((barriers, thrusters)),
-        rhs=np.zeros(barriers),
-        price=np.zeros(barriers),
-        mapped_rows=np.zeros((n, thrusters)),
-        size=np.zeros(n),
-        residual=np.zeros(n),
-        multipliers=np.zeros(n),
-        trial=np.zeros(n),
-        row_state=np.zeros(n, dtype=np.int64),
-        passive=np.zeros(n, dtype=np.int64),
-        factor=np.zeros((n, n)),
-        nominal=np.zeros(thrusters),
-        dual_force=np.zeros(thrusters),
-        refined=np.zeros(thrusters),
-    )
+    return Workspace(r=barriers, m=thrusters, k=barriers + 2 * thrusters)
 
 
 def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array, forces: Array) -> int:

@@ -27,10 +27,12 @@ Vector4 = Annotated[Array, Shape(4)]
 Vector6 = Annotated[Array, Shape(6)]
 Matrix3 = Annotated[Array, Shape(3, 3)]
 Matrix6 = Annotated[Array, Shape(6, 6)]
-Number = Annotated[Array, Shape(1)]  # a scalar that is kept
-Rows3 = Annotated[Array, Shape(None, 3)]
-Columns3 = Annotated[Array, Shape(3, None)]
-Columns6 = Annotated[Array, Shape(6, None)]
+Number = Annotated[Array, Shape(1)]  # the number of the only region
+VectorM = Annotated[Array, Shape("m")]  # of m thrusters
+VectorN = Annotated[Array, Shape("n")]  # of n regions
+Rows3 = Annotated[Array, Shape("n", 3)]
+Columns3 = Annotated[Array, Shape(3, "m")]
+Columns6 = Annotated[Array, Shape(6, "m")]
 
 
 class Ordered(np.ndarray):

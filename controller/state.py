@@ -23,7 +23,7 @@ class State(tuple[Any, ...]):
     ----------
     **given : Any
         Values of fields, and lengths by the names that `Shape` has. Arrays are kept, not copied. A field that is not
-        given has the default of the class, else 0, in each element.
+        given has the default of the class, else 0.
 
     Raises
     ------
@@ -32,18 +32,18 @@ class State(tuple[Any, ...]):
 
     Examples
     --------
-    >>> from controller.stack_array import Vector3
     >>> class Filter(State):
     ...     gain: float = 0.5
-    ...     mean: Vector3  # m
+    ...     mean: float  # m
     >>> memory = Filter(gain=0.25)
-    >>> memory.mean = memory.mean + memory.gain
-    >>> memory.mean
-    array([0.25, 0.25, 0.25])
+    >>> memory.mean += memory.gain * (2.0 - memory.mean)
+    >>> float(memory.mean)
+    0.5
     """
 
     _fields: ClassVar[tuple[str, ...]] = ()
     _defaults: ClassVar[dict[str, Any]] = {}
+    block: Array  # of a record that was made by `over`
 
     def __init_subclass__(cls) -> None:
         names = [name for name in cls.__annotations__ if not name.startswith("_")]
@@ -69,18 +69,25 @@ class State(tuple[Any, ...]):
         """Copy a value into the array of a field."""
         if name not in self._fields:
             raise AttributeError(f"{type(self).__name__} has no field {name}")
-        self[self._fields.index(name)][...] = value
+        self.storage(name)[...] = value
 
-    def __getnewargs__(self) -> tuple[Any, ...]:
-        """Make a copy from all items."""
-        return tuple(self)
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Make a copy from its array, or from all items."""
+        return (type(self).over, (self.block,)) if "block" in vars(self) else (type(self), tuple(self))
+
+    def storage(self, name: str) -> Array:
+        """Return the array in which the numbers of a field are."""
+        array: Array = self[self._fields.index(name)]
+        return array
 
     @classmethod
     def over(cls, block: Array) -> Self:
         """Make the record of the parts of an array, one behind the other."""
         shapes = [shape for _, shape in _kinds(cls).values()]
         ends = np.cumsum([math.prod(shape) for shape in shapes])
-        return cls(*(part.reshape(shape) for part, shape in zip(np.split(block, ends[:-1]), shapes, strict=True)))
+        made = cls(*(part.reshape(shape) for part, shape in zip(np.split(block, ends[:-1]), shapes, strict=True)))
+        vars(made)["block"] = block
+        return made
 
 
 def _get(i: int, state: State) -> Any:

@@ -19,7 +19,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.potential_field import PotentialMemory, clip_estimate, make_memory, write_drive, write_set_point_wrench
+from controller.potential_field import PotentialMemory, clip_estimate, write_drive, write_set_point_wrench
 from controller.quaternion import rotation_matrix, skew
 from controller.regions.region_set import PackedRegions
 from controller.stack_array import Matrix3, Shape, Vector6, zeros
@@ -69,7 +69,7 @@ def step(
     forces += Phi @ theta
     # the estimate
     write_drive(state, R, e_att, gains.lambda_p, gains.lambda_a, memory)
-    change = memory.period[0] * (Phi.T @ memory.drive)
+    change = memory.period * (Phi.T @ memory.drive)
     theta[:3] -= change[:3] / gains.k_theta_moment
     theta[3:6] -= change[3:6] / gains.k_theta
     theta[6:] -= change[6:] / gains.k_theta_moment
@@ -83,7 +83,7 @@ class AntonelliLaw(WrenchLaw):
     """Adaptive set-point control with restoring forces and current, with the push of regions."""
 
     function = staticmethod(step)
-    make_memory = staticmethod(make_memory)
+    memory_type = PotentialMemory
     gains_type = AntonelliGains
     above_zero = ("k_p1", "k_theta", "k_theta_moment")
 

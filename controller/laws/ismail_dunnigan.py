@@ -2,27 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
-import numpy as np
-
 from controller import paper_law
-from controller.law import Array, VehicleState, WrenchLaw
+from controller.law import Array, LawMemory, VehicleState, WrenchLaw
 from controller.paper_law import Gains
-from controller.potential_field import Field, empty_field, evaluate_regions
+from controller.potential_field import Field, evaluate_regions
 from controller.regions.region_set import PackedRegions
-from controller.stack_array import Number, Vector4
+from controller.stack_array import VectorN
 
 
-class IsmailDunniganMemory(NamedTuple):
+class IsmailDunniganMemory(LawMemory):
     """State between steps, and work arrays for the regions."""
 
-    desired_quaternion: Vector4
-    period: Number  # s
-    estimate: Vector4  # phi-hat [N, N m]
-    report: Array  # (0,)
     field: Field  # regions; its error and push are not used
-    alphas: Array  # (n,) gains of the regions times their weights
+    alphas: VectorN  # gains of the regions times their weights
 
 
 def step(
@@ -38,7 +30,7 @@ def step(
     field = memory.field
     # regions push by force alone (22): their derivatives by attitude are not used
     evaluate_regions(state, goal, regions, field)
-    memory.alphas[:] = regions.gains * weights
+    memory.alphas = regions.gains * weights
     paper_law.step(
         state.quaternion,
         state.velocity_body,
@@ -49,21 +41,9 @@ def step(
         field.gradients,
         memory.alphas,
         gains,
-        memory.period[0],
+        memory.period,
         memory.estimate,
         forces,
-    )
-
-
-def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> IsmailDunniganMemory:
-    """Return the memory before the first step; `period` [s] has shape (1,)."""
-    return IsmailDunniganMemory(
-        desired_quaternion=desired_quaternion,
-        period=period,
-        estimate=np.zeros(4),
-        report=np.zeros(0),
-        field=empty_field(n_regions),
-        alphas=np.zeros(n_regions),
     )
 
 
@@ -79,7 +59,7 @@ class IsmailDunniganLaw(WrenchLaw):
     """
 
     function = staticmethod(step)
-    make_memory = staticmethod(make_memory)
+    memory_type = IsmailDunniganMemory
     gains_type = Gains
     above_zero = ("k_p1", "k_q", "gamma")
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.potential_field import PotentialMemory, make_memory, write_set_point_wrench
+from controller.potential_field import PotentialMemory, write_set_point_wrench
 from controller.quaternion import rotation_matrix
 from controller.regions.region_set import PackedRegions
 from controller.stack_array import Vector6
@@ -49,7 +49,7 @@ class PdLaw(WrenchLaw):
     """PD control to a set point, with the push of regions."""
 
     function = staticmethod(step)
-    make_memory = staticmethod(make_memory)
+    memory_type = PotentialMemory
     gains_type = PdGains
     above_zero = ("k_p1",)
 

@@ -34,23 +34,31 @@ import numpy as np
 
 from controller import quadratic_program
 from controller.arithmetic import square
-from controller.law import Array, CompiledLaw, Output, VehicleModel, VehicleState, validate_period, validate_quaternion
+from controller.law import (
+    Array,
+    CompiledLaw,
+    LawMemory,
+    Output,
+    VehicleModel,
+    VehicleState,
+    validate_period,
+    validate_quaternion,
+)
 from controller.laws.deployable import model
 from controller.laws.deployable.barrier import (
     RegionObservation,
     add_row,
-    empty_observation,
     gradient_rate,
     observe_regions,
     pose_gradient,
 )
 from controller.laws.deployable.model import Dynamics, Thrusters
-from controller.potential_field import Field, empty_field, evaluate_field, set_point_error
+from controller.potential_field import Field, evaluate_field, set_point_error
 from controller.quadratic_program import Workspace
 from controller.quaternion import error, rotation_matrix
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions
-from controller.stack_array import Columns6, Matrix3, Number, Vector3, Vector4, Vector6, array, zeros
+from controller.stack_array import Columns6, Matrix3, Vector3, Vector6, array, zeros
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _PRICE = 1e-6  # price of slack: squared force that costs as much as the square of slack times mass
@@ -73,19 +81,14 @@ class PidCbfGains(NamedTuple):
     margin: float = 0.05938  # m, or rad, clearance kept from hard regions
 
 
-class PidCbfMemory(NamedTuple):
+class PidCbfMemory(LawMemory):
     """State between steps, and work arrays; of six numbers three are linear in NED, three angular in body axes."""
 
-    desired_quaternion: Vector4
-    period: Number  # s
-    started: Number  # 1 after the first measurement
+    started: float  # 1 after the first measurement
     position: Vector3  # m, NED, estimated
     velocity: Vector6  # m/s, rad/s, over ground, estimated
     disturbance: Vector6  # m/s2, rad/s2: d-hat
-    still: model.Loads  # loads of zero, in still water
     acceleration: Columns6  # acceleration by one newton of each thruster
-    estimate: Vector4  # vertical disturbance [N], which counts as weight, then zeros
-    report: Array  # (0,)
     field: Field
     observation: RegionObservation
     dynamics: Dynamics
@@ -104,25 +107,26 @@ def step(
 ) -> None:
     """Write the forces as `CompiledLaw.step`; all regions push in full, and hard ones are barriers."""
     dynamics, thrusters, field, work = memory.dynamics, memory.thrusters, memory.field, memory.program
-    mass, velocity, R = dynamics.translational_mass[0], memory.velocity, rotation_matrix(state.quaternion)
+    mass, velocity, R = dynamics.translational_mass, memory.velocity, rotation_matrix(state.quaternion)
     _update_thrusters(thrusters, state.thruster_health)
     # observer
     observe(memory, state, R, gains)
     # nominal forces
-    free = model.free_acceleration(dynamics, R, velocity[:3], velocity[3:], memory.still) + memory.disturbance
+    still = model.Loads(zeros(3), 0.0, zeros(3))
+    free = model.free_acceleration(dynamics, R, velocity[:3], velocity[3:], still) + memory.disturbance
     evaluate_field(state._replace(position=memory.position), goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
     e_att = error(memory.desired_quaternion, state.quaternion)[1:]  # (23)
     inertia = array(dynamics.mass[3, 3], dynamics.mass[4, 4], dynamics.mass[5, 5])
     force = -gains.k_p1 * field.error - gains.k_v1 * velocity[:3] + field.push - mass * memory.disturbance[:3]
     moment = -gains.k_p2 * e_att - (gains.k_v2 * velocity[3:] + inertia * memory.disturbance[3:])
-    work.nominal[:] = thrusters.allocator @ np.concatenate((R.T @ force, moment))
+    work.nominal = thrusters.allocator @ np.concatenate((R.T @ force, moment))
     # filter
     observe_regions(memory.observation, regions, memory.position, state.quaternion, velocity)
     model.write_thruster_acceleration(dynamics, thrusters, R, R, memory.acceleration, memory.acceleration)
     rows = _write_rows(memory, regions, free, gains)
     quadratic_program.solve(work, rows, thrusters.inverse, thrusters.lower, thrusters.upper, forces)
-    thrusters.forces[:] = forces
+    thrusters.forces = forces
     memory.estimate[0] = mass * memory.disturbance[2]
 
 
@@ -139,14 +143,15 @@ def _update_thrusters(thrusters: Thrusters, health: Array) -> None:
 
 def observe(memory: PidCbfMemory, state: VehicleState, R: Matrix3, gains: PidCbfGains) -> None:
     """Propagate the observer over the last period, and correct it by the finite measurements."""
-    position, velocity, disturbance, period = memory.position, memory.velocity, memory.disturbance, memory.period[0]
+    position, velocity, disturbance, period = memory.position, memory.velocity, memory.disturbance, memory.period
     measured = np.concatenate((R @ state.velocity_body[:3], state.velocity_body[3:]))
     known = np.all(np.isfinite(state.position)) and np.all(np.isfinite(measured))
-    if memory.started[0] == 0.0:
+    if memory.started == 0.0:
         if known:
-            position[:], velocity[:], memory.started[0] = state.position, measured, 1.0
+            memory.position, memory.velocity, memory.started = state.position, measured, 1.0
         return
-    acceleration = model.free_acceleration(memory.dynamics, R, velocity[:3], velocity[3:], memory.still)
+    still = model.Loads(zeros(3), 0.0, zeros(3))
+    acceleration = model.free_acceleration(memory.dynamics, R, velocity[:3], velocity[3:], still)
     acceleration += model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.forces)
     position += period * velocity[:3]
     velocity += period * (acceleration + disturbance)
@@ -165,7 +170,7 @@ def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Vector6, gai
     lower, upper, price = (
         memory.thrusters.lower,
         memory.thrusters.upper,
-        _PRICE / square(memory.dynamics.translational_mass[0]),
+        _PRICE / square(memory.dynamics.translational_mass),
     )
     for i in range(regions.kinds.size):
         of_attitude = regions.kinds[i] >= _ATTITUDE
@@ -198,18 +203,10 @@ class PidCbfLaw(CompiledLaw):
         self.gains, self.n_regions = self.validate(gains), n_regions
         self.n_forces = m = vehicle.thruster_matrix.shape[1]
         self.memory = PidCbfMemory(
+            n=n_regions,
+            m=m,
             desired_quaternion=validate_quaternion(desired_quaternion),
-            period=np.array([validate_period(period)]),
-            started=np.zeros(1),
-            position=np.zeros(3),
-            velocity=np.zeros(6),
-            disturbance=np.zeros(6),
-            still=model.Loads(np.zeros(3), np.zeros(1), np.zeros(3)),
-            acceleration=np.zeros((6, m)),
-            estimate=np.zeros(4),
-            report=np.zeros(0),
-            field=empty_field(n_regions),
-            observation=empty_observation(n_regions),
+            period=validate_period(period),
             dynamics=model.make_dynamics(vehicle, np.zeros(0)),
             thrusters=model.make_thrusters(vehicle),
             program=quadratic_program.empty_workspace(n_regions, m),

@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from controller.law import Array, VehicleState, WrenchLaw
-from controller.potential_field import PotentialMemory, clip_estimate, make_memory, write_drive, write_set_point_wrench
+from controller.potential_field import PotentialMemory, clip_estimate, write_drive, write_set_point_wrench
 from controller.quaternion import rotation_matrix
 from controller.regions.region_set import PackedRegions
 from controller.restoring import regressor
@@ -55,7 +55,7 @@ def step(
     forces += Z @ estimate
     # the estimate
     write_drive(state, R, e_att, gains.sigma_p, gains.sigma_a, memory)
-    estimate -= memory.period[0] / gains.gamma * (Z.T @ memory.drive)
+    estimate -= memory.period / gains.gamma * (Z.T @ memory.drive)
     clip_estimate(estimate[:1], gains.bound)
     clip_estimate(estimate[1:4], gains.bound_moment)
 
@@ -64,7 +64,7 @@ class SunCheahLaw(WrenchLaw):
     """Adaptive set-point control through the transposed Jacobian, with the push of regions."""
 
     function = staticmethod(step)
-    make_memory = staticmethod(make_memory)
+    memory_type = PotentialMemory
     gains_type = SunCheahGains
     above_zero = ("k_p1", "gamma")
 

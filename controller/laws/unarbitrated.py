@@ -11,7 +11,7 @@ from typing import NamedTuple
 from controller import paper_law
 from controller.law import Array, VehicleState, WrenchLaw
 from controller.paper_law import Gains, primary_error
-from controller.potential_field import PotentialMemory, clip_estimate, evaluate_field, make_memory, shorten
+from controller.potential_field import PotentialMemory, clip_estimate, evaluate_field, shorten
 from controller.quaternion import error, rotation_matrix
 from controller.regions.region_set import PackedRegions
 
@@ -48,13 +48,11 @@ def step(
     k_q = 1.0  # cancels
     g = Gains(gains.k_p1, gains.k_p2, k_q, gains.k_v1, gains.k_v2, gains.sigma_p, gains.sigma_a, gains.gamma)
     evaluate_field(state, goal, regions, gains.repulsion, gains.reach, field)
-    field.error[:] = primary_error(field.goal_value[0] + gains.margin, field.goal_gradient[0])  # (20)
+    field.error = primary_error(field.goal_value[0] + gains.margin, field.goal_gradient[0])  # (20)
     shorten(field.error, gains.limit / gains.k_p1)
     e_s = -field.push / k_q  # (21), (22)
     e_att, R = error(memory.desired_quaternion, state.quaternion)[1:], rotation_matrix(state.quaternion)  # (23), (3)
-    paper_law.apply(
-        field.error, e_s, e_att, R, state.velocity_body, g, memory.period[0], estimate, forces
-    )  # (25), (27)
+    paper_law.apply(field.error, e_s, e_att, R, state.velocity_body, g, memory.period, estimate, forces)  # (25), (27)
     clip_estimate(estimate[:1], gains.bound)
     clip_estimate(estimate[1:4], gains.bound_moment)
 
@@ -63,7 +61,7 @@ class UnarbitratedLaw(WrenchLaw):
     """The paper's law with all weights on, within bounds."""
 
     function = staticmethod(step)
-    make_memory = staticmethod(make_memory)
+    memory_type = PotentialMemory
     gains_type = UnarbitratedGains
     above_zero = ("k_p1", "gamma")
 

@@ -74,8 +74,8 @@ class Calls(Subscripts):
     def _replaced(self, function: ast.Attribute, node: ast.Call) -> Value:
         """Return a named tuple with other values of some fields."""
         record = self.value(self.expression(function.value), node)
-        named_tuple = isinstance(record.type, Record) and not record.type.mutable
-        if not named_tuple or not {k.arg for k in node.keywords} <= {*record.type.fields}:
+        fields = set(record.type.fields) if isinstance(record.type, Record) and not record.type.mutable else set()
+        if not isinstance(record.type, Record) or not {k.arg for k in node.keywords} <= fields:
             self.fail(node, "_replace of what is no named tuple, or of a field that it does not have")
         changes = dict(
             zip((k.arg for k in node.keywords), self.in_order([k.value for k in node.keywords]), strict=True)

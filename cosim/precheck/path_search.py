@@ -64,7 +64,7 @@ def find_path(
         periods[0] = left
         search()
         left, used = left - int(periods[1]), used + int(periods[1])
-        points = np.array([position, *plan.path[: plan.counts[0]]])
+        points = np.array([position, *plan.path[: plan.points]])
         clearance = float(common_depth(_samples(points), at_rest).min()) if at_rest else math.inf
         if clearance >= 0.0:
             corners = tuple((float(x), float(y), float(z)) for x, y, z in points)

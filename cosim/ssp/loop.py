@@ -6,7 +6,6 @@ import numpy as np
 
 from controller import CompiledLaw, LawError
 from controller.navigation.measurements import N_SENSORS, N_VALUES, empty_measurements
-from controller.quaternion import from_axis_angle
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.make_step import exchanged_variables, make_data, make_model
@@ -14,8 +13,6 @@ from cosim.simulation.signals import Array, Column, Signals
 from cosim.ssp.controller_step import ControllerInputs, ControllerOutputs
 from cosim.ssp.memory import Memory, arrays_of
 from cosim.step.step_model import Integers, StepData, StepModel
-
-_AXIS = np.array([0.48, 0.6, 0.64])  # rotation axis of an attitude that no law has initially
 
 
 class Loop:
@@ -41,9 +38,8 @@ class Loop:
             thrusts=np.zeros(m), lost=np.zeros(m), outages=np.zeros(N_SENSORS), values=np.zeros(n),
             clearances=np.zeros(n), failures=np.zeros(1, np.int64), changes=np.zeros(1, np.int64),
         )  # fmt: skip
-        self.desired_quaternion = _find_attitude(self.law, law_of(scenario))
-        # (1,) s, that of the law if its memory has one
-        self.period: Array = getattr(self.law.memory, "period", np.array([scenario.time.control]))
+        self.desired_quaternion = _attitude_of(self.law)
+        self.period = _period_of(self.law, scenario.time.control)
         self.ramp = np.array([scenario.arbiter.ramp])
         self.memory = Memory()
         self.constants = self._allocate_arrays()
@@ -99,11 +95,16 @@ class Loop:
         return {self.memory.keep(counter): maximum for counter, maximum in counters}
 
 
-def _find_attitude(law: CompiledLaw, other: CompiledLaw) -> Array:
-    """Return the array in a law's memory that `set_attitude` writes, found with another law of the scenario."""
-    before = [array.copy() for array in arrays_of(other.memory)]
-    other.set_attitude(from_axis_angle(_AXIS, 2.0))
-    for old, new, own in zip(before, arrays_of(other.memory), arrays_of(law.memory), strict=True):
-        if not np.array_equal(old, new, equal_nan=old.dtype == float):
-            return own
-    raise LawError(f"law {law.name} keeps no attitude that could be another, expected one that `set_attitude` sets")
+def _period_of(law: CompiledLaw, period: float) -> Array:
+    """Return the array of the period [s] in a law's memory, or an own one if it has none."""
+    fields = law.memory._fields
+    array: Array = law.memory[fields.index("period")] if "period" in fields else np.array([period])
+    return array
+
+
+def _attitude_of(law: CompiledLaw) -> Array:
+    """Return the array in a law's memory that `set_attitude` writes."""
+    attitude = law.desired_quaternion
+    if not any(array is attitude for array in arrays_of(law.memory)):
+        raise LawError(f"law {law.name}: desired_quaternion is not in its memory, expected an array that C can read")
+    return attitude

@@ -11,11 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from controller.law import Array, VehicleState, WrenchLaw
-from controller.potential_field import Field, empty_field, evaluate_field, set_point_error
+from controller.law import Array, LawMemory, VehicleState, WrenchLaw
+from controller.potential_field import Field, evaluate_field, set_point_error
 from controller.quaternion import error, rotation_matrix
 from controller.regions.region_set import PackedRegions
-from controller.stack_array import Vector4
 
 
 class SlidingModeGains(NamedTuple):
@@ -32,12 +31,9 @@ class SlidingModeGains(NamedTuple):
     reach: float = 1.0  # m, clearance below which regions repel
 
 
-class SlidingModeMemory(NamedTuple):
-    """Desired attitude and work arrays; nothing else is kept between steps."""
+class SlidingModeMemory(LawMemory):
+    """Work arrays; nothing else is kept between steps."""
 
-    desired_quaternion: Vector4
-    estimate: Vector4  # zeros: the law estimates nothing
-    report: Array  # (0,)
     field: Field
 
 
@@ -60,16 +56,11 @@ def step(
     forces[:3], forces[3:] = -gains.force * s[:3], -gains.moment * s[3:]
 
 
-def make_memory(desired_quaternion: Array, period: Array, n_regions: int) -> SlidingModeMemory:
-    """Return the memory before the first step; `period` [s] has shape (1,)."""
-    return SlidingModeMemory(desired_quaternion, np.zeros(4), np.zeros(0), empty_field(n_regions))
-
-
 class SlidingModeLaw(WrenchLaw):
     """Sliding-mode law."""
 
     function = staticmethod(step)
-    make_memory = staticmethod(make_memory)
+    memory_type = SlidingModeMemory
     gains_type = SlidingModeGains
     above_zero = ("slope", "layer")
 

@@ -45,7 +45,7 @@ def test_step_is_its_equations(ball):
     law, rng, forces = law_of((ball,)), np.random.default_rng(3), np.zeros(8)
     memory, gains = law.memory, law.gains
     turned = np.array([0.9, 0.2, -0.3, 0.1]) / np.linalg.norm([0.9, 0.2, -0.3, 0.1])
-    memory.started[0], memory.position[:], memory.velocity[:] = 1.0, (3.1, 0.0, 2.4), rng.normal(size=6) * 0.2
+    memory.started, memory.position[:], memory.velocity[:] = 1.0, (3.1, 0.0, 2.4), rng.normal(size=6) * 0.2
     memory.velocity[:3] += np.array(ball.shape.center) - memory.position
     memory.disturbance[:], memory.thrusters.forces[:] = rng.normal(size=6) * 0.05, rng.normal(size=8) * 5.0
     R = rotation_matrix(turned)
@@ -57,7 +57,8 @@ def test_step_is_its_equations(ball):
     # observer
     turning = np.kron(np.diag([1, 0]), R) + np.kron(np.diag([0, 1]), np.eye(3))
     pushes = turning @ memory.dynamics.inverse_mass @ memory.thrusters.matrix
-    free = model.free_acceleration(memory.dynamics, R, before.velocity[:3], before.velocity[3:], memory.still)
+    still = model.Loads(np.zeros(3), 0.0, np.zeros(3))
+    free = model.free_acceleration(memory.dynamics, R, before.velocity[:3], before.velocity[3:], still)
     z, change = 1.0 / (1.0 + gains.observer * PERIOD), free + pushes @ before.thrusters.forces + before.disturbance
     predicted = before.velocity + PERIOD * change
     off = turning @ measured - predicted
@@ -66,7 +67,7 @@ def test_step_is_its_equations(ball):
     )
     assert v == pytest.approx(predicted + (1.0 - z**2) * off, rel=1e-9)
     assert d == pytest.approx(before.disturbance + (1.0 - z) ** 2 / PERIOD * off, rel=1e-9)
-    free = model.free_acceleration(memory.dynamics, R, v[:3], v[3:], memory.still)
+    free = model.free_acceleration(memory.dynamics, R, v[:3], v[3:], still)
     # nominal forces
     error, away = p - GOAL.shape.center, p - ball.shape.center
     error *= min(1.0, gains.limit / gains.k_p1 / np.linalg.norm(error))
@@ -152,8 +153,8 @@ def test_observer_ignores_a_measurement_with_a_number_that_is_not_finite(at):
     numbers[at] = math.nan
     memory = law.memory
     pid_cbf.observe(memory, VehicleState(numbers[:3], LEVEL, numbers[3:], np.ones(8)), np.eye(3), law.gains)
-    assert memory.started[0] == 0.0
-    memory.started[0], memory.velocity[0] = 1.0, 0.5
+    assert memory.started == 0.0
+    memory.started, memory.velocity[0] = 1.0, 0.5
     pid_cbf.observe(memory, VehicleState(numbers[:3], LEVEL, numbers[3:], np.ones(8)), np.eye(3), law.gains)
     assert memory.position.tolist() == [0.5 * PERIOD, 0.0, 0.0] and not memory.disturbance.any()
 

@@ -12,8 +12,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from controller.arithmetic import exponential
@@ -23,6 +21,7 @@ from controller.laws.deployable.model import Thrusters
 from controller.laws.deployable.thrust_limit import limited_force
 from controller.linear_algebra import norm
 from controller.stack_array import Array, Vector3, Vector4, Vector6
+from controller.state import State
 
 _GREATEST_TURN = 0.5  # rad, greatest turn of the predicted attitude
 
@@ -81,17 +80,12 @@ def _of_lag(lag: float, period: float) -> tuple[float, float]:
     return remains, lag / period * (1.0 - remains)
 
 
-class PredictedState(NamedTuple):
+class PredictedState(State):
     """The predicted state, ahead by the lag."""
 
     position: Vector3  # m, NED
     velocity: Vector6  # m/s over ground, NED, and rad/s, body axes
     quaternion: Vector4  # from body to world
-
-
-def empty_prediction() -> PredictedState:
-    """Return the state before the first step."""
-    return PredictedState(np.zeros(3), np.zeros(6), np.array([1.0, 0.0, 0.0, 0.0]))
 
 
 def predict_state(
@@ -104,8 +98,8 @@ def predict_state(
     lag: float,
 ) -> None:
     """Predict the state ahead; position, velocity [m], omega [rad/s], acceleration [m/s2], lag [s]."""
-    predicted.position[:] = position + lag * velocity
-    predicted.velocity[:] = np.concatenate((velocity, omega)) + lag * acceleration
+    predicted.position = position + lag * velocity
+    predicted.velocity = np.concatenate((velocity, omega)) + lag * acceleration
     angle = lag * norm(omega)
     limited_lag = lag if angle < _GREATEST_TURN else lag * _GREATEST_TURN / angle
-    predicted.quaternion[:] = integrate_attitude(quaternion, omega, limited_lag)
+    predicted.quaternion = integrate_attitude(quaternion, omega, limited_lag)

@@ -9,7 +9,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated
 
 import numpy as np
 
@@ -21,7 +21,10 @@ from controller.linear_algebra import cross, norm
 from controller.quaternion import down_in_body, error, rate
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, attitude_clearance
-from controller.stack_array import Array, Matrix3, Number, Vector3, Vector4, Vector6, array, zeros
+from controller.stack_array import Array, Matrix3, Shape, Vector3, Vector4, Vector6, array, zeros
+from controller.state import State
+
+Moments2 = Annotated[Array, Shape(3, 2)]
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _RETURN = 0.2  # 1/s, rate of return to the preferred attitude
@@ -29,29 +32,29 @@ _CURRENT_STEP = 0.01  # m/s, step of the current in a difference quotient
 _TURN = 4.0  # 1/s, turning rate per radian by which the clearance of a region of attitude is below `comfort`
 
 
-class Attitude(NamedTuple):
+class Attitude(State):
     """State of the attitude loop."""
 
     preferred: Vector4  # from body to world: attitude where no region requires another
     desired: Vector4  # from body to world: setpoint of the loop
     last_omega: Vector3  # rad/s, body rates of the last step
-    by_current: Array  # (3, 2) N s, derivative of the modeled moment by the current, north and east
+    by_current: Moments2  # N s, derivative of the modeled moment by the current, north and east
     measured_moment: Vector3  # N m, body axes: moment of thrusters and weight over the last period
-    started: Number  # 1 if `last_omega` was measured in the last step, else 0
+    started: float  # 1 if `last_omega` was measured in the last step, else 0
 
 
 def empty_attitude(preferred: Array) -> Attitude:
     """Return the state before the first step, for a preferred attitude, shape (4,)."""
-    return Attitude(preferred.copy(), preferred.copy(), np.zeros(3), np.zeros((3, 2)), np.zeros(3), np.zeros(1))
+    return Attitude(preferred=preferred.copy(), desired=preferred.copy())
 
 
 def measure_moment(
     attitude: Attitude, dynamics: Dynamics, R: Matrix3, omega: Vector3, estimate: Estimate, period: float
 ) -> bool:
     """Measure the moment of thrusters and weight by the change of the rates over the period [s]; omega [rad/s]."""
-    started = bool(attitude.started[0] > 0.0)
+    started = bool(attitude.started > 0.0)
     mean, none = 0.5 * (attitude.last_omega + omega), zeros(3)
-    loads = Loads(estimate.water_velocity, zeros(1), none)  # weight and buoyancy are the unknowns
+    loads = Loads(estimate.water_velocity, 0.0, none)  # weight and buoyancy are the unknowns
     wrench = free_wrench(dynamics, R, estimate.velocity, mean, loads)
     for axis in range(2):  # Munk's moment depends on the current
         water = estimate.water_velocity.copy()
@@ -62,9 +65,9 @@ def measure_moment(
     nu_r = R.T @ (estimate.velocity - estimate.water_velocity)
     linear_rate = R.T @ estimate.acceleration - cross(mean, nu_r)
     rate = np.concatenate((linear_rate, (omega - attitude.last_omega) / period))
-    attitude.measured_moment[:] = dynamics.mass[3:] @ rate - wrench[3:]
-    attitude.last_omega[:] = omega
-    attitude.started[0] = 1.0
+    attitude.measured_moment = dynamics.mass[3:] @ rate - wrench[3:]
+    attitude.last_omega = omega
+    attitude.started = 1.0
     return started
 
 
@@ -92,13 +95,13 @@ def update_desired(
     size = norm(omega)
     if size > gains.turning_rate:
         omega *= gains.turning_rate / size
-    attitude.desired[:] = integrate_attitude(attitude.desired, omega, period)
+    attitude.desired = integrate_attitude(attitude.desired, omega, period)
     # within the allowed tilt: only the turn about the vertical remains
     upright = down_in_body(attitude.desired)[2]
     if upright < cosine(gains.tilt) and upright < down_in_body(attitude.preferred)[2]:
-        attitude.desired[:] = integrate_attitude(attitude.desired, -omega, period)
+        attitude.desired = integrate_attitude(attitude.desired, -omega, period)
         k = down_in_body(attitude.desired)
-        attitude.desired[:] = integrate_attitude(attitude.desired, (k @ omega) * k, period)
+        attitude.desired = integrate_attitude(attitude.desired, (k @ omega) * k, period)
 
 
 def integrate_attitude(quaternion: Vector4, omega: Vector3, period: float) -> Vector4:

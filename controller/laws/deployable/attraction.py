@@ -25,8 +25,8 @@ def approach_speed(distance: float, deceleration: float, slope: float) -> float:
 
 def desired_velocity(plan: PathPlan, position: Vector3, goal_velocity: Vector3, gains: DeployableGains) -> Vector3:
     """Return the velocity [m/s], NED, that follows the path from a position [m, NED]."""
-    waits, path = plan.waits[0], plan.path
-    count = 1 if waits else plan.counts[0]
+    waits, path = plan.waits, plan.path
+    count = 1 if waits else plan.points
     speed, traveled, to_go = gains.speed, 0.0, _LOOKAHEAD
     heading, before = zeros(3), zeros(3)
     for leg in range(count):

@@ -31,7 +31,8 @@ from controller.linear_algebra import norm
 from controller.quadratic_program import Workspace
 from controller.regions.kinds import FIRST_OF_ATTITUDE, FLAT
 from controller.regions.region_set import PackedRegions, evaluate_packed, position_clearance
-from controller.stack_array import Array, Columns6, Number, Rows3, Vector3, Vector4, Vector6, zeros
+from controller.stack_array import Array, Columns6, Rows3, Vector3, Vector4, Vector6, VectorN, zeros
+from controller.state import State
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _IMPULSE = 0.5  # s, assumed duration of the desired acceleration in the search for faces ahead
@@ -44,20 +45,22 @@ KEPT = 0.01  # m/s2, slack up to which a barrier counts as kept
 _BOUND_LEAP = 0.05  # m, fall of the bound in a step that counts as a jump: more than the vehicle's motion can cause
 
 
-class RegionObservation(NamedTuple):
+class RegionObservation(State):
     """Regions evaluated at the estimated pose, now and `_FD_STEP` later."""
 
-    values: Array  # (n,) g, above 0 where a region is violated
+    values: VectorN  # g, above 0 where a region is violated
     gradients: Rows3  # derivative of g by the position, NED
     rotation_gradients: Rows3  # derivative of g by a rotation about the body axes
-    clearances: Array  # (n,) m, or rad for regions of attitude
+    clearances: VectorN  # m, or rad for regions of attitude
     later_shifts: Rows3  # m, NED: shifts of the regions `_FD_STEP` later
-    later_values: Array  # (n,) the same quantities `_FD_STEP` later
+    later_values: VectorN  # the same quantities `_FD_STEP` later
     later_gradients: Rows3
     later_rotation_gradients: Rows3
-    later_clearances: Array  # (n,)
-    bound: Number  # m: lower bound of the clearances by `write_rows`, if no barrier yields
-    previous_rhs: Array  # (n,) m/s2, rad/s2: last right side of the barrier of each region's nearest face
+    later_clearances: VectorN
+    previous_rhs: VectorN  # m/s2, rad/s2: last right side of the barrier of each region's nearest face
+    bound: float  # m: lower bound of the clearances in this step, by `write_rows`, if no barrier yields
+    last_bound: float = np.nan  # m, `bound` of the last step; NaN without one
+    guaranteed_bound: float = np.nan  # m, of the clearances from now on; NaN without one
 
 
 class Motion(NamedTuple):
@@ -73,14 +76,6 @@ class Motion(NamedTuple):
     position_spread: float  # m, uncertainty of the position between two steps
     position_variance: Vector3  # m2, NED: variance of the estimated position
     attitude_deviation: float  # rad, standard deviation of the estimated attitude
-
-
-def empty_observation(n: int) -> RegionObservation:
-    """Return an observation of `n` regions, all zero."""
-    return RegionObservation(
-        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros((n, 3)),
-        np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3)), np.zeros(n), np.zeros(1), np.zeros(n),
-    )  # fmt: skip
 
 
 def predict_shifts(regions: PackedRegions, time: float, out: Rows3) -> None:
@@ -206,7 +201,7 @@ def write_rows(
                 observation.previous_rhs[i] = rhs
 
             rows = add_row(work, rows, n, motion.thruster_acceleration, rhs, price, lower, upper)
-    observation.bound[0] = bound
+    observation.bound = bound
     return rows
 
 
@@ -241,10 +236,11 @@ def vehicle_bound(regions: PackedRegions, position: Vector3, motion: Motion, gai
     return bound
 
 
-def update_clearance_bound(guaranteed: Array, bound: float, slack: float) -> None:
-    """Raise the guaranteed lower bound of the clearances, shape (2,) [m], to a higher bound of this step."""
+def update_guarantee(observation: RegionObservation, slack: float) -> None:
+    """Raise the guaranteed lower bound of the clearances to a higher bound of this step."""
     # A falling bound does not lower the guarantee, which would else follow any violation. The guarantee is reset if a
     # barrier yields by more than `KEPT`, or if the bound jumps, since then regions or estimate jumped.
-    if slack > KEPT or not bound >= guaranteed[1] - _BOUND_LEAP:
-        guaranteed[0] = bound
-    guaranteed[0], guaranteed[1] = max(guaranteed[0], bound), bound
+    o = observation
+    if slack > KEPT or not o.bound >= o.last_bound - _BOUND_LEAP:
+        o.guaranteed_bound = o.bound
+    o.guaranteed_bound, o.last_bound = max(o.guaranteed_bound, o.bound), o.bound

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import numpy as np
 
 from controller.law import Diagnostic
 from controller.laws.deployable.estimate import EFFECTIVENESS, Estimate
 from controller.linear_algebra import norm
-from controller.stack_array import Array, Vector3
+from controller.stack_array import Array, Shape, Vector3
+from controller.state import State
+
+Vector2 = Annotated[Array, Shape(2)]
 
 NO_BOUND = np.nan  # m, reported bound without an estimate, or without barriers
 
@@ -32,35 +37,48 @@ DIAGNOSTICS = (
     Diagnostic("rejected", "", "Fraction of the position and velocity samples so far that the gate rejected"),
     Diagnostic("thrust_limit", "", "Least estimated limit of a thruster, as a fraction of that in the vehicle's file"),
 )
-BOUND, REJECTED, THRUST_LIMIT = 16, 17, 18  # indices in `DIAGNOSTICS`
 
 
-def write_report(report: Array, estimate: Estimate, cost: float, points: int, health: Array, desired: Vector3) -> None:
-    """Write the `DIAGNOSTICS` of estimate, path and thrusters; `report` has the thruster that was isolated last."""
-    report[:3] = estimate.position
-    report[3:6] = estimate.velocity
-    report[6:8] = estimate.water_velocity[:2]
-    report[8] = norm(desired)
-    report[9] = cost
-    report[10] = points - 1
-    last = int(report[14])
+class Report(State):
+    """The numbers of `DIAGNOSTICS`, in their order."""
+
+    position: Vector3
+    velocity: Vector3
+    current: Vector2
+    desired_speed: float
+    path_cost: float
+    path_corners: float
+    barriers: float
+    constraint_slack: float
+    qp_steps: float
+    failed_thruster: float
+    time_since_measurement: float
+    bound: float
+    rejected: float
+    thrust_limit: float
+
+
+def write_report(report: Report, estimate: Estimate, cost: float, points: int, health: Array, desired: Vector3) -> None:
+    """Write what there is about estimate, path and thrusters; `report` has the thruster that was isolated last."""
+    report.position, report.velocity, report.current = estimate.position, estimate.velocity, estimate.water_velocity[:2]
+    report.desired_speed, report.path_cost, report.path_corners = norm(desired), cost, points - 1
+    last = int(report.failed_thruster)
     if last == 0 or health[last - 1] > 0.0:
-        report[14] = 0.0
+        report.failed_thruster = 0.0
         for j in range(health.size):
             if health[j] == 0.0:
-                report[14] = j + 1
-    report[15] = estimate.time_since_measurement[0]
-    report[THRUST_LIMIT] = np.inf
+                report.failed_thruster = j + 1
+    report.time_since_measurement = estimate.time_since_measurement
+    report.thrust_limit = np.inf
     for j in range(health.size):
         if health[j] > 0.0:
-            report[THRUST_LIMIT] = min(report[THRUST_LIMIT], estimate.state[EFFECTIVENESS + health.size + j])
+            report.thrust_limit = min(report.thrust_limit, estimate.state[EFFECTIVENESS + health.size + j])
 
 
-def write_program_report(report: Array, multipliers: Array, price: Array, rows: int, steps: int) -> None:
-    """Write the `DIAGNOSTICS` of barriers and quadratic program."""
-    active, yielding = 0, 0.0
+def write_program_report(report: Report, multipliers: Array, price: Array, rows: int, steps: int) -> None:
+    """Write what there is about barriers and quadratic program."""
+    report.barriers, report.constraint_slack, report.qp_steps = 0.0, 0.0, steps
     for i in range(rows):
         if multipliers[i] > 0.0:
-            active += 1
-            yielding = max(yielding, multipliers[i] * price[i])
-    report[11], report[12], report[13] = active, yielding, steps
+            report.barriers += 1.0
+            report.constraint_slack = max(report.constraint_slack, multipliers[i] * price[i])

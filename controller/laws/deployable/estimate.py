@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated
 
 import numpy as np
 
 from controller.arithmetic import square
 from controller.law import VehicleModel
 from controller.laws.deployable.gains import DeployableGains
-from controller.stack_array import Array, Columns3, Number, Vector3, Vector6, zeros
+from controller.laws.deployable.model import Rows2
+from controller.stack_array import Array, Columns3, Shape, Vector3, Vector6, VectorM, zeros
+from controller.state import State
+
+Pair = Annotated[Array, Shape(2)]
+Innovations = Annotated[Array, Shape(9)]
+# of k = 14 + 2 m states and h = 2 m hypotheses
+Unknowns = Annotated[Array, Shape("k")]
+Covariance = Annotated[Array, Shape("k", "k")]
+Sensitivity = Annotated[Array, Shape(3, "k")]
+Deviations = Annotated[Array, Shape("h", "k")]
+Hypotheses = Annotated[Array, Shape("h")]
+Evidence = Annotated[Array, Shape(2, "h")]
 
 # index of the first state of each kind
 POSITION, VELOCITY, CURRENT, NET_WEIGHT, MOMENTS, HEIGHT, LAG, EFFECTIVENESS = 0, 3, 6, 8, 9, 12, 13, 14
@@ -28,47 +40,47 @@ _GREATEST_EFFECTIVENESS = 1.1  # upper bound of an estimated effectiveness, and 
 _LEAST_CEILING = 0.3  # lower bound of an estimated ceiling
 
 
-class Estimate(NamedTuple):
+class Estimate(State):
     """State and covariance of the filter, and the parts that other modules read."""
 
-    first_state: Array  # (14 + 2 m,) state before the first measurement
-    first_covariance: Array  # (14 + 2 m, 14 + 2 m) covariance before the first measurement
-    state: Array  # (14 + 2 m,) in the order of `observer`; SI, NED, moments in body axes
-    covariance: Array  # (14 + 2 m, 14 + 2 m) covariance of the state
+    first_state: Unknowns  # state before the first measurement
+    first_covariance: Covariance  # covariance before the first measurement
+    state: Unknowns  # in the order of `observer`; SI, NED, moments in body axes
+    covariance: Covariance  # covariance of the state
     position: Vector3  # m, NED
     velocity: Vector3  # m/s over ground, NED
     water_velocity: Vector3  # m/s, NED; its down component is 0
-    net_weight: Number  # N, W - B
+    net_weight: float  # N, W - B
     moments: Vector3  # phi_2..phi_4 [N m], body axes
     acceleration: Vector3  # m/s2 over ground, NED, predicted for the last period
-    time_since_measurement: Number  # s since the last valid measurement; negative before the first
-    time_since_valid: Array  # (2,) s since the last valid position, and velocity
-    repeated: Array  # (2,) 1 if the last position, or velocity, equals the one before bit for bit
-    slow: Array  # (2,) 1 if position, or velocity, repeats while the vehicle moves: its sensor is slower than the steps
-    longest_gap: Number  # s, longest recent time without a measurement
-    weight: Number  # weight of positions and velocities as evidence of failures: below 1 for lasting errors
+    time_since_measurement: float = -1.0  # s since the last valid measurement; negative before the first
+    time_since_valid: Pair  # s since the last valid position, and velocity
+    repeated: Pair  # 1 if the last position, or velocity, equals the one before bit for bit
+    slow: Pair  # 1 if position, or velocity, repeats while the vehicle moves: its sensor is slower than the steps
+    longest_gap: float  # s, longest recent time without a measurement
+    weight: float = 1.0  # weight of positions and velocities as evidence of failures: below 1 for lasting errors
     last_measured: Vector6  # last measured position [m, NED] and velocity [m/s, body axes]
-    mass_scale: Number  # mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
+    mass_scale: float  # mass over 50 kg, at least 1: a heavier vehicle's W - B is less well known
     lags: Vector3  # s: estimated lag less a standard deviation, at least 0; the lag itself; the lag plus one
-    bracket: Array  # (2, m) N, forces at the end of the period, for the minimum and the maximum of `lags`
-    by_lag: Array  # (m,) N/s, secant of the acting forces between the minimum and the maximum of `lags`
-    curvature: Array  # (m,) N, difference of the acting forces from that secant
-    # (3, m) N, by the ceiling: derivative of the acting forces; of those at the end of the period; (-) the ceilings
+    bracket: Rows2  # N, forces at the end of the period, for the minimum and the maximum of `lags`
+    by_lag: VectorM  # N/s, secant of the acting forces between the minimum and the maximum of `lags`
+    curvature: VectorM  # N, difference of the acting forces from that secant
+    # N, by the ceiling: derivative of the acting forces; of those at the end of the period; (-) the ceilings
     # of these forces
-    by_ceiling: Array
-    transition: Columns3  # (3, 14 + 2 m) derivative of the next velocity by the state
-    product: Columns3  # (3, 14 + 2 m) transition times covariance
-    row: Array  # (14 + 2 m,) derivative of a measured number by the state
-    gain: Array  # (14 + 2 m,) Kalman gain of a measured number
-    deviation: Array  # (2 m, 14 + 2 m) true state less estimate by each hypothesis: j, thruster j is lost; m + j, stuck
-    supposed: Array  # (2, m) hypothesis of a stuck thruster: its effectiveness; its force [N] at effectiveness 1
-    missing: Array  # (m,) N, difference of a stuck thruster's force from the expected one
-    direct: Array  # (2 m,) direct effect of the missing force on the last measured number
-    # (2, 2 m) of the last measurements, divided by variances: innovations times those that each hypothesis expects;
+    by_ceiling: Columns3
+    transition: Sensitivity  # derivative of the next velocity by the state
+    product: Sensitivity  # transition times covariance
+    row: Unknowns  # derivative of a measured number by the state
+    gain: Unknowns  # Kalman gain of a measured number
+    deviation: Deviations  # true state less estimate by each hypothesis: j, thruster j is lost; m + j, stuck
+    supposed: Rows2  # hypothesis of a stuck thruster: its effectiveness; its force [N] at effectiveness 1
+    missing: VectorM  # N, difference of a stuck thruster's force from the expected one
+    direct: Hypotheses  # direct effect of the missing force on the last measured number
+    # of the last measurements, divided by variances: innovations times those that each hypothesis expects;
     # the expected ones squared
-    evidence: Array
-    bias: Array  # (9,) low-passed innovations over their standard deviations: of moments, position, velocity
-    misfit: Number  # mean square of `bias`, smoothed, relative to that of a model that fits
+    evidence: Evidence
+    bias: Innovations  # low-passed innovations over their standard deviations: of moments, position, velocity
+    misfit: float = 1.0  # mean square of `bias`, smoothed, relative to that of a model that fits
 
 
 def make_estimate(vehicle: VehicleModel) -> Estimate:
@@ -87,42 +99,11 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
     covariance = np.diag(deviations**2)
     covariance[EFFECTIVENESS : EFFECTIVENESS + m, EFFECTIVENESS : EFFECTIVENESS + m] += _FIRST_COMMON**2
     covariance[EFFECTIVENESS + m :, EFFECTIVENESS + m :] += _FIRST_COMMON_CEILING**2
-    return Estimate(
-        first_state=state,
-        first_covariance=covariance,
-        state=state.copy(),
-        covariance=covariance.copy(),
-        position=np.zeros(3),
-        velocity=np.zeros(3),
-        water_velocity=np.zeros(3),
-        net_weight=np.zeros(1),
-        moments=np.zeros(3),
-        acceleration=np.zeros(3),
-        time_since_measurement=np.array([-1.0]),
-        time_since_valid=np.zeros(2),
-        repeated=np.zeros(2),
-        slow=np.zeros(2),
-        longest_gap=np.zeros(1),
-        weight=np.ones(1),
-        last_measured=np.full(6, np.nan),
-        mass_scale=np.array([mass_scale]),
-        lags=np.array([0.0, 0.5, 1.0]),
-        bracket=np.zeros((2, m)),
-        by_lag=np.zeros(m),
-        curvature=np.zeros(m),
-        by_ceiling=np.vstack([np.zeros((2, m)), np.ones(m)]),
-        transition=np.zeros((3, n)),
-        product=np.zeros((3, n)),
-        row=np.zeros(n),
-        gain=np.zeros(n),
-        deviation=np.zeros((2 * m, n)),
-        supposed=np.zeros((2, m)),
-        missing=np.zeros(m),
-        direct=np.zeros(2 * m),
-        evidence=np.zeros((2, 2 * m)),
-        bias=np.zeros(9),
-        misfit=np.ones(1),
-    )
+    estimate = Estimate(m=m, k=n, h=2 * m, mass_scale=mass_scale, lags=np.array([0.0, 0.5, 1.0]))
+    estimate.first_state, estimate.first_covariance = state, covariance
+    estimate.state, estimate.covariance = state, covariance
+    estimate.by_ceiling[2], estimate.last_measured[:] = 1.0, np.nan
+    return estimate
 
 
 def reset(estimate: Estimate) -> None:
@@ -131,7 +112,7 @@ def reset(estimate: Estimate) -> None:
     estimate.state[:EFFECTIVENESS] = estimate.first_state[:EFFECTIVENESS]
     P[:EFFECTIVENESS], P[:, :EFFECTIVENESS] = P_0[:EFFECTIVENESS], P_0[:, :EFFECTIVENESS]
     estimate.deviation[:, :] = 0.0
-    estimate.time_since_measurement[0] = -1.0
+    estimate.time_since_measurement = -1.0
     publish(estimate)
 
 
@@ -143,7 +124,7 @@ def initialize(estimate: Estimate, position: Vector3, velocity: Vector3, gains: 
     else:
         start_from(estimate, VELOCITY, velocity, gains.velocity_noise)
     project(estimate, gains)
-    estimate.time_since_measurement[0] = 0.0
+    estimate.time_since_measurement = 0.0
 
 
 def start_from(estimate: Estimate, first: int, measured: Vector3, deviation: float) -> None:
@@ -165,8 +146,8 @@ def _decouple(estimate: Estimate, i: int, variance: float) -> None:
 def publish(estimate: Estimate) -> None:
     """Copy the parts of the state that other modules read."""
     x = estimate.state
-    estimate.position[:], estimate.velocity[:], estimate.moments[:] = x[:3], x[VELOCITY:CURRENT], x[MOMENTS:HEIGHT]
-    estimate.water_velocity[:2], estimate.net_weight[0] = x[CURRENT:NET_WEIGHT], x[NET_WEIGHT]
+    estimate.position, estimate.velocity, estimate.moments = x[:3], x[VELOCITY:CURRENT], x[MOMENTS:HEIGHT]
+    estimate.water_velocity[:2], estimate.net_weight = x[CURRENT:NET_WEIGHT], x[NET_WEIGHT]
 
 
 def set_effectiveness(estimate: Estimate, j: int, value: float) -> None:
@@ -190,9 +171,9 @@ def freeze(estimate: Estimate, gains: DeployableGains) -> None:
 
 def project(estimate: Estimate, gains: DeployableGains) -> None:
     """Project the unknowns onto their bounds."""
-    bound = gains.restoring_bound * estimate.mass_scale[0]
+    bound = gains.restoring_bound * estimate.mass_scale
     _bound(estimate, NET_WEIGHT, -bound, bound)
-    bound = gains.moment_bound * square(estimate.mass_scale[0])
+    bound = gains.moment_bound * square(estimate.mass_scale)
     for i in range(MOMENTS, HEIGHT):
         _bound(estimate, i, -bound, bound)
     for i in range(CURRENT, NET_WEIGHT):

@@ -21,17 +21,27 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
-from controller.laws.deployable.estimate import EFFECTIVENESS, Estimate, inflate_effectiveness, set_effectiveness
+from controller.laws.deployable.estimate import (
+    EFFECTIVENESS,
+    Estimate,
+    Evidence,
+    Hypotheses,
+    inflate_effectiveness,
+    set_effectiveness,
+)
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.model import Thrusters
+from controller.stack_array import Shape
+from controller.state import State
 
 Array = NDArray[np.float64]
+Counts = Annotated[NDArray[np.int64], Shape("m")]
 
 _MOST_A_STEP = 3.0  # limit of the log-likelihood ratio per step, so that no single outlier decides
 _LOSS = 0.6  # fraction of force that the hypothesis of a loss assumes lost: close enough to both a half and all
@@ -45,21 +55,15 @@ _TRIAL = 5.0  # s from the last isolation or trial to a thruster's first trial
 _RARER = 8  # factor by which that time grows with each trial
 
 
-class FaultState(NamedTuple):
+class FaultState(State):
     """The hypotheses, two for each thruster."""
 
-    ratio: Array  # (2 m,) summed log-likelihood ratio: thruster j is lost; m + j: is stuck
-    sums: Array  # (2, 2 m) sums of `Estimate.evidence` since the supposed time of the failure
-    # (m,) isolations of each thruster, one by a wide lead counted twice: at 1, it is used again if another is isolated
-    tentative: NDArray[np.int64]
-    trials: NDArray[np.int64]  # (m,) number of trials of each thruster after an isolation
-    waited: Array  # (1,) s since the last isolation or trial
-
-
-def empty_fault_state(m: int) -> FaultState:
-    """Return the state for `m` thrusters, all sums at zero."""
-    counts = np.zeros((2, m), dtype=np.int64)
-    return FaultState(np.zeros(2 * m), np.zeros((2, 2 * m)), counts[0].copy(), counts[1].copy(), np.zeros(1))
+    ratio: Hypotheses  # summed log-likelihood ratio: thruster j is lost; m + j: is stuck
+    sums: Evidence  # sums of `Estimate.evidence` since the supposed time of the failure
+    # isolations of each thruster, one by a wide lead counted twice: at 1, it is used again if another is isolated
+    tentative: Counts
+    trials: Counts  # number of trials of each thruster after an isolation
+    waited: float  # s since the last isolation or trial
 
 
 def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, gains: DeployableGains) -> int:
@@ -103,7 +107,7 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
         usual += x[EFFECTIVENESS + j] / m
     useful = _USEFUL * min(usual / _FITTING, 1.0)
     for j in range(m):
-        spread = max(estimate.misfit[0], 1.0) * np.sqrt(estimate.covariance[EFFECTIVENESS + j, EFFECTIVENESS + j])
+        spread = max(estimate.misfit, 1.0) * np.sqrt(estimate.covariance[EFFECTIVENESS + j, EFFECTIVENESS + j])
         if thrusters.health[j] > 0.0 and x[EFFECTIVENESS + j] + _SPREADS * spread < useful:
             fault_state.tentative[j] += 1
             _isolate(fault_state, estimate, thrusters, j, np.nan)
@@ -115,16 +119,16 @@ def try_again(
     fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, reported: Array, quiet: bool, period: float
 ) -> int:
     """Try one of several isolated thrusters again after a while, and return it, or -1; reported (m,), period [s]."""
-    fault_state.waited[0] += period
+    fault_state.waited += period
     isolated, candidate = 0, -1
     for j in range(thrusters.health.size):
         if thrusters.health[j] == 0.0 and reported[j] > 0.0:
             isolated += 1
             if candidate < 0 or fault_state.trials[j] < fault_state.trials[candidate]:
                 candidate = j
-    if isolated < 2 or not quiet or fault_state.waited[0] < _TRIAL * _RARER ** fault_state.trials[candidate]:
+    if isolated < 2 or not quiet or fault_state.waited < _TRIAL * _RARER ** fault_state.trials[candidate]:
         return -1
-    fault_state.waited[0] = 0.0
+    fault_state.waited = 0.0
     fault_state.trials[candidate] += 1
     fault_state.tentative[candidate] = 0
     thrusters.health[candidate], thrusters.stuck[candidate] = 1.0, np.nan
@@ -143,7 +147,7 @@ def _likelier(fault_state: FaultState, j: int, m: int) -> int:
 
 def _add_evidence(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, j: int, hypothesis: int) -> None:
     """Add the evidence of the last measurements for a hypothesis about thruster j."""
-    weight = 1.0 / square(max(estimate.misfit[0], 1.0))
+    weight = 1.0 / square(max(estimate.misfit, 1.0))
     innovations, squares = weight * estimate.evidence[0, hypothesis], weight * estimate.evidence[1, hypothesis]
     loss = _LOSS if hypothesis == j else 1.0
     step = loss * innovations - 0.5 * square(loss) * squares
@@ -178,9 +182,9 @@ def _isolate(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, 
         if thrusters.health[j] == 0.0 and fault_state.tentative[j] == 1:
             thrusters.health[j], thrusters.stuck[j] = 1.0, np.nan
             set_effectiveness(estimate, j, 1.0)
-    fault_state.waited[0] = 0.0
+    fault_state.waited = 0.0
     estimate.bias[:] = 0.0
-    estimate.misfit[0] = 1.0
+    estimate.misfit = 1.0
     thrusters.health[failed], thrusters.stuck[failed] = 0.0, force
     set_effectiveness(estimate, failed, 0.0 if np.isnan(force) else 1.0)
     if not np.isnan(force):  # the force is uncertain, and may be zero

@@ -66,21 +66,21 @@ def update_thrusters(memory: DeployableMemory, reported: Array) -> None:
 
 def process_measurement(memory: DeployableMemory, state: VehicleState, gains: DeployableGains) -> bool:
     """Propagate the estimate over the last period and correct it; return True if the measurement was accepted."""
-    estimate, period = memory.state_estimate, memory.period[0]
+    estimate, period = memory.state_estimate, memory.period
     valid = _is_plausible_attitude(state.quaternion, state.velocity_body)
     if valid:
-        memory.quaternion[:] = state.quaternion / norm(state.quaternion)
-        memory.omega[:] = state.velocity_body[3:]
+        memory.quaternion = state.quaternion / norm(state.quaternion)
+        memory.omega = state.velocity_body[3:]
     else:
         _propagate_attitude(memory)
-        memory.attitude.started[0] = 0.0  # the next change of the rates would span several periods
+        memory.attitude.started = 0.0  # the next change of the rates would span several periods
     R, deviation = rotation_matrix(memory.quaternion), memory.deviation
     deviation[:] = np.where(state.deviation >= 0.0, np.minimum(state.deviation, _FARTHEST), _FARTHEST)
     # an estimated state drifts, and jumps by a fraction of its deviation
     max_deviation = np.max(deviation[3:6])
     position_noise = max(gains.position_noise, _JUMP * np.max(deviation[:3]))
     velocity_noise = max(gains.velocity_noise, square(max_deviation) / _STEADY)
-    estimate.weight[0] = 1.0 if max_deviation <= _STEADY else square(_STEADY / max_deviation)
+    estimate.weight = 1.0 if max_deviation <= _STEADY else square(_STEADY / max_deviation)
     position = np.where(abs(state.position) < _FARTHEST, state.position, np.nan)
     velocity = R @ state.velocity_body[:3]
     if not (valid and np.all(abs(velocity) < _FASTEST)):
@@ -89,7 +89,7 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     velocity_repeats = _repeats(state.velocity_body[:3], estimate.last_measured[3:])
 
     actuator_lag.update_forces(estimate, memory.thrusters, period)
-    started = estimate.time_since_measurement[0] >= 0.0
+    started = estimate.time_since_measurement >= 0.0
     if started:
         acceleration = memory.thruster_acceleration
         observer.predict(estimate, memory.dynamics, memory.thrusters, acceleration, R, memory.omega, gains, period)
@@ -110,8 +110,8 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
         memory, estimate_state.VELOCITY, velocity, velocity_noise, gains
     )
     if position_used or velocity_used:
-        estimate.longest_gap[0] = max(estimate.longest_gap[0], estimate.time_since_measurement[0])
-        estimate.time_since_measurement[0] = 0.0
+        estimate.longest_gap = max(estimate.longest_gap, estimate.time_since_measurement)
+        estimate.time_since_measurement = 0.0
     return position_used or velocity_used
 
 
@@ -137,8 +137,8 @@ def _correct_group(
     estimate, group = memory.state_estimate, 0 if first == estimate_state.POSITION else 1
     corrected = observer.correct(estimate, first, measured, noise, gains)
     if not np.all(np.isnan(measured)):
-        memory.samples[0] += 1.0
-        memory.samples[1] += 0.0 if corrected else 1.0
+        memory.samples += 1.0
+        memory.rejected_samples += 0.0 if corrected else 1.0
     if corrected:
         estimate.time_since_valid[group] = 0.0
         return True
@@ -156,7 +156,7 @@ def _repeats(measured: Vector3, last: Vector3) -> bool:
 
 def _correct_by_rates(memory: DeployableMemory, R: Matrix3, predicted: bool, gains: DeployableGains) -> None:
     """Correct the estimate by the moment from the change of the rates, if the estimate was `predicted`."""
-    estimate, attitude, period = memory.state_estimate, memory.attitude, memory.period[0]
+    estimate, attitude, period = memory.state_estimate, memory.attitude, memory.period
     known = attitude_loop.measure_moment(attitude, memory.dynamics, R, memory.omega, estimate, period)
     if known and predicted:
         observer.correct_by_moment(
@@ -181,13 +181,13 @@ def _is_plausible_attitude(quaternion: Vector4, velocity_body: Vector6) -> bool:
 
 def _propagate_attitude(memory: DeployableMemory) -> None:
     """Propagate attitude and rates over the last period by the model."""
-    estimate, thrusters, period = memory.state_estimate, memory.thrusters, memory.period[0]
+    estimate, thrusters, period = memory.state_estimate, memory.thrusters, memory.period
     R = rotation_matrix(memory.quaternion)
     loads = model.Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
     acceleration = model.free_acceleration(memory.dynamics, R, estimate.velocity, memory.omega, loads)
     acceleration += model.thrust_acceleration(memory.dynamics, thrusters, R, thrusters.acting)
-    memory.omega[:] = np.clip(memory.omega + period * acceleration[3:], -_FASTEST, _FASTEST)
-    memory.quaternion[:] = attitude_loop.integrate_attitude(memory.quaternion, memory.omega, period)
+    memory.omega = np.clip(memory.omega + period * acceleration[3:], -_FASTEST, _FASTEST)
+    memory.quaternion = attitude_loop.integrate_attitude(memory.quaternion, memory.omega, period)
 
 
 def _is_plausible_motion(position: Vector3, velocity: Vector3) -> bool:

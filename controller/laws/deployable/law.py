@@ -25,17 +25,16 @@ from controller.laws.deployable import (
     input_validation,
     model,
 )
-from controller.laws.deployable.actuator_lag import empty_prediction, predict_state
+from controller.laws.deployable.actuator_lag import predict_state
 from controller.laws.deployable.attitude import empty_attitude
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
 from controller.laws.deployable.barrier import (
     KEPT,
     Motion,
     RegionObservation,
-    empty_observation,
     observe_regions,
     predict_shifts,
-    update_clearance_bound,
+    update_guarantee,
     vehicle_bound,
     write_rows,
 )
@@ -43,13 +42,13 @@ from controller.laws.deployable.braking import least_forces
 from controller.laws.deployable.diagnostics import (
     DIAGNOSTICS,
     NO_BOUND,
-    REJECTED,
+    Report,
     write_program_report,
     write_report,
 )
 from controller.laws.deployable.estimate import LAG, Estimate, make_estimate
 from controller.laws.deployable.faces import FACES
-from controller.laws.deployable.fault_detection import empty_fault_state
+from controller.laws.deployable.fault_detection import FaultState
 from controller.laws.deployable.gains import SPREADS, DeployableGains, check_gains
 from controller.laws.deployable.memory import DeployableMemory
 from controller.laws.deployable.model import Dynamics, Loads, make_dynamics, make_thrusters
@@ -82,18 +81,19 @@ def step(
     forces: Array,
 ) -> None:
     """Run a step of the deployable law, as specified by `CompiledLaw.step`; `forces` are those of the thrusters [N]."""
-    estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period[0]
+    estimate, thrusters, dynamics, period = memory.state_estimate, memory.thrusters, memory.dynamics, memory.period
     input_validation.smooth_weights(weights, memory.weights, regions.hard, period / (period + gains.price_smoothing))
     # estimate
     input_validation.process_measurement(memory, state, gains)
-    memory.report[REJECTED] = memory.samples[1] / max(memory.samples[0], 1.0)
+    memory.report.rejected = memory.rejected_samples / max(memory.samples, 1.0)
     R = rotation_matrix(memory.quaternion)
     # there is no estimate, or it is too old
-    if estimate.time_since_measurement[0] < 0.0 or estimate.time_since_measurement[0] > gains.coast:
+    if estimate.time_since_measurement < 0.0 or estimate.time_since_measurement > gains.coast:
         _hold_weight(memory, R, gains, forces)
-        thrusters.forces[:] = forces
-        memory.report[15], memory.report[16] = estimate.time_since_measurement[0], NO_BOUND
-        memory.clearance_bound[:] = memory.expected[:] = np.nan
+        thrusters.forces = forces
+        memory.report.time_since_measurement, memory.report.bound = estimate.time_since_measurement, NO_BOUND
+        memory.observation.guaranteed_bound = memory.observation.last_bound = np.nan
+        memory.expected[:] = np.nan
         return
 
     memory.expected[:3] = estimate.position + period * estimate.velocity
@@ -102,9 +102,9 @@ def step(
     # fault detection
     changed = fault_detection.detect_fault(memory.fault_state, estimate, thrusters, gains)
     if changed >= 0:
-        memory.report[14] = changed + 1
+        memory.report.failed_thruster = changed + 1
     else:
-        quiet = memory.report[11] == 0.0
+        quiet = memory.report.barriers == 0.0
         changed = fault_detection.try_again(memory.fault_state, estimate, thrusters, memory.reported, quiet, period)
     if changed >= 0 or input_validation.reports_change(state.thruster_health, memory.reported, thrusters.health):
         input_validation.update_thrusters(memory, state.thruster_health)
@@ -130,7 +130,7 @@ def step(
     P = estimate.covariance
     variance = array(P[0, 0], P[1, 1], P[2, 2]) + memory.deviation[:3] ** 2
     spread = SPREADS * np.sqrt(np.max(variance))
-    memory.position_variance[:] = np.minimum(variance, square(2.0 * _TRUSTED_SPREAD / SPREADS))
+    memory.position_variance = np.minimum(variance, square(2.0 * _TRUSTED_SPREAD / SPREADS))
     wider = min(spread, _TRUSTED_SPREAD)
     limits = PathLimits(gains.clearance + wider, gains.margin + wider, gains.speed, gains.depth)
     if gains.path_planning > 0.0:
@@ -144,17 +144,17 @@ def step(
     observe_regions(memory.observation, regions_ahead, ahead.position, ahead.quaternion, ahead.velocity)
     fraction = period / (period + gains.smoothing)
     by_thrust = desired_acceleration(desired, velocity, gains) - free[:3]
-    memory.filtered_acceleration[:] += fraction * (by_thrust - memory.filtered_acceleration)
+    memory.filtered_acceleration += fraction * (by_thrust - memory.filtered_acceleration)
     force = dynamics.mass[:3, :3] @ (R_ahead.T @ memory.filtered_acceleration)
-    deep = min(clearance_at(goal_ahead, 0, memory.plan.path[memory.plan.counts[0] - 1]), gains.depth)
+    deep = min(clearance_at(goal_ahead, 0, memory.plan.path[memory.plan.points - 1]), gains.depth)
     entered = min(max(clearance_at(goal_ahead, 0, ahead.position) / max(deep, _SHALLOWEST), 0.0), 1.0)
     pushed = _soft_forces(memory.observation, regions, memory.weights[1], desired, entered, dynamics)
     attitude_loop.update_desired(memory.attitude, regions_ahead, ahead.position, gains, period)
     moment = attitude_loop.compute_moment(memory.attitude, dynamics, ahead.quaternion, omega, against, gains)
     wrench = np.concatenate((force + R_ahead.T @ pushed, moment))
     work = memory.program
-    work.nominal[:] = thrusters.allocator @ wrench
-    work.nominal[:] *= np.clip(thrusters.effectiveness / _LEAST_EFFECTIVENESS, _MIN_FRACTION, 1.0)
+    work.nominal = thrusters.allocator @ wrench
+    work.nominal *= np.clip(thrusters.effectiveness / _LEAST_EFFECTIVENESS, _MIN_FRACTION, 1.0)
     lower, upper = memory.given_limits[0], memory.given_limits[1]
     model.write_force_limits(thrusters, memory.given_limits)
 
@@ -167,7 +167,7 @@ def step(
         ahead.velocity,
         free,
         memory.acceleration_ahead,
-        dynamics.translational_mass[0],
+        dynamics.translational_mass,
         (dynamics.mass[3, 3] + dynamics.mass[4, 4] + dynamics.mass[5, 5]) / 3.0,
         gains.braking_share * model.available_braking(dynamics, thrusters),
         0.5 * gains.acceleration * (square(period) + square(lag)),
@@ -175,42 +175,43 @@ def step(
         np.max(memory.deviation[6:9]),
     )
     rows = 0
-    memory.observation.bound[0] = NO_BOUND
+    memory.observation.bound = NO_BOUND
     if gains.barriers > 0.0:
-        yields = memory.report[12] > KEPT  # yielding barriers amplify noise
+        yields = memory.report.constraint_slack > KEPT  # yielding barriers amplify noise
         rows = write_rows(
             work, memory.observation, regions_ahead, memory.weights[1], motion, lower, upper,
             fraction if yields else 1.0, gains,
         )  # fmt: skip
         vehicle = vehicle_bound(regions, estimate.position, motion, gains)
-        memory.observation.bound[0] = min(memory.observation.bound[0], vehicle)
+        memory.observation.bound = min(memory.observation.bound, vehicle)
 
     # quadratic program
     steps = quadratic_program.solve(work, rows, thrusters.inverse, lower, upper, forces)
     model.command_forces(thrusters, forces)
-    thrusters.forces[:] = forces
-    memory.estimate[0] = estimate.net_weight[0]
+    thrusters.forces = forces
+    memory.estimate[0] = estimate.net_weight
     memory.estimate[1:] = estimate.moments
-    write_report(memory.report, estimate, memory.plan.cost[0], memory.plan.counts[0], thrusters.health, desired)
+    write_report(memory.report, estimate, memory.plan.cost[0], memory.plan.points, thrusters.health, desired)
     write_program_report(memory.report, work.multipliers, work.price, rows, steps)
     beyond = max(spread - 2.0 * _TRUSTED_SPREAD, 0.0)  # spread that the margins do not cover
-    slack = memory.report[12]
-    update_clearance_bound(memory.clearance_bound, memory.observation.bound[0], slack)
-    memory.report[16] = memory.clearance_bound[0] - beyond - slack / (gains.barrier_rate * gains.barrier_slope)
+    slack = memory.report.constraint_slack
+    update_guarantee(memory.observation, slack)
+    firm = slack / (gains.barrier_rate * gains.barrier_slope)
+    memory.report.bound = memory.observation.guaranteed_bound - beyond - firm
 
 
 def _hold_weight(memory: DeployableMemory, R: Matrix3, gains: DeployableGains, forces: Array) -> None:
     """Write the forces that compensate W - B, plus `rise`; zeros before the first estimate, or without an attitude."""
     thrusters, wrench = memory.thrusters, zeros(6)
-    if memory.state_estimate.time_since_measurement[0] > 0.0 and memory.attitude.started[0] > 0.0:
-        wrench[:3] = -R[2] * (memory.state_estimate.net_weight[0] + gains.rise)
+    if memory.state_estimate.time_since_measurement > 0.0 and memory.attitude.started > 0.0:
+        wrench[:3] = -R[2] * (memory.state_estimate.net_weight + gains.rise)
     forces[:] = np.clip(thrusters.allocator @ wrench, thrusters.lower, thrusters.upper)
 
 
 def _limit_speed(estimate: Estimate, spread: float, gains: DeployableGains, desired: Vector3) -> None:
     """Limit the desired velocity so that the vehicle can stop before `coast` ends or the position is too uncertain."""
     # `spread` is the uncertainty of the position [m].
-    gap = max(estimate.time_since_measurement[0], estimate.longest_gap[0])
+    gap = max(estimate.time_since_measurement, estimate.longest_gap)
     max_speed = gains.speed
     if gap > _STALE:
         max_speed = min(max_speed, gains.acceleration * max(gains.coast - gap, 0.0))
@@ -235,7 +236,7 @@ def _soft_forces(
     # region, however slow the approach is: `entered` is 0 there, and 1 where the vehicle is as deep in it as the path's
     # end.
     speed, total = norm(desired), zeros(3)
-    most = dynamics.translational_mass[0] * np.min(dynamics.braking)
+    most = dynamics.translational_mass * np.min(dynamics.braking)
     for i in range(regions.kinds.size):
         if regions.hard[i] or not observation.values[i] > 0.0 or regions.kinds[i] >= _ATTITUDE:
             continue
@@ -271,40 +272,33 @@ class DeployableLaw(CompiledLaw):
         self.gains, self.n_regions = self.validate(gains), n_regions
         desired = validate_quaternion(desired_quaternion)
         self.n_forces = m = vehicle.thruster_matrix.shape[1]
-        self.memory = DeployableMemory(
-            period=np.array([validate_period(period)]),
-            estimate=np.zeros(4),
-            report=np.zeros(len(DIAGNOSTICS)),
+        self.memory = memory = DeployableMemory(
+            n=n_regions,
+            m=m,
+            period=validate_period(period),
+            report=Report.over(np.zeros(len(DIAGNOSTICS))),
             dynamics=make_dynamics(vehicle, least_forces(vehicle)),
             thrusters=make_thrusters(vehicle),
             state_estimate=make_estimate(vehicle),
             attitude=empty_attitude(desired),
-            fault_state=empty_fault_state(m),
+            fault_state=FaultState(m=m, h=2 * m),
             plan=empty_plan(n_regions, _SEED),
-            observation=empty_observation(n_regions),
             program=empty_workspace((1 + FACES) * n_regions, m),
-            predicted=empty_prediction(),
-            expected=np.full(6, np.nan),
-            quaternion=desired.copy(),
-            omega=np.zeros(3),
-            deviation=np.zeros(12),
-            position_variance=np.zeros(3),
-            clearance_bound=np.full(2, np.nan),
-            goal_shifts=np.zeros((1, 3)),
-            region_shifts=np.zeros((n_regions, 3)),
-            samples=np.zeros(2),
-            weights=np.full((2, n_regions), np.nan),
-            reported=np.ones(m),
-            filtered_acceleration=np.zeros(3),
-            thruster_acceleration=np.zeros((6, m)),
-            acceleration_ahead=np.zeros((6, m)),
-            given_limits=np.zeros((2, m)),
         )
+        memory.quaternion, memory.predicted.quaternion[0] = desired, 1.0
+        memory.expected[:] = memory.weights[:] = np.nan
+        memory.reported[:] = 1.0
 
     @classmethod
     def validate(cls, gains: Any) -> Any:
         """Validate the gains, and return them."""
         return check_gains(gains)
+
+    @property
+    def report(self) -> Array:
+        """Diagnostics of the last step, shape (len(diagnostics),)."""
+        report: Array = self.memory.report.block
+        return report
 
     @property
     def expected(self) -> Array:

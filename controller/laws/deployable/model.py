@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from controller.law import VehicleModel
 from controller.laws.deployable.thrust_limit import command_for, limited_force
 from controller.linear_algebra import cross, invert_symmetric
-from controller.stack_array import Array, Columns6, Matrix3, Matrix6, Number, Vector3, Vector6, array, interpret
+from controller.stack_array import Array, Columns6, Matrix3, Matrix6, Shape, Vector3, Vector6, VectorM, array, interpret
+from controller.state import State
+
+Allocator = Annotated[Array, Shape("m", 6)]
+MatrixM = Annotated[Array, Shape("m", "m")]
+Rows2 = Annotated[Array, Shape(2, "m")]
 
 _REGULARISATION = 1e-3  # relative to a thruster's diagonal entry of H
 
@@ -21,12 +26,12 @@ class Dynamics(NamedTuple):
     inverse_mass: Matrix6  # 1/kg, 1/(kg m), 1/(kg m2): M^-1
     linear_damping: Vector6  # N s/m, N m s/rad
     quadratic_damping: Vector6  # N s2/m2, N m s2/rad2
-    translational_mass: Number  # kg, mean over the three axes
-    rigid_mass: Number  # kg, without added mass
+    translational_mass: float  # kg, mean over the three axes
+    rigid_mass: float  # kg, without added mass
     braking: Array  # (m + 1,) m/s2, worst direction: with thruster j lost, and last with all working
 
 
-class Thrusters(NamedTuple):
+class Thrusters(State):
     """Thrusters and their allocation."""
 
     # A failed thruster has a column of zeros and limits of zero; a stuck one keeps its column, and its limits are its
@@ -34,20 +39,20 @@ class Thrusters(NamedTuple):
 
     nominal_matrix: Columns6  # thruster matrix of the vehicle
     matrix: Columns6  # thruster matrix with the columns of failed thrusters zero, unless they are stuck
-    lower: Array  # (m,) N, present lower limits
-    upper: Array  # (m,) N, present upper limits
-    nominal_lower: Array  # (m,) N, lower limits of the vehicle
-    nominal_upper: Array  # (m,) N, upper limits of the vehicle
-    inverse: Array  # (m, m) H^-1 with H = B^T Q B + regularization
-    allocator: Array  # (m, 6) H^-1 B^T Q: maps a wrench to its least-squares forces
+    lower: VectorM  # N, present lower limits
+    upper: VectorM  # N, present upper limits
+    nominal_lower: VectorM  # N, lower limits of the vehicle
+    nominal_upper: VectorM  # N, upper limits of the vehicle
+    inverse: MatrixM  # H^-1 with H = B^T Q B + regularization
+    allocator: Allocator  # H^-1 B^T Q: maps a wrench to its least-squares forces
     metric: Vector6  # 1/N2, 1/(N m)2: Q, cost of an error of the wrench
-    health: Array  # (m,) 1 working, 0 failed
-    stuck: Array  # (m,) N, constant force of a stuck thruster; NaN for all others
-    effectiveness: Array  # (m,) estimated ratio of each thruster's force to the commanded one
-    ceiling: Array  # (2, m) estimated true limits, as a fraction of the nominal ones, and their standard deviations
-    forces: Array  # (m,) N, commanded forces of the last period
-    acting: Array  # (m,) N, mean forces behind the lag over that period
-    acting_now: Array  # (m,) N, forces behind the lag at its end
+    health: VectorM  # 1 working, 0 failed
+    stuck: VectorM  # N, constant force of a stuck thruster; NaN for all others
+    effectiveness: VectorM  # estimated ratio of each thruster's force to the commanded one
+    ceiling: Rows2  # estimated true limits, as a fraction of the nominal ones, and their standard deviations
+    forces: VectorM  # N, commanded forces of the last period
+    acting: VectorM  # N, mean forces behind the lag over that period
+    acting_now: VectorM  # N, forces behind the lag at its end
 
 
 def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
@@ -61,8 +66,8 @@ def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
         inverse_mass=inverse,
         linear_damping=vehicle.linear_damping.copy(),
         quadratic_damping=vehicle.quadratic_damping.copy(),
-        translational_mass=np.array([mean]),
-        rigid_mass=np.array([vehicle.rigid_mass[0, 0]]),
+        translational_mass=mean,
+        rigid_mass=float(vehicle.rigid_mass[0, 0]),
         braking=np.asarray(braking) / mean,
     )
 
@@ -70,26 +75,19 @@ def make_dynamics(vehicle: VehicleModel, braking: Array) -> Dynamics:
 def make_thrusters(vehicle: VehicleModel) -> Thrusters:
     """Return the thrusters, all working."""
     B = vehicle.thruster_matrix
-    m = B.shape[1]
     arm = np.sqrt(np.sum(B[3:] ** 2) / np.sum(B[:3] ** 2))  # m, typical lever arm of a thruster
     thrusters = Thrusters(
+        m=B.shape[1],
         nominal_matrix=B.copy(),
         matrix=B.copy(),
         lower=vehicle.thrust_min.copy(),
         upper=vehicle.thrust_max.copy(),
         nominal_lower=vehicle.thrust_min.copy(),
         nominal_upper=vehicle.thrust_max.copy(),
-        inverse=np.zeros((m, m)),
-        allocator=np.zeros((m, 6)),
         metric=np.array([1.0] * 3 + [4.0 / arm**2] * 3),
-        health=np.ones(m),
-        stuck=np.full(m, np.nan),
-        effectiveness=np.ones(m),
-        ceiling=np.vstack([np.full(m, 2.0), np.zeros(m)]),
-        forces=np.zeros(m),
-        acting=np.zeros(m),
-        acting_now=np.zeros(m),
     )
+    thrusters.health[:] = thrusters.effectiveness[:] = 1.0
+    thrusters.stuck[:], thrusters.ceiling[0] = np.nan, 2.0
     interpret(reallocate, (thrusters,))
     return thrusters
 
@@ -97,22 +95,22 @@ def make_thrusters(vehicle: VehicleModel) -> Thrusters:
 def reallocate(thrusters: Thrusters) -> None:
     """Update matrix, limits and inverses from `health` and `stuck`."""
     t, H = thrusters, thrusters.inverse
-    t.matrix[:] = t.nominal_matrix * np.where(np.isnan(t.stuck), t.health, 1.0)
-    t.lower[:] = np.where(np.isnan(t.stuck), t.nominal_lower * t.health, t.stuck)
-    t.upper[:] = np.where(np.isnan(t.stuck), t.nominal_upper * t.health, t.stuck)
+    t.matrix = t.nominal_matrix * np.where(np.isnan(t.stuck), t.health, 1.0)
+    t.lower = np.where(np.isnan(t.stuck), t.nominal_lower * t.health, t.stuck)
+    t.upper = np.where(np.isnan(t.stuck), t.nominal_upper * t.health, t.stuck)
     H[:] = (t.matrix.T * t.metric) @ t.matrix
     for j in range(t.health.size):
         column = t.nominal_matrix[:, j]
         H[j, j] += _REGULARISATION * max(float((column * t.metric) @ column), 1e-12)
     invert_symmetric(H)
-    t.allocator[:] = (t.inverse @ t.matrix.T) * t.metric
+    t.allocator = (t.inverse @ t.matrix.T) * t.metric
 
 
 class Loads(NamedTuple):
     """Loads on the vehicle other than its thrusters."""
 
     water_velocity: Vector3  # m/s, NED
-    net_weight: Number  # N, W - B
+    net_weight: float  # N, W - B
     moments: Vector3  # phi_2..phi_4 of (12) [N m], body axes
 
 
@@ -125,7 +123,7 @@ def free_wrench(dynamics: Dynamics, R: Matrix3, velocity: Vector3, omega: Vector
     momentum = dynamics.mass @ nu_r
     drag = -(dynamics.linear_damping + dynamics.quadratic_damping * abs(nu_r)) * nu_r
     k = R[2]  # R^T e3
-    force = drag[:3] + (loads.net_weight[0] * k - cross(omega, momentum[:3]))
+    force = drag[:3] + (loads.net_weight * k - cross(omega, momentum[:3]))
     moment = drag[3:] - cross(k, loads.moments) - cross(omega, momentum[3:]) - cross(nu_r[:3], momentum[:3])
     return np.concatenate((force, moment))
 

@@ -10,12 +10,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.arithmetic import square
+from controller.laws.deployable.attitude import Moments2
 from controller.laws.deployable.estimate import (
     CURRENT,
     EFFECTIVENESS,
@@ -33,9 +31,7 @@ from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.model import Dynamics, Loads, Thrusters, free_acceleration
 from controller.linear_algebra import cross
 from controller.quaternion import down_in_body
-from controller.stack_array import Columns6, Matrix3, Shape, Vector3, Vector4
-
-Moments2 = Annotated[NDArray[np.float64], Shape(3, 2)]
+from controller.stack_array import Columns6, Matrix3, Vector3, Vector4
 
 _UNMODELED = 0.03  # m/s2/sqrt(Hz), acceleration noise of the model
 _SLOWEST = 0.15  # m/s against the water, least speed at which drag is linearized
@@ -77,17 +73,17 @@ def predict(
     # derivatives of the next velocity; drag is that of the mean axis, linearized
     linear, quadratic = np.sum(dynamics.linear_damping[:3]) / 3.0, np.sum(dynamics.quadratic_damping[:3]) / 3.0
     speed = np.maximum(abs(estimate.velocity - estimate.water_velocity), _SLOWEST)
-    slope = (linear + 2.0 * quadratic * speed) / dynamics.translational_mass[0]
+    slope = (linear + 2.0 * quadratic * speed) / dynamics.translational_mass
     F[:, :] = 0.0
     for axis in range(3):
         F[axis, VELOCITY + axis] = 1.0 - slope[axis] * T
     F[0, CURRENT], F[1, CURRENT + 1] = slope[0] * T, slope[1] * T
-    F[2, NET_WEIGHT] = T / dynamics.translational_mass[0]
+    F[2, NET_WEIGHT] = T / dynamics.translational_mass
     F[:, LAG] = T * (A @ (estimate.by_lag * effectiveness))
     F[:, EFFECTIVENESS : EFFECTIVENESS + m] = T * A * thrusters.acting
     F[:, EFFECTIVENESS + m : EFFECTIVENESS + m + m] = T * A * estimate.by_ceiling[0] * effectiveness
     # the state and its covariance
-    estimate.acceleration[:] = acceleration
+    estimate.acceleration = acceleration
     x[:3] += T * (estimate.velocity + 0.5 * T * acceleration)
     x[VELOCITY:CURRENT] += T * acceleration
     _propagate_covariance(estimate, T)
@@ -97,9 +93,9 @@ def predict(
         P[MOMENTS + axis, MOMENTS + axis] += square(gains.adaptation * _ANGULAR * dynamics.mass[3 + axis, 3 + axis]) * T
     for axis in range(2):
         P[CURRENT + axis, CURRENT + axis] += square(gains.current_drift) * T
-    P[NET_WEIGHT, NET_WEIGHT] += square(gains.restoring_drift * estimate.mass_scale[0]) * T
+    P[NET_WEIGHT, NET_WEIGHT] += square(gains.restoring_drift * estimate.mass_scale) * T
     P[LAG, LAG] += square(_LAG_DRIFT) * T
-    thrusters.effectiveness[:], thrusters.ceiling[0] = effectiveness, x[EFFECTIVENESS + m : EFFECTIVENESS + m + m]
+    thrusters.effectiveness, thrusters.ceiling[0] = effectiveness, x[EFFECTIVENESS + m : EFFECTIVENESS + m + m]
     for j in range(EFFECTIVENESS, EFFECTIVENESS + m):
         thrusters.ceiling[1, j - EFFECTIVENESS] = np.sqrt(P[j + m, j + m])
         if P[j, j] > 0.0:
@@ -108,17 +104,17 @@ def predict(
     freeze(estimate, gains)
     _propagate_deviations(estimate, thrusters, thruster_acceleration, T)
     estimate.evidence[:, :] = 0.0
-    estimate.time_since_measurement[0] += period
-    estimate.time_since_valid[:] += period
-    estimate.longest_gap[0] *= 1.0 - period / _GAP_MEMORY
+    estimate.time_since_measurement += period
+    estimate.time_since_valid += period
+    estimate.longest_gap *= 1.0 - period / _GAP_MEMORY
     publish(estimate)
 
 
 def _update_misfit(estimate: Estimate, period: float) -> None:
     """Update the misfit of the model over a period [s]: innovations of a model that fits are white."""
-    mean = estimate.bias @ estimate.bias / estimate.bias.size
+    mean = float(estimate.bias @ estimate.bias) / estimate.bias.size
     relative = min(mean / _USUAL_BIAS, _GREATEST_MISFIT)
-    estimate.misfit[0] += period / (period + _MISFIT_MEMORY) * (relative - estimate.misfit[0])
+    estimate.misfit += period / (period + _MISFIT_MEMORY) * (relative - estimate.misfit)
 
 
 def _propagate_covariance(estimate: Estimate, period: float) -> None:
@@ -136,7 +132,7 @@ def _propagate_deviations(
 ) -> None:
     """Propagate the deviations of all hypotheses over a period [s], with the missing force of stuck thrusters."""
     F, m = estimate.transition, thrusters.acting.size
-    estimate.missing[:] = estimate.supposed[0] * (estimate.supposed[1] - thrusters.acting)
+    estimate.missing = estimate.supposed[0] * (estimate.supposed[1] - thrusters.acting)
     for j in range(2 * m):
         d = estimate.deviation[j]
         d[:3] += period * d[VELOCITY:CURRENT]
@@ -172,9 +168,9 @@ def correct_by_moment(
         row[MOMENTS + b] = -middle[a]  # moment = B (f e) - S(k) phi - m z e3 x a
         row[MOMENTS + a] = middle[b]
         if i == 0:
-            row[HEIGHT] = dynamics.rigid_mass[0] * body[1]
+            row[HEIGHT] = dynamics.rigid_mass * body[1]
         elif i == 1:
-            row[HEIGHT] = -dynamics.rigid_mass[0] * body[0]
+            row[HEIGHT] = -dynamics.rigid_mass * body[0]
         row[EFFECTIVENESS : EFFECTIVENESS + m] = B * thrusters.acting
         expected = row @ x
         row[CURRENT:NET_WEIGHT] = by_current[i]
@@ -208,7 +204,7 @@ def correct(estimate: Estimate, first: int, measured: Vector3, noise: float, gai
             estimate.row[:] = 0.0
             estimate.row[first + axis] = 1.0
             at = first + axis
-            _correct(estimate, measured[axis] - x[at], square(noise), estimate.weight[0], 3 + at, at, at + 1)
+            _correct(estimate, measured[axis] - x[at], square(noise), estimate.weight, 3 + at, at, at + 1)
     project(estimate, gains)
     return True
 

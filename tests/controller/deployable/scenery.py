@@ -58,7 +58,7 @@ class Sea:
             remains = np.exp(-h / self.lag) if self.lag else 0.0
             self.given = commanded + remains * (self.given - commanded)
             R = rotation_matrix(self.quaternion)
-            loads = Loads(self.current, np.array([self.net_weight]), RIGHTING)
+            loads = Loads(self.current, self.net_weight, RIGHTING)
             free = free_acceleration(self.dynamics, R, self.velocity, self.omega, loads)
             pushed = thrust_acceleration(self.dynamics, self.thrusters, R, self.given * self.left)
             self.position += h * self.velocity
@@ -73,9 +73,7 @@ def askew(rng):
     root = rng.normal(size=(6, 6))
     mass = root @ root.T + np.diag([90.0, 80.0, 70.0, 9.0, 8.0, 7.0])
     damping, braking = rng.uniform(1.0, 30.0, (2, 6)), rng.uniform(0.1, 0.4, 9)
-    return Dynamics(
-        mass, np.linalg.inv(mass), *damping, np.array([np.trace(mass[:3, :3]) / 3.0]), np.array([70.0]), braking
-    )
+    return Dynamics(mass, np.linalg.inv(mass), *damping, float(np.trace(mass[:3, :3])) / 3.0, 70.0, braking)
 
 
 def law_for(regions, gains=None, period=0.02):

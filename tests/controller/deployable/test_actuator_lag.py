@@ -5,7 +5,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from controller.laws.deployable import actuator_lag
-from controller.laws.deployable.actuator_lag import empty_prediction, predict_state
+from controller.laws.deployable.actuator_lag import PredictedState, predict_state
 from controller.laws.deployable.estimate import EFFECTIVENESS, LAG, make_estimate
 from controller.laws.deployable.model import make_thrusters
 from tests.controller.deployable.scenery import LEVEL, ODIN
@@ -74,7 +74,7 @@ def test_lag_estimate_change_moves_the_estimated_forces():
 
 def test_predicted_point_responds_to_commands_without_lag():
     """p'' = f, tau f' = u - f: the second derivative of p + tau p' is u, at every instant."""
-    lag, ahead = 0.4, empty_prediction()
+    lag, ahead = 0.4, PredictedState()
 
     def command(t):
         return np.array([np.sin(3.0 * t), 1.0, -t, 0.2 * np.cos(t), 0.1, -0.1 * t])
@@ -95,7 +95,7 @@ def test_predicted_point_responds_to_commands_without_lag():
 
 
 def test_predicted_attitude_rotation_is_limited_to_half_a_radian():
-    ahead, still = empty_prediction(), np.zeros(3)
+    ahead, still = PredictedState(), np.zeros(3)
     for rate, angle in ((0.5, 0.1), (9.0, 0.5)):
         predict_state(ahead, still, still, LEVEL, np.array([0.0, 0.0, rate]), np.zeros(6), 0.2)
         assert 2.0 * np.arctan2(ahead.quaternion[3], ahead.quaternion[0]) == pytest.approx(angle, rel=0.03)

@@ -68,7 +68,7 @@ def spread(n, motion, deviation=0.0):
 def written(regions, motion, quaternion, weights, limits=(-30.0, 25.0), time=1.5):
     packed, n = pack(regions), len(regions)
     packed.move_to(time)
-    sight, work = barrier.empty_observation(n), empty_workspace((1 + faces.FACES) * n, 8)
+    sight, work = barrier.RegionObservation(n=n), empty_workspace((1 + faces.FACES) * n, 8)
     barrier.observe_regions(sight, packed, motion.position, quaternion, motion.velocity)
     lower, upper = (np.full(8, limit) for limit in limits)
     count = barrier.write_rows(work, sight, packed, weights, motion, lower, upper, 1.0, GAINS)
@@ -141,7 +141,7 @@ def test_gradient_rate_equals_the_curvature(keep):
             A = np.diag(size**-2.0)
             n = unit(A @ at) * (1.0 if keep == "out" else -1.0)
             exact = v @ (np.eye(3) - np.outer(n, n)) @ A @ v / np.linalg.norm(A @ at) * (1.0 if keep == "out" else -1.0)
-            packed, sight = pack([Region("one", shape, keep)]), barrier.empty_observation(1)
+            packed, sight = pack([Region("one", shape, keep)]), barrier.RegionObservation(n=1)
             barrier.observe_regions(sight, packed, at, LEVEL, np.r_[v, np.zeros(3)])
             now, later = np.zeros(6), np.zeros(6)
             barrier.pose_gradient(sight.gradients, sight.rotation_gradients, 0, False, now)
@@ -159,7 +159,7 @@ def test_barrier_bound_is_the_least_admissible_clearance():
     rng, wall, fallen = np.random.default_rng(5), Region("wall", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in"), 0
     for _ in range(60):
         motion = moving(rng, np.r_[rng.normal(size=3) * 0.8, np.zeros(3)])
-        packed, sight, work = pack([wall]), barrier.empty_observation(1), empty_workspace(1 + faces.FACES, 8)
+        packed, sight, work = pack([wall]), barrier.RegionObservation(n=1), empty_workspace(1 + faces.FACES, 8)
         barrier.observe_regions(sight, packed, motion.position, np.array([1.0, 0.0, 0.0, 0.0]), motion.velocity)
         limits = np.full(8, -30.0), np.full(8, 25.0)
         barrier.write_rows(work, sight, packed, np.ones(1), motion, *limits, 1.0, GAINS)
@@ -169,7 +169,7 @@ def test_barrier_bound_is_the_least_admissible_clearance():
         psi = inwards @ motion.velocity[:3] + allowed(h, motion.braking, GAINS.barrier_slope)
         expected = min(0.0, float(h + GAINS.margin), float(np.ravel(psi)[0] / GAINS.barrier_slope))
         assert sight.clearances[0] == pytest.approx(distance)
-        assert sight.bound[0] == pytest.approx(expected, abs=1e-12)
+        assert sight.bound == pytest.approx(expected, abs=1e-12)
         fallen += expected < 0.0
     assert 10 < fallen < 60
 
@@ -177,7 +177,7 @@ def test_barrier_bound_is_the_least_admissible_clearance():
 def test_barrier_right_side_is_smoothed_while_violated():
     rng, packed = np.random.default_rng(7), pack([Region("wall", HalfSpace((0.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")])
     sight, work, limits = (
-        barrier.empty_observation(1),
+        barrier.RegionObservation(n=1),
         empty_workspace(1 + faces.FACES, 8),
         (np.full(8, -30.0), np.full(8, 25.0)),
     )
@@ -196,11 +196,12 @@ def test_barrier_right_side_is_smoothed_while_violated():
 
 
 def test_promised_clearance_rises_with_the_bound_and_falls_only_with_slack_or_a_jump():
-    promised = np.full(2, np.nan)
+    observation = barrier.RegionObservation(n=0)
 
     def promise(bound, slack=0.0):
-        barrier.update_clearance_bound(promised, bound, slack)
-        return promised[0]
+        observation.bound = bound
+        barrier.update_guarantee(observation, slack)
+        return observation.guaranteed_bound
 
     assert promise(-0.2) == -0.2  # the first: a start within a region
     assert promise(-0.16) == -0.16

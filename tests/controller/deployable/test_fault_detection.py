@@ -151,7 +151,7 @@ def test_two_wrongly_isolated_thrusters_recover():
 def started():
     estimate, thrusters = make_estimate(ODIN), make_thrusters(ODIN)
     initialize(estimate, np.zeros(3), np.zeros(3), GAINS)
-    return estimate, thrusters, fault_detection.empty_fault_state(8)
+    return estimate, thrusters, fault_detection.FaultState(m=8, h=16)
 
 
 def periods(count, rng, left, stuck):
@@ -159,7 +159,7 @@ def periods(count, rng, left, stuck):
     estimate, thrusters, state = started()
     dynamics, R, still = make_dynamics(ODIN, np.ones(9)), np.eye(3), np.zeros(3)
     body, estimate.state[LAG] = dynamics.inverse_mass @ thrusters.matrix, 0.0
-    velocity, mass = np.zeros(3), dynamics.translational_mass[0]
+    velocity, mass = np.zeros(3), dynamics.translational_mass
     for k in range(count):
         fault_detection.detect_fault(state, estimate, thrusters, GAINS._replace(failure_threshold=1e9))
         thrusters.forces[:] = 8.0 * np.sin(0.1 * k + np.arange(8))
@@ -228,11 +228,11 @@ def test_evidence_is_summed_since_the_hypothetical_failure():
 def test_evidence_counts_less_by_the_square_of_the_misfit():
     for misfit, weight in ((0.5, 1.0), (3.0, 1.0 / 9.0)):
         estimate, thrusters, state = started()
-        estimate.evidence[:, 2], estimate.misfit[0] = (3.0, 2.0), misfit
+        estimate.evidence[:, 2], estimate.misfit = (3.0, 2.0), misfit
         fault_detection._add_evidence(state, estimate, thrusters, 2, 2)
         assert state.sums[:, 2] == pytest.approx([3.0 * weight, 2.0 * weight])
         fault_detection._isolate(state, estimate, thrusters, 2, np.nan)  # it explains the misfit
-        assert estimate.misfit[0] == 1.0
+        assert estimate.misfit == 1.0
 
 
 def test_innovations_are_clipped_at_three_standard_deviations():
@@ -313,9 +313,9 @@ def test_ineffective_thruster_is_isolated_without_an_estimate_jump():
     estimate.covariance[EFFECTIVENESS + 5, EFFECTIVENESS + 5] = 0.1**2  # it may give a third
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
     estimate.covariance[EFFECTIVENESS + 5, EFFECTIVENESS + 5] = 0.02**2
-    estimate.misfit[0] = 5.0  # the model does not fit
+    estimate.misfit = 5.0  # the model does not fit
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
-    estimate.misfit[0], estimate.state[EFFECTIVENESS : EFFECTIVENESS + 5] = 0.8, 0.1  # all thrusters seem weak
+    estimate.misfit, estimate.state[EFFECTIVENESS : EFFECTIVENESS + 5] = 0.8, 0.1  # all thrusters seem weak
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == -1
     estimate.state[EFFECTIVENESS : EFFECTIVENESS + 5] = 0.95
     assert fault_detection.detect_fault(state, estimate, thrusters, GAINS) == 5

@@ -156,7 +156,7 @@ def test_with_attitude_alone_the_weight_is_compensated(rise):
 
     pushed = fly(own, sea, regions=[], steps=1100, change=lost)[-1]
     assert (ODIN.thruster_matrix @ pushed)[2] == pytest.approx(-sea.net_weight - rise, abs=1.0)
-    assert own.memory.report[15] > 2.0 and np.isnan(own.memory.report[16])
+    assert own.memory.report.time_since_measurement > 2.0 and np.isnan(own.memory.report.bound)
 
 
 @pytest.mark.medium
@@ -182,7 +182,7 @@ def test_conflicting_regions_keep_the_promised_clearances():
 
     def check(t):
         packed.move_to(t)
-        rows.append((min(clearance_at(packed, i, sea.position) for i in range(2)), own.memory.report[16]))
+        rows.append((min(clearance_at(packed, i, sea.position) for i in range(2)), own.memory.report.bound))
 
     fly(own, sea, regions=[plate, band], steps=2500, each=check)
     clearance, bound = np.array(rows).T

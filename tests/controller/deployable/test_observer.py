@@ -70,7 +70,7 @@ def predict(estimate, dynamics, thrusters, R=None, omega=(0.0, 0.0, 0.0)):
 
 def transition(estimate, dynamics, thrusters, by_force):
     """Return F of a period, from what the estimate is before it."""
-    x, F, mass = estimate.state, np.eye(N), dynamics.translational_mass[0]
+    x, F, mass = estimate.state, np.eye(N), dynamics.translational_mass
     linear, quadratic = dynamics.linear_damping[:3].mean(), dynamics.quadratic_damping[:3].mean()
     for axis in range(3):
         speed = abs(estimate.velocity[axis] - estimate.water_velocity[axis])
@@ -175,7 +175,7 @@ def test_moment_correction_matches_the_kalman_update():
         H, given = np.zeros((3, N)), thrusters.matrix[3:] * thrusters.acting
         H[:, CURRENT:NET_WEIGHT] = by_current
         H[:, MOMENTS:HEIGHT] = -np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
-        H[:, HEIGHT] = -dynamics.rigid_mass[0] * np.cross([0.0, 0.0, 1.0], R.T @ estimate.acceleration)
+        H[:, HEIGHT] = -dynamics.rigid_mass * np.cross([0.0, 0.0, 1.0], R.T @ estimate.acceleration)
         H[:, LAG], H[:, EFFECTIVENESS:CEILING] = thrusters.matrix[3:] @ (estimate.by_lag * e), given
         H[:, CEILING:] = thrusters.matrix[3:] * estimate.by_ceiling[0] * e
         noise = (0.019 * np.diag(dynamics.mass)[3:]) ** 2 / PERIOD + np.sum((0.05 * given) ** 2, axis=1)
@@ -268,7 +268,7 @@ def test_implausible_measurement_is_rejected_without_effect(first, noise):
         assert not observer.correct(estimate, first, measured, noise, GAINS)
     for part, was in zip(estimate, before, strict=True):
         assert np.array_equal(part, was, equal_nan=True)
-    assert estimate.time_since_measurement[0] == pytest.approx(PERIOD)
+    assert estimate.time_since_measurement == pytest.approx(PERIOD)
 
 
 def test_missing_components_do_not_affect_other_corrections():
@@ -294,7 +294,7 @@ def test_prediction_follows_the_vehicle_model():
         estimate.covariance[CEILING:] = 0.0  # the limits are known
         publish(estimate)
         thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
-        loads = Loads(estimate.water_velocity, np.array([7.0]), estimate.moments)
+        loads = Loads(estimate.water_velocity, 7.0, estimate.moments)
         free = free_acceleration(dynamics, R, estimate.velocity, omega, loads)
         pushed = thrust_acceleration(dynamics, thrusters, R, thrusters.forces * x[EFFECTIVENESS:CEILING])
         a, v, p = (free + pushed)[:3], estimate.velocity.copy(), estimate.position.copy()
@@ -303,7 +303,7 @@ def test_prediction_follows_the_vehicle_model():
         assert estimate.position == pytest.approx(p + PERIOD * v + 0.5 * PERIOD**2 * a, rel=1e-12)
         assert estimate.velocity == pytest.approx(v + PERIOD * a, rel=1e-12)
         assert thrusters.effectiveness == pytest.approx(x[EFFECTIVENESS:CEILING], rel=1e-12)
-        assert estimate.time_since_measurement[0] == PERIOD
+        assert estimate.time_since_measurement == PERIOD
 
 
 def test_measurement_gate_is_six_standard_deviations_plus_0_05():
@@ -337,4 +337,4 @@ def test_reset_keeps_only_effectiveness_and_ceilings():
     assert np.array_equal(estimate.state[:EFFECTIVENESS], fresh.state[:EFFECTIVENESS])
     assert np.array_equal(estimate.covariance[:EFFECTIVENESS], fresh.covariance[:EFFECTIVENESS])
     assert np.array_equal(estimate.state[EFFECTIVENESS:], kept) and kept[2] == 0.0
-    assert estimate.time_since_measurement[0] == -1.0
+    assert estimate.time_since_measurement == -1.0

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from controller.compiling.function import CompiledFunction
 from controller.laws.deployable.attraction import approach_speed, desired_acceleration, desired_velocity
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.path_planning.cost import add_cost, begin_cost, empty_cost
+from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost
 from controller.laws.deployable.path_planning.planner import (
     CORNERS,
     empty_plan,
@@ -105,8 +105,8 @@ def test_path_around_blocking_obstacles_is_found():
             continue
         blocked += 1
         plan, goal = run(regions)
-        found += least_clearance(plan.path, plan.counts[0], regions) > 0.1
-        assert clearance_at(goal, 0, plan.path[plan.counts[0] - 1]) > 0.0
+        found += least_clearance(plan.path, plan.points, regions) > 0.1
+        assert clearance_at(goal, 0, plan.path[plan.points - 1]) > 0.0
     assert blocked > 8
     assert found == blocked
 
@@ -115,10 +115,10 @@ def test_path_around_blocking_obstacles_is_found():
 def test_partly_covered_goal_is_entered_at_its_free_part():
     regions = pack([Region("cover", Sphere((8.4, 0.0, 2.5), 0.6), "out")])
     plan, goal = run(regions, 800)
-    end = plan.path[plan.counts[0] - 1]
+    end = plan.path[plan.points - 1]
     assert clearance_at(goal, 0, end) > 0.0
     assert clearance_at(regions, 0, end) > GAINS.margin
-    assert least_clearance(plan.path, plan.counts[0], regions) > GAINS.margin
+    assert least_clearance(plan.path, plan.points, regions) > GAINS.margin
 
 
 def test_path_end_follows_a_moving_goal():
@@ -133,7 +133,7 @@ def test_path_end_follows_a_moving_goal():
 
     for goal, moved in ((sailing, sail), (GOAL, jump)):
         plan, packed = run(NOTHING, 400, goal, moved=moved)
-        assert clearance_at(packed, 0, plan.path[plan.counts[0] - 1]) > 0.05
+        assert clearance_at(packed, 0, plan.path[plan.points - 1]) > 0.05
 
 
 @pytest.mark.parametrize("velocity", [(-0.9, 0.0, 0.0), (0.0, 0.5, 0.0), (0.4, -0.4, 0.0)])
@@ -148,8 +148,8 @@ def test_vehicle_at_rest_steps_aside_from_a_fast_region_and_returns(velocity):
         improve(plan, at, packed, regions, GAINS, 0.02)
         desired = desired_velocity(plan, at, np.zeros(3), GAINS)
         at = at + 0.02 * desired * min(1.0, 0.5 / max(np.linalg.norm(desired), 1e-9))
-        least, waited = min(least, clearance_at(regions, 0, at)), waited or bool(plan.waits[0])
-    assert least > 0.2 and waited and not plan.waits[0]
+        least, waited = min(least, clearance_at(regions, 0, at)), waited or bool(plan.waits)
+    assert least > 0.2 and waited and not plan.waits
     assert clearance_at(packed, 0, at) > 0.2
 
 
@@ -164,7 +164,7 @@ def arrays_of(plan):
 
 def test_planning_is_deterministic():
     one, other = (run(scene(3, moving=True))[0] for _ in range(2))
-    assert one.counts[0] > 1
+    assert one.points > 1
     for a, b in zip(arrays_of(one), arrays_of(other), strict=True):
         assert np.array_equal(a, b)
 
@@ -193,7 +193,7 @@ def test_clearance_evaluations_are_bounded(monkeypatch):
     regions = pack([Region(f"floor {i}", HalfSpace((0.0, 0.0, -1.0), (0.0, 0.0, 2.55)), "in") for i in range(3)])
     way = np.zeros((CORNERS + 1, 3))
     way[:] = [(100.0 * (i + 1), 50.0 * (-1.0) ** i, 2.5) for i in range(CORNERS + 1)]
-    cost, calls = empty_cost(3), [0]
+    cost, calls = PathCost(n=3), [0]
     begin_cost(cost, START, np.zeros(3), False)
     while not add_cost(cost, way, CORNERS + 1, regions, GAINS, np.inf):
         calls.append(len(looked))
@@ -206,7 +206,7 @@ def test_search_at_rest_ends_with_a_free_path_or_its_period_limit():
     regions, goal = pack([Region("wall", Box((4.0, 0.0, 2.5), (0.5, 4.0, 9.0)), "out")]), pack([GOAL])
     CompiledFunction(search_path)(plan, START, goal, regions, GAINS, 0.02, periods)
     assert 2 < periods[1] < 2000
-    assert least_clearance(plan.path, plan.counts[0], regions) > 0.0
+    assert least_clearance(plan.path, plan.points, regions) > 0.0
     shut = pack([Region("wall", HalfSpace((1.0, 0.0, 0.0), (4.0, 0.0, 0.0)), "out")])
     CompiledFunction(search_path)(empty_plan(1, 1), START, goal, shut, GAINS, 0.02, periods)
     assert periods[1] == 2000

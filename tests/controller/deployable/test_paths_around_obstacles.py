@@ -6,7 +6,7 @@ import pytest
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.path_planning import planner as way_round
 from controller.laws.deployable.path_planning import search
-from controller.laws.deployable.path_planning.cost import add_cost, begin_cost, empty_cost
+from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost
 from controller.laws.deployable.path_planning.planner import (
     CORNERS,
     empty_plan,
@@ -114,7 +114,7 @@ def expected_cost(points, packed, gains=GAINS, drift=(0.0, 0.0, 0.0), waits=Fals
 
 def cost_of(way, count, packed, start=START, most=np.inf, drift=(0.0, 0.0, 0.0), waits=False):
     """Return what the planner makes of a way, and in how many calls."""
-    cost, calls = empty_cost(packed.kinds.size), 1
+    cost, calls = PathCost(n=packed.kinds.size), 1
     begin_cost(cost, start, np.array(drift), waits)
     while not add_cost(cost, way, count, packed, GAINS, most):
         calls += 1
@@ -176,7 +176,7 @@ def test_path_end_keeps_a_margin_inside_a_soft_keep_in_region(begins, inside, co
     packed = pack([Region("beyond", beyond, "in", hard=False, crossing_cost=cost)])
     for k in range(1500):
         improve_path(plan, np.array([min(0.02 * k, begins), 0.0, 2.5]), goal, packed, GAINS, 0.02)
-    assert inside - 0.025 < clearance_at(packed, 0, plan.path[plan.counts[0] - 1]) < inside + 0.1
+    assert inside - 0.025 < clearance_at(packed, 0, plan.path[plan.points - 1]) < inside + 0.1
 
 
 @pytest.mark.medium
@@ -195,7 +195,7 @@ def test_search_prefers_cheap_regions():
         packed.crossing_costs[[0, 3]] = costs
         for _ in range(1500):
             improve_path(plan, start, goal, packed, GAINS, 0.02)
-        points = np.array([start, *plan.path[: plan.counts[0]]])
+        points = np.array([start, *plan.path[: plan.points]])
         (leg,) = (i for i in range(len(points) - 1) if points[i, 0] <= 4.0 < points[i + 1, 0])
         fraction = (4.0 - points[leg, 0]) / (points[leg + 1, 0] - points[leg, 0])
         ends[costs] = points[leg, 1] + fraction * (points[leg + 1, 1] - points[leg, 1])
@@ -247,7 +247,7 @@ def test_search_starts_and_ends_closer_to_a_region_than_the_line_margin():
     balls = [Region("ball", Sphere((4.0, 0.2, 2.4), 0.7), "out"), Region("other", Sphere((-2.0, 0.9, 2.4), 0.6), "out")]
     start, end = np.array([3.26, 0.2, 2.4]), np.array([-2.0, 0.24, 2.4])  # 0.04 m and 0.06 m away
     way = np.zeros((9, 3))
-    assert max(looks(search.empty_search(), start, end, pack(balls), 40, np.random.default_rng(0), way)) > 0
+    assert max(looks(search.Search(), start, end, pack(balls), 40, np.random.default_rng(0), way)) > 0
 
 
 def limits(start, end, room):
@@ -315,7 +315,7 @@ class Tree:
 
     def check(self, tree):
         """Compare it with the one that the search made."""
-        assert tree.size[0] == len(self.nodes) and tree.root[0] == self.root
+        assert tree.size == len(self.nodes) and tree.root == self.root
         np.testing.assert_allclose(tree.nodes[: len(self.nodes)], self.nodes, rtol=1e-12, atol=1e-12)
         assert tree.parents[: len(self.nodes)].tolist() == self.parents
 
@@ -336,7 +336,7 @@ def shortened(start, points, packed):
 
 def walk(seed, packed, steps, end):
     """Search beside a transcription of it, and return the points of paths found."""
-    rng, state, way, found = np.random.default_rng(seed), search.empty_search(), np.zeros((9, 3)), []
+    rng, state, way, found = np.random.default_rng(seed), search.Search(), np.zeros((9, 3)), []
     start, end, room, trees = START.copy(), np.array(end), 3.0, []
     for k in range(steps):
         if k % 40 == 39:
@@ -380,19 +380,19 @@ def test_search_matches_the_reference_transcription(steps, end, points, misses):
 def test_root_closer_to_a_region_than_the_line_margin_keeps_its_tree():
     wall, tree = (
         pack([Region("wall", HalfSpace((4.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")]),
-        search.empty_search().of_goal,
+        search.Search().of_goal,
     )
     for x in (0.0, 3.94):
         search.move_root(tree, np.array([x, 0.2, 2.5]), wall, MARGIN)
-    assert (tree.size[0], tree.root[0]) == (2, 1) and tree.parents[:2].tolist() == [1, -1]
+    assert (tree.size, tree.root) == (2, 1) and tree.parents[:2].tolist() == [1, -1]
     assert tree.nodes[:2, 0].tolist() == [0.0, 3.94]
 
 
 def test_corner_is_dropped_even_where_the_path_starts_closer_than_the_line_margin():
-    wall, state = pack([Region("wall", HalfSpace((4.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")]), search.empty_search()
+    wall, state = pack([Region("wall", HalfSpace((4.0, 0.0, 0.0), (1.0, 0.0, 0.0)), "in")]), search.Search()
     start, way = np.array([3.94, 0.2, 2.5]), np.zeros((9, 3))
     for tree, places in ((state.of_vehicle, (3.94, 3.0)), (state.of_goal, (1.0,))):
-        tree.size[0], tree.parents[: len(places)] = len(places), range(-1, len(places) - 1)
+        tree.size, tree.parents[: len(places)] = len(places), range(-1, len(places) - 1)
         tree.nodes[: len(places)] = [(x, 0.2, 2.5) for x in places]
     assert search._write_path(state, 0, 1, start, wall, MARGIN, way) == 1
     assert way[0].tolist() == [1.0, 0.2, 2.5]
@@ -413,7 +413,7 @@ def test_soft_regions_costlier_than_their_mean_are_closed_before_all_are():
 @pytest.mark.medium
 def test_found_path_is_free():
     rng, packed, way, checked = np.random.default_rng(6), pack(REGIONS), np.zeros((9, 3)), 0
-    state, end = search.empty_search(), np.array([8.0, 0.5, 2.5])
+    state, end = search.Search(), np.array([8.0, 0.5, 2.5])
     for count in (looks(state, START, end, packed, 1, rng, way)[0] for _ in range(200)):
         points = [START, *way[:count]]
         for a, b in zip(points[:-1], points[1:], strict=True):
@@ -424,15 +424,15 @@ def test_found_path_is_free():
 
 @pytest.mark.medium
 def test_full_tree_restarts_and_overlong_chain_is_no_path():
-    packed, state, rng = pack([]), search.empty_search(), np.random.default_rng(7)
+    packed, state, rng = pack([]), search.Search(), np.random.default_rng(7)
     way, end = np.zeros((9, 3)), np.array([8.0, 0.5, 2.5])
     sizes = []
     for _ in range(1300):
         looks(state, START, end, packed, 1, rng, way)
-        sizes.append(state.of_goal.size[0])
+        sizes.append(state.of_goal.size)
     assert max(sizes) == 512 and sizes[-1] < 512
     tree = state.of_vehicle
-    tree.nodes[:70, 0], tree.size[0], tree.root[0] = 0.01 * np.arange(70), 70, 0
+    tree.nodes[:70, 0], tree.size, tree.root = 0.01 * np.arange(70), 70, 0
     tree.nodes[:70, 1:], tree.parents[:70] = START[1:], np.arange(-1, 69)
     assert search._write_path(state, 0, 69, START, packed, MARGIN, way) == 0
     assert search._write_path(state, 0, 40, START, packed, MARGIN, way) > 0
@@ -443,7 +443,7 @@ class Change:
 
     def __init__(self, plan, goal):
         self.random, self.goal = plan.random.copy(), goal
-        self.way = plan.path[: plan.counts[0]].copy()
+        self.way = plan.path[: plan.points].copy()
 
     def draw(self):
         return uniform(self.random)
@@ -485,12 +485,12 @@ class Change:
 def test_path_changes_match_the_reference_transcription():
     plan, goal, rng = empty_plan(0, 3), pack([GOAL]), np.random.default_rng(5)
     for k in range(300):
-        plan.counts[0] = 1 + k % (CORNERS + 1)
+        plan.points = 1 + k % (CORNERS + 1)
         plan.path[:] = rng.normal([4.0, 0.0, 2.5], 2.0, size=(CORNERS + 1, 3))
         change = Change(plan, goal)
         expected = change.made()
         way_round._mutate_path(plan, START, goal, GAINS)
-        assert plan.counts[1] == len(expected)
+        assert plan.candidate_points == len(expected)
         np.testing.assert_allclose(plan.candidate[: len(expected)], expected, rtol=1e-12, atol=1e-12)
         assert plan.random[0] == change.random[0]
 
@@ -506,10 +506,10 @@ def test_path_is_updated_and_replaced_by_a_sufficiently_cheaper_one():
         start = start + np.array([0.004, 0.0, 0.0])
         packed.move_to(0.02 * k)
         goal.move_to(0.02 * k)
-        before, phase, nodes = plan.path[: plan.counts[0]].copy(), plan.phase[0], plan.search.of_goal.size[0]
-        cost, found, candidate = plan.cost.copy(), plan.counts[2], plan.candidate[: plan.counts[1]].copy()
+        before, phase, nodes = plan.path[: plan.points].copy(), plan.phase, plan.search.of_goal.size
+        cost, found, candidate = plan.cost.copy(), plan.found_points, plan.candidate[: plan.candidate_points].copy()
         improve_path(plan, start, goal, packed, GAINS, 0.02)
-        way = plan.path[: plan.counts[0]]
+        way = plan.path[: plan.points]
         if k == 0:
             continue
         before[-1] += np.array([0.05, -0.02, 0.01]) * 0.02
@@ -517,16 +517,16 @@ def test_path_is_updated_and_replaced_by_a_sufficiently_cheaper_one():
             before = before[1:]
         blocked = plan.cost[1] > 0.3 * np.linalg.norm(np.diff([start, *way], axis=0), axis=1).sum()
         dear = plan.cost[2] > 0.3 * np.linalg.norm(np.diff([start, *way], axis=0), axis=1).sum()
-        looks_again = plan.blocked[1] > 0  # for other paths, after a long search
-        assert blocked or dear or looks_again or plan.search.sampling_margin[0] == 3.0
-        grown += plan.search.of_goal.size[0] != nodes
-        if phase == way_round._BEGIN and plan.phase[0] == way_round._CANDIDATE:  # the path, in one call
+        looks_again = plan.second_look > 0  # for other paths, after a long search
+        assert blocked or dear or looks_again or plan.search.sampling_margin == 3.0
+        grown += plan.search.of_goal.size != nodes
+        if phase == way_round._BEGIN and plan.phase == way_round._CANDIDATE:  # the path, in one call
             np.testing.assert_allclose(way, before, rtol=1e-12)
             assert plan.cost == pytest.approx(expected_cost([start, *before], packed, drift=drift), rel=1e-9)
             evaluated_from = start
             if found > 0:
                 assert np.array_equal(plan.candidate[:found], plan.found[:found]) or blocked
-        elif phase == way_round._CANDIDATE and plan.phase[0] == way_round._BEGIN and not blocked:
+        elif phase == way_round._CANDIDATE and plan.phase == way_round._BEGIN and not blocked:
             new = expected_cost([evaluated_from, *candidate], packed, drift=drift)
             if new[0] < cost[0] - 0.03 - 0.01 * cost[0]:
                 taken += 1
@@ -540,9 +540,15 @@ def test_path_is_updated_and_replaced_by_a_sufficiently_cheaper_one():
 
 def test_found_path_is_the_next_candidate():
     plan, goal = empty_plan(0, 1), pack([GOAL])
-    plan.counts[:], plan.path[0], plan.found[:2] = (1, 0, 2), (8.0, 0.5, 2.5), [(4.0, 1.0, 2.5), (8.0, 0.5, 2.5)]
+    plan.points, plan.found_points, plan.path[0], plan.found[:2] = (
+        1,
+        2,
+        (8.0, 0.5, 2.5),
+        [(4.0, 1.0, 2.5), (8.0, 0.5, 2.5)],
+    )
     way_round._choose_candidate(plan, START, goal, pack([]), GAINS)
-    assert plan.counts.tolist() == [1, 2, -1] and np.array_equal(plan.candidate[:2], plan.found[:2])
+    assert (plan.points, plan.candidate_points, plan.found_points) == (1, 2, -1)
+    assert np.array_equal(plan.candidate[:2], plan.found[:2])
     way_round._choose_candidate(plan, START, goal, pack([]), GAINS)
     assert not np.array_equal(plan.candidate[:2], plan.found[:2])
 
@@ -550,11 +556,11 @@ def test_found_path_is_the_next_candidate():
 @pytest.mark.parametrize(("count", "waits"), [(2, False), (2, True), (CORNERS, False), (CORNERS + 1, False)])
 def test_wait_is_put_before_the_path_or_moved_and_stays_below_the_surface(count, waits):
     plan, rng, corners = empty_plan(0, 1), np.random.default_rng(1), []
-    plan.path[:], plan.counts[0], plan.waits[0] = rng.normal(size=(CORNERS + 1, 3)), count, waits
+    plan.path[:], plan.points, plan.waits = rng.normal(size=(CORNERS + 1, 3)), count, waits
     first, added = (plan.path[0], 0) if waits else (START, int(count <= CORNERS))
     for _ in range(300):
         way_round._choose_wait(plan, START)
-        assert plan.waits[1] and plan.counts[1] == count + added
+        assert plan.candidate_waits and plan.candidate_points == count + added
         assert np.array_equal(plan.candidate[1 : count + added], plan.path[1 - added : count])
         corners.append(plan.candidate[0].copy())
     off = np.array(corners) - first
@@ -566,11 +572,11 @@ def test_wait_is_put_before_the_path_or_moved_and_stays_below_the_surface(count,
 def test_passed_corners_of_a_full_path_are_dropped_and_its_length_is_measured():
     """By the cost of hard regions from which it counts as blocked."""
     plan, start = empty_plan(0, 1), np.array([0.45, 0.4, 2.5])
-    plan.counts[0], plan.path[:, 0], plan.path[:, 1:] = CORNERS + 1, np.linspace(0.4, 8.4, CORNERS + 1), (0.5, 2.5)
+    plan.points, plan.path[:, 0], plan.path[:, 1:] = CORNERS + 1, np.linspace(0.4, 8.4, CORNERS + 1), (0.5, 2.5)
     plan.path[1, 0] = 0.5
     before = plan.path.copy()
     improve_path(plan, start, pack([GOAL]), pack([]), GAINS, 0.02)
-    assert plan.counts[0] == CORNERS - 1
+    assert plan.points == CORNERS - 1
     assert np.array_equal(plan.path[: CORNERS - 1], before[2:])
     length = np.hypot(1.95, 0.1) + 6.0
     for part in (0.2999, 0.3001):
@@ -610,6 +616,6 @@ def test_trees_grow_faster_once_the_path_has_been_blocked_for_a_second():
     nodes = []
     for _ in range(100):
         improve_path(plan, np.array([0.0, 0.0, 9.0]), goal, packed, GAINS, 0.02)
-        nodes.append(int(plan.search.of_goal.size[0] + plan.search.of_vehicle.size[0]))
+        nodes.append(int(plan.search.of_goal.size + plan.search.of_vehicle.size))
     grown = np.diff(nodes)
     assert grown[:48].max() == 1 and 2.0 < grown[52:].mean() < grown[52:].max() <= 8

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from controller import VehicleState
 from controller.laws.deployable import actuator_lag, diagnostics, input_validation, law, observer
 from controller.laws.deployable.attraction import desired_velocity
-from controller.laws.deployable.barrier import empty_observation, observe_regions
+from controller.laws.deployable.barrier import RegionObservation, observe_regions
 from controller.laws.deployable.estimate import POSITION, VELOCITY, initialize, make_estimate
 from controller.laws.deployable.gains import DeployableGains
 from controller.laws.deployable.model import (
@@ -40,7 +40,7 @@ def test_desired_velocity_slows_at_corners_and_at_the_end():
     rng, plan, slowed = np.random.default_rng(1), empty_plan(0, 1), 0
     for _ in range(200):
         count, at, drift = int(rng.integers(1, 5)), rng.normal(size=3), rng.normal(size=3) * 0.1
-        plan.counts[0], plan.path[:] = count, rng.normal(size=(CORNERS + 1, 3)) * rng.choice([0.15, 1.5])
+        plan.points, plan.path[:] = count, rng.normal(size=(CORNERS + 1, 3)) * rng.choice([0.15, 1.5])
         points = np.vstack([at + 0.3 * rng.normal(size=3) if rng.uniform() < 0.3 else at, plan.path[:count]])
         points[0] = at
         legs = np.diff(points, axis=0)
@@ -87,9 +87,9 @@ def test_violated_soft_regions_repel():
         Region("hard", Sphere((0.0, 0.0, 0.0), 1.0), "out", gain=3.0),
         Region("face", Orientation((0.0, 1.0, 0.0, 0.0), 0.1), "in", gain=3.0, hard=False),
     ]
-    weights, sight = rng.uniform(0.3, 1.0, 5), empty_observation(5)
+    weights, sight = rng.uniform(0.3, 1.0, 5), RegionObservation(n=5)
     observe_regions(sight, pack(regions), position, ATTITUDE, np.zeros(6))
-    most = dynamics.translational_mass[0] * dynamics.braking.min()
+    most = dynamics.translational_mass * dynamics.braking.min()
     expected, count = np.zeros(3), 0
     for i in (0, 1):
         out = -sight.gradients[i] / np.linalg.norm(sight.gradients[i])
@@ -111,7 +111,7 @@ def test_moving_vehicle_is_repelled_sideways_but_not_backwards(entered):
         askew(np.random.default_rng(4)),
         Region("wall", HalfSpace((0.5, 0.0, 0.0), (1.0, 1.0, 0.0)), "out", gain=10.0, hard=False),
     )
-    sight = empty_observation(1)
+    sight = RegionObservation(n=1)
     observe_regions(sight, pack([region]), np.zeros(3), ATTITUDE, np.zeros(6))
     push = 10.0 * sight.values[0]
     along = np.array([1.0, 1.0, 0.0]) / np.sqrt(2.0) * push  # out of it, along its normal
@@ -143,19 +143,22 @@ def test_available_braking_accounts_for_lost_thrusters(lost):
 
 
 def test_report_holds_the_diagnostics():
-    seen, report = make_estimate(ODIN), np.full(len(law.DIAGNOSTICS), np.nan)
+    seen, report = make_estimate(ODIN), diagnostics.Report()
+    names = [name.partition(".")[0] for name in (diagnostic.name for diagnostic in law.DIAGNOSTICS)]
+    assert names == [field for field in report._fields for _ in range(report.storage(field).size)]
     seen.position[:], seen.velocity[:], seen.water_velocity[:2] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0)
-    wanted, report[14] = np.array([2.0, -3.0, 6.0]), 1.0
+    wanted, report.failed_thruster = np.array([2.0, -3.0, 6.0]), 1.0
     for second in (0.0, 1.0):  # the first one was isolated last
         diagnostics.write_report(report, seen, 9.5, 4, np.array([0.0, second, 0.0, 1.0]), wanted)
-        assert report[14] == 1.0
+        assert report.failed_thruster == 1.0
     health = np.array([1.0, 1.0, 0.0, 1.0])
     diagnostics.write_report(report, seen, 9.5, 4, health, wanted)
-    assert report[:11].tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 7.0, 9.5, 3.0]
-    assert report[14:16].tolist() == [3.0, -1.0]
+    assert np.concatenate(report[:3]).tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0]
+    assert (report.desired_speed, report.path_cost, report.path_corners) == (7.0, 9.5, 3.0)
+    assert (report.failed_thruster, report.time_since_measurement) == (3.0, -1.0)
     program = np.array([0.0, 2.0, 3.0, 9.0]), np.array([1.0, 0.5, 0.1, 9.0]), 3, -6
     diagnostics.write_program_report(report, *program)
-    assert report[11:14].tolist() == [2.0, 1.0, -6.0]
+    assert (report.barriers, report.constraint_slack, report.qp_steps) == (2.0, 1.0, -6.0)
 
 
 # ---- what is believed ----
@@ -217,7 +220,7 @@ def test_measurements_in_the_world_frame_count_by_their_greatest_deviation(axis)
     assert observer.correct(theirs.state_estimate, VELOCITY, np.array([0.41, -0.31, 0.21]), noise[1], GAINS)
     assert memory.state_estimate.state == pytest.approx(theirs.state_estimate.state, rel=1e-9, abs=1e-12)
     assert memory.state_estimate.covariance == pytest.approx(theirs.state_estimate.covariance, rel=1e-9, abs=1e-15)
-    assert memory.state_estimate.weight[0] == pytest.approx(weight)
+    assert memory.state_estimate.weight == pytest.approx(weight)
 
 
 @pytest.mark.parametrize("axis", range(3))
@@ -264,11 +267,11 @@ def test_impossible_measurements_are_rejected_and_others_accepted(change, accept
     seen = memory.state_estimate
     assert input_validation.process_measurement(memory, state_of(memory, **change), GAINS) == bool(accepted)
     assert (seen.time_since_valid == 0.0).tolist() == ["position" in accepted, "velocity" in accepted]
-    assert (seen.time_since_measurement[0] == 0.0) == bool(accepted)
+    assert (seen.time_since_measurement == 0.0) == bool(accepted)
     rates = state_of(memory, **change).velocity_body[3:]  # it starts with attitude, rates and place
     starts = "quaternion" not in change and "position" not in change and np.abs(rates).sum() < 100.0
     assert input_validation.process_measurement(fresh, state_of(memory, **change), GAINS) == starts
-    assert (fresh.state_estimate.time_since_measurement[0] < 0.0) != starts
+    assert (fresh.state_estimate.time_since_measurement < 0.0) != starts
     assert starts or input_validation.process_measurement(fresh, state_of(memory, quaternion=0.999 * ATTITUDE), GAINS)
 
 
@@ -278,13 +281,13 @@ def test_longest_measurement_gap_decays_over_a_second():
     for _ in range(24):
         assert not input_validation.process_measurement(memory, nothing, GAINS)
     seen = memory.state_estimate
-    assert seen.time_since_measurement[0] == pytest.approx(0.48)
+    assert seen.time_since_measurement == pytest.approx(0.48)
     depth = np.array([np.nan, np.nan, seen.position[2]])
     assert input_validation.process_measurement(memory, nothing._replace(position=depth), GAINS)
-    assert seen.longest_gap[0] == pytest.approx(0.5) and seen.time_since_valid.tolist() == pytest.approx([0.0, 0.5])
+    assert seen.longest_gap == pytest.approx(0.5) and seen.time_since_valid.tolist() == pytest.approx([0.0, 0.5])
     given = memory.dynamics, memory.thrusters, memory.thruster_acceleration
     observer.predict(seen, *given, TURNED, memory.omega, GAINS, 0.02)
-    assert seen.longest_gap[0] == pytest.approx(0.5 * 0.98)
+    assert seen.longest_gap == pytest.approx(0.5 * 0.98)
 
 
 def test_diverged_estimate_is_reset():
@@ -292,7 +295,7 @@ def test_diverged_estimate_is_reset():
     memory.state_estimate.state[1], memory.fault_state.ratio[2] = 2e6, 5.0
     bad = state_of(memory, position=np.full(3, np.nan))
     assert not input_validation.process_measurement(memory, bad, GAINS)
-    assert memory.state_estimate.time_since_measurement[0] == -1.0
+    assert memory.state_estimate.time_since_measurement == -1.0
     assert not memory.state_estimate.position.any() and not memory.fault_state.ratio.any()
     assert input_validation.process_measurement(memory, state_of(memory), GAINS)
 

@@ -65,7 +65,7 @@ def expected(memory, state, goal, regions, weights):
     rates = 0.02 / (0.02 + np.where(regions.hard, GAINS.price_smoothing, 0.0))
     stages = memory.weights[0] + rates * (weights - memory.weights[0])
     smoothed = memory.weights[1] + rates * (stages - memory.weights[1])
-    fraction = 0.02 / (0.02 + GAINS.smoothing) if memory.report[12] > barrier.KEPT else 1.0
+    fraction = 0.02 / (0.02 + GAINS.smoothing) if memory.report.constraint_slack > barrier.KEPT else 1.0
     rows = barrier.write_rows(
         memory.program, memory.observation, regions, smoothed, motion, lower, upper, fraction, GAINS
     )
@@ -108,7 +108,7 @@ def test_step_is_the_sequence_of_its_stages():
         assert own.memory.program.nominal == pytest.approx(program.nominal, rel=1e-8, abs=1e-9)
         assert forces == pytest.approx(wanted_forces, abs=1e-6)
         assert np.array_equal(own.memory.thrusters.forces, forces)
-        assert own.estimate.tolist() == [own.memory.state_estimate.net_weight[0], *own.memory.state_estimate.moments]
+        assert own.estimate.tolist() == [own.memory.state_estimate.net_weight, *own.memory.state_estimate.moments]
     assert most >= 2
 
 
@@ -126,7 +126,7 @@ def test_soft_region_pushes_back_by_the_depth_in_the_goal_relative_to_the_end_of
         nominal.append(own.memory.program.nominal.copy())
     plan, ahead = own.memory.plan, own.memory.predicted
     wanted = desired_velocity(plan, ahead.position, goal.velocities[0], GAINS)
-    end = plan.path[plan.counts[0] - 1]
+    end = plan.path[plan.points - 1]
     entered = clearance_at(goal, 0, ahead.position) / min(clearance_at(goal, 0, end), GAINS.depth)
     R = rotation_matrix(ahead.quaternion)
     force = law._soft_forces(own.memory.observation, regions, np.ones(1), wanted, entered, memory.dynamics)
@@ -143,9 +143,9 @@ def test_promised_clearance_is_less_by_the_spread_beyond_the_margins_and_by_the_
     for _ in range(3):
         own.step(sea.measured()._replace(deviation=deviation), pack([GOAL]), pack(walls), np.ones(2), forces)
     spread = 3.0 * np.sqrt(own.memory.state_estimate.covariance[0, 0] + 0.25**2)
-    slack = own.report[12] / (GAINS.barrier_rate * GAINS.barrier_slope)
-    assert spread > 0.65 and slack > 0.01 and abs(own.memory.clearance_bound[0]) > 0.01
-    assert own.report[16] == pytest.approx(own.memory.clearance_bound[0] - (spread - 0.6) - slack, rel=1e-12)
+    slack = own.memory.report.constraint_slack / (GAINS.barrier_rate * GAINS.barrier_slope)
+    assert spread > 0.65 and slack > 0.01 and abs(own.memory.observation.guaranteed_bound) > 0.01
+    assert own.report[16] == pytest.approx(own.memory.observation.guaranteed_bound - (spread - 0.6) - slack, rel=1e-12)
 
 
 def test_unequal_effectiveness_causes_no_opposing_forces_at_a_barrier():
@@ -187,8 +187,8 @@ def test_without_measurements_speed_is_limited_to_a_timely_stop():
 @pytest.mark.parametrize("rise", [0.0, 5.0])
 def test_weight_is_held_at_any_attitude_without_a_moment(rise):
     memory, forces = law_for([]).memory, np.empty(8)
-    memory.state_estimate.time_since_measurement[0] = memory.attitude.started[0] = 1.0
-    memory.state_estimate.net_weight[0] = 9.0
+    memory.state_estimate.time_since_measurement = memory.attitude.started = 1.0
+    memory.state_estimate.net_weight = 9.0
     R = rotation_matrix(np.array([0.8, 0.4, -0.4, 0.2]))
     law._hold_weight(memory, R, GAINS._replace(rise=rise), forces)
     held = np.r_[R.T @ [0.0, 0.0, -9.0 - rise], np.zeros(3)]
@@ -200,7 +200,7 @@ def test_position_uncertainty_reduces_speed():
     for spread in (0.01, 0.09, 0.15, 0.25):
         own = law_for([])
         desired, seen = np.array([GAINS.speed, 0.0, 0.0]), own.memory.state_estimate
-        seen.time_since_measurement[0] = 0.0
+        seen.time_since_measurement = 0.0
         law._limit_speed(seen, 3.0 * spread, GAINS, desired)
         speeds.append(desired[0])
     assert speeds == pytest.approx([GAINS.speed, GAINS.speed, 0.5 * GAINS.speed, 0.0])

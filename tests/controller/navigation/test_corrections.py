@@ -46,7 +46,7 @@ def begun(rng, age=0.0):
     tilted = Rotation.from_euler("ZYX", rng.uniform([-3.0, -0.6, -0.6], [3.0, 0.6, 0.6]))
     memory.quaternion[:] = tilted.as_quat()[[3, 0, 1, 2]]
     memory.constants[:] = rng.normal(size=9) * [*[0.01] * 3, *[0.1] * 3, 0.02, 0.02, 0.01]
-    memory.time[0] = memory.started[0] = 1.0
+    memory.time[0] = memory.started = 1.0
     samples = rng.normal(size=3) * 0.3 + [0.0, 0.0, -9.8], rng.normal(size=3) * 0.2
     memory.omega[:] = samples[1]
     propagate(memory, *samples, SENSORS, 0.01)

@@ -139,7 +139,7 @@ def test_initial_position_is_the_mean_of_two_fixes_with_their_spread():
 
 def test_written_state_is_the_estimate_with_the_deviation_of_each_axis():
     memory, state, turned = empty_memory(), make_vehicle_state(), Rotation.from_euler("ZYX", [0.4, -0.3, 0.2])
-    memory.started[0] = memory.time[0] = 1.0
+    memory.started = memory.time[0] = 1.0
     memory.quaternion[:], memory.velocity[:] = turned.as_quat()[[3, 0, 1, 2]], (0.3, -0.2, 0.1)
     deviation = 0.01 * np.arange(1.0, 19.0)
     memory.covariance[:] = np.diag(deviation**2)

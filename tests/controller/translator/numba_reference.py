@@ -9,9 +9,10 @@ import types
 
 import numba
 import numpy as np
-from numba.extending import overload
+from numba.extending import overload, typeof_impl
 
 from controller.stack_array import array, zeros
+from controller.state import State
 
 
 @functools.cache
@@ -21,7 +22,7 @@ def by_numba(function):
     cells = inspect.getclosurevars(function).nonlocals
     names |= {name: _of_numba(value) for name, value in cells.items()}
     names |= {"__name__": function.__module__, "__builtins__": __builtins__, "abs": np.abs}
-    names |= {f.__name__: f for f in (_product, _replaced, _items)}
+    names |= {f.__name__: f for f in (_product, _replaced, _items, _value)}
     text = getattr(function, "source", None) or textwrap.dedent(inspect.getsource(function))
     tree = ast.fix_missing_locations(_InOrder().visit(ast.parse(text)))
     tree.body[0].decorator_list, tree.body[0].returns = [], None
@@ -49,12 +50,31 @@ class _InOrder(ast.NodeTransformer):
             return made
         return node
 
+    def visit_Attribute(self, node):
+        self.generic_visit(node)
+        if node.attr not in _state_fields():
+            return node
+        if isinstance(node.ctx, ast.Load):
+            return ast.Call(ast.Name("_value", ast.Load()), [node], [])
+        return ast.Subscript(ast.Attribute(node.value, node.attr, ast.Load()), ast.Constant(...), ast.Store())
+
+    def visit_AugAssign(self, node):
+        if not isinstance(node.target, ast.Attribute):
+            return self.generic_visit(node)
+        old = ast.Attribute(node.target.value, node.target.attr, ast.Load())
+        return self.visit(ast.Assign([node.target], ast.BinOp(old, node.op, node.value)))
+
     def visit_Assign(self, node):
         self.generic_visit(node)
         if isinstance(node.targets[0], ast.Tuple) and not isinstance(node.value, ast.Tuple):
             n = ast.Constant(len(node.targets[0].elts))
             node.value = ast.Call(ast.Name("_items", ast.Load()), [node.value, n], [])
         return node
+
+
+def _state_fields(of=State):
+    """Return the names of the fields of all kinds of states."""
+    return set(of._fields).union(*map(_state_fields, of.__subclasses__()))
 
 
 def _used(code):
@@ -94,6 +114,22 @@ def _replaced(record, name, value):
 
 def _items(values, n):
     raise NotImplementedError
+
+
+@typeof_impl.register(State)
+def _type_of_state(state, context):
+    return numba.types.NamedTuple([typeof_impl(item, context) for item in state], type(state))
+
+
+def _value(item):
+    raise NotImplementedError
+
+
+@overload(_value)
+def _value_of_field(item):
+    if getattr(item, "ndim", None) == 0:
+        return lambda item: item[()]
+    return lambda item: item
 
 
 @overload(zeros)

@@ -78,7 +78,11 @@ def assert_sound(law, forces):
             "state_estimate.last_measured",
             "plan.new_cost.clear_until",
             "expected",
-            "clearance_bound",
+            "observation.bound",
+            "observation.last_bound",
+            "observation.guaranteed_bound",
+            "report.bound",
+            "report.thrust_limit",
             "thrusters.stuck",
         ):
             numbers = np.delete(value, BOUND) if key == "report" else value  # without an estimate no bound

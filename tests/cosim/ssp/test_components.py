@@ -147,10 +147,9 @@ def test_numbers_of_the_scenario_are_parameters(controller):
 
 
 class FixedAttitude(SlidingModeLaw):
-    """A law whose memory is no attitude that can be set."""
+    """A law whose attitude is not in its memory."""
 
-    def set_attitude(self, quaternion):
-        pass
+    desired_quaternion = np.array([1.0, 0.0, 0.0, 0.0])
 
 
 def with_law(monkeypatch, law):
@@ -170,8 +169,8 @@ def test_law_of_ones_own_needs_no_period_in_its_memory(fmi, monkeypatch):
             assert_step(slave, parts, k, motion, np.zeros(3))
 
 
-def test_law_without_a_changing_attitude_is_refused(monkeypatch):
-    with pytest.raises(LawError, match="law own keeps no attitude that could be another"):
+def test_law_without_an_attitude_in_its_memory_is_refused(monkeypatch):
+    with pytest.raises(LawError, match="law own: desired_quaternion is not in its memory"):
         controller_component(with_law(monkeypatch, FixedAttitude))
 
 

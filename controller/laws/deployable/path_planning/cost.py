@@ -6,10 +6,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
-from numpy.typing import NDArray
 
 from controller.arithmetic import square
 from controller.laws.deployable.path_planning.search import PathLimits, uncertainty
@@ -17,7 +14,8 @@ from controller.linear_algebra import norm
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at_position, clearance_of_sphere
-from controller.stack_array import Array, Rows3, Vector3, Vector4, zeros
+from controller.stack_array import Rows3, Vector3, Vector4, VectorN, zeros
+from controller.state import State
 
 # maximum number of evaluations of the regions along a path: in one call; in total, after which the rest is blocked
 _SAMPLES = (64, 512)
@@ -42,30 +40,25 @@ _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 
 
-class PathCost(NamedTuple):
+class PathCost(State):
     """The cost of a path, complete or not yet."""
 
     start: Vector3  # m, NED: start of the path when the evaluation began
     drift: Vector3  # m/s, NED: velocity of the path's end, which moves with the goal
-    counts: NDArray[np.int64]  # (2,) index of the next leg to evaluate; number of evaluations so far
-    waits: NDArray[np.bool_]  # (1,) True if the vehicle waits at the first corner until fast regions have passed
-    traveled: Array  # (2,) m: length of the evaluated legs; evaluated length of the present leg
+    leg: int  # index of the next leg to evaluate
+    evaluations: int  # number so far
+    waits: bool  # True if the vehicle waits at the first corner until fast regions have passed
+    traveled: float  # m, length of the evaluated legs
+    on_leg: float  # m, evaluated length of the present leg
     cost: Vector4  # m: cost so far; parts by hard regions and soft ones on the way; by fast ones at rest
-    clear_until: Array  # (n,) m: length of path before which each region needs no evaluation
-
-
-def empty_cost(n_regions: int) -> PathCost:
-    """Return the state before the first evaluation, for `n_regions`."""
-    return PathCost(
-        np.zeros(3), np.zeros(3), np.zeros(2, dtype=np.int64), np.zeros(1, dtype=np.bool_), np.zeros(2), np.zeros(4),
-        np.zeros(n_regions),
-    )  # fmt: skip
+    clear_until: VectorN  # m: length of path before which each region needs no evaluation
 
 
 def begin_cost(cost: PathCost, start: Vector3, drift: Vector3, waits: bool) -> None:
     """Begin the evaluation of a path from a start [m, NED] to an end that drifts [m/s, NED]."""
-    cost.start[:], cost.drift[:], cost.waits[0] = start, drift, waits
-    cost.counts[:], cost.traveled[:], cost.cost[:], cost.clear_until[:] = 0, 0.0, 0.0, 0.0
+    cost.start, cost.drift, cost.waits = start, drift, waits
+    cost.leg, cost.evaluations, cost.traveled, cost.on_leg = 0, 0, 0.0, 0.0
+    cost.cost[:] = cost.clear_until[:] = 0.0
 
 
 def add_cost(
@@ -73,28 +66,28 @@ def add_cost(
 ) -> bool:
     """Continue to evaluate a path [m, NED]; return True once it is complete, or the cost exceeds `cost_limit` [m]."""
     for _ in range(_SAMPLES[0]):
-        leg, s = cost.counts[0], cost.traveled[1]
+        leg, s = cost.leg, cost.on_leg
         if cost.cost[0] > cost_limit:
             return True
         if leg == count:
             cost.cost[0] += _STAY * _stay_cost(path[count - 1], cost.drift, regions, limits)
-            if not (cost.waits[0] or _drifts(cost.drift)):
+            if not (cost.waits or _drifts(cost.drift)):
                 _add_rest_cost(cost, path[count - 1], regions, limits)
             return True
         begin = cost.start if leg == 0 else path[leg - 1]
         length = norm(path[leg] - begin)
         if s >= length:
-            cost.counts[0] += 1
-            cost.traveled[0] += length
-            cost.traveled[1] = 0.0
-            if leg == 0 and cost.waits[0]:
+            cost.leg += 1
+            cost.traveled += length
+            cost.on_leg = 0.0
+            if leg == 0 and cost.waits:
                 cost.cost[0] += _WAIT
                 _add_rest_cost(cost, path[0], regions, limits)
             continue
-        if cost.counts[1] == _SAMPLES[1]:
+        if cost.evaluations == _SAMPLES[1]:
             _add_stride(cost, length - s, 0.0, _INSIDE)
             continue
-        cost.counts[1] += 1
+        cost.evaluations += 1
         point = begin + (path[leg] - begin) * (s / length)
         free, soft, reach = _evaluate_point(cost, point, regions, limits)
         spare = max(_TRUST * (free - limits.clearance), 0.5 * (free - limits.margin))  # m, no surface in between
@@ -105,7 +98,7 @@ def add_cost(
 
 def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> None:
     """Add a stride [m] with the extra cost per meter of `soft` regions and `penalty` of hard ones."""
-    cost.traveled[1] += stride
+    cost.on_leg += stride
     cost.cost[0] += stride * (1.0 + soft + penalty)
     cost.cost[1] += stride * penalty
     cost.cost[2] += stride * soft
@@ -115,14 +108,14 @@ def _evaluate_point(
     cost: PathCost, place: Vector3, regions: PackedRegions, limits: PathLimits
 ) -> tuple[float, float, float]:
     """Return the minimum clearance of hard regions [m], the penalty of soft ones per meter, the stride limit [m]."""
-    traveled = cost.traveled[0] + cost.traveled[1]
+    traveled = cost.traveled + cost.on_leg
     later = traveled / limits.speed  # s
     effect_distance = limits.clearance + _STRIDE[1] / _TRUST  # m, clearance beyond which a hard region has no effect
     free, soft, reach, scratch = effect_distance, 0.0, _STRIDE[1], zeros(3)
     for i in range(regions.kinds.size):
         if traveled < cost.clear_until[i] or regions.kinds[i] >= _ATTITUDE:
             continue
-        if cost.waits[0] and cost.counts[0] > 0 and is_fast(regions, i, limits):
+        if cost.waits and cost.leg > 0 and is_fast(regions, i, limits):
             continue  # it has passed by then
         point = place - regions.velocities[i] * later
         region_speed = np.sum(abs(regions.velocities[i]))  # m/s, summed over the axes
@@ -177,7 +170,7 @@ def _add_rest_cost(cost: PathCost, place: Vector3, regions: PackedRegions, limit
     for i in range(regions.kinds.size):
         if not is_fast(regions, i, limits):
             continue
-        v, later = regions.velocities[i], cost.traveled[0] / limits.speed
+        v, later = regions.velocities[i], cost.traveled / limits.speed
         speed = norm(v)
         while later < _HORIZON:
             clearance = clearance_at_position(regions, i, place - v * later, scratch) - uncertainty(regions, i)

@@ -9,25 +9,25 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import exponential
-from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost, empty_cost, is_fast
+from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost, is_fast
 from controller.laws.deployable.path_planning.search import (
     SAMPLING_MARGIN,
     PathLimits,
     Search,
-    empty_search,
     limits_along,
     look_for_path,
 )
 from controller.linear_algebra import norm
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at, clearance_at_position, evaluate_packed
-from controller.stack_array import Array, Rows3, Vector3, Vector4, zeros
+from controller.stack_array import Array, Rows3, Shape, Vector3, Vector4, zeros
+from controller.state import State
 
 _LN_30 = 3.4011973816621555
 CORNERS = 8  # maximum number of corners of a path
@@ -46,49 +46,44 @@ _DEEP_ENOUGH = 1e-3  # m, tolerance of the depth of an end
 _BEGIN, _PATH, _CANDIDATE = 0, 1, 2  # phases: no evaluation under way; the path is evaluated; the candidate is
 _WAIT_THRESHOLD = 1.0  # m, cost by hard regions above which candidates may wait until fast ones have passed
 _WAIT_FRACTION = 0.4  # fraction of the candidates that then wait
-_USED = -1  # value of `counts[2]` while the found path is the candidate
+_USED = -1  # value of `found_points` while the found path is the candidate
 _LESS = 0.5  # m by which random corners stay closer to start and end than random nodes of the trees
 
 
-class PathPlan(NamedTuple):
+Points = Annotated[Array, Shape(CORNERS + 1, 3)]
+Numbers5 = Annotated[Array, Shape(5)]
+Closed = Annotated[NDArray[np.bool_], Shape("n")]
+Generator = Annotated[NDArray[np.uint64], Shape(1)]
+
+
+class PathPlan(State):
     """State of the planner: the path, and a candidate."""
 
-    path: Rows3  # (CORNERS + 1, 3) m, NED: corners, then the end; the end moves with the goal
-    candidate: Rows3  # (CORNERS + 1, 3) m, NED: path that may replace it
-    found: Rows3  # (CORNERS + 1, 3) m, NED: path found by the search
-    counts: NDArray[np.int64]  # (3,) number of points of path, candidate and found, the end included; 0: none yet
+    path: Points  # m, NED: corners, then the end; the end moves with the goal
+    candidate: Points  # m, NED: path that may replace it
+    found: Points  # m, NED: path found by the search
+    points: int  # number of points of the path, the end included; 0: none yet
+    candidate_points: int  # the same of the candidate
+    found_points: int  # the same of the found path
     cost: Vector4  # m: cost of the path and its parts, as in `PathCost`
-    waits: NDArray[np.bool_]  # (2,) True if path, or candidate, waits at its first corner for fast regions to pass
+    waits: bool  # True if the path waits at its first corner for fast regions to pass
+    candidate_waits: bool  # the same of the candidate
     new_cost: PathCost  # evaluation under way, of path or candidate
     search: Search
-    closed: NDArray[np.bool_]  # (n,) True for regions that the search keeps out of
-    turn: NDArray[np.int64]  # (3,) closed regions: `_HARD`, `_ALL` or `_COSTLY`; calls left with them; calls for each
-    random_numbers: Array  # (5,) numbers in [0, 1) for one call of the search
-    phase: NDArray[np.int64]  # (1,) `_BEGIN`, `_PATH` or `_CANDIDATE`
-    blocked: NDArray[np.int64]  # (2,) number of periods: for which the path has been blocked; left of a second look
-    random: NDArray[np.uint64]  # (1,) state of the generator
+    closed: Closed  # True for regions that the search keeps out of
+    closed_kinds: int  # closed regions: `_HARD`, `_ALL` or `_COSTLY`
+    calls_left: int  # number of calls of the search left with them
+    calls: int  # number of calls for each choice
+    random_numbers: Numbers5  # numbers in [0, 1) for one call of the search
+    phase: int  # `_BEGIN`, `_PATH` or `_CANDIDATE`
+    blocked: int  # number of periods for which the path has been blocked
+    second_look: int  # number of periods left of a second look
+    random: Generator  # state of the generator
 
 
 def empty_plan(n_regions: int, seed: int) -> PathPlan:
     """Return a planner without a path, for `n_regions`, with random numbers from a seed."""
-    n = CORNERS + 1
-    state = np.array([seed * 2 + 0x9E3779B97F4A7C15], dtype=np.uint64)
-    return PathPlan(
-        path=np.zeros((n, 3)),
-        candidate=np.zeros((n, 3)),
-        found=np.zeros((n, 3)),
-        counts=np.zeros(3, dtype=np.int64),
-        cost=np.zeros(4),
-        waits=np.zeros(2, dtype=np.bool_),
-        new_cost=empty_cost(n_regions),
-        search=empty_search(),
-        closed=np.zeros(n_regions, dtype=np.bool_),
-        turn=np.zeros(3, dtype=np.int64),
-        random_numbers=np.zeros(5),
-        phase=np.zeros(1, dtype=np.int64),
-        blocked=np.zeros(2, dtype=np.int64),
-        random=state,
-    )
+    return PathPlan(n=n_regions, random=np.array([seed * 2 + 0x9E3779B97F4A7C15], dtype=np.uint64))
 
 
 def uniform(random: NDArray[np.uint64]) -> float:
@@ -140,17 +135,17 @@ def improve_path(
     _evaluate(plan, start, goal, regions, limits)
     blocked = is_blocked(plan, start)
     looks_again = _count_blocked(plan, blocked, period)
-    if not (blocked or looks_again) and plan.cost[2] <= _BLOCKED * _length(plan.path, plan.counts[0], start):
-        plan.search.sampling_margin[0], plan.turn[0] = SAMPLING_MARGIN[0], _HARD
-    elif plan.counts[2] == 0:
-        end, random_numbers = plan.path[plan.counts[0] - 1], plan.random_numbers
+    if not (blocked or looks_again) and plan.cost[2] <= _BLOCKED * _length(plan.path, plan.points, start):
+        plan.search.sampling_margin, plan.closed_kinds = SAMPLING_MARGIN[0], _HARD
+    elif plan.found_points == 0:
+        end, random_numbers = plan.path[plan.points - 1], plan.random_numbers
         _choose_closed(plan, blocked or looks_again, start, end, regions, limits.margin)
         closed = regions._replace(hard=plan.closed)
-        for _ in range(_MORE_CALLS if looks_again or plan.blocked[0] * period > _BLOCKED_LONG else 1):
+        for _ in range(_MORE_CALLS if looks_again or plan.blocked * period > _BLOCKED_LONG else 1):
             for i in range(random_numbers.size):
                 random_numbers[i] = uniform(plan.random)
-            plan.counts[2] = look_for_path(plan.search, start, end, random_numbers, closed, limits, plan.found)
-            if plan.counts[2] > 0:
+            plan.found_points = look_for_path(plan.search, start, end, random_numbers, closed, limits, plan.found)
+            if plan.found_points > 0:
                 if looks_again:
                     _restart_trees(plan.search)
                 break
@@ -159,24 +154,24 @@ def improve_path(
 def _count_blocked(plan: PathPlan, blocked: bool, period: float) -> bool:
     """Count the periods for which the path has been blocked; return True during a second look for other paths."""
     if blocked:
-        plan.blocked[0] += 1
-        plan.blocked[1] = 0
-    elif plan.blocked[0] * period > _BLOCKED_LONG:
-        plan.blocked[0], plan.blocked[1] = 0, int(_SECOND_LOOK / period)
+        plan.blocked += 1
+        plan.second_look = 0
+    elif plan.blocked * period > _BLOCKED_LONG:
+        plan.blocked, plan.second_look = 0, int(_SECOND_LOOK / period)
         _restart_trees(plan.search)
     else:
-        plan.blocked[0], plan.blocked[1] = 0, max(plan.blocked[1] - 1, 0)
-    return bool(plan.blocked[1] > 0)
+        plan.blocked, plan.second_look = 0, max(plan.second_look - 1, 0)
+    return bool(plan.second_look > 0)
 
 
 def _restart_trees(search: Search) -> None:
-    search.of_goal.size[0] = search.of_vehicle.size[0] = 0
-    search.sampling_margin[0] = SAMPLING_MARGIN[0]
+    search.of_goal.size = search.of_vehicle.size = 0
+    search.sampling_margin = SAMPLING_MARGIN[0]
 
 
 def go_straight(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: PathLimits) -> None:
     """Set the path to a straight line to the nearest end in the goal region, without regard to regions."""
-    plan.counts[0] = 1
+    plan.points = 1
     nearest_goal_point(goal, start, limits.depth, plan.path[0])
 
 
@@ -186,19 +181,19 @@ def _choose_closed(
     """Choose the regions that the trees keep out of; a change of the choice restarts the trees."""
     # While hard regions block the path, only these are closed. Otherwise the costlier soft ones, or all, are closed
     # too, in turns that grow longer. A soft region near or around start or end of the path stays open.
-    turn, scratch = plan.turn[0], zeros(3)
+    turn, scratch = plan.closed_kinds, zeros(3)
     if blocked:
         turn = _HARD
     elif turn == _HARD:
-        turn, plan.turn[2] = _COSTLY, _SEARCH_CALLS[0]
-    elif plan.turn[1] == 0:
+        turn, plan.calls = _COSTLY, _SEARCH_CALLS[0]
+    elif plan.calls_left == 0:
         turn = _ALL if turn == _COSTLY else _COSTLY
         if turn == _COSTLY:
-            plan.turn[2] = min(2 * plan.turn[2], _SEARCH_CALLS[1])
-    if turn != plan.turn[0]:
-        plan.turn[0], plan.turn[1] = turn, plan.turn[2]
+            plan.calls = min(2 * plan.calls, _SEARCH_CALLS[1])
+    if turn != plan.closed_kinds:
+        plan.closed_kinds, plan.calls_left = turn, plan.calls
         _restart_trees(plan.search)
-    plan.turn[1] -= 1
+    plan.calls_left -= 1
     soft, mean = 0, 0.0
     for i in range(regions.kinds.size):
         plan.closed[i] = regions.hard[i]
@@ -220,47 +215,47 @@ def _choose_closed(
 def _follow(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: PathLimits, period: float) -> None:
     """Begin a path, or move its end with the goal and drop corners that the vehicle has passed."""
     path = plan.path
-    if plan.counts[0] == 0:
-        plan.counts[0] = 1
+    if plan.points == 0:
+        plan.points = 1
         nearest_goal_point(goal, start, limits.depth, path[0])
     else:
-        end = plan.counts[0] - 1
+        end = plan.points - 1
         path[end] += goal.velocities[0] * period  # the end moves with the goal; corrected if the goal moved otherwise
         if not clearance_at(goal, 0, path[end]) > 0.0:
             nearest_goal_point(goal, path[end], limits.depth, path[end])
-    while plan.counts[0] > 1 and not plan.waits[0] and norm(path[0] - start) < _PASSED:
-        for i in range(plan.counts[0] - 1):
+    while plan.points > 1 and not plan.waits and norm(path[0] - start) < _PASSED:
+        for i in range(plan.points - 1):
             path[i] = path[i + 1]
-        plan.counts[0] -= 1
-        if plan.phase[0] == _PATH:
-            plan.phase[0] = _BEGIN
+        plan.points -= 1
+        if plan.phase == _PATH:
+            plan.phase = _BEGIN
 
 
 def _evaluate(plan: PathPlan, start: Vector3, goal: PackedRegions, regions: PackedRegions, limits: PathLimits) -> None:
     """Continue the evaluation of path or candidate, in turn; the candidate becomes the path if it costs less."""
     cost = plan.new_cost
-    if plan.phase[0] == _BEGIN:
-        begin_cost(cost, start, goal.velocities[0], plan.waits[0])
-        plan.phase[0] = _PATH
-    if plan.phase[0] == _PATH:
-        if add_cost(cost, plan.path, plan.counts[0], regions, limits, np.inf):
-            plan.cost[:] = cost.cost
+    if plan.phase == _BEGIN:
+        begin_cost(cost, start, goal.velocities[0], plan.waits)
+        plan.phase = _PATH
+    if plan.phase == _PATH:
+        if add_cost(cost, plan.path, plan.points, regions, limits, np.inf):
+            plan.cost = cost.cost
             _choose_candidate(plan, start, goal, regions, limits)
-            begin_cost(cost, cost.start, goal.velocities[0], plan.waits[1])
-            plan.phase[0] = _CANDIDATE
+            begin_cost(cost, cost.start, goal.velocities[0], plan.candidate_waits)
+            plan.phase = _CANDIDATE
         return
     most = plan.cost[0] - _BETTER - _BETTER_PART * plan.cost[0]
-    if add_cost(cost, plan.candidate, plan.counts[1], regions, limits, most):
-        plan.phase[0] = _BEGIN
+    if add_cost(cost, plan.candidate, plan.candidate_points, regions, limits, most):
+        plan.phase = _BEGIN
         if cost.cost[0] < most:
-            plan.path[:] = plan.candidate
-            plan.counts[0], plan.waits[0] = plan.counts[1], plan.waits[1]
-            plan.cost[:] = cost.cost
+            plan.path = plan.candidate
+            plan.points, plan.waits = plan.candidate_points, plan.candidate_waits
+            plan.cost = cost.cost
 
 
 def is_blocked(plan: PathPlan, start: Vector3) -> bool:
     """Return True if the cost by hard regions is above `_BLOCKED` of the path's length."""
-    return bool(plan.cost[1] > _BLOCKED * _length(plan.path, plan.counts[0], start))
+    return bool(plan.cost[1] > _BLOCKED * _length(plan.path, plan.points, start))
 
 
 def search_path(
@@ -278,7 +273,7 @@ def search_path(
     while periods[1] < periods[0]:
         improve_path(plan, start, goal, regions, limits, period)
         periods[1] += 1
-        if plan.phase[0] == _CANDIDATE and not is_blocked(plan, start):
+        if plan.phase == _CANDIDATE and not is_blocked(plan, start):
             return
 
 
@@ -286,18 +281,18 @@ def _choose_candidate(
     plan: PathPlan, start: Vector3, goal: PackedRegions, regions: PackedRegions, limits: PathLimits
 ) -> None:
     """Choose the next candidate: the path that the search found, once, or else a mutation of the path."""
-    plan.waits[1] = False
-    if plan.counts[2] > 0:
-        plan.candidate[:] = plan.found
-        plan.counts[1] = plan.counts[2]
-        plan.counts[2] = _USED
+    plan.candidate_waits = False
+    if plan.found_points > 0:
+        plan.candidate = plan.found
+        plan.candidate_points = plan.found_points
+        plan.found_points = _USED
         return
-    plan.counts[2] = 0
+    plan.found_points = 0
     has_fast = False
     if plan.cost[1] + plan.cost[3] > _WAIT_THRESHOLD:
         for i in range(regions.kinds.size):
             has_fast = has_fast or is_fast(regions, i, limits)
-    if (plan.waits[0] or has_fast) and uniform(plan.random) < _WAIT_FRACTION:
+    if (plan.waits or has_fast) and uniform(plan.random) < _WAIT_FRACTION:
         _choose_wait(plan, start)
     else:
         _mutate_path(plan, start, goal, limits)
@@ -305,15 +300,15 @@ def _choose_candidate(
 
 def _choose_wait(plan: PathPlan, start: Vector3) -> None:
     """Write the path into `candidate`, with a wait at a random first corner."""
-    added = 0 if plan.waits[0] or plan.counts[0] > CORNERS else 1
+    added = 0 if plan.waits or plan.points > CORNERS else 1
     for i in range(CORNERS, added - 1, -1):
         plan.candidate[i] = plan.path[i - added]
-    center = plan.path[0] if plan.waits[0] else start
+    center = plan.path[0] if plan.waits else start
     reach = 0.2 * exponential(_LN_30 * uniform(plan.random))
     for axis in range(3):
         plan.candidate[0, axis] = center[axis] + reach * _bell_shaped(plan.random)
     plan.candidate[0, 2] = max(plan.candidate[0, 2], min(start[2], 0.0))
-    plan.counts[1], plan.waits[1] = plan.counts[0] + added, True
+    plan.candidate_points, plan.candidate_waits = plan.points + added, True
 
 
 def _length(path: Rows3, count: int, start: Vector3) -> float:
@@ -325,14 +320,10 @@ def _length(path: Rows3, count: int, start: Vector3) -> float:
 
 def _mutate_path(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: PathLimits) -> None:
     """Write a mutation of the path into `candidate`."""
-    path, candidate, random, sampling_margin = (
-        plan.path,
-        plan.candidate,
-        plan.random,
-        plan.search.sampling_margin[0] - _LESS,
-    )
+    path, candidate, random = plan.path, plan.candidate, plan.random
+    sampling_margin = plan.search.sampling_margin - _LESS
     candidate[:] = path
-    count = plan.counts[0]
+    count = plan.points
     last = count - 1
     choice = uniform(random)
     if choice < 0.1:  # straight to the nearest end
@@ -369,4 +360,4 @@ def _mutate_path(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: Pa
             low, high = limits_along(axis, start, path[last], sampling_margin)
             candidate[0, axis] = low + uniform(random) * (high - low)
         count = 2
-    plan.counts[1] = count
+    plan.candidate_points = count

@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,8 @@ from controller.linear_algebra import norm
 from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at_position, clearance_of_sphere
-from controller.stack_array import Array, Number, Rows3, Vector3, zeros
+from controller.stack_array import Array, Rows3, Shape, Vector3, zeros
+from controller.state import State
 
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
@@ -37,6 +38,11 @@ _ALL = 1.0 - 1e-9  # fraction of a line that counts as all of it, to allow for r
 _BEFORE_A_WALL = 0.8  # fraction of the free length of a blocked line at which a node is placed
 
 
+Nodes = Annotated[Array, Shape(_NODES, 3)]
+Chain = Annotated[Array, Shape(_CHAIN, 3)]
+Parents = Annotated[NDArray[np.int64], Shape(_NODES)]
+
+
 class PathLimits(NamedTuple):
     """Requirements of a path."""
 
@@ -51,35 +57,23 @@ def line_margin(limits: PathLimits) -> float:
     return limits.margin + 0.4 * limits.clearance
 
 
-class Tree(NamedTuple):
+class Tree(State):
     """Nodes, each with its parent."""
 
-    nodes: Rows3  # (_NODES, 3) m, NED
-    parents: NDArray[np.int64]  # (_NODES,) index of each node's parent; -1 for the root
-    size: NDArray[np.int64]  # (1,) number of nodes
-    root: NDArray[np.int64]  # (1,) index of the root
+    nodes: Nodes  # m, NED
+    parents: Parents  # index of each node's parent; -1 for the root
+    size: int  # number of nodes
+    root: int  # index of the root
 
 
-class Search(NamedTuple):
+class Search(State):
     """State of the search."""
 
     of_goal: Tree  # root at the end of the path
     of_vehicle: Tree  # root at the vehicle
-    turn: NDArray[np.int64]  # (1,) 0: the tree of the goal grows next, 1: that of the vehicle
-    sampling_margin: Number  # m beyond start and end within which random nodes lie
-    chain: Rows3  # (_CHAIN, 3) m, NED: the last path found, before it is shortened
-
-
-def empty_search() -> Search:
-    """Return a search whose trees have no nodes."""
-    return Search(
-        _empty_tree(), _empty_tree(), np.zeros(1, dtype=np.int64), np.array([SAMPLING_MARGIN[0]]), np.zeros((_CHAIN, 3))
-    )
-
-
-def _empty_tree() -> Tree:
-    size, root = np.zeros(1, dtype=np.int64), np.zeros(1, dtype=np.int64)
-    return Tree(np.zeros((_NODES, 3)), np.zeros(_NODES, dtype=np.int64), size, root)
+    turn: int  # 0: the tree of the goal grows next, 1: that of the vehicle
+    sampling_margin: float = SAMPLING_MARGIN[0]  # m beyond start and end within which random nodes lie
+    chain: Chain  # m, NED: the last path found, before it is shortened
 
 
 def uncertainty(regions: PackedRegions, i: int) -> float:
@@ -147,11 +141,11 @@ def look_for_path(
         return 0
     move_root(of_goal, end, regions, margin)
     move_root(of_vehicle, start, regions, margin)
-    search.sampling_margin[0] = min(_GROWS * search.sampling_margin[0], SAMPLING_MARGIN[1])
+    search.sampling_margin = min(_GROWS * search.sampling_margin, SAMPLING_MARGIN[1])
     reach = max(_REACH[0], _REACH[1] * norm(start - end))
-    if search.turn[0] == 0:
-        search.turn[0] = 1
-        _draw_target(of_goal, start, end, start, search.sampling_margin[0], reach, random_numbers, target)
+    if search.turn == 0:
+        search.turn = 1
+        _draw_target(of_goal, start, end, start, search.sampling_margin, reach, random_numbers, target)
         grown = extend_tree(of_goal, target, reach, regions, margin)
         if grown < 0:
             return 0
@@ -159,8 +153,8 @@ def look_for_path(
         if not _sees(of_vehicle, met, of_goal.nodes[grown], regions, margin):
             return 0
         return _write_path(search, grown, met, start, regions, margin, path)
-    search.turn[0] = 0
-    _draw_target(of_vehicle, start, end, end, search.sampling_margin[0], reach, random_numbers, target)
+    search.turn = 0
+    _draw_target(of_vehicle, start, end, end, search.sampling_margin, reach, random_numbers, target)
     grown = extend_tree(of_vehicle, target, reach, regions, margin)
     if grown < 0:
         return 0
@@ -184,7 +178,7 @@ def _draw_target(
     if random_numbers[3] < _TO_OTHER:
         target[:] = other
     elif random_numbers[3] < _TO_OTHER + _NEAR_A_NODE:
-        node = int(random_numbers[4] * tree.size[0])
+        node = int(random_numbers[4] * tree.size)
         target[:] = tree.nodes[node] + reach * (2.0 * random_numbers[:3] - 1.0)
     else:
         for axis in range(3):
@@ -194,18 +188,18 @@ def _draw_target(
 
 def move_root(tree: Tree, point: Vector3, regions: PackedRegions, margin: float) -> None:
     """Set the root of a tree to a point: add it if its line to the old root is free, else restart the tree."""
-    nodes, parents, root = tree.nodes, tree.parents, tree.root[0]
-    if tree.size[0] > 0:
+    nodes, parents, root = tree.nodes, tree.parents, tree.root
+    if tree.size > 0:
         distance = norm(nodes[root] - point)
-        if tree.size[0] < _NODES and distance <= _MOVED:
+        if tree.size < _NODES and distance <= _MOVED:
             return
         root_margin = min(_margin_at(tree, root, regions, margin), clearance_of_all(point, regions, zeros(3)) - _SLACK)
-        if tree.size[0] < _NODES and is_line_free(nodes[root], point, regions, root_margin):
-            new = tree.size[0]
-            nodes[new], parents[new], parents[root], tree.root[0] = point, -1, new, new
-            tree.size[0] += 1
+        if tree.size < _NODES and is_line_free(nodes[root], point, regions, root_margin):
+            new = tree.size
+            nodes[new], parents[new], parents[root], tree.root = point, -1, new, new
+            tree.size += 1
             return
-    nodes[0], parents[0], tree.size[0], tree.root[0] = point, -1, 1, 0
+    nodes[0], parents[0], tree.size, tree.root = point, -1, 1, 0
 
 
 def _sees(tree: Tree, node: int, place: Vector3, regions: PackedRegions, margin: float) -> bool:
@@ -215,7 +209,7 @@ def _sees(tree: Tree, node: int, place: Vector3, regions: PackedRegions, margin:
 
 def _margin_at(tree: Tree, node: int, regions: PackedRegions, margin: float) -> float:
     """Return the clearance [m] required of lines from a node: a root may be closer, its lines not closer than it."""
-    if node != tree.root[0]:
+    if node != tree.root:
         return margin
     return min(margin, clearance_of_all(tree.nodes[node], regions, zeros(3)) - _SLACK)
 
@@ -223,7 +217,7 @@ def _margin_at(tree: Tree, node: int, regions: PackedRegions, margin: float) -> 
 def nearest_node(tree: Tree, place: Vector3) -> int:
     """Return the index of a tree's node nearest to a point [m, NED]."""
     nearest, least = 0, np.inf
-    for i in range(tree.size[0]):
+    for i in range(tree.size):
         squared = np.sum((tree.nodes[i] - place) ** 2)
         if squared < least:
             nearest, least = i, squared
@@ -253,10 +247,10 @@ def extend_tree(tree: Tree, target: Vector3, reach: float, regions: PackedRegion
         if ancestor < 0 or not _sees(tree, ancestor, new, regions, margin):
             break
         parent = ancestor
-    index = tree.size[0]
+    index = tree.size
     nodes[index] = new
     parents[index] = parent
-    tree.size[0] += 1
+    tree.size += 1
     return int(index)
 
 
@@ -268,7 +262,7 @@ def _write_path(
     # the number of points, 0 if there are too many.
     chain, tree = search.chain, search.of_vehicle
     count, node = 0, of_vehicle
-    while node != tree.root[0]:
+    while node != tree.root:
         count, node = count + 1, tree.parents[node]
     length = count
     if length >= _CHAIN:
