@@ -10,6 +10,7 @@ import numpy as np
 
 from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
+from fuzzy_arbiter.engines.clipped_curves import ClippedCurves
 from fuzzy_arbiter.engines.engine import Defuzzifier, Engine
 from fuzzy_arbiter.engines.firing import slots_of
 from fuzzy_arbiter.engines.quadrature import Quadrature
@@ -49,6 +50,10 @@ class ExactEngine(Engine):
         ):
             with suppress(EngineError):  # more lines than an outline should have
                 return Centroid(output, implications == {"prod"})
+        joins = (output.defuzzifier, output.aggregation, *implications)
+        if joins in (("centroid", "max", "min"), ("centroid", "sum", "min"), ("centroid", "sum", "prod")):
+            with suppress(EngineError):  # terms that are not smooth
+                return ClippedCurves(output, slots)
         return Quadrature(output, slots)
 
     @property

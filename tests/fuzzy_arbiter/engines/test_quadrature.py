@@ -14,7 +14,9 @@ from scipy.integrate import quad
 from benchmarks.fuzzy_accuracy import BOUND as ACCURACY
 from benchmarks.fuzzy_accuracy import errors, random_cases, strengths_system
 from fuzzy_arbiter import Arbiter, Output, Rule, Term, falling, rising, triangle
+from fuzzy_arbiter.engines.clipped_curves import ClippedCurves
 from fuzzy_arbiter.engines.exact import ExactEngine
+from fuzzy_arbiter.engines.firing import slots_of
 from fuzzy_arbiter.engines.quadrature import Quadrature
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.propositions import Is
@@ -72,6 +74,31 @@ def test_a_lone_gaussian_has_its_mean_for_all_values(deviation, implication):
         cuts = (1.0,) if implication == "drastic_product" and defuzzifier != "mom" else (1.0, 0.6)
         for cut in cuts:
             assert value(output, [cut], implication) == pytest.approx(9.7, abs=1e-9), (defuzzifier, cut)
+
+
+@pytest.mark.medium(fast=1)
+@pytest.mark.parametrize("seed", range(8))
+def test_clipped_curves_match_quadrature_for_cuts_of_any_size(seed):
+    rng, compared = np.random.default_rng(seed), 0
+    for case in random_cases(12, 1000 + seed):
+        for implication, aggregation in (("min", "max"), ("min", "sum"), ("prod", "sum")):
+            output = replace(case.output, defuzzifier="centroid", aggregation=aggregation)
+            (curves,) = ExactEngine(strengths_system(output, implication)).defuzzifiers
+            slots = len(output.terms)
+            x = rng.uniform(*output.universe, 20)
+            degrees = np.array([term.membership.of_many(x) for term in output.terms])  # at which terms meet their cuts
+            cuts = np.hstack([
+                degrees, degrees * (1 - 1e-15), rng.random((slots, 20)), 10 ** rng.uniform(-300, 0, (slots, 20)),
+                rng.choice([0.0, 1e-9, 0.5, 0.7, 0.999, 1.0], (slots, 20)),
+            ])  # fmt: skip
+            cuts = cuts[:, cuts.max(axis=0) > 0.0]
+            found = curves.values(cuts, np.zeros((cuts.shape[1], 0)))
+            expected = Quadrature(output, slots_of(strengths_system(output, implication), output)).values(cuts, cuts)
+            assert found / (output.universe[1] - output.universe[0]) == pytest.approx(
+                expected / (output.universe[1] - output.universe[0]), abs=1e-9, nan_ok=True
+            )
+            compared += isinstance(curves, ClippedCurves)
+    assert compared > 15
 
 
 @pytest.mark.parametrize(

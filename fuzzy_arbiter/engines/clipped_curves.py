@@ -1,0 +1,198 @@
+"""Centroids of terms of any smooth shape that are clipped, or scaled and added, for many samples at once."""
+
+# Over a panel in which each term rises or falls and no two cross, the highest term counts up to its cut, the next one
+# above that up to its own, and so on, as in `clipped_centroid`. The area under a term that is clipped at c is the
+# integral of a polynomial up to the position where the term is c, and c times the rest of the panel. An error of this
+# position counts by its square, as the height on both sides of it is c.
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from fuzzy_arbiter.definition import Output
+from fuzzy_arbiter.engines.engine import Defuzzifier
+from fuzzy_arbiter.engines.firing import Slot
+from fuzzy_arbiter.engines.panels import Indices, points_of, roots, smooth_panels
+from fuzzy_arbiter.engines.quadrature import Quadrature
+from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.shapes import Array, Membership
+from fuzzy_arbiter.terms.curves import Curve
+from fuzzy_arbiter.terms.values import Formula
+
+_ORDER = 16  # number of coefficients of each polynomial
+_NODES, _WEIGHTS = legendre.leggauss(_ORDER)
+# Legendre series through the values at the nodes, and the powers of each of its polynomials: one matrix for both rounds
+_SERIES = ((np.arange(_ORDER) + 0.5) * legendre.legvander(_NODES, _ORDER - 1)) * _WEIGHTS[:, None]
+_AS_POWERS = np.array([np.pad(legendre.leg2poly(row), (0, _ORDER - k - 1)) for k, row in enumerate(np.eye(_ORDER))])
+_TABLE = -np.cos(np.linspace(0.0, np.pi, 65))  # positions in a panel of the table by which a degree's is guessed
+_SPACING = np.pi / 64
+_INSIDE = _TABLE * (1.0 - 1e-9)  # on the panel's side of a jump
+_POWERS = np.arange(_ORDER)
+_STEPS = 2  # of Newton's method
+_ERROR = 1e-10  # maximum error of a sample's area, as a fraction of it; quadrature takes the others
+_NOISE = 1e-14  # error of a degree by rounding
+_SAME = 1e-12  # terms whose degrees differ by less do not cross
+_MAX_TABLE = 2**24  # maximum number of degrees that are compared to find crossings
+_BLOCK = 2**18  # number of heights that are computed at a time
+# A line is a term's part over a panel, a polynomial of r from -1 to 1 which rises with r. Its column holds the panel's
+# middle, from the universe's start, and half of its width; -1 where the term falls, else 1; its lowest and its highest
+# degree; and coefficients of the powers of r: of its degree, of the integral of that from -1, and of r times it.
+_DEGREE = 5
+_INTEGRAL = _DEGREE + _ORDER
+_LEVER = _INTEGRAL + _ORDER + 1
+
+
+class ClippedCurves(Defuzzifier):
+    """The centroid of smooth terms that are clipped and joined by max or a sum, or scaled and added."""
+
+    def __init__(self, output: Output, slots: Sequence[Slot]) -> None:
+        shapes = [output.terms[slot.term].membership for slot in slots]
+        if any(isinstance(s, Formula) or (isinstance(s, Curve) and s.kind == "singleton") for s in shapes):
+            raise EngineError(f"output {output.name!r}: a term is a formula or a singleton, expected smooth terms")
+        self._quadrature = Quadrature(output, slots)
+        self.method = self._quadrature.method
+        self._universe = output.universe
+        self._max, self._scales = output.aggregation == "max", slots[0].implication == "prod"
+        edges = _edges(output, shapes) if self._max else smooth_panels(output.universe, shapes)
+        self._slots, lines, keys, self._error = _lines(edges, shapes, self._max)
+        if not self._error < _ERROR * max(shape.area(output.universe) for shape in shapes):
+            raise EngineError(f"output {output.name!r}: its terms are too rough, expected smooth terms")
+        self._lines = np.concatenate([lines, lines], axis=1) if self._max else lines  # clipped at tops, and at bottoms
+        self._keys, self._positions = keys, np.tile(_TABLE, self._slots.size)
+        ones = np.ones(self._lines.shape[1])
+        self._full = np.array(_integrals(self._lines, ones, ones))
+        self._signs = np.repeat([1.0, -1.0], self._slots.size)[: len(ones)]
+
+    def values(self, cuts: Array, inputs: Array) -> Array:
+        """Return the centroids for many samples; cuts (slots, n)."""
+        size = max(1, _BLOCK // self._lines.shape[1])
+        blocks = range(0, max(1, cuts.shape[1]), size)
+        return np.concatenate([self._centroids(cuts[:, i : i + size], inputs) for i in blocks])
+
+    def _centroids(self, cuts: Array, inputs: Array) -> Array:
+        if cuts.shape[1] == 1:  # of two columns NumPy adds rows in their order, as of many
+            return self._centroids(np.repeat(cuts, 2, axis=1), inputs)[:1]
+        area, moment = self._scaled(cuts) if self._scales else self._clipped(cuts)
+        smooth = area * _ERROR >= self._error
+        result = self._universe[0] + moment / np.where(smooth, area, 1.0)
+        if not smooth.all():
+            result[~smooth] = self._quadrature.values(cuts[:, ~smooth], inputs)
+        return np.minimum(np.maximum(result, self._universe[0]), self._universe[1])
+
+    def _scaled(self, cuts: Array) -> tuple[Array, Array]:
+        """Return the areas and moments of scaled terms; cuts (slots, n), returns (n,)."""
+        heights = cuts[self._slots.ravel()]
+        return _summed(self._full[0], heights), _summed(self._full[1], heights)
+
+    def _clipped(self, cuts: Array) -> tuple[Array, Array]:
+        """Return the areas and moments of clipped terms, each above those before it; cuts (slots, n), returns (n,)."""
+        tops = cuts[self._slots]  # (panels, terms of a panel, n)
+        bottoms = np.zeros_like(tops)
+        if self._max:
+            np.maximum.accumulate(tops[:, :-1], axis=1, out=bottoms[:, 1:])
+        counts = (tops > bottoms).reshape(-1, tops.shape[2])
+        if self._max:
+            tops, counts = np.stack([np.maximum(tops, bottoms), bottoms]), np.concatenate([counts, counts])
+        levels = tops.reshape(counts.shape)
+        middle, half, _, low, high = self._lines[:_DEGREE, :, None]
+        full = levels >= high
+        areas = np.where(full, self._full[0][:, None], 2.0 * half * levels)
+        moments = np.where(full, self._full[1][:, None], middle * areas)
+        meets = np.nonzero(counts & (levels > low) & ~full)
+        lines, cut = self._lines[:, meets[0]], levels[meets]
+        areas[meets], moments[meets] = _integrals(lines, self._meeting(lines, meets[0], cut), cut)
+        return _summed(self._signs, areas), _summed(self._signs, moments)
+
+    def _meeting(self, lines: Array, index: Indices, cut: Array) -> Array:
+        """Return the r at which each line has the degree of its cut."""
+        _, _, _, low, high = lines[:_DEGREE]
+        r = np.interp(2 * (index % self._slots.size) + (cut - low) / (high - low), self._keys, self._positions)
+        reach = _SPACING * (np.sqrt(1.0 - r * r) + _SPACING)
+        first, last = np.maximum(r - reach, -1.0), np.minimum(r + reach, 1.0)
+        degree = lines[_DEGREE:_INTEGRAL]
+        slopes = degree[1:] * _POWERS[1:, None]
+        for _ in range(_STEPS):  # of Newton's method
+            powers = _powers(r, _ORDER)
+            off, slope = (degree * powers).sum(axis=0) - cut, (slopes * powers[:-1]).sum(axis=0)
+            r = r - off / np.where((slope > 0.0) & (np.abs(off) > _NOISE), slope, np.inf)
+            r = np.minimum(np.maximum(r, first), last)
+        return np.asarray(r)
+
+
+def _summed(factors: Array, rows: Array) -> Array:
+    return np.asarray((factors[:, None] * rows).sum(axis=0))
+
+
+def _powers(r: Array, count: int) -> Array:
+    """Return the powers of r from 0 on, shape (count, n)."""
+    result = np.empty((count, len(r)))
+    result[0], result[1:] = 1.0, r
+    return np.asarray(np.multiply.accumulate(result, axis=0, out=result))
+
+
+def _integrals(lines: Array, r: Array, cut: Array) -> tuple[Array, Array]:
+    """Return area and moment under lines that are cut from r on."""
+    (middle, half, sign), powers = lines[:3], _powers(r, _ORDER + 2)
+    area = half * ((lines[_INTEGRAL:_LEVER] * powers[:-1]).sum(axis=0) + cut * (1.0 - r))
+    lever = (lines[_LEVER:] * powers).sum(axis=0) + cut * (1.0 - r * r) / 2
+    return area, middle * area + sign * half * half * lever
+
+
+def _edges(output: Output, shapes: Sequence[Membership]) -> Array:
+    """Return the ends of panels in which terms are smooth and do not cross."""
+    edges, precision = smooth_panels(output.universe, shapes), 4e-16 * max(map(abs, output.universe))
+    if len(shapes) ** 2 * len(edges) * len(_TABLE) > _MAX_TABLE:
+        raise EngineError(f"output {output.name!r}: its {len(shapes)} terms may cross in too many positions")
+    positions = points_of(edges[:-1], edges[1:], _INSIDE)
+    degrees = np.array([shape.of_many(positions.ravel()).reshape(positions.shape) for shape in shapes])
+    starts, ends, pairs = [np.zeros(0)], [np.zeros(0)], [np.zeros((0, 2), dtype=np.intp)]
+    for i, j in itertools.combinations(range(len(shapes)), 2):
+        margin = degrees[i] - degrees[j]
+        changes = (margin[:, 1:] >= 0.0) != (margin[:, :-1] >= 0.0)
+        changes &= np.maximum(np.abs(margin[:, 1:]), np.abs(margin[:, :-1])) > _SAME
+        starts.append(positions[:, :-1][changes])
+        ends.append(positions[:, 1:][changes])
+        pairs.append(np.tile([i, j], (len(ends[-1]), 1)))
+    one, other = np.concatenate(pairs).T
+
+    def margins(x: Array, which: Indices) -> Array:
+        values, order = np.array([shape.of_many(x) for shape in shapes]), np.arange(len(x))
+        return np.asarray(values[one[which], order] - values[other[which], order])
+
+    crossings, _ = roots(margins, np.concatenate(starts), np.concatenate(ends), precision)
+    return np.unique([*edges, *crossings[np.isfinite(crossings)]])
+
+
+def _lines(edges: Array, shapes: Sequence[Membership], ordered: bool) -> tuple[Indices, Array, Array, float]:
+    """Return the slots of each panel, the highest first; their lines; the keys of these; and the area's error."""
+    starts, ends = edges[:-1], edges[1:]
+    half = (ends - starts) / 2
+    nodes, positions = (points_of(starts, ends, points) for points in (_NODES, _INSIDE))
+    at_nodes, degrees = (np.array([s.of_many(x.ravel()).reshape(x.shape) for s in shapes]) for x in (nodes, positions))
+    series = at_nodes @ _SERIES @ _AS_POWERS  # (shapes, panels, powers)
+    table = series @ _powers(_INSIDE, _ORDER)
+    error = np.abs(table - degrees).max(axis=-1)
+    falls = series[..., 1::2].sum(axis=-1) < 0.0
+    series[..., 1::2] *= np.where(falls, -1.0, 1.0)[..., None]
+    table = series @ _powers(_TABLE, _ORDER)
+    error += np.maximum(-np.diff(table, axis=-1), 0.0).sum(axis=-1)  # of terms that turn within a panel
+    integral = np.pad(series / (_POWERS + 1), ((0, 0), (0, 0), (1, 0)))
+    lever = np.pad(series / (_POWERS + 2), ((0, 0), (0, 0), (2, 0)))
+    for each in (integral, lever):
+        each[..., 0] -= (each * (-1.0) ** np.arange(each.shape[-1])).sum(axis=-1)
+    order = np.argsort(-integral.sum(axis=-1), axis=0)
+    order = order[: max(1, int((degrees.max(axis=-1) > 0.0).sum(axis=0).max()))]
+    upper, lower = (np.take_along_axis(degrees, rows[..., None], axis=0) for rows in (order[:-1], order[1:]))
+    error = error.sum(axis=0) + ordered * np.maximum(lower - upper, 0.0).max(axis=-1).sum(axis=0)
+    slots, panel = np.asarray(order.T, dtype=np.intp), np.repeat(np.arange(len(half)), len(order))
+    chosen = [each[slots.ravel(), panel].T for each in (series, integral, lever, table)]
+    low, high = np.maximum(chosen[3][0], 0.0), chosen[3][-1]
+    rise = np.where(high > low, high - low, np.inf)
+    keys = np.maximum.accumulate(np.clip((chosen[3] - low) / rise, 0.0, 1.0), axis=0) + 2 * np.arange(len(panel))
+    sign = np.where(falls[slots.ravel(), panel], -1.0, 1.0)
+    lines: Array = np.vstack([(starts + half - starts[0])[panel], half[panel], sign, low, high, *chosen[:3]])
+    return slots, lines, np.asarray(keys.T.ravel(), dtype=np.float64), float(2.0 * half @ error)
