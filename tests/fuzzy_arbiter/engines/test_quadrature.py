@@ -89,7 +89,7 @@ def test_clipped_curves_match_quadrature_for_cuts_of_any_size(seed):
             degrees = np.array([term.membership.of_many(x) for term in output.terms])  # at which terms meet their cuts
             cuts = np.hstack([
                 degrees, degrees * (1 - 1e-15), rng.random((slots, 20)), 10 ** rng.uniform(-300, 0, (slots, 20)),
-                rng.choice([0.0, 1e-9, 0.5, 0.7, 0.999, 1.0], (slots, 20)),
+                rng.choice([0.0, 1e-9, 0.5, 0.7, 0.7 - 1e-15, 1.0 - 1e-15, 0.999, 1.0], (slots, 20)),
             ])  # fmt: skip
             cuts = cuts[:, cuts.max(axis=0) > 0.0]
             found = curves.values(cuts, np.zeros((cuts.shape[1], 0)))
