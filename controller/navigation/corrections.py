@@ -57,7 +57,7 @@ def correct_by_sensor(memory: NavigationMemory, measurements: Measurements, sens
     noise = _predict_sample(memory, measurements, sensor, sensors, position, velocity, R, innovation, rows)
     if noise < 0.0:
         return
-    age = memory.time[0] - measurements.times[sensor]
+    age = memory.time - measurements.times[sensor]
     for i in range(count):
         _age_row(rows[i], age, memory.acceleration, R, sensors.gravity)
     if _is_outlier(memory.covariance, rows, innovation, noise, count):
@@ -150,7 +150,7 @@ def _is_outlier(P: ErrorMatrix, rows: ErrorRows, innovation: Vector3, noise: flo
 
 def restart(memory: NavigationMemory) -> None:
     """Clear the estimate, so that the filter starts again with the next fixes."""
-    memory.started[0] = 0.0
+    memory.started = 0.0
     memory.previous_fix[:] = np.nan
 
 
@@ -186,8 +186,8 @@ def _correct_number(
 
 def _apply(memory: NavigationMemory, error: Errors) -> None:
     """Add an estimated error to the estimate."""
-    memory.position[:] += error[:3]
-    memory.velocity[:] += error[VELOCITY : VELOCITY + 3]
+    memory.position += error[:3]
+    memory.velocity += error[VELOCITY : VELOCITY + 3]
     turn = rotation_matrix(memory.quaternion).T @ error[ATTITUDE : ATTITUDE + 3]  # from world to body axes
     rotate(memory.quaternion, turn)
-    memory.constants[:] += error[GYRO_BIAS:]
+    memory.constants += error[GYRO_BIAS:]

@@ -37,16 +37,16 @@ def propagate(memory: NavigationMemory, force: Vector3, omega: Vector3, sensors:
     f = R @ force
     acceleration = f + array(0.0, 0.0, sensors.gravity)
     step = period * (memory.velocity + 0.5 * period * acceleration)
-    memory.position[:] += step
-    memory.velocity[:] += period * acceleration
+    memory.position += step
+    memory.velocity += period * acceleration
     memory.imu_motion[:3] += step
     memory.imu_motion[3:6] += period * acceleration
     rotate(memory.imu_motion[6:], turn)
-    memory.acceleration[:], memory.omega[:] = acceleration, omega
-    memory.time[0] += period
-    i = memory.recorded[0] % memory.imu_history.shape[0]  # the motion by the IMU alone
-    memory.imu_history[i, 0], memory.imu_history[i, 1:] = memory.time[0], memory.imu_motion
-    memory.recorded[0] += 1
+    memory.acceleration, memory.omega = acceleration, omega
+    memory.time += period
+    i = memory.recorded % memory.imu_history.shape[0]  # the motion by the IMU alone
+    memory.imu_history[i, 0], memory.imu_history[i, 1:] = memory.time, memory.imu_motion
+    memory.recorded += 1
     _propagate_covariance(memory.covariance, R, f, sensors, period)
 
 
@@ -83,15 +83,15 @@ def estimate_at(
     memory: NavigationMemory, time: float, position: Vector3, velocity: Vector3, quaternion: Vector4
 ) -> bool:
     """Write position [m], velocity [m/s] and attitude at a time [s]; return False if the history does not reach it."""
-    later, history, n = time - memory.time[0], memory.imu_history, memory.imu_history.shape[0]
+    later, history, n = time - memory.time, memory.imu_history, memory.imu_history.shape[0]
     quaternion[:] = memory.quaternion
     if later >= 0.0:
         position[:] = memory.position + later * (memory.velocity + 0.5 * later * memory.acceleration)
         velocity[:] = memory.velocity + later * memory.acceleration
         rotate(quaternion, later * memory.omega)
         return True
-    newest = memory.recorded[0] - 1
-    oldest = max(memory.recorded[0] - n, 0)
+    newest = memory.recorded - 1
+    oldest = max(memory.recorded - n, 0)
     i = newest
     while i > oldest and history[i % n, 0] > time:
         i -= 1

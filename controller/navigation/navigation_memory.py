@@ -5,14 +5,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import square
 from controller.navigation.measurements import N_SENSORS, SensorModel
-from controller.stack_array import Array, Number, Shape, Vector3, Vector4
+from controller.stack_array import Shape, Vector3, Vector4
+from controller.state import State
 
 # index of the first error of each kind
 POSITION, VELOCITY, ATTITUDE, GYRO_BIAS, ACCELERATION_BIAS = 0, 3, 6, 9, 12
@@ -26,12 +27,14 @@ _REMEMBERED = 128  # number of IMU samples in the history, for late measurements
 Errors = Annotated[NDArray[np.float64], Shape(N_ERRORS)]
 ErrorMatrix = Annotated[NDArray[np.float64], Shape(N_ERRORS, N_ERRORS)]
 ErrorRows = Annotated[NDArray[np.float64], Shape(3, N_ERRORS)]
+PerSensor = Annotated[NDArray[np.float64], Shape(N_SENSORS)]
+Innovations = Annotated[NDArray[np.float64], Shape(N_SENSORS, 3)]
 Constants = Annotated[NDArray[np.float64], Shape(9)]
 ImuMotion = Annotated[NDArray[np.float64], Shape(10)]
 ImuHistory = Annotated[NDArray[np.float64], Shape(_REMEMBERED, 11)]
 
 
-class NavigationMemory(NamedTuple):
+class NavigationMemory(State):
     """Estimate and covariance."""
 
     position: Vector3  # m, NED
@@ -39,45 +42,28 @@ class NavigationMemory(NamedTuple):
     quaternion: Vector4  # from body to world
     constants: Constants  # errors of gyros [rad/s] (3), accelerometers [m/s2] (3), compass [rad], depth [m], DVL
     covariance: ErrorMatrix  # covariance of the errors
-    time: Number  # s, time of the estimate: that of the last IMU sample; NaN before the first
+    now: float  # s, time for which the state is estimated
+    time: float = np.nan  # s, time of the estimate: that of the last IMU sample; NaN before the first
     acceleration: Vector3  # m/s2 over ground, NED, at the last IMU sample
     omega: Vector3  # rad/s, body axes, at the last IMU sample
-    sample_times: Array  # (5,) s, times of the last samples used
+    sample_times: PerSensor  # s, times of the last samples used
     previous_fix: Vector3  # m, NED, the last fix before the start; NaN: none yet
-    rejected: Array  # (5,) samples rejected in a row
-    resets: Array  # (5,) resets of the covariance by each sensor since it was confirmed
-    accepted: Array  # (5,) samples accepted since the start, or since the sensor reset the covariance
-    innovations: Array  # (5, 3) a row a sensor: sum of normalized squared innovations, their degrees, rejected samples
-    started: Number  # 1 once there is an estimate
+    rejected: PerSensor  # samples rejected in a row
+    resets: PerSensor  # resets of the covariance by each sensor since it was confirmed
+    accepted: PerSensor  # samples accepted since the start, or since the sensor reset the covariance
+    innovations: Innovations  # a row a sensor: sum of normalized squared innovations, their degrees, rejected samples
+    started: float  # 1 once there is an estimate
     imu_motion: ImuMotion  # change of position, velocity and attitude by the IMU alone, since the start
     imu_history: ImuHistory  # time and `imu_motion` of the last IMU samples
-    recorded: NDArray[np.int64]  # (1,) number of recorded samples
+    recorded: int  # number of recorded samples
 
 
 def empty_memory() -> NavigationMemory:
     """Return the filter's memory before the first sample."""
-    motion = np.zeros(10)
-    motion[6] = 1.0
-    return NavigationMemory(
-        position=np.zeros(3),
-        velocity=np.zeros(3),
-        quaternion=np.array([1.0, 0.0, 0.0, 0.0]),
-        constants=np.zeros(9),
-        covariance=np.zeros((N_ERRORS, N_ERRORS)),
-        time=np.array([np.nan]),
-        acceleration=np.zeros(3),
-        omega=np.zeros(3),
-        sample_times=np.full(N_SENSORS, -1e11),
-        previous_fix=np.full(3, np.nan),
-        rejected=np.zeros(N_SENSORS),
-        resets=np.zeros(N_SENSORS),
-        accepted=np.zeros(N_SENSORS),
-        innovations=np.zeros((N_SENSORS, 3)),
-        started=np.zeros(1),
-        imu_motion=motion,
-        imu_history=np.zeros((_REMEMBERED, 11)),
-        recorded=np.zeros(1, np.int64),
-    )
+    memory = NavigationMemory()
+    memory.quaternion[0] = memory.imu_motion[6] = 1.0
+    memory.sample_times[:], memory.previous_fix[:] = -1e11, np.nan
+    return memory
 
 
 def set_first_covariance(memory: NavigationMemory, sensors: SensorModel) -> None:

@@ -37,7 +37,7 @@ from controller.navigation.navigation_memory import (
     set_first_covariance,
 )
 from controller.quaternion import rotation_matrix
-from controller.stack_array import Array, Vector4, array, zeros
+from controller.stack_array import Vector4, array, zeros
 
 _NEVER = -1e11  # s, time before any sample
 _UNEXPLAINED = 4.0  # number of standard deviations of a fix beyond which two fixes differ by more than noise
@@ -48,21 +48,19 @@ _FAST = 0.5  # m/s, standard deviation of a velocity beyond which it counts as u
 _QUARTER_TURN = 1.5707963267948966  # rad
 
 
-def navigate(
-    measurements: Measurements, now: Array, sensors: SensorModel, memory: NavigationMemory, state: VehicleState
-) -> None:
-    """Process the new samples, and write the estimated state at this time, shape (1,) [s]; NaN where it is unknown."""
+def navigate(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory, state: VehicleState) -> None:
+    """Process the new samples, and write the estimated state at the time `memory.now`; NaN where it is unknown."""
     if measurements.times[IMU] > memory.sample_times[IMU]:
         _take_imu_sample(measurements, sensors, memory)
-    if memory.started[0] == 0.0:
+    if memory.started == 0.0:
         _start(measurements, sensors, memory)
     else:
         for sensor in range(N_SENSORS):
-            new = measurements.times[sensor] > memory.sample_times[sensor] and memory.started[0] > 0.0
+            new = measurements.times[sensor] > memory.sample_times[sensor] and memory.started > 0.0
             if sensor != IMU and new:
                 memory.sample_times[sensor] = measurements.times[sensor]
                 correct_by_sensor(memory, measurements, sensor, sensors)
-    _write_state(memory, sensors, now[0], state)
+    _write_state(memory, sensors, memory.now, state)
 
 
 def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory) -> None:
@@ -70,14 +68,14 @@ def _take_imu_sample(measurements: Measurements, sensors: SensorModel, memory: N
     time = measurements.times[IMU]
     omega = measurements.values[ANGULAR_VELOCITY : ANGULAR_VELOCITY + 3] - memory.constants[:3]
     force = measurements.values[ACCELERATION : ACCELERATION + 3] - memory.constants[3:6]
-    period = time - memory.time[0]
-    if memory.started[0] > 0.0 and period <= _MAX_GAP:
+    period = time - memory.time
+    if memory.started > 0.0 and period <= _MAX_GAP:
         propagate(memory, force, omega, sensors, period)
     else:
-        if memory.started[0] > 0.0:  # too long without a sample
+        if memory.started > 0.0:  # too long without a sample
             restart(memory)
-        memory.omega[:] = omega
-    memory.time[0] = memory.sample_times[IMU] = time
+        memory.omega = omega
+    memory.time = memory.sample_times[IMU] = time
 
 
 def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationMemory) -> None:
@@ -86,20 +84,20 @@ def _start(measurements: Measurements, sensors: SensorModel, memory: NavigationM
     # mean; half their distance adds to its deviation where noise does not explain it.
     times = measurements.times
     latest = min(times[IMU], times[COMPASS], times[DEPTH_SENSOR], times[USBL])
-    if not latest > _NEVER or times[IMU] != memory.time[0] or not times[USBL] > memory.sample_times[USBL]:
+    if not latest > _NEVER or times[IMU] != memory.time or not times[USBL] > memory.sample_times[USBL]:
         return
     fix = measurements.values[MEASURED_POSITION : MEASURED_POSITION + 3]
     apart = fix - memory.previous_fix
-    memory.sample_times[USBL], memory.previous_fix[:] = times[USBL], fix
+    memory.sample_times[USBL], memory.previous_fix = times[USBL], fix
     if not np.all(abs(apart) < _FIX_DEVIATIONS * sensors.position + _FIX_DISTANCE):
         return
     memory.constants[:] = 0.0
-    f, memory.started[0] = measurements.values[ACCELERATION : ACCELERATION + 3], 1.0
+    f, memory.started = measurements.values[ACCELERATION : ACCELERATION + 3], 1.0
     roll, pitch = arctangent(-f[1], -f[2]), arctangent(f[0], hypotenuse(f[1], f[2]))
-    memory.quaternion[:] = _from_euler(roll, pitch, measurements.values[HEADING])
-    memory.position[:], memory.velocity[:], memory.acceleration[:] = fix - 0.5 * apart, 0.0, 0.0
+    memory.quaternion = _from_euler(roll, pitch, measurements.values[HEADING])
+    memory.position, memory.velocity[:], memory.acceleration[:] = fix - 0.5 * apart, 0.0, 0.0
     memory.position[2] = measurements.values[DEPTH]
-    memory.recorded[0] = 0
+    memory.recorded = 0
     set_first_covariance(memory, sensors)
     for i in range(2):  # variance of a mean of two fixes; greater where noise does not explain their distance
         memory.covariance[POSITION + i, POSITION + i] -= 0.5 * square(sensors.position)
@@ -125,7 +123,7 @@ def _from_euler(roll: float, pitch: float, yaw: float) -> Vector4:
 def _write_state(memory: NavigationMemory, sensors: SensorModel, now: float, state: VehicleState) -> None:
     """Write the state at a time [s] with its standard deviations."""
     velocity, P, deviation = zeros(3), memory.covariance, state.deviation
-    known = memory.started[0] > 0.0 and now - memory.time[0] <= _MAX_GAP
+    known = memory.started > 0.0 and now - memory.time <= _MAX_GAP
     if known:
         estimate_at(memory, now, state.position, velocity, state.quaternion)
     else:
@@ -150,14 +148,14 @@ class Navigator:
     def __init__(self, sensors: SensorModel, state: VehicleState) -> None:
         self.sensors, self.state = sensors, state
         self.measurements, self.memory = empty_measurements(), empty_memory()
-        self._now, self._step = np.zeros(1), CompiledFunction(navigate)
+        self._step = CompiledFunction(navigate)
 
     @property
     def started(self) -> bool:
         """True if there is an estimate."""
-        return bool(self.memory.started[0] > 0.0)
+        return bool(self.memory.started > 0.0)
 
     def step(self, time: float) -> None:
         """Process the measurements, and write the state at a time [s]."""
-        self._now[0] = time
-        self._step(self.measurements, self._now, self.sensors, self.memory, self.state)
+        self.memory.now = time
+        self._step(self.measurements, self.sensors, self.memory, self.state)

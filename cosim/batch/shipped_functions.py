@@ -46,7 +46,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     signals = step_signals(scenario, law, inputs, outputs)
     data = make_data(scenario, model, law, signals, inputs, outputs, make_noise(scenario))
     state, goal, regions = data.state, data.goal, data.regions
-    yield navigate, (data.measurements, data.now, model.sensors, data.navigation, state)
+    yield navigate, (data.measurements, model.sensors, data.navigation, state)
     for kind in LAWS.values():
         gains, level = kind.gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
         made = kind.for_vehicle(vehicle_model(scenario.vehicle), gains, level, scenario.time.control, 1)

@@ -73,7 +73,7 @@ def control(model: StepModel, data: StepData) -> None:
 
 def controls(model: StepModel, data: StepData) -> bool:
     """Return True if the law computes the forces: the command is not given, and there is a state."""
-    return data.manual[0] == 0 and (not model.through_sensors or data.navigation.started[0] > 0.0)
+    return data.manual[0] == 0 and (not model.through_sensors or data.navigation.started > 0.0)
 
 
 def bound_wrench(wrench: Array) -> bool:

@@ -52,7 +52,8 @@ def read_outputs(data: StepData, plant: PlantCalls) -> None:
 def estimate_state(model: StepModel, data: StepData) -> None:
     """Write the state that law and arbiter receive."""
     if model.through_sensors:
-        navigate(data.measurements, data.now, model.sensors, data.navigation, data.state)
+        data.navigation.now = data.now[0]
+        navigate(data.measurements, model.sensors, data.navigation, data.state)
     else:
         sense(model, data)
 

@@ -46,7 +46,7 @@ def begun(rng, age=0.0):
     tilted = Rotation.from_euler("ZYX", rng.uniform([-3.0, -0.6, -0.6], [3.0, 0.6, 0.6]))
     memory.quaternion[:] = tilted.as_quat()[[3, 0, 1, 2]]
     memory.constants[:] = rng.normal(size=9) * [*[0.01] * 3, *[0.1] * 3, 0.02, 0.02, 0.01]
-    memory.time[0] = memory.started = 1.0
+    memory.time = memory.started = 1.0
     samples = rng.normal(size=3) * 0.3 + [0.0, 0.0, -9.8], rng.normal(size=3) * 0.2
     memory.omega[:] = samples[1]
     propagate(memory, *samples, SENSORS, 0.01)
@@ -105,7 +105,7 @@ def test_attitude_is_corrected_by_the_measured_velocity_while_the_estimated_one_
     H, off = rows_by_differences(truth, DVL), ideal_measurement(truth, DVL) - ideal_measurement(memory, DVL)
     K = P @ H.T @ np.linalg.inv(H @ P @ H.T + NOISE[DVL] ** 2 * np.eye(3))
     expected = moved(memory, K @ off), (np.eye(N_ERRORS) - K @ H) @ P
-    correct(memory, DVL, ideal_measurement(truth, DVL), memory.time[0])
+    correct(memory, DVL, ideal_measurement(truth, DVL), memory.time)
     assert_estimate(memory, *expected)
 
 
@@ -122,7 +122,7 @@ def test_sample_corrects_as_by_plain_matrices(sensor, age):
     S = H @ P @ H.T + NOISE[sensor] ** 2 * np.eye(len(H))
     off, K = rng.multivariate_normal(np.zeros(len(H)), S) * 0.5, P @ H.T @ np.linalg.inv(S)
     expected = moved(memory, K @ off), (np.eye(N_ERRORS) - K @ H) @ P
-    correct(memory, sensor, ideal_measurement(before, sensor) + off, before.time[0])
+    correct(memory, sensor, ideal_measurement(before, sensor) + off, before.time)
     assert_estimate(memory, *expected)
     assert memory.innovations[sensor] == pytest.approx([off @ np.linalg.inv(S) @ off, len(H), 0.0], rel=1e-5)
     assert (memory.accepted[sensor], memory.rejected[sensor], memory.resets[sensor]) == (1.0, 0.0, 0.0)
@@ -132,7 +132,7 @@ def test_sample_corrects_as_by_plain_matrices(sensor, age):
 def test_sample_from_before_the_history_counts_as_rejected_alone(sensor):
     memory, _ = begun(np.random.default_rng(9))
     expected, measurements = copy.deepcopy(memory), empty_measurements()
-    measurements.times[sensor] = memory.time[0] - 1.0
+    measurements.times[sensor] = memory.time - 1.0
     expected.innovations[sensor, 2] = 1.0
     correct_by_sensor(memory, measurements, sensor, SENSORS)
     for ours, theirs in zip(memory, expected, strict=True):
@@ -146,10 +146,10 @@ def test_single_outlier_is_rejected_and_third_consecutive_is_accepted():
     before, measurements = memory.position.copy(), empty_measurements()
     measurements.values[12:15] = before + np.array([5.0, 0.0, 0.0])
     for k in range(2):
-        measurements.times[USBL] = memory.time[0]
+        measurements.times[USBL] = memory.time
         correct_by_sensor(memory, measurements, USBL, SENSORS)
         assert np.array_equal(memory.position, before) and memory.rejected[USBL] == k + 1.0
-    measurements.times[USBL] = memory.time[0]
+    measurements.times[USBL] = memory.time
     correct_by_sensor(memory, measurements, USBL, SENSORS)
     assert memory.position[0] == pytest.approx(before[0] + 5.0, abs=0.05) and memory.rejected[USBL] == 0.0
     assert memory.innovations[USBL, 2] == 3.0
@@ -169,7 +169,7 @@ def test_third_consecutive_outlier_widens_the_position_by_its_innovation(sensor)
     measurements = empty_measurements()
     measurements.values[PLACES[sensor]] = ideal_measurement(memory, sensor) + off
     for _ in range(3):
-        measurements.times[sensor] = memory.time[0]
+        measurements.times[sensor] = memory.time
         correct_by_sensor(memory, measurements, sensor, SENSORS)
     assert (memory.accepted[sensor], memory.rejected[sensor], memory.resets[sensor]) == (1.0, 0.0, 1.0)
     P = start
@@ -187,7 +187,7 @@ def test_heading_innovation_wraps_around(side):
     memory.constants[6] = 0.0
     measurements = empty_measurements()
     measurements.values[11] = -side * (np.pi - 0.01)
-    measurements.times[COMPASS] = memory.time[0]
+    measurements.times[COMPASS] = memory.time
     correct_by_sensor(memory, measurements, COMPASS, SENSORS)
     yaw = rotation(memory.quaternion).as_euler("ZYX")[0] + memory.constants[6]
     assert abs((yaw - side * (np.pi + 0.01) + np.pi) % (2 * np.pi) - np.pi) < 1e-3
@@ -198,7 +198,7 @@ def test_compass_sample_is_ignored_at_vertical_pitch():
     memory.quaternion[:] = Rotation.from_euler("Y", 1.5).as_quat()[[3, 0, 1, 2]]
     before = copy.deepcopy(memory)
     measurements = empty_measurements()
-    measurements.times[COMPASS] = memory.time[0]
+    measurements.times[COMPASS] = memory.time
     correct_by_sensor(memory, measurements, COMPASS, SENSORS)
     for ours, theirs in zip(memory, before, strict=True):
         assert np.array_equal(ours, theirs, equal_nan=True)

@@ -20,7 +20,7 @@ def begun(rng):
     memory.omega[:] = rng.normal(size=3) * 0.3
     half = rng.normal(size=(N_ERRORS, N_ERRORS))
     memory.covariance[:] = half @ half.T * 1e-3
-    memory.time[0] = 0.0
+    memory.time = 0.0
     return memory
 
 
@@ -72,7 +72,7 @@ def test_strapdown_integration_matches_scipy():
     assert memory.position == pytest.approx(end[:3], abs=2e-4)
     assert memory.velocity == pytest.approx(end[3:6], abs=2e-4)
     assert (rotation(memory.quaternion) * rotation(end[6:]).inv()).magnitude() < 2e-5
-    assert memory.time[0] == pytest.approx(2.0)
+    assert memory.time == pytest.approx(2.0)
 
     # the recent past, between two samples, from the present estimate
     position, velocity, quaternion = np.zeros(3), np.zeros(3), np.zeros(4)

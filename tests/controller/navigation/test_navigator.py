@@ -59,7 +59,7 @@ def test_known_constant_errors_of_the_imu_cause_no_motion():
         level(navigator, 1.19 + 0.01 * k, sensors=[IMU])
         navigator.measurements.values[5:11] += memory.constants[[3, 4, 5, 0, 1, 2]]
         navigator.step(1.19 + 0.01 * k)
-    assert navigator.started and memory.time[0] == pytest.approx(1.29)
+    assert navigator.started and memory.time == pytest.approx(1.29)
     for part, was in zip(memory[:3], before, strict=True):
         assert part == pytest.approx(was, abs=1e-4)
 
@@ -139,7 +139,7 @@ def test_initial_position_is_the_mean_of_two_fixes_with_their_spread():
 
 def test_written_state_is_the_estimate_with_the_deviation_of_each_axis():
     memory, state, turned = empty_memory(), make_vehicle_state(), Rotation.from_euler("ZYX", [0.4, -0.3, 0.2])
-    memory.started = memory.time[0] = 1.0
+    memory.started = memory.time = 1.0
     memory.quaternion[:], memory.velocity[:] = turned.as_quat()[[3, 0, 1, 2]], (0.3, -0.2, 0.1)
     deviation = 0.01 * np.arange(1.0, 19.0)
     memory.covariance[:] = np.diag(deviation**2)
