@@ -23,13 +23,13 @@ def validate_description(path: Path, root: ET.Element) -> None:
     """Refuse a model description whose numbers or names could harm an importer."""
     version = root.get("fmiVersion", "")
     if root.tag != "fmiModelDescription" or not (version == "2.0" or version.startswith("3.0")):
-        raise FmuFileError(f"{path}: FMI version is {_short(version)}, expected 2.0 or 3.0")
+        raise FmuFileError(f"{path}: FMI version is {_quote(version)}, expected 2.0 or 3.0")
     for interface in INTERFACES:
         for element in root.findall(interface):
             identifier = element.get("modelIdentifier", "")
             if not _IDENTIFIER.fullmatch(identifier):
                 raise FmuFileError(
-                    f"{path}: modelIdentifier of {interface} is {_short(identifier)}, expected a name of letters, "
+                    f"{path}: modelIdentifier of {interface} is {_quote(identifier)}, expected a name of letters, "
                     "digits and _"
                 )
     indicators = root.get("numberOfEventIndicators")
@@ -53,9 +53,9 @@ def _check_variables(path: Path, root: ET.Element) -> None:
             raise FmuFileError(f"{path}: a variable of modelDescription.xml has no {missing}, expected one")
         if not 0 < len(name) <= MAX_NAME:
             raise FmuFileError(
-                f"{path}: a variable's name has {len(name)} characters ({_short(name)}), expected 1 to {MAX_NAME}"
+                f"{path}: a variable's name has {len(name)} characters ({_quote(name)}), expected 1 to {MAX_NAME}"
             )
-        _parse_integer(f"{path}: valueReference of {_short(name)}", reference, MAX_REFERENCE)
+        _parse_integer(f"{path}: valueReference of {_quote(name)}", reference, MAX_REFERENCE)
         if dimensions := element.findall("Dimension"):
             arrays.append((name, dimensions))
         elif (start := element.get("start")) is not None:
@@ -64,15 +64,15 @@ def _check_variables(path: Path, root: ET.Element) -> None:
         entries = 1
         for dimension in dimensions:
             length = dimension.get("start") or starts.get(dimension.get("valueReference", ""), "1")
-            entries *= _parse_integer(f"{path}: a dimension of {_short(name)}", length, MAX_ENTRIES)
+            entries *= _parse_integer(f"{path}: a dimension of {_quote(name)}", length, MAX_ENTRIES)
             if entries > MAX_ENTRIES:
-                raise FmuFileError(f"{path}: {_short(name)} has {entries} entries, expected at most {MAX_ENTRIES}")
+                raise FmuFileError(f"{path}: {_quote(name)} has {entries} entries, expected at most {MAX_ENTRIES}")
 
 
 def _parse_integer(key: str, text: str, maximum: int) -> int:
     number = int(text) if len(text) <= 20 and re.fullmatch(r"\s*\+?[0-9]+\s*", text, re.ASCII) else maximum + 1
     if number > maximum:
-        raise FmuFileError(f"{key} is {_short(text)}, expected a whole number of at most {maximum}")
+        raise FmuFileError(f"{key} is {_quote(text)}, expected a whole number of at most {maximum}")
     return number
 
 
@@ -82,8 +82,8 @@ def _require_finite(key: str, text: str | None, *, above_zero: bool) -> None:
     except ValueError:
         number = math.nan
     if not (math.isfinite(number) and (number > 0.0 or not above_zero)):
-        raise FmuFileError(f"{key} is {_short(text or '')}, expected a finite number{' above 0' if above_zero else ''}")
+        raise FmuFileError(f"{key} is {_quote(text or '')}, expected a finite number{' above 0' if above_zero else ''}")
 
 
-def _short(text: str) -> str:
+def _quote(text: str) -> str:
     return repr(text if len(text) <= 60 else f"{text[:60]}...")

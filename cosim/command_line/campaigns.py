@@ -10,7 +10,7 @@ from concurrent.futures import Executor
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from cosim.command_line.flags import add_changes, add_verb, flag, refuse_flags, whole
+from cosim.command_line.flags import add_changes, add_verb, flag, int_range, refuse_flags
 from cosim.command_line.process import say, say_if_interrupted
 from cosim.errors import RunError
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from cosim.campaigns.sweeps.design import Vary
 
 _SENSING = ("state", "sensors")  # with the scenes' noise; or IMU, DVL, compass, pressure sensor and USBL
-_WORKERS = whole(1, 1024)
+_WORKERS = int_range(1, 1024)
 
 
 def add_verbs(verbs: Any) -> None:
@@ -64,7 +64,7 @@ def _add_scenes(verb: argparse.ArgumentParser) -> None:
 def add_campaign_folder(verb: argparse.ArgumentParser) -> None:
     """Add the flags for the folder of a campaign, and for the replays of its worst flights."""
     flag(verb, "--out DIR", "a new folder, or one to go on with what is left", Path, required=True)
-    flag(verb, "--replays N", "worst flights, of each law, that are repeated with a replay", whole(0, 1000), 3)
+    flag(verb, "--replays N", "worst flights, of each law, that are repeated with a replay", int_range(0, 1000), 3)
 
 
 def add_workers(verb: argparse.ArgumentParser) -> None:

@@ -7,7 +7,7 @@ import contextlib
 from dataclasses import fields
 from typing import Any
 
-from cosim.command_line.flags import add_changes, add_remote, add_run_folder, add_verb, flag, number, whole
+from cosim.command_line.flags import add_changes, add_remote, add_run_folder, add_verb, flag, float_range, int_range
 from cosim.command_line.link_flags import add_live_flag, network_endpoint, open_live, origin
 from cosim.command_line.process import INTERRUPTED, print_run, print_status
 from cosim.mavlink.wire.options import PROFILES
@@ -40,22 +40,22 @@ def add_verbs(verbs: Any) -> None:
     where = verb.add_mutually_exclusive_group()
     flag(where, "--scene-origin LAT,LON", "coordinates of the scene's origin: seven decimals are 1 cm", _scene_origin)
     flag(where, "--surveyed-origin N,E,D", "position of the autopilot's local origin in the scene [m]", _position)
-    flag(verb, "--surface-pressure HPA", "pressure of the air at the surface", number(500.0, 1200.0), 1013.25)
-    flag(verb, "--water-density KG/M3", "sea: 1025", number(900.0, 1200.0), 1000.0)
+    flag(verb, "--surface-pressure HPA", "pressure of the air at the surface", float_range(500.0, 1200.0), 1013.25)
+    flag(verb, "--water-density KG/M3", "sea: 1025", float_range(900.0, 1200.0), 1000.0)
     arming = verb.add_mutually_exclusive_group()
     flag(arming, "--dry-run", "compute and record, and send neither sticks nor commands")
     flag(arming, "--await-arm", "wait for somebody to arm the vehicle (the default)")
     flag(arming, "--arm", "arm the vehicle")
-    flag(verb, "--pilot-gain N", "fraction of the wrench at full sticks: JS_GAIN_DEFAULT", number(0.05, 1.0), 0.5)
-    lag = number(0.01, 10.0)
+    flag(verb, "--pilot-gain N", "fraction of the wrench at full sticks: JS_GAIN_DEFAULT", float_range(0.05, 1.0), 0.5)
+    lag = float_range(0.01, 10.0)
     flag(verb, "--velocity-lag S", "time constant of the autopilot's horizontal velocity loop", lag, 2.0)
     flag(verb, "--vertical-lag S", "time constant of the autopilot's vertical velocity loop", lag, 0.5)
-    flag(verb, "--reckoning-error N", "position error per distance, without a fix", number(0.0, 1.0), 0.03)
-    flag(verb, "--level-dive M", "an ArduSub's dive after arming, to align its heading", number(0.0, 10.0), 0.6)
-    flag(verb, "--least-battery PERCENT", "charge below which the vehicle holds still", number(0.0, 100.0), 0.0)
-    flag(verb, "--system-id N", "system id: an ArduSub takes sticks from its SYSID_MYGCS alone", whole(1, 255), 255)
-    flag(verb, "--timeout S", "end if steering cannot begin in so many seconds", number(0.1, 1e6))
-    flag(verb, "--speedup N", "seconds of a simulated autopilot per second", number(0.01, 100.0), 1.0)
+    flag(verb, "--reckoning-error N", "position error per distance, without a fix", float_range(0.0, 1.0), 0.03)
+    flag(verb, "--level-dive M", "an ArduSub's dive after arming, to align its heading", float_range(0.0, 10.0), 0.6)
+    flag(verb, "--least-battery PERCENT", "charge below which the vehicle holds still", float_range(0.0, 100.0), 0.0)
+    flag(verb, "--system-id N", "system id: an ArduSub takes sticks from its SYSID_MYGCS alone", int_range(1, 255), 255)
+    flag(verb, "--timeout S", "end if steering cannot begin in so many seconds", float_range(0.1, 1e6))
+    flag(verb, "--speedup N", "seconds of a simulated autopilot per second", float_range(0.01, 100.0), 1.0)
     add_remote(verb)
     add_live_flag(verb, "show the flight in browsers while it goes on")
     add_run_folder(verb)

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.flags import LIST, add_changes, add_verb, flag, number, refuse_flags, whole
+from cosim.command_line.flags import LIST, add_changes, add_verb, flag, float_range, int_range, refuse_flags
 from cosim.command_line.process import say_if_interrupted
 
 
@@ -27,8 +27,8 @@ def add_verbs(verbs: Any) -> None:
     flag(verb, "--out FILE", "file to write (default: RUN.FORMAT or SCENARIO.ssp here)", Path)
     flag(verb, "--force", "replace a file that exists")
     thinned = verb.add_mutually_exclusive_group()
-    flag(thinned, "--every N", "export every N-th step (default: all)", whole(1, 10**9))
-    flag(thinned, "--rate HZ", "steps per simulated second", number(1e-9, 1e9))
+    flag(thinned, "--every N", "export every N-th step (default: all)", int_range(1, 10**9))
+    flag(thinned, "--rate HZ", "steps per simulated second", float_range(1e-9, 1e9))
     flag(verb, "--signals GLOB", "such as 'position.*' (default: all); the time is always included", **LIST)
     flag(verb, "--fmi", "with ssp: FMI version (default: 2, which most SSP masters support)", int, choices=(2, 3))
     flag(verb, "--platforms NAMES", "with ssp: native (default), all, or such as x86_64-linux,x86_64-windows")

@@ -10,7 +10,7 @@ from typing import Any
 
 from cosim.errors import RunError
 
-_SHOWN = 40  # maximum number of characters of a refused text in the message
+_MAX_QUOTED = 40  # maximum number of characters of a refused text in the message
 
 # of a flag that takes several values and may be repeated
 LIST: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
@@ -22,12 +22,12 @@ def add_verb(
     verbs: Any, name: str, call: Callable[[argparse.Namespace], int], summary: str, page: str, examples: Sequence[str]
 ) -> argparse.ArgumentParser:
     """Add a verb that runs `call`; its help has the summary, examples, and the page of docs/ that explains it."""
-    shown = "".join(f"  cosim {example}\n" for example in examples)
+    example_lines = "".join(f"  cosim {example}\n" for example in examples)
     verb: argparse.ArgumentParser = verbs.add_parser(
         name,
         help=summary,
         description=f"{summary[0].upper()}{summary[1:]}.",
-        epilog=f"examples:\n{shown}\nmore: docs/{page}.md",
+        epilog=f"examples:\n{example_lines}\nmore: docs/{page}.md",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     verb.set_defaults(call=call)
@@ -63,9 +63,9 @@ def add_scenario(verb: Container, **more: Any) -> None:
     verb.add_argument("scenario", help="a shipped name (cosim show lists them), or a TOML file", **more)
 
 
-def add_changes(verb: Container, of: str = "a key of the scenario, such as law.gains.k_p1=10") -> None:
+def add_changes(verb: Container, what: str = "a key of the scenario, such as law.gains.k_p1=10") -> None:
     """Add the flag that changes keys of the scenario, or gains of a law."""
-    flag(verb, "--set KEY=VALUE", f"set {of}; may be repeated", action="append", default=[])
+    flag(verb, "--set KEY=VALUE", f"set {what}; may be repeated", action="append", default=[])
 
 
 def add_run_folder(verb: Container) -> None:
@@ -83,20 +83,20 @@ def add_remote(verb: Container) -> None:
 # ---- types of numbers within bounds ----------------------------------------------------------------------------------
 
 
-def whole(low: int, high: int) -> Callable[[str], int]:
-    """Make the type of a flag that takes a whole number."""
+def int_range(low: int, high: int) -> Callable[[str], int]:
+    """Make the type of a flag that takes a whole number from low to high."""
 
     def parse(text: str) -> int:
         digits = text.isascii() and text.isdecimal() and len(text) <= len(str(high))
         if digits and low <= int(text) <= high:
             return int(text)
-        raise argparse.ArgumentTypeError(f"{text[:_SHOWN]!r}: expected a whole number from {low} to {high}")
+        raise argparse.ArgumentTypeError(f"{text[:_MAX_QUOTED]!r}: expected a whole number from {low} to {high}")
 
     return parse
 
 
-def number(low: float, high: float) -> Callable[[str], float]:
-    """Make the type of a flag that takes a number."""
+def float_range(low: float, high: float) -> Callable[[str], float]:
+    """Make the type of a flag that takes a number from low to high."""
 
     def parse(text: str) -> float:
         try:
@@ -105,7 +105,7 @@ def number(low: float, high: float) -> Callable[[str], float]:
             value = math.nan
         if low <= value <= high:
             return value
-        raise argparse.ArgumentTypeError(f"{text[:_SHOWN]!r}: expected a number from {low:g} to {high:g}")
+        raise argparse.ArgumentTypeError(f"{text[:_MAX_QUOTED]!r}: expected a number from {low:g} to {high:g}")
 
     return parse
 
@@ -113,6 +113,6 @@ def number(low: float, high: float) -> Callable[[str], float]:
 def rate(text: str) -> float:
     """Parse a rate in simulated seconds per second; ``max`` is infinity."""
     try:
-        return math.inf if text == "max" else number(1e-3, 1e6)(text)
+        return math.inf if text == "max" else float_range(1e-3, 1e6)(text)
     except argparse.ArgumentTypeError as error:
         raise argparse.ArgumentTypeError(f"{error}, or max") from None

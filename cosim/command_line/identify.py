@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.flags import add_verb, flag, number, refuse_flags, whole
+from cosim.command_line.flags import add_verb, flag, float_range, int_range, refuse_flags
 from cosim.command_line.process import say
 
 _EXCITATION: dict[str, Any] = {
@@ -47,12 +47,12 @@ def add_verbs(verbs: Any) -> None:
     )  # fmt: skip
     excite = verb.add_argument_group("excitation")
     flag(excite, "--excite", "choose stick inputs that make the parameters identifiable, instead of fitting runs")
-    length = number(0.1, 1000.0)
+    length = float_range(0.1, 1000.0)
     flag(excite, "--box NORTH EAST DOWN", "sizes of the water that may be used [m] (default: 10 10 4)", length, nargs=3)
     flag(excite, "--depth M", "depth of the box's center [m] (default: 3)", length)
-    flag(excite, "--time S", "duration of all inputs [s] (default: 300)", number(1.0, 36000.0))
-    flag(excite, "--current SPEED", "current that the box allows for [m/s] (default: 0.1)", number(0.0, 2.0))
-    flag(excite, "--seed N", "seed of the candidates (default: 0)", whole(0, 2**31))
+    flag(excite, "--time S", "duration of all inputs [s] (default: 300)", float_range(1.0, 36000.0))
+    flag(excite, "--current SPEED", "current that the box allows for [m/s] (default: 0.1)", float_range(0.0, 2.0))
+    flag(excite, "--seed N", "seed of the candidates (default: 0)", int_range(0, 2**31))
 
 
 def identify(options: argparse.Namespace) -> int:

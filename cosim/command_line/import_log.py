@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.flags import add_verb, flag, number
+from cosim.command_line.flags import add_verb, flag, float_range
 from cosim.command_line.process import print_run, say_if_interrupted
 
 _BAR = "{desc} {percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
@@ -25,10 +25,10 @@ def add_verbs(verbs: Any) -> None:
     flag(verb, "--vehicle NAME", "a shipped vehicle or a TOML file, whose thrusters are driven", required=True)
     flag(verb, "--scenario NAME", "shipped name or TOML file, whose goal and regions judge it (default: none)")
     flag(verb, "--map FILE", "column map, for tables and bags of ROS", Path)
-    flag(verb, "--rate HZ", "rows per second (default: by the log)", number(1e-3, 1e4))
+    flag(verb, "--rate HZ", "rows per second (default: by the log)", float_range(1e-3, 1e4))
     curves = "linear", "quadratic", "t200"
     flag(verb, "--curve", "curve from servo pulse to force (default: that of the vehicle's file)", choices=curves)
-    flag(verb, "--voltage V", "supply voltage of the thrusters (default: that of the log)", number(1.0, 1e3))
+    flag(verb, "--voltage V", "supply voltage of the thrusters (default: that of the log)", float_range(1.0, 1e3))
     flag(verb, "--out RUN", "the run folder (default: a new one below runs)", Path)
     flag(verb, "--overwrite", "replace the run that the folder holds")
     flag(verb, "--no-report", "write no report and no replay")

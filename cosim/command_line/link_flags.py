@@ -7,7 +7,7 @@ import contextlib
 import math
 from typing import TYPE_CHECKING
 
-from cosim.command_line.flags import add_remote, flag, number, refuse_flags, whole
+from cosim.command_line.flags import add_remote, flag, float_range, int_range, refuse_flags
 from cosim.command_line.process import print_status
 from cosim.errors import TelemetryError
 from cosim.live.address import HOST, PORT, parse_live
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from cosim.live.live_view import LiveView
     from cosim.mavlink.wire.endpoint import Endpoint
 
-_SYSTEM = whole(1, 255)
+_SYSTEM = int_range(1, 255)
 
 
 def add_link_flags(verb: argparse.ArgumentParser, commands: bool = False, required: bool = False) -> None:
@@ -42,7 +42,7 @@ def add_link_flags(verb: argparse.ArgumentParser, commands: bool = False, requir
         verb,
         "--link-timeout S",
         f"silence that counts as link loss (default: {usual.loss_timeout:g})",
-        number(0.1, 3600.0),
+        float_range(0.1, 3600.0),
     )
 
 

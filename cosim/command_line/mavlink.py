@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.flags import add_remote, add_verb, flag, number, rate, whole
+from cosim.command_line.flags import add_remote, add_verb, flag, float_range, int_range, rate
 from cosim.command_line.link_flags import add_link_flags, links_from, network_endpoint
 from cosim.command_line.process import print_status, say
 
@@ -36,8 +36,8 @@ def add_verbs(verbs: Any) -> None:
     verb.add_argument("endpoint", metavar="ENDPOINT", help="such as udpin:127.0.0.1:14550 or tcp:127.0.0.1:5760")
     add_remote(verb)
     flag(verb, "--once", f"print one picture, after {_ONCE:g} s, and end")
-    flag(verb, "--seconds S", "end after so many seconds", number(1e-9, 1e9))
-    flag(verb, "--count N", "end after so many messages", whole(1, 10**12))
+    flag(verb, "--seconds S", "end after so many seconds", float_range(1e-9, 1e9))
+    flag(verb, "--count N", "end after so many messages", int_range(1, 10**12))
 
     verb = add_verb(
         inner, "stream", stream, "be a recorded run's vehicle on MAVLink links, or write it as a .tlog", "mavlink",

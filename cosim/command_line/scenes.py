@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from cosim.command_line.flags import add_verb, flag, whole
+from cosim.command_line.flags import add_verb, flag, int_range
 from cosim.errors import ScenarioError
 
 _MAX_COUNT = 10**7  # scenes, whose flights take more than a month
@@ -18,8 +18,14 @@ def add_verbs(verbs: Any) -> None:
         verbs, "scenes", scenes, "generate random scenes for campaigns, one JSON object a line", "campaigns",
         ("scenes --count 200 --seed 0 --out scenes.jsonl", "scenes --kind hard --count 3"),
     )  # fmt: skip
-    flag(verb, "--count N", "scenes", whole(1, _MAX_COUNT), 100)
-    flag(verb, "--seed S", "seed of the first scene, which the next ones count up", whole(0, 2**63 - 1 - _MAX_COUNT), 0)
+    flag(verb, "--count N", "scenes", int_range(1, _MAX_COUNT), 100)
+    flag(
+        verb,
+        "--seed S",
+        "seed of the first scene, which the next ones count up",
+        int_range(0, 2**63 - 1 - _MAX_COUNT),
+        0,
+    )
     flag(
         verb, "--kind", "hard: more obstacles, drift, a stronger current, noise, a thruster that fails; conflict: "
         "regions that exclude each other, on three vehicles; tour: the same with goals in turn; trial: scenes that "

@@ -6,7 +6,7 @@ import argparse
 import contextlib
 from typing import TYPE_CHECKING, Any
 
-from cosim.command_line.flags import add_changes, add_run_folder, add_verb, flag, number, refuse_flags, whole
+from cosim.command_line.flags import add_changes, add_run_folder, add_verb, flag, float_range, int_range, refuse_flags
 from cosim.command_line.process import INTERRUPTED, print_run, print_status, say
 from cosim.io.network_address import resolve_host
 
@@ -27,16 +27,18 @@ def add_verbs(verbs: Any) -> None:
     add_changes(verb)
     flag(verb, "--backend", "ardupilot: JSON by UDP; px4: HIL by TCP", default="ardupilot", choices=tuple(_PORTS))
     ports = "default: {ardupilot}, with px4 {px4}".format(**_PORTS)
-    flag(verb, "--port N", ports, whole(1, 65535))
+    flag(verb, "--port N", ports, int_range(1, 65535))
     flag(verb, "--host ADDRESS", "bound address", default="127.0.0.1")
     flag(verb, "--allow-remote", "let the address be seen from other machines")
-    flag(verb, "--timeout S", "end after so many seconds without a frame (default: never)", number(1e-3, 1e6))
-    flag(verb, "--speedup N", "with px4: most simulated seconds per second (default: 1)", number(0.01, 100.0))
-    flag(verb, "--record-rate HZ", "maximum number of recorded rows per simulated second", number(1e-3, 1e6), 100.0)
+    flag(verb, "--timeout S", "end after so many seconds without a frame (default: never)", float_range(1e-3, 1e6))
+    flag(verb, "--speedup N", "with px4: most simulated seconds per second (default: 1)", float_range(0.01, 100.0))
+    flag(
+        verb, "--record-rate HZ", "maximum number of recorded rows per simulated second", float_range(1e-3, 1e6), 100.0
+    )
     flag(verb, "--autopilot ENDPOINT", "with ardupilot: its port, such as tcp:127.0.0.1:5762; records its estimate")
-    flag(verb, "--dvl HZ", "rate of VISION_POSITION_DELTA to the autopilot, in simulated time", number(0.1, 100.0))
-    flag(verb, "--dvl-latency S", "their latency", number(0.0, 10.0), 0.1)
-    flag(verb, "--dvl-dropout PART", "part of these messages that is lost", number(0.0, 1.0), 0.0)
+    flag(verb, "--dvl HZ", "rate of VISION_POSITION_DELTA to the autopilot, in simulated time", float_range(0.1, 100.0))
+    flag(verb, "--dvl-latency S", "their latency", float_range(0.0, 10.0), 0.1)
+    flag(verb, "--dvl-dropout PART", "part of these messages that is lost", float_range(0.0, 1.0), 0.0)
     add_run_folder(verb)
 
 

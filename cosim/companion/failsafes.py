@@ -14,8 +14,8 @@ _REQUEST_PERIOD = 0.5  # s, between two requests of the missing parameters
 _READ_TIMEOUT = 3.0  # s, from the first request on; an ArduSub does not answer requests of parameters that it lacks
 _MAV_PARAM_TYPE_INT32 = 6
 
-_ON_SILENCE = {0: "does nothing", 1: "warns", 2: "disarms"}
-_ON_GCS_LOSS = {**_ON_SILENCE, 3: "holds the depth", 4: "surfaces"}
+_FAILSAFE_ACTIONS = {0: "does nothing", 1: "warns", 2: "disarms"}
+_ON_GCS_LOSS = {**_FAILSAFE_ACTIONS, 3: "holds the depth", 4: "surfaces"}
 _ON_LOST_SET_POINTS = {
     0: "changes to Position", 1: "changes to Altitude", 2: "changes to Stabilized", 3: "returns", 4: "lands",
     5: "holds", 6: "terminates", 7: "disarms",
@@ -28,21 +28,21 @@ class Parameter:
     """A parameter of an autopilot, with its meaning, and that of its values if it is an enumeration."""
 
     name: str
-    words: str
+    meaning: str
     choices: dict[int, str] | None = None
 
 
 PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
     "ardusub": (
-        Parameter("FS_PILOT_INPUT", "when sticks stop", _ON_SILENCE),
+        Parameter("FS_PILOT_INPUT", "when sticks stop", _FAILSAFE_ACTIONS),
         Parameter("FS_PILOT_TIMEOUT", "s until then"),
         Parameter("RC_OVERRIDE_TIME", "s for which the last sticks stay active, -1 for ever"),
         Parameter("FS_GCS_ENABLE", "on a ground station that falls silent", _ON_GCS_LOSS),
         Parameter("FS_GCS_TIMEOUT", "s until then"),
-        Parameter("FS_EKF_ACTION", "on an unreliable estimate", _ON_SILENCE),
+        Parameter("FS_EKF_ACTION", "on an unreliable estimate", _FAILSAFE_ACTIONS),
         Parameter("FS_EKF_THRESH", "variance above which the estimate is unreliable"),
         Parameter("FS_LEAK_ENABLE", "on a leak", {0: "does nothing", 1: "warns", 2: "surfaces"}),
-        Parameter("FS_CRASH_CHECK", "on a crash", _ON_SILENCE),
+        Parameter("FS_CRASH_CHECK", "on a crash", _FAILSAFE_ACTIONS),
         Parameter("BATT_FS_LOW_ACT", "on a low battery", {0: "does nothing", 2: "disarms", 3: "surfaces"}),
         Parameter("SYSID_MYGCS", "system whose sticks are accepted"),
         Parameter("MAV_GCS_SYSID", "system whose sticks are accepted, from 4.7 on"),
@@ -77,8 +77,8 @@ _OPTIONAL = ("SYSID_MYGCS", "MAV_GCS_SYSID", "MAV_GCS_SYSID_HI", "FS_GCS_TIMEOUT
 _GCS_TIMEOUT = 2.5  # s, of an ArduSub without FS_GCS_TIMEOUT, as 4.5
 _HOLD_TIMES = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # times [s] the last sticks act: with a radio, and without one
 _MAX_HOLD_TIME = 1.0  # s
-_NEVER = 2.0  # value of EK3_MAG_CAL: never learn the magnetic field
-_BY_STICKS = (0.0, 1.0, 2.0)  # values of COM_OBL_RC_ACT: modes that need sticks; without them NAV_RCL_ACT applies
+_NEVER_LEARN = 2.0  # value of EK3_MAG_CAL: never learn the magnetic field
+_STICK_MODES = (0.0, 1.0, 2.0)  # values of COM_OBL_RC_ACT: modes that need sticks; without them NAV_RCL_ACT applies
 _SATURATION = "UUV_THRUST_SAT"
 
 
@@ -88,14 +88,14 @@ class Failsafes:
     def __init__(self, profile: ProfileName) -> None:
         self._profile: ProfileName = profile
         self.values: dict[str, float] = {}
-        self._first, self._last = math.inf, -math.inf  # our times [s] of the first and the last request
+        self._first_request, self._last_request = math.inf, -math.inf  # our times [s] of the first and the last request
 
     def names_to_request(self, now: float) -> list[str]:
         """Return the names of missing parameters to request at our time `now` [s]; none for 0.5 s after a request."""
-        if self.is_read(now) or now - self._last < _REQUEST_PERIOD:
+        if self.is_read(now) or now - self._last_request < _REQUEST_PERIOD:
             return []
-        self._first = min(self._first, now)
-        self._last = now
+        self._first_request = min(self._first_request, now)
+        self._last_request = now
         return self._missing()
 
     def receive(self, message: Any) -> None:
@@ -109,7 +109,7 @@ class Failsafes:
 
     def is_read(self, now: float) -> bool:
         """Return True if all parameters were received, or the wait for the missing ones is over."""
-        return not self._missing() or now - self._first > _READ_TIMEOUT
+        return not self._missing() or now - self._first_request > _READ_TIMEOUT
 
     def text(self) -> list[str]:
         """Return the received parameters as lines of text; the last ones are warnings."""
@@ -126,7 +126,7 @@ class Failsafes:
         if reactions and all(values.get(name, 0.0) == 0.0 for name in reactions):
             yield f"no reaction is known if the companion fails: {', '.join(reactions)} are 0 or unknown"
         lost = values.get("COM_OBL_RC_ACT")
-        if lost in _BY_STICKS and values.get("NAV_RCL_ACT") == 0.0:
+        if lost in _STICK_MODES and values.get("NAV_RCL_ACT") == 0.0:
             yield (
                 "without sticks, the last forces act for ever after set-points are lost: "
                 f"COM_OBL_RC_ACT is {lost:g} and NAV_RCL_ACT 0; expected COM_OBL_RC_ACT 5, which holds"
@@ -134,16 +134,16 @@ class Failsafes:
         saturation = values.get(_SATURATION, 1.0)
         if saturation < 1.0:
             yield f"{_SATURATION} is {saturation:g}, but the law counts on the thrusters' full force; expected 1"
-        if lasting := self.lasting_sticks():
-            yield lasting
+        if warning := self.held_sticks_warning():
+            yield warning
 
-    def lasting_sticks(self) -> str:
+    def held_sticks_warning(self) -> str:
         """Return the parameters by which the last sticks act for long after a lost link; empty if none is known."""
         hold_times = {name: self.values[name] for name in _HOLD_TIMES if name in self.values}
         if all(0.0 <= time <= _MAX_HOLD_TIME for time in hold_times.values()):
             return ""
-        listed = ", ".join(f"{name} is {time:g}" for name, time in hold_times.items())
-        return f"the last sticks outlast a lost link: {listed}; expected {_MAX_HOLD_TIME:g} s or less"
+        settings = ", ".join(f"{name} is {time:g}" for name, time in hold_times.items())
+        return f"the last sticks outlast a lost link: {settings}; expected {_MAX_HOLD_TIME:g} s or less"
 
     def ignored_sticks(self, system: int) -> str:
         """Return the parameters by which the autopilot ignores sticks of a system id; empty if none is known."""
@@ -156,12 +156,12 @@ class Failsafes:
 
     def learns_magnetic_field(self) -> bool:
         """Return True if an ArduSub learns the magnetic field in flight; without a fix its heading then drifts."""
-        return self.values.get("EK3_MAG_CAL", _NEVER) != _NEVER
+        return self.values.get("EK3_MAG_CAL", _NEVER_LEARN) != _NEVER_LEARN
 
     def _line(self, parameter: Parameter) -> str:
         value = self.values[parameter.name]
-        chosen = (parameter.choices or {}).get(round(value))
-        return f"{parameter.name} {value:g}: {parameter.words}" + (f" it {chosen}" if chosen else "")
+        action = (parameter.choices or {}).get(round(value))
+        return f"{parameter.name} {value:g}: {parameter.meaning}" + (f" it {action}" if action else "")
 
     def _missing(self) -> list[str]:
         return [p.name for p in PARAMETERS[self._profile] if p.name not in self.values]

@@ -146,8 +146,8 @@ class AutopilotSession:
         if ignored := self.failsafes.ignored_sticks(system):
             text = f"{ignored}, and the companion's system id {system}: its sticks would be ignored"
             return f"{text}; expected the same number, or --steer-by velocity"
-        if o.steer_by == "wrench" and (lasting := self.failsafes.lasting_sticks()):
-            return f"{lasting}; with --steer-by wrench they would turn the vehicle over"
+        if o.steer_by == "wrench" and (warning := self.failsafes.held_sticks_warning()):
+            return f"{warning}; with --steer-by wrench they would turn the vehicle over"
         if self._gain_error() > GAIN_TOLERANCE:
             return f"the autopilot's pilot gain is {self._gain():g}, expected {o.pilot_gain:g} of --pilot-gain"
         return ""

@@ -115,7 +115,7 @@ class Design:
         """Center of the box, shape (3,) [m, NED]."""
         return np.array(self.scenario.initial.position)
 
-    def vehicle_part(self) -> list[int]:
+    def vehicle_indices(self) -> list[int]:
         """Return the indices of the vehicle's own parameters."""
         return [i for i, p in enumerate(self.parameters) if not p.is_nuisance]
 

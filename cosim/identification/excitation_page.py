@@ -31,14 +31,14 @@ _COMMENTS = {
 def verdict(design: Design) -> str:
     """Return a sentence about the number of segments and the free parameters that they determine."""
     ratios = _prior_ratios(design)
-    weak = [design.parameters[i].name for i in design.vehicle_part() if ratios[i] > _MAX_DEVIATION]
+    weak = [design.parameters[i].name for i in design.vehicle_indices() if ratios[i] > _MAX_DEVIATION]
     text = (
         f"{len(design.segments)} segments of {SECONDS:g} s were chosen among {design.candidates}, "
         f"{design.scenario.time.duration:g} s in all"
     )
     if weak:
         return f"{text}; they hardly determine {', '.join(weak)}."
-    return f"{text}; they determine all {len(design.vehicle_part())} free numbers of the vehicle."
+    return f"{text}; they determine all {len(design.vehicle_indices())} free numbers of the vehicle."
 
 
 def warnings(design: Design) -> Iterator[str]:
@@ -114,7 +114,7 @@ def _page(design: Design, out: Path) -> str:
          ", ".join(f"{x:.2f}" for x in np.abs(segment.sticks).max(axis=0)))
         for k, segment in enumerate(design.segments)
     ]  # fmt: skip
-    parameters = [(design.parameters[i], NORMAL * float(design.deviations[i])) for i in design.vehicle_part()]
+    parameters = [(design.parameters[i], NORMAL * float(design.deviations[i])) for i in design.vehicle_indices()]
     return render_page(
         "cosim.identification/excite.html.j2", vehicle=design.scenario.vehicle.title, start=design.start, out=out,
         verdict=verdict(design), warnings=warnings(design), figures=inline_figures(rehearsal_figures(design)),

@@ -36,7 +36,7 @@ _NEEDS = {  # motion that determines the numbers of a key
 
 def verdict(fit: Fit) -> str:
     """Return a sentence about the count of determined numbers and the quality of the fit."""
-    free = fit.vehicle_part()
+    free = fit.vehicle_indices()
     determined = len(free) - len(fit.undetermined())
     seconds = sum(window.steps for window in fit.windows) * fit.step
     return (
@@ -167,7 +167,7 @@ _CAUSES = {
 }  # fmt: skip
 
 
-def require_apart(fit: Fit) -> None:
+def require_distinguishable(fit: Fit) -> None:
     """Refuse a fit of a delay and the thrusters' lag that the runs do not separate."""
     lags, delays = ([i for i, p in enumerate(fit.parameters) if p.kind == kind] for kind in ("lag", "delay"))
     for lag, delay in itertools.product(lags, delays):
@@ -183,8 +183,8 @@ def require_apart(fit: Fit) -> None:
 def advice(fit: Fit) -> Iterator[str]:
     """Yield the maneuvers to drive next, for the numbers that are determined worst."""
     worst: dict[str, float] = {}
-    for i in fit.vehicle_part():
-        key, ratio = ".".join(fit.parameters[i].name.split(".")[:2]), float(fit.intervals.prior_part[i])
+    for i in fit.vehicle_indices():
+        key, ratio = ".".join(fit.parameters[i].name.split(".")[:2]), float(fit.intervals.prior_fraction[i])
         if ratio > _WEAK:
             worst[key] = max(worst.get(key, 0.0), ratio)
     for key in sorted(worst, key=lambda key: -worst[key])[:3]:

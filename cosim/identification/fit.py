@@ -15,7 +15,7 @@ from threadpoolctl import threadpool_limits
 from cosim.errors import IdentificationError
 from cosim.identification.causes import Cause, find_causes
 from cosim.identification.delays import find_delays, move_back, within_margins
-from cosim.identification.intervals import DISAGREES, MAX_PRIOR_PART, Intervals, estimate_intervals
+from cosim.identification.intervals import DISAGREES, MAX_PRIOR_FRACTION, Intervals, estimate_intervals
 from cosim.identification.log import Log, command_spans
 from cosim.identification.parameters import Parameter
 from cosim.identification.residuals import Reduced, Residuals
@@ -53,17 +53,17 @@ class Fit:
     command_error: float | None = None  # errors of sampled commands, relative to those of steps at random times
     forces: Array | None = None  # (windows, 3) N, NED, random force of each window, if it is estimated
 
-    def vehicle_part(self) -> list[int]:
+    def vehicle_indices(self) -> list[int]:
         """Return the indices of the vehicle's own parameters."""
         return [i for i, p in enumerate(self.parameters) if not p.is_nuisance]
 
     def free_keys(self) -> list[str]:
         """Return the keys of the vehicle's file that are free, each once."""
-        return list(dict.fromkeys(".".join(self.parameters[i].name.split(".")[:2]) for i in self.vehicle_part()))
+        return list(dict.fromkeys(".".join(self.parameters[i].name.split(".")[:2]) for i in self.vehicle_indices()))
 
     def undetermined(self) -> list[int]:
         """Return the indices of the vehicle's parameters that rest on their priors."""
-        return [i for i in self.vehicle_part() if self.intervals.prior_part[i] > MAX_PRIOR_PART]
+        return [i for i in self.vehicle_indices() if self.intervals.prior_fraction[i] > MAX_PRIOR_FRACTION]
 
     def correlated(self, threshold: float) -> Iterator[tuple[str, str]]:
         """Yield pairs whose correlation exceeds a threshold in magnitude, the greatest first; no pairs of nuisances."""

@@ -9,7 +9,7 @@ from pathlib import Path
 from cosim.errors import IdentificationError
 from cosim.identification import findings
 from cosim.identification.fit import Fit, fit
-from cosim.identification.intervals import MAX_PRIOR_PART
+from cosim.identification.intervals import MAX_PRIOR_FRACTION
 from cosim.identification.log import UNITS, Log, load_log
 from cosim.identification.parameters import (
     DEFAULT_FREE,
@@ -54,19 +54,19 @@ def identify(
     parameters = free_parameters(vehicle, free)
     if not parameters:
         raise IdentificationError("--free: nothing is free, expected one key at the least")
-    logs, others = (tuple(load_log(run, vehicle) for run in folders) for folders in (runs, held_out))
+    logs, held_out_logs = (tuple(load_log(run, vehicle) for run in folders) for folders in (runs, held_out))
     parameters += nuisances(nuisance, logs)
     try:
         fitted = fit(logs, vehicle, parameters, progress, RANDOM_FORCE in nuisance)
     except IdentificationError as error:
-        slow = [text for log in logs if (text := findings.slow_commands(log))]
-        raise IdentificationError(". ".join([str(error), *([" ".join(slow)] if slow else [])])) from error
-    findings.require_apart(fitted)
-    if others:
-        predictions = validate(others, vehicle, *with_mean_nuisances(parameters, fitted.values), fitted.step)
+        delay_notes = [text for log in logs if (text := findings.slow_commands(log))]
+        raise IdentificationError(". ".join([str(error), *([" ".join(delay_notes)] if delay_notes else [])])) from error
+    findings.require_distinguishable(fitted)
+    if held_out_logs:
+        predictions = validate(held_out_logs, vehicle, *with_mean_nuisances(parameters, fitted.values), fitted.step)
     else:
         predictions = validate(logs, vehicle, parameters, fitted.values, fitted.step)
-    return Identification(start, vehicle, logs, others, fitted, tuple(predictions))
+    return Identification(start, vehicle, logs, held_out_logs, fitted, tuple(predictions))
 
 
 def vehicle_contents(result: Identification, out: Path) -> str:
@@ -117,5 +117,5 @@ def _rows(fit: Fit, nuisance: bool) -> Iterator[tuple[Parameter, float, float, s
     """Yield parameter, value, half width of its 95 % interval, and what it rests on."""
     for i, p in enumerate(fit.parameters):
         if p.is_nuisance == nuisance:
-            basis = "prior" if fit.intervals.prior_part[i] > MAX_PRIOR_PART else "runs"
+            basis = "prior" if fit.intervals.prior_fraction[i] > MAX_PRIOR_FRACTION else "runs"
             yield p, float(fit.values[i]), float(fit.intervals.half[i]), basis

@@ -53,7 +53,7 @@ _REHEARSAL = (
 
 
 def _numbers(fit: Fit) -> Figure:
-    indices = fit.vehicle_part()[:_MAX_SHOWN]
+    indices = fit.vehicle_indices()[:_MAX_SHOWN]
     figure = Figure(figsize=(_WIDTH, 0.7 + 0.19 * len(indices)), layout="constrained")
     axes = figure.subplots()
     deviation = np.array([fit.parameters[i].deviation for i in indices])
@@ -100,7 +100,7 @@ def _predictions(predictions: Sequence[Prediction]) -> Figure:
 
 
 def _correlation(fit: Fit) -> Figure:
-    indices = fit.vehicle_part()[:_MAX_SHOWN]
+    indices = fit.vehicle_indices()[:_MAX_SHOWN]
     size = max(3.0, 0.12 * len(indices) + 1.8)
     figure = Figure(figsize=(min(_WIDTH, size + 0.8), size), layout="constrained")
     axes = figure.subplots()

@@ -15,7 +15,7 @@ from cosim.identification.windows import Window
 from cosim.simulation.signals import Array
 
 DISAGREES = 1.2  # chi2 per degree of freedom, above which the model is called wrong
-MAX_PRIOR_PART = 0.5  # ratio of nominal to prior deviation, above which a number rests on its prior
+MAX_PRIOR_FRACTION = 0.5  # ratio of nominal to prior deviation, above which a number rests on its prior
 _BLOCK = 5.0  # s, length of the pieces that the jackknife leaves out
 _LONG_BLOCK = 20.0  # s, their length if neighboring windows are correlated: a model error may last for seconds
 _MIN_RUNS = 8  # number of runs from which on the jackknife leaves out whole runs
@@ -32,7 +32,7 @@ class Intervals:
     covariance: Array  # (p, p) covariance of a normal distribution with these intervals and the fit's correlation
     clusters: str  # description of the pieces that the jackknife leaves out
     chi2: float  # chi2 per degree of freedom
-    prior_part: Array  # (p,) ratios of nominal to prior deviation
+    prior_fraction: Array  # (p,) ratios of nominal to prior deviation
 
     @property
     def correlation(self) -> Array:
@@ -67,7 +67,7 @@ def estimate_intervals(
     covariance: Any = inverse * np.outer(scale, scale)
     return Intervals(
         half=half, nominal=nominal, covariance=covariance, clusters=clusters, chi2=chi2,
-        prior_part=nominal * np.sqrt(prior),
+        prior_fraction=nominal * np.sqrt(prior),
     )  # fmt: skip
 
 

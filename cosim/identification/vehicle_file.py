@@ -80,7 +80,7 @@ def _entry(key: str, vehicle: Vehicle) -> Any:
 def _comment(key: str, fit: Fit) -> str:
     """Return values, half widths of 95 % intervals and units of the parameters of a key; empty for other keys."""
     texts = []
-    for i in fit.vehicle_part():
+    for i in fit.vehicle_indices():
         p = fit.parameters[i]
         if p.name != key and not p.name.startswith(f"{key}."):
             continue
@@ -98,7 +98,7 @@ def posterior_lines(fit: Fit, vehicle: Vehicle) -> list[str]:
 
 def draw_plants(fit: Fit, vehicle: Vehicle, seed: int, count: int = DRAWS) -> list[dict[str, float]]:
     """Draw parameters of the FMU from the normal distribution of the identified parameters."""
-    indices = fit.vehicle_part()
+    indices = fit.vehicle_indices()
     parameters = [fit.parameters[i] for i in indices]
     low, high = (np.array([getattr(p, name) for p in parameters]) for name in ("min", "max"))
     covariance = fit.intervals.covariance[np.ix_(indices, indices)]

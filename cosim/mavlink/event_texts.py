@@ -9,9 +9,9 @@ from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.vehicle.view import View
 from cosim.simulation.commands.mission_executor import passed_items
 
-_MARGIN = 0.01  # m or rad past a region's surface, beyond which it counts as entered or left
-_RELEASED = 1_000_000  # µs of simulated time without saturation, before its end is reported
-_EVERY = 2.0  # s of the wall clock, between two texts of a kind
+_HYSTERESIS = 0.01  # m or rad past a region's surface, beyond which it counts as entered or left
+_UNSATURATED_TIME = 1_000_000  # µs of simulated time without saturation, before its end is reported
+_TEXT_PERIOD = 2.0  # s of the wall clock, between two texts of the same kind
 
 
 class EventTexts:
@@ -40,7 +40,7 @@ class EventTexts:
         self._watch_regions(view)
         self._watch_limits(view)
         if view.touches_bottom and not before.touches_bottom:
-            context.send_text("Bottom touched", "WARNING", "bottom", _EVERY)
+            context.send_text("Bottom touched", "WARNING", "bottom", _TEXT_PERIOD)
 
     def _watch_commands(self, before: View, view: View) -> None:
         context = self._context
@@ -72,7 +72,7 @@ class EventTexts:
         for i, clearance in enumerate(view.clearances):
             satisfied = self._satisfied[i]
             # hysteresis of a margin about the surface; NaN changes nothing
-            now_satisfied = not clearance < -_MARGIN if satisfied else clearance > _MARGIN
+            now_satisfied = not clearance < -_HYSTERESIS if satisfied else clearance > _HYSTERESIS
             if now_satisfied == satisfied:
                 continue
             self._satisfied[i] = now_satisfied
@@ -84,12 +84,14 @@ class EventTexts:
             inside = now_satisfied == (region.keep == "in")
             text = f"{what} {region.name} {'entered' if inside else 'left'}"
             severity = "INFO" if now_satisfied else "WARNING"
-            self._context.send_text(text if now_satisfied else f"{text}: keep {region.keep}", severity, text, _EVERY)
+            self._context.send_text(
+                text if now_satisfied else f"{text}: keep {region.keep}", severity, text, _TEXT_PERIOD
+            )
 
     def _report_target(self, view: View, inside: bool) -> None:
         context = self._context
         last = view.item == len(context.plan) - 1 and view.mode == "mission"
-        context.send_text("Target reached" if inside else "Target left", "INFO", f"target {inside}", _EVERY)
+        context.send_text("Target reached" if inside else "Target left", "INFO", f"target {inside}", _TEXT_PERIOD)
         if inside and last:
             self._reached_item(view.item)
 
@@ -98,8 +100,8 @@ class EventTexts:
         if view.saturated:
             self._saturated_us = view.boot_us
             if not self._saturated:
-                context.send_text("Thrust saturated", "WARNING", "saturated", _EVERY)
+                context.send_text("Thrust saturated", "WARNING", "saturated", _TEXT_PERIOD)
             self._saturated = True
-        elif self._saturated and view.boot_us - self._saturated_us >= _RELEASED:
+        elif self._saturated and view.boot_us - self._saturated_us >= _UNSATURATED_TIME:
             self._saturated = False
-            context.send_text("Thrust no longer saturated", "INFO", "released", _EVERY)
+            context.send_text("Thrust no longer saturated", "INFO", "released", _TEXT_PERIOD)

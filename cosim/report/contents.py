@@ -73,7 +73,7 @@ def _remarks(run: Run) -> tuple[str, ...]:
 def _claims(run: Run) -> Table | None:
     if run.scenario.compare != "paper":
         return None
-    rows = tuple((c.stated, c.measured, c.why) for c in paper_claims(run.scenario, run.summary))
+    rows = tuple((c.statement, c.result, c.reason) for c in paper_claims(run.scenario, run.summary))
     return Table("Beside the paper", ("The paper states", "This run gave", "Why"), rows)
 
 

@@ -17,49 +17,49 @@ PAPER_WINDOW = (2.65, 2.95)  # s, "An intersection of the secondary sub-regions 
 class Claim:
     """A statement of the paper beside the result of a run."""
 
-    stated: str
-    measured: str
-    why: str  # reason why both differ or agree
+    statement: str
+    result: str
+    reason: str  # why both differ or agree
 
 
 def paper_claims(scenario: Scenario, summary: dict[str, Any]) -> list[Claim]:
     """Return the paper's claims beside the results of this run."""
     return [
-        _reaching(summary),
-        _window(scenario, summary),
-        _avoiding(scenario, summary),
-        _one_at_a_time(summary),
+        _convergence(summary),
+        _intersection(scenario, summary),
+        _avoidance(scenario, summary),
+        _arbitration(summary),
         _effort(scenario, summary),
-        _adapting(summary),
+        _adaptation(summary),
     ]
 
 
-def _reaching(summary: dict[str, Any]) -> Claim:
+def _convergence(summary: dict[str, Any]) -> Claim:
     if summary["settled"]:
-        measured = f"In at {summary['reach_time']:.2f} s, inside from {summary['settle_time']:.2f} s."
-        why = "Agrees that the region is reached; the paper gives no time."
+        result = f"In at {summary['reach_time']:.2f} s, inside from {summary['settle_time']:.2f} s."
+        reason = "Agrees that the region is reached; the paper gives no time."
     elif summary["reached"]:
-        measured = f"In at {summary['reach_time']:.2f} s, but not inside for the last 10 s."
-        why = "The run ends, or the vehicle leaves, before it has settled."
+        result = f"In at {summary['reach_time']:.2f} s, but not inside for the last 10 s."
+        reason = "The run ends, or the vehicle leaves, before it has settled."
     else:
-        measured = f"Never in; closest {summary['closest_to_goal']:.2f} m from the region's surface."
-        why = "See the estimate below: adaptation (27) goes on while the actuators give less than the law asks for."
+        result = f"Never in; closest {summary['closest_to_goal']:.2f} m from the region's surface."
+        reason = "See the estimate below: adaptation (27) goes on while the actuators give less than the law asks for."
         if summary["saturated_time"] == 0.0:
-            why = f"The actuators were never saturated; the run is {summary['simulated_time']:g} s long."
-    return Claim("The vehicle converges into the primary sub-region (Fig. 5, 6).", measured, why)
+            reason = f"The actuators were never saturated; the run is {summary['simulated_time']:g} s long."
+    return Claim("The vehicle converges into the primary sub-region (Fig. 5, 6).", result, reason)
 
 
-def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
+def _intersection(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     windows = summary["intersection_windows"]
     names = " and ".join(summary["intersection"])
-    measured = (
+    result = (
         ", ".join(f"{a:.3f} s to {b:.3f} s" for a, b in windows) + f" inside {names}."
         if windows
         else f"Never inside {names}."
     )
-    stated = f"The regions' intersection is crossed at {PAPER_WINDOW[0]} s to {PAPER_WINDOW[1]} s (Fig. 8)."
+    statement = f"The regions' intersection is crossed at {PAPER_WINDOW[0]} s to {PAPER_WINDOW[1]} s (Fig. 8)."
     if not windows:
-        return Claim(stated, measured, f"In {summary['simulated_time']:g} s the path did not meet the overlap.")
+        return Claim(statement, result, f"In {summary['simulated_time']:g} s the path did not meet the overlap.")
     first = windows[0]
     limits = (
         [f"a body force of at most {format_force(scenario.limit.force)}"] if scenario.limit.force < math.inf else []
@@ -67,43 +67,43 @@ def _window(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     limits += [f"a lag of {scenario.limit.time_constant:g} s"] if scenario.limit.time_constant > 0.0 else []
     limits += ["the thrusters' limits"] if scenario.actuation.through == "thrusters" else []
     if limits:
-        why = (
+        reason = (
             f"With {' and '.join(limits)}. "
             "The paper states no limits: these are a choice of this scenario, no evidence of what was simulated there."
         )
     else:
-        why = (
+        reason = (
             f"Without a limit the law starts with {format_force(summary['max_force_asked'])} and the vehicle runs at "
             f"up to {summary['max_speed']:.1f} m/s. "
             "The paper's times need a limit on the actuators that it does not state."
         )
     if abs(first[0] - PAPER_WINDOW[0]) < 0.05 and abs(first[1] - PAPER_WINDOW[1]) < 0.05:
-        why = "Agrees. " + why
-    return Claim(stated, measured, why)
+        reason = "Agrees. " + reason
+    return Claim(statement, result, reason)
 
 
-def _avoiding(scenario: Scenario, summary: dict[str, Any]) -> Claim:
+def _avoidance(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     clearances = summary["min_clearance"]
     entered = [r for r in scenario.regions if clearances[r.region.name] < 0.0]
     later = [r for r in entered if r.region.name not in summary["violated_at_start"]]
-    measured = "; ".join(f"{name}: {c:+.3f} m" for name, c in clearances.items()) + " (negative: violated)."
+    result = "; ".join(f"{name}: {c:+.3f} m" for name, c in clearances.items()) + " (negative: violated)."
     push = max(
         (r.region.gain * r.region.shape.radius**2 for r in later if isinstance(r.region.shape, Sphere)), default=None
     )
     if push is not None:
-        why = (
+        reason = (
             f"A sphere pushes with at most gain × r² = {push:.0f} N; the law asked for up to "
             f"{format_force(summary['max_force_asked'])} in all. "
             "The paper's own Fig. 8 shows the vehicle inside the intersection."
         )
     elif later:
-        why = f"Entered: {', '.join(r.region.name for r in later)}."
+        reason = f"Entered: {', '.join(r.region.name for r in later)}."
     else:
-        why = "No region was entered" + (", but for those in which the run starts." if entered else ".")
-    return Claim("The control effort leads the vehicle out of the undesired sub-regions (Fig. 5b).", measured, why)
+        reason = "No region was entered" + (", but for those in which the run starts." if entered else ".")
+    return Claim("The control effort leads the vehicle out of the undesired sub-regions (Fig. 5b).", result, reason)
 
 
-def _one_at_a_time(summary: dict[str, Any]) -> Claim:
+def _arbitration(summary: dict[str, Any]) -> Claim:
     above = summary["weights_above_half"]
     return Claim(
         "Only a single α is high at a time.",
@@ -125,21 +125,21 @@ def _effort(scenario: Scenario, summary: dict[str, Any]) -> Claim:
     )
 
 
-def _adapting(summary: dict[str, Any]) -> Claim:
+def _adaptation(summary: dict[str, Any]) -> Claim:
     final, true = summary["estimate_final"][0], summary["estimate_true"][0]
     low, high = summary["estimate_lowest"][0], summary["estimate_highest"][0]
     lever, true_lever = summary["estimate_final"][3], summary["estimate_true"][3]
-    measured = (
+    result = (
         f"φ̂1 between {low:.2f} and {high:.2f} N, at the end {final:.2f} N; true {true:.2f} N. "
         f"φ̂4 at the end {lever:.2f} N m; true {true_lever:.2f} N m."
     )
     if abs(final - true) < 1.0:
-        why = "φ̂1, weight less buoyancy, ends within 1 N of the truth."
+        reason = "φ̂1, weight less buoyancy, ends within 1 N of the truth."
     elif summary["saturated_time"] > 0.0:
-        why = (
+        reason = (
             f"Winds up: the actuators were saturated for {summary['saturated_time']:.1f} s, "
             "in which (27) took the error for an unknown weight."
         )
     else:
-        why = "Has not converged to the truth; (27) promises only that the errors vanish."
-    return Claim("The unknown restoring forces are compensated by adaptation.", measured, why)
+        reason = "Has not converged to the truth; (27) promises only that the errors vanish."
+    return Claim("The unknown restoring forces are compensated by adaptation.", result, reason)

@@ -21,7 +21,7 @@ from cosim.logs.message_definitions import parse_definition, reachable_types
 from cosim.logs.spool import LogContents
 from plant_fmu.toml_tables import hint
 
-_PENDING = 4096  # messages of a quantity that are written together
+_BATCH_SIZE = 4096  # messages of a quantity that are written together
 _PART = re.compile(r"\.?([A-Za-z_]\w*)|\[(\d+)\]")  # a field's name or an index in a path
 _PATH = re.compile(f"({_PART.pattern})*")
 _TIMES = ("builtin_interfaces/msg/Time", "builtin_interfaces/msg/Duration")  # types that definitions may omit
@@ -37,9 +37,9 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
         read_recording(path, contents, on_progress)
         return
     columns = require_map(columns)
-    nameless = next((name for name, mapped in columns.quantities.items() if not mapped.topic), None)
-    if nameless is not None:
-        raise ImportLogError(f"the map says no topic for [{nameless}], expected topic and columns")
+    without_topic = next((name for name, mapped in columns.quantities.items() if not mapped.topic), None)
+    if without_topic is not None:
+        raise ImportLogError(f"the map says no topic for [{without_topic}], expected topic and columns")
     readers: dict[str, list[_FieldReader]] = {}
     for name, mapped in columns.quantities.items():
         readers.setdefault(mapped.topic, []).append(_FieldReader(columns, name, contents))
@@ -50,18 +50,18 @@ def read(path: Path, columns: ColumnMap | None, contents: LogContents, on_progre
         if message.topic not in readers:
             contents.unread[message.topic] += 1
             continue
-        written = clock.time(message.time)
+        write_time = clock.time(message.time)
         try:
             decoded = decoder.decode(message)
         except (SerdeError, *DAMAGE):
             contents.unread[f"{message.topic} that cannot be decoded"] += 1
             continue
         for reader in readers[message.topic]:
-            reader.add(decoded, written)
+            reader.add(decoded, write_time)
     missing = sorted(set(readers) - topics)
     if missing:
         raise ImportLogError(f"has no topic {missing[0]!r}, which the map names; {hint(missing[0], topics)}")
-    for reader in (reader for several in readers.values() for reader in several):
+    for reader in (reader for group in readers.values() for reader in group):
         reader.flush()
     contents.remarks += clock.remarks("The clock of the bag's writer")
 
@@ -132,11 +132,11 @@ class _FieldReader:
         self._clock = Clock()
         self._rows: list[list[float]] = []
 
-    def add(self, message: Any, written: float) -> None:
+    def add(self, message: Any, write_time: float) -> None:
         """Add a message, written at a time [s]."""
-        time = written if self._stamp is None else self._clock.time(self._stamp(message))
+        time = write_time if self._stamp is None else self._clock.time(self._stamp(message))
         self._rows.append([time, *(get(message) for get in self._getters)])
-        if len(self._rows) >= _PENDING:
+        if len(self._rows) >= _BATCH_SIZE:
             self.flush()
 
     def flush(self) -> None:

@@ -15,8 +15,8 @@ from cosim.simulation.commands.commands import ChangeSetting, Command, MissionIt
 from cosim.simulation.commands.mission_executor import passed_items
 
 _MAX_ITEMS = 500
-_RETRY = 1.0  # s of the wall clock
-_RETRIES = 5
+_RETRY_PERIOD = 1.0  # s of the wall clock
+_MAX_RETRIES = 5
 _MISSION, _ALL = 0, 255  # MAV_MISSION_TYPE
 _GO_TO, _CHANGE_DEPTH = 2, 3  # MISSION_ITEM.current of guided items, which are not part of a mission
 _SUPPORTED_TYPES = (0, 1, 2)
@@ -28,7 +28,7 @@ class _Upload:
 
     sender: Sender
     count: int
-    requested: float  # s, time of the last request for an item
+    request_time: float  # s, the last request for an item
     items: list[ReceivedMissionItem] = field(default_factory=list)
     decoded: list[MissionItem] = field(default_factory=list)  # without home
     retries: int = 0
@@ -44,7 +44,7 @@ class MissionProtocol(Service):
         self._targets, self._parameters = targets, parameters
         self._current_item = -1  # item of the last snapshot
         self._upload: _Upload | None = None
-        self._first = int(context.profile.has_home_item)
+        self._first_seq = int(context.profile.has_home_item)  # sequence number of the first item after home
 
     def restart(self) -> None:
         """Cancel an upload under way."""
@@ -65,7 +65,7 @@ class MissionProtocol(Service):
 
     def _all_items(self) -> tuple[ReceivedMissionItem, ...]:
         plan = self.context.plan
-        return (home_item(self.context), *plan) if plan and self._first else plan
+        return (home_item(self.context), *plan) if plan and self._first_seq else plan
 
     def _receive_mission_request_list(self, sender: Sender, message: Any) -> None:
         mission_type = message.mission_type
@@ -83,7 +83,7 @@ class MissionProtocol(Service):
             self._ack(sender, m.MAV_MISSION_INVALID_SEQUENCE, mission_type)
             return
         item = items[seq]
-        current = int(context.mode == "mission" and context.view.item + self._first == seq)
+        current = int(context.mode == "mission" and context.view.item + self._first_seq == seq)
         head = *sender.address, seq, item.frame, item.command, current, item.autocontinue
         numbers = item.param1, item.param2, item.param3, item.param4
         if message.get_type() == "MISSION_REQUEST_INT":
@@ -118,12 +118,12 @@ class MissionProtocol(Service):
     def _request_next(self, upload: _Upload) -> None:
         """Request the next item, or finish the upload."""
         context, sender = self.context, upload.sender
-        upload.requested = context.now
+        upload.request_time = context.now
         if len(upload.items) < upload.count:
             sender.link.send(context.make("MISSION_REQUEST_INT", *sender.address, len(upload.items), _MISSION))
             return
         self._upload = None
-        self._ack(sender, self._submit_mission(sender, upload.items[self._first :], upload.decoded), _MISSION)
+        self._ack(sender, self._submit_mission(sender, upload.items[self._first_seq :], upload.decoded), _MISSION)
 
     def _receive_mission_item(self, sender: Sender, message: Any) -> None:
         m, upload, mission_type = self.context.mavlink, self._upload, message.mission_type
@@ -148,7 +148,7 @@ class MissionProtocol(Service):
 
     def _add(self, upload: _Upload, message: Any) -> int:
         """Add an item to an upload, and return MAV_MISSION_RESULT."""
-        context, m, first = self.context, self.context.mavlink, self._first
+        context, m, first = self.context, self.context.mavlink, self._first_seq
         item = _received_item(message, m)
         if item is None:
             return int(m.MAV_MISSION_INVALID)
@@ -182,7 +182,7 @@ class MissionProtocol(Service):
         result = self.submit(sender, SetMission(tuple(decoded)))
         if result == Result.ACCEPTED:
             context.plan, context.mission_items = tuple(items), tuple(decoded)
-            for number, item in enumerate(decoded, self._first):
+            for number, item in enumerate(decoded, self._first_seq):
                 if item.position is not None:
                     self._targets.warn_about(item.position, f"mission item {number}")
             return int(m.MAV_MISSION_ACCEPTED)
@@ -196,9 +196,9 @@ class MissionProtocol(Service):
     def tick(self) -> None:
         """Request a missing item again each second; cancel the upload after five retries."""
         upload, context = self._upload, self.context
-        if upload is None or context.now - upload.requested < _RETRY:
+        if upload is None or context.now - upload.request_time < _RETRY_PERIOD:
             return
-        if upload.retries < _RETRIES:
+        if upload.retries < _MAX_RETRIES:
             upload.retries += 1
             self._request_next(upload)
         else:
@@ -219,26 +219,28 @@ class MissionProtocol(Service):
 
     # ---- current item ----
 
-    def _begin(self, sender: Sender, seq: int | None, *more: Command) -> Result:
+    def _set_current_item(self, sender: Sender, seq: int | None, *more: Command) -> Result:
         context = self.context
         if not context.accepts_commands:
             return context.submit()
-        item = None if seq is None else max(seq - self._first, 0)
+        item = None if seq is None else max(seq - self._first_seq, 0)
         if item is None or item >= len(context.plan):
             context.reject(f"mission item {seq}: there are {len(self._all_items())}", "item")
             return Result.DENIED if context.plan else Result.FAILED
         return self.submit(sender, SetCurrentItem(item), *more)
 
     def _receive_mission_set_current(self, sender: Sender, message: Any) -> None:
-        self._begin(sender, message.seq)
+        self._set_current_item(sender, message.seq)
 
     def _execute_do_set_mission_current(self, request: CommandRequest) -> Result:
         """Continue with another item; -1 is the present one."""
         seq = request.int_param(1)
-        return self._begin(request.sender, seq if seq is None or seq >= 0 else self.context.view.item + self._first)
+        return self._set_current_item(
+            request.sender, seq if seq is None or seq >= 0 else self.context.view.item + self._first_seq
+        )
 
     def _execute_mission_start(self, request: CommandRequest) -> Result:
-        return self._begin(request.sender, max(request.int_param(1) or 0, 0), SetMode("mission"))
+        return self._set_current_item(request.sender, max(request.int_param(1) or 0, 0), SetMode("mission"))
 
 
 def _scale(frame: int, mavlink: Any) -> float:

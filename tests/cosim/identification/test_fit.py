@@ -9,7 +9,7 @@ import pytest
 from controller.quaternion import rotation_matrix
 from cosim.errors import IdentificationError
 from cosim.identification.delays import find_delays
-from cosim.identification.findings import require_apart, slow_commands, warnings
+from cosim.identification.findings import require_distinguishable, slow_commands, warnings
 from cosim.identification.fit import Problem, fit, integration_step
 from cosim.identification.log import TOPICS, Log, make_topic
 from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisances, with_mean_nuisances, with_values
@@ -295,8 +295,8 @@ def test_inseparable_delay_and_lag_are_rejected_by_name(vehicle, log, correlatio
     matrix[lag, delay] = matrix[delay, lag] = correlation
     found = SimpleNamespace(parameters=parameters, intervals=SimpleNamespace(correlation=matrix))
     if not refused:
-        require_apart(found)
+        require_distinguishable(found)
         return
     with pytest.raises(IdentificationError, match=r"are not separated by these runs \(correlation 0\.91\)") as error:
-        require_apart(found)
+        require_distinguishable(found)
     assert parameters[lag].name in str(error.value) and parameters[delay].name in str(error.value)

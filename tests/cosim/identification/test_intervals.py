@@ -62,4 +62,4 @@ def test_number_that_two_pieces_determine_has_one_degree_of_freedom():
 def test_number_that_no_piece_determines_rests_on_its_prior():
     found = intervals_of([np.column_stack([np.ones(4), np.zeros(4)])] * 6, [np.full(4, (-1.0) ** k) for k in range(6)])
     assert found.half[1] == pytest.approx(1e6 * 1.95996, rel=1e-4)
-    assert found.prior_part[1] == pytest.approx(1.0) and np.isfinite(found.half).all()
+    assert found.prior_fraction[1] == pytest.approx(1.0) and np.isfinite(found.half).all()

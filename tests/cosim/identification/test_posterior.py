@@ -26,7 +26,7 @@ def fit_of(keys, values=None, deviations=0.05):
     size = deviations * np.array([p.deviation for p in parameters])
     intervals = SimpleNamespace(covariance=np.diag(size**2))
     return SimpleNamespace(
-        parameters=parameters, values=found, intervals=intervals, vehicle_part=lambda: list(range(len(parameters)))
+        parameters=parameters, values=found, intervals=intervals, vehicle_indices=lambda: list(range(len(parameters)))
     )
 
 

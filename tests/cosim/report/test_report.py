@@ -129,13 +129,13 @@ def test_claims_carry_this_runs_numbers(shipped_run):
         summary = shipped_run(name, "arbiter.engine=closed").summary
         reaching, window, avoiding, single, effort, adapting = paper_claims(scenario, summary)
         (start, end), *_ = summary["intersection_windows"]
-        assert f"{start:.3f} s to {end:.3f} s" in window.measured
-        assert ("Never in" in reaching.measured) == (not summary["reached"])
-        assert ("no evidence" in window.why) == (name != "paper")
-        assert f"{summary['min_clearance']['SR1']:+.3f} m" in avoiding.measured
-        assert "At most 1" in single.measured
-        assert "26.82 kN" in effort.measured
-        assert ("Winds up" in adapting.why) == (name != "paper")
+        assert f"{start:.3f} s to {end:.3f} s" in window.result
+        assert ("Never in" in reaching.result) == (not summary["reached"])
+        assert ("no evidence" in window.reason) == (name != "paper")
+        assert f"{summary['min_clearance']['SR1']:+.3f} m" in avoiding.result
+        assert "At most 1" in single.result
+        assert "26.82 kN" in effort.result
+        assert ("Winds up" in adapting.reason) == (name != "paper")
 
 
 @pytest.mark.slow
@@ -145,18 +145,18 @@ def test_claims_mention_thruster_limits(tmp_path):
     summary = run_scenario(scenario, tmp_path / "run", report=False).summary
     assert summary["saturated_time"] == pytest.approx(7.145, abs=0.05)
     reaching, window, *_, adapting = paper_claims(scenario, summary)
-    assert "never saturated" not in reaching.why
-    assert "thrusters' limits" in window.why
-    assert "Winds up" in adapting.why
+    assert "never saturated" not in reaching.reason
+    assert "thrusters' limits" in window.reason
+    assert "Winds up" in adapting.reason
 
 
 def test_claims_mention_only_entered_spheres(tmp_path):
     scenario = load_scenario("paper", ["arbiter.engine=closed", "time.duration=1", "initial.position=[0,3,1]"])
     summary = run_scenario(scenario, tmp_path / "run", report=False).summary
     _, window, avoiding, *_ = paper_claims(scenario, summary)
-    assert "Never inside SR1 and SR2" in window.measured
-    assert "sphere" not in avoiding.why
-    assert "starts" in avoiding.why
+    assert "Never inside SR1 and SR2" in window.result
+    assert "sphere" not in avoiding.reason
+    assert "starts" in avoiding.reason
 
 
 SHAPES = {
