@@ -55,7 +55,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield write_clearances, (regions, _TABLE, _FLAT, _FLAT)
     yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
     yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, _INTEGERS)
-    yield compute_inputs, (model.inputs, goal, regions, state, _FLAT, _FLAT, data.signals)
+    yield compute_inputs, (model.inputs, goal, regions, state, 0.0, _FLAT, data.signals)
     references, rows = np.zeros(1, np.uint32), np.zeros((0, 0))
     calls = PlantCalls(*[Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)] * 3)
     yield fly, (model, data, calls, empty_metrics()[1], _FLAT, rows)

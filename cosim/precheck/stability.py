@@ -97,7 +97,7 @@ def start_weights(scenario: Scenario) -> Array:
     packed = pack_inputs(scenario.regions, scenario.criteria, scenario.rules, scenario.arbiter.ramp)
     signals = empty_signals(packed, len(secondary), len(scenario.criteria))
     goal, regions = pack([scenario.goal_region]), pack(secondary)
-    BoundCall(compute_inputs, (packed, goal, regions, state, np.zeros(1), clearances, signals)).call()
+    BoundCall(compute_inputs, (packed, goal, regions, state, 0.0, clearances, signals)).call()
     weights = Arbiter(system=scenario.rules.system, engine=scenario.arbiter.engine)(signals.inputs.tolist())
     return np.array(weights)[list(scenario.criterion_places)]
 

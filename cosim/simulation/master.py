@@ -278,7 +278,7 @@ class Master:
         """Do `n` steps from step `k` on; raise the error of plant, law, arbiter or command that ends one early."""
         step, span = self.scenario.time.step, self._span
         span[0], span[1], span[2] = k, n, 0
-        self.data.failed_step[0] = -1
+        self.data.failed_step = -1
         self._noise.draw(1 + (k + n - 1) // self.scenario.control_every)
         self._bound_law.refresh()
         self._plant.prepare_steps()
@@ -290,7 +290,7 @@ class Master:
             self._boundary = (k + done) * step
         for part in self._parts:
             part.raise_error()
-        if self.data.failed_step[0] >= 0:
+        if self.data.failed_step >= 0:
             self._plant.raise_failure()
 
     def measure_initial_state(self) -> None:
@@ -318,18 +318,18 @@ class Master:
     def _take_commands(self) -> None:
         """Apply the commands of this step, after it has measured."""
         if self.command_handler is not None and self._commands is not None:
-            self._apply_commands(self.command_handler, self._commands.take(int(self.data.k[0])))
+            self._apply_commands(self.command_handler, self._commands.take(int(self.data.k)))
 
     def _continue_mission(self) -> None:
         """Begin the next mission item if it is time, and compute a manual command, once the regions are evaluated."""
         handler, data = self.command_handler, self.data
         assert handler is not None
-        if handler.update(float(data.now[0]), self._goal_clearance):
+        if handler.update(float(data.now), self._goal_clearance):
             self._apply_commands(handler, ())  # changes by the next mission item
             self._locate.call()
-        if data.k[0] % self.model.control_every == 0:
-            data.manual[0] = not handler.automatic_control
-            if data.manual[0]:
+        if data.k % self.model.control_every == 0:
+            data.manual = not handler.automatic_control
+            if data.manual:
                 data.command[:] = handler.wrench()
 
     @property
@@ -341,7 +341,7 @@ class Master:
     def _apply_commands(self, command_handler: CommandHandler, commands: Sequence[Command]) -> None:
         """Apply the commands of this step, and pass changed settings to law and arbiter."""
         for command in commands:
-            command_handler.apply(command, float(self.data.now[0]))
+            command_handler.apply(command, float(self.data.now))
         if command_handler.control_regained:
             self._bound_law.restart(law_of(self.scenario))
         if isinstance(self.law, CompiledLaw) and (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from controller import CompiledLaw, LawError
-from controller.navigation.measurements import N_SENSORS, N_VALUES, empty_measurements
+from controller.navigation.measurements import N_SENSORS, N_VALUES
 from cosim.scenario.law_factory import law_of
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.make_step import exchanged_variables, make_data, make_model
@@ -26,18 +26,11 @@ class Loop:
         )  # the importer sets velocities, and the C code counts the law's period
         inputs, outputs = exchanged_variables(scenario)
         signals, noise = Signals([Column("time", "s", "Simulated time")]), np.zeros((1, 6))
-        data = make_data(scenario, self.model, self.law, signals, inputs, outputs, noise)
-        self.data: StepData = data._replace(measurements=empty_measurements())
+        self.data: StepData = make_data(scenario, self.model, self.law, signals, inputs, outputs, noise)
+        self.data.measurements.times[:] = -np.inf
         n_values, n_sensors = (N_VALUES, N_SENSORS) if self.model.through_sensors else (0, 0)
-        self.inputs = ControllerInputs(
-            motion=np.zeros(13), start=np.zeros(13), samples=np.zeros(n_values), sample_times=np.zeros(n_sensors),
-            end=np.zeros(1), controls=np.zeros(1, np.int64),
-        )  # fmt: skip
-        m, n = self.data.thrusts.size, 1 + len(scenario.regions)
-        self.out = ControllerOutputs(
-            thrusts=np.zeros(m), lost=np.zeros(m), outages=np.zeros(N_SENSORS), values=np.zeros(n),
-            clearances=np.zeros(n), failures=np.zeros(1, np.int64), changes=np.zeros(1, np.int64),
-        )  # fmt: skip
+        self.inputs = ControllerInputs(samples=np.zeros(n_values), sample_times=np.zeros(n_sensors))
+        self.out = ControllerOutputs(m=self.data.thrusts.size, n=1 + len(scenario.regions))
         self.desired_quaternion = _attitude_of(self.law)
         self.period = _period_of(self.law, scenario.time.control)
         self.ramp = np.array([scenario.arbiter.ramp])
@@ -67,7 +60,7 @@ class Loop:
         memory.keep(model.inputs.memberships.ramps)
         for array in (data.goal.shifts, data.regions.shifts, *arrays_of(self.law.memory)):
             memory.keep(array)
-        memory.fix(model, data.goal, data.regions, data.allocator, data.k, data.manual, data.failed_step)
+        memory.fix(model, data.goal, data.regions, data.allocator, *map(data.storage, ("k", "manual", "failed_step")))
         if not model.through_sensors:
             memory.fix(data.navigation, data.measurements)
         return {
@@ -75,9 +68,9 @@ class Loop:
             "N_OUTPUTS": n_outputs,
             "PERIOD_INDEX": memory.keep(self.period),
             "RAMP_INDEX": memory.keep(self.ramp),
-            "NOW_INDEX": memory.keep(data.now),
-            "END_INDEX": memory.keep(inputs.end),
-            "CONTROLS_INDEX": memory.keep(inputs.controls),
+            "NOW_INDEX": memory.keep(data.storage("now")),
+            "END_INDEX": memory.keep(inputs.storage("end")),
+            "CONTROLS_INDEX": memory.keep(inputs.storage("controls")),
             "NOISE_INDEX": memory.keep(data.noise),
             "N_GAINS": max(len(self.law.gains), 1),
         }
@@ -86,11 +79,11 @@ class Loop:
         """Return the largest valid number of each counter, by its index in the model's integers."""
         model, data, out = self.model, self.data, self.out
         counters = (
-            (data.stage, len(data.allocator.lower) - 1),
-            (data.goal_index, len(model.goal_places)),
-            (data.failures, model.failed.size),
-            (out.failures, model.failed.size),
-            (out.changes, model.outage_steps.size),
+            (data.storage("stage"), len(data.allocator.lower) - 1),
+            (data.storage("goal_index"), len(model.goal_places)),
+            (data.storage("failures"), model.failed.size),
+            (out.storage("failures"), model.failed.size),
+            (out.storage("changes"), model.outage_steps.size),
         )
         return {self.memory.keep(counter): maximum for counter, maximum in counters}
 

@@ -15,6 +15,7 @@ from controller.linear_algebra import norm
 from controller.quaternion import rate, rotation_matrix
 from controller.regions.region_set import PackedRegions, clearance_of_pose
 from controller.stack_array import zeros
+from controller.state import State
 from cosim.scenario.arbiter_rules import ArbiterRules
 from cosim.scenario.criteria import CriterionSetup
 from cosim.scenario.region_tables import SecondaryRegion
@@ -41,12 +42,12 @@ class PackedInputs(NamedTuple):
     by_speed: bool  # True if an input or a membership needs closing speeds
 
 
-class ArbiterSignals(NamedTuple):
+class ArbiterSignals(State):
     """Output of `compute_inputs` for the goal and n regions."""
 
     memberships: Array  # (criteria,) in [0, 1]
     inputs: Array  # (m,) value of each input of the rules, in its unit
-    goal_clearance: Array  # (1,) m, clearance of the goal
+    goal_clearance: float  # m, clearance of the goal
     closing_speeds: Array  # (n + 1,) m/s or rad/s, the goal's first; above 0 where the clearance shrinks
     approach_times: Array  # (n,) s, 0 where violated, inf where the clearance does not shrink
 
@@ -75,7 +76,12 @@ def empty_signals(packed: PackedInputs, n_regions: int, n_criteria: int) -> Arbi
     """Return signals for `compute_inputs` to fill: zeros, and infinite approach times."""
     memberships = np.zeros(n_criteria)
     inputs = np.zeros(packed.kinds.size) if packed.kinds.size else memberships
-    return ArbiterSignals(memberships, inputs, np.zeros(1), np.zeros(n_regions + 1), np.full(n_regions, np.inf))
+    return ArbiterSignals(
+        memberships=memberships,
+        inputs=inputs,
+        closing_speeds=np.zeros(n_regions + 1),
+        approach_times=np.full(n_regions, np.inf),
+    )
 
 
 def empty_state() -> VehicleState:
@@ -99,23 +105,23 @@ def compute_inputs(
     goal: PackedRegions,
     regions: PackedRegions,
     state: VehicleState,
-    now: Array,
+    now: float,
     clearances: Array,
     signals: ArbiterSignals,
 ) -> None:
-    """Compute the memberships and the inputs of the arbiter's rules; now (1,) [s], clearances (n,) [m or rad]."""
+    """Compute the memberships and the inputs of the arbiter's rules; now [s], clearances (n,) [m or rad]."""
     if packed.of_goal:
-        signals.goal_clearance[0] = clearance_of_pose(goal, 0, state.position, state.quaternion, zeros(3))
+        signals.goal_clearance = clearance_of_pose(goal, 0, state.position, state.quaternion, zeros(3))
     if packed.by_speed:
         speeds = signals.closing_speeds
         if packed.of_goal:
-            speeds[0] = _closing_speed(goal, 0, state, signals.goal_clearance[0])
+            speeds[0] = _closing_speed(goal, 0, state, signals.goal_clearance)
         for i in range(clearances.size):
             speeds[1 + i] = _closing_speed(regions, i, state, clearances[i])
             signals.approach_times[i] = _approach_time(clearances[i], speeds[1 + i])
     compute_memberships(packed.memberships, clearances, signals.approach_times, signals.memberships)
     for k in range(packed.kinds.size):
-        x = _input(packed, k, state, now[0], clearances, signals)
+        x = _input(packed, k, state, now, clearances, signals)
         signals.inputs[k] = x if x <= packed.upper[k] else packed.upper[k]  # NaN too
 
 
@@ -135,7 +141,7 @@ def _input(
     elif kind == _CLOSING_SPEED:
         x = signals.closing_speeds[index]
     elif kind != _TIME:
-        x = signals.goal_clearance[0] if index == 0 else clearances[index - 1]
+        x = signals.goal_clearance if index == 0 else clearances[index - 1]
         if kind == _APPROACH_TIME:
             x = _approach_time(x, signals.closing_speeds[index])
     return x

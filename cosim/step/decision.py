@@ -26,7 +26,7 @@ def update_inputs(model: StepModel, data: StepData) -> None:
     """Compute the memberships and the inputs of the arbiter's rules."""
     clearances = data.true_evaluation.clearances if model.exact else data.arbiter_evaluation.clearances
     compute_inputs(model.inputs, data.goal, data.regions, data.arbiter_state, data.now, clearances[1:], data.signals)
-    data.shown_inputs[:] = data.signals.memberships[: data.shown_inputs.size]
+    data.shown_inputs = data.signals.memberships[: data.shown_inputs.size]
 
 
 def weigh(model: StepModel, data: StepData) -> None:
@@ -38,7 +38,7 @@ def weigh(model: StepModel, data: StepData) -> None:
 
 def update_delayed_weights(model: StepModel, data: StepData) -> None:
     """Take over the weights and the arbiter's inputs that follow from the step before (Jacobi)."""
-    if (data.k[0] - 1) % model.arbiter_every == 0:
+    if (data.k - 1) % model.arbiter_every == 0:
         weigh(model, data)
     if position_is_known(model, data):
         update_inputs(model, data)
@@ -49,31 +49,31 @@ def control(model: StepModel, data: StepData) -> None:
     started = seconds(model.clock, data.ticks) if model.clock.size > 0 else 0.0
     data.expected[:] = np.nan
     if controls(model, data):
-        data.estimate[:] = data.law.estimate
+        data.estimate = data.law.estimate
         call_back(data, LAW)
-        data.report[:] = data.law.report
+        data.report = data.law.report
         if not model.exact:
-            data.expected[:] = data.law.expected
+            data.expected = data.law.expected
         if not model.law_gives_wrench and model.for_record:
-            data.command[:] = model.thruster_matrix @ data.thrusts
-    elif data.manual[0] == 0:
+            data.command = model.thruster_matrix @ data.thrusts
+    elif data.manual == 0:
         data.command[:] = 0.0
     by_wrench = model.law_gives_wrench or not controls(model, data)
     if by_wrench and model.through_thrusters:
-        stage, allocator = data.stage[0], data.allocator
+        stage, allocator = data.stage, data.allocator
         lower, upper, direction = allocator.lower[stage], allocator.upper[stage], allocator.direction
-        data.saturated[0] = allocate(allocator.inverse[stage], lower, upper, direction, data.command, data.thrusts)
+        data.saturated = allocate(allocator.inverse[stage], lower, upper, direction, data.command, data.thrusts)
     elif by_wrench:
-        data.wrench[:] = data.command
+        data.wrench = data.command
         if model.commands:
-            data.saturated[0] = bound_wrench(data.wrench)
+            data.saturated = bound_wrench(data.wrench)
     if model.clock.size > 0:
-        data.max_duration[0] = max(data.max_duration[0], seconds(model.clock, data.ticks) - started)
+        data.max_duration = max(data.max_duration, seconds(model.clock, data.ticks) - started)
 
 
 def controls(model: StepModel, data: StepData) -> bool:
     """Return True if the law computes the forces: the command is not given, and there is a state."""
-    return data.manual[0] == 0 and (not model.through_sensors or data.navigation.started > 0.0)
+    return data.manual == 0 and (not model.through_sensors or data.navigation.started > 0.0)
 
 
 def bound_wrench(wrench: Array) -> bool:

@@ -14,25 +14,25 @@ from cosim.step.step_model import LOCATED, MEASURED, PLANT_STEP, Array, Integers
 
 def step(model: StepModel, data: StepData, plant: PlantCalls, k: int) -> None:
     """Do step `k`; the last one does not advance the plant."""
-    data.k[0] = k
-    data.now[0] = k * model.step
+    data.k = k
+    data.now = k * model.step
     fail_thrusters(model, data, plant)
     if model.jacobi and k > 0:
         update_delayed_weights(model, data)
     measure(model, data, plant)
     decide(model, data, k % model.arbiter_every == 0, k % model.control_every == 0)
-    if k < model.steps and data.failed_step[0] < 0:
+    if k < model.steps and data.failed_step < 0:
         step_plant(model, data, plant)
 
 
 def decide(model: StepModel, data: StepData, arbitrates: bool, controls: bool) -> None:
     """Evaluate the regions, and decide by the measured state."""
     call_back(data, MEASURED)
-    if data.calls[MEASURED] != 0 and data.failed_step[0] >= 0:
+    if data.calls[MEASURED] != 0 and data.failed_step >= 0:
         return
     locate(model, data)
     call_back(data, LOCATED)
-    if data.failed_step[0] >= 0:
+    if data.failed_step >= 0:
         return
     if arbitrates and not model.jacobi:
         arbitrate(model, data)
@@ -45,7 +45,7 @@ def advance(model: StepModel, data: StepData, plant: PlantCalls, span: Integers,
     span[2] = 0
     for i in range(span[1]):
         step(model, data, plant, span[0] + i)
-        if data.failed_step[0] >= 0:
+        if data.failed_step >= 0:
             break
         span[2] = i + 1
         if rows.shape[0] > 0:
@@ -54,8 +54,8 @@ def advance(model: StepModel, data: StepData, plant: PlantCalls, span: Integers,
 
 def show_start(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     """Measure the initial state without noise, and evaluate the regions, as a run does that waits for its start."""
-    data.k[0] = 0
-    data.now[0] = 0.0
+    data.k = 0
+    data.now = 0.0
     read_outputs(data, plant)
     data.state.position[:] = data.true_state.position
     data.state.quaternion[:] = data.true_state.quaternion
@@ -67,7 +67,7 @@ def locate(model: StepModel, data: StepData) -> None:
     """Move the regions, evaluate them at the arbiter's pose and at the true one, and advance the goal."""
     if model.moving:
         move_regions(model, data)
-    if model.for_record or data.k[0] % model.arbiter_every == 0:
+    if model.for_record or data.k % model.arbiter_every == 0:
         write_arbiter_state(data.state, data.expected, data.arbiter_state)
         if not model.exact:
             evaluate(model, data, data.arbiter_state, data.arbiter_evaluation)
@@ -84,12 +84,12 @@ def step_plant(model: StepModel, data: StepData, plant: PlantCalls) -> None:
         data.delayed[j] = data.inputs[j]
         native.inputs[j] = data.stuck[j] if math.isfinite(data.stuck[j]) else given
     data.inputs[own:] = native.inputs[own:]  # of a coupled plant: its caller sets them
-    if fmi_set(native) and fmi_do_step(native, data.now[0], model.step) and fmi_get(native) and fmi_get_flags(native):
+    if fmi_set(native) and fmi_do_step(native, data.now, model.step) and fmi_get(native) and fmi_get_flags(native):
         call_back(data, PLANT_STEP)
     else:
-        data.failed_step[0] = data.k[0]
-    if data.failed_step[0] < 0:
-        first = data.first_applied[0]
+        data.failed_step = data.k
+    if data.failed_step < 0:
+        first = data.first_applied
         data.outputs[first:] = native.outputs[first:]
         for j in range(data.flags.size):
             data.flags[j] = native.flags[j]

@@ -55,8 +55,8 @@ def write_clearances_of_pose(regions: PackedRegions, state: VehicleState, cleara
 
 def move_regions(model: StepModel, data: StepData) -> None:
     """Move goal and regions to their positions at the present time."""
-    move_packed(data.goal, data.goal_origin, data.now[0])
-    move_packed(data.regions, data.region_origins, data.now[0])
+    move_packed(data.goal, data.goal_origin, data.now)
+    move_packed(data.regions, data.region_origins, data.now)
     for i in range(model.moving_regions.size):
         region = model.moving_regions[i]
         if region > 0:
@@ -72,15 +72,15 @@ def move_packed(regions: PackedRegions, origins: Array, now: float) -> None:
 
 def advance_goal(model: StepModel, data: StepData) -> None:
     """Move the goal to its next position, from the next step on, once the vehicle has stayed in it long enough."""
-    index = data.goal_index[0]
-    data.shown_goal_index[0] = index
+    index = data.goal_index
+    data.shown_goal_index = index
     if index == model.goal_places.shape[0]:
         return
-    now, since = data.now[0], data.inside_since
-    since[0] = min(since[0], now) if data.true_evaluation.clearances[0] >= 0.0 else math.inf
-    if completed_steps(model, now - since[0]) >= model.goal_stay:
+    inside = data.true_evaluation.clearances[0] >= 0.0
+    data.inside_since = min(data.inside_since, data.now) if inside else math.inf
+    if completed_steps(model, data.now - data.inside_since) >= model.goal_stay:
         data.goal_origin[0] = model.goal_places[index]
-        data.goal_index[0], since[0] = index + 1, math.inf
+        data.goal_index, data.inside_since = index + 1, math.inf
 
 
 def completed_steps(model: StepModel, duration: float) -> float:

@@ -58,17 +58,17 @@ def fly(
 ) -> None:
     """Fly from start to end; rows (control steps, columns), or (0, 0) for none; before (i,) last inputs."""
     if not fmi_get(plant.native):
-        data.failed_step[0] = 0
+        data.failed_step = 0
     for k in range(model.steps + 1):
-        if data.failed_step[0] >= 0:
+        if data.failed_step >= 0:
             break
         step(model, data, plant, k)
         score_state(model, data, metrics, k)
         if k < model.steps:
             score_forces(model, data, metrics, before)
-            if rows.shape[0] > 0 and k % model.control_every == 0 and data.failed_step[0] < 0:
+            if rows.shape[0] > 0 and k % model.control_every == 0 and data.failed_step < 0:
                 rows[k // model.control_every] = data.row
-    metrics.worst_step[0], metrics.failed_step[0] = data.max_duration[0], data.failed_step[0]
+    metrics.worst_step[0], metrics.failed_step[0] = data.max_duration, data.failed_step
 
 
 def score_state(model: StepModel, data: StepData, metrics: FlightMetrics[Array], k: int) -> None:
@@ -84,7 +84,7 @@ def score_state(model: StepModel, data: StepData, metrics: FlightMetrics[Array],
                 metrics.min_angle[0] = minimum(clearances[i], metrics.min_angle[0])
         if k < model.steps and not clearances[i] >= 0.0:
             metrics.weighted_violation[0] -= model.priorities[i] * clearances[i] * model.step
-    if data.shown_goal_index[0] == model.goal_places.shape[0]:
+    if data.shown_goal_index == model.goal_places.shape[0]:
         metrics.goal_clearance[0] = max(metrics.goal_clearance[0], goal_clearance)
         if goal_clearance >= 0.0 and metrics.inside[0] == 0.0:
             metrics.last_entered[0] = k
@@ -98,7 +98,7 @@ def score_state(model: StepModel, data: StepData, metrics: FlightMetrics[Array],
         metrics.promises[0] += 0.0 if np.isnan(metrics.bound[0]) else 1.0
         if model.isolated >= 0 and data.law.report[model.isolated] > 0.0:
             failed = False
-            for i in range(data.failures[0]):
+            for i in range(data.failures):
                 failed = failed or model.failed[i] + 1 == data.law.report[model.isolated]
             metrics.healthy_isolated[0] = max(metrics.healthy_isolated[0], 0.0 if failed else 1.0)
         if model.limit >= 0:
@@ -110,7 +110,7 @@ def score_forces(model: StepModel, data: StepData, metrics: FlightMetrics[Array]
     for j in range(before.size):
         metrics.thrust_variation[0] += abs(data.inputs[j] - before[j])
         before[j] = data.inputs[j]
-    if data.failed_step[0] >= 0:
+    if data.failed_step >= 0:
         return
     for j in range(data.forces.size):
         metrics.thrust_effort[0] += abs(data.forces[j]) * model.step

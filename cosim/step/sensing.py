@@ -12,28 +12,28 @@ from cosim.step.step_model import PLANT_SET, StepData, StepModel, call_back
 
 def fail_thrusters(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     """Fail the thrusters that are scheduled for this step, and report total failures."""
-    first = data.failures[0]
+    first = data.failures
     report_failures(model, data)
-    for i in range(first, data.failures[0]):
+    for i in range(first, data.failures):
         thruster, remaining = model.failed[i], model.remaining[i]
         if remaining >= 0.0:
             plant.effectiveness.inputs[thruster] = remaining
             call_back(data, PLANT_SET)
             if not (fmi_set_one(plant.effectiveness, thruster) and fmi_get(plant.native)):
-                data.failed_step[0] = data.k[0]
+                data.failed_step = data.k
         else:
             data.stuck[thruster] = plant.native.inputs[thruster]
 
 
 def report_failures(model: StepModel, data: StepData) -> None:
     """Report total failures of thrusters that are due to law and allocation."""
-    i, k = data.failures[0], completed_steps(model, data.now[0])
+    i, k = data.failures, completed_steps(model, data.now)
     while i < model.failed.size and model.failure_steps[i] <= k:
         if model.report_failures and not model.remaining[i] > 0.0:
             data.state.thruster_health[model.failed[i]] = 0.0
-            data.stage[0] = min(data.stage[0] + 1, data.allocator.lower.shape[0] - 1)
+            data.stage = min(data.stage + 1, data.allocator.lower.shape[0] - 1)
         i += 1
-    data.failures[0] = i
+    data.failures = i
 
 
 def measure(model: StepModel, data: StepData, plant: PlantCalls) -> None:
@@ -46,13 +46,13 @@ def measure(model: StepModel, data: StepData, plant: PlantCalls) -> None:
 
 def read_outputs(data: StepData, plant: PlantCalls) -> None:
     """Copy the plant's outputs of the beginning of a step."""
-    data.outputs[: data.first_applied[0]] = plant.native.outputs[: data.first_applied[0]]
+    data.outputs[: data.first_applied] = plant.native.outputs[: data.first_applied]
 
 
 def estimate_state(model: StepModel, data: StepData) -> None:
     """Write the state that law and arbiter receive."""
     if model.through_sensors:
-        data.navigation.now = data.now[0]
+        data.navigation.now = data.now
         navigate(data.measurements, model.sensors, data.navigation, data.state)
     else:
         sense(model, data)
@@ -60,20 +60,20 @@ def estimate_state(model: StepModel, data: StepData) -> None:
 
 def apply_outages(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     """Change the sensors' loss probabilities where an outage begins or ends with this step."""
-    i = data.outages[0]
-    while i < model.outage_steps.size and data.k[0] == model.outage_steps[i]:
+    i = data.outages
+    while i < model.outage_steps.size and data.k == model.outage_steps[i]:
         sensor = model.outage_sensors[i]
         plant.losses.inputs[sensor] = model.outage_losses[i]
         call_back(data, PLANT_SET)
         if not fmi_set_one(plant.losses, sensor):
-            data.failed_step[0] = data.k[0]
+            data.failed_step = data.k
         i += 1
-    data.outages[0] = i
+    data.outages = i
 
 
 def sense(model: StepModel, data: StepData) -> None:
     """Write the measured state: with noise, held, or lost."""
-    true_state, state, now = data.true_state, data.state, data.now[0]
+    true_state, state, now = data.true_state, data.state, data.now
     state.quaternion[:] = true_state.quaternion
     state.velocity_body[3:] = true_state.velocity_body[3:]
     lost = model.dead_from <= now < model.dead_until
@@ -85,7 +85,7 @@ def sense(model: StepModel, data: StepData) -> None:
         state.position[:] = np.nan
         state.velocity_body[:3] = np.nan
     elif not (lost or model.exact):
-        noise = data.noise[data.k[0] // model.control_every % data.noise.shape[0]]
+        noise = data.noise[data.k // model.control_every % data.noise.shape[0]]
         state.position[:] += noise[:3]
         state.velocity_body[:3] += noise[3:]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Callable
 from typing import NamedTuple, Protocol
 
@@ -13,6 +14,7 @@ from controller import VehicleState
 from controller.navigation.measurements import Measurements, SensorModel
 from controller.navigation.navigation_memory import NavigationMemory
 from controller.regions.region_set import PackedRegions
+from controller.state import State
 from controller.translator.foreign import POINTER, call_c
 from cosim.step.arbiter_inputs import ArbiterSignals, PackedInputs
 from cosim.step.region_positions import RegionEvaluation
@@ -93,14 +95,14 @@ class LawOutputs(NamedTuple):
     report: Array  # (r,) diagnostics
 
 
-class StepData(NamedTuple):
+class StepData(State):
     """State and signals. Signals are parts of the row, if the row has them."""
 
     row: Array  # (columns,)
-    k: Integers  # (1,) number of the step
-    now: Array  # (1,) s
+    k: int  # number of the step
+    now: float  # s
     outputs: Array  # (o,) the plant's outputs, from the beginning of the step, and from `first_applied` on from its end
-    first_applied: Integers  # (1,) index of the first output from the end of the step
+    first_applied: int  # index of the first output from the end of the step
     forces: Array  # (m,) N, given by the thrusters; (0,) without thrusters
     force: Array  # (3,) N, on the body
     flags: Array  # (f,) Boolean outputs of the plant, from the end of the step
@@ -113,9 +115,9 @@ class StepData(NamedTuple):
     goal_origin: Array  # (1, 3) m, NED: shift of the goal, extrapolated to time 0
     region_origins: Array  # (n, 3) m, NED
     shifts: Array  # (moving, 3) m, NED
-    goal_index: Integers  # (1,) index of the goal's present position
-    shown_goal_index: Array  # (1,) the same during the step
-    inside_since: Array  # (1,) s, time since which the vehicle has been in the goal; inf: it is outside
+    goal_index: int  # index of the goal's present position
+    shown_goal_index: float  # the same during the step
+    inside_since: float = math.inf  # s, time since which the vehicle has been in the goal; inf: it is outside
     true_state: VehicleState
     state: VehicleState  # measured state, which law and arbiter receive
     arbiter_state: VehicleState  # state that the arbiter uses
@@ -129,22 +131,22 @@ class StepData(NamedTuple):
     by_criterion: Array  # (criteria,) weight of each criterion
     weights: Array  # (n,) weight of each region's criterion
     calls: Integers  # (12,) addresses of C functions and of their arguments; 0: none
-    manual: Integers  # (1,) 1: the command is given, and the law does not compute it
+    manual: bool  # True: the command is given, and the law does not compute it
     law: LawOutputs
     expected: Array  # (6,) prediction that the arbiter uses; NaN: none
     estimate: Array  # (4,) N, N m: estimate before the last call of the law
     report: Array  # (r,) diagnostics of the law
     command: Array  # (6,) N, N m, body frame
-    saturated: Array  # (1,) 1 if the limits clipped the command
+    saturated: float  # 1 if the limits clipped the command
     thrusts: Array  # (m,) N, commanded thruster forces
     allocator: Allocator
-    stage: Integers  # (1,) number of reported failures
+    stage: int  # number of reported failures
     stuck: Array  # (j,) the vehicle's own inputs of stuck thrusters, NaN for others
-    failures: Integers  # (1,) number of failures so far
-    outages: Integers  # (1,) number of changes of sensors so far
-    failed_step: Integers  # (1,) step in which the FMU failed, -1 for none
+    failures: int  # number of failures so far
+    outages: int  # number of changes of sensors so far
+    failed_step: int = -1  # step in which the FMU failed, -1 for none
     ticks: Integers  # (2,) for `plant_calls.seconds`
-    max_duration: Array  # (1,) s of the wall clock, longest time of law and allocation in a step
+    max_duration: float  # s of the wall clock, longest time of law and allocation in a step
 
 
 def set_call(data: StepData, which: int, call: Call) -> None:
@@ -160,4 +162,4 @@ def call_back(data: StepData, call: int) -> None:
 
 
 def _end_step(data: StepData) -> None:
-    data.failed_step[0] = data.k[0]
+    data.failed_step = data.k

@@ -51,7 +51,7 @@ def inputs_of(signals, state, now=0.0):
     goal.move_to(now)
     regions.move_to(now)
     found = empty_signals(packed, len(REGIONS), 3)
-    compute_inputs(packed, goal, regions, state, np.array([now]), clearances_of(REGIONS, state, now), found)
+    compute_inputs(packed, goal, regions, state, now, clearances_of(REGIONS, state, now), found)
     return found
 
 
