@@ -77,8 +77,8 @@ class _Sampled(Defuzzifier):
         # scikit-fuzzy knows nothing of a term that no rule concludes, not even where it is 0
         every = zip(cuts, self._samples, self._concluded, strict=True)
         terms = [(cut, degrees) for cut, degrees, concluded in every if concluded or cut > 0.0]
-        crossings = [x for cut, degrees in terms for x in _interp_universe_fast(self._positions, degrees, cut)]
-        positions = np.union1d(self._positions, crossings)
+        crossings = [_interp_universe_fast(self._positions, degrees, cut) for cut, degrees in terms]
+        positions = np.sort(np.concatenate([self._positions, *crossings]))  # a position twice adds nothing
         outline = np.zeros_like(positions)
         for cut, degrees in terms:
             np.maximum(outline, np.minimum(cut, interp_membership(self._positions, degrees, positions)), out=outline)
