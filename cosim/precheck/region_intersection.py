@@ -13,13 +13,14 @@ import numpy as np
 from scipy.optimize import minimize
 
 from controller.regions import Region
-from controller.regions.region_set import clearances_at
+from controller.regions.region_set import RegionEvaluator, clearances_at, pack
 from cosim.simulation.signals import Array
 
 Vector3 = tuple[float, float, float]
 
 TOLERANCE = 0.01  # m, accuracy of the common depth
 _MAX_BOXES = 400_000  # maximum number of boxes in one round of halving
+_LEVEL = (1.0, 0.0, 0.0, 0.0)  # the regions do not depend on attitude
 
 
 @dataclass(frozen=True)
@@ -75,8 +76,9 @@ def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float 
 
 def _refine(regions: Sequence[Region], point: Array, depth: float, low: Array, high: Array) -> tuple[Array, float]:
     """Improve a point by Nelder-Mead, since the minimum clearance is not smooth; return point and depth."""
+    evaluator = RegionEvaluator(pack(regions))
     done = minimize(
-        lambda p: -float(common_depth(p[None, :], regions)[0]), point, method="Nelder-Mead",
+        lambda p: -float(evaluator.evaluate(p, _LEVEL)[3].min()), point, method="Nelder-Mead",
         bounds=list(zip(low, high, strict=True)), options={"xatol": 1e-5, "fatol": 1e-6, "maxiter": 300},
     )  # fmt: skip
     return (np.asarray(done.x), -float(done.fun)) if -done.fun > depth else (point, depth)
