@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from cosim.errors import RunError
-from cosim.replay.interactive.data import flight_data
 from cosim.replay.page import is_page, write_page
 from cosim.replay.sampling import MAX_BYTES, MAX_BYTES_INTERACTIVE
 from cosim.replay.trace import trace_of
@@ -15,7 +14,11 @@ from cosim.results.run_result import REPLAY, Run, load_run
 
 def write_replay(run: Run, out: Path | None = None, title: str | None = None, interactive: bool = False) -> Path:
     """Write the page of one run."""
-    flight = flight_data(run) if interactive else None
+    flight = None
+    if interactive:
+        from cosim.replay.interactive.data import flight_data  # with the rooms of packaged controllers
+
+        flight = flight_data(run)
     trace = trace_of(run, MAX_BYTES_INTERACTIVE if interactive else MAX_BYTES)
     return write_page(out or run.folder / REPLAY, [trace.as_json()], title or run.scenario.title, flight)
 
