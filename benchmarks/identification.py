@@ -26,7 +26,7 @@ from scipy.signal import lfilter
 
 from controller.quaternion import from_axis_angle, multiply
 from cosim.identification.excitation import DVL_PERIOD, NOISE, ROW, design, excitation_scenario, rehearse
-from cosim.identification.findings import NAMED
+from cosim.identification.findings import MIN_CAUSE_FRACTION
 from cosim.identification.fit import Fit, fit, integration_step
 from cosim.identification.intervals import DISAGREES
 from cosim.identification.log import Log, make_topic
@@ -232,7 +232,7 @@ def measure(
     n = len(truths)
     off = np.abs(done.values[:n] - truth)
     halves = done.intervals.half[:n]
-    cause = done.causes[0].flag if done.causes and done.causes[0].share > NAMED else "none"
+    cause = done.causes[0].flag if done.causes and done.causes[0].fraction > MIN_CAUSE_FRACTION else "none"
     line = {
         "nuisance": nuisance, "estimated": estimated, "seed": seed, "chi2": round(done.intervals.chi2, 3),
         "covered": (off <= halves).tolist(), "nominal": (off <= 1.96 * done.intervals.nominal[:n]).tolist(),

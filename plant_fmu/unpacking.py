@@ -93,16 +93,18 @@ def library_names(root: ET.Element, platforms: Sequence[str]) -> dict[str, str]:
     """Return the names of the libraries that an FMU must have for a machine, by the interface that needs them."""
     folder = platforms[0 if root.get("fmiVersion", "").startswith("2") else -1]
     suffix = SUFFIXES.get(platforms[-1].partition("-")[2], "")
-    needed = {element.tag: element.get("modelIdentifier") for element in root if element.tag in INTERFACES}
-    return {interface: f"binaries/{folder}/{name}{suffix}" for interface, name in needed.items()}
+    identifiers = {element.tag: element.get("modelIdentifier") for element in root if element.tag in INTERFACES}
+    return {interface: f"binaries/{folder}/{name}{suffix}" for interface, name in identifiers.items()}
 
 
-def _check_libraries(path: Path, archive: zipfile.ZipFile, needed: Mapping[str, str], platforms: Sequence[str]) -> None:
+def _check_libraries(
+    path: Path, archive: zipfile.ZipFile, identifiers: Mapping[str, str], platforms: Sequence[str]
+) -> None:
     """Refuse libraries of this machine that the system's loader would refuse, or that would end this process."""
     folders = tuple(f"binaries/{platform}/" for platform in platforms)
     for member in archive.infolist():
         if not member.is_dir() and member.filename.startswith(folders):
-            is_loaded = member.filename in needed.values()
+            is_loaded = member.filename in identifiers.values()
             with archive.open(member) as source:
                 defect = library_defect(source, member.file_size, platforms[-1], is_loaded)
             if defect:

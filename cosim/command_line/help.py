@@ -37,9 +37,9 @@ def add_verbs(verbs: Any, parser: argparse.ArgumentParser) -> None:
          "help --completion zsh > ~/.zfunc/_cosim    # a folder of fpath",
          "help --completion fish > ~/.config/fish/completions/cosim.fish"),
     )  # fmt: skip
-    either = verb.add_mutually_exclusive_group()
-    either.add_argument("about", nargs="?", choices=tuple(verbs.choices), metavar="VERB", help="such as run")
-    flag(either, "--completion SHELL", f"print the script for a shell: {', '.join(SHELLS)}", choices=SHELLS)
+    group = verb.add_mutually_exclusive_group()
+    group.add_argument("about", nargs="?", choices=tuple(verbs.choices), metavar="VERB", help="such as run")
+    flag(group, "--completion SHELL", f"print the script for a shell: {', '.join(SHELLS)}", choices=SHELLS)
     verb.set_defaults(parser=parser, verbs=verbs.choices)
 
 

@@ -90,8 +90,8 @@ def export_run(
     try:
         try:
             with temporary_folder(f".{path.name}-", path.parent) as scratch:
-                for made in import_module(form.writer).write(excerpt, scratch / path.name):
-                    made.replace(path.parent / made.name)
+                for file in import_module(form.writer).write(excerpt, scratch / path.name):
+                    file.replace(path.parent / file.name)
         except BaseException:
             for file in new:  # so that the same command does not meet the first of two
                 file.unlink(missing_ok=True)

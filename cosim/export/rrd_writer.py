@@ -122,9 +122,9 @@ class _Sender:
         """Send regions as lines."""
         scene, began = self._scene, self._excerpt.run.record.value("time", 0)
         for i, solid in enumerate(scene.solids):
-            place = f"{_FRAMES[solid.frame]}/{rr.escape_entity_path_part(solid.name)}"
+            entity_path = f"{_FRAMES[solid.frame]}/{rr.escape_entity_path_part(solid.name)}"
             shapes = [(began, solid), *((time, new) for time, j, new in scene.changes if j == i)]
-            self._lines.append((i, solid, self._send_shapes(place, shapes)))
+            self._lines.append((i, solid, self._send_shapes(entity_path, shapes)))
 
     def send_rows(self) -> None:
         """Send every signal as a series, and the motion of the scene."""
@@ -150,8 +150,8 @@ class _Sender:
         self._send(time[known], _FRAMES[BODY], rr.Transform3D.columns(quaternion=e[known][:, [1, 2, 3, 0]]))
         for solid in self._scene.solids:
             if solid.moves:
-                place = f"{_FRAMES[solid.frame]}/{rr.escape_entity_path_part(solid.name)}"
-                self._send(time, place, rr.Transform3D.columns(translation=block.stack(solid.shift)))
+                entity_path = f"{_FRAMES[solid.frame]}/{rr.escape_entity_path_part(solid.name)}"
+                self._send(time, entity_path, rr.Transform3D.columns(translation=block.stack(solid.shift)))
 
     def _send_thrusts(self, block: Rows, rows: NDArray[np.intp]) -> None:
         if not self._forces:
@@ -171,13 +171,13 @@ class _Sender:
             for path, kind in kinds.items():
                 self._send(time[changes], path, kind.columns(**_activity_attributes(kind, solid.color, now[changes])))
 
-    def _send_shapes(self, place: str, shapes: list[tuple[float, Solid]]) -> dict[str, Any]:
+    def _send_shapes(self, entity_path: str, shapes: list[tuple[float, Solid]]) -> dict[str, Any]:
         """Send the shapes of a region over time; return the types of its drawings by path."""
         kinds: dict[str, Any] = {}
         before = None
         for time, solid in shapes:
             drawn = _archetype(solid)
-            path = f"{place}/{type(drawn).__name__}"
+            path = f"{entity_path}/{type(drawn).__name__}"
             kinds[path] = type(drawn)
             self._recording.set_time(TIMELINE, duration=time)
             if before not in (None, path):  # the type of the shape has changed

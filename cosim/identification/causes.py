@@ -21,7 +21,7 @@ class Cause:
     """A group of fixed numbers, and the share of the residuals that it would explain."""
 
     flag: str  # command-line flag that frees the group
-    share: float  # explained fraction of the sum of squares beyond the noise, by one Gauss-Newton step
+    fraction: float  # explained fraction of the sum of squares beyond the noise, by one Gauss-Newton step
 
 
 def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values: Array, step: float) -> list[Cause]:
@@ -56,7 +56,7 @@ def find_causes(logs: Sequence[Log], vehicle: Vehicle, fitted: Residuals, values
         added = _explained(information, score, free + list(range(count, count + len(group)))) - explained
         causes.append(Cause(flag, added / excess))
         count += len(group)
-    return sorted(causes, key=lambda cause: -cause.share)
+    return sorted(causes, key=lambda cause: -cause.fraction)
 
 
 def _explained(information: Array, score: Array, free: list[int]) -> float:

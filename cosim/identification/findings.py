@@ -16,7 +16,7 @@ from cosim.identification.parameters import NUISANCES, RANDOM_FORCE
 _USELESS = 10.0  # chi2 per degree of freedom, above which nothing was identified
 _MAX_CORRELATION = 0.95  # magnitude of the correlation, above which runs do not separate two numbers
 _MAX_LISTED = 6  # names in a list
-NAMED = 0.1  # share of the unexplained residuals, above which a cause is named
+MIN_CAUSE_FRACTION = 0.1  # fraction of the unexplained residuals, above which a cause is named
 _WEAK = 0.1  # ratio of nominal to prior deviation, above which a maneuver is advised
 _LATE = 0.15  # s, delay of samples above which a delay is named as a cause: a lag of the thrusters is seldom longer
 _SLOW = 0.2  # s, time between changes of the commands, from which on added mass and lag are not determined
@@ -134,9 +134,9 @@ def _cause(fit: Fit, slow: bool) -> str:
     if late and not slow and not any(p.kind == "delay" for p in fit.parameters):
         delays = ", ".join(f"{name.replace('_', ' ')} {x:.2f} s" for name, x in late.items())
         return f"Samples come late behind the commands: {delays}. Estimate that, too: {_nuisance_flag(fit, 'delay')}."
-    named = [cause for cause in fit.causes if cause.share > NAMED]
+    named = [cause for cause in fit.causes if cause.fraction > MIN_CAUSE_FRACTION]
     if named:
-        causes = ", ".join(f"{_CAUSES[c.flag.split()[1]]} ({100 * c.share:.0f} %: {c.flag})" for c in named[:3])
+        causes = ", ".join(f"{_CAUSES[c.flag.split()[1]]} ({100 * c.fraction:.0f} %: {c.flag})" for c in named[:3])
         return (
             f"What would explain most of that, in one step of the fit: {causes}. A flag takes the place of what it "
             f"names now, {_nuisance_flag(fit)}: give it whole."

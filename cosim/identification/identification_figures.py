@@ -90,7 +90,7 @@ def _predictions(predictions: Sequence[Prediction]) -> Figure:
         bars = np.arange(len(p.identified))
         for k, (label, values, color) in enumerate((
             ("identified", p.identified, BLUE), ("start vehicle", p.start_vehicle, ORANGE),
-            ("hold the start velocity", p.held, SKY),
+            ("hold the start velocity", p.constant_velocity, SKY),
         )):  # fmt: skip
             axes.bar(bars + 0.27 * (k - 1), values, 0.25, color=color, label=label)
         axes.set_xticks(bars, list(AXES[p.topic]))

@@ -29,7 +29,7 @@ class Prediction:
     windows: int  # number of predicted windows
     identified: Array  # (c,) errors of the identified vehicle
     start_vehicle: Array  # (c,) errors of the vehicle with the start values
-    held: Array  # (c,) errors of a prediction with constant velocity
+    constant_velocity: Array  # (c,) errors of a prediction with constant velocity
 
 
 def validate(
@@ -51,8 +51,8 @@ def validate(
             except IdentificationError:
                 continue  # one of the two predictions does not stay finite
             for topic in window.topics:
-                held = residual(topic, _constant_velocity(window.start, topic.times), NO_ERRORS)
-                rows = (identified[topic.name], start_vehicle[topic.name], held)
+                constant_velocity = residual(topic, _constant_velocity(window.start, topic.times), NO_ERRORS)
+                rows = (identified[topic.name], start_vehicle[topic.name], constant_velocity)
                 errors.setdefault(topic.name, []).append(tuple(r * topic.noise for r in rows))
         for name in TOPICS:
             if name in errors:

@@ -233,7 +233,7 @@ class Residuals:
         if self.holds_starts:
             return state
         if known is not None:
-            state = self._moved(known.state, known.slope @ (values - known.values))
+            state = self._add_step(known.state, known.slope @ (values - known.values))
         weight, best, base, step = self.weights[i], np.inf, state, np.zeros(len(self._starts))
         for _ in range(_MAX_SOLVES):
             try:
@@ -246,10 +246,10 @@ class Residuals:
                 cost = np.inf
             if cost > best + 1.0:  # too far
                 step = 0.5 * step
-                state = self._moved(base, step)
+                state = self._add_step(base, step)
                 continue
             best, base, step = cost, state, self._step_of(left, by_start)
-            state = self._moved(base, step)
+            state = self._add_step(base, step)
             if float(np.sum(np.square(by_start @ step))) < _SOLVED**2:
                 break
         return state
@@ -317,7 +317,7 @@ class Residuals:
         step: Array = np.asarray(-np.linalg.solve(normal, by_start.T @ residual), float)
         return step
 
-    def _moved(self, state: Array, step: Array) -> Array:
+    def _add_step(self, state: Array, step: Array) -> Array:
         """Return a start that is moved along its own directions."""
         moved: Array = state + (step @ self._basis(state))[: len(state)]
         moved[3:7] /= np.linalg.norm(moved[3:7])

@@ -37,36 +37,36 @@ class TopicReader:
         last = int(np.searchsorted(self._rows[:, 0], end, "right")) + 1
         return self._rows[:last, 0], self._rows[:last, 1:]
 
-    def interpolated(self, at: Array) -> Array:
+    def interpolate(self, query: Array) -> Array:
         """Interpolate the components at rising times, shape (n,); return shape (n, size), NaN in gaps."""
-        times, values = self.window(float(at[0]), float(at[-1]))
-        result = np.full((len(at), self.topic.size), np.nan)
+        times, values = self.window(float(query[0]), float(query[-1]))
+        result = np.full((len(query), self.topic.size), np.nan)
         if not len(times):
             return result
-        i = np.searchsorted(times, at + _EXACT, "right") - 1
+        i = np.searchsorted(times, query + _EXACT, "right") - 1
         j = np.minimum(i + 1, len(times) - 1)
         i = np.maximum(i, 0)
-        on = np.abs(times[i] - at) <= _EXACT
-        inside = (times[i] <= at) & (at <= times[j]) & (times[j] - times[i] <= self.topic.longest)
+        on = np.abs(times[i] - query) <= _EXACT
+        inside = (times[i] <= query) & (query <= times[j]) & (times[j] - times[i] <= self.topic.longest)
         span = np.where(times[j] > times[i], times[j] - times[i], 1.0)
-        part = np.where(on, 0.0, (at - times[i]) / span)[:, None]
-        good = inside | on
+        part = np.where(on, 0.0, (query - times[i]) / span)[:, None]
+        valid = inside | on
         a, b = values[i], values[j]
         if self.topic.quantity == "attitude":  # the shorter rotation; normalized linear interpolation of close samples
             b = np.where((a * b).sum(axis=1, keepdims=True) < 0.0, -b, b)
         mixed = a + part * (b - a)
         if self.topic.quantity == "attitude":
             mixed /= np.linalg.norm(mixed, axis=1, keepdims=True)
-        result[good] = mixed[good]
+        result[valid] = mixed[valid]
         return result
 
-    def held(self, at: Array) -> tuple[Array, Array]:
+    def hold(self, query: Array) -> tuple[Array, Array]:
         """Return components and time of the last sample at rising times, shapes (n, size) and (n,); NaN in gaps."""
-        times, values = self.window(float(at[0]), float(at[-1]))
-        result, when = np.full((len(at), self.topic.size), np.nan), np.full(len(at), np.nan)
+        times, values = self.window(float(query[0]), float(query[-1]))
+        result, when = np.full((len(query), self.topic.size), np.nan), np.full(len(query), np.nan)
         if not len(times):
             return result, when
-        i = np.searchsorted(times, at + _EXACT, "right") - 1
-        known = (i >= 0) & (at - times[np.maximum(i, 0)] <= self.topic.longest)
+        i = np.searchsorted(times, query + _EXACT, "right") - 1
+        known = (i >= 0) & (query - times[np.maximum(i, 0)] <= self.topic.longest)
         result[known], when[known] = values[i[known]], times[i[known]]
         return result, when

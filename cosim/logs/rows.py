@@ -70,7 +70,7 @@ class RowMaker:
         self._put_motion(put, readers, log_time)
         for quantity, (names, sensor) in _SENSORS.items():
             if quantity in readers:
-                values, when = readers[quantity].held(log_time)
+                values, when = readers[quantity].hold(log_time)
                 put(names, values)
                 put([f"measured.time.{sensor}"], (when - self.start)[:, None])
                 if quantity == "altitude":
@@ -81,28 +81,28 @@ class RowMaker:
     @staticmethod
     def _put_motion(put: Put, readers: Readers, times: Array) -> None:
         if "position" in readers:
-            put(_POSITION, readers["position"].interpolated(times))
+            put(_POSITION, readers["position"].interpolate(times))
         elif "depth" in readers:
-            put(["position.z"], readers["depth"].interpolated(times))
-        quaternions = readers["attitude"].interpolated(times) if "attitude" in readers else None
+            put(["position.z"], readers["depth"].interpolate(times))
+        quaternions = readers["attitude"].interpolate(times) if "attitude" in readers else None
         if quaternions is not None:
             put(_QUATERNION, quaternions)
             put([f"attitude.{name}" for name in ("roll", "pitch", "yaw")], euler_zyx(quaternions))
         if "velocity" in readers:
-            put([f"velocity.{a}" for a in "uvw"], readers["velocity"].interpolated(times))
+            put([f"velocity.{a}" for a in "uvw"], readers["velocity"].interpolate(times))
         elif "velocity_world" in readers and quaternions is not None:
-            over_ground = readers["velocity_world"].interpolated(times)
+            over_ground = readers["velocity_world"].interpolate(times)
             put([f"velocity.{a}" for a in "uvw"], rotate_to_body(quaternions, over_ground))
         rates = readers.get("rates") or readers.get("gyro")
         if rates is not None:
-            put([f"velocity.{a}" for a in "pqr"], rates.interpolated(times))
+            put([f"velocity.{a}" for a in "pqr"], rates.interpolate(times))
 
     def _put_commands(self, put: Put, readers: Readers, times: Array, commands: CommandForces) -> None:
-        values, when = readers[commands.quantity].held(times)
+        values, when = readers[commands.quantity].hold(times)
         put([COMMAND_TIME], (when - self.start)[:, None])
         volts = np.full(len(times), self.voltage)
         if "voltage" in readers and not np.isfinite(self.voltage):
-            volts = readers["voltage"].held(times)[0][:, 0]
+            volts = readers["voltage"].hold(times)[0][:, 0]
         forces = commands.forces(values, volts)
         vehicle = self.scenario.vehicle
         if commands.through == "wrench":

@@ -39,11 +39,11 @@ class _Extremes:
         """Update the extremes of a (part, signal) by its next rows, the first of which has index `first`."""
         missing = np.isnan(signal)
         self.finite[key] |= np.isfinite(signal).any()
-        for which, signed in enumerate((signal, -signal)):
+        for side, signed in enumerate((signal, -signal)):
             known = np.where(missing, np.inf, signed)  # NaN is neither the least nor the greatest
             i = int(np.argmin(known))
-            if known[i] < self._bounds[which, *key] or self.rows[which, *key] < 0:
-                self._bounds[which, *key], self.rows[which, *key] = known[i], first + i
+            if known[i] < self._bounds[side, *key] or self.rows[side, *key] < 0:
+                self._bounds[side, *key], self.rows[side, *key] = known[i], first + i
 
 
 def even_edges(rows: int, parts: int) -> NDArray[np.intp]:
@@ -57,7 +57,7 @@ def even_edges(rows: int, parts: int) -> NDArray[np.intp]:
 def rows_at(rows: Rows, times: Sequence[float]) -> NDArray[np.intp]:
     """Return the index of the first row at or after each time; the number of rows for a time after the end."""
     # with rows [s], times [s]
-    found = np.zeros(len(times), np.intp)
+    indices = np.zeros(len(times), np.intp)
     for block in rows.blocks(["time"]):
-        found += np.searchsorted(block["time"], times)
-    return found
+        indices += np.searchsorted(block["time"], times)
+    return indices

@@ -44,12 +44,12 @@ class _End:
     def __init__(self, scenario: Scenario, record: Rows, flags: list[str]) -> None:
         last = len(record) - 1
         seconds = [record.value("time", row) for row in (0, last)]
-        share = min(_WINDOW / max(seconds[1] - seconds[0], 1e-9), 1.0)
-        wanted = ("time", "goal.clearance", "goal.place", "law.time_since_measurement")
+        fraction = min(_WINDOW / max(seconds[1] - seconds[0], 1e-9), 1.0)
+        columns = ("time", "goal.clearance", "goal.place", "law.time_since_measurement")
         thrusts = [f"thrust[{j + 1}]" for j in range(scenario.vehicle.n_thrusters)]
         shifts = [f"{name}.shift.{axis}" for name in scenario.moving for axis in "xyz"]
-        names = [n for n in (*wanted, *_POSITION, *_SPEED, *flags, *thrusts, *shifts) if n in record.units]
-        picked = np.unique(np.linspace(last - round(share * last), last, _SAMPLES).astype(int))
+        names = [n for n in (*columns, *_POSITION, *_SPEED, *flags, *thrusts, *shifts) if n in record.units]
+        picked = np.unique(np.linspace(last - round(fraction * last), last, _SAMPLES).astype(int))
         rows = self.rows = record.take(picked.tolist(), names)
         self.duration = float(rows["time"][-1] - rows["time"][0])
         self.distance = -rows["goal.clearance"]  # m

@@ -30,7 +30,7 @@ _FORMER = "record.parts"  # folder in which earlier versions left the rows of a 
 _DIGITS = 9  # maximum number of digits of a format number
 _BLOCK = 10_000  # rows that are read at once
 _SMALL = 2**22  # numbers; a record of at most so many is read as a whole
-_KEPT = 24  # signals of a larger record that are kept in memory
+_MAX_CACHED_SIGNALS = 24  # signals of a larger record that are kept in memory
 
 
 class Rows:
@@ -151,7 +151,7 @@ class Record(Rows):
                 first += len(batch)
             self._kept.update(zip((column.name for column in columns), whole, strict=True))
         self._kept.move_to_end(name)
-        while len(self._kept) > _KEPT and not self._small:
+        while len(self._kept) > _MAX_CACHED_SIGNALS and not self._small:
             self._kept.popitem(last=False)
         return self._kept[name]
 

@@ -13,7 +13,7 @@ from cosim.simulation.columns import column_names
 log = logging.getLogger(__name__)
 
 _OPTIONAL = ("law.", "sensed.", "water_velocity.")  # prefixes of columns that are only exported
-REGION_COLUMNS = (".clearance", ".shift.x", ".shift.y", ".shift.z")  # suffixes of the needed columns of a region
+REGION_COLUMNS = (".clearance", ".shift.x", ".shift.y", ".shift.z")  # suffixes of the required columns of a region
 _NAMED = 3  # maximum number of columns named in a message
 
 
@@ -21,9 +21,9 @@ def require_columns(scenario: Scenario, record: Record) -> None:
     """Raise a RunError if a record lacks columns of its scenario; log a warning if it lacks optional ones."""
     expected, found = column_names(scenario), list(record.units)
     missing = [name for name in expected if name not in record.units]
-    needed = [name for name in missing if not _is_optional(name)]
-    if needed:
-        raise RunError(f"{record.file}: has no {_list_names(needed)}, which its scenario calls for")
+    required = [name for name in missing if not _is_optional(name)]
+    if required:
+        raise RunError(f"{record.file}: has no {_list_names(required)}, which its scenario calls for")
     # code that reads neighboring columns, or the first one, relies on the order
     here = [found[0], *(name for name in found if name in expected)]
     there = [expected[0], *(name for name in expected if name in record.units)]

@@ -21,7 +21,7 @@ from cosim.simulation.signals import Array
 _SUM_SIZE = 2**18  # numbers that are summed at once
 
 _FORCE = [f"actuation.{axis}" for axis in "XYZ"]
-_ASKED = [f"command.{axis}" for axis in "XYZ"]
+_COMMAND_COLUMNS = [f"command.{axis}" for axis in "XYZ"]
 _SPEED = [f"velocity.{axis}" for axis in "uvw"]
 _POSITION = [f"position.{axis}" for axis in "xyz"]
 _ESTIMATE = [f"estimate.phi{i}" for i in range(1, 5)]
@@ -106,7 +106,7 @@ class _SummaryData:
         self._weights = [f"weight.{name}" for name in scenario.criterion_names]
         self._place = ["goal.place"] if scenario.goal_then else []
         self.signals = [
-            "time", "goal.clearance", *self._clearances, *_FORCE, *_ASKED, *_SPEED, *_POSITION, *_ESTIMATE,
+            "time", "goal.clearance", *self._clearances, *_FORCE, *_COMMAND_COLUMNS, *_SPEED, *_POSITION, *_ESTIMATE,
             *self._weights, *self.flags, *self._place,
             *(name for name in (ISOLATED, REJECTED) if name in record.units),
         ]  # fmt: skip
@@ -157,7 +157,7 @@ class _SummaryData:
         self._update_extremes(self.greatest, np.fmax, {
             "goal.clearance": goal,
             "force": force,
-            "asked": np.linalg.norm(block.stack(_ASKED), axis=1),
+            "asked": np.linalg.norm(block.stack(_COMMAND_COLUMNS), axis=1),
             "speed": np.linalg.norm(block.stack(_SPEED), axis=1),
             "above half": (weights > 0.5).sum(axis=1),
             "sum of weights": weights.sum(axis=1),
@@ -186,9 +186,9 @@ class _Sum:
     def add(self, numbers: Array) -> None:
         """Add numbers, shape (n,)."""
         while numbers.size:
-            taken = numbers[: _SUM_SIZE - self._filled]
-            self._waiting[self._filled : self._filled + len(taken)] = taken
-            self._filled, numbers = self._filled + len(taken), numbers[len(taken) :]
+            accepted = numbers[: _SUM_SIZE - self._filled]
+            self._waiting[self._filled : self._filled + len(accepted)] = accepted
+            self._filled, numbers = self._filled + len(accepted), numbers[len(accepted) :]
             if self._filled == _SUM_SIZE:
                 self._total, self._filled = self.total(), 0
 

@@ -99,9 +99,9 @@ def isolation_text(thruster: int, isolated: bool) -> str:
 
 def format_isolations(summary: dict[str, Any]) -> str:
     """List the thrusters that the law isolated and when, such as ``3 at 12.30 s``; empty for none."""
-    listed = [f"{one['thruster']} at {one['time']:.2f} s" for one in summary["isolations"]]
-    more = f" and {len(listed) - _MAX_LISTED} more" if len(listed) > _MAX_LISTED else ""
-    return ", ".join(listed[:_MAX_LISTED]) + more
+    isolations = [f"{one['thruster']} at {one['time']:.2f} s" for one in summary["isolations"]]
+    more = f" and {len(isolations) - _MAX_LISTED} more" if len(isolations) > _MAX_LISTED else ""
+    return ", ".join(isolations[:_MAX_LISTED]) + more
 
 
 def _law_reports(summary: dict[str, Any]) -> str:

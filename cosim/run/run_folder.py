@@ -25,7 +25,7 @@ from cosim.results.run_result import COMMANDS_LOG, REPLAY, REPORT, SCENARIO, SUM
 from cosim.scenario.scenario import VEHICLE_COPY, Scenario
 from plant_fmu.archive import is_temporary, temporary_folder
 
-_MADE = frozenset(
+_OUTPUT_NAMES = frozenset(
     {SCENARIO, VEHICLE_COPY, COMMANDS_LOG, IMPORT, RECORD, STREAM, SUMMARY, REPORT, REPLAY, FIGURES}
 )  # names of the files and folders that a run makes
 
@@ -53,7 +53,7 @@ class RunFolder:
     def discard(self) -> None:
         """Remove all files of the run. May be called twice."""
         for file in list(self.path.iterdir()) if self.path.exists() else ():
-            if file.name in _MADE:
+            if file.name in _OUTPUT_NAMES:
                 _remove(file)
         if self.created:
             with contextlib.suppress(OSError):  # the folder is not empty: its user has put files there
@@ -65,9 +65,9 @@ class RunFolder:
         try:
             yield
         except OSError as error:
-            raise RunError(f"{self.path}: {reason(error)}; {self._kept()}") from error
+            raise RunError(f"{self.path}: {reason(error)}; {self._describe_kept_data()}") from error
 
-    def _kept(self) -> str:
+    def _describe_kept_data(self) -> str:
         """Describe what is left of a run that could not be written to its end."""
         if self._has_record():
             return f"the rows that were written are kept, and `cosim report {quote(str(self.path))}` reads them"
@@ -129,7 +129,7 @@ def _remove_run(path: Path) -> None:
     odd = sorted(
         file.name
         for file in path.iterdir()
-        if not (file.name in _MADE or file.match("report*.*") or is_temporary(file.name))
+        if not (file.name in _OUTPUT_NAMES or file.match("report*.*") or is_temporary(file.name))
     )
     if odd or not (path / SCENARIO).is_file():
         what = f"{odd[0]!r}, which no run makes" if odd else "no run"

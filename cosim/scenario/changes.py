@@ -29,8 +29,8 @@ def with_values(table: dict[str, Any], values: Mapping[str, Any]) -> dict[str, A
         if key.startswith(PARAMETERS):
             changed["plant"]["parameters"][key.removeprefix(PARAMETERS)] = value
         else:
-            at, last = place_of(changed, key)
-            at[last] = value
+            container, last = place_of(changed, key)
+            container[last] = value
     return changed
 
 
@@ -87,8 +87,8 @@ def value_at(table: dict[str, Any], key: str, vehicle: Vehicle) -> Any:
         if name not in known:
             raise ScenarioError(f"key {key!r} is no parameter of the vehicle's FMU; {hint(name, known)}")
         return table["plant"]["parameters"].get(name, known[name])
-    at, last = place_of(table, key)
-    return at[last]
+    container, last = place_of(table, key)
+    return container[last]
 
 
 def shown_title(table: dict[str, Any], vehicle: Vehicle, law: str) -> str:

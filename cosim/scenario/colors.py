@@ -25,21 +25,21 @@ def colors_of_regions(scenario: Scenario) -> list[str]:
     # The first region of a criterion has the criterion's color. The others have shades of it, nearer to it in hue than
     # to any other criterion and to the goal; after six regions they repeat.
     own = {criterion.name: criterion.color for criterion in scenario.criteria}
-    seen = dict.fromkeys(own, 0)
+    counts = dict.fromkeys(own, 0)
     colors = [GOAL_COLOR]
     for secondary in scenario.regions:
         name = secondary.criterion
         others = [GOAL_COLOR, *(color for other, color in own.items() if other != name)]
-        colors.append(_shade(own[name], others, seen[name]))
-        seen[name] += 1
+        colors.append(_shade(own[name], others, counts[name]))
+        counts[name] += 1
     return colors
 
 
-def _shade(color: str, others: Sequence[str], place: int) -> str:
-    place %= len(_SHADES)
-    if place == 0:
+def _shade(color: str, others: Sequence[str], index: int) -> str:
+    index %= len(_SHADES)
+    if index == 0:
         return color
-    (part, lighter, full), (hue, lightness, saturation) = _SHADES[place], _hls(color)
+    (part, lighter, full), (hue, lightness, saturation) = _SHADES[index], _hls(color)
     # at most half the hue difference to the next color, on the side where that is farther
     apart = [(_hls(other)[0] - hue) % 1.0 for other in others]
     up, down = min(apart), min(1.0 - turn for turn in apart)

@@ -2,9 +2,9 @@
 
 # A planner chooses between regions that are far from each other and from the vehicle, for which the present weights do
 # not hold. So the arbiter is evaluated beforehand for each pair of criteria with soft regions: both have membership 1,
-# all others 0. The share of a criterion is the mean over its pairs of its part of the two weights. A meter of path
-# through a region, half a meter deep, costs `_EQUAL` m at share 1/2, the share of all criteria without preference. At
-# share 1 it costs `_PREFERRED` times as much, at share 0 as much less.
+# all others 0. The preference of a criterion is the mean over its pairs of its part of the two weights. A meter of path
+# through a region, half a meter deep, costs `_EQUAL` m at preference 1/2, that of equal criteria. At
+# preference 1 it costs `_PREFERRED` times as much, at preference 0 as much less.
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from cosim.scenario.arbiter_rules import ArbiterRules, InputSignal
 from cosim.scenario.region_tables import SecondaryRegion
 from fuzzy_arbiter import Arbiter
 
-_EQUAL = 2.0  # m, cost at share 1/2
-_PREFERRED = 5.0  # factor of the cost at share 1
+_EQUAL = 2.0  # m, cost at preference 1/2
+_PREFERRED = 5.0  # factor of the cost at preference 1
 
 
 def with_crossing_costs(
@@ -51,7 +51,7 @@ def _costs(
             return signal.course[0][1]
         return depth if signal.kind == "depth" else 0.0
 
-    def share(*pair: str) -> float:
+    def preference(*pair: str) -> float:
         inputs = zip(rules.inputs, rules.system.inputs, strict=False)
         weights = arbiter([value(signal, variable.universe[1], pair) for signal, variable in inputs])
         one, other = (weights[criteria.index(name)] for name in pair)
@@ -59,6 +59,6 @@ def _costs(
 
     costs = {}
     for name in soft:
-        shares = [share(name, other) for other in soft if other != name] or [0.5]
-        costs[name] = _EQUAL * _PREFERRED ** (2.0 * math.fsum(shares) / len(shares) - 1.0)
+        preferences = [preference(name, other) for other in soft if other != name] or [0.5]
+        costs[name] = _EQUAL * _PREFERRED ** (2.0 * math.fsum(preferences) / len(preferences) - 1.0)
     return costs

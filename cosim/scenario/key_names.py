@@ -78,9 +78,9 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
         unit = QUANTITIES.get(rest[2], "").partition(",")[0] if rest[1] == "membership" and len(rest) > 2 else ""
         return KeyName(f"{' '.join(rest[1:]).replace('_', ' ')} of {item['name']}", unit)
     if key not in KEYS and (vector := key.rpartition(".")[0]) in _WORDS:
-        place, count = int(rest[-1]), len(table[head][rest[0]])
+        index, count = int(rest[-1]), len(table[head][rest[0]])
         linear, _, angular = KEYS[vector].unit.partition(", ")
-        return KeyName(f"{_WORDS[vector]} {_AXES[count][place]}", angular if angular and place >= 3 else linear)
+        return KeyName(f"{_WORDS[vector]} {_AXES[count][index]}", angular if angular and index >= 3 else linear)
     unit = KEYS[key].unit if key in KEYS else ""
     return KeyName(_WORDS.get(key, key.replace(".", " ").replace("_", " ")), unit)
 
@@ -88,15 +88,15 @@ def key_name(key: str, table: dict[str, Any], vehicle: Vehicle) -> KeyName:
 def _region_key_name(name: str, region: dict[str, Any], path: list[str]) -> KeyName:
     """Return the name of a key of a region or of its shape."""
     if path[0] == "shape" and len(path) > 1:
-        _, key, *places = path
+        _, key, *indices = path
         value, unit = region["shape"].get(key), unit_of_shape(region["shape"]["type"], key)
     else:
-        key, *places = path
+        key, *indices = path
         of = KEYS.get(f"regions[].{key}") or KEYS[f"goal.{key}"]
         value, unit = region.get(key), of.unit
     words = key.replace("_", " ")
-    if len(places) == 2:  # a corner or point of several
-        words, value, places = f"{words.removesuffix('s')} {places[0]}", value[int(places[0])], places[1:]
-    if places:
-        words += f" {_AXES.get(len(value), 'xy')[int(places[0])]}"
+    if len(indices) == 2:  # a corner or point of several
+        words, value, indices = f"{words.removesuffix('s')} {indices[0]}", value[int(indices[0])], indices[1:]
+    if indices:
+        words += f" {_AXES.get(len(value), 'xy')[int(indices[0])]}"
     return KeyName(f"{words} of {name}", unit)

@@ -82,7 +82,7 @@ def _stack_depth(tree: Node) -> int:
 def term_in_words(term: Membership, unit: str) -> str:
     """Describe a term in words."""
     if isinstance(term, Shape):
-        return ", ".join(f"{degree:g} at {place:g} {unit}" for place, degree in term.points)
+        return ", ".join(f"{degree:g} at {position:g} {unit}" for position, degree in term.points)
     if isinstance(term, Formula):
         return f"{term.text}, with x in {unit}"
     assert isinstance(term, Curve)

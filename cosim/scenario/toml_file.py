@@ -202,7 +202,7 @@ def _short(text: str) -> str:
 
 def _index(items: list[Any], part: str, key: str) -> int:
     """Return the index of an item of a list, given its name or index as text."""
-    if (index := _place(items, part)) is not None:
+    if (index := _find_key(items, part)) is not None:
         return int(index)
     known = f"one of {', '.join(map(str, names))}, nor " if (names := _names(items)) else ""
     raise ScenarioError(f"--set {_short(key)}: {_short(part)!r} is not {known}a number below {len(items)}")
@@ -213,7 +213,7 @@ def _names(items: Any) -> list[Any]:
     return [item.get("name") for item in items if isinstance(item, dict)]
 
 
-def _place(container: Any, part: str) -> Any:
+def _find_key(container: Any, part: str) -> Any:
     """Return the key of an item in a table, or its index in a list, given its name or index as text; else None."""
     if isinstance(container, dict):
         name = current_name(container, part)
@@ -237,7 +237,7 @@ def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
     """Return the table or list that holds a key, and the name or index in it."""
     inner: Any = table
     for depth, part in enumerate(parts := key.split(".")):
-        container, index = inner, _place(inner, part)
+        container, index = inner, _find_key(inner, part)
         if index is None:
             from plant_fmu.toml_tables import hint
 
@@ -272,8 +272,8 @@ def current_key(table: dict[str, Any], key: str) -> str:
     parts: list[str] = []
     for part in key.split("."):
         parts.append(current_name(container, part))
-        place = _place(container, part)
-        container = None if place is None else container[place]
+        index = _find_key(container, part)
+        container = None if index is None else container[index]
     return ".".join(parts)
 
 

@@ -14,9 +14,9 @@ _INLINE = ("shape", "membership")  # tables that are written in one line if they
 _COMMENT_AT = 40  # column at which comments begin, after a shorter line
 
 
-def scenario_text(table: Mapping[str, Any], said: Mapping[str, str]) -> str:
+def scenario_text(table: Mapping[str, Any], key_comments: Mapping[str, str]) -> str:
     """Format the table of a scenario as TOML."""
-    return "\n".join(_lines(table, said)) + "\n"
+    return "\n".join(_lines(table, key_comments)) + "\n"
 
 
 def _lines(table: Mapping[str, Any], comments: Mapping[str, str], head: str = "", path: str = "") -> Iterator[str]:

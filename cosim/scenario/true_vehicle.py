@@ -25,7 +25,7 @@ def true_vehicle(scenario: Scenario) -> Vehicle:
     changed: dict[str, float | Array] = {}
     effectiveness = np.ones(vehicle.n_thrusters)
     for name, value in over.items():
-        stem, index = _place(name)
+        stem, index = _split_name(name)
         if stem == "thrust_effectiveness":
             effectiveness[index] = value
         elif hasattr(vehicle, stem):
@@ -53,7 +53,7 @@ def true_model(scenario: Scenario) -> Model:
     )
 
 
-def _place(name: str) -> tuple[str, tuple[int, ...]]:
+def _split_name(name: str) -> tuple[str, tuple[int, ...]]:
     """Split a parameter's name into the attribute of a vehicle and the index of the element."""
     indexed = _INDEXED.fullmatch(name)
     if indexed:

@@ -19,8 +19,8 @@ def licenses(fmi: int) -> dict[str, str]:
     """Return the files of ``documentation/licenses``, by name."""
     package = resources.files("plant_fmu")
     # a wheel has a copy in the package, a checkout has the one file beside it
-    places = [package / "LICENSE", Path(str(package)).parent / "LICENSE"]
-    text = next((place.read_text(encoding="utf-8") for place in places if place.is_file()), "")
+    files = [package / "LICENSE", Path(str(package)).parent / "LICENSE"]
+    text = next((file.read_text(encoding="utf-8") for file in files if file.is_file()), "")
     header = (Path(fmpy.__file__).parent / "c-code" / f"fmi{fmi}Functions.h").read_text(encoding="utf-8")
     start, end = header.find("Copyright"), header.find("*/")
     if not text or not 0 <= start < end:

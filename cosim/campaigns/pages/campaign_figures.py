@@ -17,7 +17,7 @@ from cosim.report.figures.style import BLACK, BLUE, CYCLE, GREEN, ORANGE, RED, N
 from cosim.simulation.signals import Array
 
 WIDTH = 5.6  # in, width of a figure, which is readable on a phone too
-_ACROSS = 2  # number of panels per row
+_PANELS_PER_ROW = 2  # number of panels per row
 _MAX_KEYS = 8  # maximum number of keys that are drawn
 _POINTS = 700  # maximum number of points in a panel
 _TICKS = 5  # maximum number of intervals across a panel, so that labels of five digits fit
@@ -95,7 +95,7 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> 
     figure, panels = _panels(len(drawn), 2.3)
     for axes, (column, groups) in zip(panels, drawn.items(), strict=True):
         for i, (name, values) in enumerate(groups.items()):
-            x, shares = _thinned(*shares_up_to(values))
+            x, shares = _thinned(*cumulative_fractions(values))
             color, dash = CYCLE[i % len(CYCLE)], _DASHES[i % len(_DASHES)]
             axes.step(x, shares, where="post", color=color, linestyle=dash, label=name)
             median = quantiles(values)["0.5"]
@@ -114,7 +114,7 @@ def distributions(columns: Mapping[str, Mapping[str, Array]], addition: str) -> 
     yield NamedFigure("distributions", f"{caption} {addition}".rstrip(), figure)
 
 
-def shares_up_to(values: Array) -> tuple[Array, Array]:
+def cumulative_fractions(values: Array) -> tuple[Array, Array]:
     """Return the empirical distribution of numbers; values (n,)."""
     finite = np.sort(values[np.isfinite(values)])
     return finite, np.arange(1, len(finite) + 1) / max(1, len(values))
@@ -132,7 +132,7 @@ def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
                 [part.median for part in parts], shares, yerr=(shares - low, high - shares), label=fact,
                 color=FACT_COLORS[fact], marker=_MARKS[fact], markersize=4, linewidth=1.0, elinewidth=1.6,
             )  # fmt: skip
-        _across(axes, key)
+        _format_key_axis(axes, key)
         axes.set(ylim=(-0.03, 1.03))
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
     legend_above(figure, panels[0])
@@ -141,9 +141,9 @@ def binned_rates(keys: Sequence[Key], facts: Mapping[str, Facts]) -> Figure:
 
 def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, violated: Facts) -> Figure:
     """Draw a number of every row over each key, with markers by outcome; values (n,), reached, violated (n,)."""
-    some = np.flatnonzero(np.isfinite(values))
-    if len(some) > _POINTS:
-        some = some[np.unique(np.linspace(0, len(some) - 1, _POINTS).astype(int))]
+    rows = np.flatnonzero(np.isfinite(values))
+    if len(rows) > _POINTS:
+        rows = rows[np.unique(np.linspace(0, len(rows) - 1, _POINTS).astype(int))]
     figure, panels = _panels(min(len(keys), _MAX_KEYS), 2.1)
     for axes, key in zip(panels, keys, strict=False):
         for what, of, color, mark in (
@@ -151,10 +151,10 @@ def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, viol
             ("not reached, nothing violated", ~reached & ~violated, ORANGE, "^"),
             ("violated", violated, RED, "x"),
         ):
-            if (at := some[of[some]]).size:
+            if (at := rows[of[rows]]).size:
                 axes.plot(key.values[at], values[at], mark, color=color, markersize=3.5, alpha=0.7, label=what)
         axes.axhline(0.0, color=BLACK, linewidth=0.8)
-        _across(axes, key)
+        _format_key_axis(axes, key)
         axes.set(ylabel=label)
     legend_above(figure, panels[0])
     return figure
@@ -162,7 +162,7 @@ def scatter(keys: Sequence[Key], values: Array, label: str, reached: Facts, viol
 
 def side_by_side(one: str, results: Results, other: str, others: Results, columns: Sequence[tuple[str, str]]) -> Figure:
     """Draw each scene as a marker at the numbers of both laws, by which of them completes it."""
-    some = np.unique(np.linspace(0, len(results) - 1, min(len(results), _MAX_SCENES)).astype(int))
+    sample = np.unique(np.linspace(0, len(results) - 1, min(len(results), _MAX_SCENES)).astype(int))
     mine, theirs = (rows["reached"] & ~rows["violation"] for rows in (results, others))
     figure = Figure(figsize=(WIDTH, 3.4), layout="constrained")
     panels = figure.subplots(1, len(columns), squeeze=False)[0]
@@ -185,7 +185,7 @@ def side_by_side(one: str, results: Results, other: str, others: Results, column
         ):
             if not mask.any():
                 continue
-            rows = some[mask[some]]
+            rows = sample[mask[sample]]
             axes.plot(x[rows], y[rows], mark, color=color, markersize=3.5, alpha=0.7, label=f"{what} ({mask.sum()})")
         axes.plot([low, high], [low, high], color=BLACK, linewidth=0.8)
         axes.set(xlabel=f"{label}, {one}", ylabel=f"{label}, {other}")
@@ -195,15 +195,15 @@ def side_by_side(one: str, results: Results, other: str, others: Results, column
 
 def _panels(count: int, height: float) -> tuple[Figure, list[Axes]]:
     """Create a figure with `count` panels."""
-    down = -(-count // _ACROSS)
+    down = -(-count // _PANELS_PER_ROW)
     figure = Figure(figsize=(WIDTH, 0.35 + height * down), layout="constrained")
-    axes = figure.subplots(down, min(count, _ACROSS), squeeze=False).ravel()
+    axes = figure.subplots(down, min(count, _PANELS_PER_ROW), squeeze=False).ravel()
     for unused in axes[count:]:
         unused.set_visible(False)
     return figure, list(axes[:count])
 
 
-def _across(axes: Axes, key: Key) -> None:
+def _format_key_axis(axes: Axes, key: Key) -> None:
     """Label the axis of a key: few ticks on a logarithmic scale, no fractions for whole numbers."""
     axes.set(xlabel=key.label, xscale="log" if key.log else "linear")
     if key.log:
@@ -226,5 +226,5 @@ def legend_above(figure: Figure, axes: Axes) -> None:
 def _thinned(x: Array, shares: Array) -> tuple[Array, Array]:
     if len(x) <= _STEPS:
         return x, shares
-    some = np.unique(np.linspace(0, len(x) - 1, _STEPS).astype(int))
-    return x[some], shares[some]
+    rows = np.unique(np.linspace(0, len(x) - 1, _STEPS).astype(int))
+    return x[rows], shares[rows]

@@ -29,9 +29,9 @@ from cosim.report.figures.style import (
     BLACK,
     PATH_COLOR,
     FigureData,
-    Place,
+    RegionInstance,
     features_of,
-    places_of,
+    region_instances,
 )
 from cosim.report.figures.trajectory import SampledPath, sample_path
 from cosim.scenario.colors import GOAL_COLOR
@@ -61,10 +61,10 @@ def path_3d(data: FigureData) -> Figure:
     labels = box.draw(ax)
     clip = Path(box.outline)
     few = len(data.scenario.regions) <= _NAMED  # labels of more regions could not be assigned
-    for place in places_of(data):
-        drawn_outline = _region(ax, place, low, high, box.view, clip)
-        if drawn_outline and not place.faint and few:
-            labels.request(place.region.name, np.vstack(drawn_outline))
+    for instance in region_instances(data):
+        drawn_outline = _region(ax, instance, low, high, box.view, clip)
+        if drawn_outline and not instance.faint and few:
+            labels.request(instance.region.name, np.vstack(drawn_outline))
     for name, color, feature in features_of(data):
         ax.plot(*(box.view @ feature), "*", color=color, markersize=9)
         labels.request(name, (box.view @ feature)[None])
@@ -106,10 +106,10 @@ def path_plane(data: FigureData) -> Figure:
         ax.set_ylabel("depth, NED z [m]" if axis == 2 else "east, NED y [m]")
         ax.yaxis.set_label_coords((0.17 - LEFT) / across, 0.5)
         labels = Labels(ax, scale, _frame(view @ low, view @ high))
-        for place in places_of(data):
-            drawn_outline = _region(ax, place, low, high, view)
-            if drawn_outline and not place.faint:
-                labels.request(place.region.name, np.vstack(drawn_outline))
+        for instance in region_instances(data):
+            drawn_outline = _region(ax, instance, low, high, view)
+            if drawn_outline and not instance.faint:
+                labels.request(instance.region.name, np.vstack(drawn_outline))
         for name, color, feature in features_of(data):
             ax.plot(*(view @ feature), "*", color=color, markersize=9)
             labels.request(name, (view @ feature)[None])
@@ -122,26 +122,30 @@ def path_plane(data: FigureData) -> Figure:
     return figure
 
 
-def _region(ax: Axes, place: Place, low: Array, high: Array, view: Array, clip: Path | None = None) -> list[Array]:
+def _region(
+    ax: Axes, instance: RegionInstance, low: Array, high: Array, view: Array, clip: Path | None = None
+) -> list[Array]:
     """Draw a region in a view, in 3D with its edges; return its visible areas."""
-    lines = lines_of_shape(place.region.shape, low - place.shift, high - place.shift, view)
+    lines = lines_of_shape(instance.region.shape, low - instance.shift, high - instance.shift, view)
     if lines is None:
         return []
     areas, outline, edges = (
-        [line + view @ place.shift for line in part] for part in (lines.areas, lines.outline, lines.edges)
+        [line + view @ instance.shift for line in part] for part in (lines.areas, lines.outline, lines.edges)
     )
     if clip is None and cover(areas, view @ low, view @ high):
         return []  # a region that covers the whole picture is not drawn
-    alpha = _FAINT if place.faint else 1.0
+    alpha = _FAINT if instance.faint else 1.0
     whole = Path.make_compound_path(*(Path(area, closed=True) for area in areas))
-    dashes = "-" if place.region.keep == "out" else "--"
+    dashes = "-" if instance.region.keep == "out" else "--"
     drawn: list[Artist] = [
-        ax.add_patch(PathPatch(whole, color=place.color, alpha=(0.15 if clip is None else 0.08) * alpha, linewidth=0)),
-        *ax.plot(*_with_gaps(outline), color=place.color, linewidth=1.1, linestyle=dashes, alpha=alpha),
+        ax.add_patch(
+            PathPatch(whole, color=instance.color, alpha=(0.15 if clip is None else 0.08) * alpha, linewidth=0)
+        ),
+        *ax.plot(*_with_gaps(outline), color=instance.color, linewidth=1.1, linestyle=dashes, alpha=alpha),
     ]
     if clip is not None:
         if edges:
-            drawn += ax.plot(*_with_gaps(edges), color=place.color, linewidth=0.5, alpha=0.7 * alpha)
+            drawn += ax.plot(*_with_gaps(edges), color=instance.color, linewidth=0.5, alpha=0.7 * alpha)
         for artist in drawn:
             artist.set_clip_path(clip, ax.transData)
     return areas
@@ -213,19 +217,19 @@ def _with_gaps(lines: list[Array]) -> Array:
 def _extent(data: FigureData, sampled: SampledPath) -> tuple[Array, Array]:
     """Return the corners of a box around path, goal and near regions, with a margin."""
     path = sampled.points
-    places = list(places_of(data))
-    all_bounds = [np.array(place.region.shape.bounds()) + place.shift for place in places]
+    instances = list(region_instances(data))
+    all_bounds = [np.array(instance.region.shape.bounds()) + instance.shift for instance in instances]
     goals = [
         np.where(np.isfinite(bounds), bounds, path[0])
-        for place, bounds in zip(places, all_bounds, strict=True)
-        if place.region.name == "goal" and not place.faint
+        for instance, bounds in zip(instances, all_bounds, strict=True)
+        if instance.region.name == "goal" and not instance.faint
     ]
     targets = [np.array([middle - radius, middle + radius]) for middle, radius in sampled.targets]
     points = np.vstack([path, *goals, *targets])  # infinite bounds of the goal are ignored
     low, high = points.min(axis=0), points.max(axis=0)
     size = (high - low).max()
-    for place, bounds in zip(places, all_bounds, strict=True):  # include near regions
-        near = (0.1 if place.faint else 0.5) * size
+    for instance, bounds in zip(instances, all_bounds, strict=True):  # include near regions
+        near = (0.1 if instance.faint else 0.5) * size
         if np.isfinite(bounds).all() and (bounds[1] >= low - near).all() and (bounds[0] <= high + near).all():
             points = np.vstack([points, np.clip(bounds, low - near, high + near)])
     points = np.vstack([points, *(feature[None] for _, _, feature in features_of(data))])

@@ -18,8 +18,8 @@ from cosim.results.run_result import Run
 from cosim.scenario.scenario import Scenario
 from cosim.simulation.signals import Array
 
-_WHOLE = 200_000  # maximum number of rows of a record that is used as a whole
-_MOST = 80_000  # maximum number of rows with extremes
+_MAX_WHOLE_ROWS = 200_000  # maximum number of rows of a record that is used as a whole
+_MAX_SAMPLED_ROWS = 80_000  # maximum number of rows with extremes
 _EVEN = 2_000  # number of evenly spaced rows
 _CHANGES = 100  # maximum number of changes by commands in a block of rows; in all a hundred times as many
 _DRAWN = (
@@ -35,7 +35,7 @@ def make_figure_data(run: Run) -> FigureData:
     # parts of the run and of the enlarged spans; rows evenly spaced in time and along the path; and rows at which
     # commands changed a signal.
     data = FigureData(run.scenario, run.record, run.summary)
-    if len(run.record) <= _WHOLE:
+    if len(run.record) <= _MAX_WHOLE_ROWS:
         return data
     names = [name for name in run.record.units if name.startswith(_DRAWN) or name.endswith(REGION_COLUMNS)]
     return dataclasses.replace(data, record=run.record.take(_rows(data, names), names))
@@ -47,7 +47,7 @@ def _rows(data: FigureData, names: list[str]) -> NDArray[np.intp]:
     n, enlarged = len(record), [*overlap_columns(data), *zoom_columns(data)[:1]]
     bounds = rows_at(record, [time for span in enlarged for time in (span.start, span.end)]).clip(0, n - 1)
     signals = len(_signals_with_extremes(scenario, record.take([0], names)))
-    parts = max(1, _MOST // (2 * signals * (1 + len(enlarged))))
+    parts = max(1, _MAX_SAMPLED_ROWS // (2 * signals * (1 + len(enlarged))))
     edges = [even_edges(n, parts)]
     edges += [first + even_edges(end - first, parts) for first, end in bounds.reshape(-1, 2)]
     blocks = (_signals_with_extremes(scenario, block) for block in record.blocks(names))

@@ -20,7 +20,7 @@ _AROUND = np.column_stack([np.cos(_TURN), np.sin(_TURN)])
 _CORNERS = np.array([[i, j, k] for i in (-1.0, 1.0) for j in (-1.0, 1.0) for k in (-1.0, 1.0)])
 _BOX_EDGES = [(a, b) for a in range(8) for b in range(a) if (_CORNERS[a] != _CORNERS[b]).sum() == 1]
 _SHARP = np.cos(np.radians(31.0))  # cosine of the angle between faces from which on their edge is drawn
-_BESIDE = 1e-3  # distance of test points from a shape's outline, relative to the shape's size
+_TEST_DISTANCE = 1e-3  # distance of test points from a shape's outline, relative to the shape's size
 _GRID = 12  # number of points of the test grid per side
 _PIECES = 4  # number of pieces of an outline's edge whose visibility is tested
 
@@ -58,8 +58,10 @@ def hull_of(points: Array, view: Array) -> Array:
 
 def cover(areas: Sequence[Array], low: Array, high: Array) -> bool:
     """Return True if the areas of a `ShapeLines` cover all points of a grid in a rectangle."""
-    shares = np.linspace(0.01, 0.99, _GRID)
-    points = np.array([[x, y] for x in low[0] + shares * (high - low)[0] for y in low[1] + shares * (high - low)[1]])
+    fractions = np.linspace(0.01, 0.99, _GRID)
+    points = np.array(
+        [[x, y] for x in low[0] + fractions * (high - low)[0] for y in low[1] + fractions * (high - low)[1]]
+    )
     return bool(_within(points, areas).all())
 
 
@@ -151,7 +153,7 @@ def _seen_part(outline: Array, areas: Sequence[Array]) -> Array:
     ends = np.roll(starts, -1, axis=0)
     steps = ends - starts
     right = np.column_stack([steps[:, 1], -steps[:, 0]]) / np.maximum(np.linalg.norm(steps, axis=1), 1e-12)[:, None]
-    beside = (starts + ends) / 2.0 + _BESIDE * np.ptp(outline, axis=0).max() * right
+    beside = (starts + ends) / 2.0 + _TEST_DISTANCE * np.ptp(outline, axis=0).max() * right
     hidden = _within(beside, areas)
     pieces = np.stack([starts, ends, np.full_like(starts, np.nan)], axis=1)
     pieces[hidden] = np.nan

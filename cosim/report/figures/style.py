@@ -95,7 +95,7 @@ def regions_of(scenario: Scenario) -> Iterator[tuple[Region, str]]:
 
 
 @dataclass(frozen=True)
-class Place:
+class RegionInstance:
     """A region in space at one time."""
 
     region: Region
@@ -104,7 +104,7 @@ class Place:
     faint: bool  # True at the start or end of the region's motion
 
 
-def places_of(data: FigureData) -> Iterator[Place]:
+def region_instances(data: FigureData) -> Iterator[RegionInstance]:
     """Yield the goal at the end of the run, and each region at the time of its minimum clearance."""
     # A moving region is preceded by itself at the start and at the end, marked as faint. Regions of attitude have no
     # position and are skipped.
@@ -117,9 +117,9 @@ def places_of(data: FigureData) -> Iterator[Place]:
         # NaN is not the least
         at = -1 if region.name == "goal" else int(np.argmin(np.where(np.isnan(clearance), np.inf, clearance)))
         if shifts.any() and region.name not in dynamic:
-            yield Place(region, color, shifts[0], faint=True)
-            yield Place(region, color, shifts[-1], faint=True)
-        yield Place(region, color, shifts[at], faint=False)
+            yield RegionInstance(region, color, shifts[0], faint=True)
+            yield RegionInstance(region, color, shifts[-1], faint=True)
+        yield RegionInstance(region, color, shifts[at], faint=False)
 
 
 def features_of(data: FigureData) -> Iterator[tuple[str, str, Array]]:

@@ -36,8 +36,13 @@ def sample_path(data: FigureData) -> SampledPath:
     known = np.flatnonzero(np.isfinite(path).all(axis=1))
     length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path[known], axis=0), axis=1))])
     indices = np.searchsorted(length, np.linspace(0.0, length[-1], POINTS))
-    at = known[np.unique(np.minimum(indices, len(known) - 1))]
-    return SampledPath(path[at], _active_criterion(data, at), _overlap(data)[at], targets_of(data))
+    samples = known[np.unique(np.minimum(indices, len(known) - 1))]
+    return SampledPath(
+        path[samples],
+        _active_criterion(data, samples),
+        _overlap(data)[samples],
+        targets_of(data),
+    )
 
 
 def targets_of(data: FigureData) -> list[tuple[Array, float]]:
@@ -59,10 +64,10 @@ def _overlap(data: FigureData) -> NDArray[np.bool_]:
     return inside
 
 
-def _active_criterion(data: FigureData, at: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the index of the active region's criterion at rows `at`, -1 for the goal."""
+def _active_criterion(data: FigureData, samples: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the index of the active region's criterion at rows `samples`, -1 for the goal."""
     if not data.scenario.regions:
-        return np.full(len(at), -1)
-    active = active_at(data.scenario, data.record.take(at, activity_signals(data.scenario)))
+        return np.full(len(samples), -1)
+    active = active_at(data.scenario, data.record.take(samples, activity_signals(data.scenario)))
     active_criterion: NDArray[np.intp] = np.array([-1, *data.scenario.criterion_places])[active]
     return active_criterion

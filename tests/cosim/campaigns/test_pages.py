@@ -10,7 +10,7 @@ import pytest
 
 from cosim.campaigns import compare, run_campaign, run_sweep
 from cosim.campaigns.analysis.statistics import quantiles
-from cosim.campaigns.pages.campaign_figures import distributions, shares_up_to
+from cosim.campaigns.pages.campaign_figures import cumulative_fractions, distributions
 from cosim.campaigns.pages.campaign_page import write_campaign_page
 from cosim.campaigns.pages.comparison_page import write_comparison_page
 from cosim.campaigns.pages.sections import SECTIONS
@@ -283,6 +283,6 @@ def test_median_marker_matches_the_table(n, never):
 
 
 def test_cumulative_shares_count_unreached_rows():
-    values, shares = shares_up_to(np.array([3.0, np.nan, 1.0, np.nan]))
+    values, shares = cumulative_fractions(np.array([3.0, np.nan, 1.0, np.nan]))
     assert values.tolist() == [1.0, 3.0] and shares.tolist() == [0.25, 0.5]
-    assert [a.size for a in shares_up_to(np.zeros(0))] == [0, 0]
+    assert [a.size for a in cumulative_fractions(np.zeros(0))] == [0, 0]

@@ -111,7 +111,7 @@ def test_gradient_matches_the_cost(log, vehicle, found):
 def test_fitted_model_predicts_better_than_constant_velocity(log, vehicle, found):
     for p in validate([log], vehicle, found.parameters, found.values, found.step):
         if p.topic == "velocity":
-            assert p.identified[0] < p.start_vehicle[0] and p.identified[0] < 0.5 * p.held[0]
+            assert p.identified[0] < p.start_vehicle[0] and p.identified[0] < 0.5 * p.constant_velocity[0]
 
 
 @pytest.mark.slow
@@ -162,7 +162,7 @@ def test_a_cause_that_is_not_estimated_is_named(log, late, vehicle):
     assert "Samples come late" in said and "too: --nuisance current bias delay." in said  # what is named now stays
     scaled = tuple(dataclasses.replace(t, values=1.05 * t.values) if t.name == "velocity" else t for t in log.topics)
     done = fit([dataclasses.replace(log, topics=scaled)], vehicle, parameters)
-    assert done.causes[0].flag == "--nuisance scale" and done.causes[0].share > 0.3
+    assert done.causes[0].flag == "--nuisance scale" and done.causes[0].fraction > 0.3
     said = " ".join(warnings(done, [log]))
     assert "the DVL's scale (" in said and "what it names now, --nuisance current bias: give it whole" in said
 
@@ -192,7 +192,7 @@ def test_random_force_is_estimated_window_by_window(vehicle, log):
     pushed = flown(vehicle, log.wrench, times, rng, force)
     parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
     blind, done = (fit([pushed], vehicle, parameters, random_force=known) for known in (False, True))
-    assert blind.causes[0].flag == "--nuisance random_force" and blind.causes[0].share > 0.5
+    assert blind.causes[0].flag == "--nuisance random_force" and blind.causes[0].fraction > 0.5
     assert "a force that changes in time" in " ".join(warnings(blind, [pushed]))
     truth = np.array([TRUTH[p.plant] if p.plant else BIAS[p.index] for p in parameters])
     assert (np.abs(done.values[:2] - truth[:2]) < done.intervals.half[:2]).all()

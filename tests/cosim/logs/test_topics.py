@@ -66,14 +66,14 @@ def test_gaps_are_counted_and_contain_no_row(contents, tmp_path):
     assert topic.gap_count == 2
     np.testing.assert_allclose(topic.gaps, [(10.0, 13.0), (40.0, 41.0)], atol=1e-6)
     grid = np.arange(0.0, 60.0, 0.05)
-    for read in ("interpolated", "held"):
+    for read in ("interpolate", "hold"):
         with contextlib.closing(TopicReader(topic)) as reader:
             parts = [getattr(reader, read)(part) for part in np.array_split(grid, 13)]
-        values = np.vstack([part if read == "interpolated" else part[0] for part in parts])[:, 0]
+        values = np.vstack([part if read == "interpolate" else part[0] for part in parts])[:, 0]
         known = np.isfinite(values)
         assert not known[(grid > 10.35) & (grid < 12.95)].any()
         assert known[(grid > 13.05) & (grid < 39.9)].all()
-        np.testing.assert_allclose(values[known], grid[known], atol=0.31 if read == "held" else 1e-9)
+        np.testing.assert_allclose(values[known], grid[known], atol=0.31 if read == "hold" else 1e-9)
 
 
 def test_unordered_and_non_finite_samples_are_dropped_and_counted(contents, tmp_path):
@@ -100,7 +100,7 @@ def test_attitudes_are_interpolated_along_the_shorter_arc(contents, tmp_path):
     topic, _ = cleaned(contents, tmp_path, "attitude", angle, q)
     grid = np.arange(0.0, 19.5, 0.1)
     with contextlib.closing(TopicReader(topic)) as reader:
-        found = reader.interpolated(grid)
+        found = reader.interpolate(grid)
     np.testing.assert_allclose(np.linalg.norm(found, axis=1), 1.0)
     expected = np.column_stack([np.cos(grid / 2), np.sin(grid / 2)])
     assert np.abs(np.abs((found[:, [0, 3]] * expected).sum(axis=1)) - 1.0).max() < 1e-4

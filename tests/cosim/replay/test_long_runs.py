@@ -42,7 +42,7 @@ def run_of(request, shipped_run):
 def streamed(monkeypatch):
     """Return a function that opens a run anew, to be read in blocks of an odd size."""
     monkeypatch.setattr("cosim.results.record._BLOCK", 777)
-    monkeypatch.setattr("cosim.report.figures.sampled_rows._WHOLE", 100)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._MAX_WHOLE_ROWS", 100)
 
     def reopened(run):
         with monkeypatch.context() as patch:
@@ -87,7 +87,7 @@ def test_streamed_excerpt_is_identical(every, rate, docking, streamed):
 @pytest.mark.medium(fast=1)
 @pytest.mark.parametrize("name", RUNS)
 def test_figures_of_a_long_run_are_thinned_and_keep_extremes(name, run_of, streamed, monkeypatch):
-    monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 2000)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._MAX_SAMPLED_ROWS", 2000)
     monkeypatch.setattr("cosim.report.figures.sampled_rows._EVEN", 50)
     run = run_of(name)
     story = make_figure_data(streamed(run))
@@ -115,7 +115,7 @@ def test_figures_of_a_long_run_are_thinned_and_keep_extremes(name, run_of, strea
 def test_every_figure_of_a_long_run_is_drawn(name, run_of, streamed, monkeypatch):
     from cosim.report.figures.figures import drawings
 
-    monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 2000)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._MAX_SAMPLED_ROWS", 2000)
     run = run_of(name)
     stories = FigureData(run.scenario, run.record, run.summary), make_figure_data(streamed(run))
     whole, few = ([drawing.name for drawing in drawings(story)] for story in stories)
@@ -221,8 +221,8 @@ def _exported(path):
 @pytest.mark.slow
 def test_memory_does_not_grow_with_the_rows(tmp_path, monkeypatch):
     monkeypatch.setattr("cosim.results.record._SMALL", 2**21)
-    monkeypatch.setattr("cosim.report.figures.sampled_rows._MOST", 5000)
-    monkeypatch.setattr("cosim.report.figures.sampled_rows._WHOLE", 5000)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._MAX_SAMPLED_ROWS", 5000)
+    monkeypatch.setattr("cosim.report.figures.sampled_rows._MAX_WHOLE_ROWS", 5000)
     rows = {n: tmp_path / str(n) for n in (40_000, 160_000)}
     for n, path in rows.items():
         write_long_run(path, n)

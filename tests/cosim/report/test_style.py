@@ -9,7 +9,7 @@ from matplotlib.text import Text
 
 from cosim.report.figures.axes_box import Box
 from cosim.report.figures.figures import drawings
-from cosim.report.figures.style import FigureData, features_of, legend_columns, places_of, shifts_of
+from cosim.report.figures.style import FigureData, features_of, legend_columns, region_instances, shifts_of
 from cosim.results.record import load_record
 from cosim.results.wording import verdict
 from cosim.run.run_scenario import run_scenario
@@ -37,7 +37,7 @@ def drifting(tmp_path_factory):
 
 
 def test_attitude_regions_are_not_drawn_but_features_are(inspection):
-    assert [(place.region.name, place.faint) for place in places_of(inspection)] == [
+    assert [(instance.region.name, instance.faint) for instance in region_instances(inspection)] == [
         ("goal", True), ("goal", True), ("goal", False), ("pipe", False), ("sea bed", False),
     ]  # fmt: skip
     ((name, _, feature),) = features_of(inspection)
@@ -46,7 +46,9 @@ def test_attitude_regions_are_not_drawn_but_features_are(inspection):
 
 
 def test_moving_regions_are_drawn_at_start_end_and_closest_approach(drifting):
-    first, last, nearest = [place for place in places_of(drifting) if place.region.name == "crossing buoy"]
+    first, last, nearest = [
+        instance for instance in region_instances(drifting) if instance.region.name == "crossing buoy"
+    ]
     assert list(first.shift) == [0.0, 0.0, 0.0]
     assert last.shift == pytest.approx([-8.0, 2.6, 0.0])
     path = drifting.record.stack(["position.x", "position.y", "position.z"])
