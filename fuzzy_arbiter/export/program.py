@@ -12,6 +12,7 @@ from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines import choose
 from fuzzy_arbiter.engines.clipped_centroid import Outline, outline
+from fuzzy_arbiter.engines.clipped_curves import ClippedCurves
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.firing import Logic
@@ -136,7 +137,7 @@ def _require_sayable(system: System, engine: Engine) -> None:
         what = f"export: output {output.name!r}"
         if output.lock_previous:
             raise UnsupportedError(f"{what} keeps its previous value, which a function of one sample has not")
-        if isinstance(defuzzifier, Quadrature):
+        if isinstance(defuzzifier, ClippedCurves | Quadrature):
             raise UnsupportedError(
                 f"{what} is integrated by quadrature; expected the centroid of piecewise-linear terms under min or "
                 "prod, joined by max, or values"
