@@ -22,6 +22,7 @@ DEFUZZIFIERS = ("centroid", "bisector", "mom", "som", "lom")
 BOUND = 1e-9  # maximum error: of the universe's width, of the area, and of the maximum height
 _CELLS = 20_000  # number of equal cells of the reference, before their division
 _HALVINGS = 50
+_STRIDE = 53  # from one system to the next in the list of all operators, which it visits in turn
 _MAX_CELLS = 100_000
 # Lobatto's rule has the ends of a cell among its points, so that it sees a bend near one
 _NODES = np.array([-1.0, -np.sqrt(3 / 7), 0.0, np.sqrt(3 / 7), 1.0])
@@ -48,7 +49,7 @@ def random_cases(count: int, seed: int = 0) -> Iterator[Case]:
     ways = [(d, a, i) for i in T_NORMS for a in AGGREGATIONS for d in DEFUZZIFIERS]
     made = 0
     while made < count:
-        defuzzifier, aggregation, implication = ways[made % len(ways)]
+        defuzzifier, aggregation, implication = ways[made * _STRIDE % len(ways)]
         low = float(rng.choice([0.0, -3.0, 100.0]))
         width = float(rng.choice([1.0, 10.0, 25.0]))
         terms = tuple(Term(f"t{j}", _random_shape(rng, low, width)) for j in range(rng.integers(1, 5)))

@@ -1,4 +1,4 @@
-"""Centroids of terms of any smooth shape that are clipped, or scaled and added, for many samples at once."""
+"""Values of terms of any smooth shape that are clipped or scaled, for many samples at once."""
 
 # Over a panel in which each term rises or falls and no two cross, the highest term counts up to its cut, the next one
 # above that up to its own, and so on, as in `clipped_centroid`. The area under a term that is clipped at c is the
@@ -32,9 +32,12 @@ _TABLE = -np.cos(np.linspace(0.0, np.pi, 65))  # positions in a panel of the tab
 _SPACING = np.pi / 64
 _INSIDE = _TABLE * (1.0 - 1e-9)  # on the panel's side of a jump
 _POWERS = np.arange(_ORDER)
-_STEPS = 2  # of Newton's method
+_STEPS, _FINE_STEPS = 2, 5  # of Newton's method: where the area counts, and where the position does
 _ERROR = 1e-10  # maximum error of a sample's area, as a fraction of it; quadrature takes the others
 _NOISE = 1e-14  # error of a degree by rounding
+_EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
+_APART = 1e-9  # positions count as one within this fraction of the universe
+_JUMP = 1e-8  # minimum height of a jump at the end of a panel
 _SAME = 1e-12  # terms whose degrees differ by less do not cross
 _MAX_TABLE = 2**24  # maximum number of degrees that are compared to find crossings
 _BLOCK = 2**18  # number of heights that are computed at a time
@@ -47,7 +50,7 @@ _LEVER = _INTEGRAL + _ORDER + 1
 
 
 class ClippedCurves(Defuzzifier):
-    """The centroid of smooth terms that are clipped and joined by max or a sum, or scaled and added."""
+    """The centroid of smooth terms, clipped or in a sum; or where the maximum of clipped or scaled ones is."""
 
     def __init__(self, output: Output, slots: Sequence[Slot]) -> None:
         shapes = [output.terms[slot.term].membership for slot in slots]
@@ -55,9 +58,9 @@ class ClippedCurves(Defuzzifier):
             raise EngineError(f"output {output.name!r}: a term is a formula or a singleton, expected smooth terms")
         self._quadrature = Quadrature(output, slots)
         self.method = self._quadrature.method
-        self._universe = output.universe
+        self._universe, self._kind = output.universe, output.defuzzifier
         self._max, self._scales = output.aggregation == "max", slots[0].implication == "prod"
-        edges = _edges(output, shapes) if self._max else smooth_panels(output.universe, shapes)
+        edges = _edges(output, shapes) if self._max else smooth_panels(output.universe, list(dict.fromkeys(shapes)))
         self._slots, lines, keys, self._error = _lines(edges, shapes, self._max)
         if not self._error < _ERROR * max(shape.area(output.universe) for shape in shapes):
             raise EngineError(f"output {output.name!r}: its terms are too rough, expected smooth terms")
@@ -68,10 +71,12 @@ class ClippedCurves(Defuzzifier):
         self._signs = np.repeat([1.0, -1.0], self._slots.size)[: len(ones)]
 
     def values(self, cuts: Array, inputs: Array) -> Array:
-        """Return the centroids for many samples; cuts (slots, n)."""
+        """Return the values for many samples; cuts (slots, n)."""
         size = max(1, _BLOCK // self._lines.shape[1])
-        blocks = range(0, max(1, cuts.shape[1]), size)
-        return np.concatenate([self._centroids(cuts[:, i : i + size], inputs) for i in blocks])
+        blocks = [cuts[:, i : i + size] for i in range(0, max(1, cuts.shape[1]), size)]
+        if self._kind == "centroid":
+            return np.concatenate([self._centroids(block, inputs) for block in blocks])
+        return np.concatenate([self._of_maximum(block) for block in blocks])
 
     def _centroids(self, cuts: Array, inputs: Array) -> Array:
         if cuts.shape[1] == 1:  # of two columns NumPy adds rows in their order, as of many
@@ -107,15 +112,47 @@ class ClippedCurves(Defuzzifier):
         areas[meets], moments[meets] = _integrals(lines, self._meeting(lines, meets[0], cut), cut)
         return _summed(self._signs, areas), _summed(self._signs, moments)
 
-    def _meeting(self, lines: Array, index: Indices, cut: Array) -> Array:
+    def _of_maximum(self, cuts: Array) -> Array:
+        """Return the mean, smallest or largest position of the maximum height; cuts (slots, n)."""
+        low, high = self._lines[3:_DEGREE, : self._slots.size].reshape(2, *self._slots.shape, 1)
+        tops = cuts[self._slots]
+        heights = high * tops if self._scales else np.minimum(high, tops)
+        maximum = heights.max(axis=(0, 1))
+        reaches = (heights >= maximum * _EQUAL) & (heights > 0.0)
+        panel, row = np.nonzero(reaches.any(axis=1))
+        order = np.argsort(row, kind="stable")
+        panel, row = panel[order], row[order]
+        highest = reaches[panel, :, row].argmax(axis=1)
+        index, degree = panel * self._slots.shape[1] + highest, maximum[row]
+        if self._scales:
+            degree = degree / tops[panel, highest, row]
+        lines = self._lines[:, index]
+        middle, half, sign, low, high = lines[:_DEGREE]
+        meeting = self._meeting(lines, index, np.minimum(np.maximum(degree, low), high), _FINE_STEPS)
+        r = np.where(low >= degree * _EQUAL, -1.0, np.where(high * _EQUAL <= degree, 1.0, meeting))
+        ends = self._universe[0] + middle + sign * half * np.array([r, np.ones(len(r))])
+        result, n = np.full(cuts.shape[1], np.nan), cuts.shape[1]
+        if self._kind != "mom":
+            pick = np.fmin if self._kind == "som" else np.fmax
+            pick.at(result, row, pick(*ends))
+            return result
+        width, length, center = _APART * (self._universe[1] - self._universe[0]), half * (1.0 - r), ends.mean(axis=0)
+        is_distinct = np.append(True, (row[1:] != row[:-1]) | (np.diff(center) > width))[: len(row)]
+        weight = np.where(np.bincount(row, length, n)[row] > width, length, is_distinct)
+        total = np.bincount(row, weight, n)
+        np.divide(np.bincount(row, weight * (center - self._universe[0]), n), total, out=result, where=total > 0.0)
+        return result + self._universe[0]
+
+    def _meeting(self, lines: Array, index: Indices, cut: Array, steps: int = _STEPS) -> Array:
         """Return the r at which each line has the degree of its cut."""
         _, _, _, low, high = lines[:_DEGREE]
-        r = np.interp(2 * (index % self._slots.size) + (cut - low) / (high - low), self._keys, self._positions)
+        rise = np.where(high > low, high - low, np.inf)
+        r = np.interp(2 * (index % self._slots.size) + (cut - low) / rise, self._keys, self._positions)
         reach = _SPACING * (np.sqrt(1.0 - r * r) + _SPACING)
         first, last = np.maximum(r - reach, -1.0), np.minimum(r + reach, 1.0)
         degree = lines[_DEGREE:_INTEGRAL]
         slopes = degree[1:] * _POWERS[1:, None]
-        for _ in range(_STEPS):  # of Newton's method
+        for _ in range(steps):  # of Newton's method
             powers = _powers(r, _ORDER)
             off, slope = (degree * powers).sum(axis=0) - cut, (slopes * powers[:-1]).sum(axis=0)
             r = r - off / np.where((slope > 0.0) & (np.abs(off) > _NOISE), slope, np.inf)
@@ -179,6 +216,12 @@ def _lines(edges: Array, shapes: Sequence[Membership], ordered: bool) -> tuple[I
     falls = series[..., 1::2].sum(axis=-1) < 0.0
     series[..., 1::2] *= np.where(falls, -1.0, 1.0)[..., None]
     table = series @ _powers(_TABLE, _ORDER)
+    at_edges = np.array([shape.of_many(edges) for shape in shapes])
+    for end, x in (
+        (0, np.where(falls, at_edges[:, 1:], at_edges[:, :-1])),
+        (-1, np.where(falls, at_edges[:, :-1], at_edges[:, 1:])),
+    ):
+        table[..., end] = np.where(np.abs(table[..., end] - x) < _JUMP, x, table[..., end])
     error += np.maximum(-np.diff(table, axis=-1), 0.0).sum(axis=-1)  # of terms that turn within a panel
     integral = np.pad(series / (_POWERS + 1), ((0, 0), (0, 0), (1, 0)))
     lever = np.pad(series / (_POWERS + 2), ((0, 0), (0, 0), (2, 0)))

@@ -21,6 +21,12 @@ from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 from fuzzy_arbiter.terms.values import Constant, Value, place_of
 
 _BLOCK = 2**20  # number of heights that are computed at a time
+_MAXIMA = {("max", "min"), ("max", "prod")}
+# aggregations and implications of outputs whose values follow from lines of terms alone
+_BY_LINES = {
+    "centroid": {("max", "min"), ("sum", "min"), ("sum", "prod")},
+    **dict.fromkeys(("mom", "som", "lom"), _MAXIMA),
+}
 _EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
 
 
@@ -50,8 +56,8 @@ class ExactEngine(Engine):
         ):
             with suppress(EngineError):  # more lines than an outline should have
                 return Centroid(output, implications == {"prod"})
-        joins = (output.defuzzifier, output.aggregation, *implications)
-        if joins in (("centroid", "max", "min"), ("centroid", "sum", "min"), ("centroid", "sum", "prod")):
+        joins = {(output.aggregation, implication) for implication in implications}
+        if len(joins) == 1 and joins <= _BY_LINES.get(output.defuzzifier, set()):
             with suppress(EngineError):  # terms that are not smooth
                 return ClippedCurves(output, slots)
         return Quadrature(output, slots)

@@ -13,7 +13,7 @@ from scipy.integrate import quad
 
 from benchmarks.fuzzy_accuracy import BOUND as ACCURACY
 from benchmarks.fuzzy_accuracy import errors, random_cases, strengths_system
-from fuzzy_arbiter import Arbiter, Output, Rule, Term, falling, rising, triangle
+from fuzzy_arbiter import Arbiter, Output, Rule, Term, falling, rising, trapezoid, triangle
 from fuzzy_arbiter.engines.clipped_curves import ClippedCurves
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.firing import slots_of
@@ -222,6 +222,7 @@ PLATEAU = Output("y", (0, 10), {"t": triangle(0.0, 5.0, 8.0)})
 CORNER = Output("y", (0, 10), {"t": triangle(4.0, 4.0, 10.0)})
 HALVES = Output("y", (0, 10), {"a": triangle(0, 1, 2), "b": triangle(8, 9, 10)})
 BESIDE = Output("y", (0, 10), {"a": triangle(0, 1, 2), "b": triangle(1, 2, 3)})
+STEEP_EDGE = Output("y", (100, 101), {"t": trapezoid(100.3664914526739, 100.36649262908301, 100.375, 100.9)})
 GAUSSIANS = gaussians((17.9, 0.05), (2.0, 6.0))
 
 
@@ -236,6 +237,16 @@ GAUSSIANS = gaussians((17.9, 0.05), (2.0, 6.0))
         *((BESIDE, "mom", "prod", [cut, cut], 1.5) for cut in (1.0, 1e-3, 1e-20)),
         (GAUSSIANS, "mom", "min", [1.0, 0.5], 17.9),
         (GAUSSIANS, "som", "min", [0.5, 0.5], 0.0),  # clipped alike, both are level: the wider from the start
+        # a plateau beside a steep edge, whose degrees are rounded
+        *(
+            (STEEP_EDGE, name, word, [cut], place)
+            for word, cut in (("min", 1.0), ("prod", 0.75))
+            for name, place in (
+                ("som", 100.36649262908301),
+                ("lom", 100.375),
+                ("mom", (100.36649262908301 + 100.375) / 2),
+            )
+        ),
     ],
 )
 def test_defuzzified_values_match_geometry(output, defuzzifier, implication, cuts, expected):
