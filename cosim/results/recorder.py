@@ -33,7 +33,7 @@ class Recorder:
     # the file by single assignment statements, and an interrupted write is repeated from `_end`.
 
     def __init__(self, folder: Path, columns: Sequence[Column], batch_rows: int | None = None) -> None:
-        self._folder, self._schema = folder, _schema(columns)
+        self._folder, self._schema = folder, record_schema(columns)
         size = batch_rows or max(1, min(_BATCH, _BATCH_VALUES // len(columns)))
         self._buffer: Array = np.empty((size, len(columns)))
         self._filled = self._flushed = 0  # rows of the buffer, and rows that it held before
@@ -123,7 +123,8 @@ def _groups(batches: Iterator[pa.RecordBatch], size: int) -> Iterator[list[pa.Re
         yield group
 
 
-def _schema(columns: Sequence[Column]) -> pa.Schema:
+def record_schema(columns: Sequence[Column]) -> pa.Schema:
+    """Return the Arrow schema of a record, with units and descriptions."""
     return pa.schema(
         [
             pa.field(c.name, pa.float64(), nullable=False, metadata={"unit": c.unit, "description": c.description})

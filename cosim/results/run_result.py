@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow as pa
 
 from controller import LAWS
 from cosim.errors import RunError
@@ -16,6 +17,7 @@ from cosim.io.strict_json import read_json
 from cosim.results.as_flown import scenario_as_flown
 from cosim.results.log_facts import IMPORT
 from cosim.results.record import RECORD, Record, load_record
+from cosim.results.recorder import record_schema
 from cosim.results.required_columns import require_columns
 from cosim.results.signal_plot import plot_signals
 from cosim.results.summary import summarize
@@ -66,13 +68,8 @@ class Run:
         pyarrow.Table
             A row per step, a column per signal; each field's metadata has its ``unit``.
         """
-        import pyarrow as pa
-
-        fields = [
-            pa.field(column.name, pa.float64(), metadata={"unit": column.unit, "description": column.description})
-            for column in self.record.columns
-        ]
-        return pa.table([self.record[field.name] for field in fields], schema=pa.schema(fields))
+        columns = self.record.columns
+        return pa.table([self.record[column.name] for column in columns], schema=record_schema(columns))
 
     def frame(self) -> Any:
         """Return the record as a pandas data frame.
@@ -88,11 +85,10 @@ class Run:
             If pandas is not installed.
         """
         try:
-            import pandas as pd
+            return self.table().to_pandas()
         except ImportError as error:
             command = install_hint("pandas>=2.2")
             raise RunError(f"a data frame needs pandas, of the extra notebook: {command}") from error
-        return pd.DataFrame({column.name: self.record[column.name] for column in self.record.columns})
 
     def plot(self, *signals: str, ax: Any = None) -> Any:
         """Draw signals over time, each unit in axes of its own, one below the other.

@@ -13,29 +13,15 @@ from tqdm import tqdm
 COMPILING_NOTICE = "compiling the law and what it needs (first use)"
 
 
-class ProgressBar:
-    """Progress bar, shown if standard error is a terminal."""
+class ProgressBar(tqdm):  # type: ignore[misc]
+    """Progress bar, shown if standard error is a terminal; `close` may be called twice, and leaves it as it is."""
 
     def __init__(self, shown: bool, bar_format: str, **options: Any) -> None:
-        self._bar = tqdm(bar_format=bar_format, disable=None if shown and sys.stderr else True, **options)
-
-    def update(self, n: float) -> None:
-        """Advance the bar by `n`."""
-        self._bar.update(n)
+        super().__init__(bar_format=bar_format, disable=None if shown and sys.stderr else True, **options)
 
     def update_to(self, n: float) -> None:
         """Advance the bar to `n`, at most to its total."""
-        self._bar.update(min(n, self._bar.total) - self._bar.n)
-
-    def close(self) -> None:
-        """End the bar, and leave it as it is. May be called twice."""
-        self._bar.close()
-
-    def __enter__(self) -> ProgressBar:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
+        self.update(min(n, self.total) - self.n)
 
 
 class _Notice(logging.Handler):

@@ -116,13 +116,13 @@ def _fmu(component: Component, fmi: int, platforms: str) -> bytes:
 
 def _require(scenario: Scenario) -> None:
     """Raise a RunError for features that the FMUs of a system do not support."""
-    streamed = next((r.region.name for r in scenario.regions if r.streamed), "")
+    streamed, engine = next((r.region.name for r in scenario.regions if r.streamed), ""), scenario.arbiter.engine
     require_builtin_law(scenario)
     for ok, key, received, expected in (
         (
-            scenario.arbiter.engine in _EXACT,
+            engine in _EXACT,
             "arbiter.engine",
-            repr(scenario.arbiter.engine),
+            repr(engine),
             "'closed' or 'exact', such as by --set arbiter.engine=closed",
         ),
         (not scenario.commands.enabled, "commands.enabled", "true", "false: a system takes no commands"),
