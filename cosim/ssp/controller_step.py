@@ -4,8 +4,9 @@
 
 from __future__ import annotations
 
-import math
 from typing import Annotated
+
+import numpy as np
 
 from controller.navigation.measurements import N_SENSORS
 from controller.stack_array import Shape, VectorM, VectorN
@@ -56,8 +57,8 @@ def step_controller(model: StepModel, data: StepData, inputs: ControllerInputs, 
         out.values = data.true_evaluation.values if model.exact else data.arbiter_evaluation.values
         out.clearances = data.true_evaluation.clearances if model.exact else data.arbiter_evaluation.clearances
     schedule_failures(model, data, out)
-    for j in range(out.thrusts.size):
-        out.thrusts[j] = data.stuck[j] if math.isfinite(data.stuck[j]) else data.thrusts[j]
+    stuck = data.stuck[: out.thrusts.size]
+    out.thrusts[:] = np.where(np.isfinite(stuck), stuck, data.thrusts)
 
 
 def read_inputs(data: StepData, inputs: ControllerInputs) -> None:
@@ -74,10 +75,7 @@ def read_inputs(data: StepData, inputs: ControllerInputs) -> None:
 
 def is_zero(values: Array) -> bool:
     """Return True if all numbers are 0."""
-    zero = True
-    for i in range(values.size):
-        zero = zero and values[i] == 0.0
-    return zero
+    return bool(np.all(values == 0.0))
 
 
 def schedule_failures(model: StepModel, data: StepData, out: ControllerOutputs) -> None:

@@ -91,13 +91,11 @@ def empty_state() -> VehicleState:
 
 def write_arbiter_state(measured: VehicleState, expected: Array, out: VehicleState) -> None:
     """Write the state that the arbiter uses: the law's prediction, which has less noise than the measurement."""
-    for i in range(3):
-        known = expected[i] == expected[i] and measured.position[i] == measured.position[i]
-        out.position[i] = expected[i] if known else measured.position[i]
-        out.velocity_body[i] = expected[3 + i] if known else measured.velocity_body[i]
-        out.velocity_body[3 + i] = measured.velocity_body[3 + i]
-    for i in range(4):
-        out.quaternion[i] = measured.quaternion[i]
+    lost = np.isnan(expected[:3] + measured.position)
+    out.position[:] = np.where(lost, measured.position, expected[:3])
+    out.velocity_body[:3] = np.where(lost, measured.velocity_body[:3], expected[3:])
+    out.velocity_body[3:] = measured.velocity_body[3:]
+    out.quaternion[:] = measured.quaternion
 
 
 def compute_inputs(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 
 from controller.allocation import allocate
@@ -79,13 +77,10 @@ def controls(model: StepModel, data: StepData) -> bool:
 def bound_wrench(wrench: Array) -> bool:
     """Scale force and moment of a wrench [N, N m] to at most `MAX_WRENCH`, or to 0 if they are not finite."""
     changed = False
-    for part in range(2):
-        largest, finite = 0.0, True
-        for i in range(3 * part, 3 * part + 3):
-            largest = max(largest, abs(wrench[i]))
-            finite = finite and math.isfinite(wrench[i])
+    for i in range(0, 6, 3):
+        axes = wrench[i : i + 3]
+        finite, largest = np.all(np.isfinite(axes)), np.max(np.abs(axes))
         if not (finite and largest <= MAX_WRENCH):
             changed = True
-            for i in range(3 * part, 3 * part + 3):
-                wrench[i] = wrench[i] * (MAX_WRENCH / largest) if finite else 0.0
+            axes[:] = np.where(finite, axes * (MAX_WRENCH / largest), 0.0)
     return changed

@@ -66,8 +66,7 @@ def compute_memberships(
     packed: PackedMemberships, clearances: Array, approach_times: Array, memberships: Array
 ) -> None:
     """Compute the membership of each criterion: the greatest over its regions; clearances [m], approach_times [s]."""
-    for i in range(memberships.size):
-        memberships[i] = 0.0
+    memberships[:] = 0.0
     for k in range(packed.regions.size):
         i, criterion, width = packed.regions[k], packed.criteria[k], packed.ramps[k]
         x = clearances[i] if packed.quantities[k] == 0 else approach_times[i]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+import numpy as np
 
 from cosim.step.arbiter_inputs import write_arbiter_state
 from cosim.step.decision import arbitrate, control, update_delayed_weights
@@ -77,12 +77,11 @@ def locate(model: StepModel, data: StepData) -> None:
 
 def step_plant(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     """Send the inputs, those of stuck thrusters as they are, and advance the plant."""
-    native = plant.native
-    own = data.stuck.size
-    for j in range(own):
-        given = data.delayed[j] if model.jacobi else data.inputs[j]
-        data.delayed[j] = data.inputs[j]
-        native.inputs[j] = data.stuck[j] if math.isfinite(data.stuck[j]) else given
+    native, own = plant.native, data.stuck.size
+    native.inputs[:own] = np.where(
+        np.isnan(data.stuck), np.where(model.jacobi, data.delayed, data.inputs[:own]), data.stuck
+    )
+    data.delayed[:] = data.inputs[:own]
     data.inputs[own:] = native.inputs[own:]  # of a coupled plant: its caller sets them
     if fmi_set(native) and fmi_do_step(native, data.now, model.step) and fmi_get(native) and fmi_get_flags(native):
         call_back(data, PLANT_STEP)
@@ -91,5 +90,4 @@ def step_plant(model: StepModel, data: StepData, plant: PlantCalls) -> None:
     if data.failed_step < 0:
         first = data.first_applied
         data.outputs[first:] = native.outputs[first:]
-        for j in range(data.flags.size):
-            data.flags[j] = native.flags[j]
+        data.flags[:] = native.flags
