@@ -85,10 +85,11 @@ class Run:
             If pandas is not installed.
         """
         try:
-            return self.table().to_pandas()
+            import pandas as pd
         except ImportError as error:
             command = install_hint("pandas>=2.2")
             raise RunError(f"a data frame needs pandas, of the extra notebook: {command}") from error
+        return pd.DataFrame({column.name: self.record[column.name] for column in self.record.columns})
 
     def plot(self, *signals: str, ax: Any = None) -> Any:
         """Draw signals over time, each unit in axes of its own, one below the other.
