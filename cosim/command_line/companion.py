@@ -54,6 +54,12 @@ def add_verbs(verbs: Any) -> None:
     flag(verb, "--level-dive M", "an ArduSub's dive after arming, to align its heading", float_range(0.0, 10.0), 0.6)
     flag(verb, "--least-battery PERCENT", "charge below which the vehicle holds still", float_range(0.0, 100.0), 0.0)
     flag(verb, "--system-id N", "system id: an ArduSub takes sticks from its SYSID_MYGCS alone", int_range(1, 255), 255)
+    flag(
+        verb,
+        "--vehicle-system N",
+        "the autopilot's system id (default: that of the first one heard)",
+        int_range(1, 255),
+    )
     flag(verb, "--timeout S", "end if steering cannot begin in so many seconds", float_range(0.1, 1e6))
     flag(verb, "--speedup N", "seconds of a simulated autopilot per second", float_range(0.01, 100.0), 1.0)
     add_remote(verb)
@@ -85,6 +91,7 @@ def companion(options: argparse.Namespace) -> int:
                 printed.add(companion.placement)
                 print_status(companion.placement)
             if state != "waiting" and unprinted:
+                print_status(f"autopilot: system {companion.session.reported.system}")
                 for line in unprinted.pop().text():
                     print_status(line)
             print_status(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))

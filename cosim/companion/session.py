@@ -45,7 +45,7 @@ class AutopilotSession:
         self.output = Output(self._mavlink, vehicle, options)
         self._dive_mode: Mode = options.steering_mode if options.steer_by == "velocity" else "hold"
         self._mode = self.profile.custom_modes[options.steering_mode]
-        self.reported = ReportedState(link.identity)
+        self.reported = ReportedState(link.identity, options.vehicle_system)
         self.alignment = FrameAlignment(options.origin)
         self.heading = HeadingWatch()
         self.dive = LevelDive(options.level_dive if options.profile == "ardusub" and not options.dry_run else 0.0)
@@ -124,7 +124,8 @@ class AutopilotSession:
         """Return the missing conditions for steering as text."""
         reported, now = self.reported, self._link.clock()
         if reported.system is None:
-            return "a heartbeat of an autopilot"
+            wanted = self._options.vehicle_system
+            return "a heartbeat of an autopilot" + (f" of system {wanted}" if wanted is not None else "")
         if not math.isfinite(reported.age(now)):
             return "LOCAL_POSITION_NED and ATTITUDE_QUATERNION, or ODOMETRY"
         if not self.failsafes.is_read(now):

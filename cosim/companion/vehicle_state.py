@@ -43,8 +43,8 @@ _MILLI, _MICRO = 1e-3, 1e-6
 class ReportedState:
     """The state of one autopilot, as its messages report it. Nothing is estimated here."""
 
-    def __init__(self, identity: tuple[int, int]) -> None:
-        self._identity = identity
+    def __init__(self, identity: tuple[int, int], vehicle_system: int | None = None) -> None:
+        self._identity, self._wanted = identity, vehicle_system  # None: the first autopilot that is heard
         self.system: int | None = None
         self.autopilot = 0
         # position [m] and velocity [m/s], NED, in the autopilot's own local frame
@@ -79,7 +79,7 @@ class ReportedState:
                 self.pilot_at = now
             return
         if self.system is None and name == "HEARTBEAT" and component == 1 and message.autopilot != 8:
-            self.system = system
+            self.system = system if self._wanted in (None, system) else None
         handler = getattr(self, f"_receive_{name.lower()}", None)
         if system != self.system or component != 1 or handler is None:
             return

@@ -152,6 +152,7 @@ def parameter(name, value):
 NOT_STEERED = {
     "no origin": ({}, {"origin": SceneOrigin()}, None, "waiting for the scene's origin"),
     "no global position": ({"silent": ["GLOBAL_POSITION_INT"]}, {}, None, "the autopilot has no global position"),
+    "another vehicle": ({}, {"vehicle_system": 2}, None, "waiting for a heartbeat of an autopilot of system 2"),
     "not armed, by default": ({"armed": False}, {}, None, "waiting for arming"),
     "an ArduSub that would ignore sticks": (
         {"profile": "ardusub"}, {"profile": "ardusub"}, parameter(b"SYSID_MYGCS", 250.0),

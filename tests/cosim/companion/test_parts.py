@@ -94,6 +94,15 @@ def test_frame_offset_is_derived_from_global_position_and_pressure():
     assert alignment.to_scene(state.position) == pytest.approx(true, abs=0.02)
 
 
+@pytest.mark.parametrize(("wanted", "first"), [(None, 2), (3, 3)])
+def test_only_one_of_two_autopilots_is_flown(wanted, first):
+    state = ReportedState((255, 191), wanted)
+    for system in (2, 3):
+        for sent in (message("HEARTBEAT", type=12, autopilot=3, base_mode=1), message("LOCAL_POSITION_NED", x=system)):
+            state.receive(system, 1, sent, 1.0)
+    assert state.system == first and state.position[0] == first
+
+
 def test_zero_latitude_and_longitude_are_a_position_of_an_absolute_estimate():
     state = reported((0.0, 0.0, 0.0), (0.0, 0.0))
     assert state.global_position is None  # what an ArduSub without one sends
