@@ -20,7 +20,7 @@ from cosim.scenario.start_values import start_values
 from cosim.simulation.bindings import BoundLaw, bind_rules
 from cosim.simulation.make_step import NO_CLOCK, exchanged_variables, make_data, make_model, make_noise, step_signals
 from cosim.simulation.stepped_plant import plant_calls
-from cosim.step.score import FlightMetrics, empty_metrics, fly
+from cosim.step.score import FlightMetrics, fly
 from cosim.step.step_model import Array, Integers, StepData, StepModel
 from fuzzy_arbiter import Arbiter
 from plant_fmu import Plant, PlantError
@@ -86,7 +86,7 @@ def _fixed_keys(scenario: Scenario) -> dict[str, tuple[Any, Any]]:
 
 def fly_scenario(
     plant: Plant, scenario: Scenario, trace: bool = False, clock: Integers = NO_CLOCK
-) -> tuple[FlightMetrics[float], StepModel, StepData, Rows]:
+) -> tuple[FlightMetrics, StepModel, StepData, Rows]:
     """Reset a plant, and fly a scenario with it; return its signals at each control step if a trace is wanted."""
     law = law_of(scenario)
     plant.reset()
@@ -99,16 +99,16 @@ def fly_scenario(
     bound_law, rules = BoundLaw(law, model, data), bind_rules(scenario.rules.system, data)
     decisions = -(-scenario.steps // scenario.control_every)
     rows = np.zeros((decisions, signals.row.size) if trace else (0, 0))
-    values, metrics = empty_metrics()
+    metrics = FlightMetrics()
     BoundCall(fly, (model, data, calls, metrics, np.zeros(len(inputs)), rows)).call()
     bound_law.raise_error()
     rules.raise_error()
     columns = signals.columns if trace else ()
     flown = Rows(columns, {column.name: values for column, values in zip(columns, rows.T, strict=True)})
-    return FlightMetrics(*values.tolist()), model, data, flown
+    return metrics, model, data, flown
 
 
-def _outcome(metrics: FlightMetrics[float], model: StepModel, data: StepData) -> NDArray[np.void]:
+def _outcome(metrics: FlightMetrics, model: StepModel, data: StepData) -> NDArray[np.void]:
     def when(step: float) -> float:
         return step * model.step if step >= 0 else math.nan
 

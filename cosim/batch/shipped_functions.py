@@ -29,7 +29,7 @@ from cosim.simulation.make_step import exchanged_variables, make_data, make_mode
 from cosim.step.arbiter_inputs import compute_inputs
 from cosim.step.one_step import advance, locate, show_start
 from cosim.step.plant_calls import Clock, PlantCalls
-from cosim.step.score import empty_metrics, fly
+from cosim.step.score import FlightMetrics, fly
 from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
@@ -58,7 +58,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     yield compute_inputs, (model.inputs, goal, regions, state, 0.0, _FLAT, data.signals)
     references, rows = np.zeros(1, np.uint32), np.zeros((0, 0))
     calls = PlantCalls(*[Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)] * 3)
-    yield fly, (model, data, calls, empty_metrics()[1], _FLAT, rows)
+    yield fly, (model, data, calls, FlightMetrics(), _FLAT, rows)
     yield advance, (model, data, calls, _INTEGERS, rows)
     yield show_start, (model, data, calls)
     yield locate, (model, data)

@@ -125,19 +125,19 @@ class SceneFlyer:
             self._plants[vehicle.name] = Plant(vehicle)
         return self._plants[vehicle.name]
 
-    def _score(self, metrics: FlightMetrics[float], scenario: Scenario) -> Score:
+    def _score(self, metrics: FlightMetrics, scenario: Scenario) -> Score:
         inside, since, step = metrics.inside > 0.0 and metrics.failed_step < 0, metrics.last_entered, scenario.time.step
         return Score(
-            reached=inside and scenario.steps - since >= math.ceil(self.conditions.settled / step - _ROUNDING),
-            reach_time=since * step if inside else math.inf,
-            min_clearance=metrics.min_clearance,
-            effort=metrics.thrust_effort,
-            thrust_variation=metrics.thrust_variation,
-            worst_step=metrics.worst_step,
+            reached=bool(inside and scenario.steps - since >= math.ceil(self.conditions.settled / step - _ROUNDING)),
+            reach_time=float(since * step) if inside else math.inf,
+            min_clearance=float(metrics.min_clearance),
+            effort=float(metrics.thrust_effort),
+            thrust_variation=float(metrics.thrust_variation),
+            worst_step=float(metrics.worst_step),
             failed_step=int(metrics.failed_step),
-            bound_excess=metrics.bound_excess,
-            weighted_violation=metrics.weighted_violation,
-            bound_promised=metrics.promises / metrics.calls if metrics.calls else math.nan,
+            bound_excess=float(metrics.bound_excess),
+            weighted_violation=float(metrics.weighted_violation),
+            bound_promised=float(metrics.promises / metrics.calls) if metrics.calls else math.nan,
             healthy_weakened=bool(metrics.healthy_isolated or metrics.thrust_limit < _HALF * _least_limit(scenario)),
         )
 

@@ -42,7 +42,7 @@ def flight_data(run: Run) -> dict[str, Any]:
         "title": scenario.title,
         "rows": len(flight.rows),
         "columns": flight.columns,  # index of each signal in a row
-        "metrics": {name: memory.keep(values) for name, values in flight.metrics._asdict().items()},
+        "metrics": dict(zip(flight.metrics._fields, map(memory.keep, flight.metrics), strict=True)),
         "step": scenario.time.step,
         "every": scenario.control_every,
         "settled_for": SETTLED_FOR,

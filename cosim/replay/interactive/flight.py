@@ -18,7 +18,7 @@ from cosim.simulation.columns import columns_of_channels
 from cosim.simulation.make_step import SENSED, exchanged_variables, make_data, make_model
 from cosim.simulation.signals import Column, Signals
 from cosim.simulation.stepped_plant import plant_calls, vehicle_channels
-from cosim.step.score import empty_metrics
+from cosim.step.score import FlightMetrics
 from plant_fmu.running.channels import Channel
 from plant_fmu.running.native import Native
 from plant_fmu.variables import variables
@@ -53,7 +53,7 @@ class Flight:
         self.noise = np.zeros((1 + periods if through_state else 0, 6))
         self.data = make_data(scenario, self.model, self.law, signals, inputs, outputs, self.noise, flags)
         self.plant = plant_calls(scenario.vehicle, self._native(inputs, outputs, flags), self._native)
-        _, self.metrics = empty_metrics()
+        self.metrics = FlightMetrics()
         self.rows = np.zeros((-(-scenario.steps // scenario.control_every), len(self.columns)))
         self.fly = self.model, self.data, self.plant, self.metrics, np.zeros(len(inputs)), self.rows
         data, forces = self.data, self.data.command if model.law_gives_wrench else self.data.thrusts
