@@ -10,7 +10,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import minimize
 
 from controller.regions import Region
 from controller.regions.region_set import RegionEvaluator, clearances_at, pack
@@ -76,6 +75,8 @@ def search(regions: Sequence[Region], low: Array, high: Array, tolerance: float 
 
 def _refine(regions: Sequence[Region], point: Array, depth: float, low: Array, high: Array) -> tuple[Array, float]:
     """Improve a point by Nelder-Mead, since the minimum clearance is not smooth; return point and depth."""
+    from scipy.optimize import minimize  # a slow import, which scenes do without
+
     evaluator = RegionEvaluator(pack(regions))
     done = minimize(
         lambda p: -float(evaluator.evaluate(p, _LEVEL)[3].min()), point, method="Nelder-Mead",
