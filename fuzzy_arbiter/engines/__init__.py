@@ -11,7 +11,8 @@ from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.engine import Engine
-from fuzzy_arbiter.engines.exact import ExactEngine, GridEngine
+from fuzzy_arbiter.engines.exact import ExactEngine
+from fuzzy_arbiter.engines.grid import GridEngine
 from fuzzy_arbiter.engines.normal_form import NoClosedFormError
 from fuzzy_arbiter.errors import EngineError
 

@@ -12,7 +12,7 @@ from skfuzzy.fuzzymath.fuzzy_ops import _interp_universe_fast, interp_membership
 
 from fuzzy_arbiter.definition import Output, System, Variable
 from fuzzy_arbiter.engines.engine import Defuzzifier, Engine
-from fuzzy_arbiter.engines.exact import sampled
+from fuzzy_arbiter.engines.grid import sampled
 from fuzzy_arbiter.engines.supported import unsupported_reason
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.shapes import Array
