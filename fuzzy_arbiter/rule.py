@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import TypeVar
 
 from fuzzy_arbiter.checks import all_of, finite, require_choice, shown
 from fuzzy_arbiter.errors import DefinitionError
@@ -137,6 +138,7 @@ def parse_rule(text: str) -> Rule:
 
 
 Conclusions = list[tuple[tuple[str, ...], Is]]  # each with its hedges
+T = TypeVar("T")
 
 
 def _parsed(text: str, hedges: bool) -> tuple[Proposition, Conclusions, float]:
@@ -185,14 +187,23 @@ class _Parser:
         self.take("if", "'if'")
         condition = self.joined(Or)
         self.take("then", "'then', 'and' or 'or'")
-        conclusions = [self.conclusion(hedges)]
-        while self.accept("and") or self.accept(","):
-            conclusions.append(self.conclusion(hedges))
+        conclusions = self.conclusions(hedges)
         weight = self.number() if self.accept("with") else 1.0
         self.take("end", "'and', 'with' or the end")
         if weight != 1.0 and any(words for words, _ in conclusions):
             raise DefinitionError("a hedge in a conclusion of a rule with a weight, expected the weight 1")
         return condition, conclusions, weight
+
+    def conclusions(self, hedges: bool) -> Conclusions:
+        """Read conclusions, some of which may stand in parentheses."""
+        result: Conclusions = []
+        while not result or self.accept("and") or self.accept(","):
+            if self.accept("("):
+                result += self.inner(lambda: self.conclusions(hedges))
+                self.take(")", "')' or 'and'")
+            else:
+                result.append(self.conclusion(hedges))
+        return result
 
     def conclusion(self, hedges: bool) -> tuple[tuple[str, ...], Is]:
         variable = self.take("name", "an output's name")
@@ -231,14 +242,14 @@ class _Parser:
             parts.append(part())
         return kind(tuple(parts)) if len(parts) > 1 else parts[0]
 
-    def inner(self, parse: Callable[[], Proposition]) -> Proposition:
+    def inner(self, parse: Callable[[], T]) -> T:
         """Parse what is nested in parentheses, or follows *not* or a hedge."""
         self.depth += 1
         if self.depth > MAX_NESTING:
             raise DefinitionError(f"nested deeper than {MAX_NESTING} parentheses and negations")
-        proposition = parse()
+        parsed = parse()
         self.depth -= 1
-        return proposition
+        return parsed
 
     def statement(self) -> Proposition:
         if self.accept("not"):

@@ -95,7 +95,8 @@ class Shape(Membership):
                 raise DefinitionError(f"shape: position {b} comes after {a}, expected positions that never decrease")
         for (a, _), (b, _) in zip(points, points[2:], strict=False):
             if a == b:
-                raise DefinitionError(f"shape: more than two points at {a}, expected at most two, which make a jump")
+                hint = f"; one position alone is curve('singleton', {a})" if points[0][0] == points[-1][0] else ""
+                raise DefinitionError(f"shape: more than two points at {a}, expected at most two for a jump{hint}")
         if finite(points[-1][0] - points[0][0]) is None:
             raise DefinitionError(f"shape: positions {points[0][0]} to {points[-1][0]}, expected a finite distance")
         while len(points) > 1 and points[0][1] == points[1][1]:

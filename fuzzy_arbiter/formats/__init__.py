@@ -5,6 +5,7 @@ Imports: terms, engines.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
@@ -144,7 +145,10 @@ def load(path: str | Path, block: str | None = None) -> System:
             raise FormatError(f"{path}: has more than {MAX_FILE} bytes, expected a definition for people")
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise FormatError(f"{path}: byte {error.start} is no UTF-8, expected text in UTF-8") from None
+        if format in ("json", "toml") or b"\0" in data:
+            raise FormatError(f"{path}: byte {error.start} is no UTF-8, expected text in UTF-8") from None
+        warnings.warn(f"{path}: byte {error.start} is no UTF-8, so the text is taken as Latin-1", stacklevel=2)
+        text = data.decode("latin-1")
     except (OSError, ValueError) as error:  # ValueError: a name with a null character
         raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     try:

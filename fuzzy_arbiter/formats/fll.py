@@ -7,7 +7,7 @@ from typing import Any
 
 from fuzzy_arbiter.definition import WEIGHTED, Output, System, Variable
 from fuzzy_arbiter.errors import FormatError, UnsupportedError
-from fuzzy_arbiter.formats.fll_terms import RESERVED, VALUES, format_shape, read_shape
+from fuzzy_arbiter.formats.fll_terms import FUNCTION_NAMES, RESERVED, VALUES, format_shape, read_shape
 from fuzzy_arbiter.formats.notation import (
     Block,
     RuleBlock,
@@ -38,7 +38,7 @@ _KEYS = {
     "OutputVariable": (*_VARIABLE, "aggregation", "defuzzifier", "default", "lock-previous"),
     "RuleBlock": ("description", "enabled", "conjunction", "disjunction", "implication", "activation", "rule"),
 }
-_OLD = {"accumulation": "aggregation"}  # keys of fuzzylite 5
+_OLD = {"accumulation": "aggregation", "lock-valid": "lock-previous"}  # keys of fuzzylite 5
 
 
 def read(text: str) -> System:
@@ -158,7 +158,7 @@ def write(system: System) -> str:
     """Format a system in the FuzzyLite Language."""
     if "#" in system.name:
         raise UnsupportedError(f"fll cannot say the name {system.name!r}: what follows # is a comment")
-    require_words(system, "fll", RESERVED)
+    require_words(system, "fll", RESERVED, FUNCTION_NAMES)
     lines = [f"# {text}" for text in format_settings(system, settings_of(system.outputs))]
     lines.append(f"Engine: {system.name}")
     for v in (*system.inputs, *system.outputs):

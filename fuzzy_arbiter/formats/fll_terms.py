@@ -15,9 +15,8 @@ from fuzzy_arbiter.terms.norms import HEDGES
 from fuzzy_arbiter.terms.values import Constant, Formula, Linear, Value
 
 _FUNCTIONS = "acosh asinh atanh gt lt le ge eq neq abs fabs"
-RESERVED = frozenset(
-    (*(word for word, hedge in HEDGES.items() if hedge.fll), "any", "not", *WORDS, *_FUNCTIONS.split())
-)
+RESERVED = frozenset((*(word for word, hedge in HEDGES.items() if hedge.fll), "any", "not"))
+FUNCTION_NAMES = frozenset((*WORDS, *_FUNCTIONS.split()))  # in small letters alone
 # number of positions of each; a height may follow
 _PLACES = {"Triangle": 3, "Trapezoid": 4, "Ramp": 2, "Rectangle": 2, "Binary": 2}
 _CURVES = {kind.fll: name for name, kind in KINDS.items() if kind.fll}

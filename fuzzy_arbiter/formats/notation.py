@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, NoReturn, TypeVar
@@ -131,18 +131,18 @@ def assembled(
         raise type(error)(f"line {lines[int(fault[1]) - 1] if fault else line}: {error}") from None
 
 
-def require_words(system: System, format: str, reserved: frozenset[str]) -> None:
+def require_words(system: System, format: str, reserved: frozenset[str], functions: Collection[str] = ()) -> None:
     """Require that a format accepts the names of a system's variables and terms."""
     for variable in (*system.inputs, *system.outputs):
         for name in (variable.name, *variable.term_names):
-            require_word(name, format, reserved)
+            require_word(name, format, reserved, functions)
 
 
-def require_word(name: str, format: str, reserved: frozenset[str]) -> None:
+def require_word(name: str, format: str, reserved: frozenset[str], functions: Collection[str] = ()) -> None:
     """Require that a format accepts a name."""
     if not is_identifier(name) or name.startswith("_"):
         raise UnsupportedError(f"{format} cannot say the name {name!r}: expected letters, digits and _, a letter first")
-    if name.lower() in reserved:
+    if name.lower() in reserved or name in functions:
         raise UnsupportedError(f"{format} cannot say the name {name!r}: it is a word of the language")
 
 

@@ -7,7 +7,19 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from fuzzy_arbiter import Criterion, Output, Rule, Shape, System, Term, Variable, falling, prioritized, rising
+from fuzzy_arbiter import (
+    Criterion,
+    Output,
+    Rule,
+    Shape,
+    System,
+    Term,
+    Variable,
+    falling,
+    prioritized,
+    rising,
+    trapezoid,
+)
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.propositions import Is, Not, Or
@@ -55,6 +67,10 @@ def nested(depth):
             r"shape: point \('0', '1'\), expected a finite position and a degree in \[0, 1\]",
         ),
         (lambda: Shape(((HUGE, 1),)), "shape: point .* that is too long to show, 1"),
+        (
+            lambda: trapezoid(1, 1, 1, 1),
+            r"two points at 1.0, .*; one position alone is curve\('singleton', 1.0\)",
+        ),
         (lambda: rising(-1e308, 1e308), "shape: positions -1e.308 to 1e.308, expected a finite distance"),
         (lambda: Output("o", (0, 1e200), sail.terms), r"output 'o': universe is \[0, 1e.200\], expected a width from"),
         (
@@ -100,6 +116,15 @@ def test_numbers_of_other_libraries_become_floats():
     assert made == Variable("v", (0.0, 1.0), (Term("a", falling(0.0, 1.0)),))
     assert type(Rule(CALM, sail["full"], np.float32(0.25)).weight) is float
     assert str(Shape(((-0.0, 0), (1, 1)))) == str(Shape(((0.0, 0), (1, 1))))
+
+
+@pytest.mark.parametrize("text", ["(a is b) and (c is d)", "(a is b and c is d)", "((a is b), c is d)"])
+def test_conclusions_may_stand_in_parentheses(text):
+    rule = Rule.parse(f"if wind is calm then {text} with 0.5")
+    assert str(rule) == "if wind is calm then a is b and c is d with 0.5"
+    for fault in ("(a is b", "(a is b or c is d)", "()"):
+        with pytest.raises(DefinitionError, match="expected"):
+            Rule.parse(f"if wind is calm then {fault}")
 
 
 def test_definition_copies_lists_and_generators():

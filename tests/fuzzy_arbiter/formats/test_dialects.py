@@ -177,13 +177,15 @@ def test_fuzzylite_5_keywords_are_read():
     text = (
         "Engine: old\nInputVariable: x\n  range: 0.000 1.000\n  term: on Ramp 0.000 1.000\nOutputVariable: y\n"
         "  range: 0.000 1.000\n  accumulation: BoundedSum\n  defuzzifier: LargestOfMaximum 50\n"
-        "  term: low Ramp 1.000 0.000\nRuleBlock: only\n  activation: EinsteinProduct\n"
+        "  lock-valid: true\n  term: low Ramp 1.000 0.000\nRuleBlock: only\n  activation: EinsteinProduct\n"
         "  rule: if x is on then y is low\n"
     )
     system = reads(text, "fll")
     (y,) = system.outputs
     assert (system.implication, system.points) == ("einstein_product", 50)
-    assert (y.aggregation, y.defuzzifier) == ("bounded_sum", "lom")
+    assert (y.aggregation, y.defuzzifier, y.lock_previous) == ("bounded_sum", "lom", True)
+    with pytest.raises(FormatError, match="lock-previous appears twice in OutputVariable 'y'"):
+        reads(text.replace("  lock-valid: true\n", "  lock-valid: true\n  lock-previous: true\n"), "fll")
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 
 from fuzzy_arbiter import prioritized
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
-from fuzzy_arbiter.formats import FORMATS, load, save
+from fuzzy_arbiter.formats import FORMATS, load, save, writes
 from tests.fuzzy_arbiter.formats.systems import TIPPING
 
 
@@ -71,10 +71,18 @@ def test_unreadable_and_unwritable_paths_are_rejected(tmp_path):
     assert os.listdir(tmp_path) == ["folder.json"]
 
 
-def test_non_utf8_text_is_rejected(tmp_path):
-    path = tmp_path / "a.fis"
-    path.write_bytes(b"[System]\n% caf\xe9")
-    with pytest.raises(FormatError, match=r"a\.fis: byte 14 is no UTF-8"):
+@pytest.mark.parametrize("format", FORMATS)
+def test_text_of_other_tools_may_be_latin_1(format, tmp_path):
+    path, comment = tmp_path / f"a.{format}", {"fcl": "// ", "fis": "% ", "fll": "# "}.get(format, "")
+    path.write_bytes(f"{comment}caf\xe9\n".encode("latin-1") + writes(TIPPING, format).encode())
+    if not comment:
+        with pytest.raises(FormatError, match=rf"a\.{format}: byte \d+ is no UTF-8, expected text in UTF-8"):
+            load(path)
+        return
+    with pytest.warns(UserWarning, match=rf"a\.{format}: byte \d+ is no UTF-8, so the text is taken as Latin-1"):
+        assert load(path) == TIPPING
+    path.write_bytes(b"caf\xe9\0")
+    with pytest.raises(FormatError, match="byte 3 is no UTF-8, expected text in UTF-8"):
         load(path)
 
 

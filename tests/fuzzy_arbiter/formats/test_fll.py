@@ -4,10 +4,23 @@ from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import Output, Shape, Term, Variable, falling, prioritized, rising, trapezoid, triangle
+from fuzzy_arbiter import (
+    Arbiter,
+    Output,
+    Shape,
+    System,
+    Term,
+    Variable,
+    falling,
+    prioritized,
+    rising,
+    trapezoid,
+    triangle,
+)
 from fuzzy_arbiter.errors import FormatError, UnsupportedError
 from fuzzy_arbiter.formats import reads, writes
 from fuzzy_arbiter.rule import Operators
+from fuzzy_arbiter.terms.values import Formula
 from tests.fuzzy_arbiter.formats.systems import FOREIGN, TIPPING
 
 OTHERS = FOREIGN["tipper.fll"]
@@ -95,6 +108,15 @@ def test_file_with_two_engines_is_rejected():
 def test_unsupported_features_are_rejected_by_name(change, fault):
     with pytest.raises(UnsupportedError, match=f"^fll cannot say {fault}"):
         writes(replace(TIPPING, **change), "fll")
+
+
+def test_names_differ_from_functions_by_capital_letters():
+    v = Variable("LE", (0, 1), (Term("Abs", rising(0, 1)),))
+    values = {"Min": Formula("le(LE, 0.5) + LE")}
+    system = System((v,), (Output("y", (0, 2), values, defuzzifier="average"),), ("if LE is Abs then y is Min",))
+    system = replace(system, points=1000)
+    assert reads(writes(system, "fll"), "fll") == system
+    assert Arbiter(system=system)([0.25])["y"] == 1.25
 
 
 def test_engine_names_may_be_any_text():
