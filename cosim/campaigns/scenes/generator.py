@@ -16,7 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cosim.campaigns.scenes.conflicts import make_conflict
-from cosim.campaigns.scenes.mismatches import make_mismatch
 from cosim.campaigns.scenes.trials import make_trial
 
 MAX_OBSTACLES = {"plain": 6, "hard": 14}  # maximum number of obstacles of each kind of scene
@@ -93,11 +92,17 @@ def _make_obstacle(rng: Any, start: NDArray[np.float64], goal: NDArray[np.float6
             return {"centre": center.tolist(), "radius": radius, "velocity": [0.0, 0.0, 0.0]}
 
 
+def _make_mismatch(seed: int) -> dict[str, Any]:
+    from cosim.campaigns.scenes.mismatches import make_mismatch  # needs SciPy
+
+    return make_mismatch(seed)
+
+
 MAKERS: dict[str, Callable[[int], dict[str, Any]]] = {
     "plain": make_scene,
     "hard": functools.partial(make_scene, kind="hard"),
     "conflict": make_conflict,
     "tour": functools.partial(make_conflict, family="tour"),
     "trial": make_trial,
-    "mismatch": make_mismatch,
+    "mismatch": _make_mismatch,
 }
