@@ -14,7 +14,7 @@ try:
     from fuzzy_arbiter.arbiter import Arbiter
     from fuzzy_arbiter.command_line.definitions import BUILT_IN, convert, described, load_system, require_suffix
     from fuzzy_arbiter.command_line.drawing import IMAGES, PICTURES, draw, image, middles
-    from fuzzy_arbiter.command_line.values import evaluated, evaluated_table, sample
+    from fuzzy_arbiter.command_line.evaluation import evaluated, evaluated_table, sample
     from fuzzy_arbiter.engines import ENGINES
     from fuzzy_arbiter.errors import ArbiterError, InputError, one_line
     from fuzzy_arbiter.explanation import Explanation

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from fuzzy_arbiter.arbiter import Arbiter
-from fuzzy_arbiter.command_line.values import sample
+from fuzzy_arbiter.command_line.evaluation import sample
 from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.errors import InputError
 

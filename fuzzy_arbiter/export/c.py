@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from importlib.resources import files
 
 from fuzzy_arbiter.definition import System
-from fuzzy_arbiter.export.functions import in_c
+from fuzzy_arbiter.export.code_functions import in_c
 from fuzzy_arbiter.export.program import TABLES, Assign, Program, Return, Statement, Sweep, formatted, program
 
 

@@ -19,7 +19,7 @@ from fuzzy_arbiter.engines.firing import Logic
 from fuzzy_arbiter.engines.quadrature import Quadrature
 from fuzzy_arbiter.engines.rational_pieces import Piece
 from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
-from fuzzy_arbiter.export.functions import called
+from fuzzy_arbiter.export.code_functions import called
 from fuzzy_arbiter.hierarchy import DEGREE
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.shapes import Membership, Shape

@@ -10,7 +10,7 @@ from typing import Any
 from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.engines import clipped_centroid
 from fuzzy_arbiter.errors import EngineError
-from fuzzy_arbiter.export.functions import in_python
+from fuzzy_arbiter.export.code_functions import in_python
 from fuzzy_arbiter.export.program import TABLES, Assign, Program, Return, Statement, Sweep, formatted, program
 
 _MATH = """

@@ -9,8 +9,8 @@ Imports: terms, engines.
 import warnings
 
 from fuzzy_arbiter.pictures.fields import decisions, surface
-from fuzzy_arbiter.pictures.firing import rules
 from fuzzy_arbiter.pictures.lines import normalizations, profile, terms
+from fuzzy_arbiter.pictures.rule_picture import rules
 from fuzzy_arbiter.pictures.style import COLORS
 
 __all__ = [

@@ -3,8 +3,8 @@
 Imports: engines.
 """
 
-from fuzzy_arbiter.verification.checks import verify
 from fuzzy_arbiter.verification.report import Verification
+from fuzzy_arbiter.verification.system_checks import verify
 
 __all__ = [
     "Verification",

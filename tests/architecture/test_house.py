@@ -2,6 +2,7 @@
 
 import ast
 import re
+from collections import Counter
 
 import pytest
 
@@ -70,3 +71,8 @@ def test_no_default_address_is_a_wildcard():
 
 def test_generated_pages_do_not_count_as_handwritten():
     assert [words_by_hand(ROOT / page) > 0 for page in (*GENERATED, "README.md")] == [False, False, True]
+
+
+def test_a_module_name_occurs_once_in_a_package():
+    names = [(module.partition(".")[0], path.name) for module, path in FILES.items() if path.name[0] != "_"]
+    assert [name for name, count in Counter(names).items() if count > 1] == []

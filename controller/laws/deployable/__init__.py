@@ -3,8 +3,8 @@
 Imports: regions.
 """
 
+from controller.laws.deployable.deployable_law import DeployableLaw
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.law import DeployableLaw
 
 __all__ = ["LAW", "DeployableGains", "DeployableLaw"]
 

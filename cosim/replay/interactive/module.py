@@ -9,7 +9,7 @@ import platformdirs
 
 from controller.compiling.library import is_whole, keep
 from cosim.replay.interactive.flight import Flight
-from cosim.replay.interactive.sources import flight_sources
+from cosim.replay.interactive.flight_sources import flight_sources
 from cosim.scenario.scenario import Scenario
 from cosim.ssp.memory import Memory
 from plant_fmu.archive import temporary_folder

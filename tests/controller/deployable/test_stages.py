@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from controller import VehicleState
-from controller.laws.deployable import actuator_lag, diagnostics, input_validation, law, observer
+from controller.laws.deployable import actuator_lag, deployable_law, diagnostics, input_validation, observer
 from controller.laws.deployable.attraction import desired_velocity
 from controller.laws.deployable.barrier import RegionObservation, observe_regions
 from controller.laws.deployable.estimate import POSITION, VELOCITY, initialize, make_estimate
@@ -96,7 +96,7 @@ def test_violated_soft_regions_repel():
         push = min(regions[i].gain * weights[i] * sight.values[i], most)
         count += push < most
         expected += out * push
-    force = law._soft_forces(sight, pack(regions), weights, np.zeros(3), 0.0, dynamics)
+    force = deployable_law._soft_forces(sight, pack(regions), weights, np.zeros(3), 0.0, dynamics)
     assert force == pytest.approx(expected, rel=1e-12)
     assert count == 1
 
@@ -127,7 +127,7 @@ def test_moving_vehicle_is_repelled_sideways_but_not_backwards(entered):
         expected, desired = along.copy(), np.array(desired)
         if desired[0] < 0.0:  # against the push in x
             expected[0] *= min(1.0 - min(-desired[0] / 0.3, 1.0), entered)
-        force = law._soft_forces(sight, pack([region]), np.ones(1), desired, entered, dynamics)
+        force = deployable_law._soft_forces(sight, pack([region]), np.ones(1), desired, entered, dynamics)
         assert force == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
@@ -144,7 +144,7 @@ def test_available_braking_accounts_for_lost_thrusters(lost):
 
 def test_report_holds_the_diagnostics():
     seen, report = make_estimate(ODIN), diagnostics.Report()
-    names = [name.partition(".")[0] for name in (diagnostic.name for diagnostic in law.DIAGNOSTICS)]
+    names = [name.partition(".")[0] for name in (diagnostic.name for diagnostic in deployable_law.DIAGNOSTICS)]
     assert names == [field for field in report._fields for _ in range(report.storage(field).size)]
     seen.position[:], seen.velocity[:], seen.water_velocity[:2] = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0), (7.0, 8.0)
     wanted, report.failed_thruster = np.array([2.0, -3.0, 6.0]), 1.0

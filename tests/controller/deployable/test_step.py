@@ -5,7 +5,7 @@ import copy
 import numpy as np
 import pytest
 
-from controller.laws.deployable import actuator_lag, attitude, barrier, input_validation, law, model
+from controller.laws.deployable import actuator_lag, attitude, barrier, deployable_law, input_validation, model
 from controller.laws.deployable.attraction import desired_acceleration, desired_velocity
 from controller.laws.deployable.estimate import CURRENT, EFFECTIVENESS, LAG, MOMENTS, VELOCITY, publish
 from controller.laws.deployable.gains import DeployableGains
@@ -129,7 +129,7 @@ def test_soft_region_pushes_back_by_the_depth_in_the_goal_relative_to_the_end_of
     end = plan.path[plan.points - 1]
     entered = clearance_at(goal, 0, ahead.position) / min(clearance_at(goal, 0, end), GAINS.depth)
     R = rotation_matrix(ahead.quaternion)
-    force = law._soft_forces(own.memory.observation, regions, np.ones(1), wanted, entered, memory.dynamics)
+    force = deployable_law._soft_forces(own.memory.observation, regions, np.ones(1), wanted, entered, memory.dynamics)
     wrench = np.r_[R.T @ force, 0.0, 0.0, 0.0]
     assert 0.3 < entered < 0.7 and np.linalg.norm(wanted) < 0.3 and np.abs(wrench).max() > 0.1
     assert nominal[0] - nominal[1] == pytest.approx(memory.thrusters.allocator @ wrench, rel=1e-9, abs=1e-9)
@@ -181,7 +181,7 @@ def test_without_measurements_speed_is_limited_to_a_timely_stop():
         elif since < GAINS.coast - 1e-9:
             assert speed == pytest.approx(min(GAINS.speed, GAINS.acceleration * (GAINS.coast - since)), abs=1e-9)
         assert pushes == (since <= GAINS.coast)
-    assert law.DIAGNOSTICS[8].name == "desired_speed"
+    assert deployable_law.DIAGNOSTICS[8].name == "desired_speed"
 
 
 @pytest.mark.parametrize("rise", [0.0, 5.0])
@@ -190,7 +190,7 @@ def test_weight_is_held_at_any_attitude_without_a_moment(rise):
     memory.state_estimate.time_since_measurement = memory.attitude.started = 1.0
     memory.state_estimate.net_weight = 9.0
     R = rotation_matrix(np.array([0.8, 0.4, -0.4, 0.2]))
-    law._hold_weight(memory, R, GAINS._replace(rise=rise), forces)
+    deployable_law._hold_weight(memory, R, GAINS._replace(rise=rise), forces)
     held = np.r_[R.T @ [0.0, 0.0, -9.0 - rise], np.zeros(3)]
     assert ODIN.thruster_matrix @ forces == pytest.approx(held, rel=5e-3, abs=0.05)  # allocated at a small cost
 
@@ -201,6 +201,6 @@ def test_position_uncertainty_reduces_speed():
         own = law_for([])
         desired, seen = np.array([GAINS.speed, 0.0, 0.0]), own.memory.state_estimate
         seen.time_since_measurement = 0.0
-        law._limit_speed(seen, 3.0 * spread, GAINS, desired)
+        deployable_law._limit_speed(seen, 3.0 * spread, GAINS, desired)
         speeds.append(desired[0])
     assert speeds == pytest.approx([GAINS.speed, GAINS.speed, 0.5 * GAINS.speed, 0.0])
