@@ -52,6 +52,7 @@ from controller.laws.deployable.fault_detection import FaultState
 from controller.laws.deployable.gains import SPREADS, DeployableGains, check_gains
 from controller.laws.deployable.memory import DeployableMemory
 from controller.laws.deployable.model import Dynamics, Loads, make_dynamics, make_thrusters
+from controller.laws.deployable.path_planning.cost import TOTAL
 from controller.laws.deployable.path_planning.planner import empty_plan, go_straight, improve_path
 from controller.laws.deployable.path_planning.search import PathLimits
 from controller.linear_algebra import norm
@@ -191,7 +192,7 @@ def step(
     thrusters.forces = forces
     memory.estimate[0] = estimate.net_weight
     memory.estimate[1:] = estimate.moments
-    write_report(memory.report, estimate, memory.plan.cost[0], memory.plan.points, thrusters.health, desired)
+    write_report(memory.report, estimate, memory.plan.cost[TOTAL], memory.plan.points, thrusters.health, desired)
     write_program_report(memory.report, work.multipliers, work.price, rows, steps)
     beyond = max(spread - 2.0 * _TRUSTED_SPREAD, 0.0)  # spread that the margins do not cover
     slack = memory.report.constraint_slack

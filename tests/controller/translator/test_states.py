@@ -164,6 +164,9 @@ def test_a_copy_has_numbers_of_its_own(copied):
     assert type(other) is Outer and same_bits(state, other)
     other.x, other.inner.v = 5.0, 1.0
     assert state.x == 2.0 and state.inner.v.tolist() == [0.0, 0.0, 0.0]
+    other = copied(Inner.over(np.arange(4.0)))
+    other.x = 7.0
+    assert other.block.tolist() == [7.0, 1.0, 2.0, 3.0]
 
 
 def test_a_state_over_an_array_has_its_numbers():

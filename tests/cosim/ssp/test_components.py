@@ -4,6 +4,7 @@ import ctypes
 import logging
 import re
 from pathlib import Path
+from typing import NamedTuple
 
 import fmpy
 import numpy as np
@@ -11,6 +12,7 @@ import pytest
 from fmpy.fmi2 import FMU2Slave
 
 from controller import LAWS, LawError
+from controller.potential_field import Field
 from cosim.scenario.scenario import load_scenario
 from cosim.ssp import arbiter_component, controller_component
 from cosim.ssp.loop import Loop
@@ -158,8 +160,25 @@ def with_law(monkeypatch, law):
     return load_scenario(ALL_SHAPES, ["law.name='own'", "law.gains={}"])
 
 
-def test_law_of_ones_own_needs_no_period_in_its_memory(fmi, monkeypatch):
-    own = with_law(monkeypatch, SlidingModeLaw)
+class PlainMemory(NamedTuple):
+    desired_quaternion: np.ndarray
+    estimate: np.ndarray
+    report: np.ndarray
+    field: Field
+
+
+class PlainLaw(SlidingModeLaw):
+    """A law whose memory is a named tuple of arrays, without a period."""
+
+    @classmethod
+    def make_memory(cls, desired_quaternion, period, n_regions):
+        assert period.shape == (1,)
+        return PlainMemory(desired_quaternion, np.zeros(4), np.zeros(0), Field(n=n_regions))
+
+
+@pytest.mark.parametrize("law", [SlidingModeLaw, PlainLaw])
+def test_law_of_ones_own_needs_no_state_and_no_period_in_its_memory(law, fmi, monkeypatch):
+    own = with_law(monkeypatch, law)
     rng, parts = np.random.default_rng(5), Parts(own)
     with CoSimulationInstance(cached_fmu(controller_component(own), fmi)) as slave:
         slave.initialize()

@@ -38,6 +38,8 @@ _AWAY = 0.05  # m, distance from a soft region within which a stay counts as ins
 _COARSE = 0.25  # m, minimum distance between two evaluations near the surface of a soft region
 _SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
+# indices in `PathCost.cost`: all; by hard regions and soft ones on the way; by fast ones at rest
+TOTAL, BY_HARD, BY_SOFT, AT_REST = range(4)
 
 
 class PathCost(State):
@@ -50,7 +52,7 @@ class PathCost(State):
     waits: bool  # True if the vehicle waits at the first corner until fast regions have passed
     traveled: float  # m, length of the evaluated legs
     on_leg: float  # m, evaluated length of the present leg
-    cost: Vector4  # m: cost so far; parts by hard regions and soft ones on the way; by fast ones at rest
+    cost: Vector4  # m: cost so far, and its parts, in the order of `TOTAL` to `AT_REST`
     clear_until: VectorN  # m: length of path before which each region needs no evaluation
 
 
@@ -67,10 +69,10 @@ def add_cost(
     """Continue to evaluate a path [m, NED]; return True once it is complete, or the cost exceeds `cost_limit` [m]."""
     for _ in range(_SAMPLES[0]):
         leg, s = cost.leg, cost.on_leg
-        if cost.cost[0] > cost_limit:
+        if cost.cost[TOTAL] > cost_limit:
             return True
         if leg == count:
-            cost.cost[0] += _STAY * _stay_cost(path[count - 1], cost.drift, regions, limits)
+            cost.cost[TOTAL] += _STAY * _stay_cost(path[count - 1], cost.drift, regions, limits)
             if not (cost.waits or _drifts(cost.drift)):
                 _add_rest_cost(cost, path[count - 1], regions, limits)
             return True
@@ -81,7 +83,7 @@ def add_cost(
             cost.traveled += length
             cost.on_leg = 0.0
             if leg == 0 and cost.waits:
-                cost.cost[0] += _WAIT
+                cost.cost[TOTAL] += _WAIT
                 _add_rest_cost(cost, path[0], regions, limits)
             continue
         if cost.evaluations == _SAMPLES[1]:
@@ -99,9 +101,9 @@ def add_cost(
 def _add_stride(cost: PathCost, stride: float, soft: float, penalty: float) -> None:
     """Add a stride [m] with the extra cost per meter of `soft` regions and `penalty` of hard ones."""
     cost.on_leg += stride
-    cost.cost[0] += stride * (1.0 + soft + penalty)
-    cost.cost[1] += stride * penalty
-    cost.cost[2] += stride * soft
+    cost.cost[TOTAL] += stride * (1.0 + soft + penalty)
+    cost.cost[BY_HARD] += stride * penalty
+    cost.cost[BY_SOFT] += stride * soft
 
 
 def _evaluate_point(
@@ -177,8 +179,8 @@ def _add_rest_cost(cost: PathCost, place: Vector3, regions: PackedRegions, limit
             free = min(free, clearance)
             later += max((clearance - limits.clearance) / speed, _HORIZON / _PREDICTIONS)
     price = _STAY * _near_cost(free, limits)
-    cost.cost[0] += price
-    cost.cost[3] += price
+    cost.cost[TOTAL] += price
+    cost.cost[AT_REST] += price
 
 
 def _stay_cost(end: Vector3, drift: Vector3, regions: PackedRegions, limits: PathLimits) -> float:

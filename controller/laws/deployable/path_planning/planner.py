@@ -15,7 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller.arithmetic import exponential
-from controller.laws.deployable.path_planning.cost import PathCost, add_cost, begin_cost, is_fast
+from controller.laws.deployable.path_planning.cost import (
+    AT_REST,
+    BY_HARD,
+    BY_SOFT,
+    TOTAL,
+    PathCost,
+    add_cost,
+    begin_cost,
+    is_fast,
+)
 from controller.laws.deployable.path_planning.search import (
     SAMPLING_MARGIN,
     PathLimits,
@@ -135,7 +144,7 @@ def improve_path(
     _evaluate(plan, start, goal, regions, limits)
     blocked = is_blocked(plan, start)
     looks_again = _count_blocked(plan, blocked, period)
-    if not (blocked or looks_again) and plan.cost[2] <= _BLOCKED * _length(plan.path, plan.points, start):
+    if not (blocked or looks_again) and plan.cost[BY_SOFT] <= _BLOCKED * _length(plan.path, plan.points, start):
         plan.search.sampling_margin, plan.closed_kinds = SAMPLING_MARGIN[0], _HARD
     elif plan.found_points == 0:
         end, random_numbers = plan.path[plan.points - 1], plan.random_numbers
@@ -244,10 +253,10 @@ def _evaluate(plan: PathPlan, start: Vector3, goal: PackedRegions, regions: Pack
             begin_cost(cost, cost.start, goal.velocities[0], plan.candidate_waits)
             plan.phase = _CANDIDATE
         return
-    most = plan.cost[0] - _BETTER - _BETTER_PART * plan.cost[0]
+    most = plan.cost[TOTAL] - _BETTER - _BETTER_PART * plan.cost[TOTAL]
     if add_cost(cost, plan.candidate, plan.candidate_points, regions, limits, most):
         plan.phase = _BEGIN
-        if cost.cost[0] < most:
+        if cost.cost[TOTAL] < most:
             plan.path = plan.candidate
             plan.points, plan.waits = plan.candidate_points, plan.candidate_waits
             plan.cost = cost.cost
@@ -255,7 +264,7 @@ def _evaluate(plan: PathPlan, start: Vector3, goal: PackedRegions, regions: Pack
 
 def is_blocked(plan: PathPlan, start: Vector3) -> bool:
     """Return True if the cost by hard regions is above `_BLOCKED` of the path's length."""
-    return bool(plan.cost[1] > _BLOCKED * _length(plan.path, plan.points, start))
+    return bool(plan.cost[BY_HARD] > _BLOCKED * _length(plan.path, plan.points, start))
 
 
 def search_path(
@@ -289,7 +298,7 @@ def _choose_candidate(
         return
     plan.found_points = 0
     has_fast = False
-    if plan.cost[1] + plan.cost[3] > _WAIT_THRESHOLD:
+    if plan.cost[BY_HARD] + plan.cost[AT_REST] > _WAIT_THRESHOLD:
         for i in range(regions.kinds.size):
             has_fast = has_fast or is_fast(regions, i, limits)
     if (plan.waits or has_fast) and uniform(plan.random) < _WAIT_FRACTION:
