@@ -112,7 +112,7 @@ def step(
     # observer
     observe(memory, state, R, gains)
     # nominal forces
-    still = model.Loads(zeros(3), 0.0, zeros(3))
+    still = model.Loads(zeros(3), 0.0, zeros(3), 0.0, 1.0)
     free = model.free_acceleration(dynamics, R, velocity[:3], velocity[3:], still) + memory.disturbance
     evaluate_field(state._replace(position=memory.position), goal, regions, gains.repulsion, gains.reach, field)
     set_point_error(field, gains.inset, gains.limit / gains.k_p1)
@@ -150,7 +150,7 @@ def observe(memory: PidCbfMemory, state: VehicleState, R: Matrix3, gains: PidCbf
         if known:
             memory.position, memory.velocity, memory.started = state.position, measured, 1.0
         return
-    still = model.Loads(zeros(3), 0.0, zeros(3))
+    still = model.Loads(zeros(3), 0.0, zeros(3), 0.0, 1.0)
     acceleration = model.free_acceleration(memory.dynamics, R, velocity[:3], velocity[3:], still)
     acceleration += model.thrust_acceleration(memory.dynamics, memory.thrusters, R, memory.thrusters.forces)
     position += period * velocity[:3]

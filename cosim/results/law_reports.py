@@ -8,6 +8,7 @@ from cosim.results.spans import Flags
 from cosim.simulation.signals import Array
 
 ISOLATED = "law.failed_thruster"  # column with the number of the thruster that was isolated last, 0 for none
+DRAG = "law.drag"  # column with the estimated drag, relative to the vehicle's file
 REJECTED = "law.rejected"  # column with the fraction of the samples so far that the law rejected
 
 

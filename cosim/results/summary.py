@@ -10,7 +10,7 @@ import numpy as np
 
 from controller.regions.region_set import of_attitude
 from cosim.results.goal_miss import explain_miss
-from cosim.results.law_reports import ISOLATED, REJECTED, Isolations
+from cosim.results.law_reports import DRAG, ISOLATED, REJECTED, Isolations
 from cosim.results.lyapunov_summary import summarize_lyapunov
 from cosim.results.record import Rows
 from cosim.results.spans import SETTLED_FOR, Span, Spans
@@ -81,6 +81,7 @@ def summarize(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "saturated_time": data.saturated * period,
         "isolations": [{"thruster": j, "time": time} for time, j, isolated in data.isolations.changes if isolated],
         "rejected_samples": last.get(REJECTED),
+        "drag_ratio": last.get(DRAG),
         "above_surface": above,
         "time_above_surface": min(data.above * period, simulated) if submerged else 0.0,
         "estimate_final": [last[name] for name in _ESTIMATE],
@@ -108,7 +109,7 @@ class _SummaryData:
         self.signals = [
             "time", "goal.clearance", *self._clearances, *_FORCE, *_COMMAND_COLUMNS, *_SPEED, *_POSITION, *_ESTIMATE,
             *self._weights, *self.flags, *self._place,
-            *(name for name in (ISOLATED, REJECTED) if name in record.units),
+            *(name for name in (ISOLATED, REJECTED, DRAG) if name in record.units),
         ]  # fmt: skip
         self._last_place = len(scenario.goal_then)
         # rows with acting forces that are left: the forces of a complete run's last row do not act
@@ -166,8 +167,8 @@ class _SummaryData:
         self._update_extremes(self.least, np.fmin, {name: block[name] for name in (*self._clearances, *_ESTIMATE)})
         if ISOLATED in block.units:
             self.isolations.add(time, block[ISOLATED])
-        rejected = [REJECTED] if REJECTED in block.units else []
-        self.last = {name: float(block[name][-1]) for name in ("time", *_POSITION, *_ESTIMATE, *self._place, *rejected)}
+        reports = [name for name in (REJECTED, DRAG) if name in block.units]
+        self.last = {name: float(block[name][-1]) for name in ("time", *_POSITION, *_ESTIMATE, *self._place, *reports)}
 
     @staticmethod
     def _update_extremes(known: dict[str, float], extreme: np.ufunc, signals: dict[str, Array]) -> None:

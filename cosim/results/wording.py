@@ -11,6 +11,7 @@ from cosim.scenario.scenario import Scenario
 
 IMPORTED = "imported"  # status of a run that was imported from a log
 _MAX_LISTED = 6  # maximum number of isolations that a sentence lists
+_SAME_DRAG = (0.6, 1.7)  # estimated drags, relative to the file, between which a sentence leaves them out
 _FEW_REJECTED = 0.005  # fraction of rejected samples below which a sentence leaves them out
 
 
@@ -105,11 +106,14 @@ def format_isolations(summary: dict[str, Any]) -> str:
 
 
 def _law_reports(summary: dict[str, Any]) -> str:
-    """Describe isolated thrusters and rejected samples."""
+    """Describe isolated thrusters, rejected samples, and a drag unlike the file's."""
     isolated, rejected = format_isolations(summary), summary["rejected_samples"] or 0.0
     text = f" It isolated thruster {isolated}." if isolated else ""
     if rejected >= _FEW_REJECTED:
         text += f" It rejected {rejected:.0%} of the position and velocity samples."
+    ratio = summary["drag_ratio"]
+    if ratio and not _SAME_DRAG[0] < ratio < _SAME_DRAG[1]:
+        text += f" The vehicle is not that of the file: the law estimates {ratio:.2g} times its drag."
     return text
 
 

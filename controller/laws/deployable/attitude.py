@@ -54,7 +54,7 @@ def measure_moment(
     """Measure the moment of thrusters and weight by the change of the rates over the period [s]; omega [rad/s]."""
     started = bool(attitude.started > 0.0)
     mean, none = 0.5 * (attitude.last_omega + omega), zeros(3)
-    loads = Loads(estimate.water_velocity, 0.0, none)  # weight and buoyancy are the unknowns
+    loads = Loads(estimate.water_velocity, 0.0, none, 0.0, 0.0)  # weight and buoyancy are the unknowns
     wrench = free_wrench(dynamics, R, estimate.velocity, mean, loads)
     for axis in range(2):  # Munk's moment depends on the current
         water = estimate.water_velocity.copy()

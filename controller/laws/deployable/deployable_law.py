@@ -112,7 +112,7 @@ def step(
 
     # prediction
     lag, ahead = estimate.state[LAG], memory.predicted
-    loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
+    loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments, estimate.yaw_moment, estimate.drag)
     acceleration = zeros(6)
     if lag > 0.0:
         acceleration = model.thrust_acceleration(dynamics, thrusters, R, thrusters.acting_now)

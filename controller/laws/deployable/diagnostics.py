@@ -36,6 +36,7 @@ DIAGNOSTICS = (
     Diagnostic("bound", "m", "What the clearance of a hard region may fall to from here; NaN: no promise"),
     Diagnostic("rejected", "", "Fraction of the position and velocity samples so far that the gate rejected"),
     Diagnostic("thrust_limit", "", "Least estimated limit of a thruster, as a fraction of that in the vehicle's file"),
+    Diagnostic("drag", "", "Estimated drag of translation, relative to the vehicle's file"),
 )
 
 
@@ -56,6 +57,7 @@ class Report(State):
     bound: float
     rejected: float
     thrust_limit: float
+    drag: float
 
 
 def write_report(report: Report, estimate: Estimate, cost: float, points: int, health: Array, desired: Vector3) -> None:
@@ -69,7 +71,7 @@ def write_report(report: Report, estimate: Estimate, cost: float, points: int, h
             if health[j] == 0.0:
                 report.failed_thruster = j + 1
     report.time_since_measurement = estimate.time_since_measurement
-    report.thrust_limit = np.inf
+    report.thrust_limit, report.drag = np.inf, estimate.drag
     for j in range(health.size):
         if health[j] > 0.0:
             report.thrust_limit = min(report.thrust_limit, estimate.state[EFFECTIVENESS + health.size + j])

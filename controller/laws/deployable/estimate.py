@@ -15,7 +15,7 @@ from controller.state import State
 
 Pair = Annotated[Array, Shape(2)]
 Innovations = Annotated[Array, Shape(9)]
-# of k = 14 + 2 m states and h = 2 m hypotheses
+# of k = 16 + 2 m states and h = 2 m hypotheses
 Unknowns = Annotated[Array, Shape("k")]
 Covariance = Annotated[Array, Shape("k", "k")]
 Sensitivity = Annotated[Array, Shape(3, "k")]
@@ -24,7 +24,9 @@ Hypotheses = Annotated[Array, Shape("h")]
 Evidence = Annotated[Array, Shape(2, "h")]
 
 # index of the first state of each kind
-POSITION, VELOCITY, CURRENT, NET_WEIGHT, MOMENTS, HEIGHT, LAG, EFFECTIVENESS = 0, 3, 6, 8, 9, 12, 13, 14
+POSITION, VELOCITY, CURRENT, NET_WEIGHT, MOMENTS, YAW_MOMENT, HEIGHT, DRAG, LAG, EFFECTIVENESS = (
+    0, 3, 6, 8, 9, 12, 13, 14, 15, 16,
+)  # fmt: skip
 
 _LIGHT = 50.0  # kg, mass above which deviation, drift and bound of W - B, and the bound of moments, grow with the mass
 _FIRST_VELOCITY = 0.3  # m/s, initial standard deviation of an unmeasured velocity
@@ -34,6 +36,9 @@ _GRAVITY = 9.81  # m/s2
 _FIRST_HEIGHT, _FIRST_ARM = 0.05, 0.15
 _FIRST_EFFECTIVENESS, _FIRST_COMMON = 0.12, 0.12  # initial standard deviations: of each thruster alone; common to all
 _FIRST_CEILING, _FIRST_COMMON_CEILING = 0.12, 0.2  # the same of the ceilings: a battery that sags weakens all
+_FIRST_YAW = 0.02  # m, lever arm of the weight by which the moment about z is unknown at first
+_FIRST_DRAG = 0.5  # initial standard deviation of the drag, relative to the vehicle's
+_DRAG_RANGE = (0.05, 10.0)  # bounds of it
 _FIRST_LAG = 0.3  # s, initial lag and its standard deviation if the vehicle's own is 0
 _KNOWN_LAG = 1e-6  # s, standard deviation of a lag that is not estimated
 _GREATEST_EFFECTIVENESS = 1.1  # upper bound of an estimated effectiveness, and of a ceiling
@@ -52,6 +57,8 @@ class Estimate(State):
     water_velocity: Vector3  # m/s, NED; its down component is 0
     net_weight: float  # N, W - B
     moments: Vector3  # phi_2..phi_4 [N m], body axes
+    yaw_moment: float  # N m, about the body's z axis, beside these
+    drag: float = 1.0  # drag of translation, relative to the vehicle's
     acceleration: Vector3  # m/s2 over ground, NED, predicted for the last period
     time_since_measurement: float = -1.0  # s since the last valid measurement; negative before the first
     time_since_valid: Pair  # s since the last valid position, and velocity
@@ -74,6 +81,7 @@ class Estimate(State):
     gain: Unknowns  # Kalman gain of a measured number
     deviation: Deviations  # true state less estimate by each hypothesis: j, thruster j is lost; m + j, stuck
     supposed: Rows2  # hypothesis of a stuck thruster: its effectiveness; its force [N] at effectiveness 1
+    drift: Vector6  # variance of the drift of current, W - B and moments about the body axes, relative to their gains'
     missing: VectorM  # N, difference of a stuck thruster's force from the expected one
     direct: Hypotheses  # direct effect of the missing force on the last measured number
     # of the last measurements, divided by variances: innovations times those that each hypothesis expects;
@@ -92,8 +100,9 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
     state[EFFECTIVENESS : EFFECTIVENESS + m], state[EFFECTIVENESS + m :], state[LAG] = 0.95, 1.0, lag
     deviations[CURRENT:NET_WEIGHT] = _FIRST_CURRENT
     deviations[NET_WEIGHT] = _FIRST_RESTORING * mass_scale
-    deviations[MOMENTS:HEIGHT] = _FIRST_ARM * _GRAVITY * mass
-    deviations[HEIGHT], deviations[LAG] = _FIRST_HEIGHT, lag
+    deviations[MOMENTS:YAW_MOMENT], deviations[YAW_MOMENT] = _FIRST_ARM * _GRAVITY * mass, _FIRST_YAW * _GRAVITY * mass
+    deviations[HEIGHT], deviations[DRAG], deviations[LAG] = _FIRST_HEIGHT, _FIRST_DRAG, lag
+    state[DRAG] = 1.0
     deviations[EFFECTIVENESS : EFFECTIVENESS + m] = _FIRST_EFFECTIVENESS
     deviations[EFFECTIVENESS + m :] = _FIRST_CEILING
     covariance = np.diag(deviations**2)
@@ -102,7 +111,7 @@ def make_estimate(vehicle: VehicleModel) -> Estimate:
     estimate = Estimate(m=m, k=n, h=2 * m, mass_scale=mass_scale, lags=np.array([0.0, 0.5, 1.0]))
     estimate.first_state, estimate.first_covariance = state, covariance
     estimate.state, estimate.covariance = state, covariance
-    estimate.by_ceiling[2], estimate.last_measured[:] = 1.0, np.nan
+    estimate.by_ceiling[2], estimate.last_measured[:], estimate.drift[:] = 1.0, np.nan, 1.0
     return estimate
 
 
@@ -111,7 +120,7 @@ def reset(estimate: Estimate) -> None:
     P, P_0 = estimate.covariance, estimate.first_covariance
     estimate.state[:EFFECTIVENESS] = estimate.first_state[:EFFECTIVENESS]
     P[:EFFECTIVENESS], P[:, :EFFECTIVENESS] = P_0[:EFFECTIVENESS], P_0[:, :EFFECTIVENESS]
-    estimate.deviation[:, :] = 0.0
+    estimate.deviation[:, :], estimate.drift[:] = 0.0, 1.0
     estimate.time_since_measurement = -1.0
     publish(estimate)
 
@@ -146,8 +155,9 @@ def _decouple(estimate: Estimate, i: int, variance: float) -> None:
 def publish(estimate: Estimate) -> None:
     """Copy the parts of the state that other modules read."""
     x = estimate.state
-    estimate.position, estimate.velocity, estimate.moments = x[:3], x[VELOCITY:CURRENT], x[MOMENTS:HEIGHT]
+    estimate.position, estimate.velocity, estimate.moments = x[:3], x[VELOCITY:CURRENT], x[MOMENTS:YAW_MOMENT]
     estimate.water_velocity[:2], estimate.net_weight = x[CURRENT:NET_WEIGHT], x[NET_WEIGHT]
+    estimate.yaw_moment, estimate.drag = x[YAW_MOMENT], x[DRAG]
 
 
 def set_effectiveness(estimate: Estimate, j: int, value: float) -> None:
@@ -174,7 +184,7 @@ def project(estimate: Estimate, gains: DeployableGains) -> None:
     bound = gains.restoring_bound * estimate.mass_scale
     _bound(estimate, NET_WEIGHT, -bound, bound)
     bound = gains.moment_bound * square(estimate.mass_scale)
-    for i in range(MOMENTS, HEIGHT):
+    for i in range(MOMENTS, YAW_MOMENT + 1):
         _bound(estimate, i, -bound, bound)
     for i in range(CURRENT, NET_WEIGHT):
         _bound(estimate, i, -gains.current_bound, gains.current_bound)
@@ -182,6 +192,7 @@ def project(estimate: Estimate, gains: DeployableGains) -> None:
     for j in range(m):
         _bound(estimate, EFFECTIVENESS + j, 0.0, _GREATEST_EFFECTIVENESS)
         _bound(estimate, EFFECTIVENESS + m + j, _LEAST_CEILING, _GREATEST_EFFECTIVENESS)
+    _bound(estimate, DRAG, _DRAG_RANGE[0], _DRAG_RANGE[1])
     _bound(estimate, LAG, 0.0, gains.lag_bound)
     publish(estimate)
 

@@ -183,7 +183,9 @@ def _propagate_attitude(memory: DeployableMemory) -> None:
     """Propagate attitude and rates over the last period by the model."""
     estimate, thrusters, period = memory.state_estimate, memory.thrusters, memory.period
     R = rotation_matrix(memory.quaternion)
-    loads = model.Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
+    loads = model.Loads(
+        estimate.water_velocity, estimate.net_weight, estimate.moments, estimate.yaw_moment, estimate.drag
+    )
     acceleration = model.free_acceleration(memory.dynamics, R, estimate.velocity, memory.omega, loads)
     acceleration += model.thrust_acceleration(memory.dynamics, thrusters, R, thrusters.acting)
     memory.omega = np.clip(memory.omega + period * acceleration[3:], -_FASTEST, _FASTEST)

@@ -112,6 +112,8 @@ class Loads(NamedTuple):
     water_velocity: Vector3  # m/s, NED
     net_weight: float  # N, W - B
     moments: Vector3  # phi_2..phi_4 of (12) [N m], body axes
+    yaw_moment: float  # N m, about the body's z axis, beside these
+    drag: float  # drag of translation, relative to the vehicle's
 
 
 def free_wrench(dynamics: Dynamics, R: Matrix3, velocity: Vector3, omega: Vector3, loads: Loads) -> Vector6:
@@ -123,9 +125,17 @@ def free_wrench(dynamics: Dynamics, R: Matrix3, velocity: Vector3, omega: Vector
     momentum = dynamics.mass @ nu_r
     drag = -(dynamics.linear_damping + dynamics.quadratic_damping * abs(nu_r)) * nu_r
     k = R[2]  # R^T e3
-    force = drag[:3] + (loads.net_weight * k - cross(omega, momentum[:3]))
+    force = loads.drag * drag[:3] + (loads.net_weight * k - cross(omega, momentum[:3]))
     moment = drag[3:] - cross(k, loads.moments) - cross(omega, momentum[3:]) - cross(nu_r[:3], momentum[:3])
+    moment[2] += loads.yaw_moment
     return np.concatenate((force, moment))
+
+
+def drag_acceleration(dynamics: Dynamics, R: Matrix3, relative: Vector3) -> Vector3:
+    """Return the acceleration [m/s2], NED, by the vehicle's own drag at a velocity [m/s], NED, against the water."""
+    nu_r = R.T @ relative
+    force = -(dynamics.linear_damping[:3] + dynamics.quadratic_damping[:3] * abs(nu_r)) * nu_r
+    return R @ (dynamics.inverse_mass[:3, :3] @ force)
 
 
 def to_acceleration(

@@ -1,34 +1,37 @@
 """Observer: one Kalman filter of the motion and of all unknown parameters that affect it."""
 
-# The states: position (3), velocity over ground (3), current (2), W - B, the restoring moments phi_2..phi_4 of (12),
-# height of the center of gravity below the origin, lag of the thrusters, effectiveness and ceiling (`thrust_limit`) of
-# each. The prediction is the model (11) with its coupled mass matrix, under the commanded forces within their estimated
-# limits behind the lag, so that a saturated thruster causes no wind-up. The states are corrected by the moment from
-# measured rates, and by measured position and velocity. A joint filter attributes each effect to the right state;
-# `fault_detection` tests its hypotheses by the innovations of the same filter. Projection keeps all but position,
-# velocity and height in bounds.
+# The states: position (3), velocity over ground (3), current (2), W - B, the restoring moments phi_2..phi_4 of (12), a
+# moment about the body's z axis, height of the center of gravity below the origin, drag relative to the vehicle's, lag
+# of the thrusters, effectiveness and ceiling (`thrust_limit`) of each. The prediction is the model (11) with its
+# coupled mass matrix, under the commanded forces within their estimated limits behind the lag, so that a saturated
+# thruster causes no wind-up. The states are corrected by the moment from measured rates, and by measured position and
+# velocity. A joint filter attributes each effect to the right state; `fault_detection` tests its hypotheses by the
+# innovations of the same filter. Current, W - B and moments also stand for other disturbances, such as gusts or errors
+# of the model. Projection keeps all but position, velocity and height in bounds.
 
 from __future__ import annotations
 
 import numpy as np
 
-from controller.arithmetic import square
+from controller.arithmetic import exponential, square
 from controller.laws.deployable.attitude import Moments2
 from controller.laws.deployable.estimate import (
     CURRENT,
+    DRAG,
     EFFECTIVENESS,
     HEIGHT,
     LAG,
     MOMENTS,
     NET_WEIGHT,
     VELOCITY,
+    YAW_MOMENT,
     Estimate,
     freeze,
     project,
     publish,
 )
 from controller.laws.deployable.gains import DeployableGains
-from controller.laws.deployable.model import Dynamics, Loads, Thrusters, free_acceleration
+from controller.laws.deployable.model import Dynamics, Loads, Thrusters, drag_acceleration, free_acceleration
 from controller.linear_algebra import cross
 from controller.quaternion import down_in_body
 from controller.stack_array import Columns6, Matrix3, Vector3, Vector4
@@ -45,6 +48,9 @@ _GAP_MEMORY = 1.0  # s, time constant at which the longest gap decays
 _RIPPLE = 0.05  # standard deviation of a thruster's force in one period, relative to it
 _WEAR = 0.01  # 1/sqrt(s), drift of an effectiveness
 _SAG = 0.01  # 1/sqrt(s), drift of a ceiling
+_DRIFT_RATE = 0.3  # 1/s, rate at which disturbances are let drift faster while innovations are biased
+_GREATEST_DRIFT = 400.0  # limit of the variance of a drift, relative to that of its gain
+_DRAG_DRIFT = 0.01  # 1/sqrt(s), drift of the drag
 _LAG_DRIFT = 0.003  # s/sqrt(s), drift of the lag
 _CURVED = 0.9  # s, correlation time of the error of the lag's secant, which scales it as noise
 _OUTLIER = 3.0  # standard deviations to which an innovation is limited, by increasing its variance
@@ -62,10 +68,10 @@ def predict(
 ) -> None:
     """Predict the estimate over a period [s] under the forces that acted in it."""
     # `thruster_acceleration` is the acceleration by one newton of each thruster.
-    x, P, F = estimate.state, estimate.covariance, estimate.transition
+    x, P, F, drift = estimate.state, estimate.covariance, estimate.transition, estimate.drift
     T, m, A = period, thrusters.acting.size, thruster_acceleration[:3]
     effectiveness = x[EFFECTIVENESS : EFFECTIVENESS + m]
-    loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments)
+    loads = Loads(estimate.water_velocity, estimate.net_weight, estimate.moments, estimate.yaw_moment, estimate.drag)
     free = free_acceleration(dynamics, R, estimate.velocity, omega_body, loads)
     acceleration = free[:3] + A @ (thrusters.acting * effectiveness)
     curvature = T * (A @ (estimate.curvature * effectiveness))
@@ -73,12 +79,13 @@ def predict(
     # derivatives of the next velocity; drag is that of the mean axis, linearized
     linear, quadratic = np.sum(dynamics.linear_damping[:3]) / 3.0, np.sum(dynamics.quadratic_damping[:3]) / 3.0
     speed = np.maximum(abs(estimate.velocity - estimate.water_velocity), _SLOWEST)
-    slope = (linear + 2.0 * quadratic * speed) / dynamics.translational_mass
+    slope = estimate.drag * (linear + 2.0 * quadratic * speed) / dynamics.translational_mass
     F[:, :] = 0.0
     for axis in range(3):
         F[axis, VELOCITY + axis] = 1.0 - slope[axis] * T
     F[0, CURRENT], F[1, CURRENT + 1] = slope[0] * T, slope[1] * T
     F[2, NET_WEIGHT] = T / dynamics.translational_mass
+    F[:, DRAG] = T * drag_acceleration(dynamics, R, estimate.velocity - estimate.water_velocity)
     F[:, LAG] = T * (A @ (estimate.by_lag * effectiveness))
     F[:, EFFECTIVENESS : EFFECTIVENESS + m] = T * A * thrusters.acting
     F[:, EFFECTIVENESS + m : EFFECTIVENESS + m + m] = T * A * estimate.by_ceiling[0] * effectiveness
@@ -90,10 +97,13 @@ def predict(
     for axis in range(3):
         P[VELOCITY + axis, VELOCITY + axis] += square(_UNMODELED) * T + _CURVED / T * square(curvature[axis])
         # the moments adapt at the rate `adaptation`
-        P[MOMENTS + axis, MOMENTS + axis] += square(gains.adaptation * _ANGULAR * dynamics.mass[3 + axis, 3 + axis]) * T
+        angular = square(gains.adaptation * _ANGULAR * dynamics.mass[3 + axis, 3 + axis]) * T
+        P[MOMENTS + axis, MOMENTS + axis] += max(drift[3], drift[4]) * angular
+    P[YAW_MOMENT, YAW_MOMENT] += drift[5] * angular
     for axis in range(2):
-        P[CURRENT + axis, CURRENT + axis] += square(gains.current_drift) * T
-    P[NET_WEIGHT, NET_WEIGHT] += square(gains.restoring_drift * estimate.mass_scale) * T
+        P[CURRENT + axis, CURRENT + axis] += drift[axis] * square(gains.current_drift) * T
+    P[NET_WEIGHT, NET_WEIGHT] += drift[2] * square(gains.restoring_drift * estimate.mass_scale) * T
+    P[DRAG, DRAG] += square(_DRAG_DRIFT) * T
     P[LAG, LAG] += square(_LAG_DRIFT) * T
     thrusters.effectiveness, thrusters.ceiling[0] = effectiveness, x[EFFECTIVENESS + m : EFFECTIVENESS + m + m]
     for j in range(EFFECTIVENESS, EFFECTIVENESS + m):
@@ -111,7 +121,12 @@ def predict(
 
 
 def _update_misfit(estimate: Estimate, period: float) -> None:
-    """Update the misfit of the model over a period [s]: innovations of a model that fits are white."""
+    """Update misfit and drifts over a period [s]: innovations of a model that fits are white."""
+    # While an innovation is biased, what disturbs the vehicle along its axis is let drift faster, until it is white.
+    for axis in range(6):
+        biased = min(square(estimate.bias[(6 + axis) % 9]) / _USUAL_BIAS, _GREATEST_MISFIT)
+        drift = estimate.drift[axis] * exponential(_DRIFT_RATE * period * (biased - 1.0))
+        estimate.drift[axis] = min(max(drift, 1.0), _GREATEST_DRIFT)
     mean = float(estimate.bias @ estimate.bias) / estimate.bias.size
     relative = min(mean / _USUAL_BIAS, _GREATEST_MISFIT)
     estimate.misfit += period / (period + _MISFIT_MEMORY) * (relative - estimate.misfit)
@@ -171,6 +186,8 @@ def correct_by_moment(
             row[HEIGHT] = dynamics.rigid_mass * body[1]
         elif i == 1:
             row[HEIGHT] = -dynamics.rigid_mass * body[0]
+        else:
+            row[YAW_MOMENT] = 1.0
         row[EFFECTIVENESS : EFFECTIVENESS + m] = B * thrusters.acting
         expected = row @ x
         row[CURRENT:NET_WEIGHT] = by_current[i]
@@ -182,7 +199,7 @@ def correct_by_moment(
         variance += 2.0 * square(rate_deviation[i] * inertia / period)  # of the difference of two rates
         variance += np.sum((_RIPPLE * B * thrusters.acting) ** 2)
         variance += _CURVED / period * np.sum((B * estimate.curvature) ** 2)
-        _correct(estimate, moment[i] - expected, variance, 1.0, i, 0, row.size)
+        _correct(estimate, moment[i] - expected, variance, 1.0, i, CURRENT, row.size)
     estimate.direct[:] = 0.0
     project(estimate, gains)
 

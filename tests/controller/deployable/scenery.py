@@ -58,7 +58,7 @@ class Sea:
             remains = np.exp(-h / self.lag) if self.lag else 0.0
             self.given = commanded + remains * (self.given - commanded)
             R = rotation_matrix(self.quaternion)
-            loads = Loads(self.current, self.net_weight, RIGHTING)
+            loads = Loads(self.current, self.net_weight, RIGHTING, 0.0, 1.0)
             free = free_acceleration(self.dynamics, R, self.velocity, self.omega, loads)
             pushed = thrust_acceleration(self.dynamics, self.thrusters, R, self.given * self.left)
             self.position += h * self.velocity

@@ -75,7 +75,7 @@ def test_stuck_thruster_is_isolated_with_its_force():
 
 @pytest.mark.medium
 def test_dead_thruster_misjudged_as_stuck_does_not_displace_the_vehicle():
-    """The force that it is supposed to give is estimated on, and found to be none."""
+    """What it is supposed to give, and does not, is compensated as a disturbance."""
     law, sea = law_for([]), Sea(noise=NOISE)
     fly(law, sea, regions=[], steps=100)
     memory = law.memory
@@ -83,7 +83,6 @@ def test_dead_thruster_misjudged_as_stuck_does_not_displace_the_vehicle():
     fault_detection._isolate(memory.fault_state, memory.state_estimate, memory.thrusters, 2, 15.0)
     reallocate(memory.thrusters)
     fly(law, sea, regions=[], steps=1300, first=100)
-    assert memory.thrusters.stuck[2] * memory.state_estimate.state[EFFECTIVENESS + 2] == pytest.approx(0.0, abs=2.0)
     assert np.linalg.norm(sea.position - (8.0, 0.5, 2.5)) < 0.6
 
 
@@ -200,7 +199,7 @@ def test_evidence_is_the_log_likelihood_ratio():
     rng = np.random.default_rng(2)
     for _ in range(20):
         estimate, _, _ = started()
-        estimate.row[:], estimate.deviation[:] = rng.normal(size=30), rng.normal(size=(16, 30)) * 0.1
+        estimate.row[:], estimate.deviation[:] = rng.normal(size=32), rng.normal(size=(16, 32)) * 0.1
         variance = 1.0 + estimate.row @ estimate.covariance @ estimate.row
         innovation = rng.normal() * np.sqrt(variance)
         expected = estimate.deviation @ estimate.row
@@ -238,7 +237,7 @@ def test_evidence_counts_less_by_the_square_of_the_misfit():
 def test_innovations_are_clipped_at_three_standard_deviations():
     for sigmas, counted in ((2.9, 2.9), (30.0, 3.0)):
         estimate, _, _ = started()
-        estimate.row[:] = np.eye(30)[3]
+        estimate.row[:] = np.eye(32)[3]
         spread = np.sqrt(1.0 + estimate.covariance[3, 3])
         estimate.deviation[0, 3] = 1.0
         before, gain = estimate.state[3], estimate.covariance[3, 3]

@@ -52,7 +52,7 @@ def test_model_acceleration_matches_the_plant(name):
             R = rotation_matrix(e)
             before = R @ nu[:3]
             there = np.r_[rotation_matrix(after[:4]) @ after[4:7] - before, after[7:] - nu[3:]] / step
-            free = free_acceleration(dynamics, R, before, nu[3:], Loads(current, restoring, moments))
+            free = free_acceleration(dynamics, R, before, nu[3:], Loads(current, restoring, moments, 0.0, 1.0))
             thrusters.effectiveness[:] = rng.uniform(0.3, 1.0, 8)
             pushed = thrust_acceleration(dynamics, thrusters, R, forces / thrusters.effectiveness)
             # a step is a difference quotient: it is off by half a step times what the acceleration changes in a second

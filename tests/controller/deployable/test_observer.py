@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from controller.laws.deployable import actuator_lag, observer
 from controller.laws.deployable.estimate import (
     CURRENT,
+    DRAG,
     EFFECTIVENESS,
     HEIGHT,
     LAG,
@@ -17,6 +18,7 @@ from controller.laws.deployable.estimate import (
     NET_WEIGHT,
     POSITION,
     VELOCITY,
+    YAW_MOMENT,
     initialize,
     make_estimate,
     project,
@@ -74,7 +76,7 @@ def transition(estimate, dynamics, thrusters, by_force):
     linear, quadratic = dynamics.linear_damping[:3].mean(), dynamics.quadratic_damping[:3].mean()
     for axis in range(3):
         speed = abs(estimate.velocity[axis] - estimate.water_velocity[axis])
-        slope = (linear + 2.0 * quadratic * max(speed, 0.15)) / mass
+        slope = x[DRAG] * (linear + 2.0 * quadratic * max(speed, 0.15)) / mass
         F[axis, VELOCITY + axis] = PERIOD
         row = F[VELOCITY + axis]
         row[VELOCITY + axis] -= slope * PERIOD
@@ -82,6 +84,9 @@ def transition(estimate, dynamics, thrusters, by_force):
         row[EFFECTIVENESS:CEILING] = PERIOD * by_force[axis] * thrusters.acting
         row[CEILING:] = PERIOD * by_force[axis] * estimate.by_ceiling[0] * x[EFFECTIVENESS:CEILING]
         row[LAG] = PERIOD * np.sum(by_force[axis] * estimate.by_lag * x[EFFECTIVENESS:CEILING])
+    nu = estimate.velocity - estimate.water_velocity
+    force = -(dynamics.linear_damping[:3] + dynamics.quadratic_damping[:3] * abs(nu)) * nu
+    F[VELOCITY:CURRENT, DRAG] = PERIOD * (dynamics.inverse_mass[:3, :3] @ force)
     return F
 
 
@@ -91,6 +96,7 @@ def random_estimate(rng, thrusters):
     estimate.covariance[:] = root @ root.T
     estimate.state[CURRENT : CURRENT + 2], estimate.state[NET_WEIGHT] = rng.normal(size=2) * 0.2, 4.0
     estimate.state[EFFECTIVENESS:CEILING], estimate.state[LAG] = rng.uniform(0.6, 1.0, 8), 0.15
+    estimate.state[DRAG], estimate.drift[:] = 0.7, rng.uniform(2.0, 9.0, 6)
     estimate.state[CEILING:], estimate.by_ceiling[2] = rng.uniform(0.5, 0.9, (2, 8))
     estimate.by_ceiling[:2] = rng.uniform(0.0, 20.0, (2, 8))
     publish(estimate)
@@ -115,11 +121,13 @@ def test_prediction_covariance_matches_a_kalman_filter():
             estimate.curvature * before.state[EFFECTIVENESS:CEILING],
         )
         expected = F @ P @ F.T
-        Q = np.zeros(N)
+        Q, drift = np.zeros(N), estimate.drift
         Q[VELOCITY:CURRENT] = 0.03**2 * PERIOD + 0.9 * PERIOD * (by_force[:3] @ curvature) ** 2
-        Q[CURRENT:NET_WEIGHT] = GAINS.current_drift**2 * PERIOD
-        Q[NET_WEIGHT] = (GAINS.restoring_drift * 125.0 / 50.0) ** 2 * PERIOD
-        Q[MOMENTS:HEIGHT] = (GAINS.adaptation * 0.019 * np.diag(dynamics.mass)[3:]) ** 2 * PERIOD
+        Q[CURRENT:NET_WEIGHT] = drift[:2] * GAINS.current_drift**2 * PERIOD
+        Q[NET_WEIGHT] = drift[2] * (GAINS.restoring_drift * 125.0 / 50.0) ** 2 * PERIOD
+        angular = (GAINS.adaptation * 0.019 * np.diag(dynamics.mass)[3:]) ** 2 * PERIOD
+        Q[MOMENTS:YAW_MOMENT], Q[YAW_MOMENT] = max(drift[3:5]) * angular, drift[5] * angular[2]
+        Q[DRAG] = 0.01**2 * PERIOD
         Q[LAG], Q[EFFECTIVENESS:] = 0.003**2 * PERIOD, 0.01**2 * PERIOD
         assert estimate.covariance == pytest.approx(expected + np.diag(Q), rel=1e-9, abs=1e-13)
         assert np.array_equal(estimate.covariance, estimate.covariance.T) or np.allclose(
@@ -168,13 +176,14 @@ def test_moment_correction_matches_the_kalman_update():
         estimate.by_lag[:], estimate.curvature[:] = rng.normal(size=8), 0.1 * rng.normal(size=8)
         estimate.by_ceiling[0] = rng.normal(size=8)
         estimate.acceleration[:], estimate.state[HEIGHT] = rng.normal(size=3), 0.02
-        estimate.state[MOMENTS:HEIGHT] = rng.normal(size=3) * 20.0
+        estimate.state[MOMENTS:HEIGHT] = rng.normal(size=4) * 20.0
         turned, omega, by_current = Rotation.random(random_state=rng), rng.normal(size=3), rng.normal(size=(3, 2))
         R, x, P = turned.as_matrix(), estimate.state.copy(), estimate.covariance.copy()
         k, e = R[2] + 0.5 * PERIOD * np.cross(omega, R[2]), x[EFFECTIVENESS:CEILING]
         H, given = np.zeros((3, N)), thrusters.matrix[3:] * thrusters.acting
         H[:, CURRENT:NET_WEIGHT] = by_current
-        H[:, MOMENTS:HEIGHT] = -np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
+        H[2, YAW_MOMENT] = 1.0
+        H[:, MOMENTS:YAW_MOMENT] = -np.array([[0.0, -k[2], k[1]], [k[2], 0.0, -k[0]], [-k[1], k[0], 0.0]])
         H[:, HEIGHT] = -dynamics.rigid_mass * np.cross([0.0, 0.0, 1.0], R.T @ estimate.acceleration)
         H[:, LAG], H[:, EFFECTIVENESS:CEILING] = thrusters.matrix[3:] @ (estimate.by_lag * e), given
         H[:, CEILING:] = thrusters.matrix[3:] * estimate.by_ceiling[0] * e
@@ -289,12 +298,12 @@ def test_prediction_follows_the_vehicle_model():
     for model in MODELS.values():
         estimate, dynamics, thrusters = started(velocity=(0.6, -0.4, 0.1), model=model)
         R, x = Rotation.from_euler("zyx", [0.7, -0.3, 0.2]).as_matrix(), estimate.state
-        x[CURRENT:NET_WEIGHT], x[NET_WEIGHT], x[MOMENTS:HEIGHT] = (0.2, -0.1), 7.0, (0.3, -0.2, 4.0)
-        x[EFFECTIVENESS:CEILING], x[LAG] = rng.uniform(0.5, 1.0, 8), 0.0
+        x[CURRENT:NET_WEIGHT], x[NET_WEIGHT], x[MOMENTS:HEIGHT] = (0.2, -0.1), 7.0, (0.3, -0.2, 4.0, 0.5)
+        x[EFFECTIVENESS:CEILING], x[LAG], x[DRAG] = rng.uniform(0.5, 1.0, 8), 0.0, 0.6
         estimate.covariance[CEILING:] = 0.0  # the limits are known
         publish(estimate)
         thrusters.forces[:] = rng.uniform(-20.0, 20.0, 8)
-        loads = Loads(estimate.water_velocity, 7.0, estimate.moments)
+        loads = Loads(estimate.water_velocity, 7.0, estimate.moments, 0.5, 0.6)
         free = free_acceleration(dynamics, R, estimate.velocity, omega, loads)
         pushed = thrust_acceleration(dynamics, thrusters, R, thrusters.forces * x[EFFECTIVENESS:CEILING])
         a, v, p = (free + pushed)[:3], estimate.velocity.copy(), estimate.position.copy()

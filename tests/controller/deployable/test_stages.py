@@ -176,7 +176,7 @@ def begun():
 def test_missing_attitude_and_rates_are_propagated_by_the_model():
     memory = begun()
     seen = memory.state_estimate
-    loads = Loads(seen.water_velocity, seen.net_weight, seen.moments)
+    loads = Loads(seen.water_velocity, seen.net_weight, seen.moments, seen.yaw_moment, seen.drag)
     free = free_acceleration(memory.dynamics, TURNED, seen.velocity, memory.omega, loads)
     wrench = memory.thrusters.matrix @ memory.thrusters.forces
     omega = memory.omega + 0.02 * (free[3:] + (memory.dynamics.inverse_mass @ wrench)[3:])

@@ -29,7 +29,7 @@ def expected(memory, state, goal, regions, weights):
     thrusters, dynamics, seen = memory.thrusters, memory.dynamics, memory.state_estimate
     input_validation.process_measurement(memory, state, GAINS)
     R, omega, ahead = rotation_matrix(memory.quaternion), memory.omega, memory.predicted
-    loads = model.Loads(seen.water_velocity, seen.net_weight, seen.moments)
+    loads = model.Loads(seen.water_velocity, seen.net_weight, seen.moments, seen.yaw_moment, seen.drag)
     free = model.free_acceleration(dynamics, R, seen.velocity, omega, loads)
     pushing = model.thrust_acceleration(dynamics, thrusters, R, thrusters.acting_now)
     motion = seen.position, seen.velocity, memory.quaternion, omega, free + pushing
@@ -59,7 +59,7 @@ def expected(memory, state, goal, regions, weights):
     motion = barrier.Motion(
         position, ahead.velocity, free, turned @ dynamics.inverse_mass @ thrusters.matrix,
         np.trace(dynamics.mass[:3, :3]) / 3.0, np.trace(dynamics.mass[3:, 3:]) / 3.0,
-        GAINS.braking_share * dynamics.braking.min(),
+        GAINS.braking_share * model.available_braking(dynamics, thrusters),
         0.5 * GAINS.acceleration * (0.02**2 + seen.state[LAG] ** 2), variance, state.deviation[6:9].max(),
     )  # fmt: skip
     rates = 0.02 / (0.02 + np.where(regions.hard, GAINS.price_smoothing, 0.0))

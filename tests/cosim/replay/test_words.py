@@ -70,7 +70,8 @@ def test_python_formatters_say_what_is_no_number(value):
         "min_clearance": {"wall": value}, "hard": ["wall"], "hard_violated": [], "violated_at_start": [],
         "clearance_unit": {"wall": "m"},
         "status": "completed", "max_force_asked": value, "max_force": value, "simulated_time": 1.0,
-        "above_surface": [], "time_above_surface": 0.0, "isolations": [], "rejected_samples": 0.0, "goal_miss": None,
+        "above_surface": [], "time_above_surface": 0.0, "isolations": [], "rejected_samples": 0.0,
+        "drag_ratio": None, "goal_miss": None,
     }  # fmt: skip
     assert number(value) == number(None) == "–" and format_number(value, 3) == format_force(value) == "no number"
     assert not NOT_SHOWN.search(verdict(summary | {"min_clearance": {"wall": math.nan}}))

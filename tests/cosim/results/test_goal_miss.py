@@ -69,7 +69,7 @@ def ran(tmp_path, capsys):
         ("", {"duration": 6.0, "goal": 6.0}, "The time was too short: the vehicle, "),
         ("", {"duration": 14.0, "goal": 3.0}, "The time was too short: the vehicle was in the goal for the last "),
         ("", {"current": -1.3}, "The thrust was not enough: "),
-        ("", {"current": -1.6}, "The vehicle was adrift: "),
+        ("", {"current": -1.6}, "The thrust was not enough: "),
         ("[sensing]\ndead_from = 1.0\ndead_for = 99.0\n", {"goal": 9.0}, "the law had no measurement for the last 19."),
     ],
     ids=["covered", "wall", "shortest", "short", "late", "current", "strong current", "blind"],

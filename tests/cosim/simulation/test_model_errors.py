@@ -43,6 +43,10 @@ def check(scenario):
         ("odin", "half drag", 8),
         ("rexrov", "half drag", 8),
         ("bluerov2_heavy", "half drag", 8),
+        ("bluerov2_heavy_wu", "half drag", 8),
+        ("bluerov2_heavy_wu", "other set", 4),
+        ("odin", "gusts", 4),
+        ("rexrov", "gusts", 4),
         pytest.param("bluerov2_heavy", "weak", 60, marks=pytest.mark.slow),
         pytest.param("bluerov2_heavy", "uneven", 60, marks=pytest.mark.slow),
     ],
@@ -52,6 +56,20 @@ def test_no_healthy_thruster_is_isolated(vehicle, case, count):
     for seed in range(count):
         table = scene(model, case, seed, LAG.get(vehicle), 15.0, 0.0) | {"vehicle": vehicle}
         assert check(validate_scenario(json.loads(json.dumps(table)), f"{case} {seed}"))
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("seeds", [range(6), pytest.param(range(6, 40), marks=pytest.mark.slow)], ids=["few", "many"])
+def test_regions_are_kept_with_an_eighth_of_the_drag_of_the_file(seeds):
+    """Drag and added mass of the other published set of the BlueROV2."""
+    for seed in seeds:
+        table = scene(load_vehicle("bluerov2_heavy"), "other set", seed, 0.15, 15.0, 0.0) | {
+            "vehicle": "bluerov2_heavy"
+        }
+        with FusedFlyer(Variation(validate_scenario(json.loads(json.dumps(table)), f"other set {seed}"), ())) as flyer:
+            outcome, trace = flyer.fly_one(flyer.variation.base, trace=True)
+        assert outcome["settled"] and not outcome["violated"], seed
+        assert trace["law.drag"].min() < 0.4  # the true one is 0.13 to 0.3
 
 
 @pytest.mark.medium
