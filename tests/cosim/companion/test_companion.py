@@ -438,8 +438,8 @@ def test_a_pilot_drives_away_by_sticks_of_the_system_that_the_autopilot_obeys(
     def drive():
         link.hear(mavlink.MAVLink_manual_control_message(1, 1000, 0, 500, 0, 0), station)
 
-    link.events = [(0.5, lambda: link.hear(parameter(b"SYSID_MYGCS", 255.0), 1, 1)),
-                   (0.6, lambda: link.hear(BEAT, station)),
+    link.events = [(0.4, lambda: link.hear(BEAT, station)),
+                   (0.5, lambda: link.hear(parameter(b"SYSID_MYGCS", 255.0), 1, 1)),
                    *((begun + 0.04 * k, drive) for k in range(300))]  # fmt: skip
     flight = Flight(tmp_path, 10.0, link=link, profile="ardusub", arm=True, level_dive=0.0)
     assert flight.status == "pilot: pilot's sticks" and flight.time_of("pilot") - begun <= 0.2
