@@ -5,7 +5,7 @@ import pytest
 
 from controller import LAWS, LawError, VehicleState
 from controller.laws.deployable import DeployableGains, DeployableLaw
-from controller.regions import Box, HalfSpace, Orientation, Region, Sphere, Visibility, pack
+from controller.regions import HalfSpace, Orientation, Region, Sphere, Visibility, pack
 from controller.regions.region_set import clearance_at
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu import Plant
@@ -72,19 +72,7 @@ OFF = np.array([2.0, -1.0, 1.0])
 UNNORMALIZED = VehicleState(
     np.array([np.inf, 0.0, 0.0]), np.array([5.0, 0.0, 0.0, 0.0]), np.full(6, np.inf), np.ones(8)
 )
-COMER = Region("comer", Sphere((9.0, 0.0, 2.0), 0.6), "out", velocity=(-0.15, 0.0, 0.0))
 LEAVING = Region("goal", Sphere((4.0, 0.0, 2.0), 0.5), "in", velocity=(0.1, 0.15, 0.0))
-# open behind: a potential alone would stay in it
-POCKET = [
-    Region(name, Box(center, size), "out")
-    for name, center, size in (
-        ("front", (2.0, 0.0, 2.0), (0.2, 3.0, 3.0)),
-        ("left", (1.0, -1.5, 2.0), (2.2, 0.2, 3.0)),
-        ("right", (1.0, 1.5, 2.0), (2.2, 0.2, 3.0)),
-        ("top", (1.0, 0.0, 0.5), (2.2, 3.0, 0.2)),
-        ("bottom", (1.0, 0.0, 3.5), (2.2, 3.0, 0.2)),
-    )
-]
 
 
 def from_2_s(change):
@@ -101,9 +89,7 @@ FLIGHTS = {
     "only velocities": ([ROCK], {"spoil": from_2_s(lambda s: s._replace(position=np.full(3, np.nan)))}),
     "unnormalized": ([ROCK], {"spoil": lambda t, s: UNNORMALIZED if 2.0 < t < 3.0 else s}),
     "an outlier": ([ROCK], {"spoil": lambda t, s: s._replace(position=s.position + OFF) if abs(t - 4.0) < 1e-3 else s}),
-    "a moving obstacle": ([COMER], {"duration": 60.0}),
     "a moving goal": ([], {"goal": LEAVING, "duration": 40.0}),
-    "a pocket": (POCKET, {"start": (1.0, 0.0, 2.0), "duration": 60.0}),
 }
 
 

@@ -124,21 +124,21 @@ def test_fused_loop_with_curves_equals_the_master():
     assert np.ptp(run["membership.obstacle"]) > 0.5
 
 
-def test_fused_loop_with_an_arbiter_file_equals_the_master(own):
-    changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=6.0", "arbiter.inputs.charge=[[1, 1], [4, 0.1]]"]
-    assert_same_to_the_last_bit(load_scenario(own, changes))
-
-
-def test_fused_loop_with_exact_centroids_equals_the_master(swept):
-    changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=6.0"]
-    assert_same_to_the_last_bit(load_scenario(swept, changes))
-
-
-def test_fused_loop_with_sensors_equals_the_master(own):
-    changes = ["initial.position=[6.5, 0.0, 4.2]", "time.duration=20.0", "sensing.through=sensors"]
-    assert_same_to_the_last_bit(
-        load_scenario(own, [*changes, *(f"sensing.{key}=0.0" for key in ("position_noise", "velocity_noise"))])
-    )
+@pytest.mark.parametrize(
+    ("rules", "changes"),
+    [
+        ("own", ["time.duration=6.0", "arbiter.inputs.charge=[[1, 1], [4, 0.1]]"]),
+        ("swept", ["time.duration=6.0"]),
+        (
+            "own",
+            ["time.duration=20.0", "sensing.through=sensors", "sensing.position_noise=0", "sensing.velocity_noise=0"],
+        ),
+    ],
+    ids=["closed form", "exact centroids", "sensors"],
+)
+def test_fused_loop_with_an_arbiter_file_equals_the_master(rules, changes, request):
+    file = request.getfixturevalue(rules)
+    assert_same_to_the_last_bit(load_scenario(file, ["initial.position=[6.5, 0.0, 4.2]", *changes]))
 
 
 def test_record_holds_the_arbiter_inputs(own, tmp_path):

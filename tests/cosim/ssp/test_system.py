@@ -96,45 +96,37 @@ def test_documentation_example_runs(tmp_path, monkeypatch, capsys):
     assert names["result"]["plant.position.z"][-1] == pytest.approx(6.2665, abs=1e-3)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("fmi", [pytest.param(2, marks=pytest.mark.slow), 3])
-@pytest.mark.parametrize("name", ["paper", "paper-limited"])
-@pytest.mark.parametrize("master", ["fmpy", "ecos", "libcosim", "oms"])
-def test_masters_reproduce_the_papers_run(master, name, fmi, tmp_path):
-    """30 s at 10 ms; in the first step FMPy's connectors are 0, those of the others hold the plant's first outputs."""
-    if fmi == 3 and master != "ecos":
-        pytest.skip("takes FMI 2.0 alone in a system")
-    settings = [*TEN_MS, "time.duration=30.0"]
+def assert_system_flies_as_the_run(name, settings, tmp_path, master="fmpy", fmi=2):
     scenario = load_scenario(name, settings)
     path = package_system(scenario, tmp_path / "s.ssp", fmi)
     compared(jacobi(name, settings), in_master(master, path, scenario.steps, scenario.time.step, tmp_path / "rows.npy"))
+    return path
+
+
+# with noise, delays, lost samples and outliers of the data sheets, two outages and a failed thruster
+ON_SENSORS = [
+    "sensing.through=sensors", "sensing.position_noise=0", "sensing.velocity_noise=0", "sensing.seed=4",
+    "outages=[{sensor='dvl', time=1.0, duration=1.5}, {sensor='usbl', time=2.015, duration=9.0}]",
+    "failures=[{thruster=3, time=2.0}]", "time.duration=6.0",
+]  # fmt: skip
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("master", "fmi"), [("fmpy", 2), ("ecos", 2), ("ecos", 3), ("libcosim", 2), ("oms", 2)])
-@pytest.mark.parametrize("name", ["docking", "pipe-inspection", "inspection-visibility", "harbour"])
-def test_masters_reproduce_shipped_scenarios(name, master, fmi, tmp_path):
-    """The deployable law on thrusters, noise, regions on the move, four criteria: whole runs, of harbour a minute."""
-    settings = ["time.duration=60.0"] if name == "harbour" else []
-    scenario = load_scenario(name, settings)
-    path = package_system(scenario, tmp_path / "s.ssp", fmi)
-    compared(jacobi(name, settings), in_master(master, path, scenario.steps, scenario.time.step, tmp_path / "rows.npy"))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("master", "fmi"), [("fmpy", 2), ("ecos", 2), ("ecos", 3), ("libcosim", 2), ("oms", 2)])
-def test_masters_reproduce_flights_on_sensors(master, fmi, tmp_path):
-    """With noise, delays, lost samples and outliers of the data sheets, two outages and a failed thruster."""
-    outages = "outages=[{sensor='dvl', time=1.0, duration=1.5}, {sensor='usbl', time=2.015, duration=9.0}]"
-    settings = [
-        "sensing.through=sensors", "sensing.position_noise=0", "sensing.velocity_noise=0", "sensing.seed=4", outages,
-        "failures=[{thruster=3, time=2.0}]", "time.duration=6.0",
-    ]  # fmt: skip
-    scenario = load_scenario("docking", settings)
-    path = package_system(scenario, tmp_path / "s.ssp", fmi)
-    compared(
-        jacobi("docking", settings), in_master(master, path, scenario.steps, scenario.time.step, tmp_path / "rows.npy")
-    )
+@pytest.mark.parametrize(
+    ("name", "settings"),
+    [
+        *((name, [*TEN_MS, "time.duration=30.0"]) for name in ("paper", "paper-limited")),
+        *((name, []) for name in ("docking", "pipe-inspection", "inspection-visibility")),
+        ("harbour", ["time.duration=60.0"]),
+        ("docking", ON_SENSORS),
+    ],
+    ids=["paper", "paper-limited", "docking", "pipe-inspection", "inspection-visibility", "harbour", "sensors"],
+)
+def test_masters_reproduce_shipped_scenarios(name, settings, master, fmi, tmp_path):
+    """The laws on wrench and thrusters, noise, regions on the move, four criteria: whole runs, of harbour a minute."""
+    # in the first step FMPy's connectors are 0, those of the others hold the plant's first outputs
+    assert_system_flies_as_the_run(name, settings, tmp_path, master, fmi)
 
 
 @pytest.mark.slow
@@ -152,10 +144,7 @@ def test_masters_reproduce_flights_on_sensors(master, fmi, tmp_path):
     ],
 )
 def test_every_law_equals_its_python_run(name, settings, tmp_path):
-    settings = ["time.duration=2.0", *settings]
-    scenario = load_scenario(name, settings)
-    path = package_system(scenario, tmp_path / "s.ssp")
-    compared(jacobi(name, settings), run_in_fmpy(path, scenario.steps, scenario.time.step))
+    assert_system_flies_as_the_run(name, ["time.duration=2.0", *settings], tmp_path)
 
 
 # ---- the file ----
@@ -290,10 +279,7 @@ CRITERIA = 'criteria=[{name="obstacle"},{name="depth",order=0},{name="shape"},{n
 
 @pytest.mark.slow
 def test_a_system_has_as_many_criteria_as_the_scenario(tmp_path):
-    settings = ["time.duration=0.5", CRITERIA]
-    scenario = load_scenario(ALL_SHAPES, settings)
-    path = package_system(scenario, tmp_path / "four.ssp")
-    compared(jacobi(ALL_SHAPES, settings), run_in_fmpy(path, scenario.steps, scenario.time.step))
+    path = assert_system_flies_as_the_run(ALL_SHAPES, ["time.duration=0.5", CRITERIA], tmp_path)
     with zipfile.ZipFile(path) as archive, zipfile.ZipFile(io.BytesIO(archive.read("resources/arbiter.fmu"))) as fmu:
         described = fmu.read("modelDescription.xml").decode()
     assert re.findall(r'name="weight\.(\w+)"', described) == ["depth", "obstacle", "shape", "visibility"]
@@ -304,7 +290,4 @@ def test_custom_memberships_and_rules_are_packaged(tmp_path):
     """With inputs that are no memberships: a clearance, a speed, the time and such."""
     (tmp_path / "mine.toml").write_text(RULES)
     (tmp_path / "scenario.toml").write_text(SCENARIO)
-    settings = ["time.duration=1.0"]
-    scenario = load_scenario(tmp_path / "scenario.toml", settings)
-    path = package_system(scenario, tmp_path / "s.ssp")
-    compared(jacobi(tmp_path / "scenario.toml", settings), run_in_fmpy(path, scenario.steps, scenario.time.step))
+    assert_system_flies_as_the_run(tmp_path / "scenario.toml", ["time.duration=1.0"], tmp_path)
