@@ -81,7 +81,9 @@ def statements(seed, n):
 
     def scalar():
         return draw.choice((f"{draw.choice(SCALARS)}", f"({draw.choice(SCALARS)} - {draw.choice(SCALARS)})",
-                            "change(s.inner, 0.5)", "outcome(t)", f"np.sum({draw.choice(VECTORS)})"))  # fmt: skip
+                            "change(s.inner, 0.5)", "outcome(t)",
+                            f"({draw.choice(SCALARS)} - change(s.inner, 0.5))",
+                            f"np.sum({draw.choice(VECTORS)})"))  # fmt: skip
 
     def target():
         return draw.choice(("s.x", "s.y", "s.inner.x", "t.x", "s.v[0]", "a", "named.inner.x"))
