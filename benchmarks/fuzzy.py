@@ -22,7 +22,9 @@ from benchmarks.peers import skfuzzy_rules
 from benchmarks.peers.fuzzy_libraries import LIBRARIES
 from benchmarks.table import Row, compared
 from benchmarks.timing import Own, Timing, time_batches, time_calls, timed
-from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, Output, System, Variable, auto_terms, triangle
+from fuzzy_arbiter import SECTION_VI, Arbiter, Criterion, Output, System, Variable, auto_terms, curve, triangle
+from fuzzy_arbiter.definition import Defuzzifier
+from fuzzy_arbiter.shapes import Membership
 
 STEPS = 20_000
 RATIO = "how many times as long as scikit-fuzzy as its examples use it"
@@ -33,6 +35,13 @@ OTHER_PYTHON = "FUZZY_LIBRARIES_PYTHON"
 _MODULES = {"pyfuzzylite": "fuzzylite", "simpful": "simpful"}  # importable module of each distribution
 _ROWS = 5  # rows of a batch per step
 _SLOWER = 50  # divisor of the calls of slower contestants
+_OTHER_TIPPING: dict[str, dict[str, Any]] = {
+    "Gaussian tips": {"curved": True},
+    "Gaussian tips, bisector": {"curved": True, "defuzzifier": "bisector"},
+    "Gaussian tips, mean of maxima": {"curved": True, "defuzzifier": "mom"},
+    "sum of triangles": {"aggregation": "sum"},
+    "probabilistic sum of triangles": {"aggregation": "probor"},
+}
 
 
 def measure(steps: int, repeats: int) -> list[Row]:
@@ -74,6 +83,10 @@ def measure(steps: int, repeats: int) -> list[Row]:
         )
         add(f"batch of {len(rows)}: exact, {name}", time_batches(_batch(general, rows), len(rows), repeats))
         add(f"compiled, in a loop of its own: exact, {name}", _looped(general, rows, repeats))
+    for name, options in _OTHER_TIPPING.items():
+        other, rows = _tipping(**options), batch[: max(1, len(batch) // _SLOWER), :2] * 10.0
+        add(f"one call: exact, tipping, {name}", _calls(other, few, repeats))
+        add(f"batch of {len(rows)}: exact, tipping, {name}", time_batches(_batch(other, rows), len(rows), repeats))
     for system in ("section_vi", "tipping"):
         add(f"batch of {len(batch)}: pyfuzzylite, resolution 100, {system}", _other_batch(system, len(batch), repeats))
     add("building: 40 criteria", time_calls(lambda: Arbiter(criteria), max(1, few // 10), repeats))
@@ -125,15 +138,21 @@ def _general() -> Arbiter:
     return Arbiter(system=replace(system, rules=(*system.rules[:-1], replace(system.rules[-1], weight=0.9))))
 
 
-def _tipping() -> Arbiter:
+def _tipping(curved: bool = False, defuzzifier: Defuzzifier = "centroid", aggregation: str = "max") -> Arbiter:
     service, food = (Variable(name, (0, 10), auto_terms(3)) for name in ("service", "food"))
-    terms = {"low": triangle(0, 0, 13), "medium": triangle(0, 13, 25), "high": triangle(13, 25, 25)}
+    terms: dict[str, Membership] = {
+        "low": triangle(0, 0, 13), "medium": triangle(0, 13, 25), "high": triangle(13, 25, 25),
+    }  # fmt: skip
+    if curved:
+        terms = {name: curve("gaussian", mean, 3.0) for name, mean in (("low", 4.0), ("medium", 12.5), ("high", 21.0))}
     rules = (
         "if service is poor or food is poor then tip is low",
         "if service is average then tip is medium",
         "if service is good or food is good then tip is high",
     )
-    return Arbiter(system=System((service, food), (Output("tip", (0, 25), terms),), rules))
+    return Arbiter(
+        system=System((service, food), (Output("tip", (0, 25), terms, None, defuzzifier, aggregation),), rules)
+    )
 
 
 def _looped(arbiter: Arbiter, rows: np.ndarray[Any, np.dtype[np.float64]], repeats: int) -> Timing | str:
