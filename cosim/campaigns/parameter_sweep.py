@@ -98,13 +98,13 @@ def summarize_sweep(work: SweepWork, results: Results, folder: Path) -> dict[str
         **{name: rate(results.fact(name)[is_flown]) for name in FACTS},
         "quantiles": {name: quantiles(results.number(name)) for name in SPREADS},
         "worst": worst_table(results, folder),
-        "effects": _of_keys(work, results, is_flown, effect),
-        "rank_correlations": _of_keys(work, results, is_flown, _rank_correlation),
+        "effects": _measure_keys(work, results, is_flown, effect),
+        "rank_correlations": _measure_keys(work, results, is_flown, _rank_correlation),
         **{key: value for key, value in work.plan.items() if key != "name"},
     }
 
 
-def _of_keys(
+def _measure_keys(
     work: SweepWork, results: Results, flown: Facts, measure: Callable[[Array, Array], dict[str, float] | None]
 ) -> dict[str, dict[str, Any]]:
     """Return a measure of each key with each outcome, over the flown rows with a finite outcome."""

@@ -81,7 +81,7 @@ def repeat_of(folder: Path, key: int) -> Repeat:
         raise RunError(f"{folder}: row {key} is not flown again: {KILLED}")
     try:
         with understood(folder / PLAN):
-            return (_of_sweep if plan["kind"] == SWEEP else _of_scene)(folder, plan, stored)
+            return (_sweep_repeat if plan["kind"] == SWEEP else _scene_repeat)(folder, plan, stored)
     except (CosimError, PlantFmuError, ControllerError) as error:
         if str(folder) in str(error):
             raise
@@ -100,7 +100,7 @@ def require_complete(folder: Path) -> None:
         raise RunError(f"{folder}: is not complete, expected a campaign that is; its own command goes on with it")
 
 
-def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
+def _sweep_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
     work = SweepWork(load_scenario(folder / SCENARIO), design_of(plan))
     scenarios = (
         {"scenario": rename_former_keys(plan["scenario"])},
@@ -121,7 +121,7 @@ def _of_sweep(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Rep
     return Repeat(stored, work.task, batch, scenario, _row_outcome)
 
 
-def _of_scene(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
+def _scene_repeat(folder: Path, plan: dict[str, Any], stored: dict[str, Any]) -> Repeat:
     gains = law_named(plan["law"]).gains_type(**plan["gains"])
     conditions: Conditions = decode(plan["conditions"], Conditions, "conditions")
     line = stored["scene"].encode()

@@ -8,7 +8,7 @@ from typing import Any
 from controller import LAWS
 from cosim.errors import ScenarioError
 from cosim.scenario.key_names import PARAMETERS, key_name
-from cosim.scenario.toml_file import place_of
+from cosim.scenario.toml_file import locate_key
 from cosim.scenario.validation import known_parameters
 from plant_fmu.errors import one_line
 from plant_fmu.toml_tables import hint
@@ -29,7 +29,7 @@ def with_values(table: dict[str, Any], values: Mapping[str, Any]) -> dict[str, A
         if key.startswith(PARAMETERS):
             changed["plant"]["parameters"][key.removeprefix(PARAMETERS)] = value
         else:
-            container, last = place_of(changed, key)
+            container, last = locate_key(changed, key)
             container[last] = value
     return changed
 
@@ -87,7 +87,7 @@ def value_at(table: dict[str, Any], key: str, vehicle: Vehicle) -> Any:
         if name not in known:
             raise ScenarioError(f"key {key!r} is no parameter of the vehicle's FMU; {hint(name, known)}")
         return table["plant"]["parameters"].get(name, known[name])
-    container, last = place_of(table, key)
+    container, last = locate_key(table, key)
     return container[last]
 
 

@@ -233,7 +233,7 @@ def flatten(table: dict[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
-def place_of(table: dict[str, Any], key: str) -> tuple[Any, Any]:
+def locate_key(table: dict[str, Any], key: str) -> tuple[Any, Any]:
     """Return the table or list that holds a key, and the name or index in it."""
     inner: Any = table
     for depth, part in enumerate(parts := key.split(".")):

@@ -70,7 +70,7 @@ def _drawings(s: dict[str, Any]) -> Iterator[NamedFigure]:
     for name, numbers, color in (("search", s, BLUE), ("random", s["random"], ORANGE)):
         if best := numbers["best"]:  # empty if every flight was refused
             flights, costs = zip(*[*best, [numbers["flown"], best[-1][1]]], strict=True)
-            axes.step(flights, [_of_cost(s, cost) for cost in costs], where="post", color=color, label=name)
+            axes.step(flights, [_outcome_from_cost(s, cost) for cost in costs], where="post", color=color, label=name)
     if not axes.lines:
         return
     axes.set(xlabel="flights", ylabel=f"worst so far: {label}")
@@ -90,8 +90,8 @@ def _value(s: dict[str, Any], row: dict[str, Any] | None, unit: bool = False) ->
     objective = s["search"]["objective"]
     if objective == "arrival" and -row["cost"] >= s["horizon"]:
         return "never"
-    return number(_of_cost(s, row["cost"]), 3) + (f" {_UNITS[objective]}" if unit else "")
+    return number(_outcome_from_cost(s, row["cost"]), 3) + (f" {_UNITS[objective]}" if unit else "")
 
 
-def _of_cost(s: dict[str, Any], cost: float) -> float:
+def _outcome_from_cost(s: dict[str, Any], cost: float) -> float:
     return cost if s["search"]["objective"] == "clearance" else -cost

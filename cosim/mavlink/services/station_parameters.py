@@ -44,9 +44,9 @@ def station_parameters(context: VehicleContext) -> dict[str, Callable[[], float]
     """Return functions that read the read-only parameters of the vehicle's profile, by name."""
     match context.profile.name:
         case "ardusub":
-            return _constants(_of_ardusub(context.scenario.vehicle))
+            return _constants(_ardusub_parameters(context.scenario.vehicle))
         case "px4":
-            return _constants(_of_px4(context.scenario.vehicle)) | {
+            return _constants(_px4_parameters(context.scenario.vehicle)) | {
                 "NAV_DLL_ACT": lambda: _ON_LOSS[context.loss_action],
                 "COM_DL_LOSS_T": lambda: context.loss_timeout,
             }
@@ -57,7 +57,7 @@ def _constants(values: Mapping[str, float]) -> dict[str, Callable[[], float]]:
     return {name: partial(float, value) for name, value in values.items()}
 
 
-def _of_ardusub(vehicle: Vehicle) -> dict[str, float]:
+def _ardusub_parameters(vehicle: Vehicle) -> dict[str, float]:
     motors = _MOTORS[: vehicle.n_thrusters]
     functions = [*motors, *[0] * max(0, _SERVOS - len(motors))]
     return dict.fromkeys(_ARDUSUB_ZEROS, 0.0) | {
@@ -68,7 +68,7 @@ def _of_ardusub(vehicle: Vehicle) -> dict[str, float]:
     }
 
 
-def _of_px4(vehicle: Vehicle) -> dict[str, float]:
+def _px4_parameters(vehicle: Vehicle) -> dict[str, float]:
     return dict.fromkeys(_PX4_ZEROS, 0.0) | {
         "SYS_AUTOSTART": _BLUEROV2_HEAVY if vehicle.name == _HEAVY else _UUV,
         "CAL_ACC0_ID": 1.0,
