@@ -21,7 +21,6 @@ _BATCH = 10_000  # maximum number of rows of a batch
 _BATCH_VALUES = 2**21  # maximum number of values of a batch, 16 MiB
 _GROUPS = 100  # row groups of a long record: a reader needs a kilobyte per group and signal
 _GROUP_VALUES = 2**22  # maximum number of values of a row group
-_BLOCK = 250  # rows that are transposed to columns at once: they fit into processor caches
 # measured: float64 columns compress best with byte stream split; dictionaries only cost time
 _WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_split": True, "write_statistics": False}
 
@@ -29,14 +28,14 @@ _WRITING = {"compression": "zstd", "use_dictionary": False, "use_byte_stream_spl
 class Recorder:
     """Observer that records each step's row; what it has flushed can be read even after a kill."""
 
-    # Ctrl-C may interrupt every call. So that the record has each row once, rows move from `_buffer` to `_message` to
+    # Ctrl-C may interrupt every call. So that the record has each row once, rows move from `_columns` to `_message` to
     # the file by single assignment statements, and an interrupted write is repeated from `_end`.
 
     def __init__(self, folder: Path, columns: Sequence[Column], batch_rows: int | None = None) -> None:
         self._folder, self._schema = folder, record_schema(columns)
         size = batch_rows or max(1, min(_BATCH, _BATCH_VALUES // len(columns)))
-        self._buffer: Array = np.empty((size, len(columns)))
-        self._filled = self._flushed = 0  # rows of the buffer, and rows that it held before
+        self._columns: Array = np.empty((len(columns), size))
+        self._filled = self._flushed = 0  # rows of the columns, and rows that they held before
         self._message = self._schema.serialize()  # bytes that the next write appends
         (folder / STREAM).touch(exist_ok=False)
         self._end = 0  # bytes of the complete messages in the file
@@ -53,13 +52,13 @@ class Recorder:
 
     def observe_block(self, first: int, rows: Array) -> None:
         """Record the rows of the steps from `first` on, shape (steps, columns) of float64."""
-        size = len(self._buffer)
+        size = self._columns.shape[1]
         for begin in range(0, len(rows), size):
             part = rows[begin : begin + size]
             if self._filled + len(part) > size or time.monotonic() > self._due:
                 self._flush()
             n = self._filled + len(part)
-            self._buffer[self._filled : n] = part
+            self._columns[:, self._filled : n] = part.T
             self._filled = n
 
     def close(self) -> None:
@@ -71,13 +70,10 @@ class Recorder:
         (self._folder / STREAM).unlink(missing_ok=True)
 
     def _flush(self) -> None:
-        """Append the rows of the buffer to the stream."""
+        """Append the rows of the columns to the stream."""
         self._write()
         if self._filled:
-            columns = np.empty((len(self._schema), self._filled))
-            for first in range(0, self._filled, _BLOCK):
-                block = slice(first, min(first + _BLOCK, self._filled))
-                columns[:, block] = self._buffer[block].T
+            columns = self._columns[:, : self._filled]
             # not pa.array, which imports pandas where it is installed
             arrays = [
                 pa.Array.from_buffers(pa.float64(), self._filled, [None, pa.py_buffer(column)]) for column in columns
