@@ -347,3 +347,22 @@ def test_reset_keeps_only_effectiveness_and_ceilings():
     assert np.array_equal(estimate.covariance[:EFFECTIVENESS], fresh.covariance[:EFFECTIVENESS])
     assert np.array_equal(estimate.state[EFFECTIVENESS:], kept) and kept[2] == 0.0
     assert estimate.time_since_measurement == -1.0
+
+
+def test_disturbances_drift_faster_while_the_innovations_of_their_axis_are_biased():
+    """The variance grows at 0.3 (b^2 / 0.02 - 1) a second, up to 400 times, and returns."""
+    for axis, channel in enumerate([6, 7, 8, 0, 1, 2]):  # velocity, then moments
+        estimate, dynamics, thrusters = started()
+        estimate.bias[channel] = 0.2  # twice the usual mean square
+        for _ in range(50):
+            predict(estimate, dynamics, thrusters)
+        expected = np.ones(6)
+        expected[axis] = np.exp(0.3 * (0.2**2 / 0.02 - 1.0))
+        assert estimate.drift == pytest.approx(expected, rel=1e-9)
+        estimate.bias[channel] = 9.0
+        estimate.drift[axis] = 399.9
+        predict(estimate, dynamics, thrusters)
+        assert estimate.drift[axis] == 400.0
+        estimate.bias[channel], estimate.drift[axis] = 0.0, 1.001
+        predict(estimate, dynamics, thrusters)
+        assert estimate.drift[axis] == 1.0
