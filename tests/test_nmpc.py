@@ -192,7 +192,7 @@ def test_flights_in_the_file_are_not_flown_again(monkeypatch, tmp_path, planner)
     flown = nmpc_search.Flights(None, path).fly(gains, "plain", 3, 0.4)
     assert started == [(12, True)] * 2  # not settled after 0.2 s
     again = nmpc_search.Flights(None, path)
-    assert again.fly(gains, "plain", 3, 0.4) == flown and len(flown.times) == 5
+    assert repr(again.fly(gains, "plain", 3, 0.4)) == repr(flown) and len(flown.times) == 5  # NaN is in it
     assert len(started) == 2 and len(path.read_text().splitlines()) == 2
     again.fly(gains._replace(margin=0.2), "plain", 3, 0.4)
     assert len(started) == 4

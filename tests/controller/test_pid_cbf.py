@@ -57,7 +57,7 @@ def test_step_is_its_equations(ball):
     # observer
     turning = np.kron(np.diag([1, 0]), R) + np.kron(np.diag([0, 1]), np.eye(3))
     pushes = turning @ memory.dynamics.inverse_mass @ memory.thrusters.matrix
-    still = model.Loads(np.zeros(3), 0.0, np.zeros(3))
+    still = model.Loads(np.zeros(3), 0.0, np.zeros(3), 0.0, 1.0)
     free = model.free_acceleration(memory.dynamics, R, before.velocity[:3], before.velocity[3:], still)
     z, change = 1.0 / (1.0 + gains.observer * PERIOD), free + pushes @ before.thrusters.forces + before.disturbance
     predicted = before.velocity + PERIOD * change
