@@ -29,7 +29,7 @@ def test_failing_thruster_is_isolated_and_finally_no_other(failed, lag):
     assert isolated(law) == []
     sea.left[failed] = 0.0
     seen = []
-    forces = fly(law, sea, steps=450, first=150, each=lambda t: seen.append(isolated(law)))
+    forces = fly(law, sea, steps=550, first=150, each=lambda t: seen.append(isolated(law)))
     assert seen[-1] == [failed]
     assert np.abs(forces[-50:, failed]).max() < 1.0  # what fails while it gives next to nothing may count as stuck
 
