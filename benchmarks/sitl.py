@@ -49,7 +49,7 @@ def measure(steps: int, repeats: int) -> list[Row]:
 
         add_calls("FMU: one step", lambda: flight._master.plant.step(1.0 / RATE))
         add_calls("packet read", lambda: json_protocol.parse_packet(packet))
-        add_calls("pulses to forces", lambda: flights.law.take(outputs))
+        add_calls("pulses to forces", lambda: flights.law.set_outputs(outputs))
         add_calls("master's step, record at 100 Hz, motion", flight.step)
         add_calls("answer written", lambda: json_protocol.format_motion(motion))
         flights.end("ended: measured")

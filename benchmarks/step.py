@@ -46,12 +46,11 @@ def measure(steps: int, repeats: int) -> list[Row]:
     with Master(load_scenario("paper", ["arbiter.engine=closed"])) as master:
         fmu = f"FMU: set {len(master.plant.inputs)}, step, get {len(master.plant.outputs)}"
         add_calls(fmu, lambda: master.plant.step(1e-3))
-        flags, law = f"FMU: {len(master.plant.flags)} flags", "law alone, ismail_dunnigan"
-        add_calls(flags, master.plant.read_flags)
+        add_calls(f"FMU: {len(master.plant.flags)} flags", master.plant.read_flags)
         stages = {stage: BoundCall(stage, (master.model, master.data)).call for stage in (locate, arbitrate, control)}
         add_calls("regions: 4 evaluated", stages[locate])
         add_calls("arbiter, closed form", stages[arbitrate])
-        add_calls(law, _law_alone(master))
+        add_calls("law alone, ismail_dunnigan", _law_alone(master))
         add_calls("controller: law, what it reports, inputs", stages[control])
         with tempfile.TemporaryDirectory() as folder:
             recorder = Recorder(Path(folder), master.signals.columns)
@@ -64,12 +63,9 @@ def measure(steps: int, repeats: int) -> list[Row]:
         again = BoundCall(arbitrate, (master.model, master.data)).call
         add_calls("arbiter, scikit-fuzzy, inputs as before", again)
         add_calls("arbiter, scikit-fuzzy, new inputs", new_inputs, max(1, steps // _SLOWER))
-    alone = sum(timing.least for timing in (timings[fmu], timings[flags], timings[law]))
     for record in (False, True):
         how = "with record" if record else "no record"
-        whole = timings[f"whole step, closed form, {how}"] = _whole("closed", steps, repeats, record=record)
-        beside = Timing(tuple(sample - alone for sample in whole.samples))
-        timings[f"the same, above FMU, flags and law, {how}"] = beside
+        timings[f"whole step, closed form, {how}"] = _whole("closed", steps, repeats, record=record)
     timings["whole step, scikit-fuzzy, with record"] = _whole("skfuzzy", steps, repeats, record=True)
     return compared(timings)
 

@@ -60,7 +60,7 @@ class Workspace(State):
     passive: Indices  # rows whose multiplier is free, in order of addition
     factor: Factor  # Cholesky factor of G over the passive rows
     nominal: VectorM  # u0
-    dual_force: VectorM  # A^T y
+    dual_force: VectorM  # N, A^T y
     refined: VectorM  # u after refinement
 
 

@@ -70,10 +70,10 @@ def test_long_record_memory_is_printed_as_a_table(capfd, tmp_path):
 def test_all_benchmarks_print_one_table_of_ratios(here, subject, capsys, tmp_path):
     arguments = ["--budget", "1e-4", "--repeats", "2", "--peers-python", sys.executable]
     main(["all", subject, *arguments, "--json", str(tmp_path / "figures.json")])
-    assert capsys.readouterr().out.count("ratio") == 2
+    assert capsys.readouterr().out.count("ratio") == (1 if subject == "link" else 2)  # the link has no peer
     rows = [row for table in json.loads((tmp_path / "figures.json").read_text())["tables"] for row in table["rows"]]
     compared = [row for row in rows if row["ratio"]]
-    assert len(compared) > (0 if subject == "link" else 3)
+    assert not compared if subject == "link" else len(compared) > 3
     for row in compared:
         low, high = row["range"]
         assert 0.0 < low <= high
@@ -86,7 +86,7 @@ def test_growth_exponent_is_printed_for_each_curve(capsys, monkeypatch):
     monkeypatch.setattr("benchmarks.scaling.OBSTACLES", (1, 3, 10))
     monkeypatch.setattr("benchmarks.scaling.HORIZONS", (1.0, 2.0, 4.0))
     main(["scaling", "horizon", "obstacles", "--budget", "1e-4", "--repeats", "1"])
-    assert capsys.readouterr().out.count("exponent") >= 6
+    assert capsys.readouterr().out.count("exponent") == 5
 
 
 def test_comparison_row_shows_the_time_ratio(capsys):

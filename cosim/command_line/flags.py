@@ -96,7 +96,7 @@ def int_range(low: int, high: int) -> Callable[[str], int]:
 
 
 def float_range(low: float, high: float) -> Callable[[str], float]:
-    """Make the type of a flag that takes a number from low to high."""
+    """Make the type of a flag that takes a number from low to high, in units of the flag."""
 
     def parse(text: str) -> float:
         try:

@@ -29,7 +29,7 @@ class Prediction:
     windows: int  # number of predicted windows
     identified: Array  # (c,) errors of the identified vehicle
     start_vehicle: Array  # (c,) errors of the vehicle with the start values
-    constant_velocity: Array  # (c,) errors of a prediction with constant velocity
+    constant_velocity: Array  # (c,) SI, errors of a prediction with constant velocity
 
 
 def validate(

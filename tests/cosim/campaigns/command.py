@@ -22,7 +22,7 @@ from cosim.run import progress
 from cosim.campaigns.sweeps import sweep_rows
 from cosim.command_line.cli import main
 from tests.cosim.campaigns.fake import Slow
-rows.FusedFlyer = Slow
+sweep_rows.FusedFlyer = Slow
 progress._Notice.emit = lambda *_: None  # whether anything is compiled depends on what earlier runs kept
 sys.exit(main(sys.argv[1:]))
 """

@@ -169,11 +169,10 @@ def test_scenario_rejected_by_the_fmu_leaves_no_folder_but_the_users(tmp_path, o
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
 def test_run_that_is_cut_off_keeps_its_rows(tmp_path, monkeypatch, last, error):
     class Interrupting(Recorder):
-        def observe(self, k, row):
-            if k == last == 0:
-                raise error
-            super().observe(k, row)
-            if k == last:
+        def observe_block(self, first, rows):
+            if last:
+                super().observe_block(first, rows[: last + 1 - first])
+            if first + len(rows) > last:
                 raise error
 
     monkeypatch.setattr("cosim.run.run_scenario.Recorder", Interrupting)
