@@ -53,13 +53,15 @@ def add_verbs(verbs: Any) -> None:
     flag(verb, "--reckoning-error N", "position error per distance, without a fix", float_range(0.0, 1.0), 0.03)
     flag(verb, "--level-dive M", "an ArduSub's dive after arming, to align its heading", float_range(0.0, 10.0), 0.6)
     flag(verb, "--least-battery PERCENT", "charge below which the vehicle holds still", float_range(0.0, 100.0), 0.0)
-    flag(verb, "--system-id N", "system id: an ArduSub takes sticks from its SYSID_MYGCS alone", int_range(1, 255), 255)
+    system = int_range(1, 255)
     flag(
         verb,
-        "--vehicle-system N",
-        "the autopilot's system id (default: that of the first one heard)",
-        int_range(1, 255),
+        "--system-id N",
+        "own system id; an ArduSub takes sticks of SYSID_MYGCS or MAV_GCS_SYSID alone",
+        system,
+        255,
     )
+    flag(verb, "--vehicle-system N", "the autopilot's system id (default: that of the first one heard)", system)
     flag(verb, "--timeout S", "end if steering cannot begin in so many seconds", float_range(0.1, 1e6))
     flag(verb, "--speedup N", "seconds of a simulated autopilot per second", float_range(0.01, 100.0), 1.0)
     add_remote(verb)
@@ -103,12 +105,12 @@ def companion(options: argparse.Namespace) -> int:
 
 def _scene_origin(text: str) -> tuple[float, float]:
     """Parse the flag; warn if its digits are too few for a vehicle among obstacles."""
-    place = origin(text)
+    coordinates = origin(text)
     decimals = min(len(part.strip().partition(".")[2]) for part in text.split(","))
     if decimals < _DECIMALS:
         error = float(f"{1.1e5 * 0.1**decimals:.2g}")
-        print_status(f"--scene-origin {text}: {decimals} decimals are {error:g} m, expected {_DECIMALS} decimals")
-    return place
+        print_status(f"WARNING: --scene-origin {text}: its last digit is {error:g} m; give {_DECIMALS} decimals")
+    return coordinates
 
 
 def _position(text: str) -> tuple[float, float, float]:

@@ -223,9 +223,9 @@ class Companion:
         while not session.supervisor.is_steering:
             now = session.clock()
             session.exchange(np.zeros(6), now, now + period)
-            self._report(on_state)
             if reason := session.stick_rejection():
                 raise RunError(reason)
+            self._report(on_state)
             if self._options.timeout is not None and now - start > self._options.timeout:
                 raise RunError(f"{self._options.timeout:g} s have passed while waiting for {session.missing()}")
 

@@ -74,7 +74,6 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
 _REACTIONS = {"ardusub": ("FS_PILOT_INPUT", "FS_GCS_ENABLE"), "px4": ("COM_OF_LOSS_T",)}
 # absent in some versions: no warning without them
 _OPTIONAL = ("SYSID_MYGCS", "MAV_GCS_SYSID", "MAV_GCS_SYSID_HI", "FS_GCS_TIMEOUT", "ATC_ANGLE_MAX", "ANGLE_MAX")
-_GCS_TIMEOUT = 2.5  # s, of an ArduSub without FS_GCS_TIMEOUT, as 4.5
 _HOLD_TIMES = ("RC_OVERRIDE_TIME", "FS_PILOT_TIMEOUT")  # times [s] the last sticks act: with a radio, and without one
 _MAX_HOLD_TIME = 1.0  # s
 _NEVER_LEARN = 2.0  # value of EK3_MAG_CAL: never learn the magnetic field
@@ -115,7 +114,7 @@ class Failsafes:
         """Return the received parameters as lines of text; the last ones are warnings."""
         lines = [self._line(parameter) for parameter in PARAMETERS[self._profile] if parameter.name in self.values]
         if self.values.get("FS_GCS_ENABLE") and "FS_GCS_TIMEOUT" not in self.values:
-            lines.append(f"no FS_GCS_TIMEOUT: a ground station is lost after {_GCS_TIMEOUT:g} s")
+            lines.append("FS_GCS_TIMEOUT not answered: an ArduSub without it (4.5) uses 2.5 s")
         silent = [name for name in self._missing() if name not in _OPTIONAL]
         if silent:
             lines.append(f"not answered by the autopilot: {', '.join(silent)}")
@@ -137,22 +136,33 @@ class Failsafes:
         if warning := self.held_sticks_warning():
             yield warning
 
-    def held_sticks_warning(self) -> str:
+    def held_sticks_warning(self, accepts_unknown: bool = True) -> str:
         """Return the parameters by which the last sticks act for long after a lost link; empty if none is known."""
+        if self.values.get("FS_PILOT_INPUT") == 0.0:
+            return "the last sticks outlast a lost link: FS_PILOT_INPUT 0 disables FS_PILOT_TIMEOUT; sticks need 2"
+        unknown = [name for name in self._missing() if name in ("FS_PILOT_INPUT", *_HOLD_TIMES)]
+        if unknown and not accepts_unknown:
+            return f"the last sticks may outlast a lost link: {', '.join(unknown)} not answered"
         hold_times = {name: self.values[name] for name in _HOLD_TIMES if name in self.values}
         if all(0.0 <= time <= _MAX_HOLD_TIME for time in hold_times.values()):
             return ""
         settings = ", ".join(f"{name} is {time:g}" for name, time in hold_times.items())
         return f"the last sticks outlast a lost link: {settings}; expected {_MAX_HOLD_TIME:g} s or less"
 
+    def accepted_systems(self) -> range:
+        """Return the system ids whose sticks the autopilot accepts; empty if they are not known."""
+        first = self.values.get("MAV_GCS_SYSID", self.values.get("SYSID_MYGCS"))
+        if first is None:
+            return range(0)
+        return range(round(first), round(max(first, self.values.get("MAV_GCS_SYSID_HI", first))) + 1)
+
     def ignored_sticks(self, system: int) -> str:
         """Return the parameters by which the autopilot ignores sticks of a system id; empty if none is known."""
-        for name in ("SYSID_MYGCS", "MAV_GCS_SYSID"):
-            first = self.values.get(name, system)
-            last = max(first, self.values.get(f"{name}_HI", first))
-            if not first <= system <= last:
-                return f"{name} is {first:g}" + (f", {name}_HI {last:g}" if last > first else "")
-        return ""
+        accepted = self.accepted_systems()
+        if not accepted or system in accepted:
+            return ""
+        name = "MAV_GCS_SYSID" if "MAV_GCS_SYSID" in self.values else "SYSID_MYGCS"
+        return f"{name} is {accepted[0]}" + (f", {name}_HI {accepted[-1]}" if accepted[-1] > accepted[0] else "")
 
     def learns_magnetic_field(self) -> bool:
         """Return True if an ArduSub learns the magnetic field in flight; without a fix its heading then drifts."""

@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from controller.quaternion import multiply
-from cosim.companion.vehicle_state import ReportedState, turned
+from cosim.companion.vehicle_state import ReportedState, rotate
 from cosim.simulation.signals import Array
 
 log = logging.getLogger(__name__)
@@ -43,7 +43,7 @@ class HeadingWatch:
         self._before = time, state.quaternion.copy(), state.rates.copy()
         if before is None or not 0.0 < time - before[0] <= _MAX_GAP:
             return
-        expected = turned(before[1], 0.5 * (time - before[0]) * (before[2] + state.rates))
+        expected = rotate(before[1], 0.5 * (time - before[0]) * (before[2] + state.rates))
         e0, _, _, e3 = multiply(state.quaternion, expected * (1.0, -1.0, -1.0, -1.0)).tolist()
         self.leap = max(self.leap, abs(2.0 * math.atan(e3 / e0)) if e0 else math.pi)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -57,7 +57,7 @@ class AutopilotSession:
         self._is_law_active = False  # value of the last `Arm` for the master
         self._sent_at: dict[str, float] = {}
         self._held_at, self._release_until = 0.0, -math.inf
-        self._stations, self._noted_stations = set[int](), set[int]()  # system ids of other stations; those warned of
+        self._stations, self._station_warnings = set[int](), set[str]()  # system ids of other stations; warnings so far
 
     def clock(self) -> float:
         """Return the link's time [s]."""
@@ -124,8 +124,8 @@ class AutopilotSession:
         """Return the missing conditions for steering as text."""
         reported, now = self.reported, self._link.clock()
         if reported.system is None:
-            wanted = self._options.vehicle_system
-            return "a heartbeat of an autopilot" + (f" of system {wanted}" if wanted is not None else "")
+            system = self._options.vehicle_system
+            return "a heartbeat of an autopilot" + (f" of system {system}" if system is not None else "")
         if not math.isfinite(reported.age(now)):
             return "LOCAL_POSITION_NED and ATTITUDE_QUATERNION, or ODOMETRY"
         if not self.failsafes.is_read(now):
@@ -135,7 +135,7 @@ class AutopilotSession:
         return self.alignment.missing(reported) or {
             "disarmed": "arming", "held": f"a command to resume after: {self.supervisor.reason}",
             "pilot": f"a command to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
-            "diving": "the heading alignment",
+            "diving": "the heading alignment", "waiting": self.stick_rejection() or "nothing",
         }.get(self.supervisor.state, "nothing")  # fmt: skip
 
     def stick_rejection(self) -> str:
@@ -146,8 +146,11 @@ class AutopilotSession:
         system = self._link.identity[0]
         if ignored := self.failsafes.ignored_sticks(system):
             text = f"{ignored}, and the companion's system id {system}: its sticks would be ignored"
-            return f"{text}; expected the same number, or --steer-by velocity"
-        if o.steer_by == "wrench" and (warning := self.failsafes.held_sticks_warning()):
+            accepted = self.failsafes.accepted_systems()
+            expected = f"from {accepted[0]} to {accepted[-1]}" if accepted[-1] > accepted[0] else f"{accepted[0]}"
+            return f"{text}; expected --system-id {expected}, or --steer-by velocity"
+        is_read = self.failsafes.is_read(self._link.clock())
+        if o.steer_by == "wrench" and (warning := self.failsafes.held_sticks_warning(accepts_unknown=not is_read)):
             return f"{warning}; with --steer-by wrench they would turn the vehicle over"
         if self._gain_error() > GAIN_TOLERANCE:
             return f"the autopilot's pilot gain is {self._gain():g}, expected {o.pilot_gain:g} of --pilot-gain"
@@ -167,7 +170,7 @@ class AutopilotSession:
 
     def _observation(self, now: float) -> Observation:
         reported, alignment = self.reported, self.alignment
-        has_state = math.isfinite(reported.age(now)) and self.failsafes.is_read(now)
+        has_state = math.isfinite(reported.age(now)) and self.failsafes.is_read(now) and not self.stick_rejection()
         values = {
             "lost link": now - reported.received_at,
             "stale estimate": reported.age(now),
@@ -289,7 +292,7 @@ class AutopilotSession:
         if message.get_type() == "COMMAND_LONG":
             self._handle_command(system, component, message)
             return
-        if message.get_type() == "HEARTBEAT" and self._is_station(system, component, message):
+        if message.get_type() == "HEARTBEAT" and message.type == self._mavlink.MAV_TYPE_GCS:
             self._stations.add(system)
         if message.get_type() == "PARAM_VALUE" and (system, component) == (self.reported.system, 1):
             self.failsafes.receive(message)
@@ -298,26 +301,25 @@ class AutopilotSession:
         self.heading.update(self.reported)
         self.dive.update(self.reported, time)
 
-    def _is_station(self, system: int, component: int, heartbeat: Any) -> bool:
-        """Return True for another ground station, or anything else that shares our system id."""
-        ours = self._link.identity
-        is_one = heartbeat.type == self._mavlink.MAV_TYPE_GCS or system == ours[0]
-        return is_one and (system, component) != ours
-
     def _warn_of_stations(self, now: float) -> None:
-        """Warn once of each ground station whose sticks compete with ours, or whose pilot cannot take over by stick."""
+        """Warn once of each ground station whose sticks are ignored or compete, or that hides a failed companion."""
         if not self.failsafes.is_read(now):
             return
-        for system in self._stations - self._noted_stations:
-            self._noted_stations.add(system)
-            if ignored := self.failsafes.ignored_sticks(system):
-                text, more = f"station {system} has no sticks", f"also after a takeover: {ignored}"
-            elif system == self._link.identity[0] and self._options.uses_sticks:
-                text, more = f"station {system} has our system id", "its sticks compete until its pilot takes over"
-            else:
-                continue
-            log.warning("%s, %s", text, more)
-            self._send_text(f"Companion: {text}", is_warning=True)
+        for text, advice in [warning for system in sorted(self._stations) for warning in self._warnings_of(system)]:
+            if text not in self._station_warnings:
+                self._station_warnings.add(text)
+                log.warning("%s%s", text, advice)
+                self._send_text(f"Companion: {text}", is_warning=True)
+
+    def _warnings_of(self, system: int) -> Iterator[tuple[str, str]]:
+        """Yield the warnings of one ground station: a short text, and what the log adds to it."""
+        o, failsafes, accepted = self._options, self.failsafes, self.failsafes.accepted_systems()
+        if ignored := failsafes.ignored_sticks(system):
+            yield f"ArduSub ignores sticks of station {system}", f": {ignored}; set its system id to {accepted[0]}"
+        elif (accepted or system == self._link.identity[0]) and o.uses_sticks and not o.dry_run:
+            yield f"joystick of station {system} competes if on", "; enable it only to take over"
+            if failsafes.values.get("FS_PILOT_INPUT") == 0.0:
+                yield f"no failsafe while station {system} runs", "; it satisfies FS_GCS_ENABLE: set FS_PILOT_INPUT"
 
     def _handle_command(self, system: int, component: int, message: Any) -> None:
         """Apply a DO_PAUSE_CONTINUE that is addressed to the companion: 0 ends steering, 1 resumes it."""

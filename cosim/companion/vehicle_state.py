@@ -10,6 +10,7 @@ import numpy as np
 
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.clock_sync import ClockSync
+from cosim.mavlink.vehicle.profile import find_profile
 from cosim.mavlink.wire.options import ProfileName
 from cosim.simulation.signals import Array
 
@@ -28,13 +29,12 @@ _RATES = {  # Hz, requested rates of messages
     "ESTIMATOR_STATUS": 2.0,
 }
 # messages of one autopilot: another one may answer a request for them with a text on every station
-_OF_ONE: dict[str, ProfileName] = {"CURRENT_MODE": "px4", "EKF_STATUS_REPORT": "ardusub", "ESTIMATOR_STATUS": "px4"}
+_SENDER: dict[str, ProfileName] = {"CURRENT_MODE": "px4", "EKF_STATUS_REPORT": "ardusub", "ESTIMATOR_STATUS": "px4"}
 _ARMED, _CRITICAL = 128, 5  # bit of HEARTBEAT.base_mode; MAV_STATE_CRITICAL: from it on a failsafe is active
 _LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
 _RELATIVE, _ABSOLUTE = 8, 16  # estimator flags: horizontal position is relative, absolute
 _DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
 _DEFLECTED, _INVALID = 50, 0x7FFF  # MANUAL_CONTROL: deflection, of 1000, above which a stick counts; unused stick
-_CENTERED_THROTTLE = (3, 12)  # MAV_AUTOPILOT: ArduPilot and PX4
 _CENTER, _DEFLECTED_PULSE = 1500, 25  # us, center of a channel's pulse; deflection above which it counts
 _MAX_PREDICTION = 0.1  # s, of the state over its age
 _MILLI, _MICRO = 1e-3, 1e-6
@@ -44,7 +44,7 @@ class ReportedState:
     """The state of one autopilot, as its messages report it. Nothing is estimated here."""
 
     def __init__(self, identity: tuple[int, int], vehicle_system: int | None = None) -> None:
-        self._identity, self._wanted = identity, vehicle_system  # None: the first autopilot that is heard
+        self._identity, self._vehicle_system = identity, vehicle_system  # None: the first autopilot that is heard
         self.system: int | None = None
         self.autopilot = 0
         # position [m] and velocity [m/s], NED, in the autopilot's own local frame
@@ -75,11 +75,13 @@ class ReportedState:
         """Process a message that arrived at our time `now` [s]."""
         name = message.get_type()
         if name in ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"):
-            if (system, component) != self._identity and _is_deflected(message, self.autopilot):
+            target = message.target if name == "MANUAL_CONTROL" else message.target_system
+            is_for_vehicle = (system, component) != self._identity and target in (0, self.system)
+            if is_for_vehicle and _is_deflected(message, self.autopilot):
                 self.pilot_at = now
             return
         if self.system is None and name == "HEARTBEAT" and component == 1 and message.autopilot != 8:
-            self.system = system if self._wanted in (None, system) else None
+            self.system = system if self._vehicle_system in (None, system) else None
         handler = getattr(self, f"_receive_{name.lower()}", None)
         if system != self.system or component != 1 or handler is None:
             return
@@ -108,7 +110,7 @@ class ReportedState:
         lead = min(self.age(now), _MAX_PREDICTION)
         if not math.isfinite(lead):
             return self.position.copy(), self.quaternion.copy()
-        return self.position + lead * self.velocity, turned(self.quaternion, lead * self.rates)
+        return self.position + lead * self.velocity, rotate(self.quaternion, lead * self.rates)
 
     @property
     def velocity_body(self) -> Array:
@@ -195,11 +197,11 @@ class ReportedState:
 
 def requested_rates(profile: ProfileName) -> dict[str, float]:
     """Return the rates [Hz] of the messages to request from an autopilot, by name."""
-    return {name: rate for name, rate in _RATES.items() if profile in (_OF_ONE.get(name, profile), "generic")}
+    return {name: rate for name, rate in _RATES.items() if profile in (_SENDER.get(name, profile), "generic")}
 
 
-def turned(quaternion: Array, rotation: Array) -> Array:
-    """Turn an attitude by a rotation vector [rad, body frame]."""
+def rotate(quaternion: Array, rotation: Array) -> Array:
+    """Rotate an attitude by a rotation vector [rad, body frame]."""
     angle = float(np.linalg.norm(rotation))
     return multiply(quaternion, from_axis_angle(rotation / angle, angle)) if angle > 0.0 else quaternion.copy()
 
@@ -210,5 +212,5 @@ def _is_deflected(message: Any, autopilot: int) -> bool:
         pulses = (getattr(message, f"chan{i}_raw") for i in range(1, 7))
         return any(abs(pulse - _CENTER) > _DEFLECTED_PULSE for pulse in pulses if 0 < pulse < 0xFFFF)
     level = any(abs(v) > _DEFLECTED for v in (message.x, message.y, message.r) if v != _INVALID)
-    rest = 500 if autopilot in _CENTERED_THROTTLE else 0
+    rest = find_profile(autopilot).centered_stick
     return level or (message.z != _INVALID and abs(message.z - rest) > _DEFLECTED)

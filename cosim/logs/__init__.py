@@ -3,7 +3,7 @@
 A reader in `formats` writes the samples of a log to disk. Then clocks are aligned, repeats of held values removed,
 bursts spread in time and gaps marked. The result becomes rows of a record. Public: `import_log`.
 
-Imports: io, mavlink.wire, plant_fmu, results, run, scenario, simulation, simulation.commands.
+Imports: io, mavlink.vehicle, mavlink.wire, plant_fmu, results, run, scenario, simulation, simulation.commands.
 """
 
 from cosim.logs.importing import import_log

@@ -7,6 +7,7 @@ from typing import Any
 
 from cosim.logs.frames import ReadComponents, attitude_of_angles, attitude_of_quaternion, scale_fields
 from cosim.logs.spool import LogContents, handled_names
+from cosim.mavlink.vehicle.profile import find_profile
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.manual_control import decode_sticks
 
@@ -17,7 +18,6 @@ _LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
 _MARINE_TYPES = (0, 11, 12)  # MAV_TYPE of generic, surface boat and submarine
 _FROM_OTHERS = ("MANUAL_CONTROL", "VISION_POSITION_DELTA")  # messages of the pilot's station and of a DVL's driver
 _ARDUPILOT, _PX4 = 3, 12  # MAV_AUTOPILOT
-_RESTS_IN_THE_MIDDLE = (_ARDUPILOT, _PX4)  # autopilots whose vertical stick rests at 500
 _FRAME = "Frame: "  # prefix of ArduSub's text with its arrangement of thrusters
 _RATES = ("rates", scale_fields("rollspeed pitchspeed yawspeed"))
 _IMU = (
@@ -74,8 +74,8 @@ class VehicleMessages:
             read(message, written)
 
     def _read_manual_control(self, m: Any, written: float) -> None:
-        center = 500.0 if self._autopilot in _RESTS_IN_THE_MIDDLE else 0.0
-        sticks = decode_sticks(m, center, 400.0 if self._autopilot == _ARDUPILOT else 1000.0)
+        profile = find_profile(self._autopilot)
+        sticks = decode_sticks(m, profile.centered_stick, profile.full_tilt_stick)
         self._contents.put("sticks", "MANUAL_CONTROL", math.nan, written, sticks)
 
     def _read_sys_status(self, m: Any, written: float) -> None:

@@ -97,3 +97,8 @@ PROFILES: dict[ProfileName, Profile] = {
     "px4": Profile("px4", 12, _PX4, True, 500, 1000, False, True, False, "MAV_SYS_ID", (1, 15, 0)),
     "generic": Profile("generic", 0, _PX4, True, 0, 1000, False, False, False, "SYSID_THISMAV", None),
 }
+
+
+def find_profile(autopilot: int) -> Profile:
+    """Return the profile of a MAV_AUTOPILOT; generic for another one."""
+    return next((profile for profile in PROFILES.values() if profile.autopilot == autopilot), PROFILES["generic"])

@@ -1,6 +1,7 @@
 """The companion flies our own vehicle through its autopilot, whose clock is the run's; nothing here waits."""
 
 import math
+import re
 from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
@@ -85,6 +86,8 @@ class Flight:
             assert (message.x, message.y, message.z, message.r) == (0, 0, 0, 0)
 
 
+BRIEF = {"RC_OVERRIDE_TIME": 0.5, "FS_PILOT_TIMEOUT": 0.5}  # s, for which the last sticks act: wrench needs it
+
 OUTPUTS = [  # profile, steered by, sticks by, and what carries it
     ("generic", "sticks", "manual-control", {"MANUAL_CONTROL"}),
     ("generic", "wrench", "manual-control", {"MANUAL_CONTROL"}),
@@ -104,12 +107,11 @@ OUTPUTS = [  # profile, steered by, sticks by, and what carries it
     [OUTPUTS[0], *(pytest.param(*output, marks=pytest.mark.slow) for output in OUTPUTS[1:])],
 )
 def test_goal_is_reached_and_regions_satisfied_by_the_true_state(tmp_path, profile, steer_by, sticks_by, carried_by):
-    flight = Flight(
-        tmp_path, 30.0, link=StandIn(profile=profile, shift=SHIFT), profile=profile, steer_by=steer_by,
-        sticks_by=sticks_by,
-    )  # fmt: skip
+    link = StandIn(profile=profile, shift=SHIFT)
+    link.events = [(0.5, lambda: answer(**BRIEF)(link))]
+    flight = Flight(tmp_path, 30.0, link=link, profile=profile, steer_by=steer_by, sticks_by=sticks_by)
     assert {m.get_type() for _, m in flight.link.sent} & set(STICKS) == carried_by
-    link, goal = flight.link, flight.companion.scenario.goal
+    goal = flight.companion.scenario.goal
     assert flight.status == "completed" and [s for _, s in flight.states][-1] == "steering"
     true = np.array([link.now(f"position.{axis}") for axis in "xyz"])
     assert np.linalg.norm(true - flight.target()) < goal.radius
@@ -125,6 +127,7 @@ def test_goal_is_reached_and_regions_satisfied_by_the_true_state(tmp_path, profi
 def test_docking_by_wrench_keeps_walls_and_heading_by_the_true_state(tmp_path):
     """At full pilot gain, where the law asks for all that the thrusters have."""
     link = StandIn("docking", "ardusub", SHIFT, overrides=["commands.pilot_gain=1.0"])
+    link.events = [(0.5, lambda: answer(**BRIEF)(link))]
     options = CompanionOptions("ardusub", "wrench", origin=GLOBE, pilot_gain=1.0, timeout=10.0)
     companion, begun = Companion(load_scenario("docking", ["time.duration=40"]), link, options), len(link.rows)
     assert companion.run(tmp_path / "run", report=False).summary["status"] == "completed"
@@ -156,10 +159,16 @@ NOT_STEERED = {
     "not armed, by default": ({"armed": False}, {}, None, "waiting for arming"),
     "an ArduSub that would ignore sticks": (
         {"profile": "ardusub"}, {"profile": "ardusub"}, parameter(b"SYSID_MYGCS", 250.0),
-        r"SYSID_MYGCS is 250, and the companion's system id 255"),
+        r"SYSID_MYGCS is 250, and the companion's system id 255: .*; expected --system-id 250, or"),
     "an ArduSub whose last sticks of all axes would act on": (
         {"profile": "ardusub"}, {"profile": "ardusub", "steer_by": "wrench"}, parameter(b"RC_OVERRIDE_TIME", 3.0),
         r"RC_OVERRIDE_TIME is 3; expected 1 s or less; with --steer-by wrench they would turn the vehicle over"),
+    "an ArduSub whose last sticks of all axes would act for ever": (
+        {"profile": "ardusub"}, {"profile": "ardusub", "steer_by": "wrench"}, parameter(b"FS_PILOT_INPUT", 0.0),
+        r"FS_PILOT_INPUT 0 disables FS_PILOT_TIMEOUT; sticks need 2; with --steer-by wrench"),
+    "an ArduSub whose last sticks of all axes may act on": (
+        {"profile": "ardusub"}, {"profile": "ardusub", "steer_by": "wrench"}, parameter(b"RC_OVERRIDE_TIME", 0.5),
+        r"may outlast a lost link: FS_PILOT_TIMEOUT not answered; with --steer-by wrench"),
     "an ArduSub that would misread sticks": (
         {"profile": "ardusub"}, {"profile": "ardusub"},
         mavlink.MAVLink_named_value_float_message(0, b"PilotGain", 0.25),
@@ -413,41 +422,69 @@ def test_overridden_channels_rest_in_the_middle_and_are_then_given_back(tmp_path
     assert link.autopilot._context.sticks == (0.0,) * 6
 
 
-BEAT = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3)
-COMPETES = "station 255 has our system id, its sticks compete until its pilot takes over"
-POWERLESS = "station 250 has no sticks, also after a takeover: SYSID_MYGCS is 255"
+def station(system, kind=mavlink.MAV_TYPE_GCS):
+    """Return an event: the heartbeat of a ground station."""
+    return lambda link: link.hear(mavlink.MAVLink_heartbeat_message(kind, 8, 0, 0, 4, 3), system)
 
 
-def test_conflicting_system_id_is_reported_once(tmp_path, caplog, link):
-    events = [lambda: link.hear(BEAT), lambda: link.hear(BEAT), lambda: link.hear(BEAT, 250)]
-    flight = Flight(tmp_path, 4.0, link=link, events=events)
-    assert flight.status == "completed"
-    assert [r.getMessage() for r in caplog.records if "station" in r.getMessage()] == [COMPETES]
+def answer(**values):
+    """Return an event: the autopilot's parameters."""
+    return lambda link: [link.hear(parameter(name.encode(), value), 1, 1) for name, value in values.items()]
+
+
+ONBOARD = mavlink.MAV_TYPE_ONBOARD_CONTROLLER
+COMPETES = "joystick of station {} competes if on; enable it only to take over"
+IGNORED = "ArduSub ignores sticks of station 250: SYSID_MYGCS is 255; set its system id to 255"
+HIDES = "no failsafe while station 255 runs; it satisfies FS_GCS_ENABLE: set FS_PILOT_INPUT"
+
+
+@pytest.mark.medium(fast=1)
+@pytest.mark.parametrize(
+    ("profile", "options", "events", "warnings"),
+    [
+        ("generic", {}, [station(255), station(255), station(250), station(255, ONBOARD)], [COMPETES.format(255)]),
+        ("generic", {}, [station(255, ONBOARD)], []),
+        ("generic", {"dry_run": True}, [station(255)], []),
+        ("ardusub", {}, [station(250), answer(SYSID_MYGCS=255.0)], [IGNORED]),
+        ("ardusub", {}, [answer(MAV_GCS_SYSID=250.0, MAV_GCS_SYSID_HI=255.0), station(252)], [COMPETES.format(252)]),
+        ("ardusub", {}, [answer(FS_PILOT_INPUT=0.0), station(255)], [COMPETES.format(255), HIDES]),
+    ],
+)  # fmt: skip
+def test_each_station_that_competes_or_is_ignored_is_warned_of_once(
+    tmp_path, caplog, profile, options, events, warnings
+):
+    link = StandIn(profile=profile, shift=SHIFT)
+    begun = 4.0 if profile == "ardusub" else 0.5  # s: an ArduSub's missing parameters are awaited for 3 s
+    link.events = [(begun + 0.1 * k, lambda event=event: event(link)) for k, event in enumerate(events)]
+    assert Flight(tmp_path, 1.5, link=link, profile=profile, **options).status == "completed"
+    assert [r.getMessage() for r in caplog.records if "station" in r.getMessage()] == warnings
+    texts = [m.text for m in link.of_type("STATUSTEXT") if "station" in m.text]
+    for text, warning in zip(texts, warnings, strict=True):  # nothing is cut off: what follows the text is advice
+        assert re.fullmatch(re.escape(text.removeprefix("Companion: ")) + "[:;].*", warning)
 
 
 @pytest.mark.medium
 @pytest.mark.parametrize(
-    ("station", "warned", "least", "most"), [(255, COMPETES, 3.0, 10.0), (250, POWERLESS, 0.0, 1.5)]
+    ("system", "warning", "min_way", "max_way"), [(255, COMPETES.format(255), 3.0, 10.0), (250, IGNORED, 0.0, 1.5)]
 )
 def test_a_pilot_drives_away_by_sticks_of_the_system_that_the_autopilot_obeys(
-    tmp_path, caplog, station, warned, least, most
+    tmp_path, caplog, system, warning, min_way, max_way
 ):
     """One of another system, whose sticks an ArduSub ignores, is warned of before the vehicle is armed."""
     link, begun = StandIn(profile="ardusub", shift=SHIFT, armed=False, obeys=255), 6.0
 
     def drive():
-        link.hear(mavlink.MAVLink_manual_control_message(1, 1000, 0, 500, 0, 0), station)
+        link.hear(mavlink.MAVLink_manual_control_message(1, 1000, 0, 500, 0, 0), system)
 
-    link.events = [(0.4, lambda: link.hear(BEAT, station)),
-                   (0.5, lambda: link.hear(parameter(b"SYSID_MYGCS", 255.0), 1, 1)),
+    link.events = [(0.4, lambda: station(system)(link)), (0.5, lambda: answer(SYSID_MYGCS=255.0)(link)),
                    *((begun + 0.04 * k, drive) for k in range(300))]  # fmt: skip
     flight = Flight(tmp_path, 10.0, link=link, profile="ardusub", arm=True, level_dive=0.0)
     assert flight.status == "pilot: pilot's sticks" and flight.time_of("pilot") - begun <= 0.2
-    assert [r.getMessage() for r in caplog.records if "station" in r.getMessage()] == [warned]
-    (told,) = [k for k, (_, m) in enumerate(link.sent) if m.get_type() == "STATUSTEXT" and "station" in m.text]
-    (armed, *_) = [k for k, (_, m) in enumerate(link.sent) if m.get_type() == "COMMAND_LONG" and m.command == 400]
+    assert [r.getMessage() for r in caplog.records if "station" in r.getMessage()] == [warning]
+    (warned_at,) = [k for k, (_, m) in enumerate(link.sent) if m.get_type() == "STATUSTEXT" and "station" in m.text]
+    (armed_at, *_) = [k for k, (_, m) in enumerate(link.sent) if m.get_type() == "COMMAND_LONG" and m.command == 400]
     way = np.array([link.column(f"position.{axis}")[round(begun / link.step) :] for axis in "xyz"])
-    assert told < armed and least < np.linalg.norm(way[:, -1] - way[:, 0]) < most
+    assert warned_at < armed_at and min_way < np.linalg.norm(way[:, -1] - way[:, 0]) < max_way
 
 
 @pytest.mark.medium

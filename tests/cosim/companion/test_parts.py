@@ -94,13 +94,18 @@ def test_frame_offset_is_derived_from_global_position_and_pressure():
     assert alignment.to_scene(state.position) == pytest.approx(true, abs=0.02)
 
 
-@pytest.mark.parametrize(("wanted", "first"), [(None, 2), (3, 3)])
-def test_only_one_of_two_autopilots_is_flown(wanted, first):
-    state = ReportedState((255, 191), wanted)
+@pytest.mark.parametrize(("chosen", "first"), [(None, 2), (3, 3)])
+def test_only_one_of_two_autopilots_is_flown(chosen, first):
+    state = ReportedState((255, 191), chosen)
     for system in (2, 3):
         for sent in (message("HEARTBEAT", type=12, autopilot=3, base_mode=1), message("LOCAL_POSITION_NED", x=system)):
             state.receive(system, 1, sent, 1.0)
     assert state.system == first and state.position[0] == first
+    for target in (0, 1, 2, 3):
+        for sent in (sticks(900, 500, target), mavlink.MAVLink_rc_channels_override_message(target, 1, *[1700] * 8)):
+            state.pilot_at = -math.inf
+            state.receive(255, 190, sent, 2.0)
+            assert (state.pilot_at == 2.0) == (target in (0, first))
 
 
 def test_zero_latitude_and_longitude_are_a_position_of_an_absolute_estimate():
@@ -421,8 +426,8 @@ def test_supervisor_states_advance_in_order():
     assert Supervisor(dry_run=True).update(Observation(0.0, True, True, False, False, {})) == "dry_run"
 
 
-def sticks(x, z):
-    return mavlink.MAVLink_manual_control_message(1, x, 0, z, 0, 0)
+def sticks(x, z, target=1):
+    return mavlink.MAVLink_manual_control_message(target, x, 0, z, 0, 0)
 
 
 @pytest.mark.parametrize(
@@ -490,22 +495,22 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     assert first == "FS_GCS_ENABLE 2: on a ground station that falls silent it disarms"
     assert second == "FS_GCS_TIMEOUT 5: s until then"
     assert silent.startswith("not answered by the autopilot: FS_PILOT_INPUT,")
-    without_timeout = "no FS_GCS_TIMEOUT: a ground station is lost after 2.5 s"
+    without_timeout = "FS_GCS_TIMEOUT not answered: an ArduSub without it (4.5) uses 2.5 s"
     assert without_timeout in failsafes_of("ardusub", FS_GCS_ENABLE=3.0).text()
     assert without_timeout not in failsafes_of("ardusub", FS_GCS_ENABLE=0.0).text()
 
 
 def test_an_ardusub_that_ignores_the_companion_s_sticks_or_learns_the_magnetic_field_is_known():
-    unknown = failsafes_of("ardusub")
-    assert unknown.ignored_sticks(255) == "" and not unknown.learns_magnetic_field()
-    of_another = failsafes_of("ardusub", SYSID_MYGCS=250.0)
-    assert of_another.ignored_sticks(250) == "" and of_another.ignored_sticks(255) == "SYSID_MYGCS is 250"
-    for last, accepted, words in ((252.0, (250, 252), "MAV_GCS_SYSID is 250, MAV_GCS_SYSID_HI 252"),
-                                  (0.0, (250,), "MAV_GCS_SYSID is 250")):  # fmt: skip
-        newer = failsafes_of("ardusub", MAV_GCS_SYSID=250.0, MAV_GCS_SYSID_HI=last)
-        for system in (249, 250, 251, 252, 253):
-            inside = accepted[0] <= system <= accepted[-1]
-            assert newer.ignored_sticks(system) == ("" if inside else words)
+    newer = {"MAV_GCS_SYSID": 250.0, "MAV_GCS_SYSID_HI": 252.0}
+    for values, accepted, words in (
+        ({}, range(256), ""), ({"SYSID_MYGCS": 250.0}, (250,), "SYSID_MYGCS is 250"),
+        (newer, range(250, 253), "MAV_GCS_SYSID is 250, MAV_GCS_SYSID_HI 252"),
+        (newer | {"MAV_GCS_SYSID_HI": 0.0}, (250,), "MAV_GCS_SYSID is 250"),
+    ):  # fmt: skip
+        for system in range(249, 256):
+            ignored = failsafes_of("ardusub", **values).ignored_sticks(system)
+            assert ignored == ("" if system in accepted else words)
+    assert not failsafes_of("ardusub").learns_magnetic_field()
     for value, learns in ((3.0, True), (2.0, False)):
         assert failsafes_of("ardusub", EK3_MAG_CAL=value).learns_magnetic_field() == learns
 
@@ -524,7 +529,8 @@ FOR_EVER = "the last forces act for ever"
 @pytest.mark.parametrize(
     ("profile", "values", "warning"),
     [
-        ("ardusub", {"FS_PILOT_INPUT": 0.0, "FS_GCS_ENABLE": 0.0}, NO_REACTION),
+        ("ardusub", {"FS_GCS_ENABLE": 0.0}, NO_REACTION),
+        ("ardusub", {"FS_PILOT_INPUT": 0.0, "FS_PILOT_TIMEOUT": 0.5}, "FS_PILOT_INPUT 0 disables FS_PILOT_TIMEOUT"),
         ("px4", {"COM_OF_LOSS_T": 0.0}, f"{NO_REACTION}: COM_OF_LOSS_T"),
         *(("ardusub", {"RC_OVERRIDE_TIME": override, "FS_PILOT_TIMEOUT": pilot},
            OUTLASTS.format(override, pilot) if warns else None)
