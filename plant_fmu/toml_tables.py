@@ -158,7 +158,7 @@ def _sentence(text: str, value: Any, choices: list[tuple[Any, Any]], where: str,
     metas = [meta for _, metas in choices for meta in metas]
     extras = [meta.extra for meta in metas if meta.extra]
     unit = next((extra["unit"] for extra in extras), unit)
-    shown, dot = f"{where or 'file'}: ", f"{where}." if where else ""
+    shown, dot = (f"{where}: ", f"{where}.") if where else ("", "")
     if is_own:
         return f"{dot}{text}"
     if "unknown field" in text or "missing required field" in text:

@@ -12,11 +12,10 @@ from cosim.scenario.scenario import Scenario
 from cosim.simulation.commands.commands import NOT_A_COMMAND, ChangeSetting, Command, SetMission, ShiftRegion
 from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.sources import CommandQueue
-from plant_fmu.errors import one_line
+from plant_fmu.errors import TableError, one_line
+from plant_fmu.toml_tables import decode
 
 MAX_LENGTH = 16_384  # bytes of a message
-
-_decoder = msgspec.json.Decoder(Command)
 
 
 class CommandDesk:
@@ -36,11 +35,11 @@ class CommandDesk:
         if isinstance(message, bytes):
             return "binary messages are not commands, expected JSON text"
         try:
-            command = _decoder.decode(message)
+            command: Command = decode(msgspec.json.decode(message), Command)
             self._check(command)
             if not self._queue.submit(command, self._run):
                 return self._queue.refusal(command, self._run) or "too many commands at once"  # which were taken since
-        except NOT_A_COMMAND as error:
+        except (*NOT_A_COMMAND, TableError) as error:
             return one_line(f"no command: {error}")
         except CommandError as error:
             return str(error)

@@ -29,7 +29,7 @@ def decode_scene(line: bytes) -> AnyScene:
             raise ScenarioError(f"expected one JSON object, got {type(table).__name__!r}")
         scene: AnyScene = decode(table, ScenarioScene) if "scenario" in table else decode(table, Scene)
     except (msgspec.MsgspecError, PlantFmuError, RecursionError, UnicodeDecodeError) as error:
-        raise ScenarioError(str(error).removeprefix("file: ")) from error
+        raise ScenarioError(str(error)) from error
     if isinstance(scene, ScenarioScene):
         check_scenario_scene(scene)
     elif not scene.depth_band[0] < scene.depth_band[1]:

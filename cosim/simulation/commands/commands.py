@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import msgspec
+import numpy as np
 
 from cosim.errors import CommandError
 from plant_fmu.errors import TableError
@@ -169,19 +170,26 @@ Command = (
 )
 
 
-def validate_command(command: Command) -> None:
-    """Raise a CommandError if a number of a command is out of range."""
+def validate_command(command: Command) -> Command:
+    """Return a command with Python's numbers in place of NumPy's; raise a CommandError if one is out of range."""
     try:
-        decode(msgspec.to_builtins(command), type(command))
+        valid: Command = decode(msgspec.to_builtins(command, enc_hook=_to_builtin), type(command))
     except TableError as error:
-        raise CommandError(str(error)) from error
-    match command:
+        setting = f"{command.key}: " if isinstance(command, ChangeSetting) else ""
+        raise CommandError(f"{setting}{error}") from error
+    match valid:
         case SetAttitude(quaternion=q) if q is not None:
             _require(abs(math.hypot(*q) - 1.0) <= _UNIT, "quaternion", q, "four numbers of length 1")
         case SetMission():
-            for item in command.items:
-                count = len(command.items)
+            for item in valid.items:
+                count = len(valid.items)
                 _require(item.jump is None or item.jump < count, "jump", item.jump, f"0 to {count - 1}")
+    return valid
+
+
+def _to_builtin(value: Any) -> Any:
+    """Convert a NumPy number or array; what JSON cannot hold becomes a text, which no number may be."""
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else repr(value)
 
 
 def _require(ok: bool, key: str, received: object, expected: str) -> None:

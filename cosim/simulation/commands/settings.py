@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -12,7 +13,6 @@ from controller import LAWS, ControllerError
 from controller.regions.shape import Shape
 from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
-from cosim.scenario.toml_file import current_name
 from plant_fmu.variables import variables
 
 _GREATEST_RAMP = 1e3  # m, maximum value of ``arbiter.ramp``
@@ -127,9 +127,7 @@ class LiveSettings:
         return item[0] if item else None
 
     def _item_of_shape(self, key: str) -> tuple[str, str, int | None] | None:
-        if key not in self._of_shapes:
-            key = ".".join(current_name({"center": None}, part) for part in key.split("."))
-        return self._of_shapes.get(key)
+        return self._of_shapes.get(key) or self._of_shapes.get(re.sub(r"\.centre(\.\d)$", r".center\1", key))
 
 
 def _keys_of(name: str, shape: Shape) -> Iterator[tuple[str, tuple[str, str, int | None]]]:

@@ -14,6 +14,8 @@ import msgspec
 from cosim.errors import CommandError, RunError
 from cosim.scenario.validation import MAX_STEPS
 from cosim.simulation.commands.commands import NOT_A_COMMAND, Command, Reset, validate_command
+from plant_fmu.errors import TableError
+from plant_fmu.toml_tables import Table, decode
 
 QUEUED = 256  # maximum number of commands between two steps; further ones are rejected
 RUNS = 100  # maximum number of runs of a session: further resets are rejected
@@ -46,7 +48,7 @@ class CommandQueue:
 
     def submit(self, command: Command, run: int | None = None) -> bool:
         """Queue a command for the next step."""
-        validate_command(command)
+        command = validate_command(command)
         with self._lock:
             if self.refusal(command, run):
                 return False
@@ -82,7 +84,7 @@ class CommandQueue:
 _OLDER = re.compile(rb'\{"step": ?\d+, ?"order"')  # beginning of a log of older versions
 
 
-class _Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+class _Entry(Table, frozen=True):
     """A line of the log."""
 
     step: Annotated[int, msgspec.Meta(ge=0, le=MAX_STEPS)]
@@ -102,9 +104,9 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
     entries = []
     for number, line in enumerate(lines, 1):
         try:
-            entry = msgspec.json.decode(line, type=_Entry)
+            entry: _Entry = decode(msgspec.json.decode(line), _Entry)
             validate_command(entry.command)
-        except (*NOT_A_COMMAND, CommandError) as error:
+        except (*NOT_A_COMMAND, TableError, CommandError) as error:
             if type(error) in (msgspec.DecodeError, UnicodeDecodeError) and number > whole:
                 break
             raise RunError(f"{file}, line {number}: {error}") from error
