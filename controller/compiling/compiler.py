@@ -7,6 +7,7 @@ import importlib.util
 import os
 import shlex
 import shutil
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -49,7 +50,9 @@ def compiling(source: Path, library: Path, compiler: Sequence[str] | None = None
     link = f"-Wl,-install_name,@rpath/{library.name}" if library.suffix == ".dylib" else "-s"
     command = [*(compiler or compiler_command()), *FLAGS, link, str(source), "-o", str(library), "-lm"]
     try:
-        process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)  # noqa: S603
+        process = subprocess.Popen(  # noqa: S603
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
+        )
     except OSError as error:
         raise CompilationError(f"C compiler {command[0]}: {error.strerror or error}") from error
 
@@ -64,4 +67,13 @@ def compiling(source: Path, library: Path, compiler: Sequence[str] | None = None
         try:
             yield finish
         finally:
-            process.terminate()
+            if process.poll() is None:
+                _stop(process)
+
+
+def _stop(process: subprocess.Popen[str]) -> None:
+    """Stop a compiler and the processes that it has started, which are a session of their own."""
+    if hasattr(os, "killpg"):
+        os.killpg(process.pid, signal.SIGTERM)
+    else:
+        process.terminate()

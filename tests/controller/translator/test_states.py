@@ -3,11 +3,11 @@
 import copy
 import pickle
 import random
-from typing import Annotated, Any, NamedTuple, TypeVar
+from typing import Annotated, NamedTuple
 
 import numpy as np
 import pytest
-from typing_extensions import TypeAliasType
+from numpy.typing import NDArray
 
 from controller.compiling.function import CompiledFunction, c_text
 from controller.errors import TranslationError
@@ -17,9 +17,7 @@ from tests.controller.translator.building import Called, compiled
 from tests.controller.translator.flights import same_bits
 
 Grid = Annotated[Array, Shape(2, 3)]
-Item = TypeVar("Item", bound=np.generic)
-Alias = TypeAliasType("Alias", np.ndarray[Any, np.dtype[Item]], type_params=(Item,))  # as NDArray of newer NumPy
-Counts = Annotated[Alias[np.int64], Shape("k")]
+Counts = Annotated[NDArray[np.int64], Shape("k")]
 
 
 class Inner(State):
