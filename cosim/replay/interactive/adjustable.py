@@ -4,10 +4,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from typing import Any
 
 from controller import LawError
 from controller.regions.region_set import shape_entry
@@ -25,6 +25,7 @@ _NOISE = ("sensing.position_noise", "sensing.velocity_noise")
 _AXES = {"x": 0, "y": 1, "z": 2, "north": 0, "east": 1}
 _POINTS = ("center", "feature", "point", "middle", "corner")  # packed numbers that are a position
 _DEPTHS = ("top", "bottom", "depth")  # packed numbers that are a depth
+_CHANGES: tuple[Callable[[float], float], ...] = (lambda x: 0.5 * x, lambda x: 2.0 * x + 1.0)
 
 Axes = tuple[tuple[str, ...], ...]  # keys that move a region along each axis
 
@@ -51,9 +52,9 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
     }
     if flight.noise.size:
         targets |= {key: ("noise", (i,)) for i, key in enumerate(_NOISE)}
-    for i, name in enumerate(scenario.law.gains._fields):
-        if _is_used_as_given(scenario, name):
-            targets[f"law.gains.{name}"] = "gains", (i,)
+    gains = scenario.law.gains
+    for gain in _gains_used_as_given(scenario, gains._fields, _numbers(scenario, {})):
+        targets[f"law.gains.{gain}"] = "gains", (gains._fields.index(gain),)
     moves: list[Axes | None] = []
     has_center = shape_entry(scenario.goal).center is not None
     shapes = [("goal", scenario.goal, data.goal, 0)]
@@ -78,18 +79,30 @@ def find_slots(flight: Flight, memory: Memory) -> tuple[list[Slot], list[Axes | 
     return slots, moves
 
 
-def _is_used_as_given(scenario: Scenario, gain: str) -> bool:
-    """Return True if a law's function receives a gain as it is, and no other number of the law depends on it."""
-    value, others = getattr(scenario.law.gains, gain), []
-    for x in (value, 0.5 * value, 2.0 * value + 1.0):
-        gains = scenario.law.gains._replace(**{gain: x})
-        with contextlib.suppress(LawError):  # the law refuses the value
-            law = law_of(dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, gains=gains)))
-            if getattr(law.gains, gain) != x:
-                return False
-            memory = [(array.shape, array.tobytes()) for array in arrays_of(law.memory)]
-            others.append((law.gains._replace(**{gain: value}), memory))
-    return all(other == others[0] for other in others)
+def _gains_used_as_given(scenario: Scenario, names: tuple[str, ...], numbers: Any) -> list[str]:
+    """Return the gains that a law's function receives as they are, and on which none of its other numbers depends."""
+    # all at once, and by halves only where one of them is not
+
+    def is_independent(change: Callable[[float], float]) -> bool:
+        try:
+            changed = {name: change(getattr(scenario.law.gains, name)) for name in names}
+            return bool(_numbers(scenario, changed) == numbers)
+        except LawError:  # the law refuses a value
+            return len(names) == 1
+
+    if all(map(is_independent, _CHANGES)):
+        return [*names]
+    half = len(names) // 2
+    parts = (names[:half], names[half:]) if half else ()
+    return [name for part in parts for name in _gains_used_as_given(scenario, part, numbers)]
+
+
+def _numbers(scenario: Scenario, changed: dict[str, float]) -> tuple[Any, ...]:
+    """Return how much a law changes each gain that it is given, with some of them changed, and its memory."""
+    gains = scenario.law.gains._replace(**changed)
+    law = law_of(dataclasses.replace(scenario, law=dataclasses.replace(scenario.law, gains=gains)))
+    memory = [(array.shape, array.tobytes()) for array in arrays_of(law.memory)]
+    return [own - given for own, given in zip(law.gains, gains, strict=True)], memory
 
 
 def _positions(path: str, shape: Shape) -> Iterator[tuple[int, int, tuple[str, ...]]]:
