@@ -31,5 +31,6 @@ _FORMER = {"CompilationError": "errors", "TranslationError": "errors", "VehicleM
 def __getattr__(name: str) -> object:
     if name not in _FORMER:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    warnings.warn(f"controller.{name} is no longer public", DeprecationWarning, stacklevel=2)
-    return getattr(import_module(f"{__name__}.{_FORMER[name]}"), name)
+    home = f"controller.{_FORMER[name]}"
+    warnings.warn(f"controller.{name} is no longer public, but in {home}", DeprecationWarning, stacklevel=2)
+    return getattr(import_module(home), name)

@@ -6,6 +6,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Annotated, Any
 
 import numpy as np
@@ -126,3 +127,10 @@ def clip_estimate(estimate: Array, bound: float) -> None:
     """Clip numbers of an estimate in place to +-`bound`; NaN stays."""
     # This projection prevents windup of the estimate while an obstacle holds the vehicle back.
     estimate[:] = np.clip(estimate, -bound, bound)
+
+
+def __getattr__(name: str) -> object:
+    if name != "empty_field":
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    warnings.warn("empty_field(n_regions) is now Field(n=n_regions)", DeprecationWarning, stacklevel=2)
+    return lambda n_regions: Field(n=n_regions)

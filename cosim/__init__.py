@@ -103,7 +103,9 @@ def __getattr__(name: str) -> object:
         warnings.warn("cosim.Sweep is now cosim.Campaign", DeprecationWarning, stacklevel=2)
         name = "Campaign"
     if name == "Scene":
-        warnings.warn("cosim.Scene is no longer public", DeprecationWarning, stacklevel=2)
+        warnings.warn(
+            "cosim.Scene is no longer public, but in cosim.campaigns.scenes.scene", DeprecationWarning, stacklevel=2
+        )
     for module, names in _EXPORTS.items():
         if name in names:
             return getattr(importlib.import_module(f"{__name__}.{module}"), name)

@@ -5,9 +5,9 @@ import sys
 from plant_fmu.installing import install_hint
 
 try:
-    from cosim.command_line.cli import main
+    from cosim.command_line.cli import run_console
 
-    status = main()
+    status = run_console()
 except ModuleNotFoundError as error:  # in a checkout that is not installed
     if (error.name or "").partition(".")[0] in ("cosim", "controller", "fuzzy_arbiter", "plant_fmu"):
         raise

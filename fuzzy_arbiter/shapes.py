@@ -33,7 +33,7 @@ class Membership(ABC):
         """Return the degree at a position."""
 
     @abstractmethod
-    def of_many(self, positions: Array) -> Array:
+    def of_many(self, positions: Array, /) -> Array:
         """Return the degrees at many positions, each as a call gives it, to rounding."""
 
     @abstractmethod
@@ -134,7 +134,7 @@ class Shape(Membership):
         a, left = points[i - 1]
         return left + (right - left) * ((x - a) / (b - a))
 
-    def of_many(self, positions: Array) -> Array:
+    def of_many(self, positions: Array, /) -> Array:
         """Return the degrees at many positions, each as a call gives it; positions (n,), returns (n,)."""
         x, y = np.array(self.points).T
         if len(x) == 1:

@@ -18,7 +18,8 @@ _HOMES = {"build": {"build_fmu"}, "running": {"Plant"}, "vehicle": {"Vehicle", "
 
 def __getattr__(name: str) -> object:
     if name == "shipped_vehicles":
-        warnings.warn("plant_fmu.shipped_vehicles is no longer public", DeprecationWarning, stacklevel=2)
+        message = "plant_fmu.shipped_vehicles is no longer public, but in plant_fmu.vehicle"
+        warnings.warn(message, DeprecationWarning, stacklevel=2)
     elif name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     home = next((home for home, names in _HOMES.items() if name in names), "errors")

@@ -124,10 +124,15 @@ def all_verbs(parser: argparse.ArgumentParser) -> Iterator[tuple[str, argparse.A
                 yield from ((f"{name} {inner}", parser) for inner, parser in all_verbs(verb))
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command line."""
+def run_console() -> int:
+    """Run the command line in a process of its own."""
     gc.set_threshold(200_000)  # a run keeps nearly all it makes: modules, figures
     atexit.register(gc.freeze)  # nothing is collected again at exit
+    return main()
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line."""
     return run_guarded(lambda: _run(sys.argv[1:] if arguments is None else arguments))
 
 

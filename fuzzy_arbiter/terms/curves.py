@@ -99,7 +99,7 @@ class Curve(Membership):
             degree = max(degree, self._side(i + 1, x))
         return min(max(degree, 0.0), 1.0)
 
-    def of_many(self, positions: Array) -> Array:
+    def of_many(self, positions: Array, /) -> Array:
         """Return the degrees at many positions, each as a call gives it, to rounding."""
         result = np.empty(len(positions))
         with np.errstate(all="ignore"):

@@ -172,7 +172,7 @@ class Formula(Value, Membership):
         """Return the degree at a position, held within [0, 1]; NaN for a position that is NaN."""
         return x if x != x else min(max(self._parsed({"x": x}), 0.0), 1.0)
 
-    def of_many(self, positions: Array) -> Array:
+    def of_many(self, positions: Array, /) -> Array:
         """Return the degrees at many positions, each as a call gives it, to rounding."""
         values = self._parsed.of_many({"x": positions})
         return np.clip(np.broadcast_to(np.asarray(values, dtype=np.float64), np.shape(positions)), 0.0, 1.0)

@@ -2,6 +2,7 @@
 
 import ast
 import dataclasses
+import importlib
 import json
 import subprocess
 import sys
@@ -93,8 +94,12 @@ def test_paths_may_be_texts_and_scenarios_names(tmp_path, monkeypatch):
     with pytest.warns(DeprecationWarning, match=r"cosim\.Sweep is now cosim\.Campaign"):
         assert cosim.Sweep is cosim.Campaign
     for package, name in ((cosim, "Scene"), (controller, "VehicleModel"), (plant_fmu, "shipped_vehicles")):
-        with pytest.warns(DeprecationWarning, match=f"{name} is no longer public"):
+        with pytest.warns(DeprecationWarning, match=f"{name} is no longer public, but in ") as caught:
             assert getattr(package, name).__name__ == name
+        home = str(caught[0].message).rpartition(" in ")[2]
+        assert getattr(importlib.import_module(home), name).__name__ == name
+    with pytest.warns(DeprecationWarning, match=r"empty_field\(n_regions\) is now Field\(n=n_regions\)"):
+        assert importlib.import_module("controller.potential_field").empty_field(2).values.shape == (2,)
     assert len(list(cosim.read_scenes("scenes.jsonl"))) == 1
     assert cosim.run_campaign("scenes.jsonl", "pd", "campaign").folder == Path("campaign")
     assert cosim.compare("scenes.jsonl", ["pd", "sun_cheah"], "comparison").folder == Path("comparison")

@@ -65,7 +65,7 @@ def test_wheel_holds_only_the_packages(wheel, unpacked, tracked, project):
         "[console_scripts]",
         "cosim",
         "=",
-        "cosim.command_line.cli:main",
+        "cosim.command_line.cli:run_console",
     ]
     assert wheel.name == f"subreach-{project['version']}-py3-none-any.whl"
     assert wheel.stat().st_size < MOST

@@ -153,7 +153,7 @@ def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
                 client = untyped.Client(scheduler, timeout=_SCHEDULER_TIMEOUT)
             stack.enter_context(client)
             client.wait_for_workers(1, timeout=_WORKER_TIMEOUT)
-        except (OSError, ValueError, TimeoutError) as error:
+        except (OSError, ValueError, TimeoutError, RuntimeError) as error:
             reason = " ".join(str(error).split()) or type(error).__name__
             raise RunError(f"the cluster {scheduler or 'on this machine'} cannot be used: {reason}") from error
         executor = client.get_executor()

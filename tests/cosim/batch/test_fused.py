@@ -1,4 +1,4 @@
-"""The fused loop equals the reference master bit for bit for every law."""
+"""Flights without a record equal those of the master bit for bit, and their outcomes its summaries."""
 
 import numpy as np
 import pytest

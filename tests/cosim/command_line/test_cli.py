@@ -308,7 +308,7 @@ def test_ctrl_c_during_imports_exits_cleanly(tmp_path, delay):
     _, said = process.communicate(timeout=240)
     # where it comes within an exec() of some import, CPython ends by the signal, which is 130 to a shell, too
     assert process.returncode in (130, -signal.SIGINT)
-    assert said == "cosim: interrupted\n"
+    assert said in ("cosim: interrupted\n", "")  # the second once it steps
 
 
 @pytest.mark.skipif(os.name != "posix", reason="sends signals")

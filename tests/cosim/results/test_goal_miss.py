@@ -42,6 +42,7 @@ gain = 100.0
 shape = {shape}
 """
 SENSING = "[sensing]\nposition_noise = 0.02\nvelocity_noise = 0.01\n"
+WEAK = "[law.gains]\nacceleration = 0.001\nvelocity_bandwidth = 0.01\n"
 BALL = '{ type = "sphere", center = [3.0, 0.0, 2.0], radius = 1.0 }'
 WALL = '{ type = "half_space", point = [1.5, 0.0, 0.0], normal = [1.0, 0.0, 0.0] }'
 
@@ -70,9 +71,10 @@ def ran(tmp_path, capsys):
         ("", {"duration": 14.0, "goal": 3.0}, "The time was too short: the vehicle was in the goal for the last "),
         ("", {"current": -1.3}, "The thrust was not enough: "),
         ("", {"current": -1.6}, "The thrust was not enough: "),
+        (WEAK, {"current": -1.0, "goal": 6.0, "duration": 14.0}, "The vehicle was adrift: 8."),
         ("[sensing]\ndead_from = 1.0\ndead_for = 99.0\n", {"goal": 9.0}, "the law had no measurement for the last 19."),
     ],
-    ids=["covered", "wall", "shortest", "short", "late", "current", "strong current", "blind"],
+    ids=["covered", "wall", "shortest", "short", "late", "current", "strong current", "weak gains", "blind"],
 )
 def test_missed_goal_has_its_cause_in_console_summary_and_events(ran, text, changes, words):
     run, printed = ran(text, **changes)
