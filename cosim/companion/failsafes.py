@@ -48,6 +48,7 @@ PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
         Parameter("MAV_GCS_SYSID", "system whose sticks are accepted, from 4.7 on"),
         Parameter("MAV_GCS_SYSID_HI", "last system of a range of such systems, 0 for none"),
         Parameter("JS_GAIN_DEFAULT", "pilot gain"),
+        Parameter("JS_THR_GAIN", "gain of the vertical stick beside it"),
         Parameter("EK3_MAG_CAL", "when it learns the magnetic field, 2: never"),
         Parameter("ACRO_YAW_P", "yaw rate of a full stick, in 45 deg/s"),
         Parameter("ATC_ANGLE_MAX", "angle of a full stick of roll or pitch, in degrees"),

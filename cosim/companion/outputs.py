@@ -60,6 +60,8 @@ class Output:
 
     def scale_rates(self, parameters: Mapping[str, float]) -> None:
         """Scale the sticks of rates and lean angles by the autopilot's parameters (a value for each name)."""
+        if self._sticks_by == "rc-override":  # the autopilot's gains leave overridden channels alone
+            parameters = {**parameters, "JS_THR_GAIN": 1.0}
         self._scale = self._scale.with_rates(parameters)
         self._level_lead.set_gains(parameters)
 
@@ -119,6 +121,11 @@ class Output:
             self._overridden = False
             return (release_channels(self._mavlink, state.system or 0),)
         return ()
+
+    @property
+    def pulses(self) -> Array:
+        """Pulses of an ArduSub's channels 1 to 6 that the sticks command, shape (6,) [us]."""
+        return self._scale.pulses(self.sticks)
 
     @property
     def release_time(self) -> float:

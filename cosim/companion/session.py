@@ -15,6 +15,7 @@ from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment
 from cosim.companion.heading import HeadingWatch, LevelDive
 from cosim.companion.outputs import Output
+from cosim.companion.pilot_watch import PilotWatch
 from cosim.companion.safety import GAIN_TOLERANCE, Observation, State, Supervisor
 from cosim.companion.vehicle_state import ReportedState, requested_rates
 from cosim.mavlink.vehicle.profile import PROFILES
@@ -45,7 +46,8 @@ class AutopilotSession:
         self.output = Output(self._mavlink, vehicle, options)
         self._dive_mode: Mode = options.steering_mode if options.steer_by == "velocity" else "hold"
         self._mode = self.profile.custom_modes[options.steering_mode]
-        self.reported = ReportedState(link.identity, options.vehicle_system)
+        self.reported = ReportedState(options.vehicle_system)
+        self.pilot = PilotWatch(link.identity)
         self.alignment = FrameAlignment(options.origin)
         self.heading = HeadingWatch()
         self.dive = LevelDive(options.level_dive if options.profile == "ardusub" and not options.dry_run else 0.0)
@@ -194,7 +196,7 @@ class AutopilotSession:
         is_ours = self.supervisor.state == "steering" or (needs_dive and self._was_in_mode)
         if not self._options.dry_run:
             values |= {
-                "pilot's sticks": float(now - reported.pilot_at < _PILOT_TIMEOUT),
+                "pilot's sticks": float(now - self.pilot.seen_at < _PILOT_TIMEOUT),
                 "disarmed": float(not reported.is_armed),
                 "mode taken": float(not is_in_mode and is_ours),
                 "refused mode": self.supervisor.mode_wait_time(now),
@@ -254,6 +256,8 @@ class AutopilotSession:
             messages = output.release(self.reported, now - self._held_at)
         for message in messages:
             self._link.send(message)
+        if state in ("diving", "engaging", "steering"):
+            self.pilot.record_sent(output.pulses, now)
 
     def _request_hold(self, now: float) -> Sequence[Any]:
         """Request the hold mode, or depth hold if that is refused; return the messages that release the sticks."""
@@ -297,6 +301,7 @@ class AutopilotSession:
         if message.get_type() == "PARAM_VALUE" and (system, component) == (self.reported.system, 1):
             self.failsafes.receive(message)
         self.reported.receive(system, component, message, time)
+        self.pilot.receive(system, component, message, self.reported, time)
         self.alignment.update(self.reported, time)
         self.heading.update(self.reported)
         self.dive.update(self.reported, time)

@@ -54,6 +54,7 @@ class StickScale:
     yaw_rate: float = YAW_RATE  # rates of full sticks: yaw [rad/s]; up, down [m/s]
     climb_rates: tuple[float, float] = (PILOT_SPEED, PILOT_SPEED)  # rates of full sticks: yaw [rad/s]; up, down [m/s]
     max_lean: float = MAX_LEAN  # angle of a full stick of roll or pitch [rad]
+    throttle_gain: float = 1.0  # gain of the stick of heave beside the pilot gain
 
     def sticks(self, wrench: Array) -> Array:
         """Return the sticks that command a wrench, shape (6,), X Y Z K M N from -1 to 1; wrench (6,) [N, N m]."""
@@ -100,7 +101,11 @@ class StickScale:
     @cached_property
     def _gains(self) -> Array:
         tilt = self.gain if self.scales_all else 1.0
-        return np.array([self.gain, self.gain, self.gain, tilt, tilt, self.gain])
+        return np.array([self.gain, self.gain, self.gain * self.throttle_gain, tilt, tilt, self.gain])
+
+    def pulses(self, sticks: Array) -> Array:
+        """Return the pulses of channels 1 to 6 that sticks of X Y Z K M N command, shape (6,) [us]."""
+        return channel_pulses(self._gains * sticks)
 
     def yaw_rate_stick(self, rate: float) -> float:
         """Return the yaw stick that commands a yaw rate [rad/s]; 0 for one that is not finite."""
@@ -108,7 +113,7 @@ class StickScale:
 
     def climb_stick(self, rate_down: float) -> float:
         """Return the heave stick that commands a depth rate [m/s]; 0 for one that is not finite."""
-        return self._rate_stick(rate_down / self.climb_rates[rate_down > 0.0], CLIMB_DEAD_ZONE)
+        return self._rate_stick(rate_down / self.climb_rates[rate_down > 0.0], CLIMB_DEAD_ZONE, self.throttle_gain)
 
     def with_rates(self, parameters: Mapping[str, float]) -> StickScale:
         """Return this scale with the rates and angles of an ArduSub's parameters, without missing ones and 0."""
@@ -116,8 +121,11 @@ class StickScale:
         yaw, up = parameters.get("ACRO_YAW_P", 0.0), abs(parameters.get("PILOT_SPEED_UP", 0.0))
         down = abs(parameters.get("PILOT_SPEED_DN", 0.0)) or up
         climb = _CENTI * up or self.climb_rates[0], _CENTI * down or self.climb_rates[1]
-        yaw_rate = _FULL_YAW * yaw or self.yaw_rate
-        return replace(self, yaw_rate=yaw_rate, climb_rates=climb, max_lean=math.radians(degrees) or self.max_lean)
+        return replace(
+            self, yaw_rate=_FULL_YAW * yaw or self.yaw_rate, climb_rates=climb,
+            max_lean=math.radians(degrees) or self.max_lean,
+            throttle_gain=parameters.get("JS_THR_GAIN", 0.0) or 1.0,
+        )  # fmt: skip
 
     def lean_sticks(self, angles: Array) -> Array:
         """Return the sticks of roll and pitch, shape (2,), that command these angles [rad] in STABILIZE."""
@@ -125,11 +133,11 @@ class StickScale:
             [invert_dead_zone(min(max(angle / self.max_lean, -1.0), 1.0), LEAN_DEAD_ZONE) for angle in angles.tolist()]
         )
 
-    def _rate_stick(self, part: float, dead_zone: float) -> float:
+    def _rate_stick(self, part: float, dead_zone: float, gain: float = 1.0) -> float:
         if not math.isfinite(part):
             return 0.0
         deflection = invert_dead_zone(part, dead_zone * self.dead_zones)
-        return min(max(deflection / self.gain, -1.0), 1.0)
+        return min(max(deflection / (gain * self.gain), -1.0), 1.0)
 
 
 def make_stick_scale(vehicle: Vehicle, profile: Profile, pilot_gain: float, sticks_by: SticksBy) -> StickScale:
@@ -159,11 +167,15 @@ def make_manual_control(mavlink: Any, system: int, profile: Profile, sticks: Arr
     return message
 
 
+def channel_pulses(sticks: Array) -> Array:
+    """Return pulses [us] in ArduSub's order, shape (6,): pitch, roll, up, yaw, forward, right."""
+    surge, sway, heave, roll, pitch, yaw = sticks
+    return _CENTER + _SWING * np.array([pitch, roll, -heave, yaw, surge, sway])
+
+
 def override_channels(mavlink: Any, system: int, sticks: Array) -> Any:
-    """Return RC_CHANNELS_OVERRIDE in ArduSub's order: pitch, roll, up, yaw, forward, right."""
-    surge, sway, heave, roll, pitch, yaw = sticks.tolist()
-    pulses = [round(_CENTER + _SWING * part) for part in (pitch, roll, -heave, yaw, surge, sway)]
-    return _override(mavlink, system, pulses)
+    """Return RC_CHANNELS_OVERRIDE for sticks of X Y Z K M N, shape (6,)."""
+    return _override(mavlink, system, [round(pulse) for pulse in channel_pulses(sticks).tolist()])
 
 
 def release_channels(mavlink: Any, system: int) -> Any:

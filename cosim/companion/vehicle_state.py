@@ -10,7 +10,6 @@ import numpy as np
 
 from controller.quaternion import from_axis_angle, multiply, rotation_matrix
 from cosim.companion.clock_sync import ClockSync
-from cosim.mavlink.vehicle.profile import find_profile
 from cosim.mavlink.wire.options import ProfileName
 from cosim.simulation.signals import Array
 
@@ -21,6 +20,7 @@ _RATES = {  # Hz, requested rates of messages
     "LOCAL_POSITION_NED": 50.0,
     "GLOBAL_POSITION_INT": 5.0,
     "SERVO_OUTPUT_RAW": 10.0,
+    "RC_CHANNELS": 43.0,  # in step with our sticks at 50 Hz, it could always miss a pilot's between two of ours
     "SYS_STATUS": 2.0,
     "SCALED_PRESSURE": 10.0,
     "SCALED_PRESSURE2": 10.0,
@@ -28,14 +28,15 @@ _RATES = {  # Hz, requested rates of messages
     "EKF_STATUS_REPORT": 2.0,
     "ESTIMATOR_STATUS": 2.0,
 }
-# messages of one autopilot: another one may answer a request for them with a text on every station
-_SENDER: dict[str, ProfileName] = {"CURRENT_MODE": "px4", "EKF_STATUS_REPORT": "ardusub", "ESTIMATOR_STATUS": "px4"}
+# messages of some autopilots: another one may answer a request for them with a text on every station
+_SENDERS: dict[str, tuple[ProfileName, ...]] = {
+    "CURRENT_MODE": ("px4", "generic"), "RC_CHANNELS": ("ardusub",), "EKF_STATUS_REPORT": ("ardusub", "generic"),
+    "ESTIMATOR_STATUS": ("px4", "generic"),
+}  # fmt: skip
 _ARMED, _CRITICAL = 128, 5  # bit of HEARTBEAT.base_mode; MAV_STATE_CRITICAL: from it on a failsafe is active
 _LOCAL_NED, _BODY_FRD = 1, 12  # MAV_FRAME
 _RELATIVE, _ABSOLUTE = 8, 16  # estimator flags: horizontal position is relative, absolute
 _DOWNWARDS = 25  # MAV_SENSOR_ROTATION_PITCH_270
-_DEFLECTED, _INVALID = 50, 0x7FFF  # MANUAL_CONTROL: deflection, of 1000, above which a stick counts; unused stick
-_CENTER, _DEFLECTED_PULSE = 1500, 25  # us, center of a channel's pulse; deflection above which it counts
 _MAX_PREDICTION = 0.1  # s, of the state over its age
 _MILLI, _MICRO = 1e-3, 1e-6
 
@@ -43,8 +44,8 @@ _MILLI, _MICRO = 1e-3, 1e-6
 class ReportedState:
     """The state of one autopilot, as its messages report it. Nothing is estimated here."""
 
-    def __init__(self, identity: tuple[int, int], vehicle_system: int | None = None) -> None:
-        self._identity, self._vehicle_system = identity, vehicle_system  # None: the first autopilot that is heard
+    def __init__(self, vehicle_system: int | None = None) -> None:
+        self._vehicle_system = vehicle_system  # None: the first autopilot that is heard
         self.system: int | None = None
         self.autopilot = 0
         # position [m] and velocity [m/s], NED, in the autopilot's own local frame
@@ -61,8 +62,7 @@ class ReportedState:
         self.pulses: tuple[int, ...] = ()
         self.is_leaking = self.is_reckoned = self._is_absolute = False
         self.resets = 0  # ODOMETRY.reset_counter of the autopilot's estimate
-        # our times [s] of the autopilot's last processed message, and of the last deflected sticks of another station
-        self.received_at = self.pilot_at = -math.inf
+        self.received_at = -math.inf  # our time [s] of the autopilot's last processed message
         self.message_counts: Counter[str] = Counter()  # counts of received messages, by name
         self.results: dict[int, int] = {}  # last MAV_RESULT of each command, by MAV_CMD number
         self.texts: list[str] = []
@@ -74,12 +74,6 @@ class ReportedState:
     def receive(self, system: int, component: int, message: Any, now: float) -> None:
         """Process a message that arrived at our time `now` [s]."""
         name = message.get_type()
-        if name in ("MANUAL_CONTROL", "RC_CHANNELS_OVERRIDE"):
-            target = message.target if name == "MANUAL_CONTROL" else message.target_system
-            is_for_vehicle = (system, component) != self._identity and target in (0, self.system)
-            if is_for_vehicle and _is_deflected(message, self.autopilot):
-                self.pilot_at = now
-            return
         if self.system is None and name == "HEARTBEAT" and component == 1 and message.autopilot != 8:
             self.system = system if self._vehicle_system in (None, system) else None
         handler = getattr(self, f"_receive_{name.lower()}", None)
@@ -197,20 +191,10 @@ class ReportedState:
 
 def requested_rates(profile: ProfileName) -> dict[str, float]:
     """Return the rates [Hz] of the messages to request from an autopilot, by name."""
-    return {name: rate for name, rate in _RATES.items() if profile in (_SENDER.get(name, profile), "generic")}
+    return {name: rate for name, rate in _RATES.items() if profile in _SENDERS.get(name, (profile,))}
 
 
 def rotate(quaternion: Array, rotation: Array) -> Array:
     """Rotate an attitude by a rotation vector [rad, body frame]."""
     angle = float(np.linalg.norm(rotation))
     return multiply(quaternion, from_axis_angle(rotation / angle, angle)) if angle > 0.0 else quaternion.copy()
-
-
-def _is_deflected(message: Any, autopilot: int) -> bool:
-    """Return True if a stick is deflected from its rest position."""
-    if message.get_type() == "RC_CHANNELS_OVERRIDE":
-        pulses = (getattr(message, f"chan{i}_raw") for i in range(1, 7))
-        return any(abs(pulse - _CENTER) > _DEFLECTED_PULSE for pulse in pulses if 0 < pulse < 0xFFFF)
-    level = any(abs(v) > _DEFLECTED for v in (message.x, message.y, message.r) if v != _INVALID)
-    rest = find_profile(autopilot).centered_stick
-    return level or (message.z != _INVALID and abs(message.z - rest) > _DEFLECTED)

@@ -46,7 +46,7 @@ def actuator_output_status(context: VehicleContext) -> Iterator[Fields]:
 
 
 def rc_channels(context: VehicleContext) -> Iterator[Fields]:
-    """RC_CHANNELS: the last applied sticks, in the order of ArduSub: pitch roll up yaw forward lateral."""
+    """RC_CHANNELS: the last sticks, of an ArduSub times the gain, in its order: pitch roll up yaw forward lateral."""
     surge, sway, heave, roll, pitch, yaw = context.sticks
     order = pitch, roll, -heave, yaw, surge, sway
     pulses = [_CENTER + _SWING * stick for stick in order] + [0xFFFF] * 12

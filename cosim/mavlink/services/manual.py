@@ -64,9 +64,14 @@ class ManualControlService(Service):
             context.send_text("Lost manual control", "CRITICAL", "sticks", _TIMEOUT)
 
     def _receive_manual_control(self, sender: Sender, message: Any) -> None:
-        if message.target == self.context.options.system_id:
-            profile = self.context.profile
-            self._apply(sender, decode_sticks(message, profile.centered_stick, profile.full_tilt_stick), by_gain=True)
+        context, profile = self.context, self.context.profile
+        if message.target == context.options.system_id:
+            sticks = decode_sticks(message, profile.centered_stick, profile.full_tilt_stick)
+            if profile.name == "ardusub":  # its gain leaves roll and pitch alone
+                x, y, z, k, m, n = sticks
+                gain = context.settings["commands.pilot_gain"]
+                sticks = gain * x, gain * y, gain * z, k, m, gain * n
+            self._apply(sender, sticks, by_gain=profile.name != "ardusub")
 
     def _receive_rc_channels_override(self, sender: Sender, message: Any) -> None:
         pulses = [getattr(message, f"chan{i}_raw") for i in range(1, _CHANNELS + 1)]
@@ -91,30 +96,25 @@ class ManualControlService(Service):
         context = self.context
         if sticks == context.sticks:
             return
-        command = ManualControl(self._wrench_fractions(sticks, by_gain), by_gain)
-        if context.submit(command) == Result.ACCEPTED:
+        if context.submit(ManualControl(self._wrench_fractions(sticks), by_gain)) == Result.ACCEPTED:
             context.sticks = sticks
 
-    def _wrench_fractions(self, sticks: Vector6, by_gain: bool) -> Vector6:
-        """Return the fractions of the maximum wrench that the sticks command, before the pilot gain."""
-        # ArduSub commands its thrusters by gain times stick, and their force is proportional to the square of the sum.
-        # The gain does not apply to overridden channels.
+    def _wrench_fractions(self, sticks: Vector6) -> Vector6:
+        """Return the fractions of the maximum wrench that sticks command; an ArduSub's include the pilot gain."""
+        # ArduSub commands its thrusters by them, and their force is proportional to the square of the sum.
         context, mode = self.context, self.context.mode_ahead
         if context.profile.name != "ardusub":
             return sticks
         gain = context.settings["commands.pilot_gain"]
-        scale = gain if by_gain else 1.0
-        scaled = np.array(sticks) * (scale, scale, scale, 1.0, 1.0, scale)  # the gain leaves roll and pitch alone
-        is_force, parts = np.arange(len(scaled)) < _FORCE_AXES[mode], np.array(sticks)
+        is_force, parts = np.arange(len(sticks)) < _FORCE_AXES[mode], np.array(sticks)
         if self._mixer is not None:
-            mixed = np.clip(self._mixer.wrench(np.where(is_force, scaled, 0.0)) * self._reciprocal, -1.0, 1.0) / scale
-            parts[is_force] = mixed[is_force]
+            parts[is_force] = (self._mixer.wrench(np.where(is_force, parts, 0.0)) * self._reciprocal)[is_force]
         if mode != "manual":  # beyond a dead zone, a rate of turn and angles
-            parts[5] = apply_dead_zone(scaled[5], gain * YAW_DEAD_ZONE) / scale
+            parts[5] = apply_dead_zone(parts[5], gain * YAW_DEAD_ZONE)
             parts[3:5] = [
                 apply_dead_zone(part, LEAN_DEAD_ZONE) * MAX_LEAN / GREATEST_TILT for part in parts[3:5].tolist()
             ]
         if mode == "depth_hold":  # likewise of the depth
-            parts[2] = apply_dead_zone(scaled[2], gain * CLIMB_DEAD_ZONE)
+            parts[2] = apply_dead_zone(parts[2], gain * CLIMB_DEAD_ZONE)
         x, y, z, k, m, n = np.clip(parts, -1.0, 1.0).tolist()
         return x, y, z, k, m, n

@@ -31,7 +31,7 @@ class StandIn:
 
     def __init__(
         self, scenario="pipe-inspection", profile="ardusub", shift=(0.0, 0.0, 0.0), overrides=(), armed=True, silent=(),
-        obeys=None,
+        obeys=None, routed=False,
     ):  # fmt: skip
         enabled = ["commands.enabled=true", "commands.await_arm=true", "commands.obstacles=0", "time.duration=3600"]
         self.master = Master(load_scenario(scenario, [*enabled, *overrides]))
@@ -44,6 +44,7 @@ class StandIn:
         self.cut = False  # True: no link at all
         self.refused_commands, self.silent = set(), set(silent)  # commands and messages that go nowhere
         self.obeys = obeys  # the one system whose sticks reach the vehicle, as an ArduSub's SYSID_MYGCS; None: any
+        self.routed = routed  # True: mavlink-router stands between
         self.tamper = {}  # what is done to a message of a kind on its way
         self.events = []  # times, and what happens then
         self.stall = 0.0  # s, for which the companion's computer does nothing
@@ -107,11 +108,16 @@ class StandIn:
         return True
 
     def hear(self, message, system=255, component=190):
-        """Let somebody else say something, to the vehicle and to whoever listens."""
+        """Let somebody else say something, to the vehicle and to whoever listens.
+
+        mavlink-router forwards a message with a target only to endpoints that have shown its system.
+        """
         (decoded,) = mavlink.MAVLink(None).parse_buffer(message.pack(mavlink.MAVLink(None, system, component)))
         if self.obeys in (None, system) or message.get_type() != "MANUAL_CONTROL":
             self._up.append((self.clock(), decoded))
-        self._down.append((self.clock(), decoded))
+        target = getattr(decoded, "target", getattr(decoded, "target_system", 0))
+        if not self.routed or target in (0, IDENTITY[0]):
+            self._down.append((self.clock(), decoded))
 
     # ---- time ----
 

@@ -465,13 +465,15 @@ def test_each_station_that_competes_or_is_ignored_is_warned_of_once(
 
 @pytest.mark.medium
 @pytest.mark.parametrize(
-    ("system", "warning", "min_way", "max_way"), [(255, COMPETES.format(255), 3.0, 10.0), (250, IGNORED, 0.0, 1.5)]
-)
+    ("system", "routed", "warning", "min_way", "max_way"),
+    [(255, False, COMPETES.format(255), 3.0, 10.0), (255, True, COMPETES.format(255), 3.0, 10.0),
+     (250, False, IGNORED, 0.0, 1.5)],
+)  # fmt: skip
 def test_a_pilot_drives_away_by_sticks_of_the_system_that_the_autopilot_obeys(
-    tmp_path, caplog, system, warning, min_way, max_way
+    tmp_path, caplog, system, routed, warning, min_way, max_way
 ):
     """One of another system, whose sticks an ArduSub ignores, is warned of before the vehicle is armed."""
-    link, begun = StandIn(profile="ardusub", shift=SHIFT, armed=False, obeys=255), 6.0
+    link, begun = StandIn(profile="ardusub", shift=SHIFT, armed=False, obeys=255, routed=routed), 6.0
 
     def drive():
         link.hear(mavlink.MAVLink_manual_control_message(1, 1000, 0, 500, 0, 0), system)

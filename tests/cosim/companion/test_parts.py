@@ -6,6 +6,8 @@ import time
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.companion.autopilot_link import NetworkLink
@@ -15,6 +17,7 @@ from cosim.companion.companion_run import Companion
 from cosim.companion.failsafes import Failsafes
 from cosim.companion.frame_alignment import FrameAlignment, SceneOrigin
 from cosim.companion.heading import HeadingWatch, LevelDive
+from cosim.companion.pilot_watch import PilotWatch
 from cosim.companion.safety import CONDITIONS, Observation, Supervisor
 from cosim.companion.set_points import TurnLead, VelocityLead, make_attitude_message, make_velocity_target
 from cosim.companion.sticks import make_manual_control, make_stick_scale, override_channels, release_channels
@@ -57,7 +60,7 @@ def test_clock_offset_uses_the_fastest_answer_since_the_autopilot_started():
 
 def reported(position, geodetic=None, depth=None, received_at=0.0, state=None):
     """Let a state receive position and, where they are given, latitude and longitude and the pressure of a depth."""
-    state = state or ReportedState((255, 191))
+    state = state or ReportedState()
     x, y, z = map(float, position)
     messages = [
         message("HEARTBEAT", type=12, autopilot=3, base_mode=1),
@@ -96,16 +99,16 @@ def test_frame_offset_is_derived_from_global_position_and_pressure():
 
 @pytest.mark.parametrize(("chosen", "first"), [(None, 2), (3, 3)])
 def test_only_one_of_two_autopilots_is_flown(chosen, first):
-    state = ReportedState((255, 191), chosen)
+    state = ReportedState(chosen)
     for system in (2, 3):
         for sent in (message("HEARTBEAT", type=12, autopilot=3, base_mode=1), message("LOCAL_POSITION_NED", x=system)):
             state.receive(system, 1, sent, 1.0)
     assert state.system == first and state.position[0] == first
     for target in (0, 1, 2, 3):
         for sent in (sticks(900, 500, target), mavlink.MAVLink_rc_channels_override_message(target, 1, *[1700] * 8)):
-            state.pilot_at = -math.inf
-            state.receive(255, 190, sent, 2.0)
-            assert (state.pilot_at == 2.0) == (target in (0, first))
+            pilot = PilotWatch((255, 191))
+            pilot.receive(255, 190, sent, state, 2.0)
+            assert (pilot.seen_at == 2.0) == (target in (0, first))
 
 
 def test_zero_latitude_and_longitude_are_a_position_of_an_absolute_estimate():
@@ -231,7 +234,7 @@ def test_state_is_predicted_over_its_age():
     assert position == pytest.approx([1.02, 2.0, 2.99])
     assert quaternion_to_euler(quaternion.tolist()) == pytest.approx((0.0, 0.0, 0.012))
     assert state.predict(20.0)[0] == pytest.approx([1.05, 2.0, 2.975])
-    never = ReportedState((255, 191))
+    never = ReportedState()
     assert np.isnan(never.predict(0.0)[0]).all()
 
 
@@ -320,7 +323,7 @@ def test_a_dive_by_velocity_stays_on_the_spot_against_a_current():
 def test_distance_without_a_fix_is_accumulated():
     """Of 3 m north and 4 m down the horizontal part, and only while the estimate says that it is relative."""
     relative, absolute = 8, 24  # flags of EKF_STATUS_REPORT and ESTIMATOR_STATUS
-    alignment, state = FrameAlignment(SceneOrigin(surveyed=SHIFT)), ReportedState((255, 191))
+    alignment, state = FrameAlignment(SceneOrigin(surveyed=SHIFT)), ReportedState()
     way = [(0.0, absolute), (1.0, absolute), (2.0, relative), (4.0, relative), (9.0, absolute)]
     for k, (north, flags) in enumerate(way):
         reported((north, 0.0, 4.0 * north / 3.0), received_at=k * 0.02, state=state)
@@ -341,7 +344,7 @@ def attitude(state, at, yaw, rate):
 
 
 def test_a_heading_leaps_where_the_rates_do_not_explain_its_turn():
-    state, watch = ReportedState((255, 191)), HeadingWatch()
+    state, watch = ReportedState(), HeadingWatch()
     state.receive(1, 1, mavlink.MAVLink_heartbeat_message(12, 3, 0, 0, 4, 3), 0.0)
     for k in range(100):  # a turn of 50 deg/s across 180 deg
         attitude(state, 0.02 * k, 3.0 + math.radians(k), math.radians(50.0))
@@ -358,7 +361,7 @@ def test_a_heading_leaps_where_the_rates_do_not_explain_its_turn():
 
 def dived(texts=(), clearance=None, armed_first=False):
     """Let a vehicle be armed and follow the dive, and return it, the state, and for how long it dived [s]."""
-    state, dive = ReportedState((255, 191)), LevelDive(0.6)
+    state, dive = ReportedState(), LevelDive(0.6)
     dive.clearance = clearance
     state.system, state.is_armed = 1, armed_first
     state.position[:], state.velocity[:] = (0.0, 0.0, 1.0), 0.0
@@ -442,9 +445,38 @@ def sticks(x, z, target=1):
     ],
 )  # fmt: skip
 def test_deflected_foreign_sticks_count_as_a_pilot(sender, sent, counts):
-    state = reported((0.0, 0.0, 0.0))
-    state.receive(*sender, sent, 5.0)
-    assert (state.pilot_at == 5.0) == counts
+    pilot = PilotWatch((255, 191))
+    pilot.receive(*sender, sent, reported((0.0, 0.0, 0.0)), 5.0)
+    assert (pilot.seen_at == 5.0) == counts
+
+
+def channels(pulses):
+    return mavlink.MAVLink_rc_channels_message(0, 6, *np.round(pulses).astype(int).tolist(), *[0xFFFF] * 12, 0xFF)
+
+
+@given(
+    st.integers(0, 2**32 - 1), st.sampled_from([0.05, 0.3, 1.0]), st.floats(0.0, 0.4),
+    st.integers(0, 5), st.sampled_from([-1, 1]),
+)  # fmt: skip
+def test_only_channels_beyond_our_recent_sticks_and_off_their_rest_are_a_pilot(seed, size, delay, channel, sign):
+    """As an ArduSub reports them late, on any wiring; a radio rests where it was before our first stick."""
+    random, state = np.random.default_rng(seed), reported((0.0, 0.0, 0.0))
+    scale, pilot = make_stick_scale(HEAVY, ARDUSUB, 0.5, "manual-control"), PilotWatch((255, 191))
+    rest = np.where(random.random(6) < 0.5, 1500.0, random.integers(1100, 1900, 6))
+    pilot.receive(1, 1, channels(rest), state, 0.0)
+    sent = [np.clip(random.normal(0.0, size, 6), -1.0, 1.0) for _ in range(100)]
+    gains = np.array([1.0, 1.0, 0.5, 0.5, 0.5, 0.5])  # of pitch roll up yaw ahead right
+    pulses = [1500.0 + 400.0 * gains * (s * (1, 1, -1, 1, 1, 1))[[4, 3, 2, 5, 0, 1]] for s in sent]
+    for k, own in enumerate(sent):
+        now = 1.0 + 0.02 * k
+        pilot.record_sent(scale.pulses(own), now)
+        late = k - round(delay / 0.02)
+        pilot.receive(1, 1, channels(pulses[late] if late >= 0 else rest), state, now)
+    assert pilot.seen_at == -math.inf
+    foreign, recent = pulses[-1].copy(), np.array([np.full(6, 1500.0), *pulses[-26:]])[:, channel]
+    foreign[channel] = recent.max() + 40.0 if sign > 0 else recent.min() - 40.0
+    pilot.receive(1, 1, channels(foreign), state, 3.0)
+    assert (pilot.seen_at == 3.0) == (abs(foreign[channel] - rest[channel]) > 26.0)
 
 
 def test_a_px4_mode_is_known_before_its_next_heartbeat():
@@ -457,10 +489,10 @@ def test_a_px4_mode_is_known_before_its_next_heartbeat():
 
 def test_no_message_is_requested_that_the_autopilot_does_not_have():
     """An ArduSub answers each such request with a text on every station."""
-    reports = {"px4": {"CURRENT_MODE", "ESTIMATOR_STATUS"}, "ardusub": {"EKF_STATUS_REPORT"}}
-    reports["generic"] = reports["px4"] | reports["ardusub"]
+    reports = {"px4": {"CURRENT_MODE", "ESTIMATOR_STATUS"}, "ardusub": {"EKF_STATUS_REPORT", "RC_CHANNELS"}}
+    reports["generic"] = reports["px4"] | {"EKF_STATUS_REPORT"}
     for profile, names in reports.items():
-        assert set(requested_rates(profile)) & reports["generic"] == names
+        assert set(requested_rates(profile)) & (reports["px4"] | reports["ardusub"]) == names
         assert len(requested_rates(profile)) == 9 + len(names)
 
 
@@ -486,7 +518,7 @@ def test_failsafe_parameters_are_requested_for_up_to_three_seconds():
     failsafes = Failsafes("ardusub")
     assert not failsafes.is_read(0.0)
     asked = [len(failsafes.names_to_request(0.25 * k)) for k in range(9)]
-    assert asked == [23, 0, 23, 0, 23, 0, 23, 0, 23]
+    assert asked == [24, 0, 24, 0, 24, 0, 24, 0, 24]
     values = {"FS_GCS_ENABLE": 2.0, "FS_GCS_TIMEOUT": 5.0, "SOMETHING_ELSE": 1.0, "FS_EKF_ACTION": math.nan}
     failsafes_of("ardusub", failsafes, **values)
     assert "FS_GCS_ENABLE" not in failsafes.names_to_request(2.5)
