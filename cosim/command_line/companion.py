@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
+import signal
+import sys
+import threading
 from dataclasses import fields
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cosim.command_line.flags import add_changes, add_remote, add_run_folder, add_verb, flag, float_range, int_range
 from cosim.command_line.link_flags import add_live_flag, network_endpoint, open_live, origin
 from cosim.command_line.process import INTERRUPTED, print_run, print_status
 from cosim.mavlink.wire.options import PROFILES
+
+if TYPE_CHECKING:
+    from cosim.simulation.commands.sources import CommandQueue
 
 _DECIMALS = 7  # of degrees, for centimeters
 _COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
@@ -98,9 +105,26 @@ def companion(options: argparse.Namespace) -> int:
                     print_status(line)
             print_status(state.replace("_", " ") + ("" if missing == "nothing" else f", waits for {missing}"))
 
+        if sys.stdin is not None and sys.stdin.isatty():
+            print_status("Enter holds the vehicle; r and Enter resumes steering")
+            threading.Thread(
+                target=_read_keys, args=(sys.stdin.fileno(), companion.session.commands), daemon=True
+            ).start()
         run = companion.run(options.out, not options.no_report, show, live)
     print_run(options, run, not options.no_report)
     return INTERRUPTED if run.summary["status"] == "interrupted" else 0
+
+
+def _read_keys(terminal: int, commands: CommandQueue) -> None:
+    """Hold at each Enter, and resume at r and Enter, until the terminal (a file descriptor) is closed."""
+    from cosim.simulation.commands.commands import SetMode
+
+    if hasattr(signal, "pthread_sigmask"):  # in the background a read then fails, and does not stop the process
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTTIN})
+    with contextlib.suppress(OSError):
+        while data := os.read(terminal, 256):
+            for line in data.splitlines():
+                commands.submit(SetMode("reach" if line.strip().lower() == b"r" else "hold"))
 
 
 def _scene_origin(text: str) -> tuple[float, float]:

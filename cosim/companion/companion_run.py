@@ -36,7 +36,6 @@ if TYPE_CHECKING:  # websockets wait until a flight is shown
     from cosim.live.live_view import LiveView
 
 _RELEASE_TIME = 2.0  # s, maximum time to release the sticks and change to the hold mode at the end
-_NO_COMMANDS = "the page of a companion accepts no commands: take over at the autopilot's ground station"
 _DRIFT_NOISE = 0.1  # m, drift between two position sources that still counts as noise
 _RESERVE = 0.3  # fraction of the thrusters' force that stays free for the autopilot's moments
 _MIN_UNCERTAINTY = 0.05  # m, position error of an autopilot that no measurement reveals
@@ -167,7 +166,7 @@ class Companion:
         on_state : callable, optional
             Function of the state and the text of the conditions it waits for; called when either changes.
         live : LiveView, optional
-            View that shows the flight, from before steering begins; it accepts no commands.
+            View that shows the flight, from before steering begins; its buttons hold and resume.
 
         Returns
         -------
@@ -195,7 +194,7 @@ class Companion:
 
         with Master(self.scenario, plant=RemoteVehicle(self.scenario, self.session)) as master:
             if live is not None:
-                live.begin(self.scenario, master.signals.columns, _NO_COMMANDS)
+                live.begin(self.scenario, master.signals.columns, self.session.commands)
             self.prepare(show_state)
             folder = claim(None if out is None else Path(out), self.scenario)
             with folder.writing():

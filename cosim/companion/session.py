@@ -21,6 +21,7 @@ from cosim.companion.vehicle_state import ReportedState, requested_rates
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.wire.dialect import dialect, make_command, make_heartbeat, make_rate_requests
 from cosim.simulation.commands.commands import Arm, Command, Mode
+from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
@@ -55,6 +56,7 @@ class AutopilotSession:
         self.supervisor = Supervisor(options.dry_run)
         self.lateness = self.outside = 0.0  # s; m
         self.is_placed, self.misplaced = False, ""
+        self.commands = CommandQueue(("hold", "reach"))  # from page and terminal: end steering, and resume it
         self._taken_over = self._was_in_mode = False
         self._is_law_active = False  # value of the last `Arm` for the master
         self._sent_at: dict[str, float] = {}
@@ -78,6 +80,8 @@ class AutopilotSession:
         now = self._link.clock()
         self.lateness = max(0.0, now - due)
         self._receive(0.0)
+        for command in self.commands.take(0):
+            self._take_over(getattr(command, "mode", "hold") == "hold")
         self._warn_of_stations(now)
         before = self.supervisor.state
         state = self.supervisor.update(self._observation(now))
@@ -326,6 +330,14 @@ class AutopilotSession:
             if failsafes.values.get("FS_PILOT_INPUT") == 0.0:
                 yield f"no failsafe while station {system} runs", "; it satisfies FS_GCS_ENABLE: set FS_PILOT_INPUT"
 
+    def _take_over(self, is_taken_over: bool) -> None:
+        """End steering, or estimate the frame again and resume it."""
+        self._taken_over = is_taken_over
+        if not is_taken_over and self.supervisor.state in ("held", "pilot"):
+            self.alignment.restart()
+            self.is_placed = False
+            self.supervisor.resume()
+
     def _handle_command(self, system: int, component: int, message: Any) -> None:
         """Apply a DO_PAUSE_CONTINUE that is addressed to the companion: 0 ends steering, 1 resumes it."""
         m = self._mavlink
@@ -334,9 +346,5 @@ class AutopilotSession:
         result = m.MAV_RESULT_UNSUPPORTED
         if message.command == m.MAV_CMD_DO_PAUSE_CONTINUE and message.param1 in (0.0, 1.0):
             result = m.MAV_RESULT_ACCEPTED
-            self._taken_over = message.param1 == 0.0
-            if not self._taken_over:
-                self.alignment.restart()
-                self.is_placed = False
-                self.supervisor.resume()
+            self._take_over(message.param1 == 0.0)
         self._link.send(m.MAVLink_command_ack_message(message.command, result, 0, 0, system, component))

@@ -58,8 +58,9 @@ class Hub:
         """Begin showing another run."""
         self.run = run
         self._view_columns = ViewColumns(scenario, columns)
+        accepted = isinstance(queue, CommandQueue) and (list(queue.modes) or True)
         self._names = {column.name: i for i, column in enumerate(self._view_columns.columns)}
-        self._header = header_of(scenario, self._view_columns.columns, isinstance(queue, CommandQueue))
+        self._header = header_of(scenario, self._view_columns.columns, accepted)
         self._changes: list[dict[str, Any]] = []
         self._header["changes"] = self._changes
         self._change_numbers: list[int] = []  # of each kept change, from 1

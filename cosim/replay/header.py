@@ -13,6 +13,7 @@ from controller.regions.shape import Bounds, Shape
 from cosim.results.wording import describe_task
 from cosim.scenario.colors import colors_of_regions
 from cosim.scenario.scenario import Scenario
+from cosim.simulation.commands.commands import Mode
 from cosim.simulation.environment import shape_center
 from cosim.simulation.signals import Column
 from fuzzy_arbiter import System
@@ -25,8 +26,8 @@ _DIGITS = 6  # decimals of coordinates in m
 _SEA_WATER = 1026.0 * 9.81  # N/m3; for the size of a hull without a radius in the vehicle's file
 
 
-def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool = False) -> dict[str, Any]:
-    """Return the header of a run, which a view needs before its first row."""
+def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool | list[Mode] = False) -> dict[str, Any]:
+    """Return the header of a run, for a view; `commands` are those of all kinds, none, or changes to some modes."""
     limits, colors = limits_of(scenario), colors_of_regions(scenario)
     return {
         "version": VERSION,

@@ -82,7 +82,7 @@ class SitlLink:
         if endpoint.kind == "tlog":
             raise TelemetryError(f"endpoint {endpoint.text!r}: expected a network or a serial device, not a file")
         self._link, self._mavlink = GroundLink(endpoint, identity=IDENTITY), dialect()
-        self._reported = ReportedState(IDENTITY)
+        self._reported = ReportedState()
         self._dvl = None if dvl is None else Dvl(dvl)
         self.estimate: Array = np.full(len(ESTIMATE), math.nan)
         self._received_at = self._requested_at = self._heartbeat_at = -math.inf

@@ -25,6 +25,10 @@ class CommandPanel extends FieldPanel {
       this.body.replaceChildren(h("p", {}, "Watching only. Start the run with --commands to steer it from here."));
       return this.update();
     }
+    if (Array.isArray(run.header.commands)) { // modes alone: a companion holds and resumes
+      this.body.replaceChildren(this._buttons());
+      return this.update();
+    }
     this._rows = [...run.header.regions.keys()].filter((index) => canMove(run, index)).map((index) => this._row(index));
     const props = { title: "A sphere to keep out of, ahead of the vehicle", onclick: () => this._addObstacle() };
     const list = h("div.command-list", {}, h("p.hint", {}, HINT), ...this._rows.map(({ set }) => set));
@@ -36,10 +40,12 @@ class CommandPanel extends FieldPanel {
   update() {
     const { run, link } = this;
     if (!run) return;
-    const mode = MODE_NAMES[run.held("commands.mode", run.end)];
     const armed = run.held("commands.armed", run.end) !== 0;
     const commands = Boolean(run.header.commands);
-    const steers = link.acceptsCommands ? `${armed ? "armed" : "disarmed"}, ${mode ?? "waiting"}` : "no connection";
+    const modesAlone = Array.isArray(run.header.commands);
+    const mode = modesAlone ? (armed ? "reach" : "hold") : MODE_NAMES[run.held("commands.mode", run.end)];
+    const status = modesAlone ? mode : `${armed ? "armed" : "disarmed"}, ${mode ?? "waiting"}`;
+    const steers = link.acceptsCommands ? status : "no connection";
     setText(this.state, link.over ? "the run has ended" : commands ? steers : "watching");
     this.body.inert = commands && !link.acceptsCommands;
     for (const button of this.body.querySelectorAll("[data-mode], [data-armed]")) {
@@ -50,6 +56,8 @@ class CommandPanel extends FieldPanel {
 
   _buttons() {
     const group = byId("steer").content.firstElementChild.cloneNode(true);
+    const { commands } = this.run.header;
+    if (Array.isArray(commands)) for (const button of group.children) button.hidden = !commands.includes(button.dataset.mode);
     for (const button of group.querySelectorAll("[data-mode], [data-armed]")) {
       const { mode, armed } = button.dataset;
       const command = mode ? { command: "set_mode", mode } : { command: "arm", armed: armed === "true" };

@@ -13,7 +13,7 @@ import msgspec
 
 from cosim.errors import CommandError, RunError
 from cosim.scenario.validation import MAX_STEPS
-from cosim.simulation.commands.commands import NOT_A_COMMAND, Command, Reset, validate_command
+from cosim.simulation.commands.commands import NOT_A_COMMAND, Command, Mode, Reset, SetMode, validate_command
 from plant_fmu.errors import TableError
 from plant_fmu.toml_tables import Table, decode
 
@@ -40,8 +40,9 @@ class CommandQueue:
 
     exhausted = False
 
-    def __init__(self) -> None:
+    def __init__(self, modes: Sequence[Mode] = ()) -> None:
         self.run = 0
+        self.modes = modes  # modes whose SetMode alone is accepted; empty: every command is
         self._commands: deque[Command] = deque()
         self._bytes = 0  # size of this run's commands
         self._lock = threading.Lock()
@@ -60,6 +61,8 @@ class CommandQueue:
         """Return the reason why a command for a run is rejected; empty if there is none."""
         if run not in (None, self.run):
             return "the run is over"
+        if self.modes and not (isinstance(command, SetMode) and command.mode in self.modes):
+            return f"expected one of the modes {', '.join(self.modes)}"
         if self.run >= RUNS - 1 and isinstance(command, Reset):
             return f"no further reset: a session has {RUNS} runs at most"
         if self._bytes >= LOG_BYTES:

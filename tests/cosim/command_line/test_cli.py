@@ -15,8 +15,10 @@ import pytest
 import fuzzy_arbiter.__main__
 import plant_fmu.__main__
 from cosim.command_line.cli import _RENAMED, _parser, all_verbs, main
+from cosim.command_line.companion import _read_keys
 from cosim.scenario.scenario import load_scenario
 from cosim.scenario.toml_file import list_scenarios, shipped_titles
+from cosim.simulation.commands.sources import CommandQueue
 from tests.conftest import DATA
 from tests.refusals import refusals
 
@@ -261,6 +263,15 @@ def test_a_scene_origin_of_too_few_digits_is_warned_of(capsys, text, error):
     heard = capsys.readouterr().err
     warning = f"cosim: WARNING: --scene-origin {text}: its last digit is {error}; give 7 decimals\n"
     assert heard == (warning if error else "")
+
+
+def test_enter_holds_a_companion_and_r_resumes_it():
+    reading, writing = os.pipe()
+    os.write(writing, b"\n R \nr\n\n")
+    os.close(writing)
+    commands = CommandQueue(("hold", "reach"))
+    _read_keys(reading, commands)
+    assert [command.mode for command in commands.take(0)] == ["hold", "reach", "reach", "hold"]
 
 
 # ---- processes -------------------------------------------------------------------------------------------------------

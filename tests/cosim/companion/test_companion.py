@@ -3,6 +3,7 @@
 import math
 import re
 from concurrent.futures import ThreadPoolExecutor
+from threading import Event
 
 import numpy as np
 import pytest
@@ -548,11 +549,25 @@ def test_scenario_keys_of_simulation_only_are_rejected():
 
 @pytest.mark.medium
 def test_the_page_of_a_flight_shows_states_ages_modes_and_sticks(tmp_path):
+    link, sent = StandIn(profile="generic", shift=SHIFT), {"hold": Event(), "reach": Event()}
+    link.events = [(EVENT + k, lambda mode=mode: sent[mode].wait(60.0)) for k, mode in enumerate(sent)]
     with LiveView(parse_live("0")) as live, ThreadPoolExecutor(1) as pool:
-        flying = pool.submit(Flight, tmp_path, 3.0, live=live)
+        flying = pool.submit(Flight, tmp_path, 6.0, link=link, live=live)
         with Viewer(live.url) as viewer:
+            for count, (mode, state) in enumerate(zip(sent, ("steering", "held"), strict=True), 1):
+                while not any(text.startswith(state) for text in viewer.texts_of("info")):
+                    viewer.receive()
+                viewer.command(command="set_mode", mode=mode)
+                viewer.command(command="arm", armed=True)
+                while len(viewer.texts_of("refused")) < count:  # the one before it was taken
+                    viewer.receive()
+                sent[mode].set()
             end = viewer.until("end")
         flight = flying.result()
+    assert viewer.headers[0]["commands"] == ["hold", "reach"]
+    assert set(viewer.texts_of("refused")) == {"expected one of the modes hold, reach"}
+    names = [state for _, state in flight.states]
+    assert names[-5:] == ["steering", "held", "aligning", "engaging", "steering"]
     assert end["status"] == "completed"
     assert "engaging, waits for mode 458752" in viewer.texts_of("info") and "steering" in viewer.texts_of("info")
     table = flight.run.table()
