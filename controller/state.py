@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import math
 from typing import Any, ClassVar, Self, get_args, get_type_hints
@@ -22,13 +23,14 @@ class State(tuple[Any, ...]):
     Parameters
     ----------
     **given : Any
-        Values of fields, and lengths by the names that `Shape` has. Arrays are kept, not copied. A field that is not
-        given has the default of the class, else 0.
+        Values of fields, and lengths by the names that `Shape` has. Arrays and records are kept, not copied. A field
+        that is not given has the default of the class, else 0.
 
     Raises
     ------
     TypeError
-        If an array is not given whose shape is not known, or a name is neither a field nor a length.
+        If an array is not given whose shape is not known, has other numbers or another shape than the field, or a name
+        is neither a field nor a length.
 
     Examples
     --------
@@ -48,19 +50,18 @@ class State(tuple[Any, ...]):
     def __init_subclass__(cls) -> None:
         names = [name for name in cls.__annotations__ if not name.startswith("_")]
         cls._defaults = cls._defaults | {name: vars(cls)[name] for name in names if name in vars(cls)}
-        for i, name in enumerate(names, len(cls._fields)):
-            setattr(cls, name, property(functools.partial(_get, i)))
-        cls._fields = (*cls._fields, *names)
+        cls._fields = tuple(dict.fromkeys((*cls._fields, *names)))
+        for name in names:
+            setattr(cls, name, property(functools.partial(_get, cls._fields.index(name))))
 
     def __new__(cls, *items: Any, **given: Any) -> Self:
         """Make the record; `items` are those of another one, in order."""
         lengths = {name: value for name, value in given.items() if name not in cls._fields}
         for name, value in lengths.items():
-            if not isinstance(value, int):
-                raise TypeError(f"{cls.__name__}: {name} is no field, and no length")
+            if name not in _length_names(cls) or not isinstance(value, int | np.integer):
+                raise TypeError(f"{cls.__name__}: {name} (got {value!r}) is no field, and no length")
         if not items:
-            kinds = _kinds(cls).items()
-            items = tuple(_item(kind, given.get(name), cls._defaults.get(name, 0), lengths) for name, kind in kinds)
+            items = tuple(cls._item(name, given.get(name), lengths) for name in cls._fields)
         if missing := [name for name, item in zip(cls._fields, items, strict=True) if item is None]:
             raise TypeError(f"{cls.__name__}: {', '.join(missing)} not given")
         return super().__new__(cls, items)
@@ -83,11 +84,38 @@ class State(tuple[Any, ...]):
     @classmethod
     def over(cls, block: Array) -> Self:
         """Make the record of the parts of an array, one behind the other."""
-        shapes = [shape for _, shape in _kinds(cls).values()]
+        kinds = _kinds(cls)
+        if other := [name for name, (numbers, _) in kinds.items() if numbers != block.dtype]:
+            raise TypeError(f"{cls.__name__}: {', '.join(other)} in an array of {block.dtype}")
+        shapes = [shape for _, shape in kinds.values()]
         ends = np.cumsum([math.prod(shape) for shape in shapes])
         made = cls(*(part.reshape(shape) for part, shape in zip(np.split(block, ends[:-1]), shapes, strict=True)))
         vars(made)["block"] = block
         return made
+
+    @classmethod
+    def _item(cls, name: str, given: Any, lengths: dict[str, int]) -> Any:
+        """Return the array or record of a field; None if it has to be given."""
+        numbers, shape = _kinds(cls)[name]
+        default = cls._defaults.get(name, 0)
+        if shape is None:
+            is_record = isinstance(numbers, type) and issubclass(numbers, State)
+            if given is None and is_record:
+                own = {length: n for length, n in lengths.items() if length in _length_names(numbers)}
+                return copy.deepcopy(default) if default else numbers(**own)
+            if is_record and not isinstance(given, numbers):
+                raise TypeError(f"{cls.__name__}: {name} (got {given!r}), expected {numbers.__name__}")
+            return given
+        sizes = [lengths.get(n) if isinstance(n, str) else n for n in shape]
+        if given is None:
+            return None if None in sizes else np.full(sizes, default, numbers)
+        array = given if isinstance(given, np.ndarray) else np.array(given, numbers)
+        array = array if shape else array.reshape(())
+        fits = len(sizes) == array.ndim and all(n in (None, m) for n, m in zip(sizes, array.shape, strict=True))
+        if array.dtype != numbers or not fits:
+            got, expected = f"{array.dtype} of shape {array.shape}", f"{numbers.__name__} of shape {shape}"
+            raise TypeError(f"{cls.__name__}: {name} (got {got}), expected {expected}")
+        return array
 
 
 def _get(i: int, state: State) -> Any:
@@ -109,14 +137,10 @@ def _kind(hint: Any) -> tuple[Any, Any]:
     return (get_args(get_args(hint.__origin__)[1])[0], shape) if shape is not None else (None, None)
 
 
-def _item(kind: tuple[Any, Any], given: Any, default: Any, lengths: dict[str, int]) -> Any:
-    """Return the array or record of a field; None if it has to be given."""
-    numbers, shape = kind
-    if isinstance(given, np.ndarray) and shape == ():
-        return given.reshape(())
-    if given is not None:
-        return np.array(given, numbers) if shape == () else given
-    if isinstance(numbers, type) and issubclass(numbers, State):
-        return numbers(**lengths)
-    sizes = [lengths.get(n) if isinstance(n, str) else n for n in shape or ()]
-    return None if shape is None or None in sizes else np.full(sizes, default, numbers)
+@functools.cache
+def _length_names(state: type[State]) -> set[str]:
+    """Return the names of lengths of arrays in a state and its records."""
+    kinds = _kinds(state).values()
+    records = (numbers for numbers, _ in kinds if isinstance(numbers, type) and issubclass(numbers, State))
+    own = {n for _, shape in kinds for n in shape or () if isinstance(n, str)}
+    return own.union(*map(_length_names, records))

@@ -43,10 +43,10 @@ def load_functions(*calls: tuple[Callable[..., None], tuple[Any, ...]]) -> None:
 
 
 def _load(keys: Iterable[_Key]) -> None:
-    missing = [key for key in keys if key not in _libraries]
+    missing = [key for key in dict.fromkeys(keys) if key not in _libraries]
     for key, library in zip(missing, load_libraries(c_text_of(*key) for key in missing), strict=True):
         library.entry.argtypes, library.entry.restype = [ctypes.c_void_p], None
-        library.entry_misfit.argtypes, library.entry_misfit.restype = [ctypes.c_void_p], ctypes.c_char_p
+        library.entry_check_shapes.argtypes, library.entry_check_shapes.restype = [ctypes.c_void_p], ctypes.c_char_p
         _libraries[key] = library
 
 
@@ -57,16 +57,17 @@ def _described(argument: Any, known: Described) -> tuple[Any, Type, list[int]]:
     return description
 
 
-def _with_lengths(misfit: str, function: FunctionType, arguments: tuple[Any, ...]) -> str:
-    """Add the lengths of arguments to a message that names them."""
-    named = dict(zip(function.__code__.co_varnames, arguments, strict=False))
-    lengths = []
-    for path, axis in re.findall(r"([\w.]+)\.n(\d)", misfit):
-        name, *fields = path.split(".")
-        array = functools.reduce(getattr, fields, named[name])
-        lengths.append(f"{path}.shape[{axis}] is {array.shape[int(axis)]}")
-    expected = re.sub(r"\.n(\d)", r".shape[\1]", misfit)
-    return f"{' and '.join(lengths)}, expected {expected}"
+def _shape_error(function: FunctionType, arguments: tuple[Any, ...], expected: str) -> str:
+    """Return the message of lengths that are not as expected, such as "x.shape[0] == y[1].shape[0]"."""
+    named, given = dict(zip(function.__code__.co_varnames, arguments, strict=False)), []
+    for length in re.findall(r"[\w.\[\]]+\.shape\[\d+\]", expected):
+        name, *items = re.findall(r"\w+", length)
+        given.append(f"{length} is {functools.reduce(_part, items, named[name])}")
+    return f"{function.__name__}: {' and '.join(given)}, expected {expected}"
+
+
+def _part(value: Any, item: str) -> Any:
+    return value[int(item)] if item.isdigit() else getattr(value, item)
 
 
 class BoundCall:
@@ -84,9 +85,9 @@ class BoundCall:
             self._entry = library.entry
             self._words = np.array([word for _, _, words in described for word in words], dtype=np.uint64)
             self.words: int = self._words.ctypes.data
-            misfit = library.entry_misfit(self.words)
-            if misfit is not None:
-                raise TypeError(f"{function.__name__}: {_with_lengths(misfit.decode(), function, arguments)}")
+            expected = library.entry_check_shapes(self.words)
+            if expected is not None:
+                raise TypeError(_shape_error(function, arguments, expected.decode()))
             call: Any = functools.partial(self._entry, self.words)
             call.kept = self._words, arguments  # so that `call` works without this object
             self.call: Callable[[], None] = call

@@ -18,7 +18,7 @@ from controller.translator.types import Type
 
 log = logging.getLogger(__name__)
 _OWN = ("controller", "cosim", "plant_fmu", "fuzzy_arbiter")  # others' functions may depend on more than on their files
-_IMPORT = re.compile(r"^\s*(?:from +([\w.]+) +)?import +([^\n#]*)", re.M)
+_IMPORT = re.compile(r"^\s*(?:from +([\w.]+) +)?import +(\([^)]*|[^\n#]*)", re.M)
 
 
 def c_text_of(function: Callable[..., None], types: tuple[Type, ...]) -> str:

@@ -126,12 +126,15 @@ class ArrayExpressions(ArrayViews):
         if name in ("sum", "any", "all"):
             kind, start = (BOOL, "true" if name == "all" else "false") if name != "sum" else (DOUBLE, "0.0")
         else:
-            kind, start = grid.item, self._extreme_start(name, grid, node)
+            if "0" in grid.sizes or grid.item not in (DOUBLE, INT):
+                self.fail(node, f"{name} of no elements, or of what are no numbers")
+            kind, first = grid.item, {"min": ("INFINITY", "INT64_MAX"), "max": ("-INFINITY", "INT64_MIN")}[name]
+            start = first[kind == INT]
         if name == "sum" and grid.item == BOOL:
             kind, start = INT, "0"
         total = self.temporary(kind, start)
         codes = {"sum": "{0} + {1}", "any": "{0} || {1}", "all": "{0} && {1}"}
-        template = codes.get(name, f"{name}imum_f64({{0}}, {{1}})")
+        template = codes.get(name, f"{name}{'_i64' if kind == INT else 'imum_f64'}({{0}}, {{1}})")
 
         def add(index: Index) -> None:
             value = grid.at(index)
@@ -140,14 +143,6 @@ class ArrayExpressions(ArrayViews):
 
         self.each(grid.sizes, add)
         return total
-
-    def _extreme_start(self, name: str, grid: Grid, node: ast.AST) -> str:
-        """Return the C value from which a minimum or maximum is sought: infinite where there may be no element."""
-        if "0" in grid.sizes or (known_shape(grid.sizes) is None and grid.item != DOUBLE):
-            self.fail(node, f"{name} of no elements, or of integers of a length that is known only at run time")
-        if known_shape(grid.sizes) is None:
-            return "INFINITY" if name == "min" else "-INFINITY"
-        return grid.at(("0",) * len(grid.sizes)).code
 
     def _loop(self, length: str, body: Callable[[str], None]) -> None:
         k = self.new_name("i")

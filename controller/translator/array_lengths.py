@@ -2,35 +2,39 @@
 
 # The text requires of fixed lengths that they are equal, or that a slice of constant bounds lies within its axis. A
 # call passes these requirements on to its caller, and the program to its exported function, where they are checked once
-# when a call is bound. Of lengths that C computes the smaller one counts: Python requires equal ones. A slice
+# when a call is bound. Arrays of records that stand under one name must be equally long, too. Of lengths that C
+# computes the smaller one counts: Python requires equal ones. A slice
 # [i : i + n] counts as n elements where these are needed, as does an index that is computed: C does not check it.
 
 from __future__ import annotations
 
 import ast
 import math
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from controller.translator.operands import Operands, Value, View
-from controller.translator.types import Array, Record
+from controller.translator.types import AtMost
 
 Index = tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Length:
-    """A number, or with a path the length of an axis of an argument, such as "0.numbers.n0", plus a number."""
+    """A number, or with a path the length of an axis of an argument, such as "0.numbers.0", plus a number."""
 
     path: str
     offset: int = 0
 
-    def text(self, root: str) -> str:
-        """Return it in C or Python, with a name of the arguments."""
+    def text(self, parameters: Sequence[str] | None = None) -> str:
+        """Return it in Python, with the names of the parameters, else in C."""
         if not self.path:
             return str(self.offset)
-        return f"{root}{self.path}" + (f" {self.offset:+}".replace("+", "+ ").replace("-", "- ") if self.offset else "")
+        index, *items, axis = self.path.split(".")
+        place = "[{}]" if parameters else ".f{}"
+        inside = "".join(place.format(item) if item.isdigit() else f".{item}" for item in items)
+        code = f"{parameters[int(index)]}{inside}.shape[{axis}]" if parameters else f"w->a{index}{inside}.n{axis}"
+        return code + (f" {'-' if self.offset < 0 else '+'} {abs(self.offset)}" if self.offset else "")
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,6 @@ class Requirement:
     sign: str  # == or >=
     right: Length
     where: str  # module and function
-    is_conditional: bool  # True if arrays without elements meet it, too: these stand for what a run does not use
 
 
 class ArrayLengths(Operands):
@@ -51,21 +54,19 @@ class ArrayLengths(Operands):
     where: str
     bounds: dict[str, float]  # maximum of lengths that C computes, by their C expressions
     fixed: dict[str, Length]  # lengths that are fixed when a call is bound, by their C expressions
-    fixed_lengths: dict[str, tuple[Length | None, ...]]  # of variables, and of fields of records that the function made
-    record_paths: dict[str, str]  # what a variable, or a field, that holds a record stands for; "" if for several
+    fixed_lengths: dict[str, tuple[Length | None, ...]]  # of variables, and of fields of records that are made
     requirements: dict[Requirement, None]
-    branches: int  # number of conditions that decide on whether C gets here
 
     def length(self, size: str) -> Length | None:
         """Return a length if it is known, or fixed when a call is bound."""
         return Length("", int(size)) if size.isdigit() else self.fixed.get(size)
 
-    def bound(self, size: str) -> float | None:
-        """Return the maximum of a length that C computes; None if it is fixed."""
-        return None if self.length(size) else self.bounds.get(size, math.inf)
+    def extent(self, size: str) -> int | AtMost | None:
+        """Return what a type states of a length."""
+        return int(size) if size.isdigit() else None if size in self.fixed else AtMost(self.max_length(size))
 
     def max_length(self, size: str) -> float:
-        """Return the maximum of a length."""
+        """Return the maximum of a length, in elements."""
         return int(size) if size.isdigit() else self.bounds.get(size, math.inf)
 
     def bounded(self, size: str, bound: float) -> str:
@@ -76,53 +77,49 @@ class ArrayLengths(Operands):
 
     def longer(self, size: str, number: int) -> str:
         """Return the sum of a fixed length and a number."""
-        length = self.length(size)
-        assert length is not None
-        if not number or not length.path:
-            return str(int(size) + number) if not length.path else size
+        if not number or size.isdigit():
+            return str(int(size) + number) if number else size
         code = f"{size} - {-number}" if number < 0 else f"{size} + {number}"
-        self.fixed[code] = Length(length.path, length.offset + number)
+        self.fixed[code] = Length(self.fixed[size].path, self.fixed[size].offset + number)
         return code
 
-    def axis_length(self, path: str, axis: int) -> Length | None:
-        """Return a fixed length of an array by its path."""
+    def axis_length(self, paths: Sequence[str], axis: int) -> Length | None:
+        """Return a fixed length of an array, by the paths of what its name stands for: of equal lengths."""
+        lengths = [self._own_length(path, axis) for path in paths]
+        if not lengths or None in lengths:
+            return None
+        first, *others = [length for length in lengths if length]
+        for other in others:
+            self.require(first, "==", other, ast.Pass())
+        return first
+
+    def _own_length(self, path: str, axis: int) -> Length | None:
         if path in self.fixed_lengths:
             return self.fixed_lengths[path][axis]
-        parts = path.split(".")
-        for k in range(len(parts), 0, -1):
-            record = self.record_paths.get(".".join(parts[:k]))
-            if record is not None:
-                return self.axis_length(".".join([record, *parts[k:]]), axis) if record else None
-        if parts[0] in self.parameters:
-            return Length(".".join([str(self.parameters.index(parts[0])), *parts[1:], f"n{axis}"]))
-        return None
+        name, *items = path.split(".")
+        if name not in self.parameters:
+            return None
+        return Length(".".join([str(self.parameters.index(name)), *items, str(axis)]))
 
-    def note_lengths(self, name: str, value: Value, again: bool = False) -> None:
-        """Note the lengths of a value that a variable, or a field, holds; again: among other values."""
+    def note_lengths(self, path: str, value: Value, again: bool = False) -> None:
+        """Note the lengths of an array that a variable, or a field, holds; again: among others."""
         if isinstance(value, View):
             lengths = tuple(map(self.length, value.sizes))
-            if again and isinstance(value.type, Array) and (name in self.fixed_lengths or name in self.parameters):
-                before = tuple(self.axis_length(name, k) for k in range(len(lengths)))
-                lengths = tuple(a if a == b else None for a, b in zip(before, lengths, strict=False))
-            self.fixed_lengths[name] = lengths
-        elif isinstance(value.type, Record):
-            path = path_of(value.code)
-            before_path = self.record_paths.get(name, name if name in self.parameters else path)
-            if path != name and not (again and before_path == path == name):
-                self.record_paths[name] = path if not again or before_path == path else ""
+            if again and (path in self.fixed_lengths or path in self.parameters):
+                lengths = tuple(n if n == self._own_length(path, axis) else None for axis, n in enumerate(lengths))
+            self.fixed_lengths[path] = lengths
 
-    def require(self, left: Length, sign: str, right: Length, node: ast.AST, origin: Requirement | None = None) -> None:
+    def require(self, left: Length, sign: str, right: Length, node: ast.AST, where: str = "") -> None:
         """Require a relation of two lengths; refuse one that never holds."""
-        if left.path == right.path:
-            if not (left.offset == right.offset if sign == "==" else left.offset >= right.offset):
-                of_axis = " more than another" if left.path else ""
-                self.fail(node, f"a length {left.offset}{of_axis}, expected {sign} {right.offset}{of_axis}")
+        if left == right or (sign == ">=" and left.offset >= right.offset):
             return
-        if not left.path:
-            left, right = right, left
-        is_conditional = self.branches > 0 or (origin is not None and origin.is_conditional)
-        where = origin.where if origin else self.where
-        self.requirements[Requirement(left, sign, right, where, is_conditional)] = None
+        if left.path == right.path:
+            one, other = (length.text(self.parameters) for length in (left, right))
+            self.fail(
+                node, f"lengths {one} and {other}" if sign == "==" else f"length {one}, expected at least {other}"
+            )
+        left, right = (left, right) if left.path else (right, left)
+        self.requirements[Requirement(left, sign, right, where or self.where)] = None
 
     def common_length(self, one: str, other: str, node: ast.AST) -> str:
         """Return the length of two axes that belong together."""
@@ -138,26 +135,3 @@ class ArrayLengths(Operands):
             if known.isdigit() and self.max_length(computed) <= int(known):
                 return known if self.max_length(computed) == int(known) else computed
         return self.bounded(f"min_i64({one}, {other})", min(self.max_length(one), self.max_length(other)))
-
-    def require_of_call(self, requirement: Requirement, values: Sequence[Value], node: ast.AST) -> None:
-        """Require of a call's arguments what the called function requires of its parameters."""
-        lengths = [self._of_argument(length, values) for length in (requirement.left, requirement.right)]
-        if lengths[0] is None or lengths[1] is None:
-            self.fail(node, f"arrays of lengths that C computes, in {requirement.where}")
-        self.require(lengths[0], requirement.sign, lengths[1], node, requirement)
-
-    def _of_argument(self, length: Length, values: Sequence[Value]) -> Length | None:
-        if not length.path:
-            return length
-        index, *fields, last = length.path.split(".")
-        value, axis = values[int(index)], int(last[1:])
-        if isinstance(value, View):
-            own = self.length(value.sizes[axis])
-        else:
-            own = self.axis_length(".".join([path_of(value.code), *fields]), axis)
-        return own and Length(own.path, own.offset + length.offset)
-
-
-def path_of(code: str) -> str:
-    """Return the C expression of a record or field without its pointers."""
-    return re.sub(r"[(&)]", "", code).replace("->", ".")

@@ -8,13 +8,12 @@ from __future__ import annotations
 
 import ast
 import itertools
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
-from controller.translator.array_lengths import ArrayLengths, Index, path_of
+from controller.translator.array_lengths import ArrayLengths, Index
 from controller.translator.operands import Grid, Operand, Value, View
-from controller.translator.types import Array, Scalar, array_type
+from controller.translator.types import Array, AtMost, Scalar
 
 ANY = "*"  # root of an array of which nothing is known
 
@@ -70,9 +69,8 @@ class ArrayViews(ArrayLengths):
     ) -> View:
         """Return an array by the place of its elements; code is that of a variable which holds it."""
         whole = [self.product(sizes[k + 1 :]) for k in range(len(sizes))]
-        lengths = tuple(int(n) if n.isdigit() else None for n in sizes)
-        kind = array_type(item, list(strides) == whole, lengths, tuple(map(self.bound, sizes)))
-        view = View(kind, code, True, roots, data, offset, sizes, strides)
+        kind = Array(item, tuple(map(self.extent, sizes)), list(strides) == whole)
+        view = View(kind, code, True, roots, (), data, offset, sizes, strides)
         return view if code else replace(view, code=self.literal(view, kind), simple=False)
 
     def literal(self, view: View, kind: Array) -> str:
@@ -83,22 +81,21 @@ class ArrayViews(ArrayLengths):
         place = view.data if view.offset == "0" else f"{view.data} + {view.offset}"
         return f"({self.c(kind)}){{{', '.join([place, *view.sizes, *(() if kind.contiguous else view.strides)])}}}"
 
-    def view_of(self, kind: Array, code: str, roots: frozenset[str]) -> View:
+    def view_of(self, kind: Array, code: str, roots: frozenset[str], paths: Sequence[str]) -> View:
         """Return the array of a variable, or of a field."""
-        sizes = tuple(f"{code}.n{i}" if n is None else str(n) for i, n in enumerate(kind.lengths))
-        for i, (size, bound) in enumerate(zip(sizes, kind.max_lengths, strict=True)):
-            length = self.axis_length(path_of(code), i) if bound is None else None
-            if length is None:
-                self.bounded(size, math.inf if bound is None else bound)
-            elif not size.isdigit():
+        sizes = tuple(str(n) if isinstance(n, int) else f"{code}.n{i}" for i, n in enumerate(kind.shape))
+        for i, (size, n) in enumerate(zip(sizes, kind.shape, strict=True)):
+            if isinstance(n, AtMost):
+                self.bounds[size] = n.length
+            elif n is None and (length := self.axis_length(paths, i)):
                 self.fixed[size] = length
-        kind = array_type(kind.item, kind.contiguous, kind.lengths, tuple(map(self.bound, sizes)))
+        kind = replace(kind, shape=tuple(map(self.extent, sizes)))
         if kind.contiguous:
             strides = tuple(self.product(sizes[k + 1 :]) for k in range(kind.ndim))
         else:
             strides = tuple(f"{code}.s{i}" for i in range(kind.ndim))
         box, axes = tuple(("0", n) for n in sizes), tuple(range(kind.ndim))
-        return View(kind, code, True, roots, f"{code}.data", "0", sizes, strides, False, box, axes)
+        return View(kind, code, True, roots, (), f"{code}.data", "0", sizes, strides, False, box, axes)
 
     def product(self, sizes: Iterable[str]) -> str:
         """Return the C product of lengths."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from controller.translator.array_expressions import ArrayExpressions
 from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed
-from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Record, name_of, unified
+from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Record, Type, name_of, unified
 
 _ARITHMETIC = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*"}
 _FOLDED = {ast.Add: operator.add, ast.Sub: operator.sub, ast.Mult: operator.mul}  # of integers that are known
@@ -33,7 +33,8 @@ class Expressions(ArrayExpressions):
 
     def _name(self, node: ast.Name) -> Operand:
         if node.id in self.names:
-            return self.held(self.names[node.id], self.variable(node.id), True, self.roots.get(node.id, frozenset()))
+            roots, code = self.roots.get(node.id, frozenset()), self.variable(node.id)
+            return self.held(self.names[node.id], code, True, roots, (node.id,))
         if node.id in self.globals:
             return Known(self.global_value(node.id))
         builtins: Any = self.globals["__builtins__"]
@@ -49,9 +50,9 @@ class Expressions(ArrayExpressions):
                 return Known(getattr(value, node.attr))
             case Value(Record() as kind) if node.attr in kind.fields:
                 return self.field(owner, node.attr)
-            case View() if node.attr == "size":
+            case View() | Grid() if node.attr == "size":
                 return _length(self.product(owner.sizes))
-            case View() if node.attr == "shape":
+            case View() | Grid() if node.attr == "shape":
                 return Items(tuple(map(_length, owner.sizes)))
         if node.attr == "T" and self.is_array(owner):
             return self.transposed(owner, node)
@@ -61,9 +62,9 @@ class Expressions(ArrayExpressions):
         """Return a field of a named tuple."""
         assert isinstance(record.type, Record)
         item, inside = record.type.items[record.type.fields.index(name)], f"{bracketed(record)}->{name}"
-        paths = [f"{root}.{name}" for root in record.roots]
+        paths = tuple(f"{root}.{name}" for root in sorted(record.roots))
         roots = frozenset().union(*(self.made.get(path, {path}) for path in paths))
-        return self.held(item, f"(&{inside})" if isinstance(item, Record) else inside, True, roots)
+        return self.held(item, f"(&{inside})" if isinstance(item, Record) else inside, True, roots, paths)
 
     def _tuple(self, node: ast.Tuple) -> Operand:
         return Items(tuple(self.in_order(node.elts)))
@@ -112,11 +113,11 @@ class Expressions(ArrayExpressions):
         if isinstance(op, ast.Div):
             return Value(DOUBLE, f"{bracketed(a, DOUBLE)} / {bracketed(b, DOUBLE)}")
         kind = unified(unified(a.type, b.type), INT)
-        if type(op) in _ARITHMETIC:
+        if type(op) in _ARITHMETIC and not a.type == b.type == BOOL:  # a sum of those of NumPy is at most 1
             return Value(kind, f"{bracketed(a, kind)} {_ARITHMETIC[type(op)]} {bracketed(b, kind)}")
         if kind == INT and isinstance(op, ast.Mod | ast.FloorDiv):
             return Value(INT, f"{'floor_mod' if isinstance(op, ast.Mod) else 'floor_div'}({a.code}, {b.code})")
-        return self.fail(node, f"{type(op).__name__} of {name_of(kind)}")
+        return self.fail(node, f"{type(op).__name__} of {name_of(a.type)} and {name_of(b.type)}")
 
     def _power(self, base: Operand, exponent: Operand, node: ast.AST) -> Value:
         a = self.scalar(base, node)
@@ -161,9 +162,7 @@ class Expressions(ArrayExpressions):
         result = self.condition(node.values[0])
         for other in node.values[1:]:
             mark = len(self.lines)
-            self.branches += 1
             value = self.condition(other)
-            self.branches -= 1
             if len(self.lines) == mark:
                 result = Value(BOOL, f"{bracketed(result)} {sign} {bracketed(value)}")
                 continue
@@ -184,10 +183,8 @@ class Expressions(ArrayExpressions):
         branches = []
         for branch in (node.body, node.orelse):
             mark = len(self.lines)
-            self.branches += 1
             operand = self.expression(branch)
             operand = self.materialized(operand, branch) if isinstance(operand, Grid) else operand
-            self.branches -= 1
             needed, self.lines[mark:] = self.lines[mark:], []
             branches.append((needed, operand))
         (first, a), (second, b) = branches
@@ -197,19 +194,23 @@ class Expressions(ArrayExpressions):
         if not (first or second):
             return self._chosen(condition, a, b, node)
         x, y = self.value(a, node), self.value(b, node)
-        kind = unified(x.type, y.type)
+        kind = self.unify(x.type, y.type, node)
         result = self.new_variable(kind, "", x, y)
         self.lines += [f"if ({condition.code}) {{", *first, f"{result.code} = {self.converted(x, kind)};", "} else {"]
         self.lines += [*second, f"{result.code} = {self.converted(y, kind)};", "}"]
         return result
 
-    def _chosen(self, condition: Value, a: Operand, b: Operand, node: ast.AST) -> Value:
-        x, y = self.value(a, node), self.value(b, node)
+    def unify(self, one: Type, other: Type, node: ast.AST) -> Type:
+        """Return the type that holds values of both."""
         try:
-            kind = unified(x.type, y.type)
+            return unified(one, other)
         except TypeError as error:
             self.fail(node, str(error))
-        if isinstance(kind, Array):
+
+    def _chosen(self, condition: Value, a: Operand, b: Operand, node: ast.AST) -> Value:
+        x, y = self.value(a, node), self.value(b, node)
+        kind = self.unify(x.type, y.type, node)
+        if isinstance(kind, Array | Record):
             codes = [self.converted(v, kind) for v in (x, y)]
             return self.new_variable(kind, f"{bracketed(condition)} ? {codes[0]} : {codes[1]}", x, y)
         roots = x.roots | y.roots

@@ -15,9 +15,9 @@ from typing import Any, NoReturn, Protocol
 from controller.errors import TranslationError
 from controller.translator.array_lengths import Length, Requirement
 from controller.translator.array_views import ANY
-from controller.translator.operands import Known, Operand, Value, View
+from controller.translator.operands import Grid, Items, Known, Operand, Value, View
 from controller.translator.statements import Statements
-from controller.translator.types import BOOL, DOUBLE, Array, Nothing, Record, Scalar, Tuple, Type, shaped
+from controller.translator.types import BOOL, DOUBLE, Array, Nothing, Record, Scalar, Tuple, Type, known_lengths, shaped
 
 # words of C, and names that its headers define
 _RESERVED = {
@@ -76,7 +76,6 @@ class Function(Statements):
         self.made_at: dict[str, ast.AST] = {}
         self.writes_arguments, self.result = False, Nothing()
         self.fixed_lengths: dict[str, tuple[Length | None, ...]] = {}
-        self.record_paths: dict[str, str] = {}
         self.where = f"{function.__module__.rpartition('.')[2]}.{function.__name__}"
 
     def fail(self, node: ast.AST, what: str) -> NoReturn:
@@ -98,7 +97,7 @@ class Function(Statements):
             self.bounds: dict[str, float] = {}
             self.fixed: dict[str, Length] = {}
             self.requirements: dict[Requirement, None] = {}
-            self.loops, self.later, self.branches = [], [], 0
+            self.loops, self.later = [], []
             self._count = self.n_writes = 0
             self._sites: dict[str, int] = {}
             self._block(self._tree.body)
@@ -121,8 +120,7 @@ class Function(Statements):
 
     def _state(self) -> tuple[Any, ...]:
         """Return what is known of variables."""
-        lengths, paths = dict(self.fixed_lengths), dict(self.record_paths)
-        return dict(self.names), dict(self.roots), dict(self.made), lengths, paths, self.result
+        return dict(self.names), dict(self.roots), dict(self.made), dict(self.fixed_lengths), self.result
 
     def signature(self, name: str) -> str:
         """Return the head of the function."""
@@ -149,20 +147,20 @@ class Function(Statements):
         self.declared[name] = f"{self._declaration(kind, name)}{_zero(kind)};"
         if code:
             self.lines.append(f"{name} = {code};")
-        return self.held(kind, name, True, frozenset([ANY]))
+        return self.held(kind, name, True, frozenset([ANY]), ())
 
     def new_variable(self, kind: Type, code: str, *values: Value) -> Value:
         """Assign one of some values to a new variable, and return that."""
         name = self.temporary(kind, code).code
         for i, value in enumerate(values):
             self.note_lengths(name, value, again=i > 0)
-        return self.held(kind, name, True, frozenset().union(*(value.roots for value in values)))
+        return self.held(kind, name, True, frozenset().union(*(value.roots for value in values)), (name,))
 
-    def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str]) -> Value:
-        """Return what a C variable or member holds."""
+    def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str], paths: tuple[str, ...]) -> Value:
+        """Return what a C variable or member holds; its lengths are known by paths."""
         if isinstance(kind, Array):
-            return self.view_of(kind, code, roots) if kind.ndim else Value(kind.item, f"{code}.data[0]")
-        return Value(kind, code, simple, frozenset() if isinstance(kind, Scalar) else roots)
+            return self.view_of(kind, code, roots, paths) if kind.ndim else Value(kind.item, f"{code}.data[0]")
+        return Value(kind, code, simple, frozenset() if isinstance(kind, Scalar) else roots, paths)
 
     def storage(self, stem: str, node: ast.AST, item: Scalar, size: int) -> str:
         """Declare storage on the stack, one for each place in the text, and return its name."""
@@ -198,7 +196,7 @@ class Function(Statements):
             self.fail(node, str(error))
         record, name = Record(kind, types), self._site("record", node)
         if record.mutable:
-            self.fail(node, f"a new {kind.__name__}, whose numbers are stored")
+            self.fail(node, f"a new State, {kind.__name__}")
         self.declared[name] = f"{self.c(record)} {name};"
         for field, item, of in zip(fields, items, types, strict=True):
             code = f"*{item.code}" if isinstance(of, Record) else self.converted(item, of)
@@ -226,8 +224,12 @@ class Function(Statements):
         )
         aliases |= {frozenset([name]) for name, value in zip(names, values, strict=False) if self._is_aliased(value)}
         name, result, writes, requirements = self._program.instance(function, kinds, aliases)
+        operands = [a if isinstance(a, Items) else value for a, value in zip(arguments, values, strict=True)]
         for requirement in requirements:
-            self.require_of_call(requirement, values, node)
+            left, right = (self._of_argument(n, operands, node) for n in (requirement.left, requirement.right))
+            if not (left and right):
+                self.fail(node, f"arrays of lengths that C computes, in {requirement.where}")
+            self.require(left, requirement.sign, right, node, requirement.where)
         code = f"{name}({', '.join(self.converted(v, k) for v, k in zip(values, kinds, strict=True))})"
         if writes:
             self.n_writes += 1
@@ -240,18 +242,33 @@ class Function(Statements):
         name = self._site("r", node)
         self.declared[name] = f"{self.c(self.returned(result))} {name};"
         self.lines.append(f"{name} = {code};")
-        return self.stored(f"{name}.f", DOUBLE, [n or 0 for n in result.shape])
+        return self.stored(f"{name}.f", DOUBLE, known_lengths(result))
+
+    def _of_argument(self, length: Length, arguments: Sequence[Operand], node: ast.AST) -> Length | None:
+        """Return what a length of a called function's parameter is here."""
+        if not length.path:
+            return length
+        index, *items, axis = length.path.split(".")
+        operand = arguments[int(index)]
+        for item in items:
+            if isinstance(operand, Value) and isinstance(operand.type, Record):
+                operand = self.field(operand, item)
+            else:
+                operand = self.items_of(operand, node)[int(item)]
+        assert isinstance(operand, View | Grid)
+        own = self.length(operand.sizes[int(axis)])
+        return own and Length(own.path, own.offset + length.offset)
 
     def _shaped(self, owner: Any, name: str, value: Value, node: ast.AST) -> Type:
         """Return the type of a parameter or field; require the lengths of its annotation."""
         kind = shaped(owner, name, value.type)
         if isinstance(kind, Array) and isinstance(value, View):
-            for n, size in zip(kind.lengths, value.sizes, strict=True):
+            for n, size in zip(kind.shape, value.sizes, strict=True):
                 length = self.length(size)
-                if n is not None and length is None and self.max_length(size) != n:
-                    self.fail(node, f"{name} of a length that is known only at run time, expected {n}")
-                if n is not None and length is not None:
+                if isinstance(n, int) and length:
                     self.require(length, "==", Length("", n), node)
+                elif isinstance(n, int) and self.max_length(size) != n:
+                    self.fail(node, f"{name} of a length that is known only at run time, expected {n}")
         return kind
 
     def _is_aliased(self, record: Value) -> bool:

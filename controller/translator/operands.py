@@ -21,6 +21,7 @@ class Value:
     code: str
     simple: bool = False  # a name or a number: it may be written twice, and no later statement changes it
     roots: frozenset[str] = frozenset()  # of arrays and records: two may overlap only if they have one in common
+    paths: tuple[str, ...] = ()  # what a tuple stands for, as far as lengths of its arrays are known by it
 
 
 @dataclass(frozen=True)
@@ -175,8 +176,8 @@ class Operands:
         """Return an element of an array."""
         raise NotImplementedError
 
-    def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str]) -> Value:
-        """Return what a C variable or member holds."""
+    def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str], paths: tuple[str, ...]) -> Value:
+        """Return what a C variable or member holds; its lengths are known by paths."""
         raise NotImplementedError
 
     def scalar(self, operand: Operand, node: ast.AST) -> Value:
@@ -202,10 +203,14 @@ class Operands:
             case Known(tuple(items)):
                 return [Known(item) for item in items]
             case Value(Tuple() as kind, code):
+                paths = [tuple(f"{path}.{i}" for path in operand.paths) for i in range(len(kind.items))]
                 codes = [f"{code}.{kind.item(i)}" for i in range(len(kind.items))]
-                return [self.held(k, c, operand.simple, operand.roots) for k, c in zip(kind.items, codes, strict=True)]
+                each = zip(kind.items, codes, paths, strict=True)
+                return [self.held(k, c, operand.simple, operand.roots, p) for k, c, p in each]
             case View() if len(operand.sizes) == 1 and operand.sizes[0].isdigit():
                 return [self.element_of(operand, (str(i),)) for i in range(int(operand.sizes[0]))]
+            case Grid():
+                return self.items_of(self.materialized(operand, node), node)
         return self.fail(node, "expected a tuple")
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -122,7 +121,7 @@ class Program:
             case Nothing():
                 return "void"
             case Array():
-                kind = replace(kind, shape=(), bounds=())
+                kind = replace(kind, shape=(None,) * kind.ndim)
         if kind not in self._types:
             name, text = self._defined(kind)
             self._types[kind] = name
@@ -137,6 +136,8 @@ class Program:
                 fields = [f"{self.name(item)} {field};" for field, item in zip(kind.fields, kind.items, strict=True)]
                 return self._struct(kind.python.__name__, fields)
             case Tuple():
+                if any(isinstance(item, Record) for item in kind.items):
+                    raise TranslationError("a record stored in a tuple, which is not translated to C")
                 if kind.uniform:
                     return self._struct("tuple", [f"{self.name(kind.items[0])} f[{len(kind.items)}];"])
                 return self._struct("tuple", [f"{self.name(item)} f{i};" for i, item in enumerate(kind.items)])
@@ -151,14 +152,10 @@ class Program:
 def _check(name: str, requirements: Sequence[Requirement], parameters: Sequence[str]) -> str:
     """Return a C function that checks lengths of arguments; it returns the first requirement that they do not meet."""
     lines = []
-    for requirement in requirements:
-        left, right = requirement.left, requirement.right
-        code = f"{left.text('w->a')} {requirement.sign} {right.text('w->a')}"
-        lengths = [length.path for length in (left, right) if length.path and requirement.is_conditional]
-        unused = "".join(f" || w->a{path} == 0" for path in lengths)
-        told = re.sub(r"w->a(\d+)", lambda m: parameters[int(m[1])], code)
-        lines.append(f'    if (!({code}{unused}))\n        return "{told} (in {requirement.where})";\n')
-    head = f"const char *{name}_misfit(const void *words)"
+    for needed in requirements:
+        code, text = (f"{needed.left.text(p)} {needed.sign} {needed.right.text(p)}" for p in (None, parameters))
+        lines.append(f'    if (!({code}))\n        return "{text} (in {needed.where})";\n')
+    head = f"const char *{name}_check_shapes(const void *words)"
     arguments = f"    const {name}_arguments *w = words;\n" if lines else "    (void)words;\n"
     return f"\n{head};\n{head}\n{{\n{arguments}{''.join(lines)}    return NULL;\n}}\n"
 

@@ -10,7 +10,19 @@ from dataclasses import replace
 from controller.translator.array_views import known_shape
 from controller.translator.calls import Calls
 from controller.translator.operands import Grid, Items, Known, Operand, Value, View
-from controller.translator.types import BOOL, DOUBLE, INT, Array, Nothing, Record, Scalar, Tuple, Type, name_of, unified
+from controller.translator.types import (
+    BOOL,
+    DOUBLE,
+    INT,
+    Array,
+    Nothing,
+    Record,
+    Scalar,
+    Tuple,
+    Type,
+    known_lengths,
+    name_of,
+)
 
 
 class Statements(Calls):
@@ -74,7 +86,6 @@ class Statements(Calls):
         self.lines.append("continue;")
 
     def _do_return(self, node: ast.Return) -> None:
-        self.branches += self.branches > 0  # of what follows in the text
         if node.value is None:
             self.lines.append("return;")
             return
@@ -87,7 +98,7 @@ class Statements(Calls):
         value = self.value(operand, node)
         if isinstance(value.type, Record) or (isinstance(value.type, Tuple) and _holds_array(value.type)):
             self.fail(node, f"{name_of(value.type)} that is returned")
-        self.result = value.type if isinstance(self.result, Nothing) else self._unified(self.result, value.type, node)
+        self.result = value.type if isinstance(self.result, Nothing) else self.unify(self.result, value.type, node)
         self.lines.append(f"return {self._as(value, self.result, node)};")
 
     def _return_array(self, grid: Grid, node: ast.Return) -> None:
@@ -95,8 +106,8 @@ class Statements(Calls):
         shape = known_shape(grid.sizes)
         if shape is None or grid.item != DOUBLE:
             self.fail(node, "an array that is returned, of a length that is known only at run time")
-        kind = Array(DOUBLE, len(shape), True, shape)
-        self.result = kind if isinstance(self.result, Nothing) else self._unified(self.result, kind, node)
+        kind = Array(DOUBLE, shape)
+        self.result = kind if isinstance(self.result, Nothing) else self.unify(self.result, kind, node)
         if self.result != kind:
             self.fail(node, "arrays of two shapes that are returned")
         name = self.new_name("result")
@@ -106,13 +117,7 @@ class Statements(Calls):
 
     def returned(self, kind: Type) -> Type:
         """Return the type by which C returns a value: for an array, a tuple of its numbers."""
-        return Tuple((kind.item,) * math.prod(n or 0 for n in kind.shape)) if isinstance(kind, Array) else kind
-
-    def _unified(self, one: Type, other: Type, node: ast.AST) -> Type:
-        try:
-            return unified(one, other)
-        except TypeError as error:
-            self.fail(node, str(error))
+        return Tuple((kind.item,) * math.prod(known_lengths(kind))) if isinstance(kind, Array) else kind
 
     def _as(self, value: Value, kind: Type, node: ast.AST) -> str:
         """Return a value's C expression, converted to a type that holds it."""
@@ -139,7 +144,7 @@ class Statements(Calls):
             items = self.items_of(operand, node)
             if len(items) != len(target.elts):
                 self.fail(node, f"{len(items)} items for {len(target.elts)} names")
-            if isinstance(operand, Items):  # all are computed before any is written
+            if isinstance(operand, Items | View):  # all are computed before any is written
                 items = [self._fixed(item, element) for item, element in zip(items, target.elts, strict=True)]
             for element, item in zip(target.elts, items, strict=True):
                 self._assign(element, item, node)
@@ -163,24 +168,25 @@ class Statements(Calls):
         if name == "_":
             return
         value = self.materialized(operand, node, name) if isinstance(operand, Grid) else self.value(operand, node)
-        kind = self._unified(self.names[name], value.type, node) if name in self.names else value.type
+        kind = self.unify(self.names[name], value.type, node) if name in self.names else value.type
         if name in self.parameters:
             own = self.names[name]
             if isinstance(kind, Array) and isinstance(own, Array):
-                kind = replace(kind, bounds=own.bounds)
-            if kind != own:
+                shape = zip(own.shape, kind.shape, strict=True)
+                kind = replace(kind, shape=tuple(None if n is None else m for n, m in shape))
+            if kind != own or (isinstance(kind, Tuple) and _holds_array(kind)):
                 self.fail(node, f"another type for the parameter {name}")
-        self.note_lengths(self.variable(name), value, again=name in self.names)
+        self.note_lengths(name, value, again=name in self.names)
         self.names[name] = kind
         self.roots[name] = self.roots.get(name, frozenset()) | value.roots
         if isinstance(value, View) and not value.fresh:
             self.check_alias(name, value, node)
         self.lines.append(f"{self.variable(name)} = {self._as(value, kind, node)};")
 
-    def _place(self, target: ast.Subscript | ast.Attribute) -> Value:
+    def _target(self, target: ast.Subscript | ast.Attribute) -> Value:
         """Return the element, array or field that is written."""
         if isinstance(target, ast.Attribute):
-            return self._field_place(target)
+            return self._field_target(target)
         array = self.expression(target.value)
         if isinstance(array, Value) and not isinstance(array, View):
             self.fail(target, f"an item of {name_of(array.type)} that is written")
@@ -190,7 +196,7 @@ class Statements(Calls):
         places = list(target.slice.elts) if isinstance(target.slice, ast.Tuple) else [target.slice]
         return self.element(array, places, target)
 
-    def _field_place(self, target: ast.Attribute) -> Value:
+    def _field_target(self, target: ast.Attribute) -> Value:
         owner = self.expression(target.value)
         if not isinstance(owner, Value) or not isinstance(owner.type, Record) or not owner.type.mutable:
             self.fail(target, f"a value for attribute {target.attr} of what is no State")
@@ -205,7 +211,7 @@ class Statements(Calls):
     def _write(self, target: ast.Subscript | ast.Attribute, operand: Operand, node: ast.AST) -> None:
         value = operand if self.is_array(operand) else self.value(operand, node)
         mark, n_writes = len(self.lines), self.n_writes
-        lvalue = self._place(target)
+        lvalue = self._target(target)
         if len(self.lines) > mark and not (isinstance(value, Value) and value.simple):  # the value is computed first
             later, self.lines[mark:] = self.lines[mark:], []
             value = self.kept(value, node, self.n_writes > n_writes)
@@ -231,7 +237,7 @@ class Statements(Calls):
                 self._name_it(node.target.id, self.arithmetic(node.op, old, other, node), node)
             return
         assert isinstance(node.target, ast.Subscript | ast.Attribute)
-        lvalue = self._place(node.target)
+        lvalue = self._target(node.target)
         if isinstance(lvalue, View):
             self.store(lvalue, self.expression(node.value), node, node.op)
             return
@@ -251,12 +257,10 @@ class Statements(Calls):
             self._block(node.body if test.value else node.orelse)
             return
         self.lines.append(f"if ({self._truth_of(test, node)}) {{")
-        self.branches += 1
         self._block(node.body)
         if node.orelse:
             self.lines.append("} else {")
             self._block(node.orelse)
-        self.branches -= 1
         self.lines.append("}")
 
     def _truth_of(self, operand: Operand, node: ast.AST) -> str:
@@ -274,9 +278,7 @@ class Statements(Calls):
             needed, self.lines[mark:] = self.lines[mark:], []
             self.lines += ["for (;;) {", *needed, f"if (!({condition})) {{", "break;", "}"]
         self.loops.append(node)
-        self.branches += 1
         self._block(node.body)
-        self.branches -= 1
         self.loops.pop()
         self.lines.append("}")
 
@@ -326,9 +328,7 @@ class Statements(Calls):
         self.lines.append(f"for ({variable} = {first}; {variable} {sign} {end}; {change}) {{")
         if counter and name != "_":
             self.lines.append(f"{self.variable(name)} = {counter};")
-        self.branches += 1
         self._block(node.body)
-        self.branches -= 1
         self.lines.append("}")
 
     def _end(self, last: Value) -> str:

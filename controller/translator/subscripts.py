@@ -98,6 +98,7 @@ class Subscripts(Expressions):
         # of a fixed length must lie within it, which is checked when a call is bound.
         if node.step is not None:
             self.fail(node, "a slice with a step")
+        n_writes = self.n_writes
         operands = iter(self.in_order([bound for bound in (node.lower, node.upper) if bound is not None]))
         low, high = (Known(None) if bound is None else next(operands) for bound in (node.lower, node.upper))
         if isinstance(low, Known) and isinstance(high, Known):
@@ -109,7 +110,8 @@ class Subscripts(Expressions):
                 return self._constant_bounds(size, length, start, high.value, node)
         begin = "0" if low == Known(None) else self._clipped(low, size, node)
         end = size if high == Known(None) else self._clipped(high, size, node)
-        max_length = min(self.max_length(size), self._constant_length(node))
+        constant_length = self._constant_length(node) if self.n_writes == n_writes else math.inf
+        max_length = min(self.max_length(size), constant_length)
         return begin, self.bounded(end if begin == "0" else f"max_i64({end} - {begin}, 0)", max_length)
 
     def _constant_bounds(self, size: str, length: Length, low: int, high: int | None, node: ast.AST) -> tuple[str, str]:

@@ -6,7 +6,7 @@ import functools
 import math
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -29,24 +29,24 @@ _SHORT = {DOUBLE: "f64", INT: "i64", UINT: "u64", REFERENCE: "u32", BOOL: "b8"}
 
 
 @dataclass(frozen=True)
+class AtMost:
+    """The maximum of a length that C computes, or inf."""
+
+    length: float
+
+
+@dataclass(frozen=True)
 class Array:
     """A view of an array: a pointer, its shape, and its strides where it is not contiguous."""
 
     item: Scalar
-    ndim: int
+    shape: tuple[int | AtMost | None, ...]  # a length that is known at translation, that C computes, or that a call has
     contiguous: bool = True
-    shape: tuple[int | None, ...] = ()  # lengths that are known at translation; () if none is
-    bounds: tuple[float | None, ...] = ()  # maximum of those that C computes, or inf; () if none is
 
     @property
-    def lengths(self) -> tuple[int | None, ...]:
-        """Length of each axis, or None."""
-        return self.shape or (None,) * self.ndim
-
-    @property
-    def max_lengths(self) -> tuple[float | None, ...]:
-        """Maximum of each length that C computes, or None."""
-        return self.bounds or (None,) * self.ndim
+    def ndim(self) -> int:
+        """Number of axes."""
+        return len(self.shape)
 
     @property
     def c(self) -> str:
@@ -116,24 +116,19 @@ def shaped(owner: Any, name: str, kind: Type) -> Type:
     """Return the type of a parameter or field for a value: with the shape of the annotation, which it has to have."""
     if not isinstance(kind, Array):
         return kind
-    lengths = _annotated(owner, name, kind.lengths) or (None,) * kind.ndim
-    bounds = (bound if n is None else None for n, bound in zip(lengths, kind.max_lengths, strict=True))
-    return array_type(kind.item, kind.contiguous, lengths, tuple(bounds))
+    computed = (n if isinstance(n, AtMost) else None for n in kind.shape)
+    shape = zip(_annotated(owner, name, kind.shape), computed, strict=True)
+    return Array(kind.item, tuple(n if n is not None else m for n, m in shape), kind.contiguous)
 
 
-def _annotated(owner: Any, name: str, lengths: Sequence[int | None]) -> tuple[int | None, ...]:
-    """Return the shape that an annotation states, which lengths have to fit."""
-    expected = annotated_shapes(owner).get(name, ())
-    if expected:
-        fits = len(expected) == len(lengths) and all(
-            a is None or b is None or a == b for a, b in zip(expected, lengths, strict=True)
-        )
-        if not fits:
-            raise TypeError(f"{owner.__name__}: {name} has shape {_lengths(lengths)}, expected {_lengths(expected)}")
+def _annotated(owner: Any, name: str, shape: Sequence[int | AtMost | None]) -> tuple[int | None, ...]:
+    """Return the shape that an annotation states, which a shape has to fit."""
+    expected = annotated_shapes(owner).get(name) or (None,) * len(shape)
+    if len(expected) != len(shape) or any(
+        a is not None and isinstance(b, int) and a != b for a, b in zip(expected, shape, strict=True)
+    ):
+        raise TypeError(f"{owner.__name__}: {name} has shape {_lengths(shape)}, expected {_lengths(expected)}")
     return expected
-
-
-_array = functools.cache(Array)
 
 
 def check_shapes(function: Any, arguments: Sequence[Any]) -> None:
@@ -143,8 +138,8 @@ def check_shapes(function: Any, arguments: Sequence[Any]) -> None:
             _annotated(function, name, argument.shape)
 
 
-def _lengths(lengths: Sequence[int | None]) -> str:
-    return f"({', '.join('any' if n is None else str(n) for n in lengths)}{',' if len(lengths) == 1 else ''})"
+def _lengths(shape: Sequence[int | AtMost | None]) -> str:
+    return f"({', '.join(str(n) if isinstance(n, int) else 'any' for n in shape)}{',' if len(shape) == 1 else ''})"
 
 
 def type_of(value: Any) -> Type:
@@ -152,17 +147,17 @@ def type_of(value: Any) -> Type:
     if isinstance(value, np.ndarray):
         item = _ITEMS.get(value.dtype)
         if item is not None and value.flags.c_contiguous:
-            return _array(item, value.ndim, True, ())
+            return Array(item, (None,) * value.ndim)
     elif isinstance(value, tuple):
         if not hasattr(value, "_fields"):
             return Tuple(tuple(map(type_of, value)))
-        owner, kinds = type(value), []
+        kinds = []
         for name, item in zip(value._fields, value, strict=True):
             kind = type_of(item)
             if isinstance(kind, Array):
-                kind = _array(kind.item, kind.ndim, True, _annotated(owner, name, item.shape))
+                kind = replace(kind, shape=_annotated(type(value), name, item.shape))
             kinds.append(kind)
-        return Record(owner, tuple(kinds))
+        return Record(type(value), tuple(kinds))
     elif isinstance(value, float):
         return DOUBLE
     elif isinstance(value, int | np.int64):  # truth values too: each takes a word
@@ -181,32 +176,19 @@ def unified(one: Type, other: Type) -> Type:
     if isinstance(one, Tuple) and isinstance(other, Tuple) and len(one.items) == len(other.items):
         return Tuple(tuple(map(unified, one.items, other.items)))
     if isinstance(one, Array) and isinstance(other, Array) and (one.item, one.ndim) == (other.item, other.ndim):
-        lengths = tuple(a if a == b else None for a, b in zip(one.lengths, other.lengths, strict=True))
-        bounds = tuple(
-            map(
-                _unified_bound,
-                lengths,
-                zip(one.lengths, one.max_lengths, strict=True),
-                zip(other.lengths, other.max_lengths, strict=True),
-            )
-        )
-        return array_type(one.item, one.contiguous and other.contiguous, lengths, bounds)
+        lengths = zip(one.shape, other.shape, strict=True)
+        shape = tuple(a if a == b else AtMost(max(_max_length(a), _max_length(b))) for a, b in lengths)
+        return Array(one.item, shape, one.contiguous and other.contiguous)
     raise TypeError(f"{name_of(one)} and {name_of(other)} in the same place")
 
 
-def _unified_bound(length: int | None, one: tuple[float | None, ...], other: tuple[float | None, ...]) -> float | None:
-    if length is not None or (one == other == (None, None)):
-        return None
-    return max(next((n for n in lengths if n is not None), math.inf) for lengths in (one, other))
+def known_lengths(kind: Array) -> list[int]:
+    """Return the lengths that are known at translation."""
+    return [n for n in kind.shape if isinstance(n, int)]
 
 
-@functools.cache
-def array_type(
-    item: Scalar, contiguous: bool, lengths: tuple[int | None, ...], bounds: tuple[float | None, ...]
-) -> Array:
-    """Return the type of an array."""
-    known, computed = (any(n is not None for n in values) for values in (lengths, bounds))
-    return Array(item, len(lengths), contiguous, lengths if known else (), bounds if computed else ())
+def _max_length(length: int | AtMost | None) -> float:
+    return math.inf if length is None else length.length if isinstance(length, AtMost) else length
 
 
 def name_of(kind: Type) -> str:

@@ -98,12 +98,12 @@ def fly_scenario(
     data = make_data(scenario, model, law, signals, inputs, outputs, make_noise(scenario))
     bound_law, rules = BoundLaw(law, model, data), bind_rules(scenario.rules.system, data)
     decisions = -(-scenario.steps // scenario.control_every)
-    rows = np.zeros((decisions, signals.row.size) if trace else (0, 0))
+    rows = np.zeros((decisions if trace else 0, signals.row.size))
     metrics = FlightMetrics()
     BoundCall(fly, (model, data, calls, metrics, np.zeros(len(inputs)), rows)).call()
     bound_law.raise_error()
     rules.raise_error()
-    columns = signals.columns if trace else ()
+    columns = signals.columns
     flown = Rows(columns, {column.name: values for column, values in zip(columns, rows.T, strict=True)})
     return metrics, model, data, flown
 

@@ -55,6 +55,7 @@ def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, for_rec
         for f in scenario.failures
     )
     names = ["goal", *(secondary.region.name for secondary in scenario.regions)]
+    through_thrusters = scenario.actuation.through == "thrusters"
     return StepModel(
         step=step,
         steps=scenario.steps,
@@ -84,9 +85,9 @@ def make_model(scenario: Scenario, law: Law, clock: Integers = NO_CLOCK, for_rec
         failure_steps=np.array([due for due, _, _ in failures], np.int64),
         remaining=np.array([remaining for _, _, remaining in failures]),
         report_failures=scenario.report_failures,
-        through_thrusters=scenario.actuation.through == "thrusters",
+        through_thrusters=through_thrusters,
         law_gives_wrench=law.output == "wrench",
-        thruster_matrix=scenario.vehicle.thruster_matrix,
+        thruster_matrix=scenario.vehicle.thruster_matrix[:, : None if through_thrusters else 0],
         **{
             field: next((i for i, diagnostic in enumerate(law.diagnostics) if diagnostic.name == name), -1)
             for field, name in (("bound", "bound"), ("isolated", "failed_thruster"), ("limit", "thrust_limit"))

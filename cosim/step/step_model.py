@@ -71,7 +71,7 @@ class StepModel(NamedTuple):
     report_failures: bool  # True if failures are reported to the law
     through_thrusters: bool  # True: thrusters give the wrench; False: it acts on the body directly
     law_gives_wrench: bool  # True: the law gives a wrench; False: thruster forces
-    thruster_matrix: Array  # (6, m) body wrench of one newton of each thruster
+    thruster_matrix: Array  # (6, m) body wrench of one newton of each thruster; (6, 0) if the plant takes a wrench
     bound: int  # index in the law's report of its bound of the clearances; -1: it has none
     isolated: int  # the same of the thruster that it isolated last
     limit: int  # the same of the least limit of a thruster that it estimates

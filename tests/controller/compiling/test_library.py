@@ -269,6 +269,18 @@ def test_a_kept_text_is_that_of_the_present_constants(cache, monkeypatch):
     assert text() == plain
 
 
+def test_a_kept_text_depends_on_all_modules_that_are_imported(monkeypatch):
+    sources = {
+        "controller.a": "from controller import (  # two\n    b,\n    c as d,\n)",
+        "controller.b": "import controller.d as e, os",
+        "controller.c": "if True:\n    from controller.e import x",
+    }
+    for name in ("controller.a", "controller.b", "controller.c", "controller.d", "controller.e", "controller.f"):
+        monkeypatch.setitem(sys.modules, name, sys)
+    monkeypatch.setattr(text_cache, "_source", lambda name: sources.get(name, ""))
+    assert text_cache._closure({"controller.a"}) == {"controller", *(f"controller.{name}" for name in "abcde")}
+
+
 @pytest.mark.parametrize("damage", ["half", "changed", "older"])
 def test_a_damaged_text_is_made_anew(damage, cache):
     kind = (type_of(np.zeros(6)),)

@@ -38,7 +38,7 @@ class Called:
         self._entry, self._words = self._library.entry, np.array(words_of(arguments), dtype=np.uint64)
         self._entry.argtypes, self._entry.restype = [ctypes.c_void_p], None
         self._at = self._words.ctypes.data
-        check = self._library.entry_misfit
+        check = self._library.entry_check_shapes
         check.argtypes, check.restype = [ctypes.c_void_p], ctypes.c_char_p
         assert check(self._at) is None
 

@@ -129,6 +129,9 @@ def tuples(x, n, out):
     for i in range(3):
         out[8] += three[i] * (i + 1)
     out[9] = three[1:][0]
+    a, _, c = x[:3].copy()
+    for value in x[:3].copy():
+        out[10] += value * (c - a) / x[:2].copy().size
 
 
 def order(x, n, out):
@@ -241,11 +244,15 @@ def test_code_compiles_without_warnings_in_other_compilers(tmp_path):
         ("a = x[0]\n    a = x\n    a[0] = 1.0", 3, "in the same place"),
         ("x[0] = math.gamma(x[0])", 2, "gamma"),
         ("x[::2] = 0.0", 2, "slice with a step"),
+        ("x[0] = (x[1] > 0.0) + (x[2] > 0.0)", 2, "Add of bool and bool"),
+        ("a = x[: int(count_calls(x))]\n    y = x[int(count_calls(x)) : int(count_calls(x)) + 1] * 2.0", 3, "run time"),
+        ("t = (x[:2], x[2:])\n    t[0][:] = (x if x[0] > 0.0 else (1.0, 2.0))", 3, "in the same place"),
+        ("y = Nested(Pair(x, x), 1.0, 2) if x[0] > 0.0 else Pair(x, x)", 2, "Nested and Pair in the same place"),
         ("if x[0] > 0.0:\n        raise ValueError(1)", 3, "Raise"),
     ],
 )
 def test_unsupported_constructs_are_rejected_with_file_and_line(tmp_path, body, line, word):
-    path, names = tmp_path / "refused.py", {"math": math, "__name__": __name__}
+    path, names = tmp_path / "refused.py", {**globals()}
     path.write_text(f"def given(x):\n    {body}\n")
     exec(compile(path.read_text(), str(path), "exec"), names)
     with pytest.raises(TranslationError, match=word) as caught:

@@ -143,6 +143,26 @@ def add_if_there(pair, total):
         total[:] = pair.x[:2] * pair.y
 
 
+def add_chosen(pair, total):
+    other = Pair(pair.y, pair.x)
+    chosen = pair if total[0] > 0.0 else other
+    add(chosen, total)
+    add(pair if total[1] > 5.0 else other, total)
+
+
+def add_each(pair, total):
+    for one in (pair, Pair(pair.y, pair.x)):
+        add(one, total)
+
+
+def add_items(index, total):
+    total[:] = index[0] + index[1]
+
+
+def add_tuple(pair, total):
+    add_items((pair.x[1:], pair.y), total)
+
+
 @pytest.mark.parametrize(
     ("function", "lengths", "message"),
     [
@@ -160,8 +180,15 @@ def add_if_there(pair, total):
         (add_three, (3, 3, 3), None),
         (add_three, (4, 4, 3), "pair.y"),
         (add_if_there, (2, 2, 2), None),
-        (add_if_there, (2, 0, 2), None),
+        (add_if_there, (2, 0, 2), r"pair.y.shape\[0\] is 0, expected .* == 2"),
         (add_if_there, (2, 3, 2), "pair.y"),
+        (add_chosen, (3, 3, 3), None),
+        (add_chosen, (3, 2, 3), r"pair.x.shape\[0\] is 3 and pair.y.shape\[0\] is 2"),
+        (add_each, (3, 3, 3), None),
+        (add_each, (3, 3, 2), "total"),
+        (add_each, (2, 3, 2), "pair.y"),
+        (add_tuple, (4, 3, 3), None),
+        (add_tuple, (3, 3, 3), r"pair.x.shape\[0\] - 1 .*in test_slices.add_items"),
     ],
 )
 def test_lengths_are_checked_when_a_call_is_bound(function, lengths, message):
@@ -174,3 +201,9 @@ def test_lengths_are_checked_when_a_call_is_bound(function, lengths, message):
     else:
         with pytest.raises(TypeError, match=message):
             BoundCall(function, (Pair(x, y), total))
+
+
+def test_lengths_of_items_are_checked_by_name():
+    """Of a parameter whose name is reserved in C."""
+    with pytest.raises(TypeError, match=r"index\[0\].shape\[0\] is 3 and index\[1\].shape\[0\] is 2, expected"):
+        BoundCall(add_items, ((np.ones(3), np.ones(2)), np.ones(3)))

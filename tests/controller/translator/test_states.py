@@ -171,6 +171,28 @@ def test_a_copy_has_numbers_of_its_own(copied):
     assert other.block.tolist() == [7.0, 1.0, 2.0, 3.0]
 
 
+def test_a_field_may_be_stated_anew_and_a_record_has_its_default():
+    class Wider(Inner):
+        v: Grid
+        x: float = 2.0
+        inner: Inner = Inner(x=9.0)
+
+    one, other = Wider(), Wider(inner=Inner())
+    assert Wider._fields == ("x", "v", "inner") and one.v.shape == (2, 3) and one.x == 2.0
+    one.inner.x += 1.0
+    assert (one.inner.x, Wider().inner.x, other.inner.x) == (10.0, 9.0, 0.25)
+
+
+def test_a_length_reaches_only_records_that_have_it():
+    class Holder(State):
+        count: Inner
+        outer: Outer
+        rows: Annotated[Array, Shape("n", 2)]
+
+    made = Holder(k=np.int64(4), n=5)
+    assert made.outer.counts.shape == (4,) and made.outer.n == 3 and made.rows.shape == (5, 2)
+
+
 def test_a_state_over_an_array_has_its_numbers():
     block = np.arange(4.0)
     state = Inner.over(block)
@@ -184,7 +206,13 @@ def test_a_state_over_an_array_has_its_numbers():
     ("make", "message"),
     [
         (Outer, "Outer: counts not given"),
-        (lambda: Outer(k=2, z=1.0), "Outer: z is no field, and no length"),
+        (lambda: Outer(k=2, z=1.0), r"Outer: z \(got 1.0\) is no field, and no length"),
+        (lambda: Outer(k=2, m=3), r"Outer: m \(got 3\) is no field, and no length"),
+        (lambda: Outer(k=2.0), r"Outer: k \(got 2.0\) is no field, and no length"),
+        (lambda: Inner(x=np.array(1)), r"Inner: x \(got int64 of shape \(\)\), expected float64"),
+        (lambda: Inner(v=np.zeros(4)), r"Inner: v \(got float64 of shape \(4,\)\), expected float64 of shape \(3,\)"),
+        (lambda: Outer(k=2, inner=3), r"Outer: inner \(got 3\), expected Inner"),
+        (lambda: Outer.over(np.zeros(9)), "Outer: n, on, word, counts, inner in an array of float64"),
         (lambda: setattr(Outer(k=2), "z", 1.0), "Outer has no field z"),
         (lambda: setattr(Outer(k=2), "inner", Inner()), "item assignment"),
         (lambda: setattr(Outer(k=2), "v", np.zeros(2)), "broadcast"),
@@ -204,7 +232,7 @@ def test_wrong_fields_are_refused_by_name(make, message):
         ("named.x = 1.0", "a value for attribute x of what is no State"),
         ("s.v.x = 1.0", "a value for attribute x of what is no State"),
         ("t = s._replace(x=1.0)", "_replace of what is no named tuple"),
-        ("t = Inner(s.x, s.v)", "a new Inner, whose numbers are stored"),
+        ("t = Inner(s.x, s.v)", "a new State, Inner"),
         ("s.v = np.concatenate((s.v, s.v))", "shapes"),
     ],
 )

@@ -81,7 +81,6 @@ def assert_sound(law, forces):
             "observation.last_bound",
             "observation.guaranteed_bound",
             "report.bound",
-            "report.drag",
             "report.thrust_limit",
             "thrusters.stuck",
         ):
