@@ -13,14 +13,15 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 
 from controller.translator.array_lengths import Index
-from controller.translator.array_views import ArrayViews, known_shape, plus
+from controller.translator.array_views import known_shape, plus
+from controller.translator.operand_values import OperandValues
 from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed
 from controller.translator.types import BOOL, DOUBLE, INT, Array, Scalar, Type, unified
 
 _UNROLLED = 9  # maximum number of elements that are written out
 
 
-class ArrayExpressions(ArrayViews):
+class ArrayExpressions(OperandValues):
     """Translate array expressions of one function."""
 
     def arithmetic(self, op: ast.operator, left: Operand, right: Operand, node: ast.AST) -> Operand:

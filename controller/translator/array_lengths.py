@@ -11,43 +11,15 @@ from __future__ import annotations
 import ast
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from controller.translator.operands import Operands, Value, View
+from controller.translator.function_code import FunctionCode
+from controller.translator.operands import Length, Requirement, Value, View
 from controller.translator.types import AtMost
 
 Index = tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Length:
-    """A number, or with a path the length of an axis of an argument, such as "0.numbers.0", plus a number."""
-
-    path: str
-    offset: int = 0
-
-    def text(self, parameters: Sequence[str] | None = None) -> str:
-        """Return it in Python, with the names of the parameters, else in C."""
-        if not self.path:
-            return str(self.offset)
-        index, *items, axis = self.path.split(".")
-        place = "[{}]" if parameters else ".f{}"
-        inside = "".join(place.format(item) if item.isdigit() else f".{item}" for item in items)
-        code = f"{parameters[int(index)]}{inside}.shape[{axis}]" if parameters else f"w->a{index}{inside}.n{axis}"
-        return code + (f" {'-' if self.offset < 0 else '+'} {abs(self.offset)}" if self.offset else "")
-
-
-@dataclass(frozen=True)
-class Requirement:
-    """A relation of two lengths, of which the first one has a path."""
-
-    left: Length
-    sign: str  # == or >=
-    right: Length
-    where: str  # module and function
-
-
-class ArrayLengths(Operands):
+class ArrayLengths(FunctionCode):
     """Lengths of the arrays of one function."""
 
     parameters: list[str]

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import ast
 import itertools
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 from controller.translator.array_lengths import ArrayLengths, Index
 from controller.translator.operands import Grid, Operand, Value, View
-from controller.translator.types import Array, AtMost, Scalar
+from controller.translator.types import DOUBLE, Array, AtMost, Scalar, Type
 
 ANY = "*"  # root of an array of which nothing is known
 
@@ -54,15 +55,6 @@ class ArrayViews(ArrayLengths):
     roots: dict[str, frozenset[str]]  # roots of the arrays and records of each name
     made: dict[str, frozenset[str]]  # roots of the fields of records that the function made, by path
     writes_arguments: bool  # if the function writes into an array that it did not make
-    declared: dict[str, str]  # declarations of variables that Python does not have
-
-    def storage(self, stem: str, node: ast.AST, item: Scalar, size: int) -> str:
-        """Declare storage on the stack, one for each place in the text, and return its name."""
-        raise NotImplementedError
-
-    def new_name(self, stem: str) -> str:
-        """Return a name that no variable has."""
-        raise NotImplementedError
 
     def view(
         self, item: Scalar, data: str, offset: str, sizes: Index, strides: Index, roots: frozenset[str], code: str = ""
@@ -139,3 +131,30 @@ class ArrayViews(ArrayLengths):
         assert isinstance(view.type, Array)
         offset = plus([view.offset, times(index, view.strides[0])])
         return self.view(view.type.item, view.data, offset, view.sizes[1:], view.strides[1:], view.roots)
+
+    def temporary(self, kind: Type, code: str) -> Value:
+        """Assign a value to a new variable, and return that."""
+        name = self.new_name("t")
+        self.declared[name] = self.definition(kind, name)
+        if code:
+            self.lines.append(f"{name} = {code};")
+        return self.held(kind, name, True, frozenset([ANY]), ())
+
+    def new_variable(self, kind: Type, code: str, *values: Value) -> Value:
+        """Assign one of some values to a new variable, and return that."""
+        name = self.temporary(kind, code).code
+        for i, value in enumerate(values):
+            self.note_lengths(name, value, again=i > 0)
+        return self.held(kind, name, True, frozenset().union(*(value.roots for value in values)), (name,))
+
+    def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str], paths: tuple[str, ...]) -> Value:
+        """Return what a C variable or member holds; its lengths are known by paths."""
+        if isinstance(kind, Array):
+            return self.view_of(kind, code, roots, paths) if kind.ndim else Value(kind.item, f"{code}.data[0]")
+        return Value(kind, code, simple, frozenset() if isinstance(kind, Scalar) else roots, paths)
+
+    def make_zeros(self, shape: tuple[int, ...], node: ast.AST) -> Value:
+        """Return a new array of zeros on the stack."""
+        name = self.storage("zeros", node, DOUBLE, math.prod(shape))
+        self.lines.append(f"memset({name}, 0, sizeof {name});")
+        return self.stored(name, DOUBLE, shape)

@@ -3,18 +3,33 @@
 from __future__ import annotations
 
 import ast
+import itertools
 import math
-import types as python_types
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from types import FunctionType
 from typing import Any
 
 import numpy as np
 
 from controller.stack_array import array, zeros
 from controller.translator.foreign import POINTER, call_c
-from controller.translator.operands import Known, Operand, Value, bracketed
+from controller.translator.operands import Grid, Items, Known, Length, Operand, Value, View, bracketed
 from controller.translator.subscripts import Subscripts
-from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Record, name_of, unified
+from controller.translator.types import (
+    BOOL,
+    DOUBLE,
+    INT,
+    UINT,
+    Array,
+    Nothing,
+    Record,
+    Type,
+    known_lengths,
+    name_of,
+    returned,
+    shaped,
+    unified,
+)
 
 _MATH = {
     "sqrt": "sqrt", "cos": "cos", "sin": "sin", "acos": "acos", "atan2": "atan2", "hypot": "hypot",
@@ -67,7 +82,7 @@ class Calls(Subscripts):
             return Value(kind, self.converted(value, kind))
         if _is_of(function, _MODULES) or isinstance(function, np.ufunc):
             return self._of_math(name, operands, node)
-        if isinstance(function, python_types.FunctionType):
+        if isinstance(function, FunctionType):
             return self.call_translated(function, operands, node)
         return self.fail(node, f"a call of {name or function!r}")
 
@@ -109,6 +124,105 @@ class Calls(Subscripts):
         codes = [_as_kind(value, kind) for value, kind in zip(values, kinds, strict=True)]
         function = f"(int (*)({', '.join(kinds)}))(intptr_t)"
         return self.temporary(INT, f"({function}{self.scalar(address, node).code})({', '.join(codes)})")
+
+    def make_record(self, kind: type, items: Sequence[Value], node: ast.AST) -> Value:
+        """Return a new named tuple on the stack."""
+        fields: tuple[str, ...] = kind._fields  # type: ignore[attr-defined]
+        try:
+            types = tuple(self._shaped(kind, field, item, node) for field, item in zip(fields, items, strict=True))
+        except TypeError as error:
+            self.fail(node, str(error))
+        record, name = Record(kind, types), self.site("record", node)
+        if record.mutable:
+            self.fail(node, f"a new State, {kind.__name__}")
+        self.declared[name] = f"{self.c(record)} {name};"
+        for field, item, of in zip(fields, items, types, strict=True):
+            code = f"*{item.code}" if isinstance(of, Record) else self.converted(item, of)
+            self.lines.append(f"{name}.{field} = {code};")
+            self.made[f"{name}.{field}"] = item.roots
+            self.note_lengths(f"{name}.{field}", item)
+        return Value(record, f"(&{name})", False, frozenset([name]))
+
+    def call_translated(self, function: Callable[..., Any], arguments: Sequence[Operand], node: ast.AST) -> Operand:
+        """Call a function of Python that is translated too."""
+        if not isinstance(function, FunctionType):
+            self.fail(node, f"a call of {function!r}")
+        values = [self.value(argument, node) for argument in arguments]
+        names = function.__code__.co_varnames
+        try:
+            kinds = tuple(self._shaped(function, name, value, node) for name, value in zip(names, values, strict=False))
+        except TypeError as error:
+            self.fail(node, str(error))
+        roots = [self._all_roots(value) for value in values]
+        aliases = frozenset(
+            frozenset([names[i], names[k]])
+            for i, k in itertools.combinations(range(min(len(values), len(names))), 2)
+            if any(one.startswith(f"{other}.") or other.startswith(f"{one}.") for one in roots[i] for other in roots[k])
+            or self.may_overlap(roots[i], roots[k])
+        )
+        aliases |= {frozenset([name]) for name, value in zip(names, values, strict=False) if self._is_aliased(value)}
+        name, result, writes, requirements = self.program.instance(function, kinds, aliases)
+        operands = [a if isinstance(a, Items) else value for a, value in zip(arguments, values, strict=True)]
+        for requirement in requirements:
+            left, right = (self._of_argument(n, operands, node) for n in (requirement.left, requirement.right))
+            if not (left and right):
+                self.fail(node, f"arrays of lengths that C computes, in {requirement.where}")
+            self.require(left, requirement.sign, right, node, requirement.where)
+        code = f"{name}({', '.join(self.converted(v, k) for v, k in zip(values, kinds, strict=True))})"
+        if writes:
+            self.n_writes += 1
+            self.writes_arguments = self.writes_arguments or not all(map(self.is_local, roots))
+        if isinstance(result, Nothing):
+            self.lines.append(f"{code};")
+            return Known(None)
+        if not isinstance(result, Array):
+            return self.temporary(result, code)
+        name = self.site("r", node)
+        self.declared[name] = f"{self.c(returned(result))} {name};"
+        self.lines.append(f"{name} = {code};")
+        return self.stored(f"{name}.f", DOUBLE, known_lengths(result))
+
+    def _of_argument(self, length: Length, arguments: Sequence[Operand], node: ast.AST) -> Length | None:
+        """Return what a length of a called function's parameter is here."""
+        if not length.path:
+            return length
+        index, *items, axis = length.path.split(".")
+        operand = arguments[int(index)]
+        for item in items:
+            if isinstance(operand, Value) and isinstance(operand.type, Record):
+                operand = self.field(operand, item)
+            else:
+                operand = self.items_of(operand, node)[int(item)]
+        assert isinstance(operand, View | Grid)
+        own = self.length(operand.sizes[int(axis)])
+        return own and Length(own.path, own.offset + length.offset)
+
+    def _shaped(self, owner: Any, name: str, value: Value, node: ast.AST) -> Type:
+        """Return the type of a parameter or field; require the lengths of its annotation."""
+        kind = shaped(owner, name, value.type)
+        if isinstance(kind, Array) and isinstance(value, View):
+            for n, size in zip(kind.shape, value.sizes, strict=True):
+                length = self.length(size)
+                if isinstance(n, int) and length:
+                    self.require(length, "==", Length("", n), node)
+                elif isinstance(n, int) and self.max_length(size) != n:
+                    self.fail(node, f"{name} of a length that is known only at run time, expected {n}")
+        return kind
+
+    def _is_aliased(self, record: Value) -> bool:
+        """Return True if arrays of one record may overlap."""
+        fields = [self.made[path] for path in self.made for root in record.roots if path.startswith(f"{root}.")]
+        owners = {root.partition(".")[0] for root in record.roots.union(*fields)}
+        return any(frozenset([owner]) in self.aliases for owner in owners) or any(
+            self.may_overlap(one, other) for one, other in itertools.combinations(fields, 2)
+        )
+
+    def _all_roots(self, value: Value) -> frozenset[str]:
+        """Return the roots of all arrays of a value."""
+        if not isinstance(value.type, Record):
+            return value.roots
+        own = [self.made[path] for path in self.made for root in value.roots if path.startswith(f"{root}.")]
+        return value.roots.union(*own)
 
     def _absolute(self, value: Value) -> Value:
         return Value(value.type, f"{'fabs' if value.type == DOUBLE else 'llabs'}({value.code})")

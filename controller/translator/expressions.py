@@ -161,15 +161,13 @@ class Expressions(ArrayExpressions):
         sign = "&&" if isinstance(node.op, ast.And) else "||"
         result = self.condition(node.values[0])
         for other in node.values[1:]:
-            mark = len(self.lines)
-            value = self.condition(other)
-            if len(self.lines) == mark:
+            value, needed, _ = self.apart(self.condition, other)
+            if not needed:
                 result = Value(BOOL, f"{bracketed(result)} {sign} {bracketed(value)}")
                 continue
-            later, self.lines[mark:] = self.lines[mark:], []
             held = self.temporary(BOOL, result.code)
             condition = held.code if sign == "&&" else f"!{held.code}"
-            self.lines += [f"if ({condition}) {{", *later, f"{held.code} = {value.code};", "}"]
+            self.lines += [f"if ({condition}) {{", *needed, f"{held.code} = {value.code};", "}"]
             result = held
         return result
 
@@ -180,14 +178,7 @@ class Expressions(ArrayExpressions):
 
     def _ifexp(self, node: ast.IfExp) -> Operand:
         condition = self.condition(node.test)
-        branches = []
-        for branch in (node.body, node.orelse):
-            mark = len(self.lines)
-            operand = self.expression(branch)
-            operand = self.materialized(operand, branch) if isinstance(operand, Grid) else operand
-            needed, self.lines[mark:] = self.lines[mark:], []
-            branches.append((needed, operand))
-        (first, a), (second, b) = branches
+        (a, first, _), (b, second, _) = (self.apart(self._stored, branch) for branch in (node.body, node.orelse))
         if isinstance(a, Items) and isinstance(b, Items) and not (first or second):
             result = condition if condition.simple else self.temporary(BOOL, condition.code)
             return Items(tuple(self._chosen(result, x, y, node) for x, y in zip(a.items, b.items, strict=True)))
@@ -199,6 +190,10 @@ class Expressions(ArrayExpressions):
         self.lines += [f"if ({condition.code}) {{", *first, f"{result.code} = {self.converted(x, kind)};", "} else {"]
         self.lines += [*second, f"{result.code} = {self.converted(y, kind)};", "}"]
         return result
+
+    def _stored(self, node: ast.expr) -> Operand:
+        operand = self.expression(node)
+        return self.materialized(operand, node) if isinstance(operand, Grid) else operand
 
     def unify(self, one: Type, other: Type, node: ast.AST) -> Type:
         """Return the type that holds values of both."""

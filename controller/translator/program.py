@@ -9,8 +9,9 @@ from types import FunctionType
 from typing import Any
 
 from controller.errors import TranslationError
-from controller.translator.array_lengths import Requirement
-from controller.translator.functions import Aliases, Function, Instance
+from controller.translator.function_code import Aliases, Instance
+from controller.translator.functions import Function
+from controller.translator.operands import Requirement
 from controller.translator.types import Array, Nothing, Record, Scalar, Tuple, Type, shaped
 
 _HEAD = """\

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -20,8 +19,8 @@ from controller.translator.types import (
     Scalar,
     Tuple,
     Type,
-    known_lengths,
     name_of,
+    returned,
 )
 
 
@@ -29,15 +28,9 @@ class Statements(Calls):
     """Translate the statements of one function into `lines`."""
 
     parameters: list[str]
-    declared: dict[str, str]  # declarations of variables that Python does not have
     result: Type
     loops: list[ast.stmt]  # that the statement is in
     later: list[Sequence[ast.stmt]]  # statements that follow in each of the blocks that the statement is in
-    made_at: dict[str, ast.AST]  # place in the text of each storage on the stack
-
-    def new_name(self, stem: str) -> str:
-        """Return a name that no variable has."""
-        raise NotImplementedError
 
     def statement(self, node: ast.stmt) -> None:
         """Translate a statement."""
@@ -111,13 +104,9 @@ class Statements(Calls):
         if self.result != kind:
             self.fail(node, "arrays of two shapes that are returned")
         name = self.new_name("result")
-        self.declared[name] = f"{self.c(self.returned(kind))} {name};"
+        self.declared[name] = f"{self.c(returned(kind))} {name};"
         self.store(self.stored(f"{name}.f", DOUBLE, shape), grid, node)
         self.lines.append(f"return {name};")
-
-    def returned(self, kind: Type) -> Type:
-        """Return the type by which C returns a value: for an array, a tuple of its numbers."""
-        return Tuple((kind.item,) * math.prod(known_lengths(kind))) if isinstance(kind, Array) else kind
 
     def _as(self, value: Value, kind: Type, node: ast.AST) -> str:
         """Return a value's C expression, converted to a type that holds it."""
@@ -210,46 +199,32 @@ class Statements(Calls):
 
     def _write(self, target: ast.Subscript | ast.Attribute, operand: Operand, node: ast.AST) -> None:
         value = operand if self.is_array(operand) else self.value(operand, node)
-        mark, n_writes = len(self.lines), self.n_writes
-        lvalue = self._target(target)
-        if len(self.lines) > mark and not (isinstance(value, Value) and value.simple):  # the value is computed first
-            later, self.lines[mark:] = self.lines[mark:], []
-            value = self.kept(value, node, self.n_writes > n_writes)
-            self.lines += later
+        lvalue, needed, writes = self.apart(self._target, target)
+        if needed and not (isinstance(value, Value) and value.simple):  # the value is computed first
+            value = self.kept(value, node, writes)
+        self.lines += needed
         if isinstance(lvalue, View):
             self.store(lvalue, value, node)
         else:
             self.lines.append(f"{lvalue.code} = {self.converted(self.scalar(value, node), lvalue.type)};")
 
     def _do_augassign(self, node: ast.AugAssign) -> None:
-        if isinstance(node.target, ast.Name):
-            old = self.expression(ast.copy_location(ast.Name(node.target.id, ast.Load()), node))
-            mark = len(self.lines)
-            other = self.expression(node.value)
-            if len(self.lines) > mark and not isinstance(old, View):
-                later, self.lines[mark:] = self.lines[mark:], []
-                kept = self.value(old, node)
-                old = self.temporary(kept.type, kept.code)
-                self.lines += later
-            if isinstance(old, View):
-                self.store(old, other, node, node.op)
-            else:
-                self._name_it(node.target.id, self.arithmetic(node.op, old, other, node), node)
-            return
-        assert isinstance(node.target, ast.Subscript | ast.Attribute)
-        lvalue = self._target(node.target)
-        if isinstance(lvalue, View):
-            self.store(lvalue, self.expression(node.value), node, node.op)
-            return
-        mark = len(self.lines)
-        other = self.expression(node.value)
-        before: Value = lvalue
-        if len(self.lines) > mark:
-            later, self.lines[mark:] = self.lines[mark:], []
-            before = self.temporary(lvalue.type, lvalue.code)
-            self.lines += later
-        value = self.scalar(self.arithmetic(node.op, before, other, node), node)
-        self.lines.append(f"{lvalue.code} = {self.converted(value, lvalue.type)};")
+        target = node.target
+        if isinstance(target, ast.Name):
+            old = self.expression(ast.copy_location(ast.Name(target.id, ast.Load()), node))
+        else:
+            old = self._target(target)
+        other, needed, _ = self.apart(self.expression, node.value)
+        place = self.value(old, node)
+        before = self.temporary(place.type, place.code) if needed and not isinstance(old, View) else old
+        self.lines += needed
+        if isinstance(place, View):
+            self.store(place, other, node, node.op)
+        elif isinstance(target, ast.Name):
+            self._name_it(target.id, self.arithmetic(node.op, before, other, node), node)
+        else:
+            value = self.scalar(self.arithmetic(node.op, before, other, node), node)
+            self.lines.append(f"{place.code} = {self.converted(value, place.type)};")
 
     def _do_if(self, node: ast.If) -> None:
         test = self.expression(node.test)
@@ -270,13 +245,11 @@ class Statements(Calls):
     def _do_while(self, node: ast.While) -> None:
         if node.orelse:
             self.fail(node, "else of a loop")
-        mark = len(self.lines)
-        condition = self.condition(node.test).code
-        if len(self.lines) == mark:
-            self.lines.append(f"while ({condition}) {{")
+        condition, needed, _ = self.apart(self.condition, node.test)
+        if needed:
+            self.lines += ["for (;;) {", *needed, f"if (!({condition.code})) {{", "break;", "}"]
         else:
-            needed, self.lines[mark:] = self.lines[mark:], []
-            self.lines += ["for (;;) {", *needed, f"if (!({condition})) {{", "break;", "}"]
+            self.lines.append(f"while ({condition.code}) {{")
         self.loops.append(node)
         self._block(node.body)
         self.loops.pop()

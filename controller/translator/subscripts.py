@@ -7,10 +7,9 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from controller.translator.array_lengths import Length
 from controller.translator.array_views import plus, times
 from controller.translator.expressions import Expressions
-from controller.translator.operands import Grid, Items, Known, Operand, Value, View
+from controller.translator.operands import Grid, Items, Known, Length, Operand, Value, View
 from controller.translator.types import INT, Array, Tuple, name_of
 
 

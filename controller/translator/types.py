@@ -182,6 +182,11 @@ def unified(one: Type, other: Type) -> Type:
     raise TypeError(f"{name_of(one)} and {name_of(other)} in the same place")
 
 
+def returned(kind: Type) -> Type:
+    """Return the type by which C returns a value: for an array, a tuple of its numbers."""
+    return Tuple((kind.item,) * math.prod(known_lengths(kind))) if isinstance(kind, Array) else kind
+
+
 def known_lengths(kind: Array) -> list[int]:
     """Return the lengths that are known at translation."""
     return [n for n in kind.shape if isinstance(n, int)]
