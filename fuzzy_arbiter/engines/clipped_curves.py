@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 from collections.abc import Sequence
 
@@ -14,10 +15,11 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from fuzzy_arbiter.definition import Output
+from fuzzy_arbiter.engines.defuzzification import HEIGHT_RATIO, positions_of_maximum
 from fuzzy_arbiter.engines.engine import Defuzzifier
 from fuzzy_arbiter.engines.firing import Slot
 from fuzzy_arbiter.engines.panels import Indices, points_of, roots, smooth_panels
-from fuzzy_arbiter.engines.quadrature import Quadrature
+from fuzzy_arbiter.engines.quadrature import Quadrature, centroid_bound
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.shapes import Array, Membership
 from fuzzy_arbiter.terms.curves import Curve
@@ -30,16 +32,15 @@ _SERIES = ((np.arange(_ORDER) + 0.5) * legendre.legvander(_NODES, _ORDER - 1)) *
 _AS_POWERS = np.array([np.pad(legendre.leg2poly(row), (0, _ORDER - k - 1)) for k, row in enumerate(np.eye(_ORDER))])
 _TABLE = -np.cos(np.linspace(0.0, np.pi, 65))  # positions in a panel of the table by which a degree's is guessed
 _SPACING = np.pi / 64
-_INSIDE = _TABLE * (1.0 - 1e-9)  # on the panel's side of a jump
+_INNER_TABLE = _TABLE * (1.0 - 1e-9)  # on the panel's side of a jump
 _POWERS = np.arange(_ORDER)
 _STEPS, _FINE_STEPS = 2, 5  # of Newton's method: where the area counts, and where the position does
 _ERROR = 1e-10  # maximum error of a sample's area, as a fraction of it; quadrature takes the others
 _NOISE = 1e-14  # error of a degree by rounding
-_EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
-_APART = 1e-9  # positions count as one within this fraction of the universe
+_MIN_HEIGHT = 1e-6  # minimum height of which a polynomial tells the position; a lower one is searched in the term
 _JUMP = 1e-8  # minimum height of a jump at the end of a panel
-_SAME = 1e-12  # terms whose degrees differ by less do not cross
-_MAX_TABLE = 2**24  # maximum number of degrees that are compared to find crossings
+_MIN_MARGIN = 1e-12  # terms whose degrees differ by less do not cross
+_MAX_TABLE = 2**24  # maximum number of degrees in the tables of terms, and that are compared to find crossings
 _BLOCK = 2**18  # number of heights that are computed at a time
 # A line is a term's part over a panel, a polynomial of r from -1 to 1 which rises with r. Its column holds the panel's
 # middle, from the universe's start, and half of its width; -1 where the term falls, else 1; its lowest and its highest
@@ -56,11 +57,17 @@ class ClippedCurves(Defuzzifier):
         shapes = [output.terms[slot.term].membership for slot in slots]
         if any(isinstance(s, Formula) or (isinstance(s, Curve) and s.kind == "singleton") for s in shapes):
             raise EngineError(f"output {output.name!r}: a term is a formula or a singleton, expected smooth terms")
-        self._quadrature = Quadrature(output, slots)
-        self.method = self._quadrature.method
-        self._universe, self._kind = output.universe, output.defuzzifier
+        self._make_quadrature = functools.partial(Quadrature, output, slots)
+        self._shapes, self._universe, self._kind = shapes, output.universe, output.defuzzifier
+        bound = f"within {centroid_bound(output):g} of the universe's width"
+        self.method = {
+            "centroid": "integrals of polynomials, " + ("to rounding" if all(s.polynomial for s in shapes) else bound)
+        }.get(self._kind, "positions at which polynomials have the maximum height, without a bound of their errors")
         self._max, self._scales = output.aggregation == "max", slots[0].implication == "prod"
-        edges = _edges(output, shapes) if self._max else smooth_panels(output.universe, list(dict.fromkeys(shapes)))
+        edges = smooth_panels(output.universe, list(dict.fromkeys(shapes)))
+        if len(shapes) ** (2 if self._max else 1) * len(edges) * len(_TABLE) > _MAX_TABLE:
+            raise EngineError(f"output {output.name!r}: its {len(shapes)} terms have too many panels or crossings")
+        edges = _with_crossings(edges, shapes) if self._max else edges
         self._slots, lines, keys, self._error = _lines(edges, shapes, self._max)
         if not self._error < _ERROR * max(shape.area(output.universe) for shape in shapes):
             raise EngineError(f"output {output.name!r}: its terms are too rough, expected smooth terms")
@@ -73,19 +80,21 @@ class ClippedCurves(Defuzzifier):
     def values(self, cuts: Array, inputs: Array) -> Array:
         """Return the values for many samples; cuts (slots, n)."""
         size = max(1, _BLOCK // self._lines.shape[1])
-        blocks = [cuts[:, i : i + size] for i in range(0, max(1, cuts.shape[1]), size)]
-        if self._kind == "centroid":
-            return np.concatenate([self._centroids(block, inputs) for block in blocks])
-        return np.concatenate([self._of_maximum(block) for block in blocks])
+        compute = self._centroids if self._kind == "centroid" else self._of_maximum
+        return np.concatenate([compute(cuts[:, i : i + size]) for i in range(0, max(1, cuts.shape[1]), size)])
 
-    def _centroids(self, cuts: Array, inputs: Array) -> Array:
+    @functools.cached_property
+    def _quadrature(self) -> Quadrature:
+        return self._make_quadrature()
+
+    def _centroids(self, cuts: Array) -> Array:
         if cuts.shape[1] == 1:  # of two columns NumPy adds rows in their order, as of many
-            return self._centroids(np.repeat(cuts, 2, axis=1), inputs)[:1]
+            return self._centroids(np.repeat(cuts, 2, axis=1))[:1]
         area, moment = self._scaled(cuts) if self._scales else self._clipped(cuts)
         smooth = area * _ERROR >= self._error
         result = self._universe[0] + moment / np.where(smooth, area, 1.0)
         if not smooth.all():
-            result[~smooth] = self._quadrature.values(cuts[:, ~smooth], inputs)
+            result[~smooth] = self._quadrature.values(cuts[:, ~smooth], cuts)
         return np.minimum(np.maximum(result, self._universe[0]), self._universe[1])
 
     def _scaled(self, cuts: Array) -> tuple[Array, Array]:
@@ -99,7 +108,7 @@ class ClippedCurves(Defuzzifier):
         bottoms = np.zeros_like(tops)
         if self._max:
             np.maximum.accumulate(tops[:, :-1], axis=1, out=bottoms[:, 1:])
-        counts = (tops > bottoms).reshape(-1, tops.shape[2])
+        counts = (tops > bottoms).reshape(self._slots.size, tops.shape[2])
         if self._max:
             tops, counts = np.stack([np.maximum(tops, bottoms), bottoms]), np.concatenate([counts, counts])
         levels = tops.reshape(counts.shape)
@@ -118,7 +127,7 @@ class ClippedCurves(Defuzzifier):
         tops = cuts[self._slots]
         heights = high * tops if self._scales else np.minimum(high, tops)
         maximum = heights.max(axis=(0, 1))
-        reaches = (heights >= maximum * _EQUAL) & (heights > 0.0)
+        reaches = (heights >= maximum * HEIGHT_RATIO) & (heights > 0.0)
         panel, row = np.nonzero(reaches.any(axis=1))
         order = np.argsort(row, kind="stable")
         panel, row = panel[order], row[order]
@@ -129,19 +138,23 @@ class ClippedCurves(Defuzzifier):
         lines = self._lines[:, index]
         middle, half, sign, low, high = lines[:_DEGREE]
         meeting = self._meeting(lines, index, np.minimum(np.maximum(degree, low), high), _FINE_STEPS)
-        r = np.where(low >= degree * _EQUAL, -1.0, np.where(high * _EQUAL <= degree, 1.0, meeting))
+        searched = np.flatnonzero((low < degree) & (degree < np.minimum(high, _MIN_HEIGHT)))
+        if len(searched):
+            meeting[searched] = self._searched(lines[:, searched], index[searched], degree[searched], meeting[searched])
+        r = np.where(low >= degree * HEIGHT_RATIO, -1.0, np.where(high * HEIGHT_RATIO <= degree, 1.0, meeting))
         ends = self._universe[0] + middle + sign * half * np.array([r, np.ones(len(r))])
-        result, n = np.full(cuts.shape[1], np.nan), cuts.shape[1]
-        if self._kind != "mom":
-            pick = np.fmin if self._kind == "som" else np.fmax
-            pick.at(result, row, pick(*ends))
-            return result
-        width, length, center = _APART * (self._universe[1] - self._universe[0]), half * (1.0 - r), ends.mean(axis=0)
-        is_distinct = np.append(True, (row[1:] != row[:-1]) | (np.diff(center) > width))[: len(row)]
-        weight = np.where(np.bincount(row, length, n)[row] > width, length, is_distinct)
-        total = np.bincount(row, weight, n)
-        np.divide(np.bincount(row, weight * (center - self._universe[0]), n), total, out=result, where=total > 0.0)
-        return result + self._universe[0]
+        return positions_of_maximum(self._kind, row, ends.min(axis=0), ends.max(axis=0), cuts.shape[1], self._universe)
+
+    def _searched(self, lines: Array, index: Indices, degree: Array, otherwise: Array) -> Array:
+        """Return the r at which the term of each line has a degree."""
+        middle, side = self._universe[0] + lines[0], lines[1] * lines[2]
+        terms = self._slots.ravel()[index]
+
+        def margins(x: Array, which: Indices) -> Array:
+            return _degrees(self._shapes, x)[terms[which], np.arange(len(which))] - degree[which]
+
+        x, has_root = roots(margins, middle - side, middle + side, 4e-16 * max(map(abs, self._universe)))
+        return np.where(has_root, (x - middle) / side, otherwise)
 
     def _meeting(self, lines: Array, index: Indices, cut: Array, steps: int = _STEPS) -> Array:
         """Return the r at which each line has the degree of its cut."""
@@ -154,7 +167,7 @@ class ClippedCurves(Defuzzifier):
         slopes = degree[1:] * _POWERS[1:, None]
         for _ in range(steps):  # of Newton's method
             powers = _powers(r, _ORDER)
-            off, slope = (degree * powers).sum(axis=0) - cut, (slopes * powers[:-1]).sum(axis=0)
+            off, slope = _dot(degree, powers) - cut, _dot(slopes, powers[:-1])
             r = r - off / np.where((slope > 0.0) & (np.abs(off) > _NOISE), slope, np.inf)
             r = np.minimum(np.maximum(r, first), last)
         return np.asarray(r)
@@ -162,6 +175,11 @@ class ClippedCurves(Defuzzifier):
 
 def _summed(factors: Array, rows: Array) -> Array:
     return np.asarray((factors[:, None] * rows).sum(axis=0))
+
+
+def _dot(coefficients: Array, powers: Array) -> Array:
+    """Return the values of polynomials, to the same bits for any number of columns; both (count, n)."""
+    return functools.reduce(np.add, coefficients * powers)
 
 
 def _powers(r: Array, count: int) -> Array:
@@ -174,30 +192,32 @@ def _powers(r: Array, count: int) -> Array:
 def _integrals(lines: Array, r: Array, cut: Array) -> tuple[Array, Array]:
     """Return area and moment under lines that are cut from r on."""
     (middle, half, sign), powers = lines[:3], _powers(r, _ORDER + 2)
-    area = half * ((lines[_INTEGRAL:_LEVER] * powers[:-1]).sum(axis=0) + cut * (1.0 - r))
-    lever = (lines[_LEVER:] * powers).sum(axis=0) + cut * (1.0 - r * r) / 2
+    area = half * (_dot(lines[_INTEGRAL:_LEVER], powers[:-1]) + cut * (1.0 - r))
+    lever = _dot(lines[_LEVER:], powers) + cut * (1.0 - r * r) / 2
     return area, middle * area + sign * half * half * lever
 
 
-def _edges(output: Output, shapes: Sequence[Membership]) -> Array:
-    """Return the ends of panels in which terms are smooth and do not cross."""
-    edges, precision = smooth_panels(output.universe, shapes), 4e-16 * max(map(abs, output.universe))
-    if len(shapes) ** 2 * len(edges) * len(_TABLE) > _MAX_TABLE:
-        raise EngineError(f"output {output.name!r}: its {len(shapes)} terms may cross in too many positions")
-    positions = points_of(edges[:-1], edges[1:], _INSIDE)
-    degrees = np.array([shape.of_many(positions.ravel()).reshape(positions.shape) for shape in shapes])
+def _degrees(shapes: Sequence[Membership], positions: Array) -> Array:
+    return np.array([shape.of_many(positions.ravel()).reshape(positions.shape) for shape in shapes])
+
+
+def _with_crossings(edges: Array, shapes: Sequence[Membership]) -> Array:
+    """Return the ends of panels in which terms do not cross, from those in which they are smooth."""
+    precision = 4e-16 * float(np.abs(edges[[0, -1]]).max())
+    positions = points_of(edges[:-1], edges[1:], _INNER_TABLE)
+    degrees = _degrees(shapes, positions)
     starts, ends, pairs = [np.zeros(0)], [np.zeros(0)], [np.zeros((0, 2), dtype=np.intp)]
     for i, j in itertools.combinations(range(len(shapes)), 2):
         margin = degrees[i] - degrees[j]
         changes = (margin[:, 1:] >= 0.0) != (margin[:, :-1] >= 0.0)
-        changes &= np.maximum(np.abs(margin[:, 1:]), np.abs(margin[:, :-1])) > _SAME
+        changes &= np.maximum(np.abs(margin[:, 1:]), np.abs(margin[:, :-1])) > _MIN_MARGIN
         starts.append(positions[:, :-1][changes])
         ends.append(positions[:, 1:][changes])
         pairs.append(np.tile([i, j], (len(ends[-1]), 1)))
     one, other = np.concatenate(pairs).T
 
     def margins(x: Array, which: Indices) -> Array:
-        values, order = np.array([shape.of_many(x) for shape in shapes]), np.arange(len(x))
+        values, order = _degrees(shapes, x), np.arange(len(x))
         return np.asarray(values[one[which], order] - values[other[which], order])
 
     crossings, _ = roots(margins, np.concatenate(starts), np.concatenate(ends), precision)
@@ -208,15 +228,15 @@ def _lines(edges: Array, shapes: Sequence[Membership], ordered: bool) -> tuple[I
     """Return the slots of each panel, the highest first; their lines; the keys of these; and the area's error."""
     starts, ends = edges[:-1], edges[1:]
     half = (ends - starts) / 2
-    nodes, positions = (points_of(starts, ends, points) for points in (_NODES, _INSIDE))
-    at_nodes, degrees = (np.array([s.of_many(x.ravel()).reshape(x.shape) for s in shapes]) for x in (nodes, positions))
+    nodes, positions = (points_of(starts, ends, points) for points in (_NODES, _INNER_TABLE))
+    at_nodes, degrees = (_degrees(shapes, x) for x in (nodes, positions))
     series = at_nodes @ _SERIES @ _AS_POWERS  # (shapes, panels, powers)
-    table = series @ _powers(_INSIDE, _ORDER)
+    table = series @ _powers(_INNER_TABLE, _ORDER)
     error = np.abs(table - degrees).max(axis=-1)
     falls = series[..., 1::2].sum(axis=-1) < 0.0
     series[..., 1::2] *= np.where(falls, -1.0, 1.0)[..., None]
     table = series @ _powers(_TABLE, _ORDER)
-    at_edges = np.array([shape.of_many(edges) for shape in shapes])
+    at_edges = _degrees(shapes, edges)
     for end, x in (
         (0, np.where(falls, at_edges[:, 1:], at_edges[:, :-1])),
         (-1, np.where(falls, at_edges[:, :-1], at_edges[:, 1:])),

@@ -15,8 +15,8 @@ from fuzzy_arbiter.terms.curves import Curve
 if TYPE_CHECKING:
     from fuzzy_arbiter.engines.quadrature import Quadrature, Samples
 
-_EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
-_APART = 1e-9  # positions count as one within this fraction of the universe
+HEIGHT_RATIO = 1.0 - 1e-12  # quotient of heights above which they count as equal
+_MIN_DISTANCE = 1e-9  # positions that are nearer than this fraction of the universe count as one
 _CLOSER = 2  # times that many points narrow the search for a maximum
 _DENSE = np.linspace(-1.0 + 1e-12, 1.0 - 1e-12, 33)  # these points in a panel, on its side of a jump
 _LIKELY = 0.95  # least height at the points around a maximum, as a fraction of the greatest at any point
@@ -88,31 +88,31 @@ def of_maximum(samples: Samples, panels: Panels, kind: str) -> Array:
     max_heights = np.zeros(n)
     np.maximum.at(max_heights, rows, heights)
     np.maximum.at(max_heights, panels.rows[panels.flat], tops[panels.flat])
-    top = (heights >= max_heights[rows] * _EQUAL) & (heights > 0.0)
+    top = (heights >= max_heights[rows] * HEIGHT_RATIO) & (heights > 0.0)
     rows, positions = rows[top], positions[top]
-    level = panels.flat & (tops >= max_heights[panels.rows] * _EQUAL) & (tops > 0.0)
-    flat, left, right = panels.rows[level], panels.starts[level], panels.ends[level]
-    result = np.full(n, math.nan)
-    if kind == "mom":
-        order = np.lexsort((positions, rows))
-        rows, positions = rows[order], positions[order]
-        is_distinct = np.ones(len(rows), dtype=bool)
-        is_distinct[1:] = (rows[1:] != rows[:-1]) | (np.diff(positions) > _APART * quad.width)
-        count = np.bincount(rows[is_distinct], minlength=n)
-        some_points = count > 0
-        result[some_points] = (
-            np.bincount(rows[is_distinct], positions[is_distinct] - quad.low, n)[some_points] / count[some_points]
-            + quad.low
-        )
-        length = np.bincount(flat, right - left, n)
-        wide = length > _APART * quad.width
-        moment = np.bincount(flat, (right - left) * ((left + right) / 2 - quad.low), n)
-        result[wide] = quad.low + moment[wide] / length[wide]
+    level = panels.flat & (tops >= max_heights[panels.rows] * HEIGHT_RATIO) & (tops > 0.0)
+    rows = np.concatenate([rows, panels.rows[level]])
+    starts, ends = (np.concatenate([positions, column[level]]) for column in (panels.starts, panels.ends))
+    return positions_of_maximum(kind, rows, starts, ends, n, (quad.low, quad.low + quad.width))
+
+
+def positions_of_maximum(
+    kind: str, rows: Indices, starts: Array, ends: Array, n: int, universe: tuple[float, float]
+) -> Array:
+    """Return for n samples the mean, smallest or largest position of segments; a start that is its end is a point."""
+    result, (low, high) = np.full(n, math.nan), universe
+    if kind != "mom":
+        pick, positions = (np.fmin, starts) if kind == "som" else (np.fmax, ends)
+        pick.at(result, rows, positions)
         return result
-    pick, ends = (np.fmin, left) if kind == "som" else (np.fmax, right)
-    pick.at(result, rows, positions)
-    pick.at(result, flat, ends)
-    return result
+    order = np.lexsort((starts + ends, rows))
+    rows, centers, lengths = rows[order], (starts + ends)[order] / 2 - low, (ends - starts)[order]
+    distance = _MIN_DISTANCE * (high - low)
+    begins = np.append(True, (rows[1:] != rows[:-1]) | (np.diff(centers) > distance))[: len(rows)]
+    weights = np.where(np.bincount(rows, lengths, n)[rows] > distance, lengths, begins)
+    totals = np.bincount(rows, weights, n)
+    np.divide(np.bincount(rows, weights * centers, n), totals, out=result, where=totals > 0.0)
+    return result + low
 
 
 def _turning(samples: Samples, panels: Panels) -> tuple[Indices, Array]:
@@ -139,4 +139,4 @@ def _turning(samples: Samples, panels: Panels) -> tuple[Indices, Array]:
             step = legendre.legval(x, slope, tensor=False) / legendre.legval(x, bend, tensor=False)
         x = np.clip(np.where(np.isfinite(step), x - step, x), -1.0, 1.0)
     positions = points_of(starts, ends, x[:, None])[:, 0]
-    return rows, np.where(samples.heights(positions, rows).height >= height * _EQUAL, positions, best)
+    return rows, np.where(samples.heights(positions, rows).height >= height * HEIGHT_RATIO, positions, best)

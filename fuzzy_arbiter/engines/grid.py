@@ -7,6 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from fuzzy_arbiter.definition import Output, System
+from fuzzy_arbiter.engines.defuzzification import HEIGHT_RATIO
 from fuzzy_arbiter.engines.engine import Defuzzifier
 from fuzzy_arbiter.engines.exact import ExactEngine
 from fuzzy_arbiter.engines.firing import slots_of
@@ -15,7 +16,6 @@ from fuzzy_arbiter.shapes import Array
 from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
 
 _BLOCK = 2**20  # number of heights that are computed at a time
-_EQUAL = 1.0 - 1e-12  # heights count as equal if their quotient is above this
 
 
 class GridEngine(ExactEngine):
@@ -53,7 +53,7 @@ class _Sampler(Defuzzifier):
             whole = sums[:, -1:]
             return np.where(whole[:, 0] > 0.0, x[np.argmax(sums >= whole / 2, axis=1)], np.nan)
         if self._defuzzifier != "centroid":
-            heights = (heights >= heights.max(axis=1, keepdims=True) * _EQUAL) & (heights > 0.0)
+            heights = (heights >= heights.max(axis=1, keepdims=True) * HEIGHT_RATIO) & (heights > 0.0)
         if self._defuzzifier in ("som", "lom"):
             index = heights.argmax(axis=1) if self._defuzzifier == "som" else -1 - heights[:, ::-1].argmax(axis=1)
             return np.where(heights.any(axis=1), x[index], np.nan)

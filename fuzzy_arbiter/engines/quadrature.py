@@ -118,8 +118,7 @@ class Quadrature(Defuzzifier):
         polynomial = all(shape.polynomial for shape in self._shapes) and set(words) <= {"min", "prod"}
         if polynomial and self.output.aggregation in ("max", "probor", "sum", "bounded_sum"):
             return "integrals of polynomials, to rounding"
-        bound = max(BOUND, 4 * self.precision / self.width)  # positions far from 0 are rounded more
-        return f"adaptive quadrature, within {bound:g} of the universe's width"
+        return f"adaptive quadrature, within {centroid_bound(self.output):g} of the universe's width"
 
     def values(self, cuts: Array, inputs: Array) -> Array:
         """Return the output's values for many samples; cuts (slots, n), returns (n,)."""
@@ -190,6 +189,12 @@ class Quadrature(Defuzzifier):
                 constant = constant | (joined.degrees[t][:, 4] > self.level(self._clip[i], cuts)[:, 0])
             result |= constant & (top_slots == i)
         return result
+
+
+def centroid_bound(output: Output) -> float:
+    """Return the bound of a centroid's error, as a fraction of the universe's width."""
+    low, high = output.universe
+    return max(BOUND, 1.6e-15 * max(abs(low), abs(high)) / (high - low))  # positions far from 0 are rounded more
 
 
 class Samples:

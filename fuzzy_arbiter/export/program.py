@@ -1,4 +1,4 @@
-"""Exported code as statements, before they are written in a language; C and Python fraction the expressions."""
+"""Exported code as statements, before they are written in a language; C and Python share the expressions."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def _require_sayable(system: System, engine: Engine) -> None:
             raise UnsupportedError(f"{what} keeps its previous value, which a function of one sample has not")
         if isinstance(defuzzifier, ClippedCurves | Quadrature):
             raise UnsupportedError(
-                f"{what} is integrated by quadrature; expected the centroid of piecewise-linear terms under min or "
+                f"{what} has no exact sum over pieces; expected the centroid of piecewise-linear terms under min or "
                 "prod, joined by max, or values"
             )
         for term in output.terms if output.weighted else ():

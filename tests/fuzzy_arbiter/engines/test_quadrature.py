@@ -81,8 +81,11 @@ def test_a_lone_gaussian_has_its_mean_for_all_values(deviation, implication):
 def test_clipped_curves_match_quadrature_for_cuts_of_any_size(seed):
     rng, compared = np.random.default_rng(seed), 0
     for case in random_cases(12, 1000 + seed):
-        for implication, aggregation in (("min", "max"), ("min", "sum"), ("prod", "sum")):
-            output = replace(case.output, defuzzifier="centroid", aggregation=aggregation)
+        maxima = (("min", "max", name) for name in ("mom", "som", "lom"))
+        for implication, aggregation, defuzzifier in (
+            ("min", "max", "centroid"), ("min", "sum", "centroid"), ("prod", "sum", "centroid"), *maxima
+        ):  # fmt: skip
+            output = replace(case.output, defuzzifier=defuzzifier, aggregation=aggregation)
             (curves,) = ExactEngine(strengths_system(output, implication)).defuzzifiers
             slots = len(output.terms)
             x = rng.uniform(*output.universe, 20)
@@ -91,10 +94,13 @@ def test_clipped_curves_match_quadrature_for_cuts_of_any_size(seed):
                 degrees, degrees * (1 - 1e-15), rng.random((slots, 20)), 10 ** rng.uniform(-300, 0, (slots, 20)),
                 rng.choice([0.0, 1e-9, 0.5, 0.7, 0.7 - 1e-15, 1.0 - 1e-15, 0.999, 1.0], (slots, 20)),
             ])  # fmt: skip
+            if defuzzifier != "centroid":  # near the top of a term its slope hides the position
+                cuts = 10 ** np.hstack([rng.uniform(-300, -1, (slots, 50)), rng.uniform(-15, -1, (slots, 50))])
             cuts = cuts[:, cuts.max(axis=0) > 0.0]
-            found = curves.values(cuts, np.zeros((cuts.shape[1], 0)))
+            values = curves.values(cuts, np.zeros((cuts.shape[1], 0)))
+            assert values.tolist() == pytest.approx([curves.value(row, ()) for row in cuts.T], abs=0.0, nan_ok=True)
             expected = Quadrature(output, slots_of(strengths_system(output, implication), output)).values(cuts, cuts)
-            assert found / (output.universe[1] - output.universe[0]) == pytest.approx(
+            assert values / (output.universe[1] - output.universe[0]) == pytest.approx(
                 expected / (output.universe[1] - output.universe[0]), abs=1e-9, nan_ok=True
             )
             compared += isinstance(curves, ClippedCurves)
