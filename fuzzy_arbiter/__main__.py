@@ -7,6 +7,7 @@ import contextlib
 import json
 import os
 import sys
+import warnings
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
@@ -124,7 +125,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _fault("standard output is closed; expected it open, such as on /dev/null")
     try:
         try:
-            return _run(_parsed(arguments))
+            with warnings.catch_warnings():
+                warnings.showwarning = lambda message, *_: _report(str(message))
+                return _run(_parsed(arguments))
         finally:
             sys.stdout.flush()
     except BrokenPipeError:

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+import numpy as np
+
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.result import Result, result_class
@@ -105,7 +107,8 @@ class Explanation:
 def explain(engine: Engine, inputs: Sequence[float]) -> Explanation:
     """Explain the weights for one sample."""
     system, firing = engine.system, engine.firing
-    weights, centroids = engine.weights(inputs), engine.centroids(inputs)
+    row = np.array([inputs], dtype=np.float64)  # a batch, in which an output without a rule that fires is no error
+    weights, centroids = engine.weights_of_many(row)[0].tolist(), engine.centroids_of_many(row)[0].tolist()
     strengths = firing.strengths(inputs)
     rules = tuple(
         FiredRule(f"R{i + 1}", str(rule), strength, {c.variable: c.term for c in rule.conclusions})

@@ -17,6 +17,7 @@ from cosim.scenario.criteria import PAPER, CriterionSetup
 from cosim.scenario.region_tables import SecondaryRegion
 from cosim.scenario.tables import ArbiterSetup, RuleVariant
 from fuzzy_arbiter import Arbiter, ArbiterError, Rule, Shape, System, Term, Variable, prioritized
+from fuzzy_arbiter.files import read_text
 from fuzzy_arbiter.formats import FORMATS, reads
 from plant_fmu.toml_tables import hint
 
@@ -80,14 +81,10 @@ def read_rules(setup: ArbiterSetup) -> ArbiterSetup:
 
 def _text(path: Path) -> str:
     try:
-        if path.exists() and not path.is_file():  # opening a pipe would block
-            raise ScenarioError(f"arbiter.file: {path} is a folder, a pipe or a device, expected a file")
-        with path.open("rb") as file:
-            return file.read(4 * MAX_TEXT + 1).decode("utf-8").removeprefix("\ufeff").replace("\r\n", "\n")
-    except UnicodeDecodeError as error:
-        raise ScenarioError(f"arbiter.file: {path}: byte {error.start} is no UTF-8, expected text") from error
-    except (OSError, ValueError) as error:  # ValueError: a name with a null character
-        raise ScenarioError(f"arbiter.file: {path}: {getattr(error, 'strerror', None) or error}") from error
+        text = read_text(path, 4 * MAX_TEXT, path.suffix.lower() in (".json", ".toml"))
+    except ArbiterError as error:
+        raise ScenarioError(f"arbiter.file: {error}") from error
+    return text.removeprefix("\ufeff").replace("\r\n", "\n")
 
 
 def check_rules(

@@ -37,7 +37,7 @@ _POWERS = np.arange(_ORDER)
 _STEPS, _FINE_STEPS = 2, 5  # of Newton's method: where the area counts, and where the position does
 _ERROR = 1e-10  # maximum error of a sample's area, as a fraction of it; quadrature takes the others
 _NOISE = 1e-14  # error of a degree by rounding
-_MIN_HEIGHT = 1e-6  # minimum height of which a polynomial tells the position; a lower one is searched in the term
+_MIN_HEIGHT = 1e-6  # minimum height of which a polynomial tells the position; quadrature takes lower ones
 _JUMP = 1e-8  # minimum height of a jump at the end of a panel
 _MIN_MARGIN = 1e-12  # terms whose degrees differ by less do not cross
 _MAX_TABLE = 2**24  # maximum number of degrees in the tables of terms, and that are compared to find crossings
@@ -138,23 +138,14 @@ class ClippedCurves(Defuzzifier):
         lines = self._lines[:, index]
         middle, half, sign, low, high = lines[:_DEGREE]
         meeting = self._meeting(lines, index, np.minimum(np.maximum(degree, low), high), _FINE_STEPS)
-        searched = np.flatnonzero((low < degree) & (degree < np.minimum(high, _MIN_HEIGHT)))
-        if len(searched):
-            meeting[searched] = self._searched(lines[:, searched], index[searched], degree[searched], meeting[searched])
         r = np.where(low >= degree * HEIGHT_RATIO, -1.0, np.where(high * HEIGHT_RATIO <= degree, 1.0, meeting))
         ends = self._universe[0] + middle + sign * half * np.array([r, np.ones(len(r))])
-        return positions_of_maximum(self._kind, row, ends.min(axis=0), ends.max(axis=0), cuts.shape[1], self._universe)
-
-    def _searched(self, lines: Array, index: Indices, degree: Array, otherwise: Array) -> Array:
-        """Return the r at which the term of each line has a degree."""
-        middle, side = self._universe[0] + lines[0], lines[1] * lines[2]
-        terms = self._slots.ravel()[index]
-
-        def margins(x: Array, which: Indices) -> Array:
-            return _degrees(self._shapes, x)[terms[which], np.arange(len(which))] - degree[which]
-
-        x, has_root = roots(margins, middle - side, middle + side, 4e-16 * max(map(abs, self._universe)))
-        return np.where(has_root, (x - middle) / side, otherwise)
+        starts, ends = ends.min(axis=0), ends.max(axis=0)
+        result = positions_of_maximum(self._kind, row, starts, ends, cuts.shape[1], self._universe)
+        lowest = maximum < _MIN_HEIGHT
+        if lowest.any():
+            result[lowest] = self._quadrature.values(cuts[:, lowest], cuts)
+        return result
 
     def _meeting(self, lines: Array, index: Indices, cut: Array, steps: int = _STEPS) -> Array:
         """Return the r at which each line has the degree of its cut."""

@@ -5,7 +5,6 @@ Imports: terms, engines.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, get_args
@@ -13,7 +12,7 @@ from typing import Literal, get_args
 from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.errors import ArbiterError, FormatError, UnsupportedError
-from fuzzy_arbiter.files import write_atomic
+from fuzzy_arbiter.files import read_text, write_atomic
 from fuzzy_arbiter.formats import fcl, fis, fll, json_toml
 from fuzzy_arbiter.formats.native import fold_normalization
 
@@ -136,21 +135,7 @@ def load(path: str | Path, block: str | None = None) -> System:
     True
     """
     format = _format(path)
-    try:
-        if Path(path).exists() and not (Path(path).is_file() or Path(path).is_dir()):  # to open a pipe would wait
-            raise FormatError(f"{path}: is a pipe or a device, expected a file")
-        with Path(path).open("rb") as file:
-            data = file.read(MAX_FILE + 1)
-        if len(data) > MAX_FILE:
-            raise FormatError(f"{path}: has more than {MAX_FILE} bytes, expected a definition for people")
-        text = data.decode("utf-8")
-    except UnicodeDecodeError as error:
-        if format in ("json", "toml") or b"\0" in data:
-            raise FormatError(f"{path}: byte {error.start} is no UTF-8, expected text in UTF-8") from None
-        warnings.warn(f"{path}: byte {error.start} is no UTF-8, so the text is taken as Latin-1", stacklevel=2)
-        text = data.decode("latin-1")
-    except (OSError, ValueError) as error:  # ValueError: a name with a null character
-        raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
+    text = read_text(path, MAX_FILE, format in ("json", "toml"))
     try:
         return reads(text, format, block)
     except ArbiterError as error:

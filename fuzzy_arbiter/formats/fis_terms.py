@@ -41,7 +41,7 @@ def read_function(function: str, text: str, line: int, term: str, inputs: int | 
         return Formula(text)
     kind, order = _TYPES[function]
     count = len(order)
-    numbers = numbers_of(text, line, f"apex of {term!r}")
+    numbers = numbers_of(text, line, f"a parameter of term {term!r}")
     if len(numbers) == 4 > count and order and not any(numbers[count:]):
         del numbers[count:]  # the zeros with which MATLAB's old files fill all up to four
     if function in _WITHOUT_HEIGHT and len(numbers) != count:

@@ -103,8 +103,13 @@ class Block:
 
     def build(self, make: Callable[..., T], *arguments: Any) -> T:
         """Make the variable that the block defines."""
-        with located(f"line {self.line}"):
+        try:
             return make(*arguments)
+        except DefinitionError as error:
+            message = str(error).replace("universe", "range")
+            lines = [line for key, (line, _) in self.entries.items() if f" {key.lower()} is " in message]
+            lines += [line for line, text in self.many if repr(text.split(" ")[0]) in message]
+            raise type(error)(f"line {lines[-1] if lines else self.line}: {error}") from None
 
     def rules(self, parse: Callable[[int, str], Iterable[Rule]]) -> list[NumberedRule]:
         """Parse the block's rules."""

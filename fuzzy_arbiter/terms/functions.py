@@ -68,18 +68,20 @@ FUNCTIONS: dict[str, Function] = {
     "asin": _function("math.asin(a) if abs(a) <= 1.0 else math.nan", np.arcsin),
     "atan": _function("math.atan(a)", np.arctan),
     "atan2": _function("math.atan2(a, b)", np.arctan2),
-    "cosh": _function("math.cosh(a) if abs(a) < 710.475860073943 else abs(a) * math.inf", np.cosh),
+    "cosh": _function("math.cosh(a) if abs(a) < 710.475860073944 else abs(a) * math.inf", np.cosh),
     "exp": _function("math.inf if a > 709.782712893384 else math.exp(a)", np.exp),
     "fmod": _function("math.copysign(abs(a) % abs(b), a) if b != 0.0 and abs(a) < math.inf else math.nan", np.fmod),
     "max": _function("a if a > b else b if a <= b else a + b", np.maximum),
     "min": _function("a if a < b else b if a >= b else a + b", np.minimum),
     "pow": _function(
-        "math.inf if a == 0.0 and b < 0.0 else math.nan if -math.inf < a < 0.0 and b % 1.0 > 0.0 else"
-        " math.pow(a, b) if a == 0.0 or not b * math.log(abs(a)) > 709.782712893384 else"
-        " -math.inf if a < 0.0 and b % 2.0 == 1.0 else math.inf",
+        "math.copysign(math.inf, a if b % 2.0 == 1.0 else 1.0) if a == 0.0 and b < 0.0 else"
+        " math.nan if -math.inf < a < 0.0 and b % 1.0 > 0.0 else"
+        " math.pow(a, b) if a == 0.0 or not b * math.log(abs(a)) > 709.78 else"
+        " math.copysign(math.inf, a if b % 2.0 == 1.0 else 1.0) if b * math.log(abs(a)) > 710.0 else"
+        " math.copysign(math.pow(abs(a), b / 2.0), a if b % 2.0 == 1.0 else 1.0) * math.pow(abs(a), b / 2.0)",
         np.power,
     ),
-    "sinh": _function("math.sinh(a) if abs(a) < 710.475860073943 else a * math.inf", np.sinh),
+    "sinh": _function("math.sinh(a) if abs(a) < 710.475860073944 else a * math.inf", np.sinh),
     "sqrt": _function("math.sqrt(a) if a >= 0.0 else math.nan", np.sqrt),
     "tanh": _function("math.tanh(a)", np.tanh),
 }

@@ -59,7 +59,15 @@ def _s(start: float, end: float, names: tuple[str, str] = ("start", "end")) -> P
 
 
 def _z(start: float, end: float, names: tuple[str, str] = ("start", "end")) -> Pieces:
-    return [(position, {"0": "1", "1": "0"}.get(text, f"1 - ({text})")) for position, text in _s(start, end, names)]
+    if start == end:
+        return [(start, "1"), (_END, "0")]
+    a, b = names
+    return [
+        (start, "1"),
+        ((start + end) / 2, f"1 - 2 * ((x - {a}) / ({b} - {a})) ^ 2"),
+        (end, f"2 * ((x - {b}) / ({b} - {a})) ^ 2"),
+        (_END, "0"),
+    ]
 
 
 def _gaussian(mean: str, deviation: str) -> str:
@@ -71,7 +79,9 @@ def _sigmoid(inflection: str, slope: str) -> str:
 
 
 def _difference(left: float, rising: float, falling: float, right: float) -> Pieces:
-    text = f"abs({_sigmoid('left', 'rising')} - {_sigmoid('right', 'falling')})"
+    # s(a) - s(b) = s(a) s(-b) (1 - exp(b - a)), of which no term is lost to rounding where both are near 1
+    a, b = "max(min(rising * (x - left), 800), -800)", "max(min(falling * (x - right), 800), -800)"
+    text = f"(1 - exp(-abs({a} - {b}))) / ((1 + exp(-max({a}, {b}))) * (1 + exp(min({a}, {b}))))"
     if rising == falling:
         return [(_END, text)]
     return [((rising * left - falling * right) / (rising - falling), text), (_END, text)]
@@ -86,7 +96,7 @@ def _concave(inflection: float, end: float) -> Pieces:
 
 
 def _arc(start: float, end: float) -> Pieces:
-    curve = "sqrt(max(0, (end - start) ^ 2 - (x - end) ^ 2)) / abs(end - start)"
+    curve = "sqrt(max(0, (x - start) * (2 * end - start - x))) / abs(end - start)"
     return [(start, "0"), (end, curve), (_END, "1")] if start < end else [(end, "1"), (start, curve), (_END, "0")]
 
 
@@ -197,7 +207,7 @@ KINDS: dict[str, CurveKind] = {
         ("center", "width"),
         lambda center, width: [
             (center - width / 2, "0"),
-            (center + width / 2, "0.5 * (1 + cos(2 / width * pi * (x - center)))"),
+            (center + width / 2, "cos(pi / width * (x - center)) ^ 2"),
             (_END, "0"),
         ],
         fll="Cosine", fis=("cosinemf", (0, 1)), features=lambda center, width: [center],

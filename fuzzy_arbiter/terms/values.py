@@ -182,7 +182,7 @@ class Formula(Value, Membership):
         return ()
 
     def within(self, universe: tuple[float, float]) -> Formula:
-        """Return the formula itself; raise `DefinitionError` if it is NaN or above 1 at one of 1001 positions."""
+        """Return the formula itself; `DefinitionError` if it is NaN or above 1 somewhere in the `universe`."""
         positions = np.linspace(*universe, 1001)
         values = np.broadcast_to(self.expression(["x"]).of_many({"x": positions}), positions.shape)
         bad = ~(values <= 1.0 + 1e-9) | ~np.isfinite(values)

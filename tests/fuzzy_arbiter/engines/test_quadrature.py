@@ -98,7 +98,9 @@ def test_clipped_curves_match_quadrature_for_cuts_of_any_size(seed):
                 cuts = 10 ** np.hstack([rng.uniform(-300, -1, (slots, 50)), rng.uniform(-15, -1, (slots, 50))])
             cuts = cuts[:, cuts.max(axis=0) > 0.0]
             values = curves.values(cuts, np.zeros((cuts.shape[1], 0)))
-            assert values.tolist() == pytest.approx([curves.value(row, ()) for row in cuts.T], abs=0.0, nan_ok=True)
+            alone = [curves.value(row, ()) for row in cuts.T[::9]]  # the same bits in a batch of any other rows
+            assert values[::9].tolist() == pytest.approx(alone, rel=0.0, abs=0.0, nan_ok=True)
+            assert curves.values(cuts[:, :0], np.zeros((0, 0))).shape == (0,)
             expected = Quadrature(output, slots_of(strengths_system(output, implication), output)).values(cuts, cuts)
             assert values / (output.universe[1] - output.universe[0]) == pytest.approx(
                 expected / (output.universe[1] - output.universe[0]), abs=1e-9, nan_ok=True
@@ -305,7 +307,9 @@ def test_unintegrable_terms_are_rejected():
 
 def test_arbiter_names_the_evaluation_method_of_each_output():
     made = strengths_system(Output("y", (0, 10), TERMS), "min")
-    assert Arbiter(system=made).engine_reason.endswith("'y': adaptive quadrature, within 1e-09 of the universe's width")
+    assert Arbiter(system=made).engine_reason.endswith(
+        "'y': integrals of polynomials, within 1e-09 of the universe's width"
+    )
     formula = Output("y", (0, 10), {"a": Formula("max(0, 1 - abs(x - 3.001) * 50)"), "b": triangle(4, 5, 6)})
     assert "without a bound" in Arbiter(system=strengths_system(formula, "min")).engine_reason
     straight = strengths_system(Output("y", (0, 10), TERMS[3:]), "min")

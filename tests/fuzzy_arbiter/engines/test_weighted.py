@@ -95,6 +95,7 @@ def test_locked_output_is_clipped_or_holds_its_previous_value():
     assert arbiter([4.0, 0.0]) == (4.0,)
     with pytest.raises(InputError, match="no rule fires for the output 'y', which keeps its previous value"):
         arbiter([0.0, 0.0])  # a sample alone has none before it
+    assert arbiter.explain([0.0, 0.0]).weights == (-1.0,) and "its default -1" in str(arbiter.explain([0.0, 0.0]))
     assert (arbiter.batch([*rows[:2], *rows[:1] * 10_000])[1:, 0] == 4.0).all()  # more rows than a block
     free = Arbiter(system=system(replace(kept, default=None), "if x is high and z is near then y is t0"))
     assert np.isnan(free.batch(rows)[:, 0]).tolist() == [True, False, False, False, False]

@@ -1,11 +1,13 @@
 """Files: format by suffix, errors that name the file, atomic writes."""
 
 import os
+import warnings
 from dataclasses import replace
 
 import pytest
 
-from fuzzy_arbiter import prioritized
+from fuzzy_arbiter import Arbiter, prioritized
+from fuzzy_arbiter.__main__ import main
 from fuzzy_arbiter.errors import DefinitionError, FormatError, UnsupportedError
 from fuzzy_arbiter.formats import FORMATS, load, save, writes
 from tests.fuzzy_arbiter.formats.systems import TIPPING
@@ -72,15 +74,22 @@ def test_unreadable_and_unwritable_paths_are_rejected(tmp_path):
 
 
 @pytest.mark.parametrize("format", FORMATS)
-def test_text_of_other_tools_may_be_latin_1(format, tmp_path):
+def test_text_of_other_tools_may_be_of_other_encodings(format, tmp_path, capsys):
     path, comment = tmp_path / f"a.{format}", {"fcl": "// ", "fis": "% ", "fll": "# "}.get(format, "")
-    path.write_bytes(f"{comment}caf\xe9\n".encode("latin-1") + writes(TIPPING, format).encode())
+    mixed = "caf\xe9 in UTF-8\n".encode(), "caf\xe9, \u201cquoted\u201d\n".encode("cp1252"), b"caf\xe9 \x81\n"
+    path.write_bytes(b"".join(comment.encode() + line for line in mixed) + writes(TIPPING, format).encode())
     if not comment:
         with pytest.raises(FormatError, match=rf"a\.{format}: byte \d+ is no UTF-8, expected text in UTF-8"):
             load(path)
         return
-    with pytest.warns(UserWarning, match=rf"a\.{format}: byte \d+ is no UTF-8, so the text is taken as Latin-1"):
-        assert load(path) == TIPPING
+    for read in (load, Arbiter.load):
+        with pytest.warns(UserWarning, match=rf"a\.{format}: line 2 is no UTF-8, so .* Windows-1252") as caught:
+            assert getattr(read(path), "system", TIPPING) == TIPPING
+        assert caught[0].filename == __file__
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")
+        assert main(["show", str(path)]) == 0
+    assert capsys.readouterr().err == f"fuzzy_arbiter: {caught[0].message}\n"
     path.write_bytes(b"caf\xe9\0")
     with pytest.raises(FormatError, match="byte 3 is no UTF-8, expected text in UTF-8"):
         load(path)

@@ -8,7 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fuzzy_arbiter.errors import DefinitionError
-from fuzzy_arbiter.terms.expressions import Expression
+from fuzzy_arbiter.export.code_functions import in_python
+from fuzzy_arbiter.terms.expressions import EXPORTED, Expression
 from fuzzy_arbiter.terms.functions import FUNCTIONS
 from fuzzy_arbiter.terms.values import Constant, Formula, Linear
 from tests.fuzzy_arbiter.formats.systems import REFUSED
@@ -40,6 +41,22 @@ def test_expression_value_equals_python(text, a, b):
     assert many[0] == pytest.approx(expected, rel=1e-9, abs=1e-12, nan_ok=True)
     assert Expression(made.text) == made
     assert made.bound({"a": a})({"b": b}) == pytest.approx(expected, rel=1e-12, abs=1e-300, nan_ok=True)
+
+
+@given(st.data(), st.sampled_from(sorted(FUNCTIONS)))
+def test_functions_reach_infinity_as_in_numpy(data, name):
+    edge = st.sampled_from([709.782712893384, 710.4758600739439, 1023.9999999999999, 1024.0, -0.0, -3.0, 2.0, 1e308])
+    numbers = [data.draw(edge | st.floats(allow_infinity=False)) for _ in range(FUNCTIONS[name].arguments)]
+    if name == "pow" and numbers[0] not in (0.0, 1.0):  # next to the greatest number
+        numbers[1] = data.draw(st.just(numbers[1]) | st.floats(-1e-12, 1e-12).map(
+            lambda x: 709.782712893384 * (1 + x) / (math.log(abs(numbers[0])) or 1.0)
+        ))  # fmt: skip
+    with np.errstate(all="ignore"):
+        expected = float(FUNCTIONS[name].array(*map(np.float64, numbers)))
+    assert FUNCTIONS[name].number(*numbers) == pytest.approx(expected, rel=1e-12, abs=1e-300, nan_ok=True)
+    exported: dict = {"math": math}
+    exec(in_python(EXPORTED.get(name, name)), exported)
+    assert exported[EXPORTED.get(name, name)](*numbers) == pytest.approx(expected, rel=1e-12, abs=1e-300, nan_ok=True)
 
 
 @pytest.mark.parametrize(
