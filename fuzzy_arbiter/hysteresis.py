@@ -98,9 +98,10 @@ class HysteresisArbiter:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         # earlier versions have other words, and a list of the latches that are closed
-        self.__dict__ = {key.replace("_places", "_positions"): value for key, value in state.items()}
-        if closed := self.__dict__.pop("_closed", None):
-            self._since = [since if is_closed else None for since, is_closed in zip(self._since, closed, strict=True)]
+        renamed = {key.replace("_places", "_positions"): value for key, value in state.items()}
+        if closed := renamed.pop("_closed", None):
+            renamed["_since"] = [since if shut else None for since, shut in zip(renamed["_since"], closed, strict=True)]
+        self.__dict__.update(renamed)
 
     def reset(self) -> None:
         """Open all latches and clear the time, as before the first sample."""

@@ -92,8 +92,8 @@ def of_maximum(samples: Samples, panels: Panels, kind: str) -> Array:
     rows, positions = rows[top], positions[top]
     level = panels.flat & (tops >= max_heights[panels.rows] * HEIGHT_RATIO) & (tops > 0.0)
     rows = np.concatenate([rows, panels.rows[level]])
-    starts, ends = (np.concatenate([positions, column[level]]) for column in (panels.starts, panels.ends))
-    return positions_of_maximum(kind, rows, starts, ends, n, (quad.low, quad.low + quad.width))
+    sides = [np.concatenate([positions, column[level]]) for column in (panels.starts, panels.ends)]
+    return positions_of_maximum(kind, rows, sides[0], sides[1], n, (quad.low, quad.low + quad.width))
 
 
 def positions_of_maximum(
