@@ -51,7 +51,7 @@ def compiling(source: Path, library: Path, compiler: Sequence[str] | None = None
     command = [*(compiler or compiler_command()), *FLAGS, link, str(source), "-o", str(library), "-lm"]
     try:
         process = subprocess.Popen(  # noqa: S603
-            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, start_new_session=True
+            command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, process_group=0
         )
     except OSError as error:
         raise CompilationError(f"C compiler {command[0]}: {error.strerror or error}") from error
@@ -72,7 +72,7 @@ def compiling(source: Path, library: Path, compiler: Sequence[str] | None = None
 
 
 def _stop(process: subprocess.Popen[str]) -> None:
-    """Stop a compiler and the processes that it has started, which are a session of their own."""
+    """Stop a compiler and the processes that it has started, which are a process group of their own."""
     if hasattr(os, "killpg"):
         os.killpg(process.pid, signal.SIGTERM)
     else:

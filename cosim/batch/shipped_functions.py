@@ -26,16 +26,16 @@ from cosim.scenario.scenario import load_scenario
 from cosim.scenario.vehicle_model import vehicle_model
 from cosim.simulation.bindings import rules_text
 from cosim.simulation.make_step import exchanged_variables, make_data, make_model, make_noise, step_signals
+from cosim.simulation.step_functions import FLAT, INTEGERS, step_functions
 from cosim.step.arbiter_inputs import compute_inputs
-from cosim.step.one_step import advance, locate, show_start
-from cosim.step.plant_calls import Clock, PlantCalls
+from cosim.step.one_step import locate
+from cosim.step.plant_calls import Clock
 from cosim.step.score import FlightMetrics, fly
 from plant_fmu.archive import temporary_folder
 from plant_fmu.compiling.compiler import cross_compiler, find_compiler
 from plant_fmu.compiling.platforms import NATIVE, Platform, cross_platforms, native_platform
-from plant_fmu.running.native import Native
 
-_INTEGERS, _FLAT, _TABLE = np.zeros(1, np.int64), np.zeros(1), np.zeros((1, 3))
+_TABLE = np.zeros((1, 3))
 
 
 def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]:
@@ -50,17 +50,16 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
     for kind in LAWS.values():
         gains, level = kind.gains_type(), np.array([1.0, 0.0, 0.0, 0.0])
         made = kind.for_vehicle(vehicle_model(scenario.vehicle), gains, level, scenario.time.control, 1)
-        yield kind.function, (state, goal, regions, _FLAT, gains, made.memory, np.zeros(made.n_forces))
-    yield evaluate_packed, (regions, state.position, state.quaternion, _FLAT, _TABLE, _TABLE, _FLAT)
-    yield write_clearances, (regions, _TABLE, _FLAT, _FLAT)
-    yield ray_distances, (regions, state.position, _TABLE, 1.0, _FLAT)
-    yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, _INTEGERS)
-    yield compute_inputs, (model.inputs, goal, regions, state, 0.0, _FLAT, data.signals)
-    references, rows = np.zeros(1, np.uint32), np.zeros((0, 0))
-    calls = PlantCalls(*[Native(0, 0, 0, 0, references, _FLAT, references, _FLAT, _INTEGERS)] * 3)
-    yield fly, (model, data, calls, FlightMetrics(), _FLAT, rows)
-    yield advance, (model, data, calls, _INTEGERS, rows)
-    yield show_start, (model, data, calls)
+        yield kind.function, (state, goal, regions, FLAT, gains, made.memory, np.zeros(made.n_forces))
+    yield evaluate_packed, (regions, state.position, state.quaternion, FLAT, _TABLE, _TABLE, FLAT)
+    yield write_clearances, (regions, _TABLE, FLAT, FLAT)
+    yield ray_distances, (regions, state.position, _TABLE, 1.0, FLAT)
+    yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, INTEGERS)
+    yield compute_inputs, (model.inputs, goal, regions, state, 0.0, FLAT, data.signals)
+    *_, (function, arguments), start = step_functions(scenario, law)
+    yield fly, (*arguments[:3], FlightMetrics(), FLAT, arguments[-1])
+    yield function, arguments
+    yield start
     yield locate, (model, data)
 
 

@@ -12,6 +12,7 @@ from cosim.command_line.flags import add_changes, add_run_folder, add_scenario, 
 from cosim.command_line.link_flags import add_link_flags, add_live_flag, links_from, open_live
 from cosim.command_line.process import INTERRUPTED, print_run
 from cosim.errors import TelemetryError
+from cosim.report.figure_process import drawing_beside
 
 if TYPE_CHECKING:
     from cosim.mavlink.run_links import Mavlink
@@ -37,6 +38,15 @@ def add_verbs(verbs: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Run ``cosim run``."""
+    import cosim.run.run_scenario  # noqa: F401 -- so that a process to be forked has what it needs
+
+    with contextlib.ExitStack() as stack:
+        if not options.no_report:
+            stack.enter_context(drawing_beside())
+        return _run(options, stack)
+
+
+def _run(options: argparse.Namespace, stack: contextlib.ExitStack) -> int:
     from cosim.run.run_scenario import run_scenario
     from cosim.scenario.scenario import load_scenario
 
@@ -50,13 +60,11 @@ def run(options: argparse.Namespace) -> int:
     scenario = load_scenario(options.scenario, overrides)
     usual = 1.0 if options.commands or options.live is not None else math.inf
     max_rate = usual if options.rate is None else options.rate
-    with contextlib.ExitStack() as stack:
-        live = open_live(options, stack)
-        done = run_scenario(
-            scenario, options.out, mavlink, None if max_rate == math.inf else max_rate,
-            progress=not options.quiet,
-            report=not options.no_report, commands_log=options.replay_commands, live=live,
-        )  # fmt: skip
+    live = open_live(options, stack)
+    done = run_scenario(
+        scenario, options.out, mavlink, None if max_rate == math.inf else max_rate, progress=not options.quiet,
+        report=not options.no_report, commands_log=options.replay_commands, live=live,
+    )  # fmt: skip
     if options.json:
         print(_json(done), end="")
     else:

@@ -5,15 +5,12 @@ from __future__ import annotations
 import shutil
 from collections.abc import Collection
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from cosim.report.contents import contents_of
+from cosim.report.figure_process import draw_beside
 from cosim.report.web_page import FIGURES, inline_figure, render_page
 from cosim.results.run_result import REPORT, SCENARIO, SUMMARY, Run
 from plant_fmu.archive import temporary_folder
-
-if TYPE_CHECKING:  # see write_report
-    from cosim.report.figures.style import FigureData
 
 FORMATS = ("html", "png")
 
@@ -21,23 +18,25 @@ FORMATS = ("html", "png")
 def write_report(run: Run, formats: Collection[str] = ("html",)) -> list[Path]:
     """Write the report of a run into its folder."""
     # All files are written to a temporary folder, and replace the old ones at the end.
-    # importing Matplotlib takes as long as all other imports together
-    from cosim.report.figures.sampled_rows import make_figure_data
-
     with temporary_folder(".report-", run.folder) as scratch:
-        files = _with_figures(run, make_figure_data(run), formats, scratch)
+        files = _with_figures(run, formats, scratch)
         shutil.rmtree(run.folder / FIGURES, ignore_errors=True)
         (scratch / FIGURES).replace(run.folder / FIGURES)
         written = [file.replace(run.folder / file.name) for file in files]
         return written + sorted((run.folder / FIGURES).iterdir())
 
 
-def _with_figures(run: Run, data: FigureData, formats: Collection[str], folder: Path) -> list[Path]:
+def _with_figures(run: Run, formats: Collection[str], folder: Path) -> list[Path]:
     """Write the figures, and the page with them."""
-    from cosim.report.figures.figures import drawings
-
     (folder / FIGURES).mkdir()
-    shown = {drawing.name: inline_figure(drawing, folder / FIGURES, "png" in formats) for drawing in drawings(data)}
+    shown = None if "png" in formats else draw_beside(run, folder / FIGURES)
+    if shown is None:
+        # importing Matplotlib takes as long as all other imports together
+        from cosim.report.figures.figures import drawings
+        from cosim.report.figures.sampled_rows import make_figure_data
+
+        drawn = drawings(make_figure_data(run))
+        shown = {drawing.name: inline_figure(drawing, folder / FIGURES, "png" in formats) for drawing in drawn}
     if "html" not in formats:
         return []
     files = {path.name for path in run.folder.iterdir()} | {SUMMARY, SCENARIO}

@@ -134,6 +134,10 @@ class Record(Rows):
         super().__init__(columns, self._kept)
         self._small = self._count * len(columns) <= _SMALL  # reading one signal takes a tenth of the time of all
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Describe how another process opens the file."""
+        return type(self), (self.file,)
+
     def __len__(self) -> int:
         """Return the number of rows."""
         return self._count
@@ -142,18 +146,29 @@ class Record(Rows):
         """Return one signal, shape (steps,)."""
         if name not in self.units:
             raise KeyError(name)
-        if name not in self._kept:
-            columns = self.columns if self._small else self._columns_of([name])
+        self._keep([name])
+        self._kept.move_to_end(name)
+        while len(self._kept) > _MAX_CACHED_SIGNALS and not self._small:
+            self._kept.popitem(last=False)
+        return self._kept[name]
+
+    def stack(self, names: Sequence[str]) -> Array:
+        """Return several signals side by side, shape (rows, len(names))."""
+        if len(names) <= _MAX_CACHED_SIGNALS:
+            self._keep(names)  # at once, since to open the file takes longer than to read a signal
+        return super().stack(names)
+
+    def _keep(self, names: Sequence[str]) -> None:
+        """Read signals that are not in memory."""
+        missing = [name for name in names if name not in self._kept]
+        if missing:
+            columns = self.columns if self._small else self._columns_of(missing)
             whole, first = np.empty((len(columns), self._count)), 0
             for batch in self._batches(columns):  # a table of the whole would take the memory twice
                 for row, column in zip(whole, columns, strict=True):
                     row[first : first + len(batch)] = batch[column.name]
                 first += len(batch)
             self._kept.update(zip((column.name for column in columns), whole, strict=True))
-        self._kept.move_to_end(name)
-        while len(self._kept) > _MAX_CACHED_SIGNALS and not self._small:
-            self._kept.popitem(last=False)
-        return self._kept[name]
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
         """Yield all rows in order, in blocks that fit into memory, of all signals or of those in `names`."""

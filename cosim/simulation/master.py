@@ -13,13 +13,13 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from controller import CompiledLaw, Law
-from controller.compiling.function import BoundCall, load_functions
+from controller.compiling.function import BoundCall
 from controller.quaternion import from_axis_angle
 from cosim.scenario.law_factory import law_of, with_custom_law
 from cosim.scenario.scenario import Scenario
 from cosim.scenario.start_values import start_values
 from cosim.simulation.actuation_limits import ActuationLimits
-from cosim.simulation.bindings import BoundLaw, bind_arbiter, is_compiled, law_arguments
+from cosim.simulation.bindings import BoundLaw, bind_arbiter
 from cosim.simulation.columns import columns_of
 from cosim.simulation.commands.command_handler import CommandHandler
 from cosim.simulation.commands.commands import Command
@@ -29,11 +29,11 @@ from cosim.simulation.lyapunov_signals import LyapunovSignals
 from cosim.simulation.make_step import NoiseSource, make_data, make_model
 from cosim.simulation.pace import Pace
 from cosim.simulation.signals import Array, Signals
+from cosim.simulation.step_functions import make_plant
 from cosim.simulation.stepped_plant import BoundPlant, SteppedPlant, validate_plant
 from cosim.step.one_step import advance, locate, show_start
 from cosim.step.step_model import LOCATED, MEASURED, set_call
 from fuzzy_arbiter import Arbiter
-from plant_fmu import Plant
 
 _ARMING_PERIOD = 0.005  # s of the wall clock, between polls of the commands while the run waits for arming
 _BLOCK = 256  # maximum number of steps of a block
@@ -115,7 +115,7 @@ class Master:
         self._law: Law = law_of(scenario) if law is None else law
         self._boundary = 0.0  # s, beginning of the next step
 
-        self.plant: SteppedPlant = Plant(scenario.vehicle, scenario.plant.fmi) if plant is None else plant
+        self.plant: SteppedPlant = make_plant(scenario, self._law) if plant is None else plant
         try:
             self.plant.set(start_values(scenario))
             self.plant.initialize()
@@ -141,8 +141,6 @@ class Master:
         self._rows: Array = np.zeros((_BLOCK, s.row.size))
         arguments = self.model, self.data, self._plant.calls
         block = *arguments, self._span, self._rows
-        law_calls = [self.law.step_call(*law_arguments(self.model, self.data))] if is_compiled(self.law) else []
-        load_functions(*law_calls, (advance, block), (show_start, arguments))
         self._bound_law = BoundLaw(self.law, self.model, self.data)
         self._parts: list[_Raising] = [self._bound_law, bind_arbiter(self.arbiter, self.data), self._plant]
         self._advance_one = BoundCall(advance, (*arguments, self._span, self._rows[:0]))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from itertools import islice
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -18,9 +19,9 @@ from cosim.report.figures.trajectory import is_known, targets_of
 _AFTER = {figure: f" (after Fig. {figure})" for figure in ("5a", "5b", "7")}  # captions' references to the paper
 
 
-def drawings(data: FigureData) -> Iterator[NamedFigure]:
-    """Yield every figure for which the run has data."""
-    for name, caption, draw in _figures(data):
+def drawings(data: FigureData, first: int = 0, every: int = 1) -> Iterator[NamedFigure]:
+    """Yield the figures for which the run has data, or some of them: every n-th from the index `first`."""
+    for name, caption, draw in islice(_figures(data), first, None, every):
         with mpl.rc_context(FIGURE_STYLE):
             yield NamedFigure(name, caption, draw(data))
 

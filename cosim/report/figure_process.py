@@ -1,0 +1,96 @@
+"""Draw the figures of a report in processes that import Matplotlib while a run is stepped."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import signal
+import sys
+import threading
+import warnings
+from collections.abc import Iterator
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+from cosim.report.inline_svg import inline_svg
+
+if TYPE_CHECKING:
+    from cosim.report.web_page import InlineFigure
+    from cosim.results.run_result import Run
+
+_waiting: list[Connection[Any, Any]] = []  # that with at most one process that waits for a run
+
+
+@contextlib.contextmanager
+def drawing_beside() -> Iterator[None]:
+    """Have the figures of a report that is written within a block drawn beside it, where that is safe and quicker."""
+    # libraries of other systems may not work in a process that is forked, and none do if there are threads
+    can_fork = sys.platform == "linux" and threading.active_count() == 1
+    if not can_fork or "matplotlib" in sys.modules or os.cpu_count() == 1:
+        yield
+        return
+    connection, of_child = Pipe()
+    child = _fork()
+    if not child:
+        connection.close()
+        _serve(of_child)
+    of_child.close()
+    _waiting.append(connection)
+    try:
+        yield
+    finally:
+        _waiting.clear()
+        connection.close()
+        with contextlib.suppress(ProcessLookupError, ChildProcessError):  # where the parent ignores SIGCHLD
+            os.kill(child, signal.SIGKILL)
+            os.waitpid(child, 0)
+
+
+def draw_beside(run: Run, folder: Path) -> dict[str, InlineFigure] | None:
+    """Have the figures of a run drawn into a folder; return None if no process waits for that, or it fails."""
+    from cosim.report.web_page import InlineFigure
+
+    if not _waiting:
+        return None
+    connection = _waiting.pop()
+    try:
+        connection.send((run, folder))
+        drawn = sorted(connection.recv())
+    except (EOFError, OSError):
+        return None
+    figures = {}
+    for _, name, caption in drawn:
+        svg = (folder / f"{name}.svg").read_text(encoding="utf-8")
+        figures[name] = InlineFigure(inline_svg(svg, caption), caption)
+    return figures
+
+
+def _fork() -> int:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)  # threads of linear algebra, which stands a fork
+        return os.fork()
+
+
+def _serve(connection: Connection[Any, Any]) -> NoReturn:
+    """Wait for a run and a folder, draw its figures there in two processes, and send what names each."""
+    try:
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run ends, and then asks for its figures
+        from cosim.report.figures.figures import drawings
+        from cosim.report.figures.sampled_rows import make_figure_data
+
+        run, folder = connection.recv()
+        half, of_child = Pipe()
+        first = 0 if _fork() else 1
+        drawn = []
+        for i, drawing in enumerate(drawings(make_figure_data(run), first, 2)):
+            drawing.write(folder)
+            drawn.append((first + 2 * i, drawing.name, drawing.caption))
+        if first:
+            of_child.send(drawn)
+        else:
+            of_child.close()
+            connection.send(drawn + half.recv())
+    finally:
+        os._exit(0)  # whatever it raises: the run then draws itself

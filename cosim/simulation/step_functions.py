@@ -1,0 +1,46 @@
+"""The functions of a step that run as C, which are compiled before there is a plant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from controller import Law
+from controller.compiling.function import load_functions
+from cosim.scenario.scenario import Scenario
+from cosim.simulation.bindings import is_compiled, law_arguments
+from cosim.simulation.make_step import exchanged_variables, make_data, make_model, step_signals
+from cosim.step.one_step import advance, show_start
+from cosim.step.plant_calls import PlantCalls
+from plant_fmu import Plant
+from plant_fmu.running.native import Native
+
+INTEGERS, FLAT = np.zeros(1, np.int64), np.zeros(1)
+
+
+def step_functions(scenario: Scenario, law: Law) -> list[tuple[Callable[..., None], tuple[Any, ...]]]:
+    """Return the functions of a run, with arguments of the types with which it calls them."""
+    inputs, outputs = exchanged_variables(scenario)
+    model = make_model(scenario, law, for_record=True)
+    data = make_data(
+        scenario, model, law, step_signals(scenario, law, inputs, outputs), inputs, outputs, np.zeros((0, 6))
+    )
+    references = np.zeros(1, np.uint32)
+    calls = PlantCalls(*[Native(0, 0, 0, 0, references, FLAT, references, FLAT, INTEGERS)] * 3)
+    of_law = [law.step_call(*law_arguments(model, data))] if is_compiled(law) else []
+    return [*of_law, (advance, (model, data, calls, INTEGERS, np.zeros((0, 0)))), (show_start, (model, data, calls))]
+
+
+def make_plant(scenario: Scenario, law: Law) -> Plant:
+    """Make the vehicle's plant, and load the functions of a run meanwhile: the first time both are compiled."""
+    with ThreadPoolExecutor(1) as pool:
+        plant = pool.submit(Plant, scenario.vehicle, scenario.plant.fmi)
+        try:
+            load_functions(*step_functions(scenario, law))
+        except BaseException:
+            plant.result().close()
+            raise
+    return plant.result()
