@@ -6,6 +6,7 @@ import contextlib
 import dataclasses
 import itertools
 import math
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -60,6 +61,7 @@ def import_log(
     report: bool = True,
     overwrite: bool = False,
     on_progress: OnProgress | None = None,
+    moved: OnProgress | None = None,
 ) -> Run:
     r"""Read a log of a vehicle and write it as a run folder.
 
@@ -89,6 +91,8 @@ def import_log(
         True to replace a run in `out`.
     on_progress : callable, optional
         Receives the fraction of the log read so far, 0 to 1.
+    moved : callable, optional
+        Former name of `on_progress`.
 
     Returns
     -------
@@ -117,7 +121,7 @@ def import_log(
     >>> run.summary["status"], len(run.record)
     ('imported', 50)
     """
-    path = Path(log)
+    path, report_progress = Path(log), _progress_callback(on_progress, moved)
     try:
         form = _format_of(path)
         if columns is not None and not form.takes_map:
@@ -130,7 +134,7 @@ def import_log(
         with temporary_folder("cosim-import-") as scratch, np.errstate(all="ignore"):
             contents = LogContents(scratch)
             try:
-                form.read(path, column_map, contents, on_progress or (lambda fraction: None))
+                form.read(path, column_map, contents, report_progress)
             except ModuleNotFoundError as error:
                 if not form.needs or (error.name or "").startswith("cosim"):
                     raise
@@ -143,6 +147,14 @@ def import_log(
         raise ImportLogError(f"{path}: {error}") from error
     except OSError as error:
         raise ImportLogError(f"{path}: {error.strerror or error}") from error
+
+
+def _progress_callback(on_progress: OnProgress | None, moved: OnProgress | None) -> OnProgress:
+    if moved is not None:
+        if on_progress is not None:
+            raise ImportLogError("moved is the former name of on_progress, expected one of them")
+        warnings.warn("moved is now on_progress", DeprecationWarning, stacklevel=3)
+    return on_progress or moved or (lambda fraction: None)
 
 
 def _format_of(path: Path) -> LogFormat:

@@ -84,6 +84,15 @@ class ModeCommands(Service):
 
     # ---- pause ----
 
+    def _execute_override_goto(self, request: CommandRequest) -> Result:
+        m = self.context.mavlink
+        here = request.int_param(2) in (None, 0, m.MAV_GOTO_HOLD_AT_CURRENT_POSITION)
+        if request.int_param(1) == m.MAV_GOTO_DO_HOLD and here:
+            return self._hold(request.sender)
+        if request.int_param(1) == m.MAV_GOTO_DO_CONTINUE:
+            return self._continue(request.sender)
+        return Result.UNSUPPORTED
+
     def _execute_do_pause_continue(self, request: CommandRequest) -> Result:
         if request[1] == 0.0:
             return self._hold(request.sender)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import re
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -44,8 +45,10 @@ class ParameterProtocol(Service):
 
     def __init__(self, context: VehicleContext) -> None:
         super().__init__(context)
-        names = parameter_names(setting.key for setting in context.settings)
-        self._keys = {name: key for key, name in names.items()}
+        keys = [setting.key for setting in context.settings]
+        self._keys = {name: key for key, name in parameter_names(keys).items()}
+        former = parameter_names(re.sub(r"\.center\.(\d)$", r".centre.\1", key) for key in keys)
+        self._current_names = dict(zip(former.values(), self._keys, strict=True))  # by those of keys with `centre`
         self._link_parameters = self._make_link_parameters()
         self.names = sorted({*self._keys, *self._link_parameters})
         self._index = {name: i for i, name in enumerate(self.names)}
@@ -77,6 +80,10 @@ class ParameterProtocol(Service):
     def restart(self) -> None:
         """Reset the values to the vehicle's settings."""
         self.setting_values = {setting.key: setting.value for setting in self.context.settings}
+
+    def _current_name(self, name: str) -> str:
+        """Translate the former spelling of a parameter's name."""
+        return name if name in self._index else self._current_names.get(name, name)
 
     # ---- for other services ----
 
@@ -139,10 +146,11 @@ class ParameterProtocol(Service):
         else:
             del self._bursts[link]
 
-    def _send_value(self, link: Link, name: str) -> None:
+    def _send_value(self, link: Link, name: str, requested: str = "") -> None:
+        """Send a parameter's value, by the name that was requested, which may be a former one."""
         m = self.context.mavlink
         kind = m.MAV_PARAM_TYPE_REAL32, len(self.names), self._index[name]
-        link.send(self.context.make("PARAM_VALUE", name, self.value(name), *kind))
+        link.send(self.context.make("PARAM_VALUE", requested or name, self.value(name), *kind))
 
     def _send_hash(self, link: Link) -> None:
         m = self.context.mavlink
@@ -153,31 +161,32 @@ class ParameterProtocol(Service):
     # ---- single parameters ----
 
     def _receive_param_request_read(self, sender: Sender, message: Any) -> None:
-        m, index, name = self.context.mavlink, message.param_index, message.param_id
-        if name == _HASH and index < 0 and self.context.profile.has_parameter_hash:
+        m, index, requested = self.context.mavlink, message.param_index, message.param_id
+        if requested == _HASH and index < 0 and self.context.profile.has_parameter_hash:
             self._send_hash(sender.link)
         elif 0 <= index < len(self.names):
             self._send_value(sender.link, self.names[index])
-        elif index < 0 and name in self._index:
-            self._send_value(sender.link, name)
+        elif index < 0 and (name := self._current_name(requested)) in self._index:
+            self._send_value(sender.link, name, requested)
         else:
-            self._send_error(sender, name, index, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            self._send_error(sender, requested, index, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
 
     def _send_error(self, sender: Sender, name: str, index: int, error: int) -> None:
         sender.link.send(self.context.make("PARAM_ERROR", *sender.address, name, index, error))
 
     def _receive_param_set(self, sender: Sender, message: Any) -> None:
-        m, name, value = self.context.mavlink, message.param_id, message.param_value
+        m, requested, value = self.context.mavlink, message.param_id, message.param_value
+        name = self._current_name(requested)
         if name == _HASH:  # the station has the list already
             self._bursts.pop(sender.link, None)
             return
         if name not in self._index:
-            self._send_error(sender, name, -1, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
+            self._send_error(sender, requested, -1, m.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
         error = self._write(name, value, message.param_type)
         if error != m.MAV_PARAM_ERROR_NO_ERROR:
-            self._send_error(sender, name, self._index[name], error)
-        self._send_value(sender.link, name)
+            self._send_error(sender, requested, self._index[name], error)
+        self._send_value(sender.link, name, requested)
 
     def _write(self, name: str, value: float, kind: int) -> int:
         """Write a value, and return MAV_PARAM_ERROR."""

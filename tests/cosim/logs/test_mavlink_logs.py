@@ -191,10 +191,14 @@ def test_sticks_replace_missing_servo_outputs(tmp_path, imported):
         np.testing.assert_allclose(run.record[name][20:-20], expected, rtol=1e-6)
 
 
-def test_progress_is_reported(imported, six_thrusters):
-    fractions = []
+def test_progress_is_reported_by_its_former_name_too(imported, six_thrusters):
+    fractions, again = [], []
     imported(DATAFLASH, six_thrusters, on_progress=fractions.append)
-    assert fractions == sorted(fractions) and fractions[-1] == 1.0
+    with pytest.warns(DeprecationWarning, match="moved is now on_progress"):
+        imported(DATAFLASH, six_thrusters, moved=again.append)
+    assert again == fractions == sorted(fractions) and fractions[-1] == 1.0
+    with pytest.raises(ImportLogError, match="moved is the former name of on_progress, expected one of them"):
+        imported(DATAFLASH, six_thrusters, on_progress=again.append, moved=again.append)
 
 
 @pytest.mark.medium(fast=2)

@@ -9,7 +9,7 @@ from tests.cosim.mavlink.station import ACCEPTED, DENIED, FAILED, NAN, REJECTED,
 from tests.cosim.mavlink.stubs import message
 from tests.cosim.mavlink.test_mission import upload
 
-ARM, SET_MODE, STANDARD_MODE, ONCE, PAUSE, RESTART, HOME, LAND = 400, 176, 262, 512, 193, 246, 20, 21
+ARM, SET_MODE, STANDARD_MODE, ONCE, GOTO, PAUSE, RESTART, HOME, LAND = 400, 176, 262, 512, 252, 193, 246, 20, 21
 AT_HOME = SetTarget((0.0, 0.0, 0.5), 0.3)
 UP = {"ardusub": 9, "px4": 4 << 16 | 6 << 24, "generic": 4 << 16 | 6 << 24}  # custom mode to surface
 
@@ -21,8 +21,10 @@ EXCHANGES = {
     "no mission": [(long(STANDARD_MODE, 6), FAILED), "Refused: there is no mission", []],
     "no such standard mode": [*((long(STANDARD_MODE, number), FAILED) for number in (0, 2, 3, 8, NAN)),
                               "Refused: no such mode", []],
-    "pause and continue": [*((long(PAUSE, value), ACCEPTED) for value in (0.0, 0.0, 1.0)), (long(PAUSE, 2.0), DENIED),
-                           [SetMode(mode) for mode in ("hold", "hold", "reach")]],
+    "pause and continue": [
+        *((long(PAUSE, value), ACCEPTED) for value in (0.0, 1.0)), *[(long(GOTO, 0.0, 2.0), ACCEPTED)] * 2,
+        (long(GOTO, 1.0), ACCEPTED), (long(GOTO, 0.0, 3.0), UNSUPPORTED),
+        [SetMode(mode) for mode in ("hold", "reach", "hold", "hold", "reach")]],
     "continue in the mode before": [{"commands.mode": 6.0}, *((long(PAUSE, value), ACCEPTED) for value in (0.0, 1.0)),
                                     [SetMode("hold"), SetMode("depth_hold")]],
     "land, and return home": [(long(LAND), ACCEPTED), (long(HOME), ACCEPTED), [SetMode("surface"), AT_HOME]],
