@@ -23,12 +23,15 @@ class Channel(Protocol):
         # The peer of a stream can be weakly referenced; after a reconnection it is another object.
         ...
 
-    def record_peer(self, peer: Hashable) -> None:
-        """Record that an accepted frame was received from `peer`."""
+    def record_version(self, peer: Hashable, version: int) -> None:
+        """Record that an accepted frame of MAVLink 1 or 2 was received from `peer`."""
+        # A peer that has sent only MAVLink 1 is answered in MAVLink 1.
         ...
 
-    def send(self, frame: bytes) -> bool:
+    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
         """Queue a frame for all peers until the next `poll`; return False if a queue was full."""
+        # Peers that are answered in MAVLink 1 get `frame_v1`, the same message in that version, or nothing if it is
+        # None.
         ...
 
     def poll(self, now: float) -> None:

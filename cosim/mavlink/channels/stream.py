@@ -28,7 +28,7 @@ class Stream:
         self._queue = bytearray()
         self._stalled_at: float | None = None  # time of the first write without progress
         self.is_open = True
-        self.dropped = 0
+        self.version = self.dropped = 0
 
     def read(self) -> bytes | None:
         """Return received bytes, or None if there are none; at the end of the stream `is_open` becomes False."""
@@ -41,16 +41,19 @@ class Stream:
         self.is_open = bool(data)
         return data or None
 
-    def put(self, frame: bytes) -> bool:
-        """Queue a frame; return False if the queue was full or the stream has broken."""
+    def put(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
+        """Queue a frame, or `frame_v1` for MAVLink 1; return False if the queue was full or the stream has broken."""
+        queued = frame_v1 if self.version == 1 else frame
+        if queued is None:
+            return True
         if len(self._queue) > _WRITE_THRESHOLD and self._stalled_at is None:
             self._write_available()
         if not self.is_open:
             return False
-        if len(self._queue) + len(frame) > self._limit:
+        if len(self._queue) + len(queued) > self._limit:
             self.dropped += 1
             return False
-        self._queue += frame
+        self._queue += queued
         return True
 
     def flush(self, now: float) -> bool:
@@ -87,8 +90,10 @@ class StreamChannel:
     def __init__(self) -> None:
         self.losses: dict[str, int] = Counter()
 
-    def record_peer(self, peer: Hashable) -> None:
-        """Do nothing: frames are sent to peers even if they never send."""
+    def record_version(self, peer: Hashable, version: int) -> None:
+        """Record the MAVLink version of a peer; frames are sent to peers even if they never send."""
+        assert isinstance(peer, Stream)
+        peer.version = max(peer.version, version)
 
     def _close(self, stream: Stream, reason: str) -> None:
         """Close a stream, and count the frames that it dropped."""
@@ -111,12 +116,12 @@ class SinglePeer(StreamChannel):
         data = None if stream is None else stream.read()
         return None if data is None else (stream, data)
 
-    def send(self, frame: bytes) -> bool:
+    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
         """Queue a frame for the peer; return False if it is absent or the queue is full."""
         if self._stream is None:
             self.losses[f"frames dropped while there was no {self._peer_name}"] += 1
             return False
-        return self._stream.put(frame)
+        return self._stream.put(frame, frame_v1)
 
     def close(self) -> None:
         """Write what can be written without blocking, and close the stream."""

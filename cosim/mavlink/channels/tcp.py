@@ -53,9 +53,9 @@ class TcpIn(StreamChannel):
                 return client, data
         return None
 
-    def send(self, frame: bytes) -> bool:
+    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
         """Queue a frame for each client; return False if a queue was full."""
-        results = [client.put(frame) for client in self.clients]
+        results = [client.put(frame, frame_v1) for client in self.clients]
         return all(results)
 
     def poll(self, now: float) -> None:

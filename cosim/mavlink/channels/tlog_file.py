@@ -52,10 +52,10 @@ class Tlog:
         """Return None: a log is only written."""
         return None
 
-    def record_peer(self, peer: Hashable) -> None:
+    def record_version(self, peer: Hashable, version: int) -> None:
         """Do nothing: a log has no peers."""
 
-    def send(self, frame: bytes) -> bool:
+    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
         """Append a frame; return False if the buffer is full."""
         if len(self._buffer) > _BUFFER_SIZE:
             self.losses["frames not logged"] += 1

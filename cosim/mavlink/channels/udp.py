@@ -30,31 +30,31 @@ class _Udp:
 
     def __init__(self, name: str, prepare: Callable[[socket.socket], None]) -> None:
         self.losses: dict[str, int] = Counter()
-        self._packet = b""  # frames of the next datagram
+        self._packets = {1: b"", 2: b""}  # frames of the next datagram, by version
         self._socket = _open_socket(name, prepare)
 
-    def send(self, frame: bytes) -> bool:
+    def send(self, frame: bytes, frame_v1: bytes | None = None) -> bool:
         """Queue a frame for the next datagram to each peer; having no listener is no failure."""
-        if len(self._packet) + len(frame) > _MAX_PACKET:
-            self._send_packet()
-        self._packet += frame
+        frames = {1: frame_v1 or b"", 2: frame}
+        if any(len(self._packets[version]) + len(frames[version]) > _MAX_PACKET for version in frames):
+            self._send_packets()
+        self._packets = {version: self._packets[version] + frames[version] for version in frames}
         return True
 
     def poll(self, now: float) -> None:
-        """Send the queued datagram."""
-        self._send_packet()
+        """Send the queued datagrams."""
+        self._send_packets()
 
     def close(self) -> None:
-        """Send the queued datagram, and close the socket."""
-        self._send_packet()
+        """Send the queued datagrams, and close the socket."""
+        self._send_packets()
         self._socket.close()
 
-    def _send_packet(self) -> None:
-        packet, self._packet = self._packet, b""
-        if packet:
-            self._write(packet)
+    def _send_packets(self) -> None:
+        packets, self._packets = self._packets, {1: b"", 2: b""}
+        self._write(packets)
 
-    def _write(self, packet: bytes) -> None:
+    def _write(self, packets: dict[int, bytes]) -> None:
         raise NotImplementedError
 
 
@@ -63,6 +63,7 @@ class UdpOut(_Udp):
 
     def __init__(self, host: str, port: int) -> None:
         super().__init__(f"udpout:{host}:{port}", lambda s: s.connect((host, port)))
+        self._version = 0  # the highest received; 0 for none yet
 
     def receive(self) -> tuple[Hashable, bytes] | None:
         """Return a datagram, or None if there is none."""
@@ -71,11 +72,13 @@ class UdpOut(_Udp):
         except OSError:  # nothing was received, or an earlier datagram was refused
             return None
 
-    def record_peer(self, peer: Hashable) -> None:
-        """Do nothing: the peer is fixed."""
+    def record_version(self, peer: Hashable, version: int) -> None:
+        """Record the MAVLink version of the peer."""
+        self._version = max(self._version, version)
 
-    def _write(self, packet: bytes) -> None:
-        for _ in range(2):
+    def _write(self, packets: dict[int, bytes]) -> None:
+        packet = packets[1 if self._version == 1 else 2]
+        for _ in range(2 if packet else 0):
             try:
                 self._socket.send(packet)
                 return
@@ -88,10 +91,11 @@ class UdpOut(_Udp):
 
 @dataclass
 class _Peer:
-    """When accepted frames of an address were received."""
+    """When accepted frames of an address were received, and their highest version."""
 
     first: float  # s, monotonic
     last: float
+    version: int
 
 
 class UdpIn(_Udp):
@@ -119,19 +123,19 @@ class UdpIn(_Udp):
             return None
         return address, data
 
-    def record_peer(self, peer: Hashable) -> None:
+    def record_version(self, peer: Hashable, version: int) -> None:
         """Add this address to the peers, or renew it; count the frame if there is no room."""
         assert isinstance(peer, tuple)
         now, entry = time.monotonic(), self._peers.get(peer)
         if entry is not None:
-            entry.last = now
+            entry.last, entry.version = now, max(entry.version, version)
         elif len(self._peers) < MAX_PEERS or self._drop_silent_peer(now):
-            self._peers[peer] = _Peer(now, now)
+            self._peers[peer] = _Peer(now, now, version)
         else:
             self.losses["frames of peers beyond 8"] += 1
 
     def poll(self, now: float) -> None:
-        """Send the queued datagram to the peers that are not silent now [s]."""
+        """Send the queued datagrams to the peers that are not silent now [s]."""
         self._now = now
         super().poll(now)
 
@@ -146,10 +150,11 @@ class UdpIn(_Udp):
         del self._peers[min(silent, key=ages.__getitem__)]
         return True
 
-    def _write(self, packet: bytes) -> None:
+    def _write(self, packets: dict[int, bytes]) -> None:
         for address in self.peers:
             try:
-                self._socket.sendto(packet, address)
+                if packet := packets[self._peers[address].version]:
+                    self._socket.sendto(packet, address)
             except OSError:
                 self.losses[_SEND_ERRORS] += 1
 

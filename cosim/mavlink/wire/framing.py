@@ -1,4 +1,4 @@
-"""Frames: decode bytes with cheap checks first, so that no input raises."""
+"""Frames: decode bytes with cheap checks first, so that no input raises; make those of MAVLink 1."""
 
 from __future__ import annotations
 
@@ -17,7 +17,9 @@ _SIGNED = 0x01  # bit of the incompatibility flags
 _SIGNATURE = 13  # bytes
 _CRC = 2  # bytes
 _SETUP_SIGNING = 256  # id of SETUP_SIGNING
+_MAX_V1_ID = 255  # highest message id of MAVLink 1
 _V2_HEADER = struct.Struct("<BBBxxBBHB")  # marker, length, flags, system, component, id in two parts
+_SOURCE_OFFSET = 5  # of the system in a header of MAVLink 2
 _V1_HEADER = struct.Struct("<BBxBBB")  # marker, length, system, component, id
 _HEADER_SIZES = {b"\xfd": _V2_HEADER.size, b"\xfe": _V1_HEADER.size}
 _MARKER = re.compile(rb"[\xfd\xfe]")
@@ -31,6 +33,7 @@ class MessageInfo(NamedTuple):
     crc_extra: int
     max_size: int  # maximum bytes of the payload
     target_offset: int | None  # offset of the target system in the payload
+    v1_size: int  # bytes of the payload in MAVLink 1, which has no extension fields
 
 
 class Header(NamedTuple):
@@ -86,12 +89,16 @@ def message_infos() -> dict[int, MessageInfo]:
 
 def _message_info(message: Any) -> MessageInfo:
     target_field = "target" if message.msgname == "MANUAL_CONTROL" else "target_system"
-    offset, target_offset = 0, None
+    crc, offset, target_offset = dialect().x25crc(f"{message.msgname} ".encode()), 0, None
+    max_size = v1_size = int(message.unpacker.size)
     for name, length in zip(message.ordered_fieldnames, message.array_lengths, strict=True):
         type_name = message.fieldtypes[message.fieldnames.index(name)]
         target_offset = offset if name == target_field else target_offset
         offset += _FIELD_SIZES[type_name] * (length or 1)
-    return MessageInfo(message.crc_extra, int(message.unpacker.size), target_offset)
+        crc.accumulate(f"{type_name} {name} ".encode() + bytes((length,) if length else ()))
+        if crc.crc & 0xFF ^ crc.crc >> 8 == message.crc_extra:  # extension fields follow; an earlier match is chance
+            v1_size = offset
+    return MessageInfo(message.crc_extra, max_size, target_offset, v1_size)
 
 
 def parse_header(data: bytes, offset: int) -> Header | None:
@@ -109,6 +116,18 @@ def parse_header(data: bytes, offset: int) -> Header | None:
         end = _V1_HEADER.size + length
         return Header(end + _CRC, _V1_HEADER.size, end, False, system, component, message_id)
     return None
+
+
+def encode_v1(frame: bytes, seq: int) -> bytes | None:
+    """Encode an unsigned frame of MAVLink 2 as one of MAVLink 1, without extension fields; None for ids above 255."""
+    system, component, low, high = struct.unpack_from("<BBHB", frame, _SOURCE_OFFSET)
+    if low > _MAX_V1_ID or high:
+        return None
+    info = message_infos()[low]
+    payload = frame[_V2_HEADER.size : -_CRC].ljust(info.v1_size, b"\0")[: info.v1_size]
+    body = bytes((V1, len(payload), seq, system, component, low)) + payload
+    crc: int = dialect().x25crc(body[1:] + bytes((info.crc_extra,))).crc
+    return body + crc.to_bytes(_CRC, "little")
 
 
 class FrameFilter:

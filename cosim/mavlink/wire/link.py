@@ -16,7 +16,7 @@ from cosim.mavlink.channels.tlog_file import Tlog
 from cosim.mavlink.channels.udp import UdpIn, UdpOut
 from cosim.mavlink.wire.dialect import dialect
 from cosim.mavlink.wire.endpoint import Endpoint
-from cosim.mavlink.wire.framing import FrameFilter, RxStats, StreamReader
+from cosim.mavlink.wire.framing import V1, FrameFilter, RxStats, StreamReader, encode_v1
 from cosim.mavlink.wire.options import COMPONENT_ID, MavlinkOptions
 from cosim.mavlink.wire.signing import SigningClock, Verifier, timestamp_file
 
@@ -102,6 +102,7 @@ class Link:
         self.sent = self.dropped = self.unencodable = 0
         self._filter, self._signer = frame_filter, signer
         self._budget = None if budget is None else Budget(budget)
+        self._seq_v1 = 0
         self._codec = dialect().MAVLink(None, *source)
         if signer is not None:
             signing = self._codec.signing
@@ -109,6 +110,7 @@ class Link:
         self._readers: WeakKeyDictionary[Any, StreamReader] = WeakKeyDictionary()
         self._frames: Iterator[tuple[bytes, Any]] = iter(())  # of the last received bytes
         self._peer: Any = None  # their sender
+        self._has_v1_peers = False  # True once a peer has sent MAVLink 1
         self._reported: set[str] = set()  # kinds of messages that could not be encoded
 
     def has_room(self) -> bool:
@@ -132,9 +134,12 @@ class Link:
         if self._budget is not None and not self._budget.spend(len(frame), rule.has_priority):
             self.dropped += 1
             return False
+        # frames of MAVLink 1 are unsigned, so with a key such peers are rejected
+        frame_v1 = encode_v1(frame, self._seq_v1) if self._has_v1_peers and self._signer is None else None
         self._codec.seq = (self._codec.seq + 1) % 256
+        self._seq_v1 = (self._seq_v1 + (frame_v1 is not None)) % 256
         self.sent += 1
-        was_sent = self.channel.send(frame)
+        was_sent = self.channel.send(frame, frame_v1)
         if rule.is_answer:
             for tlog in self.logs:
                 tlog.send(message)
@@ -146,7 +151,9 @@ class Link:
         while time.perf_counter() < until:
             received = next(self._frames, None)
             if received is not None:
-                self.channel.record_peer(self._peer)
+                version = 1 if received[0][0] == V1 else 2
+                self._has_v1_peers |= version == 1
+                self.channel.record_version(self._peer, version)
                 yield received
                 continue
             chunk = self.channel.receive()

@@ -30,9 +30,9 @@ class Script:
         self.looked += data is not None
         return None if data is None else (0, data)
 
-    def record_peer(self, peer): ...
+    def record_version(self, peer, version): ...
 
-    def send(self, frame):
+    def send(self, frame, frame_v1=None):
         return True
 
     def poll(self, now): ...
@@ -173,13 +173,13 @@ def test_flood_of_new_addresses_does_not_displace_a_station_that_was_heard(befor
         for _ in range(max(1, round(seconds))):
             clock.now += 1.0
             for peer in [station] * speaks + [(HERE, next(ports)) for _ in range(rng.randrange(8))]:
-                channel.record_peer(peer)
+                channel.record_version(peer, 2)
             channel.poll(clock.now)
             assert len(channel._peers) <= MAX_PEERS
         return station in channel.peers
 
     for _ in range(before):
-        channel.record_peer((HERE, next(ports)))
+        channel.record_version((HERE, next(ports)), 2)
         clock.now += 0.5 * PEER_TIMEOUT
     assert passes(60.0, speaks=True)
     assert passes(silence, speaks=False) == (silence < PEER_TIMEOUT)

@@ -63,7 +63,7 @@ class Sender:
         self.frames = []
         self.link = Link("test", self, open_filter(), SOURCE, signer=Signer(KEY, clock, link))
 
-    def send(self, frame):
+    def send(self, frame, frame_v1=None):
         self.frames.append(frame)
         return True
 

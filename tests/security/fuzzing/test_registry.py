@@ -24,6 +24,7 @@ METHODS = {
 ITS_OWN = {  # what parses nothing that comes from outside: why
     "controller.force_limits:_cached": "an array in memory",
     "controller.compiling.text_cache:_read_cached": "a file of its own cache, in a folder that it alone can write to",
+    "cosim.mavlink.wire.framing:encode_v1": "a frame that pymavlink has just encoded",
     "cosim.companion.failsafes:Failsafes.receive": "the four bytes of a number of a message",
     "cosim.campaigns.rerun:_sweep_repeat": "a copy of the plan, which was read",
     "cosim.campaigns.store.folder:CampaignFolder.__init__": "a copy of its own plan",
