@@ -11,7 +11,7 @@ from cosim.mavlink.messages.message_table import build_messages
 from cosim.mavlink.messages.streams import Streams
 from cosim.mavlink.services.attitude_targets import AttitudeTargets
 from cosim.mavlink.services.command_protocol import CommandProtocol
-from cosim.mavlink.services.ftp import FileTransfer
+from cosim.mavlink.services.ftp import FileServer
 from cosim.mavlink.services.gcs_failsafe import GcsFailsafe
 from cosim.mavlink.services.manual import ManualControlService
 from cosim.mavlink.services.mission import MissionProtocol
@@ -63,7 +63,7 @@ class Autopilot:
             ManualControlService(context),
             parameters,
             MissionProtocol(context, targets, parameters),
-            FileTransfer(context),
+            FileServer(context, parameters),
             LogProtocol(context),
             Timing(context),
             Origin(context),

@@ -77,7 +77,7 @@ def available_modes_monitor(context: VehicleContext) -> Iterator[Fields]:
 
 def capabilities(context: VehicleContext) -> int:
     """Return the MAV_PROTOCOL_CAPABILITY bits of the implemented protocols."""
-    names = "MISSION_FLOAT PARAM_FLOAT MISSION_INT COMMAND_INT SET_POSITION_TARGET_LOCAL_NED"
+    names = "MISSION_FLOAT PARAM_FLOAT MISSION_INT COMMAND_INT FTP SET_POSITION_TARGET_LOCAL_NED"
     names += " SET_POSITION_TARGET_GLOBAL_INT MAVLINK2"
     return combine_flags(context.mavlink, "MAV_PROTOCOL_CAPABILITY_", names)
 

@@ -1,28 +1,178 @@
-"""File transfer: no file is served; a station that is refused its parameter file requests the list at once."""
+"""File transfer: a read-only server of one file, the packed parameters, without access to the file system."""
 
 from __future__ import annotations
 
+import re
 import struct
+from collections import OrderedDict
+from dataclasses import dataclass, field
 from typing import Any
 
+from cosim.mavlink.services.packed_parameters import compute_crc32, pack_parameters
+from cosim.mavlink.services.parameter_protocol import ParameterProtocol
 from cosim.mavlink.services.service import Service
-from cosim.mavlink.vehicle.vehicle_context import Sender
+from cosim.mavlink.vehicle.vehicle_context import Sender, VehicleContext
 
 _HEADER = struct.Struct("<HBBBBBBI")  # seq, session, opcode, size, req_opcode, burst_complete, padding, offset
-_PAYLOAD = 251  # bytes
-_ENDS = (0, 1, 2)  # opcodes of no operation, and of the end of one session and of all
-_ACK, _NAK, _NOT_FOUND = 128, 129, bytes([10])
+_MAX_DATA = 239  # bytes in a payload
+_PAYLOAD = 251
+_FOLDER, _FILE = "@PARAM", "param.pck"
+_MAX_CLIENTS = 8  # each with one open file; a further client replaces the one unused for longest
+_BURST = 16  # packets
+_MAX_PATH = 100
+
+_NONE, _TERMINATE, _RESET, _LIST, _OPEN, _READ, _CRC, _BURST_READ = 0, 1, 2, 3, 4, 5, 14, 15
+_WRITING = (6, 7, 8, 9, 10, 11, 12, 13)  # create, write, remove, make and remove folders, open, truncate, rename
+_ACK, _NAK = 128, 129
+_INVALID_SIZE, _INVALID_SESSION, _EOF, _UNKNOWN, _PROTECTED, _NOT_FOUND = 3, 4, 6, 7, 9, 10
 
 
-class FileTransfer(Service):
+@dataclass(frozen=True)
+class _Request:
+    """A decoded request."""
+
+    seq: int
+    session: int
+    opcode: int
+    size: int
+    offset: int
+    data: bytes
+
+
+@dataclass
+class _Client:
+    """The session and open file of a ground station."""
+
+    session: int = 0
+    content: bytes | None = None
+    last_request: bytes = b""
+    last_replies: list[bytes] = field(default_factory=list)
+
+
+class FtpError(Exception):
+    """Raised for a refused request; `code` is its MAV_FTP_ERR."""
+
+    def __init__(self, error: int) -> None:
+        super().__init__(error)
+        self.code = error
+
+
+class FileServer(Service):
     """FILE_TRANSFER_PROTOCOL."""
+
+    def __init__(self, context: VehicleContext, parameters: ParameterProtocol) -> None:
+        super().__init__(context)
+        self._parameters = parameters
+        self._clients: OrderedDict[tuple[str, int, int], _Client] = OrderedDict()
 
     def _receive_file_transfer_protocol(self, sender: Sender, message: Any) -> None:
         raw = bytes(message.payload[:_PAYLOAD]).ljust(_PAYLOAD, b"\0")
-        seq, session, opcode, *_ = _HEADER.unpack_from(raw)
+        seq, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(raw)
         if opcode in (_ACK, _NAK):
             return
-        answer, data = (_ACK, b"") if opcode in _ENDS else (_NAK, _NOT_FOUND)
-        header = _HEADER.pack((seq + 1) & 0xFFFF, session, answer, len(data), opcode, 0, 0, 0)
-        payload = (header + data).ljust(_PAYLOAD, b"\0")
-        self.reply(sender, [self.context.make("FILE_TRANSFER_PROTOCOL", 0, *sender.address, payload)])
+        client = self._client_of(sender)
+        if raw == client.last_request:  # repeated: the reply was lost
+            replies = client.last_replies
+        else:
+            request = _Request(seq, session, opcode, size, offset, raw[_HEADER.size : _HEADER.size + size])
+            replies = self._replies(client, request)
+            client.last_request, client.last_replies = raw, replies
+        self.reply(sender, [self.context.make("FILE_TRANSFER_PROTOCOL", 0, *sender.address, data) for data in replies])
+
+    def _client_of(self, sender: Sender) -> _Client:
+        key = sender.link.name, sender.system, sender.component
+        if key not in self._clients:
+            if len(self._clients) >= _MAX_CLIENTS:
+                self._clients.popitem(last=False)
+            self._clients[key] = _Client()
+        self._clients.move_to_end(key)
+        return self._clients[key]
+
+    def _replies(self, client: _Client, request: _Request) -> list[bytes]:
+        is_burst = request.opcode == _BURST_READ
+        try:
+            parts = _burst(client, request) if is_burst else [(request.offset, self._answer(client, request))]
+        except FtpError as error:
+            return [_packet(request, 1, _NAK, bytes([error.code]), request.offset)]
+        last = len(parts) if is_burst else 0
+        return [_packet(request, i, _ACK, data, offset, i == last) for i, (offset, data) in enumerate(parts, 1)]
+
+    def _answer(self, client: _Client, request: _Request) -> bytes:
+        opcode = request.opcode
+        if opcode in (_NONE, _TERMINATE, _RESET):
+            client.content = client.content if opcode == _NONE else None
+            return b""
+        if opcode == _LIST:
+            return self._listing(_path(request), request.offset)
+        if opcode == _OPEN:
+            client.session, client.content = request.session, self._content(_path(request))
+            return struct.pack("<I", len(client.content))
+        if opcode == _READ:
+            return _read_part(_get_content(client, request), request.offset, request.size)
+        if opcode == _CRC:
+            return struct.pack("<I", compute_crc32(self._content(_path(request))))
+        raise FtpError(_PROTECTED if opcode in _WRITING else _UNKNOWN)
+
+    # ---- files ----
+
+    def _content(self, path: str) -> bytes:
+        name, _, query = path.lstrip("/").partition("?")
+        if name != f"{_FOLDER}/{_FILE}":
+            raise FtpError(_NOT_FOUND)
+        parameters = self._parameters.list_values()
+        start, count = _number(query, "start", 0), _number(query, "count", len(parameters))
+        return pack_parameters(parameters[start : start + count], len(parameters))
+
+    def _listing(self, path: str, offset: int) -> bytes:
+        folder = path.strip("/")
+        if folder == "":
+            entries = [f"D{_FOLDER}"]
+        elif folder == _FOLDER:
+            entries = [f"F{_FILE}\t{len(self._content(f'{_FOLDER}/{_FILE}'))}"]
+        else:
+            raise FtpError(_NOT_FOUND)
+        if offset >= len(entries):
+            raise FtpError(_EOF)
+        return b"".join(entry.encode() + b"\0" for entry in entries[offset:])
+
+
+def _path(request: _Request) -> str:
+    path = request.data.split(b"\0", 1)[0]
+    if len(path) > _MAX_PATH:
+        raise FtpError(_NOT_FOUND)
+    return path.decode("ascii", "replace")
+
+
+def _number(query: str, key: str, default: int) -> int:
+    match = re.search(rf"(?:^|[?&]){key}=([0-9]{{1,5}})(?:&|$)", query)
+    return int(match[1]) if match else default
+
+
+def _get_content(client: _Client, request: _Request) -> bytes:
+    if client.content is None or request.session != client.session:
+        raise FtpError(_INVALID_SESSION)
+    return client.content
+
+
+def _burst(client: _Client, request: _Request) -> list[tuple[int, bytes]]:
+    """Return the parts of a burst, each with its offset."""
+    content, offset = _get_content(client, request), request.offset
+    parts = [(offset, _read_part(content, offset, request.size))]
+    while len(parts) < _BURST and (offset := offset + len(parts[-1][1])) < len(content):
+        parts.append((offset, _read_part(content, offset, request.size)))
+    return parts
+
+
+def _read_part(content: bytes, offset: int, size: int) -> bytes:
+    if size > _MAX_DATA:
+        raise FtpError(_INVALID_SIZE)
+    if offset >= len(content):
+        raise FtpError(_EOF)
+    return content[offset : offset + (size or _MAX_DATA)]
+
+
+def _packet(request: _Request, after: int, opcode: int, data: bytes, offset: int, complete: bool = False) -> bytes:
+    """Return a reply; it echoes the session of the request, by which a station recognizes it."""
+    seq = (request.seq + after) & 0xFFFF
+    header = _HEADER.pack(seq, request.session, opcode, len(data), request.opcode, complete, 0, offset)
+    return (header + data).ljust(_PAYLOAD, b"\0")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from cosim.errors import CommandError
-from cosim.mavlink.services.parameter_hash import hash_parameters
+from cosim.mavlink.services.packed_parameters import hash_parameters
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.services.station_parameters import station_parameters

@@ -9,7 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from pymavlink import mavutil
+from pymavlink import mavftp, mavutil
 from pymavlink.dialects.v20 import all as mavlink
 
 from cosim.errors import TelemetryError
@@ -28,8 +28,7 @@ _STARTING = 120.0  # s, includes compilation
 _ACK_TIMEOUT, _ACK_TRIES = 3.0, 3  # QGroundControl's timers [s] and numbers of tries
 _MESSAGE_TIMEOUT = 1.0  # s, from the ack to the message
 _LIST_TIMEOUT, _MISSION_TIMEOUT, _MISSION_TRIES = 5.0, 1.5, 5
-_FILE, _OPEN, _NAK, _NOT_FOUND = b"@PARAM/param.pck", 4, 129, 10
-_FILE_TIMEOUT = 1.0  # s
+_FILE = "@PARAM/param.pck"
 _COMPONENT_METADATA = 397  # missing in all dialects of pymavlink
 _GROUPS_OF_ARDUPILOT = ((1, 2), (2, 2), (3, 2), (6, 3), (10, 20), (11, 10), (12, 3))  # group, Hz
 
@@ -68,7 +67,7 @@ class GroundStation:
     def __init__(self) -> None:
         self.link = mavutil.mavlink_connection("udpin:127.0.0.1:0", 0, 255, 190, dialect="all")
         self.endpoint = Endpoint("udpout", "station", "127.0.0.1", self.link.port.getsockname()[1])
-        self.retries = 0  # requests that were sent again
+        self.retries = self.file_retries = 0  # requests that were sent again, and those of files by mavftp's timers
         self.log = bytearray()  # a .tlog of all received messages
         self.link.message_hooks.append(
             lambda link, m: self.log.extend(struct.pack(">Q", time.time_ns() // 1000) + m.get_msgbuf())
@@ -127,7 +126,7 @@ class GroundStation:
             "modes": self._modes,
             "metadata": lambda: self.request(_COMPONENT_METADATA),
             "streams": self._streams if of_ardupilot else lambda: None,
-            "parameters": self._file_or_list if of_ardupilot else self.parameters,
+            "parameters": self._file if of_ardupilot else self.parameters,
             "mission": self._mission,
         }
         seconds = {}
@@ -146,12 +145,13 @@ class GroundStation:
         for group, rate in _GROUPS_OF_ARDUPILOT:
             self.link.mav.request_data_stream_send(1, 1, group, rate, 1)
 
-    def _file_or_list(self) -> None:
-        payload = bytearray(struct.pack("<HBBBBBBI", 1, 0, _OPEN, len(_FILE), 0, 0, 0, 0) + _FILE).ljust(251, b"\0")
-        request = mavlink.MAVLink_file_transfer_protocol_message(0, 1, 1, payload)
-        reply = self.ask(request, lambda m: m.get_type() == "FILE_TRANSFER_PROTOCOL", _FILE_TIMEOUT, 3)
-        assert (reply.payload[3], reply.payload[12]) == (_NAK, _NOT_FOUND)
-        assert self.parameters()
+    def _file(self) -> None:
+        files: list[Any] = []
+        client = mavftp.MAVFTP(self.link, 1, 1)
+        client.cmd_get([_FILE], callback=lambda file: files.append(file and file.read()))
+        client.process_ftp_reply("OpenFileRO", timeout=30.0)
+        self.file_retries += client.open_retries + client.read_retries
+        assert mavftp.MAVFTP.ftp_param_decode(files[0]).params
 
     def parameters(self) -> dict[str, float]:
         """Fetch the list of parameters."""

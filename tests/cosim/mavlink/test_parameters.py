@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import all as mavlink
 
-from cosim.mavlink.services.parameter_hash import hash_parameters
+from cosim.mavlink.services.packed_parameters import hash_parameters
 from cosim.mavlink.services.parameter_names import parameter_names
 from cosim.mavlink.services.parameter_protocol import shorten_float32
 from cosim.mavlink.services.station_parameters import station_parameters

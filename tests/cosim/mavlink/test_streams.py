@@ -120,7 +120,7 @@ def test_seventeen_messages_at_50_hertz_are_accepted(station):
 def test_version_and_banner_are_sent_on_request(station):
     station.play((long(520, 1.0), ACCEPTED), (long(42428), ACCEPTED))
     (version,), able = station.wire.of("AUTOPILOT_VERSION"), "MAV_PROTOCOL_CAPABILITY_"
-    for name, has in (("MISSION_INT", True), ("FTP", False), ("MISSION_FENCE", False)):
+    for name, has in (("MISSION_INT", True), ("FTP", True), ("MISSION_FENCE", False)):
         assert bool(version.capabilities & getattr(mavlink, able + name)) == has
     assert (version.vendor_id, version.product_id) == (0, 0) and version.uid
     assert station.wire.texts[0].startswith("subreach co-simulation")

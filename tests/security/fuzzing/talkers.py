@@ -123,7 +123,7 @@ _FRAMING = ("cosim.mavlink.wire.framing:FrameFilter._decode", "cosim.mavlink.wir
     "MAVLink frames, to a vehicle",
     "bytes",
     *_FRAMING,
-    "cosim.mavlink.services.ftp:FileTransfer._receive_file_transfer_protocol",
+    "cosim.mavlink.services.ftp:FileServer._receive_file_transfer_protocol",
 )
 def to_vehicle(seeds: Seeds) -> Case:
     station = Station()

@@ -14,7 +14,7 @@ from tests.cosim.mavlink.stubs import free_port
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(900)]  # the first of them builds and installs
 
-MODULES = "param,wp,fence,mode,arm,cmdlong,link,misc,rc,signing,output,log"
+MODULES = "param,wp,fence,mode,arm,cmdlong,link,misc,rc,signing,output,log,ftp"
 PATIENCE = 60.0  # s, for what is to be seen
 
 
@@ -93,6 +93,7 @@ def test_mavproxy_connects_arms_changes_modes_and_lists_parameters(ardupilots_to
         name, before = re.search(r"^(\S+)\s+([\d.]+)", parameters, re.MULTILINE).groups()
         mavproxy.do(f"param show {name}", rf"{name}\s+{float(before):.6f}")
         mavproxy.do("wp list", r"Requesting 0 waypoints|Have 0 waypoints|Saved \d+ waypoints|\d+ waypoints")
+        mavproxy.do("ftp list @PARAM", r"param\.pck\s+\d+")  # it drops replies of a session that is not its own
         mavproxy.do("log list", "No logs")
         mavproxy.do("status", r"MAV Errors: 0", r"SYS_STATUS", r"HOME_POSITION")
         text = mavproxy.text.lower()
