@@ -7,6 +7,7 @@ import ctypes
 import functools
 import shutil
 import tempfile
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -165,6 +166,20 @@ class CoSimulationInstance:
 
     def close(self):
         self.fmu.freeInstance()
+
+
+def members(fmu):
+    """Return the files in an FMU by name."""
+    with zipfile.ZipFile(fmu) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def packed(path, files):
+    """Write files by name as an FMU, and return its path."""
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, content in files.items():
+            archive.writestr(name, content)
+    return path
 
 
 def refused(slave, call, *words, status=3):

@@ -1,7 +1,6 @@
 """`plant_fmu check`: invalid FMUs, and importers that fail, crash or hang."""
 
 import dataclasses
-import zipfile
 
 import pytest
 
@@ -17,8 +16,10 @@ from plant_fmu.compiling.compiler import compile_library, find_compiler
 from plant_fmu.compiling.platforms import native_platform
 from plant_fmu.errors import TaskError
 from tests.plant_fmu import importers
+from tests.plant_fmu.conftest import members, packed
 
 FMPY = next(importer for importer in IMPORTERS if importer.name == "FMPy")
+DESCRIPTION = "modelDescription.xml"
 PLANT = next(importer for importer in IMPORTERS if importer.name.startswith("Plant"))
 
 
@@ -32,15 +33,12 @@ def edited(odin, tmp_path):
     """Return a function that copies ODIN's FMU with other texts in its description, and another library if given."""
 
     def edit(*changes, library=None):
-        path = tmp_path / "it.fmu"
-        with zipfile.ZipFile(odin) as old, zipfile.ZipFile(path, "w") as new:
-            for name in old.namelist():
-                data = old.read(name)
-                for text, other in changes if name == "modelDescription.xml" else ():
-                    assert text.encode() in data
-                    data = data.replace(text.encode(), other.encode())
-                new.writestr(name, library if library and name.startswith("binaries/") else data)
-        return path
+        files = members(odin)
+        for old, new in changes:
+            assert old.encode() in files[DESCRIPTION]
+            files[DESCRIPTION] = files[DESCRIPTION].replace(old.encode(), new.encode())
+        libraries = dict.fromkeys((name for name in files if library and name.startswith("binaries/")), library)
+        return packed(tmp_path / "it.fmu", files | libraries)
 
     return edit
 
@@ -143,9 +141,7 @@ def test_fmu_log_messages_are_in_the_note(odin):
 
 @pytest.mark.medium
 def test_check_does_not_apply_without_a_binary_for_this_platform(odin, tmp_path):
-    other = tmp_path / "other.fmu"
-    with zipfile.ZipFile(odin) as old, zipfile.ZipFile(other, "w") as new:
-        new.writestr("modelDescription.xml", old.read("modelDescription.xml"))
+    other = packed(tmp_path / "other.fmu", {DESCRIPTION: members(odin)[DESCRIPTION]})
     statuses = {(result.interface, result.status) for result in check_fmu(other)}
     assert statuses == {("", "ok"), ("CS", "does not apply")}
 
@@ -153,8 +149,7 @@ def test_check_does_not_apply_without_a_binary_for_this_platform(odin, tmp_path)
 def test_files_that_are_no_fmu_are_named(tmp_path, capsys):
     """In one line; tests/security has hostile ones."""
     (tmp_path / "text.fmu").write_text("no zip")
-    with zipfile.ZipFile(tmp_path / "empty.fmu", "w"):
-        pass
+    packed(tmp_path / "empty.fmu", {})
     for name, words in (
         ("none.fmu", "No such file"), ("", "directory"), ("text.fmu", "zip"), ("empty.fmu", "no modelDescription.xml"),
     ):  # fmt: skip

@@ -1,7 +1,6 @@
 """Files in an FMU beside description and binary, against FMPy's schemas and parsers of HTML and images."""
 
 import re
-import zipfile
 from dataclasses import replace
 from html.parser import HTMLParser
 from pathlib import Path
@@ -18,7 +17,7 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.contents import contents
 from plant_fmu.contents.page import page
 from plant_fmu.variables import variables
-from tests.plant_fmu.conftest import EACH_VEHICLE
+from tests.plant_fmu.conftest import EACH_VEHICLE, members
 
 ROOT = Path(__file__).parents[2]
 SCHEMA = Path(fmpy.__file__).parent / "schema" / "fmi3"
@@ -66,16 +65,11 @@ def vehicle(request):
     return load_vehicle(request.param)
 
 
-def members(vehicle, fmi):
-    with zipfile.ZipFile(cached_fmu(vehicle, fmi)) as archive:
-        return {name: archive.read(name) for name in archive.namelist()}
-
-
 @pytest.mark.slow
 def test_fmu_holds_reproducible_documentation_files(vehicle, fmi):
     made = contents(vehicle, fmi)
     assert made == contents(vehicle, fmi)
-    assert made.items() <= members(vehicle, fmi).items()
+    assert made.items() <= members(cached_fmu(vehicle, fmi)).items()
 
 
 def test_file_locations_follow_the_fmi_version(vehicle):

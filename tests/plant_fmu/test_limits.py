@@ -25,20 +25,6 @@ def test_step_with_unstable_stages_is_rejected(make_slave):
     assert accepted > 0
 
 
-@pytest.mark.parametrize(
-    ("values", "substep"),
-    [
-        ({"velocity.r": 300.0, **{f"{k}_damping[6]": 0.0 for k in ("linear", "quadratic")}}, 0.005),
-        ({"r_G.z": 0.1, "quaternion.e1": 0.01}, 0.75),
-        ({"weight": 600.0, "free_surface": True, "hull_radius": 0.1, "position.z": 0.01}, 0.2),
-    ],
-    ids=["spin", "pendulum", "float"],
-)
-def test_motion_too_fast_for_the_substep_is_rejected(make_slave, fmi, values, substep):
-    slave = make_slave(fmi=fmi).start(**values, substep=substep)
-    refused(slave, lambda: slave.step(10 * substep), "too long for this motion", status=2)
-
-
 def test_sample_ticks_continue_through_time_zero(make_slave, fmi):
     """Rounding is coarser at the start than near zero, where ticks must still come one after the other."""
     model = make_slave(fmi=fmi, interface="me")

@@ -154,13 +154,6 @@ def test_unsupported_functions_are_logged(make_slave):
     refused(slave, slave.fmu.enterConfigurationMode, "fmi3EnterConfigurationMode", "not offered")
 
 
-def test_start_time_is_arbitrary_and_step_times_may_be_accumulated(make_slave):
-    slave = make_slave().begin(100.0)
-    for _ in range(20_000):  # 0.1 is no binary fraction
-        slave.step(0.1)
-    assert slave.time != 2100.0
-
-
 # ---- logging ----
 
 

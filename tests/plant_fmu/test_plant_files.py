@@ -3,7 +3,6 @@
 import gc
 import os
 import threading
-import zipfile
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -12,21 +11,15 @@ import pytest
 import plant_fmu.running.co_simulation_instance
 from plant_fmu import Plant, PlantError, load_vehicle
 from plant_fmu.build import cached_fmu
-from tests.plant_fmu.conftest import drive
+from tests.plant_fmu.conftest import drive, members, packed
 
 
 def edited(tmp_path, edit):
     """Return a copy of an FMU whose description was edited."""
-    path = tmp_path / "edited.fmu"
-    with zipfile.ZipFile(cached_fmu(load_vehicle("odin"), 3)) as old, zipfile.ZipFile(path, "w") as new:
-        for name in old.namelist():
-            if name == "modelDescription.xml":
-                root = ET.fromstring(old.read(name))
-                edit(root)
-                new.writestr(name, ET.tostring(root))
-            else:
-                new.writestr(name, old.read(name))
-    return path
+    files = members(cached_fmu(load_vehicle("odin"), 3))
+    root = ET.fromstring(files["modelDescription.xml"])
+    edit(root)
+    return packed(tmp_path / "edited.fmu", files | {"modelDescription.xml": ET.tostring(root)})
 
 
 # ---- several at once, and foreign ones ----

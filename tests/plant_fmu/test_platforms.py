@@ -19,7 +19,7 @@ from plant_fmu.__main__ import main
 from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import PLATFORMS
 from plant_fmu.errors import BuildError
-from tests.plant_fmu.conftest import STATES, CoSimulationInstance
+from tests.plant_fmu.conftest import STATES, CoSimulationInstance, members
 from tests.plant_fmu.libraries import macs, parts, read_libraries
 
 pytestmark = pytest.mark.timeout(900)  # libraries for all platforms take minutes beside other tests
@@ -36,8 +36,7 @@ OF_THE_LINKER = {"_mh_dylib_header", "__dso_handle"}
 
 
 def binaries(path):
-    with zipfile.ZipFile(path) as archive:
-        return {name.split("/")[1]: archive.read(name) for name in archive.namelist() if name.startswith("binaries/")}
+    return {name.split("/")[1]: data for name, data in members(path).items() if name.startswith("binaries/")}
 
 
 @pytest.mark.slow

@@ -7,6 +7,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from tests.cosim.records import filled
+
 GAP = slice(40, 60)  # rows without a pose
 
 
@@ -36,14 +38,8 @@ def killed(run, tmp_path_factory):
     folder.mkdir()
     shutil.copy(run / "scenario.toml", folder)
     table = pq.read_table(run / "record.parquet")
-    for name in table.schema.names:
-        if name.startswith(("position", "quaternion")):
-            values = table[name].to_numpy().copy()
-            values[GAP] = np.nan
-            at = table.schema.get_field_index(name)
-            table = table.set_column(at, table.schema.field(at), pa.array(values))
-    at = table.schema.get_field_index("bottom_contact")
-    table = table.set_column(at, table.schema.field(at), pa.array(np.full(len(table), -0.0)))
+    table = filled(table, [name for name in table.schema.names if name.startswith(("position", "quaternion"))], GAP)
+    table = filled(table, ["bottom_contact"], value=-0.0)
     with pa.ipc.new_stream(folder / "record.arrows", table.schema) as stream:
         stream.write_table(table, max_chunksize=70)
     return folder

@@ -2,7 +2,6 @@
 
 import re
 
-import msgspec
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -11,10 +10,9 @@ from cosim.export import export_run
 from cosim.export.names import valid_names
 from cosim.results.record import load_record
 from cosim.results.run_result import load_run
-from cosim.run.run_scenario import run_scenario
-from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands.commands import AddObstacle, ChangeSetting, SetTarget
 from tests.cosim.export.conftest import assert_same_bits
+from tests.cosim.records import steered_run
 
 mcap_reader = pytest.importorskip("mcap.reader")
 decoder = pytest.importorskip("mcap_protobuf.decoder")
@@ -196,16 +194,12 @@ def test_signal_selection_keeps_the_scene_complete(run, tmp_path):
 def steered(tmp_path_factory):
     """Return the folder of a run with an added, growing obstacle and a changed target."""
     commands = {
-        20: AddObstacle(7, (5.0, 0.0, 2.0), 0.4),
-        40: SetTarget((4.0, -1.0, 2.0), 0.6),
-        60: AddObstacle(7, (5.0, 0.3, 2.0), 0.8),
-        70: ChangeSetting("regions.ship.shape.semi_axes.0", 3.5),
+        20: [AddObstacle(7, (5.0, 0.0, 2.0), 0.4)],
+        40: [SetTarget((4.0, -1.0, 2.0), 0.6)],
+        60: [AddObstacle(7, (5.0, 0.3, 2.0), 0.8)],
+        70: [ChangeSetting("regions.ship.shape.semi_axes.0", 3.5)],
     }
-    folder = tmp_path_factory.mktemp("steered")
-    log = folder / "log.jsonl"
-    log.write_bytes(b"".join(msgspec.json.encode({"step": k, "command": o}) + b"\n" for k, o in commands.items()))
-    scenario = load_scenario("harbour", ["commands.enabled=true", "time.duration=1"])
-    return run_scenario(scenario, folder / "run", report=False, commands_log=log).folder
+    return steered_run(tmp_path_factory.mktemp("steered"), ["time.duration=1"], commands).folder
 
 
 @pytest.fixture(scope="module")

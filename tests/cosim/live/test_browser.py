@@ -2,7 +2,6 @@
 
 import io
 import json
-import shutil
 import time
 
 import pytest
@@ -10,13 +9,13 @@ from PIL import Image, ImageChops
 
 from cosim.results.record import load_record
 from tests.cosim.live.conftest import WAIT
+from tests.cosim.replay.browser import CHROMEDRIVER, CHROMIUM, Browser
 from tests.threads import interrupt
 
 webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(not (CHROMIUM and DRIVER), reason="chromium and chromedriver are not installed"),
+    pytest.mark.skipif(not (CHROMIUM and CHROMEDRIVER), reason="chromium and chromedriver are not installed"),
 ]
 
 TARGET = 'const r = subreach.runs[0]; return ["x", "y", "z"].map((a) => r.held(`target.${a}`, r.end));'
@@ -28,16 +27,9 @@ HELD = "const r = subreach.runs[0]; return subreach.scene.project([arguments[0],
 
 @pytest.fixture
 def browser(tmp_path):
-    options = webdriver.ChromeOptions()
-    options.binary_location = CHROMIUM
-    flags = "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking"
-    for flag in (*flags.split(), "--disable-component-update", "--disable-sync", "--window-size=1200,850"):
-        options.add_argument(flag)
-    options.add_argument(f"--user-data-dir={tmp_path / 'profile'}")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    driver = webdriver.Chrome(options=options, service=webdriver.ChromeService(DRIVER))
-    yield driver
-    driver.quit()
+    chromium = Browser(tmp_path / "profile")
+    yield chromium.driver
+    chromium.close()
 
 
 def until(found):

@@ -37,20 +37,24 @@ class Browser:
 
     def open(self, file, size=(1280, 900), scheme="light"):
         """Open a page from disk, in a window of a size [CSS pixels], for a reader who likes light or dark."""
-        from selenium.webdriver.support.ui import WebDriverWait
-
         self.driver.get("about:blank")
         self.logs()
         self.resize(*size)
         features = [{"name": "prefers-color-scheme", "value": scheme}]
         self.driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
         self.driver.get(Path(file).absolute().as_uri())
-        WebDriverWait(self.driver, _PATIENCE).until(lambda _: self.js("return window.subreach?.ready === true"))
-        self.settle()
+        self.wait_until("window.subreach?.ready === true")
 
     def resize(self, width, height):
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+
+    def wait_until(self, condition):
+        """Wait for a condition of the page, and let it paint."""
+        from selenium.webdriver.support.ui import WebDriverWait
+
+        WebDriverWait(self.driver, _PATIENCE).until(lambda _: self.js(f"return Boolean({condition})"))
+        self.settle()
 
     def js(self, script, *arguments):
         return self.driver.execute_script(script, *arguments)
@@ -68,6 +72,16 @@ class Browser:
             chain.send_keys(key)
         chain.perform()
         self.settle()
+
+    def drag(self, element, start, *ways):
+        """Drag what is at a place in an element by the mouse, along some ways."""
+        from selenium.webdriver.common.action_chains import ActionChains
+
+        at = [int(x - element.size[key] / 2) for x, key in zip(start, ("width", "height"), strict=True)]
+        hand = ActionChains(self.driver).move_to_element_with_offset(element, *at).click_and_hold()
+        for way in ways:
+            hand.move_by_offset(*way)
+        hand.release().perform()
 
     def scrub(self, time):
         """Drag the scrubber to a time, as far as the page can tell."""

@@ -4,8 +4,6 @@ import importlib.util
 import json
 import shutil
 
-import msgspec
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
@@ -14,9 +12,8 @@ from cosim.replay.page import write_page
 from cosim.replay.pages import replay
 from cosim.replay.trace import trace_of
 from cosim.results.run_result import load_run
-from cosim.run.run_scenario import run_scenario
-from cosim.scenario.scenario import load_scenario
 from cosim.simulation.commands import commands as cmd
+from tests.cosim.records import filled, steered_run
 from tests.cosim.replay.browser import CHROMEDRIVER, CHROMIUM, Browser
 from tests.cosim.replay.decoding import read_page
 
@@ -59,12 +56,7 @@ def paper(shipped_run):
 
 @pytest.fixture(scope="session")
 def steered(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("steered")
-    log = folder / "log.jsonl"
-    lines = [{"step": k, "command": command} for k, commands in COMMANDS_LOG.items() for command in commands]
-    log.write_bytes(b"".join(msgspec.json.encode(line) + b"\n" for line in lines))
-    scenario = load_scenario("harbour", ["commands.enabled=true", "time.duration=4"])
-    return load_run(run_scenario(scenario, folder / "run", report=False, commands_log=log).folder)
+    return steered_run(tmp_path_factory.mktemp("steered"), ["time.duration=4"], COMMANDS_LOG)
 
 
 @pytest.fixture(scope="session")
@@ -139,12 +131,7 @@ def spoil():
             (folder / "summary.json").write_text(json.dumps(summary | {"status": "interrupted"}))
             pq.write_table(table.slice(0, 900), folder / "record.parquet")
         else:
-            for name in GAPS:
-                column = table[name].to_numpy().copy()
-                column[300:420] = np.nan
-                at = table.schema.get_field_index(name)
-                table = table.set_column(at, table.schema.field(at), pa.array(column))
-            pq.write_table(table, folder / "record.parquet")
+            pq.write_table(filled(table, GAPS, slice(300, 420)), folder / "record.parquet")
         return folder
 
     return spoil_folder

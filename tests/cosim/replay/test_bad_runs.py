@@ -12,6 +12,7 @@ from cosim.errors import CosimError, RunError
 from cosim.replay.pages import write_replay
 from cosim.results.run_result import load_run
 from cosim.run.run_folder import conclude
+from tests.cosim.records import filled
 from tests.cosim.replay.conftest import GAPS
 from tests.cosim.replay.decoding import read_page
 
@@ -50,10 +51,7 @@ def test_gaps_are_kept_and_extremes_exclude_them(docking, copy_of, spoil):
 
 def test_summary_of_a_record_with_gaps_is_valid_json(docking, copy_of, spoil):
     folder = spoil(copy_of(docking), "gaps")
-    table = pq.read_table(folder / "record.parquet")
-    at = table.schema.get_field_index("roof.clearance")
-    nothing = np.full(len(table), np.nan)
-    pq.write_table(table.set_column(at, table.schema.field(at), [nothing]), folder / "record.parquet")
+    _rewritten(lambda table: filled(table, ["roof.clearance"]))(folder)
     run = load_run(folder)
     conclude(folder, run.planned, "completed", None, report=False)
     assert "NaN" not in (folder / "summary.json").read_text()

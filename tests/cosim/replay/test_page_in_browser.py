@@ -20,12 +20,6 @@ return [at.id || at.dataset?.look || at.className || at.tagName, around.some((e)
 """
 
 
-def wait_until(browser, script):
-    from selenium.webdriver.support.ui import WebDriverWait
-
-    WebDriverWait(browser.driver, 120).until(lambda _: browser.js(f"return {script}"))
-
-
 def test_keyboard_controls_play_seek_zoom_and_theme(browser, shown, docking):
     from selenium.webdriver.common.keys import Keys
 
@@ -33,7 +27,7 @@ def test_keyboard_controls_play_seek_zoom_and_theme(browser, shown, docking):
     browser.open(page.file)
     browser.press(" ")
     assert browser.js("return window.subreach.player.playing")
-    wait_until(browser, "window.subreach.player.t > 0.2")
+    browser.wait_until("window.subreach.player.t > 0.2")
     browser.press(" ")
     assert not browser.js("return window.subreach.player.playing")
     browser.press(Keys.HOME)
@@ -172,7 +166,7 @@ def test_panel_shows_distances_without_signs(browser, shown, docking):
         (item) => [item.querySelector(".name").textContent, item.querySelector(".value").textContent]))"""
     for end, word in (("0", " to go"), ("subreach.player.duration", "✓ inside by ")):
         browser.js(f"subreach.player.seek({end})")
-        wait_until(browser, f"document.querySelector('#panel .distances').textContent.includes('{word}')")
+        browser.wait_until(f"document.querySelector('#panel .distances').textContent.includes('{word}')")
         told = browser.js(rows)
         row = 0 if end == "0" else -1
         assert float(told["goal"].replace(word, "").removesuffix(" m")) == pytest.approx(
@@ -185,7 +179,7 @@ def test_only_the_six_nearest_regions_are_labeled(browser, shown, shipped_run):
     page = shown(load_run(shipped_run("dense-field", "time.duration=1", "arbiter.engine=closed").folder))
     browser.open(page.file)
     browser.js("subreach.player.seek(subreach.player.duration)")
-    wait_until(browser, "subreach.scene.labels.placed.length > 0")
+    browser.wait_until("subreach.scene.labels.placed.length > 0")
     named = set(
         browser.js("""
             const { scene, runs } = subreach;

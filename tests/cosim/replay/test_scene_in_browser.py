@@ -9,6 +9,7 @@ import pytest
 
 from cosim.replay.pages import write_replay
 from cosim.results.run_result import load_run
+from tests.cosim.records import filled
 from tests.cosim.replay.decoding import active_of
 
 pytestmark = pytest.mark.slow
@@ -133,12 +134,8 @@ def test_current_is_drawn_as_recorded_and_nothing_in_still_water(browser, shown,
 def test_page_of_a_record_without_numbers_says_so(value, browser, docking, copy_of, tmp_path):
     folder = copy_of(docking)
     table = pq.read_table(folder / "record.parquet")
-    for at, field in enumerate(table.schema):
-        if field.name != "time" and pa.types.is_floating(field.type):
-            column = table[field.name].to_numpy().copy()
-            column[200:] = value
-            table = table.set_column(at, field, [column])
-    pq.write_table(table, folder / "record.parquet")
+    names = [field.name for field in table.schema if field.name != "time" and pa.types.is_floating(field.type)]
+    pq.write_table(filled(table, names, slice(200, None), value), folder / "record.parquet")
     browser.open(write_replay(load_run(folder), tmp_path / "page.html"))
     for time in (0.5, 4.0):
         browser.scrub(time)

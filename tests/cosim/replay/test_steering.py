@@ -1,7 +1,6 @@
 """What commands made of goal and regions stands in the page: it gives the recorded clearances again."""
 
 import numpy as np
-import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
@@ -11,6 +10,7 @@ from cosim.errors import RunError
 from cosim.replay.trace import trace_of
 from cosim.results.record import RECORD
 from cosim.results.run_result import load_run
+from tests.cosim.records import filled
 
 
 def shape_at(header, index, time):
@@ -87,12 +87,7 @@ def test_invalid_log_gives_one_line_error(steered, copy_of):
 @pytest.mark.parametrize(("first", "end"), [(50, 70), (50, 401)])
 def test_obstacles_added_during_an_unknown_pose_get_their_size_later(steered, copy_of, first, end):
     folder = copy_of(steered)
-    table = pq.read_table(folder / RECORD)
-    for name in ("position.x", "seen 2.clearance"):
-        values = table[name].to_numpy().copy()
-        values[first:end] = np.nan
-        at = table.schema.get_field_index(name)
-        table = table.set_column(at, table.schema.field(at), pa.array(values))
+    table = filled(pq.read_table(folder / RECORD), ("position.x", "seen 2.clearance"), slice(first, end))
     pq.write_table(table, folder / RECORD)
     header = trace_of(load_run(folder)).header
     names = [region["name"] for region in header["regions"]]

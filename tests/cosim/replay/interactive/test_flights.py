@@ -67,6 +67,20 @@ def assert_same(flown, run):
         np.testing.assert_array_equal(column, expected, err_msg=name)
 
 
+@pytest.fixture
+def same_as_saved(fly, tmp_path):
+    """Return a function that flies other numbers in the page of a run, and the scenario it saves, to the last bit."""
+
+    def flown_and_saved(run, values, failure=None):
+        flown = fly(run, values, failure)
+        (tmp_path / "saved.toml").write_text(flown.toml)
+        saved = flown_run(load_scenario(tmp_path / "saved.toml"), tmp_path / "saved")
+        assert_same(flown, saved)
+        return flown, saved
+
+    return flown_and_saved
+
+
 @pytest.mark.parametrize("scene", SCENES)
 def test_page_simulation_equals_its_run_bit_for_bit(scene, fly, tmp_path):
     name, overrides = SCENES[scene]
@@ -79,12 +93,9 @@ def test_page_simulation_equals_its_run_bit_for_bit(scene, fly, tmp_path):
 @pytest.mark.parametrize(
     ("values", "failure"), [(MOVED | WATER, None), (NOISE | GAINS, FAILS)], ids=["places and water", "noise and gains"]
 )
-def test_saved_scenario_reproduces_the_run_bit_for_bit(values, failure, fly, shipped_run, tmp_path):
-    flown = fly(load_run(shipped_run("docking").folder), values, failure)
-    (tmp_path / "saved.toml").write_text(flown.toml)
-    saved = load_scenario(tmp_path / "saved.toml")
-    assert "as a test has it" in saved.title
-    assert_same(flown, flown_run(saved, tmp_path / "run"))
+def test_saved_scenario_reproduces_the_run_bit_for_bit(values, failure, same_as_saved, shipped_run):
+    _, saved = same_as_saved(load_run(shipped_run("docking").folder), values, failure)
+    assert "as a test has it" in saved.scenario.title
 
 
 @pytest.mark.parametrize(
@@ -93,20 +104,17 @@ def test_saved_scenario_reproduces_the_run_bit_for_bit(values, failure, fly, shi
      ("type='cylinder', start=[7.1,0,3.6], end=[7.1,0.1,4.4], radius=0.4", 1)],
     ids=["a sphere", "a cylinder"],
 )  # fmt: skip
-def test_goals_in_turn_move_each_by_itself(goal, then, fly, tmp_path):
+def test_goals_in_turn_move_each_by_itself(goal, then, same_as_saved, tmp_path):
     places = f"{goal}, then=[[6.0,-2.5,3.0],[6.3,-2.9,3.2]], stay=0.5"
     changed = [f"goal={{{places}}}", "time.duration=40", "plant.current=[0,0,0]"]
     run = flown_run(load_scenario("docking", changed), tmp_path / "first")
     values = {f"goal.then.{then}.0": 5.87, "goal.then.0.2": 3.31}
     values |= {"goal.start.1": 0.125, "goal.end.1": 0.225} if then else {"goal.center.1": 0.13}
-    flown = fly(run, values)
-    (tmp_path / "saved.toml").write_text(flown.toml)
-    saved = flown_run(load_scenario(tmp_path / "saved.toml"), tmp_path / "run")
+    _, saved = same_as_saved(run, values)
     assert saved.scenario.goal_then[then][0] == 5.87 and saved.record["goal.place"].max() >= 1
-    assert_same(flown, saved)
 
 
-def test_moved_cylinder_and_saved_scenario_equal_their_run(fly, tmp_path):
+def test_moved_cylinder_and_saved_scenario_equal_their_run(fly, same_as_saved, tmp_path):
     run = flown_run(load_scenario("harbour", ["time.duration=12"]), tmp_path / "first")
     shape = run.scenario.table["regions"][2]["shape"]
     values = {
@@ -114,10 +122,7 @@ def test_moved_cylinder_and_saved_scenario_equal_their_run(fly, tmp_path):
         for end in ("start", "end")
         for axis, by in ((0, -1.2), (1, 0.4), (2, 0.5))
     }
-    flown = fly(run, values)
-    (tmp_path / "saved.toml").write_text(flown.toml)
-    saved = flown_run(load_scenario(tmp_path / "saved.toml"), tmp_path / "run")
-    assert_same(flown, saved)
+    flown, _ = same_as_saved(run, values)
     assert (flown.columns["pile 1.clearance"] != fly(run).columns["pile 1.clearance"]).any()
 
 

@@ -61,15 +61,8 @@ def page(builds, tmp_path_factory):
 
 def opened(browser, page, size=(1280, 720)):
     browser.open(page, size)
-    wait_until(browser, "subreach.whatIf?.repeats !== null")
+    browser.wait_until("subreach.whatIf?.repeats !== null")
     return browser
-
-
-def wait_until(browser, condition):
-    from selenium.webdriver.support.ui import WebDriverWait
-
-    WebDriverWait(browser.driver, 120).until(lambda _: browser.js(f"return Boolean({condition})"))
-    browser.settle()
 
 
 def end_of(browser, run):
@@ -94,23 +87,18 @@ def test_page_shows_the_rows_of_a_flight_that_repeats_its_record(browser, page, 
     )
     assert rows == [1, 600, 600]
     browser.js("subreach.whatIf.set('plant.current.1', 0.3)")
-    wait_until(browser, FLOWN)
+    browser.wait_until(FLOWN)
     assert browser.js("return subreach.runs[0].header.name") == "as recorded"
     browser.press("r")
-    wait_until(browser, "subreach.runs.length === 1")
+    browser.wait_until("subreach.runs.length === 1")
     assert browser.js("return subreach.runs[0].rows") == rows[1]
 
 
 def test_dragged_goal_is_simulated_and_r_resets(browser, page):
-    from selenium.webdriver.common.action_chains import ActionChains
-
     opened(browser, page)
-    x, y = browser.js(NAME, 0)
-    width, height = browser.js("const c = subreach.scene.canvas; return [c.clientWidth, c.clientHeight]")
-    scene = browser.driver.find_element("id", "scene")
-    drag = ActionChains(browser.driver).move_to_element_with_offset(scene, x - width / 2, y - height / 2)
-    drag.click_and_hold().move_by_offset(-40, -10).move_by_offset(-60, -20).release().perform()
-    wait_until(browser, FLOWN)
+    at = browser.js(NAME, 0)
+    browser.drag(browser.driver.find_element("id", "scene"), at, (-40, -10), (-60, -20))
+    browser.wait_until(FLOWN)
     moved = dict(browser.js("return [...subreach.whatIf.values]"))
     assert moved and set(moved) <= {f"goal.center.{axis}" for axis in range(3)}
     goal = browser.js("return subreach.runs[1].header.regions[0].shape.center")
@@ -118,32 +106,27 @@ def test_dragged_goal_is_simulated_and_r_resets(browser, page):
     assert max(abs(a - b) for a, b in zip(end_of(browser, 0), end_of(browser, 1), strict=True)) > 0.3
     assert browser.js("return document.getElementById('panel').textContent").count("what if") == 1
     browser.press("r")
-    wait_until(browser, "subreach.runs.length === 1")
+    browser.wait_until("subreach.runs.length === 1")
     assert not browser.js("return subreach.whatIf.changed")
 
 
 def test_each_goal_in_turn_is_labeled_and_dragged(builds, browser, tmp_path):
-    from selenium.webdriver.common.action_chains import ActionChains
-
     goals = ["goal.then=[[6.0,-2.5,3.0],[4.0,-2.0,3.0]]", "goal.stay=1", "time.duration=60"]
     run_scenario(load_scenario("docking", goals), tmp_path / "run", report=False)
     opened(browser, replay([tmp_path / "run"], tmp_path / "page.html", interactive=True))
     assert browser.js(GOALS) == ["present goal (1 of 3)", "next goal (2 of 3)"]
     for place, key in ((1, "goal.then.0"), (0, "goal.center")):
         before = dict(browser.js("return [...subreach.whatIf.values]"))
-        x, y = browser.js(GOAL, place)
-        width, height = browser.js("const c = subreach.scene.canvas; return [c.clientWidth, c.clientHeight]")
-        scene = browser.driver.find_element("id", "scene")
+        at = browser.js(GOAL, place)
         browser.js("subreach.whatIf.took = null")
-        drag = ActionChains(browser.driver).move_to_element_with_offset(scene, x - width / 2, y - height / 2)
-        drag.click_and_hold().move_by_offset(-15, 25).move_by_offset(-10, 10).release().perform()
-        wait_until(browser, FLOWN)
+        browser.drag(browser.driver.find_element("id", "scene"), at, (-15, 25), (-10, 10))
+        browser.wait_until(FLOWN)
         moved = dict(browser.js("return [...subreach.whatIf.values]"))
         changed = {of for of in moved if moved[of] != before.get(of)}
         assert changed and changed <= {f"{key}.{axis}" for axis in range(3)}
     browser.shoot("what-if-goals-in-turn")
     browser.js("subreach.whatIf.reset()")
-    wait_until(browser, "subreach.runs.length === 1")
+    browser.wait_until("subreach.runs.length === 1")
     shown = browser.js("return subreach.runs[0].column('goal.place')")
     last = shown.index(2.0)
     browser.land(browser.js("return subreach.runs[0].time[arguments[0]]", last))
@@ -157,7 +140,7 @@ def test_view_follows_the_flight_until_the_reader_turns_it(browser, page):
 
     def fly(key, value):
         browser.js("subreach.whatIf.took = null; subreach.whatIf.set(...arguments)", key, value)
-        wait_until(browser, FLOWN)
+        browser.wait_until(FLOWN)
         return browser.js(VIEW)
 
     near = fly("plant.current.1", 0.102)
@@ -166,7 +149,7 @@ def test_view_follows_the_flight_until_the_reader_turns_it(browser, page):
         far = fly(key, value)
         assert far[:2] == above[:2] and far[2] > 1.2 * near[2] and browser.js(ALL_SEEN)
     browser.press("r")
-    wait_until(browser, "subreach.runs.length === 1")
+    browser.wait_until("subreach.runs.length === 1")
     assert browser.js(VIEW) == pytest.approx(above)
     browser.js("subreach.scene.camera.orbit(30, 20)")
     turned = browser.js(VIEW)
@@ -181,18 +164,18 @@ def test_page_is_operable_by_keyboard(browser, page):
     assert "without a place: heading. Change these" in said
     field = browser.driver.find_element("css selector", "[aria-label='current east in meters a second']")
     field.send_keys(Keys.ARROW_UP, Keys.ARROW_UP)
-    wait_until(browser, FLOWN)
+    browser.wait_until(FLOWN)
     assert dict(browser.js("return [...subreach.whatIf.values]")) == {"plant.current.1": pytest.approx(0.2)}
     assert "current y 0.2 m/s" in browser.js("return document.getElementById('asked').textContent")
     choice = browser.driver.find_element("css selector", "[aria-label='thruster that fails']")
     browser.js("subreach.whatIf.took = null")
     choice.send_keys("thruster 3")
-    wait_until(browser, FLOWN)
+    browser.wait_until(FLOWN)
     assert "failure" in browser.js("return subreach.runs[1].header.events.map((event) => event.kind)")
     browser.js("subreach.whatIf.took = null")
     place = browser.driver.find_element("css selector", "[aria-label='port wall, east in meters']")
     place.send_keys(Keys.ARROW_UP)
-    wait_until(browser, FLOWN)
+    browser.wait_until(FLOWN)
     assert "regions.1.shape.center.1" in dict(browser.js("return [...subreach.whatIf.values]"))
 
 
@@ -201,7 +184,7 @@ def test_panels_do_not_cover_buttons(size, browser, page):
     opened(browser, page, size)
     assert not browser.js(OVERLAP)
     browser.js("subreach.whatIf.set('plant.current.1', 0.3)")
-    wait_until(browser, FLOWN)
+    browser.wait_until(FLOWN)
     assert not browser.js(OVERLAP)
     browser.shoot(f"what-if-{size[0]}")
 
