@@ -14,6 +14,7 @@ from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.SceneEntity_pb2 import SceneEntity
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 from google.protobuf.timestamp_pb2 import Timestamp
+from scipy.spatial.transform import Rotation
 
 from controller.regions import Box, Cylinder, Ellipsoid, Sphere
 from controller.regions.region_set import of_attitude
@@ -176,15 +177,11 @@ def _set_color(message: Any, color: tuple[int, int, int], opaque: float) -> None
 
 
 def _unit(quaternion: Sequence[float]) -> list[float]:
-    e = np.array(quaternion)
-    return [float(part) for part in e / np.linalg.norm(e)]
+    e: list[float] = Rotation.from_quat(quaternion, scalar_first=True).as_quat(scalar_first=True).tolist()
+    return e
 
 
 def _shortest_turn(start: Array, direction: Array) -> list[float]:
-    """Return the quaternion of the shortest rotation of a unit vector into a direction."""
-    end = direction / np.linalg.norm(direction)
-    halfway = start + end
-    if np.linalg.norm(halfway) < 1e-9:  # half a turn, about any perpendicular axis
-        return [0.0, *np.roll(start, 1).tolist()]
-    halfway /= np.linalg.norm(halfway)
-    return [float(start @ halfway), *np.cross(start, halfway).tolist()]
+    """Return the quaternion of the shortest rotation of a vector into a direction."""
+    e: list[float] = Rotation.align_vectors(direction, start)[0].as_quat(scalar_first=True).tolist()
+    return e

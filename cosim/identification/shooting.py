@@ -7,7 +7,7 @@ import functools
 import hashlib
 import os
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
@@ -17,7 +17,7 @@ import numpy as np
 import platformdirs
 from numpy.typing import NDArray
 
-from controller.compiling.library import is_whole, keep
+from controller.compiling.library import is_trusted, is_whole, keep
 from cosim.errors import IdentificationError
 from cosim.simulation.signals import Array
 from plant_fmu.archive import temporary_folder
@@ -32,7 +32,7 @@ from plant_fmu.vehicle_component import make_vehicle_component
 STATE_SIZE = 13  # position 3, quaternion 4, velocity 6
 _TOKEN = "shooting"  # noqa: S105 -- no secret: instantiation token, which no model description needs to match
 _FMI = ("fmi3.c", "fmi3_unsupported.c")
-_FAST = ("-ffp-contract=fast",)  # takes three quarters of the time; the last bits differ from the FMU's
+_FAST = "-ffp-contract=fast"  # takes three quarters of the time; the last bits differ from the FMU's
 _INCLUDED = "tangent.c"  # source that shooting.c includes
 
 
@@ -126,36 +126,29 @@ NO_DIRECTIONS = Directions(np.empty((0, STATE_SIZE)), (), (), np.empty((0, 3)), 
 
 @functools.cache
 def _library(vehicle: Vehicle) -> ctypes.CDLL:
+    """Load the library for this machine's processor; compile it if it is not in the user's cache."""
     component = make_vehicle_component(vehicle)
     own = resources.files("cosim.identification").joinpath("csrc")
     files = {name: text for name, text in c_sources(component, 3).items() if name not in _FMI}
     files |= {file.name: file.read_bytes() for file in own.iterdir() if file.name.endswith((".c", ".h"))}
     files[component.header] = header(component, _TOKEN).encode()
-    sources = [name for name in files if name.endswith(".c") and name != _INCLUDED]
-    return load_tuned_library(vehicle.name, files, sources, _FAST)
-
-
-def load_tuned_library(
-    name: str, files: Mapping[str, bytes], sources: Iterable[str], flags: Sequence[str]
-) -> ctypes.CDLL:
-    """Load a library of C files for this machine's processor; compile it if it is not in the user's cache."""
     compiler = find_compiler()
-    tuning = "-mcpu=native" if "ziglang" in compiler else "-march=native"  # all instructions of this processor
-    flags = (tuning, *flags)
+    flags = "-mcpu=native" if "ziglang" in compiler else "-march=native", _FAST  # all instructions of this processor
     made_from = hashlib.sha256(
         repr((native_platform().name, compiler, FLAGS, flags, _machine(compiler, flags))).encode()
     )
     for file, text in sorted(files.items()):
         made_from.update(f"\n{file} {len(text)}\n".encode() + text)
-    name = f"{name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"
+    name = f"{vehicle.name}-{made_from.hexdigest()[:16]}{native_platform().suffix}"
     path = Path(platformdirs.user_cache_dir("subreach")) / "shooting" / name
-    if is_whole(path):
+    if is_trusted(path.parent) and is_whole(path):
         return ctypes.CDLL(str(path))
     with temporary_folder("subreach-shooting-") as folder:
         for file, text in files.items():
             (folder / file).write_bytes(text)
         built = folder / name
-        compile_library(compiler, native_platform(), [folder / file for file in sorted(sources)], [], built, flags)
+        sources = [folder / file for file in sorted(files) if file.endswith(".c") and file != _INCLUDED]
+        compile_library(compiler, native_platform(), sources, [], built, flags)
         return ctypes.CDLL(str(keep(built, path.parent)))
 
 

@@ -36,5 +36,5 @@ class Isolations:
 
 def rejects(fraction: Array, before: float) -> Flags:
     """Return where samples are rejected: where the fraction of rejected samples, shape (rows,), rises."""
-    rises: Flags = np.diff(fraction, prepend=before) > 0.0
+    rises: Flags = fraction > np.append(before, fraction[:-1])  # no difference, which warns of infinities
     return rises

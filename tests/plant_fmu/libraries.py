@@ -6,6 +6,7 @@ import atexit
 import functools
 import io
 import re
+import struct
 from dataclasses import dataclass
 
 import pytest
@@ -69,3 +70,16 @@ def read_libraries(data: bytes) -> list[Library]:
         )
         for mac in macs(data)
     ]
+
+
+def signed_pages(library: bytes, mac) -> list[tuple[int, bytes]]:
+    """Return the place of the hash of each page of a signed library for Macs, and the page (Apple's cs_blobs.h)."""
+    if not mac.has_code_signature:
+        return []
+    signature = mac.code_signature.data_offset
+    directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
+    magic, _, _, _, hashes, _, _, slots, limit = struct.unpack_from(">9I", library, directory)
+    size, kind, _, page = struct.unpack_from(">4B", library, directory + 36)
+    assert (magic, size, kind, limit) == (0xFADE0C02, 32, 2, signature)  # SHA-256 of all before the signature
+    assert slots == -(-limit // (1 << page))
+    return [(directory + hashes + 32 * i, library[i << page : min((i + 1) << page, limit)]) for i in range(slots)]

@@ -1,13 +1,12 @@
 """FMUs for all platforms: content, exports, dependencies, and results where they can run."""
 
-import hashlib
 import os
 import re
 import shutil
-import struct
 import subprocess
 import sys
 import zipfile
+from hashlib import sha256
 from pathlib import Path
 
 import fmpy
@@ -20,7 +19,8 @@ from plant_fmu.build import cached_fmu
 from plant_fmu.compiling.platforms import PLATFORMS
 from plant_fmu.errors import BuildError
 from tests.plant_fmu.conftest import STATES, CoSimulationInstance, members
-from tests.plant_fmu.libraries import macs, parts, read_libraries
+from tests.plant_fmu.libraries import macs, parts, read_libraries, signed_pages
+from tests.plant_fmu.nulls import exports
 
 pytestmark = pytest.mark.timeout(900)  # libraries for all platforms take minutes beside other tests
 
@@ -54,8 +54,7 @@ def test_every_platform_has_its_binaries_folder(all_platforms, fmi):
 @pytest.mark.slow
 def test_libraries_export_the_api_and_need_only_the_system(all_platforms, fmi):
     """Each for its machine; none contains a path of the build."""
-    header = (HEADERS / f"fmi{fmi}Functions.h").read_text()
-    api = set(re.findall(rf"FMI{fmi}_Export\s+fmi{fmi}\w+TYPE\s+(fmi{fmi}\w+);", header))
+    api = exports(fmi)
     assert len(api) > 40
     places = {"/tmp", "/root", "/home", "/Users", "C:\\", "plant_fmu", ".pdb", str(Path.home()), sys.prefix}
     for folder, data in binaries(all_platforms(fmi)).items():
@@ -86,17 +85,11 @@ def test_builds_for_all_platforms_are_reproducible(all_platforms, fmi, tmp_path,
 
 @pytest.mark.slow
 def test_arm_mac_signatures_are_valid(all_platforms, fmi):
-    """They load no library without one; it holds a hash of each page (Apple's cs_blobs.h)."""
+    """They load no library without one."""
     data = binaries(all_platforms(fmi))["darwin64" if fmi == 2 else "aarch64-darwin"]
-    library, signature = parts(data)[-1], macs(data)[-1].code_signature.data_offset
-    directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
-    magic, _, _, _, hashes, _, _, slots, limit = struct.unpack_from(">9I", library, directory)
-    size, kind, _, page = struct.unpack_from(">4B", library, directory + 36)
-    assert (magic, size, kind, limit) == (0xFADE0C02, 32, 2, signature)  # SHA-256 of all before the signature
-    assert slots == -(-limit // (1 << page))
-    for i in range(slots):
-        of_page = hashlib.sha256(library[i << page : min((i + 1) << page, limit)]).digest()
-        assert library[directory + hashes + 32 * i :][:32] == of_page
+    library = parts(data)[-1]
+    pages = signed_pages(library, macs(data)[-1])
+    assert pages and all(library[at:][:32] == sha256(page).digest() for at, page in pages)
 
 
 @pytest.mark.slow

@@ -1,10 +1,10 @@
 """Prebuilt libraries: equal to compiled ones, and unused where they do not fit."""
 
 import dataclasses
-import hashlib
 import os
 import struct
 import zipfile
+from hashlib import sha256
 
 import pytest
 
@@ -19,7 +19,7 @@ from plant_fmu.description import token
 from plant_fmu.errors import BuildError
 from plant_fmu.vehicle_component import make_vehicle_component
 from tests.plant_fmu.conftest import EACH_FMI, EACH_VEHICLE, STATES, CoSimulationInstance
-from tests.plant_fmu.libraries import macs
+from tests.plant_fmu.libraries import macs, signed_pages
 
 HERE = native_platform()
 
@@ -178,8 +178,7 @@ def test_prebuilt_libraries_match_linker_output(prebuilt_of_eight, monkeypatch):
         assert not differing(ours, theirs) - identity(platform, ours), platform.name
         assert differing(ours, before) - identity(platform, ours), platform.name
         if platform.name == "aarch64-darwin":
-            ((place, page),) = pages(ours, *macs(ours))[:1]
-            assert ours[place:][:32] == hashlib.sha256(ours[:page]).digest()
+            assert all(ours[at:][:32] == sha256(page).digest() for at, page in signed_pages(ours, *macs(ours)))
 
 
 def differing(one, other):
@@ -197,16 +196,6 @@ def identity(platform, library):
         return set(range(start, start + 20)) if start >= 16 else set()
     (mac,) = macs(library)  # LC_UUID, and with a signature the hash of the page that it is on
     found = set(range(mac.uuid.command_offset + 8, mac.uuid.command_offset + mac.uuid.size))
-    for place, _ in pages(library, mac)[:1]:
+    for place, _ in signed_pages(library, mac)[:1]:
         found |= set(range(place, place + 32))
     return found
-
-
-def pages(library, mac):
-    """Return where the hash of each page of a signed Mach-O is, and the size of a page."""
-    if not mac.has_code_signature:
-        return []
-    signature = mac.code_signature.data_offset
-    directory = signature + struct.unpack_from(">I", library, signature + 16)[0]
-    hashes, slots = (struct.unpack_from(">I", library, directory + place)[0] for place in (16, 28))
-    return [(directory + hashes + 32 * i, 1 << library[directory + 39]) for i in range(slots)]

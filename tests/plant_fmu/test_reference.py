@@ -5,12 +5,10 @@ import json
 import numpy as np
 import pytest
 
-from plant_fmu import load_vehicle
 from tests.conftest import DATA
 from tests.plant_fmu.conftest import STATES, WRENCH
 
 RUNS = json.loads((DATA / "runs.json").read_text())
-VEHICLES = json.loads((DATA / "vehicles.json").read_text())
 
 
 def drive(slave, run, rows):
@@ -35,26 +33,6 @@ def test_fmu_states_match_reference_trajectories(name, fmi, make_slave):
     rows = np.loadtxt(DATA / f"{name}.csv", delimiter=",", skiprows=1)
     states = drive(make_slave(RUNS[name]["vehicle"], fmi), RUNS[name], rows)
     assert np.abs(states - rows[:, 1:]).max() < 1e-6
-
-
-@pytest.mark.parametrize("name", VEHICLES)
-def test_shipped_vehicle_has_the_reference_numbers(name):
-    vehicle, expected = load_vehicle(name), VEHICLES[name]
-    assert vehicle.mass == expected["mass"]
-    assert vehicle.weight == expected["weight"]
-    assert vehicle.buoyancy == expected["buoyancy"]
-    for ours, theirs in (
-        (vehicle.inertia, np.diag(expected["inertia"])),
-        (vehicle.added_mass, np.diag(expected["added_mass"])),
-        (vehicle.r_G, expected["r_G"]),
-        (vehicle.r_B, expected["r_B"]),
-        (vehicle.linear_damping, expected["linear_damping"]),
-        (vehicle.quadratic_damping, expected["quadratic_damping"]),
-        (vehicle.thruster_matrix, expected["thruster_matrix"]),
-        (vehicle.thrust_max, np.full(8, expected["thrust_limit"])),
-        (vehicle.thrust_min, np.full(8, -expected["thrust_limit"])),
-    ):
-        assert np.array_equal(ours, theirs)
 
 
 def test_error_falls_with_the_fourth_power_of_the_substep(make_slave):

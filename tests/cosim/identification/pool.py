@@ -3,11 +3,9 @@
 import numpy as np
 
 from plant_fmu import Plant
+from tests.plant_fmu.conftest import STATES
 
-STATES = (
-    *(f"position.{a}" for a in "xyz"), *(f"quaternion.e{i}" for i in range(4)), *(f"velocity.{a}" for a in "uvwpqr"),
-)  # fmt: skip
-THRUST, WRENCH = tuple(f"thrust[{i}]" for i in range(1, 9)), tuple(f"wrench.{name}" for name in "XYZKMN")
+THRUST = tuple(f"thrust[{i}]" for i in range(1, 9))
 
 
 def fly(vehicle, start, names, inputs, step, outputs=STATES):

@@ -9,7 +9,8 @@ from cosim.errors import IdentificationError
 from cosim.identification.actuation import CommandedForces, steady_forces
 from cosim.identification.log import Log
 from plant_fmu import load_vehicle
-from tests.cosim.identification.pool import THRUST, WRENCH, fly
+from tests.cosim.identification.pool import THRUST, fly
+from tests.plant_fmu.conftest import WRENCH
 
 STEP = 0.02
 

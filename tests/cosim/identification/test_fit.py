@@ -17,7 +17,8 @@ from cosim.identification.prediction import validate
 from cosim.identification.residuals import Residuals
 from cosim.identification.windows import cut_windows
 from plant_fmu import load_vehicle
-from tests.cosim.identification.pool import WRENCH, fly
+from tests.cosim.identification.pool import fly
+from tests.plant_fmu.conftest import WRENCH
 
 TRUTH = {
     "quadratic_damping[1]": 110.0, "added_mass[1,1]": 8.0, "buoyancy": 131.0, "current.x": 0.06, "current.y": -0.04,

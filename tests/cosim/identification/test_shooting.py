@@ -6,7 +6,8 @@ import pytest
 from cosim.errors import IdentificationError
 from cosim.identification.shooting import STATE_SIZE, Directions, Shooter
 from plant_fmu import load_vehicle
-from tests.cosim.identification.pool import STATES, WRENCH, fly
+from tests.cosim.identification.pool import fly
+from tests.plant_fmu.conftest import STATES, WRENCH
 
 BODY = {
     "current.x": 0.1, "current.y": -0.2, "added_mass[1,5]": 0.4, "added_mass[2,4]": -0.3, "linear_damping[6]": 0.2,

@@ -24,9 +24,10 @@ def test_missing_compiler_gives_one_line_error(cache, monkeypatch):
     assert not cache.exists()
 
 
-def test_failed_compilation_leaves_no_file(cache):
+def test_failed_compilation_leaves_no_file(cache, monkeypatch):
+    monkeypatch.setattr(shooting, "c_sources", lambda *_: {"bad.c": b"no C"})
     with pytest.raises(BuildError, match="failed"):
-        shooting.load_tuned_library("bad", {"bad.c": b"no C"}, ["bad.c"], ())
+        Shooter(load_vehicle("odin"))
     assert not cache.exists() or not list(cache.iterdir())
 
 

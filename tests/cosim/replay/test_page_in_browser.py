@@ -7,7 +7,7 @@ import pytest
 from cosim.replay.page import write_page
 from cosim.replay.trace import trace_of
 from cosim.results.run_result import load_run
-from tests.cosim.replay.test_page import HOSTILE
+from tests.security.test_pages import HOSTILE
 
 pytestmark = pytest.mark.slow
 

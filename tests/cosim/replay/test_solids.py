@@ -23,7 +23,7 @@ from controller.regions import (
     Sphere,
     Visibility,
     pack,
-)
+)  # fmt: skip
 from controller.regions.region_set import attitude_clearance, clearances_at
 from controller.regions.shapes import ENTRIES
 from cosim.replay import header
@@ -170,15 +170,16 @@ def test_plane_sheets_lie_in_bounds_with_hatching_on_the_forbidden_side(shape, k
         assert (clearances_at(np.ascontiguousarray(hatch[:, 1]), region) < 0.0).all()
 
 
+def sight_of(shape):
+    """Return the drawing of a shape of attitude."""
+    code = "return sightOf(shape, { position, quaternion }, [0, 0, 0], 0.3);"
+    return run(code, shape=shape_of(shape), position=POSITION.tolist(), quaternion=QUATERNION.tolist())
+
+
 @pytest.mark.parametrize("tolerance", [0.3, 1.8])
 def test_heading_sector_rim_lies_at_the_attitude_tolerance(tolerance):
     shape = Orientation((0.9, 0.1, 0.2, -0.4), tolerance)
-    sight = run(
-        "return sightOf(shape, { position, quaternion }, [0, 0, 0], 0.3);",
-        shape=shape_of(shape),
-        position=POSITION.tolist(),
-        quaternion=QUATERNION.tolist(),
-    )
+    sight = sight_of(shape)
     regions = pack([Region("it", shape, "in")])
     wanted = np.array(shape.quaternion) / np.linalg.norm(shape.quaternion)
     for point in np.array(sight["rim"]):
@@ -190,12 +191,7 @@ def test_heading_sector_rim_lies_at_the_attitude_tolerance(tolerance):
 @pytest.mark.parametrize("half_angle", [0.5, 2.0])
 def test_view_cone_rim_lies_at_zero_clearance(half_angle):
     shape = Visibility((6.0, 3.0, 4.0), (1.0, 0.3, 0.2), half_angle, (0.2, -0.1, 0.1))
-    sight = run(
-        "return sightOf(shape, { position, quaternion }, [0, 0, 0], 0.3);",
-        shape=shape_of(shape),
-        position=POSITION.tolist(),
-        quaternion=QUATERNION.tolist(),
-    )
+    sight = sight_of(shape)
     for point in sight["rim"]:
         seen = Visibility(tuple(point), shape.camera_axis, half_angle, shape.camera_position)
         clearance = attitude_clearance(pack([Region("it", seen, "in")]), 0, POSITION, QUATERNION, np.empty(3))
