@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from cosim.companion.vehicle_state import ReportedState
+from cosim.mavlink.vehicle.ardusub_sticks import CENTER
 from cosim.mavlink.vehicle.profile import find_profile
+from cosim.mavlink.wire.manual_control import decode_sticks
 from cosim.simulation.signals import Array
 
-_DEFLECTED, _INVALID = 50, 0x7FFF  # MANUAL_CONTROL: deflection, of 1000, above which a stick counts; unused stick
-_CENTER, _TOLERANCE = 1500.0, 25.0  # us, center of a channel's pulse; difference above which it counts
+_DEFLECTED = 0.05  # of a full stick, above which it counts
+_TOLERANCE = 25.0  # us, difference of a channel's pulse above which it counts
 _AXES, _UNUSED = 6, 0xFFFF  # channels of sticks; value of an unused one, as 0
 _ARDUPILOT = 3  # MAV_AUTOPILOT; others report the channels of a radio alone
 _WINDOW = 0.5  # s, time in which our sticks appear in the reported channels
@@ -26,7 +28,7 @@ class PilotWatch:
         self._identity = identity
         self.seen_at = -math.inf  # our time [s] of the last ones
         self._sent: deque[tuple[float, Array]] = deque()  # our times [s] and pulses [us] of our sticks
-        self._rest: Array = np.full(_AXES, _CENTER)  # us, pulses before our first sticks: those of a radio, or none
+        self._rest: Array = np.full(_AXES, CENTER)  # us, pulses before our first sticks: those of a radio, or none
 
     def record_sent(self, pulses: Array, now: float) -> None:
         """Store the pulses [us] of channels 1 to 6, shape (6,), that our sticks command at our time `now` [s]."""
@@ -42,7 +44,7 @@ class PilotWatch:
             case "RC_CHANNELS_OVERRIDE":
                 target, is_deflected = (
                     message.target_system,
-                    bool((np.abs(_pulses(message) - _CENTER) > _TOLERANCE).any()),
+                    bool((np.abs(_pulses(message) - CENTER) > _TOLERANCE).any()),
                 )
             case "RC_CHANNELS" if (system, component, reported.autopilot) == (reported.system, 1, _ARDUPILOT):
                 target, is_deflected = 0, self._has_foreign(_pulses(message), now)
@@ -55,7 +57,7 @@ class PilotWatch:
         """Return True if a channel is off its rest and outside the range of our recent sticks."""
         if not self._sent:
             self._rest = pulses
-        ours = np.array([np.full(_AXES, _CENTER), *(sent for time, sent in self._sent if now - time <= _WINDOW)])
+        ours = np.array([np.full(_AXES, CENTER), *(sent for time, sent in self._sent if now - time <= _WINDOW)])
         outside = np.maximum(ours.min(axis=0) - pulses, pulses - ours.max(axis=0))
         return bool(((outside > _TOLERANCE) & (np.abs(pulses - self._rest) > _TOLERANCE)).any())
 
@@ -63,11 +65,11 @@ class PilotWatch:
 def _pulses(message: Any) -> Array:
     """Return the pulses of channels 1 to 6, shape (6,) [us]; the center for unused ones."""
     pulses = np.array([getattr(message, f"chan{i}_raw") for i in range(1, _AXES + 1)], dtype=float)
-    return np.where((pulses > 0.0) & (pulses < _UNUSED), pulses, _CENTER)
+    return np.where((pulses > 0.0) & (pulses < _UNUSED), pulses, CENTER)
 
 
 def _is_deflected(message: Any, autopilot: int) -> bool:
     """Return True if a stick of MANUAL_CONTROL is deflected from its rest position."""
-    level = any(abs(v) > _DEFLECTED for v in (message.x, message.y, message.r) if v != _INVALID)
-    rest = find_profile(autopilot).centered_stick
-    return level or (message.z != _INVALID and abs(message.z - rest) > _DEFLECTED)
+    profile = find_profile(autopilot)
+    sticks = decode_sticks(message, profile.centered_stick, profile.full_tilt_stick)
+    return any(abs(stick) > _DEFLECTED for stick in sticks)

@@ -17,6 +17,7 @@ from cosim.mavlink.vehicle.ardusub_sticks import (
     MAX_LEAN,
     YAW_DEAD_ZONE,
     MotorMixer,
+    channel_pulses,
     invert_dead_zone,
 )
 from cosim.mavlink.vehicle.profile import Profile
@@ -32,7 +33,7 @@ _FULL = 1000.0  # value of a full stick in MANUAL_CONTROL
 _NEWTON_STEPS, _MIN_COMMAND = 3, 0.05  # minimum command of a thruster at which its force is linearized
 _BISECTIONS = 8  # bisections of the fraction of the force that leaves room for the whole moments
 _PITCH, _ROLL = 1, 2  # bits of MANUAL_CONTROL.enabled_extensions
-_CENTER, _SWING, _AXES = 1500, 400, 6  # us, center and amplitude of a channel's pulse; number of channels
+_AXES = 6  # number of channels
 _RELEASED, _LEFT_ALONE = 0, 0xFFFF  # values that release a channel, and leave it unchanged
 
 
@@ -105,7 +106,7 @@ class StickScale:
 
     def pulses(self, sticks: Array) -> Array:
         """Return the pulses of channels 1 to 6 that sticks of X Y Z K M N command, shape (6,) [us]."""
-        return channel_pulses(self._gains * sticks)
+        return np.array(channel_pulses(self._gains * sticks))
 
     def yaw_rate_stick(self, rate: float) -> float:
         """Return the yaw stick that commands a yaw rate [rad/s]; 0 for one that is not finite."""
@@ -167,15 +168,9 @@ def make_manual_control(mavlink: Any, system: int, profile: Profile, sticks: Arr
     return message
 
 
-def channel_pulses(sticks: Array) -> Array:
-    """Return pulses [us] in ArduSub's order, shape (6,): pitch, roll, up, yaw, forward, right."""
-    surge, sway, heave, roll, pitch, yaw = sticks
-    return _CENTER + _SWING * np.array([pitch, roll, -heave, yaw, surge, sway])
-
-
 def override_channels(mavlink: Any, system: int, sticks: Array) -> Any:
     """Return RC_CHANNELS_OVERRIDE for sticks of X Y Z K M N, shape (6,)."""
-    return _override(mavlink, system, [round(pulse) for pulse in channel_pulses(sticks).tolist()])
+    return _override(mavlink, system, [round(pulse) for pulse in channel_pulses(sticks.tolist())])
 
 
 def release_channels(mavlink: Any, system: int) -> Any:

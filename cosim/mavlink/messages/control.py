@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator, Sequence
 
 from cosim.mavlink.messages.pose import degrees
+from cosim.mavlink.vehicle.ardusub_sticks import channel_pulses
 from cosim.mavlink.vehicle.vehicle_context import VehicleContext
 from cosim.mavlink.wire.encode import Fields
 
-_CENTER, _SWING = 1500, 400  # µs of PWM: at rest, and to either end
 _MAX_SERVOS, _MAX_OUTPUTS = 16, 32
 _MAX_NAME = 10  # characters of a named value
 _POSITION_ALONE = 0b110111111000  # type_mask: all else is ignored
@@ -47,10 +47,8 @@ def actuator_output_status(context: VehicleContext) -> Iterator[Fields]:
 
 def rc_channels(context: VehicleContext) -> Iterator[Fields]:
     """RC_CHANNELS: the last sticks, of an ArduSub times the gain, in its order: pitch roll up yaw forward lateral."""
-    surge, sway, heave, roll, pitch, yaw = context.sticks
-    order = pitch, roll, -heave, yaw, surge, sway
-    pulses = [_CENTER + _SWING * stick for stick in order] + [0xFFFF] * 12
-    yield context.view.boot_ms, len(order), *pulses, 0xFF
+    pulses = channel_pulses(context.sticks)
+    yield context.view.boot_ms, len(pulses), *pulses, *[0xFFFF] * 12, 0xFF
 
 
 def position_target_local_ned(context: VehicleContext) -> Iterator[Fields]:

@@ -8,23 +8,25 @@ import numpy as np
 
 from cosim.mavlink.services.service import Service
 from cosim.mavlink.vehicle.ardusub_sticks import (
+    CENTER,
     CLIMB_DEAD_ZONE,
     LEAN_DEAD_ZONE,
     MAX_LEAN,
     YAW_DEAD_ZONE,
     MotorMixer,
     apply_dead_zone,
+    channel_pulses,
+    channel_sticks,
 )
 from cosim.mavlink.vehicle.vehicle_context import Result, Sender, VehicleContext
-from cosim.mavlink.wire.manual_control import clip_stick, decode_sticks
+from cosim.mavlink.wire.manual_control import decode_sticks
 from cosim.scenario.region_tables import Vector6
 from cosim.simulation.commands.command_handler import greatest_wrench
 from cosim.simulation.commands.commands import STICK_MODES, ManualControl, Mode
 from cosim.simulation.commands.stick_stabilizer import GREATEST_TILT
 
 _TIMEOUT = 3.0  # s of the wall clock
-_CENTER, _SWING = 1500, 400  # us of a channel
-_CHANNELS = 6  # pitch, roll, up, yaw, forward, right, as ArduSub has them
+_CHANNELS = 6
 _RELEASED, _IGNORED = 0, 0xFFFF  # values of a channel that is released, and of one that stays unchanged
 # number of axes, from surge on, whose sticks command forces; those of the others command rates or angles
 _FORCE_AXES: dict[Mode, int] = {"manual": 6, "stabilize": 3, "depth_hold": 2}
@@ -75,13 +77,12 @@ class ManualControlService(Service):
 
     def _receive_rc_channels_override(self, sender: Sender, message: Any) -> None:
         pulses = [getattr(message, f"chan{i}_raw") for i in range(1, _CHANNELS + 1)]
-        surge, sway, heave, roll, pitch, yaw = self.context.sticks
-        before = pitch, roll, -heave, yaw, surge, sway
-        pitch, roll, up, yaw, surge, sway = (
-            old if pulse == _IGNORED else 0.0 if pulse == _RELEASED else clip_stick((pulse - _CENTER) / _SWING)
+        before = channel_pulses(self.context.sticks)
+        pulses = [
+            old if pulse == _IGNORED else CENTER if pulse == _RELEASED else pulse
             for pulse, old in zip(pulses, before, strict=True)
-        )
-        self._apply(sender, (surge, sway, -up + 0.0, roll, pitch, yaw), by_gain=False)
+        ]
+        self._apply(sender, channel_sticks(pulses), by_gain=False)
 
     def _apply(self, sender: Sender, sticks: Vector6, by_gain: bool) -> None:
         context = self.context

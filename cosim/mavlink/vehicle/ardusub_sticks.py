@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from cosim.mavlink.wire.manual_control import clip_stick
+from cosim.scenario.region_tables import Vector6
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
 
+CENTER, SWING = 1500.0, 400.0  # us, pulse of a channel at rest; change of it by a full stick
 MAX_LEAN = math.radians(45.0)  # tilt that a full stick of roll or pitch commands: ANGLE_MAX
 # deflections of a stick at a pilot gain of 1 up to which it commands nothing
 YAW_DEAD_ZONE = 0.1  # 40 of 400 us
@@ -35,6 +39,18 @@ class MotorMixer:
         sums = np.clip(self.commands @ sticks, -1.0, 1.0)
         result: Array = self._matrix @ (self.max_forces * (sums * np.abs(sums) if self.is_quadratic else sums))
         return result
+
+
+def channel_pulses(sticks: Sequence[float]) -> list[float]:
+    """Return the pulses of channels 1 to 6 [us], pitch, roll, up, yaw, forward, right, of sticks of X Y Z K M N."""
+    surge, sway, heave, roll, pitch, yaw = sticks
+    return [CENTER + SWING * part for part in (pitch, roll, -heave, yaw, surge, sway)]
+
+
+def channel_sticks(pulses: Sequence[float]) -> Vector6:
+    """Return the sticks of X Y Z K M N, -1 to 1, of the pulses of channels 1 to 6 [us]."""
+    pitch, roll, up, yaw, surge, sway = (clip_stick((pulse - CENTER) / SWING) for pulse in pulses)
+    return surge, sway, -up + 0.0, roll, pitch, yaw
 
 
 def apply_dead_zone(deflection: float, dead_zone: float) -> float:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Self
 
 from cosim.mavlink.wire.dialect import dialect, make_heartbeat
 from cosim.mavlink.wire.endpoint import Endpoint
-from cosim.mavlink.wire.framing import V2, FrameFilter, RxStats
+from cosim.mavlink.wire.framing import FrameFilter, RxStats
 from cosim.mavlink.wire.link import Link, Signer, open_channel
 from cosim.mavlink.wire.signing import SigningClock, Verifier, timestamp_file
 
@@ -35,7 +35,7 @@ class GroundLink:
 
     def __init__(self, endpoint: Endpoint, key: bytes | None = None, identity: Identity = GROUND_STATION) -> None:
         self.name, self.identity = endpoint.text, identity
-        self.stats, self.v1_frames = RxStats(), 0
+        self.stats = RxStats()
         clock = SigningClock(None if key is None else timestamp_file(key, identity))
         frames = FrameFilter(self.stats, verifier=None if key is None else Verifier(key, clock))
         self.channel, _ = open_channel(endpoint)
@@ -52,8 +52,7 @@ class GroundLink:
             now = time.monotonic()
             self.channel.poll(now)
             received: list[ReceivedMessage] = []
-            for frame, message in self._link.receive(time.perf_counter() + _MAX_READ_TIME):
-                self.v1_frames += frame[0] != V2
+            for _, message in self._link.receive(time.perf_counter() + _MAX_READ_TIME):
                 source = message.get_srcSystem(), message.get_srcComponent(), message.get_seq()
                 received.append(ReceivedMessage(time.monotonic(), *source, message.get_type(), message))
                 if len(received) == _MAX_MESSAGES:

@@ -192,6 +192,7 @@ def test_manual_control_realizes_the_desired_wrench(profile):
         ("manual-control", 1.0, {"ACRO_YAW_P": 3.375, "PILOT_SPEED_UP": 200.0, "PILOT_SPEED_DN": 100.0}, (2.0, 1.0),
          3.375),
         ("manual-control", 1.0, {"PILOT_SPEED_UP": 150.0, "PILOT_SPEED_DN": 0.0}, (1.5, 1.5), 4.5),
+        ("manual-control", 1.0, {"JS_THR_GAIN": 0.8}, (0.5, 0.5), 4.5),
     ],
 )  # fmt: skip
 def test_rate_sticks_realize_the_desired_rates_in_ardusub(sticks_by, gain, parameters, speeds, yaw):
@@ -199,7 +200,7 @@ def test_rate_sticks_realize_the_desired_rates_in_ardusub(sticks_by, gain, param
     scale = make_stick_scale(HEAVY, ARDUSUB, gain, sticks_by).with_rates(parameters)
     scaled = gain if sticks_by == "manual-control" else 1.0
     for rate in (0.02, -0.1, 0.2):
-        throttle = 500.0 - 500.0 * scaled * scale.climb_stick(rate)
+        throttle = 500.0 - 500.0 * scaled * parameters.get("JS_THR_GAIN", 1.0) * scale.climb_stick(rate)
         top, bottom = 500.0 + 100.0 * gain, 500.0 - 100.0 * gain
         climb = (throttle - top) / (1000.0 - top) if throttle > top else (throttle - bottom) / bottom
         assert -speeds[rate > 0.0] * climb == pytest.approx(rate)
@@ -440,6 +441,8 @@ def sticks(x, z, target=1):
         ((255, 190), sticks(20, 500), False),  # at rest, as an ArduSub's sticks are
         ((255, 190), sticks(0, 0), True),  # full down
         ((255, 190), sticks(0, 700), True), ((254, 1), sticks(300, 500), True),
+        ((255, 190), mavlink.MAVLink_manual_control_message(1, 0, 0, 500, 0, 0, 0, 1, 100), True),  # pitch
+        ((255, 190), mavlink.MAVLink_manual_control_message(1, 0x7FFF, 0x7FFF, 0x7FFF, 0x7FFF, 0), False),
         *(((255, 190), mavlink.MAVLink_rc_channels_override_message(1, 1, 0, 65535, 1500, 1500, pwm, 0, 0, 0), counts)
           for pwm, counts in ((1700, True), (1510, False))),
     ],
