@@ -19,6 +19,7 @@ _TOLERANCE = 25.0  # us, difference of a channel's pulse above which it counts
 _AXES, _UNUSED = 6, 0xFFFF  # channels of sticks; value of an unused one, as 0
 _ARDUPILOT = 3  # MAV_AUTOPILOT; others report the channels of a radio alone
 _WINDOW = 0.5  # s, time in which our sticks appear in the reported channels
+_REST_WINDOW = 5.0  # s, time before our first sticks in which channels show their rest
 
 
 class PilotWatch:
@@ -28,13 +29,15 @@ class PilotWatch:
         self._identity = identity
         self.seen_at = -math.inf  # our time [s] of the last ones
         self._sent: deque[tuple[float, Array]] = deque()  # our times [s] and pulses [us] of our sticks
-        self._rest: Array = np.full(_AXES, CENTER)  # us, pulses before our first sticks: those of a radio, or none
+        self._before: deque[tuple[float, Array]] = deque()  # as reported before our first sticks
+        self._rest: Array = np.full(_AXES, CENTER)  # us, of these the nearest to the center: those of a radio, or none
 
     def record_sent(self, pulses: Array, now: float) -> None:
         """Store the pulses [us] of channels 1 to 6, shape (6,), that our sticks command at our time `now` [s]."""
-        self._sent.append((now, pulses))
-        while now - self._sent[0][0] > _WINDOW:
-            self._sent.popleft()
+        if not self._sent and self._before:
+            reported = np.array([pulses for _, pulses in self._before])
+            self._rest = reported[np.abs(reported - CENTER).argmin(axis=0), np.arange(_AXES)]
+        _append(self._sent, now, pulses, _WINDOW)
 
     def receive(self, system: int, component: int, message: Any, reported: ReportedState, now: float) -> None:
         """Process a message that arrived at our time `now` [s]."""
@@ -56,10 +59,18 @@ class PilotWatch:
     def _has_foreign(self, pulses: Array, now: float) -> bool:
         """Return True if a channel is off its rest and outside the range of our recent sticks."""
         if not self._sent:
-            self._rest = pulses
+            _append(self._before, now, pulses, _REST_WINDOW)
+            return False
         ours = np.array([np.full(_AXES, CENTER), *(sent for time, sent in self._sent if now - time <= _WINDOW)])
         outside = np.maximum(ours.min(axis=0) - pulses, pulses - ours.max(axis=0))
         return bool(((outside > _TOLERANCE) & (np.abs(pulses - self._rest) > _TOLERANCE)).any())
+
+
+def _append(samples: deque[tuple[float, Array]], now: float, pulses: Array, window: float) -> None:
+    """Append pulses at our time `now` [s], and drop those older than a `window` [s]."""
+    samples.append((now, pulses))
+    while now - samples[0][0] > window:
+        samples.popleft()
 
 
 def _pulses(message: Any) -> Array:

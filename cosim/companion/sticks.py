@@ -106,7 +106,7 @@ class StickScale:
 
     def pulses(self, sticks: Array) -> Array:
         """Return the pulses of channels 1 to 6 that sticks of X Y Z K M N command, shape (6,) [us]."""
-        return np.array(channel_pulses(self._gains * sticks))
+        return np.array(channel_pulses((self._gains * sticks).tolist()), dtype=np.float64)
 
     def yaw_rate_stick(self, rate: float) -> float:
         """Return the yaw stick that commands a yaw rate [rad/s]; 0 for one that is not finite."""

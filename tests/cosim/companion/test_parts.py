@@ -459,14 +459,16 @@ def channels(pulses):
 
 @given(
     st.integers(0, 2**32 - 1), st.sampled_from([0.05, 0.3, 1.0]), st.floats(0.0, 0.4),
-    st.integers(0, 5), st.sampled_from([-1, 1]),
+    st.integers(0, 5), st.sampled_from([-1, 1]), st.booleans(),
 )  # fmt: skip
-def test_only_channels_beyond_our_recent_sticks_and_off_their_rest_are_a_pilot(seed, size, delay, channel, sign):
+def test_only_channels_beyond_our_recent_sticks_and_off_their_rest_are_a_pilot(seed, size, delay, channel, sign, rests):
     """As an ArduSub reports them late, on any wiring; a radio rests where it was before our first stick."""
     random, state = np.random.default_rng(seed), reported((0.0, 0.0, 0.0))
     scale, pilot = make_stick_scale(HEAVY, ARDUSUB, 0.5, "manual-control"), PilotWatch((255, 191))
     rest = np.where(random.random(6) < 0.5, 1500.0, random.integers(1100, 1900, 6))
-    pilot.receive(1, 1, channels(rest), state, 0.0)
+    for now, pulses in ((-9.0, np.full(6, 1500.0)), (-2.0, rest if rests else np.full(6, 1500.0)), (0.0, rest)):
+        pilot.receive(1, 1, channels(pulses), state, now)
+    rest = rest if rests else np.full(6, 1500.0)  # a stick that is held as we begin
     sent = [np.clip(random.normal(0.0, size, 6), -1.0, 1.0) for _ in range(100)]
     gains = np.array([1.0, 1.0, 0.5, 0.5, 0.5, 0.5])  # of pitch roll up yaw ahead right
     pulses = [1500.0 + 400.0 * gains * (s * (1, 1, -1, 1, 1, 1))[[4, 3, 2, 5, 0, 1]] for s in sent]
