@@ -52,7 +52,7 @@ def shipped_functions() -> Iterator[tuple[Callable[..., None], tuple[Any, ...]]]
         made = kind.for_vehicle(vehicle_model(scenario.vehicle), gains, level, scenario.time.control, 1)
         yield kind.function, (state, goal, regions, FLAT, gains, made.memory, np.zeros(made.n_forces))
     yield evaluate_packed, (regions, state.position, state.quaternion, FLAT, _TABLE, _TABLE, FLAT)
-    yield write_clearances, (regions, _TABLE, FLAT, FLAT)
+    yield write_clearances, (regions, _TABLE, FLAT)
     yield ray_distances, (regions, state.position, _TABLE, 1.0, FLAT)
     yield search_path, (empty_plan(1, 1), state.position, goal, regions, PathLimits(1.0, 1.0, 1.0, 1.0), 1.0, INTEGERS)
     yield compute_inputs, (model.inputs, goal, regions, state, 0.0, FLAT, data.signals)

@@ -14,7 +14,6 @@ from controller.arithmetic import length3
 from controller.linear_algebra import norm
 from controller.quaternion import rate, rotation_matrix
 from controller.regions.region_set import PackedRegions, clearance_of_pose
-from controller.stack_array import zeros
 from controller.state import State
 from cosim.scenario.arbiter_rules import ArbiterRules
 from cosim.scenario.criteria import CriterionSetup
@@ -109,7 +108,7 @@ def compute_inputs(
 ) -> None:
     """Compute the memberships and the inputs of the arbiter's rules; now [s], clearances (n,) [m or rad]."""
     if packed.of_goal:
-        signals.goal_clearance = clearance_of_pose(goal, 0, state.position, state.quaternion, zeros(3))
+        signals.goal_clearance = clearance_of_pose(goal, 0, state.position, state.quaternion)
     if packed.by_speed:
         speeds = signals.closing_speeds
         if packed.of_goal:
@@ -170,6 +169,6 @@ def _closing_speed(regions: PackedRegions, i: int, state: VehicleState, clearanc
     e, nu = state.quaternion, state.velocity_body
     ahead = state.position + _AHEAD * (rotation_matrix(e) @ nu[:3] - regions.velocities[i])
     turned = e + _AHEAD * rate(e, nu[3:])
-    later = clearance_of_pose(regions, i, ahead, turned / norm(turned), zeros(3))
+    later = clearance_of_pose(regions, i, ahead, turned / norm(turned))
     speed: float = (clearance - later) / _AHEAD
     return speed

@@ -9,16 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controller import VehicleState
-from controller.regions import Sphere
-from controller.regions.region_set import PackedRegions, clearance_of_pose, clearance_of_sphere, evaluate_packed
-from controller.stack_array import zeros
+from controller.regions.region_set import PackedRegions, clearance_of_pose, evaluate_packed
 
 if TYPE_CHECKING:
     from cosim.step.step_model import StepData, StepModel
 
 Array = NDArray[np.float64]
 
-_SPHERE = Sphere.kind
 _ROUNDING = 1e-6  # tolerance of times, as a part of a step
 
 
@@ -45,12 +42,8 @@ def evaluate(model: StepModel, data: StepData, state: VehicleState, evaluation: 
 
 def write_clearances_of_pose(regions: PackedRegions, state: VehicleState, clearances: Array) -> None:
     """Write the clearance of each region, [m] or [rad], at a pose."""
-    scratch = zeros(3)
     for i in range(regions.kinds.size):
-        if regions.kinds[i] == _SPHERE:
-            clearances[i] = clearance_of_sphere(regions, i, state.position)
-        else:
-            clearances[i] = clearance_of_pose(regions, i, state.position, state.quaternion, scratch)
+        clearances[i] = clearance_of_pose(regions, i, state.position, state.quaternion)
 
 
 def move_regions(model: StepModel, data: StepData) -> None:

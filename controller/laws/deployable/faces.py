@@ -11,8 +11,8 @@ import numpy as np
 
 from controller.linear_algebra import norm
 from controller.regions.kinds import KINKED_INSIDE, KINKED_OUTSIDE
-from controller.regions.region_set import PackedRegions, clearance_at_position, position_clearance
-from controller.stack_array import Vector3, zeros
+from controller.regions.region_set import PackedRegions, clearance_at, position_clearance
+from controller.stack_array import Vector3
 
 FACES = 2  # maximum number of faces besides the nearest that have barriers
 _LINE_SAMPLES = 16  # a stride along a line, which ends with an evaluation, is at least the line's length over this
@@ -34,27 +34,18 @@ def face_ahead(
     speed = norm(velocity)
     if not speed > 1e-6:
         return np.inf
-    point, gradient, low, high = zeros(3), zeros(3), 0.0, 0.0
-    clearance = _clearance_along(regions, i, position, velocity, 0.0, point, gradient)
+    clearance, low, high = clearance_at(regions, i, position), 0.0, 0.0
     while clearance > 0.0:
         if high >= reach:
             return np.inf
         low, high = high, min(high + max(clearance, reach / _LINE_SAMPLES), reach)
-        clearance = _clearance_along(regions, i, position, velocity, high / speed, point, gradient)
+        clearance = clearance_at(regions, i, position + high / speed * velocity)
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)
-        if _clearance_along(regions, i, position, velocity, middle / speed, point, gradient) > 0.0:
+        if clearance_at(regions, i, position + middle / speed * velocity) > 0.0:
             low = middle
         else:
             high = middle
-    point[:] = position + low / speed * velocity
+    point = position + low / speed * velocity
     distance = position_clearance(regions, i, point, face)
     return distance + float(face @ (position - point))
-
-
-def _clearance_along(
-    regions: PackedRegions, i: int, position: Vector3, velocity: Vector3, time: float, point: Vector3, gradient: Vector3
-) -> float:
-    """Return the clearance after a time at a velocity; write `point` and `gradient`."""
-    point[:] = position + time * velocity
-    return clearance_at_position(regions, i, point, gradient)

@@ -185,11 +185,11 @@ def test_clearance_evaluations_are_bounded(monkeypatch):
     """In plain Python, a way of any length among any regions is looked at 64 times a call, and 512 times in all."""
     looked = []
 
-    def counting(regions, i, point, room):
+    def counting(regions, i, point):
         looked.append(i)
         return clearance_at(regions, i, point)
 
-    monkeypatch.setitem(add_cost.__globals__, "clearance_at_position", counting)
+    monkeypatch.setitem(add_cost.__globals__, "clearance_at", counting)
     regions = pack([Region(f"floor {i}", HalfSpace((0.0, 0.0, -1.0), (0.0, 0.0, 2.55)), "in") for i in range(3)])
     way = np.zeros((CORNERS + 1, 3))
     way[:] = [(100.0 * (i + 1), 50.0 * (-1.0) ** i, 2.5) for i in range(CORNERS + 1)]

@@ -587,9 +587,8 @@ def test_passed_corners_of_a_full_path_are_dropped_and_its_length_is_measured():
 def test_distant_regions_are_not_reevaluated(monkeypatch):
     """In plain Python: a ball that is farther than the way is long, once; one at half of that, again after a while."""
     evaluated = []
-    clearance = add_cost.__globals__["clearance_of_sphere"]
     monkeypatch.setitem(
-        add_cost.__globals__, "clearance_of_sphere", lambda *given: evaluated.append(1) or clearance(*given)
+        add_cost.__globals__, "clearance_at", lambda *given: evaluated.append(1) or clearance_at(*given)
     )
     way = np.zeros((CORNERS + 1, 3))
     way[0] = START + np.array([6.0, 0.0, 0.0])

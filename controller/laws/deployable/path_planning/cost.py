@@ -11,10 +11,9 @@ import numpy as np
 from controller.arithmetic import square
 from controller.laws.deployable.path_planning.search import PathLimits, uncertainty
 from controller.linear_algebra import norm
-from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
-from controller.regions.region_set import PackedRegions, clearance_at_position, clearance_of_sphere
-from controller.stack_array import Rows3, Vector3, Vector4, VectorN, zeros
+from controller.regions.region_set import PackedRegions, clearance_at
+from controller.stack_array import Rows3, Vector3, Vector4, VectorN
 from controller.state import State
 
 # maximum number of evaluations of the regions along a path: in one call; in total, after which the rest is blocked
@@ -36,7 +35,6 @@ _PREDICTIONS = 16  # maximum number of predictions of one of them
 _WAIT = 0.5  # m, cost of a wait
 _AWAY = 0.05  # m, distance from a soft region within which a stay counts as inside: keeps the end off its surface
 _COARSE = 0.25  # m, minimum distance between two evaluations near the surface of a soft region
-_SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 # indices in `PathCost.cost`: all; by hard regions and soft ones on the way; by fast ones at rest
 TOTAL, BY_HARD, BY_SOFT, AT_REST = range(4)
@@ -113,18 +111,14 @@ def _evaluate_point(
     traveled = cost.traveled + cost.on_leg
     later = traveled / limits.speed  # s
     effect_distance = limits.clearance + _STRIDE[1] / _TRUST  # m, clearance beyond which a hard region has no effect
-    free, soft, reach, scratch = effect_distance, 0.0, _STRIDE[1], zeros(3)
+    free, soft, reach = effect_distance, 0.0, _STRIDE[1]
     for i in range(regions.kinds.size):
         if traveled < cost.clear_until[i] or regions.kinds[i] >= _ATTITUDE:
             continue
         if cost.waits and cost.leg > 0 and is_fast(regions, i, limits):
             continue  # it has passed by then
-        point = place - regions.velocities[i] * later
+        clearance = clearance_at(regions, i, place - regions.velocities[i] * later)
         region_speed = np.sum(abs(regions.velocities[i]))  # m/s, summed over the axes
-        if regions.kinds[i] == _SPHERE:
-            clearance = clearance_of_sphere(regions, i, point)
-        else:
-            clearance = clearance_at_position(regions, i, point, scratch)
         excess = clearance - _STRIDE[1]
         if regions.hard[i]:
             clearance -= uncertainty(regions, i)
@@ -168,14 +162,14 @@ def is_fast(regions: PackedRegions, i: int, limits: PathLimits) -> bool:
 
 def _add_rest_cost(cost: PathCost, place: Vector3, regions: PackedRegions, limits: PathLimits) -> None:
     """Add the cost of fast regions that meet a vehicle at rest after the evaluated legs, at a position [m, NED]."""
-    free, scratch = limits.clearance, zeros(3)
+    free = limits.clearance
     for i in range(regions.kinds.size):
         if not is_fast(regions, i, limits):
             continue
         v, later = regions.velocities[i], cost.traveled / limits.speed
         speed = norm(v)
         while later < _HORIZON:
-            clearance = clearance_at_position(regions, i, place - v * later, scratch) - uncertainty(regions, i)
+            clearance = clearance_at(regions, i, place - v * later) - uncertainty(regions, i)
             free = min(free, clearance)
             later += max((clearance - limits.clearance) / speed, _HORIZON / _PREDICTIONS)
     price = _STAY * _near_cost(free, limits)
@@ -188,14 +182,13 @@ def _stay_cost(end: Vector3, drift: Vector3, regions: PackedRegions, limits: Pat
     # An end that drifts [m/s, NED] with the goal is also evaluated at later positions, and against hard regions, which
     # it may meet there. The cost is the mean over these times.
     drifts = _drifts(drift)
-    samples, later, total, scratch = _STAY_SAMPLES if drifts else 1, 0.0, 0.0, zeros(3)
+    samples, later, total = _STAY_SAMPLES if drifts else 1, 0.0, 0.0
     for _ in range(samples):
         free = limits.clearance
         for i in range(regions.kinds.size):
             if regions.kinds[i] >= _ATTITUDE or (regions.hard[i] and not drifts):
                 continue
-            point = end + (drift - regions.velocities[i]) * later
-            clearance = clearance_at_position(regions, i, point, scratch)
+            clearance = clearance_at(regions, i, end + (drift - regions.velocities[i]) * later)
             if regions.hard[i]:
                 free = min(free, clearance - uncertainty(regions, i))
             else:

@@ -34,7 +34,7 @@ from controller.laws.deployable.path_planning.search import (
 )
 from controller.linear_algebra import norm
 from controller.regions.kinds import FIRST_OF_ATTITUDE
-from controller.regions.region_set import PackedRegions, clearance_at, clearance_at_position, evaluate_packed
+from controller.regions.region_set import PackedRegions, clearance_at, evaluate_packed
 from controller.stack_array import Array, Rows3, Shape, Vector3, Vector4, zeros
 from controller.state import State
 
@@ -190,7 +190,7 @@ def _choose_closed(
     """Choose the regions that the trees keep out of; a change of the choice restarts the trees."""
     # While hard regions block the path, only these are closed. Otherwise the costlier soft ones, or all, are closed
     # too, in turns that grow longer. A soft region near or around start or end of the path stays open.
-    turn, scratch = plan.closed_kinds, zeros(3)
+    turn = plan.closed_kinds
     if blocked:
         turn = _HARD
     elif turn == _HARD:
@@ -214,11 +214,8 @@ def _choose_closed(
     for i in range(regions.kinds.size):
         if regions.hard[i] or regions.kinds[i] >= FIRST_OF_ATTITUDE:
             continue
-        plan.closed[i] = turn == _ALL or regions.crossing_costs[i] > mean
-        for place in range(2):
-            clearance = clearance_at_position(regions, i, start if place == 0 else end, scratch)
-            if clearance < margin:
-                plan.closed[i] = False
+        is_near = clearance_at(regions, i, start) < margin or clearance_at(regions, i, end) < margin
+        plan.closed[i] = not is_near and (turn == _ALL or regions.crossing_costs[i] > mean)
 
 
 def _follow(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: PathLimits, period: float) -> None:

@@ -14,13 +14,11 @@ from numpy.typing import NDArray
 
 from controller.laws.deployable.gains import SPREADS
 from controller.linear_algebra import norm
-from controller.regions import Sphere
 from controller.regions.kinds import FIRST_OF_ATTITUDE
-from controller.regions.region_set import PackedRegions, clearance_at_position, clearance_of_sphere
+from controller.regions.region_set import PackedRegions, clearance_at
 from controller.stack_array import Array, Rows3, Shape, Vector3, zeros
 from controller.state import State
 
-_SPHERE = Sphere.kind
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _NODES = 512  # number of nodes at which a tree restarts
 _CHAIN = 64  # maximum number of points of a path before it is shortened
@@ -82,27 +80,22 @@ def uncertainty(regions: PackedRegions, i: int) -> float:
     return float(SPREADS * max(deviations[i, 0], deviations[i, 1], deviations[i, 2]))
 
 
-def clearance_of_all(point: Vector3, regions: PackedRegions, scratch: Vector3) -> float:
-    """Return the minimum clearance [m] of the hard regions of position at a point; `scratch` has shape (3,)."""
+def clearance_of_all(point: Vector3, regions: PackedRegions) -> float:
+    """Return the minimum clearance [m] of the hard regions of position at a point."""
     min_clearance = np.inf
     for i in range(regions.kinds.size):
         if regions.hard[i] and regions.kinds[i] < _ATTITUDE:
-            if regions.kinds[i] == _SPHERE:
-                clearance = clearance_of_sphere(regions, i, point)
-            else:
-                clearance = clearance_at_position(regions, i, point, scratch)
-            min_clearance = min(min_clearance, clearance - uncertainty(regions, i))
+            min_clearance = min(min_clearance, clearance_at(regions, i, point) - uncertainty(regions, i))
     return min_clearance
 
 
 def free_length(start: Vector3, end: Vector3, regions: PackedRegions, margin: float) -> float:
     """Return the length to which a line keeps a clearance of all hard regions at their present positions."""
     # with start, end [m, NED], margin [m], returns [m]
-    length, scratch = norm(end - start), zeros(3)
-    s, free = 0.0, -1.0
+    length, s, free = norm(end - start), 0.0, -1.0
     for _ in range(_LINE_SAMPLES):
         point = start + (end - start) * (s / length if length > 0.0 else 0.0)
-        clearance = clearance_of_all(point, regions, scratch)
+        clearance = clearance_of_all(point, regions)
         if not clearance >= margin:
             return float(free)
         if s >= length:
@@ -137,7 +130,7 @@ def look_for_path(
     """Grow one of the trees by at most one node; return the number of points of a path if one is found, else 0."""
     # with start, end [m, NED]
     margin, of_goal, of_vehicle, target = line_margin(limits), search.of_goal, search.of_vehicle, zeros(3)
-    if clearance_of_all(end, regions, target) < 0.0:  # no path leads there
+    if clearance_of_all(end, regions) < 0.0:  # no path leads there
         return 0
     move_root(of_goal, end, regions, margin)
     move_root(of_vehicle, start, regions, margin)
@@ -193,7 +186,7 @@ def move_root(tree: Tree, point: Vector3, regions: PackedRegions, margin: float)
         distance = norm(nodes[root] - point)
         if tree.size < _NODES and distance <= _MOVED:
             return
-        root_margin = min(_margin_at(tree, root, regions, margin), clearance_of_all(point, regions, zeros(3)) - _SLACK)
+        root_margin = min(_margin_at(tree, root, regions, margin), clearance_of_all(point, regions) - _SLACK)
         if tree.size < _NODES and is_line_free(nodes[root], point, regions, root_margin):
             new = tree.size
             nodes[new], parents[new], parents[root], tree.root = point, -1, new, new
@@ -211,7 +204,7 @@ def _margin_at(tree: Tree, node: int, regions: PackedRegions, margin: float) -> 
     """Return the clearance [m] required of lines from a node: a root may be closer, its lines not closer than it."""
     if node != tree.root:
         return margin
-    return min(margin, clearance_of_all(tree.nodes[node], regions, zeros(3)) - _SLACK)
+    return min(margin, clearance_of_all(tree.nodes[node], regions) - _SLACK)
 
 
 def nearest_node(tree: Tree, place: Vector3) -> int:
@@ -278,7 +271,7 @@ def _write_path(
             return 0
         chain[length] = search.of_goal.nodes[node]
         length, node = length + 1, search.of_goal.parents[node]
-    leg_margin = min(margin, clearance_of_all(start, regions, zeros(3)) - _SLACK)
+    leg_margin = min(margin, clearance_of_all(start, regions) - _SLACK)
     before, count = start, 0
     for i in range(length):
         if i + 1 < length and is_line_free(before, chain[i + 1], regions, leg_margin):
