@@ -45,22 +45,14 @@ from controller.law import (
     validate_quaternion,
 )
 from controller.laws.deployable import model
-from controller.laws.deployable.barrier import (
-    RegionObservation,
-    add_row,
-    gradient_rate,
-    observe_regions,
-    pose_gradient,
-)
+from controller.laws.deployable.barrier import RegionObservation, add_row, observe_gradient, observe_regions
 from controller.laws.deployable.model import Dynamics, Thrusters
 from controller.potential_field import Field, evaluate_field, set_point_error
 from controller.quadratic_program import Workspace
 from controller.quaternion import error, rotation_matrix
-from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions
 from controller.stack_array import Columns6, Matrix3, Vector3, Vector6, array, zeros
 
-_ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
 _PRICE = 1e-6  # price of slack: squared force that costs as much as the square of slack times mass
 
 
@@ -166,23 +158,18 @@ def _write_rows(memory: PidCbfMemory, regions: PackedRegions, free: Vector6, gai
     """Write the barrier of each hard region that the thrusters could violate; return the number of barriers."""
     # `free` is the acceleration without thrust.
     work, observation, rows = memory.program, memory.observation, 0
-    n, later = zeros(6), zeros(6)
+    n, relative = zeros(6), zeros(6)
     lower, upper, price = (
         memory.thrusters.lower,
         memory.thrusters.upper,
         _PRICE / square(memory.dynamics.translational_mass),
     )
     for i in range(regions.kinds.size):
-        of_attitude = regions.kinds[i] >= _ATTITUDE
-        if not regions.hard[i] or not pose_gradient(
-            observation.gradients, observation.rotation_gradients, i, of_attitude, n
-        ):
+        if not regions.hard[i]:
             continue
-        relative = memory.velocity.copy()
-        relative[:3] -= regions.velocities[i]
-        turning = 0.0
-        if pose_gradient(observation.later_gradients, observation.later_rotation_gradients, i, of_attitude, later):
-            turning = gradient_rate(regions.kinds[i], regions.signs[i], n, later, relative)
+        exists, turning = observe_gradient(observation, regions, i, memory.velocity, n, relative)
+        if not exists:
+            continue
         h, rate, drift_term = observation.clearances[i] - gains.margin, float(n @ relative), float(n @ free)
         rhs = -(gains.pull_in + gains.brake) * rate - gains.pull_in * gains.brake * h - drift_term - turning
         rows = add_row(work, rows, n, memory.acceleration, rhs, price, lower, upper)

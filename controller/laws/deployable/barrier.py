@@ -125,6 +125,20 @@ def gradient_rate(kind: int, sign: float, n: Vector6, later: Vector6, velocity: 
     return turning
 
 
+def observe_gradient(
+    o: RegionObservation, regions: PackedRegions, i: int, velocity: Vector6, n: Vector6, relative: Vector6
+) -> tuple[bool, float]:
+    """Write a region's gradient n over the pose, and the velocity relative to it; return False where n vanishes."""
+    # Return (dn/dt)^T v, too: v [m/s, rad/s] is relative to the region.
+    of_attitude, later, turning = regions.kinds[i] >= _ATTITUDE, zeros(6), 0.0
+    exists = pose_gradient(o.gradients, o.rotation_gradients, i, of_attitude, n)
+    relative[:] = velocity
+    relative[:3] -= regions.velocities[i]
+    if exists and pose_gradient(o.later_gradients, o.later_rotation_gradients, i, of_attitude, later):
+        turning = gradient_rate(regions.kinds[i], regions.signs[i], n, later, relative)
+    return exists, turning
+
+
 def _margin(n: Vector6, motion: Motion, deviations: Vector3, of_attitude: bool, gains: DeployableGains) -> float:
     """Return the margin [m, or rad] of a clearance with slope n, from the uncertainty of vehicle and region."""
     # `deviations` [m] are standard deviations of the region's position.
@@ -150,13 +164,14 @@ def write_rows(
     # with lower, upper [N]
     # Also write the lower bound of the clearances [m]: min(0, margin + h, psi / kappa). The `margin` covers an error of
     # the acceleration of rate kappa margin.
-    rows, bound, n, later_gradient = 0, 0.0, zeros(6), zeros(6)
-    desired = motion.free_acceleration[:3] + motion.thruster_acceleration[:3] @ work.nominal
+    rows, bound, n, relative = 0, 0.0, zeros(6), zeros(6)
+    face_normal, desired = zeros(3), motion.free_acceleration[:3] + motion.thruster_acceleration[:3] @ work.nominal
     for i in range(regions.kinds.size):
         of_attitude = regions.kinds[i] >= _ATTITUDE
-        if not regions.hard[i] or not pose_gradient(
-            observation.gradients, observation.rotation_gradients, i, of_attitude, n
-        ):
+        if not regions.hard[i]:
+            continue
+        exists, turning = observe_gradient(observation, regions, i, motion.velocity, n, relative)
+        if not exists:
             continue
         braking = gains.turning_deceleration if of_attitude else motion.braking
         margin = _margin(n, motion, regions.deviations[i], of_attitude, gains)
@@ -164,13 +179,6 @@ def write_rows(
         if of_attitude:  # weighted by the squared gradients over position [rad2/m2] and attitude [1]
             scale = scale * float(n[:3] @ n[:3]) + square(motion.inertia) * float(n[3:] @ n[3:])
         price = exponential(_LN_10 * (-_FIRM[0] - _FIRM[1] * weights[i])) / max(scale, 1e-9)
-        relative = motion.velocity.copy()
-        relative[:3] -= regions.velocities[i]
-        turning = 0.0
-        if pose_gradient(
-            observation.later_gradients, observation.later_rotation_gradients, i, of_attitude, later_gradient
-        ):
-            turning = gradient_rate(regions.kinds[i], regions.signs[i], n, later_gradient, relative)
         distance, reach, faces = observation.clearances[i], 0.0, 1
         path_velocity = relative[:3] + _IMPULSE * desired
         if not of_attitude and has_faces(regions.kinds[i], regions.signs[i]):
@@ -181,10 +189,10 @@ def write_rows(
                 faces = 1 + FACES
         for face in range(faces):  # the nearest face, and those ahead
             if face > 0:
-                distance = face_ahead(regions, i, motion.position, n[:3], path_velocity, reach, later_gradient[:3])
+                distance = face_ahead(regions, i, motion.position, n[:3], path_velocity, reach, face_normal)
                 if not distance < np.inf:
                     break
-                n[:3] = later_gradient[:3]
+                n[:3] = face_normal
                 margin = _margin(n, motion, regions.deviations[i], of_attitude, gains)
                 turning = 0.0  # the gradient of a flat face is constant
 

@@ -585,7 +585,10 @@ def test_passed_corners_of_a_full_path_are_dropped_and_its_length_is_measured():
 
 
 def test_distant_regions_are_not_reevaluated(monkeypatch):
-    """In plain Python: a ball that is farther than the way is long, once; one at half of that, again after a while."""
+    """In plain Python: a ball that is farther than the way is long, once; one at half of that, again after a while.
+
+    A soft one is also evaluated where the way ends.
+    """
     evaluated = []
     monkeypatch.setitem(
         add_cost.__globals__, "clearance_at", lambda *given: evaluated.append(1) or clearance_at(*given)
@@ -593,7 +596,7 @@ def test_distant_regions_are_not_reevaluated(monkeypatch):
     way = np.zeros((CORNERS + 1, 3))
     way[0] = START + np.array([6.0, 0.0, 0.0])
     for hard, aside, least, most in (
-        (True, 12.0, 1, 1), (True, 4.0, 2, 9), (False, 12.0, 1, 1), (False, 3.5, 2, 9)
+        (True, 12.0, 1, 1), (True, 4.0, 2, 9), (False, 12.0, 2, 2), (False, 3.5, 3, 10)
     ):  # fmt: skip
         evaluated.clear()
         regions = pack([Region("ball", Sphere((3.0, 0.2 + aside, 2.5), 0.3), "out", hard=hard)])

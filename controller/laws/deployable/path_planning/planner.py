@@ -27,15 +27,16 @@ from controller.laws.deployable.path_planning.cost import (
 )
 from controller.laws.deployable.path_planning.search import (
     SAMPLING_MARGIN,
+    Numbers5,
     PathLimits,
     Search,
-    limits_along,
     look_for_path,
+    sample_point,
 )
 from controller.linear_algebra import norm
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at, evaluate_packed
-from controller.stack_array import Array, Rows3, Shape, Vector3, Vector4, zeros
+from controller.stack_array import Array, Rows3, Shape, Vector3, Vector4, array, zeros
 from controller.state import State
 
 _LN_30 = 3.4011973816621555
@@ -60,7 +61,6 @@ _LESS = 0.5  # m by which random corners stay closer to start and end than rando
 
 
 Points = Annotated[Array, Shape(CORNERS + 1, 3)]
-Numbers5 = Annotated[Array, Shape(5)]
 Closed = Annotated[NDArray[np.bool_], Shape("n")]
 Generator = Annotated[NDArray[np.uint64], Shape(1)]
 
@@ -108,6 +108,18 @@ def uniform(random: NDArray[np.uint64]) -> float:
 def _bell_shaped(random: NDArray[np.uint64]) -> float:
     """Return a bell-shaped random number with mean 0 and standard deviation 1."""
     return (uniform(random) + uniform(random) + uniform(random) + uniform(random) - 2.0) * 1.7320508075688772
+
+
+def _random_offset(random: NDArray[np.uint64], shortest: float) -> Vector3:
+    """Return an offset in any direction, of a typical length from `shortest` to 30 times that [m]."""
+    reach = shortest * exponential(_LN_30 * uniform(random))
+    return reach * array(_bell_shaped(random), _bell_shaped(random), _bell_shaped(random))
+
+
+def _random_corner(plan: PathPlan, start: Vector3) -> Vector3:
+    """Return a random point about the start and the end of the path [m, NED]."""
+    fractions = array(uniform(plan.random), uniform(plan.random), uniform(plan.random))
+    return sample_point(start, plan.path[plan.points - 1], plan.search.sampling_margin - _LESS, fractions)
 
 
 def nearest_goal_point(goal: PackedRegions, position: Vector3, depth: float, end: Vector3) -> None:
@@ -310,9 +322,7 @@ def _choose_wait(plan: PathPlan, start: Vector3) -> None:
     for i in range(CORNERS, added - 1, -1):
         plan.candidate[i] = plan.path[i - added]
     center = plan.path[0] if plan.waits else start
-    reach = 0.2 * exponential(_LN_30 * uniform(plan.random))
-    for axis in range(3):
-        plan.candidate[0, axis] = center[axis] + reach * _bell_shaped(plan.random)
+    plan.candidate[0] = center + _random_offset(plan.random, 0.2)
     plan.candidate[0, 2] = max(plan.candidate[0, 2], min(start[2], 0.0))
     plan.candidate_points, plan.candidate_waits = plan.points + added, True
 
@@ -327,7 +337,6 @@ def _length(path: Rows3, count: int, start: Vector3) -> float:
 def _mutate_path(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: PathLimits) -> None:
     """Write a mutation of the path into `candidate`."""
     path, candidate, random = plan.path, plan.candidate, plan.random
-    sampling_margin = plan.search.sampling_margin - _LESS
     candidate[:] = path
     count = plan.points
     last = count - 1
@@ -338,9 +347,7 @@ def _mutate_path(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: Pa
             candidate[0] = candidate[last]
             count = 1
     elif choice < 0.2:  # another end, a little off or far
-        reach = 0.02 * exponential(_LN_30 * uniform(random))
-        for axis in range(3):
-            candidate[last, axis] += reach * _bell_shaped(random)
+        candidate[last] += _random_offset(random, 0.02)
         nearest_goal_point(goal, candidate[last], limits.depth, candidate[last])
     elif choice < 0.3 and count > 1:  # remove a corner
         drop = int(uniform(random) * last)
@@ -349,21 +356,15 @@ def _mutate_path(plan: PathPlan, start: Vector3, goal: PackedRegions, limits: Pa
         count -= 1
     elif choice < 0.65 and count > 1:  # move a corner
         corner = int(uniform(random) * last)
-        reach = 0.03 * exponential(_LN_30 * uniform(random))
-        for axis in range(3):
-            candidate[corner, axis] += reach * _bell_shaped(random)
+        candidate[corner] += _random_offset(random, 0.03)
     elif choice < 0.9 and count <= CORNERS:  # add a corner
         inserted = int(uniform(random) * count)
         for i in range(count, inserted, -1):
             candidate[i] = candidate[i - 1]
-        for axis in range(3):
-            low, high = limits_along(axis, start, path[last], sampling_margin)
-            candidate[inserted, axis] = low + uniform(random) * (high - low)
+        candidate[inserted] = _random_corner(plan, start)
         count += 1
     else:  # one corner alone, anywhere about
         candidate[1] = path[last]
-        for axis in range(3):
-            low, high = limits_along(axis, start, path[last], sampling_margin)
-            candidate[0, axis] = low + uniform(random) * (high - low)
+        candidate[0] = _random_corner(plan, start)
         count = 2
     plan.candidate_points = count

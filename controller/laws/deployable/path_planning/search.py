@@ -16,7 +16,7 @@ from controller.laws.deployable.gains import SPREADS
 from controller.linear_algebra import norm
 from controller.regions.kinds import FIRST_OF_ATTITUDE
 from controller.regions.region_set import PackedRegions, clearance_at
-from controller.stack_array import Array, Rows3, Shape, Vector3, zeros
+from controller.stack_array import Array, Rows3, Shape, Vector3
 from controller.state import State
 
 _ATTITUDE = FIRST_OF_ATTITUDE  # first kind of region that depends on attitude
@@ -37,6 +37,7 @@ _BEFORE_A_WALL = 0.8  # fraction of the free length of a blocked line at which a
 
 
 Nodes = Annotated[Array, Shape(_NODES, 3)]
+Numbers5 = Annotated[Array, Shape(5)]
 Chain = Annotated[Array, Shape(_CHAIN, 3)]
 Parents = Annotated[NDArray[np.int64], Shape(_NODES)]
 
@@ -110,73 +111,62 @@ def is_line_free(start: Vector3, end: Vector3, regions: PackedRegions, margin: f
     return free_length(start, end, regions, margin) >= norm(end - start)
 
 
-def limits_along(axis: int, start: Vector3, end: Vector3, margin: float) -> tuple[float, float]:
-    """Return the range of random points along an axis [m, NED]: `margin` beyond both ends, but below the surface."""
-    low, high = min(start[axis], end[axis]), max(start[axis], end[axis])
-    if axis == 2:
-        return max(low - margin, min(low, 0.0)), high + margin
-    return low - margin, high + margin
+def sample_point(start: Vector3, end: Vector3, margin: float, fractions: Vector3) -> Vector3:
+    """Return a point [m, NED] of the box about start and end: `margin` beyond both, but below the surface."""
+    low, high = np.minimum(start, end) - margin, np.maximum(start, end) + margin
+    low[2] = max(low[2], min(start[2], end[2], 0.0))
+    return low + fractions * (high - low)
 
 
 def look_for_path(
     search: Search,
     start: Vector3,
     end: Vector3,
-    random_numbers: Array,
+    random_numbers: Numbers5,
     regions: PackedRegions,
     limits: PathLimits,
     path: Rows3,
 ) -> int:
     """Grow one of the trees by at most one node; return the number of points of a path if one is found, else 0."""
     # with start, end [m, NED]
-    margin, of_goal, of_vehicle, target = line_margin(limits), search.of_goal, search.of_vehicle, zeros(3)
+    margin, of_goal, of_vehicle = line_margin(limits), search.of_goal, search.of_vehicle
     if clearance_of_all(end, regions) < 0.0:  # no path leads there
         return 0
     move_root(of_goal, end, regions, margin)
     move_root(of_vehicle, start, regions, margin)
     search.sampling_margin = min(_GROWS * search.sampling_margin, SAMPLING_MARGIN[1])
     reach = max(_REACH[0], _REACH[1] * norm(start - end))
-    if search.turn == 0:
-        search.turn = 1
-        _draw_target(of_goal, start, end, start, search.sampling_margin, reach, random_numbers, target)
-        grown = extend_tree(of_goal, target, reach, regions, margin)
-        if grown < 0:
-            return 0
-        met = nearest_node(of_vehicle, of_goal.nodes[grown])
-        if not _sees(of_vehicle, met, of_goal.nodes[grown], regions, margin):
-            return 0
-        return _write_path(search, grown, met, start, regions, margin, path)
-    search.turn = 0
-    _draw_target(of_vehicle, start, end, end, search.sampling_margin, reach, random_numbers, target)
-    grown = extend_tree(of_vehicle, target, reach, regions, margin)
+    from_goal = search.turn == 0
+    search.turn = 1 - search.turn
+    tree, other = (of_goal, of_vehicle) if from_goal else (of_vehicle, of_goal)
+    target = _draw_target(tree, start, end, from_goal, search.sampling_margin, reach, random_numbers)
+    grown = extend_tree(tree, target, reach, regions, margin)
     if grown < 0:
         return 0
-    met = nearest_node(of_goal, of_vehicle.nodes[grown])
-    if not _sees(of_goal, met, of_vehicle.nodes[grown], regions, margin):
+    met = nearest_node(other, tree.nodes[grown])
+    if not _sees(other, met, tree.nodes[grown], regions, margin):
         return 0
-    return _write_path(search, met, grown, start, regions, margin, path)
+    node_of_goal, node_of_vehicle = (grown, met) if from_goal else (met, grown)
+    return _write_path(search, node_of_goal, node_of_vehicle, start, regions, margin, path)
 
 
 def _draw_target(
     tree: Tree,
     start: Vector3,
     end: Vector3,
-    other: Vector3,
+    from_goal: bool,
     sampling_margin: float,
     reach: float,
-    random_numbers: Array,
-    target: Vector3,
-) -> None:
-    """Write the point towards which a tree grows: the other tree's root, a point near a node, or any point."""
+    random_numbers: Numbers5,
+) -> Vector3:
+    """Return the point towards which a tree grows: the other tree's root, a point near a node, or any point."""
     if random_numbers[3] < _TO_OTHER:
-        target[:] = other
-    elif random_numbers[3] < _TO_OTHER + _NEAR_A_NODE:
+        return start.copy() if from_goal else end.copy()
+    if random_numbers[3] < _TO_OTHER + _NEAR_A_NODE:
         node = int(random_numbers[4] * tree.size)
-        target[:] = tree.nodes[node] + reach * (2.0 * random_numbers[:3] - 1.0)
-    else:
-        for axis in range(3):
-            low, high = limits_along(axis, start, end, sampling_margin)
-            target[axis] = low + random_numbers[axis] * (high - low)
+        near: Vector3 = tree.nodes[node] + reach * (2.0 * random_numbers[:3] - 1.0)
+        return near
+    return sample_point(start, end, sampling_margin, random_numbers[:3])
 
 
 def move_root(tree: Tree, point: Vector3, regions: PackedRegions, margin: float) -> None:
