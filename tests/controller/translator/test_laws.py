@@ -1,4 +1,4 @@
-"""Shipped laws as C against their Python text: run by Python itself, and by Numba."""
+"""Shipped laws as C against their Python text, run by Python itself, and as C by other compilers."""
 
 import subprocess
 import sys
@@ -13,7 +13,6 @@ from controller.compiling.library import library_of
 from controller.stack_array import interpret
 from tests.controller.translator.building import Called, compiled
 from tests.controller.translator.flights import Flight, same_bits
-from tests.controller.translator.numba_reference import by_numba
 
 pytestmark = pytest.mark.timeout(900)  # compilers take minutes for a law beside other tests
 
@@ -28,28 +27,23 @@ def library(request, tmp_path_factory):
     return request.param, text, compiled(text, tmp_path_factory.mktemp(request.param))
 
 
-def first_difference(law, library, steps, seed, compiled_by=None):
-    """Return the first step after which C and the Python text differ in forces or memory; None if none does.
+def first_difference(law, library, steps, seed, reference=None):
+    """Return the first step after which C and a reference differ in forces or memory; None if none does.
 
-    Without a library it is C as laws are flown.
+    Without a library it is C as laws are flown; without another library, Python itself is the reference.
     """
     own, other = Flight(law, seed), Flight(law, seed)
     call = Called(library, other.arguments) if library else BoundCall(other.function, other.arguments).call
-    plain = compiled_by(own.function) if compiled_by else lambda *given: interpret(own.function, given)
+    plain = Called(reference, own.arguments) if reference else lambda: interpret(own.function, own.arguments)
     with np.errstate(all="ignore"):
         for k in range(steps):
             own.advance()
             other.advance()
-            plain(*own.arguments)
+            plain()
             call()
             if not (same_bits(own.forces, other.forces) and same_bits(own.memory, other.memory)):
                 return k
     return None
-
-
-def by_library(built):
-    """Return a compiler of functions for `first_difference`: to the function of a library."""
-    return lambda _: lambda *arguments: Called(built, arguments)()
 
 
 @pytest.mark.medium(fast=1)
@@ -60,11 +54,10 @@ def test_forces_and_memory_are_those_of_python_itself(law):
 
 
 @pytest.mark.slow
-def test_forces_and_memory_are_those_of_another_reference_for_long(library):
+def test_forces_and_memory_are_those_of_python_for_long(library):
     law, _, built = library
-    # Numba takes minutes to compile the deployable law: Python itself runs it, for fewer steps
-    steps, reference = (700, None) if law == "deployable" else (20_000, by_numba)
-    assert [first_difference(law, built, steps, seed, reference) for seed in range(2, 5)] == [None] * 3
+    steps = 700 if law == "deployable" else 1700  # of which Python runs a hundred a second
+    assert [first_difference(law, built, steps, seed) for seed in range(2, 5)] == [None] * 3
 
 
 @pytest.mark.slow
@@ -74,8 +67,7 @@ def test_forces_and_memory_are_those_of_another_reference_for_long(library):
 def test_any_optimization_gives_the_same_bits(library, flags, tmp_path):
     law, text, built = library
     other = compiled(text, tmp_path, *flags)
-    steps = 20_000 if law == "deployable" else 3000  # others are held against Numba for as long
-    assert first_difference(law, other, steps, 6, by_library(built)) is None
+    assert first_difference(law, other, 20_000, 6, built) is None
 
 
 @pytest.mark.slow
@@ -83,7 +75,7 @@ def test_another_compiler_gives_the_same_bits(library, tmp_path):
     pytest.importorskip("ziglang", reason="the build extra is not installed")
     law, text, built = library
     other = compiled(text, tmp_path, compiler=[sys.executable, "-m", "ziglang", "cc"])
-    assert first_difference(law, other, 3000, 7, by_library(built)) is None
+    assert first_difference(law, other, 3000, 7, built) is None
 
 
 @pytest.mark.parametrize("law", sorted(LAWS))
