@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from functools import partial
 from importlib.resources import files
 
 from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.export.code_functions import in_c
-from fuzzy_arbiter.export.program import TABLES, Assign, Program, Return, Statement, Sweep, formatted, program
+from fuzzy_arbiter.export.heights import ENDS, NODES, WEIGHTS
+from fuzzy_arbiter.export.program import TABLES, Program, program
+from fuzzy_arbiter.export.statements import FUNCTIONS, Assign, Return, Statement, Sweep, formatted
 
 
 def to_c(system: System) -> str:
@@ -26,8 +29,9 @@ def to_c(system: System) -> str:
         0, or -i if the i-th input is not in its universe, or k if no rule fires for the k-th output and that has no
         default, where a call gives NaN; a comment has their names. NAME is the system's, with an underscore for each
         sign that C has not in names. Files of different names go into one program. It gives what the arbiter's own
-        engine does, to the last bit if the compiler does not contract operations (``-ffp-contract=off``) and keeps to
-        the rules of NaN (no ``-ffast-math``); functions of ``math.h`` to their rounding.
+        engine does, within its bound; where that is exact, to the last bit if the compiler does not contract operations
+        (``-ffp-contract=off``) and keeps to the rules of NaN (no ``-ffast-math``); functions of ``math.h`` to their
+        rounding.
 
     Examples
     --------
@@ -71,6 +75,19 @@ def _file(code: Program) -> Iterator[str]:
         for name in ("clip", "scale"):
             if f"centroid_of_{name}" in text:
                 yield (files("fuzzy_arbiter.export") / f"{name}.c").read_text().rstrip()
+    if any(code.heights):
+        source = (files("fuzzy_arbiter.export") / "heights.c").read_text().rstrip()
+        for word, numbers in (("NODES", NODES), ("WEIGHTS", WEIGHTS), ("ENDS", ENDS)):
+            source = source.replace(word, ", ".join(map(repr, numbers)))
+        source = source.replace("PANELS", str(max(len(one.edges) for one in code.heights if one)))
+        yield source
+    for k, one in enumerate(code.heights, 1):
+        if one is not None:
+            yield f"\nstatic const double EDGES_{k}[] = {{{', '.join(map(repr, one.edges))}}};\n"
+            yield f"static double height_{k}(double x, const double *cuts)\n{{"
+            known = {"x"}
+            yield from formatted(one.statements, partial(_simple, known=known), _branch, "}")
+            yield "}"
     yield "\n/* Fills the outputs and returns 0. Else it leaves them as they are, and returns"
     yield from (
         f" * {-i:3}  {_safe(v.name)} is not in its universe, or no number" for i, v in enumerate(system.inputs, 1)
@@ -101,11 +118,16 @@ def _simple(statement: Statement, known: set[str]) -> Iterator[str]:
             kind = "" if name in known else "double "
             known.add(name)
             yield f"{kind}{name} = {expression};" + (f" /* {_safe(words)} */" if words else "")
-        case Sweep(name, k, cuts, scales):
+        case Sweep(name, k, cuts, method):
+            yield f"const double cuts_{k}[] = {{{', '.join(cuts)}}};"
+            if method not in ("clipped", "scaled"):
+                function, side = FUNCTIONS[method]
+                panels = f"sizeof EDGES_{k} / sizeof *EDGES_{k} - 1"
+                yield f"{name} = {function}(height_{k}, cuts_{k}, EDGES_{k}, {panels}, {side});"
+                return
             pieces = f"sizeof BREAKPOINTS_{k} / sizeof *BREAKPOINTS_{k} - 1"
             tables = f"{pieces}, {', '.join(f'{table}_{k}' for table in TABLES)}"
-            yield f"const double cuts_{k}[] = {{{', '.join(cuts)}}};"
-            yield f"{name} = centroid_of_{'scaled' if scales else 'clipped'}(cuts_{k}, {len(cuts)}, {tables});"
+            yield f"{name} = centroid_of_{method}(cuts_{k}, {len(cuts)}, {tables});"
         case Return(status):
             yield f"return {status};"
 

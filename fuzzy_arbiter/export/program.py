@@ -1,93 +1,54 @@
-"""Exported code as statements, before they are written in a language; C and Python share the expressions."""
+"""Exported code as statements, before they are written in a language."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial, reduce
-from itertools import accumulate
+from functools import partial
 
 from fuzzy_arbiter.checks import shown
 from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines import choose
 from fuzzy_arbiter.engines.clipped_centroid import Outline, outline
+from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
 from fuzzy_arbiter.engines.clipped_curves import ClippedCurves
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.engine import Engine
-from fuzzy_arbiter.engines.firing import Logic
+from fuzzy_arbiter.engines.firing import Logic, Slot
+from fuzzy_arbiter.engines.panels import smooth_panels
 from fuzzy_arbiter.engines.quadrature import Quadrature
 from fuzzy_arbiter.engines.rational_pieces import Piece
 from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
 from fuzzy_arbiter.export.code_functions import called
-from fuzzy_arbiter.hierarchy import DEGREE
+from fuzzy_arbiter.export.statements import (
+    JOINS,
+    Assign,
+    Choose,
+    Expressions,
+    Return,
+    Statement,
+    Sweep,
+    chosen,
+    degree_of,
+    texts_of,
+)
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.shapes import Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
-from fuzzy_arbiter.terms.expressions import code
-from fuzzy_arbiter.terms.norms import AGGREGATIONS, T_NORMS
-from fuzzy_arbiter.terms.values import Formula, Value
+from fuzzy_arbiter.terms.expressions import Expression, code
+from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.values import Value
 
-_JOINS = {name: f"{norm.function}({{}}, {{}})" for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
-_JOINS |= {"prod": "({} * {})", "sum": "({} + {})"}
-_DEEPEST = 20  # maximum number of nested parentheses; parsers accept some hundred
 TABLES = tuple(map(str.upper, Outline._fields))  # names of an outline's tables in code
-_LONGEST = 16  # maximum number of branches of one choice; parsers accept some hundred
 
 
 @dataclass(frozen=True, slots=True)
-class Assign:
-    """Assign an expression to a name; `words` is its comment."""
+class Heights:
+    """The joined terms of an output at a position ``x``, for ``cuts``, and the edges of panels that suit the terms."""
 
-    name: str
-    expression: str
-    words: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class Choose:
-    """Run the first branch whose condition holds; an empty condition always holds."""
-
-    branches: tuple[tuple[str, tuple[Statement, ...]], ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Sweep:
-    """Assign the centroid of the k-th output, whose terms are cut at these numbers."""
-
-    name: str
-    k: int
-    cuts: tuple[str, ...]
-    scales: bool  # True if a cut scales its term, False if it clips it
-
-
-@dataclass(frozen=True, slots=True)
-class Return:
-    """Return a status."""
-
-    status: int
-
-
-Statement = Assign | Choose | Sweep | Return
-
-
-def formatted(
-    statements: Iterable[Statement],
-    simple: Callable[[Statement], Iterable[str]],
-    branch: Callable[[int, str], str],
-    end: str,
-    indent: str = "    ",
-) -> Iterator[str]:
-    """Format statements: `simple` one without branches, `branch` the head of the i-th branch, `end` those of all."""
-    for statement in statements:
-        if isinstance(statement, Choose):
-            for i, (condition, inner) in enumerate(statement.branches):
-                yield indent + branch(i, condition)
-                yield from formatted(inner, simple, branch, end, indent + "    ")
-            if end:
-                yield indent + end
-        else:
-            yield from (indent + line for line in simple(statement))
+    statements: tuple[Statement, ...]
+    edges: tuple[float, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,62 +59,49 @@ class Program:
     statements: tuple[Statement, ...]  # statements from the inputs ``x1``, ``x2``, .. to the outputs ``y1``, ``y2``,
     # outlines of the outputs, if they are swept; None for one of values; empty where there is a closed form
     outlines: tuple[Outline | None, ...]
+    heights: tuple[Heights | None, ...]  # the same for outputs whose terms are joined otherwise
     functions: tuple[str, ...]  # names of the functions that the statements call
 
     @property
     def mathematical(self) -> bool:
         """True if the program needs functions beyond arithmetic."""
         plain = {"least", "greatest", "probabilistic_sum"}
-        return not set(self.functions) <= plain or any(o.weighted for o in self.system.outputs)
+        return not set(self.functions) <= plain or any(o.weighted for o in self.system.outputs) or any(self.heights)
 
 
 def program(system: System) -> Program:
     """Return the program of a system: the closed form where it exists, else the sweep."""
     if not isinstance(system, System):
         raise DefinitionError(f"system is {shown(system)}, expected a System, such as arbiter.system")
+    for output in system.outputs:
+        if output.lock_previous:
+            what = f"output {output.name!r} keeps its previous value"
+            raise UnsupportedError(f"export: {what}, which a function of one sample has not")
     engine, _ = choose(system, "auto")
-    _require_sayable(system, engine)
     closed = isinstance(engine, ClosedEngine)
     statements = (*_inputs(system), *(_closed(engine) if isinstance(engine, ClosedEngine) else _swept(engine)))
-    outlines = () if closed else tuple(None if o.weighted else outline(o) for o in system.outputs)
+    pairs = [] if closed else list(zip(system.outputs, engine.defuzzifiers, strict=True))
+    outlines = tuple(outline(output) if isinstance(one, Centroid) else None for output, one in pairs)
+    heights = tuple(
+        _heights(output, slots) if isinstance(one, ClippedCurves | Quadrature) and slots else None
+        for (output, one), slots in zip(pairs, engine.firing.slots, strict=False)
+    )
     total = (*statements, *_shared(system))
-    return Program(system, total, outlines, tuple(called(_texts(total))))
+    texts = texts_of([*total, *(statement for one in heights if one for statement in one.statements)])
+    return Program(system, total, outlines, heights, tuple(called(texts)))
 
 
-def _texts(statements: Sequence[Statement]) -> Iterator[str]:
-    """Yield all expressions."""
-    for statement in statements:
-        if isinstance(statement, Assign):
-            yield statement.expression
-        elif isinstance(statement, Choose):
-            for condition, inner in statement.branches:
-                yield condition
-                yield from _texts(inner)
-
-
-def _require_sayable(system: System, engine: Engine) -> None:
-    """Require that the exported code supports a system."""
-    for output, slots, defuzzifier in zip(system.outputs, engine.firing.slots, engine.defuzzifiers, strict=True):
-        what = f"export: output {output.name!r}"
-        if output.lock_previous:
-            raise UnsupportedError(f"{what} keeps its previous value, which a function of one sample has not")
-        if isinstance(defuzzifier, ClippedCurves | Quadrature):
-            raise UnsupportedError(
-                f"{what} has no exact sum over pieces; expected the centroid of piecewise-linear terms under min or "
-                "prod, joined by max, or values"
-            )
-        for term in output.terms if output.weighted else ():
-            if not isinstance(term.shape, Value):
-                raise UnsupportedError(f"{what}: term {term.name!r} is {term.kind}, expected a value")
-            names = term.shape.expression(variable_names(system.inputs), variable_names(system.outputs)).names
-            if names & set(variable_names(system.outputs)):
-                raise UnsupportedError(f"{what}: term {term.name!r} asks for another output, expected inputs alone")
-        if len({slot.implication for slot in slots}) > 1:
-            raise UnsupportedError(f"{what} has rules of several implications, expected one")
-    outputs = set(variable_names(system.outputs))
-    for i, rule in enumerate(system.rules, 1):
-        if any(s.variable in outputs for s in rule.condition.terms()):
-            raise UnsupportedError(f"export: R{i} asks for an output, expected conditions on inputs")
+def _heights(output: Output, slots: Sequence[Slot]) -> Heights:
+    """Return the height of an output's joined terms as statements."""
+    statements, logic = list[Statement](), Expressions()
+    if drastic := {output.aggregation, *(slot.implication for slot in slots)} & {"drastic_sum", "drastic_product"}:
+        raise UnsupportedError(f"export: output {output.name!r} joins terms by {drastic.pop()}, expected another norm")
+    for j in sorted({slot.term for slot in slots}):
+        statements += chosen(f"d{j}", degree_of("x", output.terms[j].membership, output.universe), output.term_names[j])
+    implied = [logic.apply(JOINS[slot.implication], f"cuts[{i}]", f"d{slot.term}") for i, slot in enumerate(slots)]
+    statements += logic.assign("height", logic.join(output.aggregation, implied), output.name)
+    edges = smooth_panels(output.universe, [output.terms[slot.term].membership for slot in slots])
+    return Heights((*statements, Return("height")), tuple(edges.tolist()))
 
 
 def _inputs(system: System) -> Iterator[Statement]:
@@ -169,7 +117,8 @@ def _inputs(system: System) -> Iterator[Statement]:
 class _Degrees:
     """Degrees of the inputs' terms, each worked out once."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, concluded: Callable[[Is], str] = str) -> None:
+        self.concluded = concluded
         self._terms = {(v.name, t.name): (i, v, t.membership) for i, v in enumerate(system.inputs, 1) for t in v.terms}
         self._names: dict[tuple[str, str], str] = {}
         self.statements: list[Statement] = []
@@ -177,106 +126,20 @@ class _Degrees:
     def name_of(self, statement: Is) -> str:
         """Return the name of a degree."""
         key = (statement.variable, statement.term)
+        if key not in self._terms:  # of an output: its degree by the rules before this one
+            return self.concluded(statement)
         if key not in self._names:
             name = f"m{len(self._names) + 1}"
             i, variable, shape = self._terms[key]
-            values = _degree(f"x{i}", shape, variable.universe)
-            self.statements += _chosen(name, values, str(statement))
+            values = degree_of(f"x{i}", shape, variable.universe)
+            self.statements += chosen(name, values, str(statement))
             self._names[key] = name
         return self._names[key]
 
 
-class _Expressions:
-    """Format operators on degrees; a deep expression is assigned to a name before the statement that uses it."""
-
-    def __init__(self) -> None:
-        self._names = 0
-        self._waiting: list[Statement] = []
-
-    def apply(self, template: str, *degrees: str) -> str:
-        """Return the expression of an operator's value."""
-        text = template.format(*degrees)
-        depth = max(accumulate((sign == "(") - (sign == ")") for sign in text))
-        if depth <= _DEEPEST:
-            return text
-        self._names += 1
-        self._waiting.append(Assign(f"t{self._names}", text))
-        return f"t{self._names}"
-
-    def join(self, kind: str, degrees: Iterable[str]) -> str:
-        """Return the expression that joins several degrees, from left to right."""
-        return reduce(partial(self.apply, _JOINS[kind]), degrees)
-
-    def assign(self, name: str, expression: str, words: str) -> Iterator[Statement]:
-        """Assign a value to a name, after the assignments that it needs."""
-        yield from self._waiting
-        self._waiting.clear()
-        yield Assign(name, expression, words)
-
-
-def _chosen(name: str, values: Sequence[tuple[str, str]], words: str) -> Iterator[Statement]:
-    """Give a name to the first value of which the condition holds."""
-    if len(values) == 1:
-        yield Assign(name, values[0][1], words)
-    else:
-        yield Assign(name, "0.0", words)
-        yield _first(name, values)
-
-
-def _first(name: str, values: Sequence[tuple[str, str]]) -> Choose:
-    """Give a name to the first value of which the condition holds, by halves where there are many."""
-    if len(values) <= _LONGEST:
-        return Choose(tuple((condition, (Assign(name, value),)) for condition, value in values))
-    half = next(i for i in range(len(values) // 2, len(values)) if " < " in values[i][0])  # rises from one to the next
-    condition, value = values[half]
-    below, above = (*values[:half], ("", value)), values[half + 1 :]
-    return Choose(((condition, (_first(name, below),)), ("", (_first(name, above),))))
-
-
-def _degree(x: str, shape: Membership, universe: tuple[float, float]) -> list[tuple[str, str]]:
-    """Format a membership function in its universe with the operations of the shape itself."""
-    if isinstance(shape, Curve):
-        return [
-            ("" if end == math.inf else f"{x} < {end!r}", f"least(greatest({code(tree, {'x': x})}, 0.0), 1.0)")
-            for end, tree in zip(shape.ends, shape.trees, strict=True)
-        ]
-    if isinstance(shape, Formula):
-        return [("", f"least(greatest({code(shape.expression(['x']).tree, {'x': x})}, 0.0), 1.0)")]
-    assert isinstance(shape, Shape)
-    if shape == DEGREE and universe == (0.0, 1.0):
-        return [("", x)]
-    knots: list[tuple[float, float, float]] = []  # position, degree left and right of it
-    for x0, degree in shape.points:
-        if knots and knots[-1][0] == x0:
-            knots[-1] = (x0, knots[-1][1], degree)
-        else:
-            knots.append((x0, degree, degree))
-    x0, left, right = knots[0]
-    if len(knots) == 1 and left == right:
-        return [("", repr(left))]
-    values = [(f"{x} < {x0!r}", repr(left)), (f"{x} == {x0!r}", repr(max(left, right)))]
-    if left >= right:
-        values = [(f"{x} <= {x0!r}", repr(left))]
-    for (a, _, start), (x0, left, right) in zip(knots, knots[1:], strict=False):
-        values.append((f"{x} < {x0!r}", _line(x, a, start, x0 - a, left - start)))
-        values.append((f"{x} == {x0!r}", repr(max(left, right))))
-    if values[-1][1] == repr(right):
-        del values[-1]
-    return [*values, ("", repr(right))]
-
-
-def _line(x: str, a: float, start: float, run: float, rise: float) -> str:
-    """Format start + rise * ((x - a) / run), without operations that change no bit."""
-    fraction = (x if a == 0.0 else f"({x} - {a!r})") + ("" if run == 1.0 else f" / {run!r}")
-    if rise == 0.0:
-        return repr(start)
-    climb = fraction if rise == 1.0 else f"{rise!r} * ({fraction})" if " " in fraction else f"{rise!r} * {fraction}"
-    return climb if start == 0.0 else f"{start!r} + {climb}"
-
-
 def _closed(engine: ClosedEngine) -> Iterator[Statement]:
     """Compute h of each output, and C(h)."""
-    degrees, logic = _Degrees(engine.system), _Expressions()
+    degrees, logic = _Degrees(engine.system), Expressions()
     values: list[Statement] = []
     unclaimed = ""
     for k, (output, clauses) in enumerate(zip(engine.system.outputs, engine.clauses, strict=True), 1):
@@ -295,7 +158,7 @@ def _closed(engine: ClosedEngine) -> Iterator[Statement]:
     for k, (output, forms) in enumerate(zip(engine.system.outputs, engine.scaled, strict=True), 1):
         ends = [*(f"h{k} < {piece.start!r}" for piece in forms[1:]), ""]
         values_of_h = [_piece(piece, f"h{k}") for piece in forms]
-        yield from _chosen(f"y{k}", list(zip(ends, values_of_h, strict=True)), output.name)
+        yield from chosen(f"y{k}", list(zip(ends, values_of_h, strict=True)), output.name)
         if engine.clips:
             yield Assign(f"y{k}", f"least(greatest(y{k}, 0.0), 1.0)")
 
@@ -323,35 +186,55 @@ def _horner(coefficients: Sequence[float], t: str) -> str:
 def _swept(engine: Engine) -> Iterator[Statement]:
     """Compute the strength of each rule, the cut of each output's term, and the centroids."""
     system = engine.system
-    degrees, logic = _Degrees(system), _Expressions()
+    logic = Expressions()
     rules: list[Statement] = []
-    for i, rule in enumerate(system.rules, 1):
+
+    def concluded(statement: Is) -> str:
+        strengths = [f"r{i}" for i, rule in enumerate(system.rules[: count - 1], 1) if statement in rule.conclusions]
+        aggregation = next(o.aggregation for o in system.outputs if o.name == statement.variable)
+        return logic.join(aggregation, strengths or ["0.0"])
+
+    degrees = _Degrees(system, concluded)
+    for count, rule in enumerate(system.rules, 1):
         norms = rule.operators or system
         operators: Logic[str] = Logic(
-            partial(logic.apply, _JOINS[norms.conjunction]),
-            partial(logic.apply, _JOINS[norms.disjunction]),
+            partial(logic.apply, JOINS[norms.conjunction]),
+            partial(logic.apply, JOINS[norms.disjunction]),
             partial(logic.apply, "(1.0 - {})"),
             lambda word, degree: logic.apply(f"{word}({{}})", degree),
             "1.0",
         )
         degree = operators.degree(rule.condition, degrees.name_of)
         weighted = degree if rule.weight == 1.0 else f"{degree} * {rule.weight!r}"
-        rules += logic.assign(f"r{i}", weighted, str(rule))
+        rules += logic.assign(f"r{count}", weighted, str(rule))
     yield from degrees.statements
     yield from rules
     for k, output in enumerate(system.outputs, 1):
         cuts = []
-        for j, term in enumerate(output.term_names, 1):
-            fires = [f"r{i}" for i, rule in enumerate(system.rules, 1) if output[term] in rule.conclusions]
+        slots = engine.firing.slots[k - 1]
+        for j, slot in enumerate(slots, 1):
+            fires = [f"r{i + 1}" for i in slot.rules] or ["0.0"]
             cuts.append(f"c{k}_{j}")
-            yield from logic.assign(cuts[-1], logic.join(output.aggregation, fires or ["0.0"]), str(output[term]))
+            words = str(output[output.term_names[slot.term]])
+            yield from logic.assign(cuts[-1], logic.join(output.aggregation, fires), words)
         default = Return(k) if output.default is None else Assign(f"y{k}", repr(output.default))
         yield Assign(f"y{k}", "0.0", output.name)
         any_fires = " or ".join(f"{cut} > 0.0" for cut in cuts)
-        scales = any(slot.implication == "prod" for slot in engine.firing.slots[k - 1])
-        fired = _valued(output, k, cuts, system) if output.weighted else (Sweep(f"y{k}", k, tuple(cuts), scales),)
-        yield Choose(((any_fires, fired), ("", (default,))))
-        if output.weighted:  # the value may be NaN or infinite
+        method: str = output.defuzzifier
+        if isinstance(engine.defuzzifiers[k - 1], Centroid):
+            method = "scaled" if slots[0].implication == "prod" else "clipped"
+        fired = _valued(output, k, cuts, system) if output.weighted else (Sweep(f"y{k}", k, tuple(cuts), method),)
+        points = [
+            (repr(shape.parameters[0]), logic.apply(JOINS[slot.implication], cut, repr(shape.height)))
+            for cut, slot in zip(cuts, slots, strict=True)
+            if isinstance(shape := output.terms[slot.term].shape, Curve) and shape.kind == "singleton"
+        ]
+        if points and method in ("centroid", "bisector"):  # they count where nothing has an area
+            total, weight = (" + ".join(texts) for texts in ([f"{x} * {y}" for x, y in points], [y for _, y in points]))
+            mean = Assign(f"y{k}", f"quotient({total}, {weight})")
+            fired = (*fired, Choose(((f"not (fabs(y{k}) < INFINITY)", (mean,)),)))
+        yield Choose(((any_fires, fired), ("", (default,)))) if cuts else default
+        if method not in ("clipped", "scaled"):  # the value may be NaN or infinite
             yield Choose(((f"not (fabs(y{k}) < INFINITY)", (default,)),))
         if output.lock_range:
             low, high = output.universe
@@ -364,14 +247,36 @@ def _swept(engine: Engine) -> Iterator[Statement]:
 
 def _valued(output: Output, k: int, cuts: Sequence[str], system: System) -> tuple[Statement, ...]:
     """Compute the mean of an output's values, weighted by their strengths, or the sum."""
-    names = {v.name: f"x{i}" for i, v in enumerate(system.inputs, 1)}
+    inputs, outputs = variable_names(system.inputs), variable_names(system.outputs[: k - 1])
+    names = {name: f"x{i}" for i, name in enumerate(inputs, 1)} | {name: f"y{i}" for i, name in enumerate(outputs, 1)}
     statements: list[Statement] = [Assign(f"w{k}", "0.0")]
-    for cut, term in zip(cuts, output.terms, strict=True):
-        assert isinstance(term.shape, Value)
-        value = code(term.shape.expression(tuple(names)).tree, names)
-        added = (Assign(f"y{k}", f"y{k} + {cut} * {value}"), Assign(f"w{k}", f"w{k} + {cut}"))
+    for j, (cut, term) in enumerate(zip(cuts, output.terms, strict=True), 1):
+        if isinstance(term.shape, Value):
+            values = [("", code(term.shape.expression(inputs, outputs).tree, names))]
+        else:
+            values = _position(term.shape, cut)
+        added = (
+            *chosen(f"v{k}_{j}", values, ""),
+            Assign(f"y{k}", f"y{k} + {cut} * v{k}_{j}"),
+            Assign(f"w{k}", f"w{k} + {cut}"),
+        )
         statements.append(Choose(((f"{cut} > 0.0", added),)))
     return (*statements, *((Assign(f"y{k}", f"y{k} / w{k}"),) if output.defuzzifier == "average" else ()))
+
+
+def _position(shape: Membership, cut: str) -> list[tuple[str, str]]:
+    """Format the position at which a term that only rises or only falls has a degree."""
+    if isinstance(shape, Shape):
+        (a, left), (b, right) = shape.points
+        return [("", f"{a!r} + {b - a!r} * (({cut} - {left!r}) / {right - left!r})")]
+    assert isinstance(shape, Curve)
+    kind, degree = KINDS[shape.kind], f"({cut} / {shape.height!r})"
+    assert kind.inverse is not None
+    named = dict(zip(kind.parameters, shape.parameters, strict=True))
+    return [
+        ("" if end == math.inf else f"{degree} <= {end!r}", code(Expression(text).bound(named).tree, {"w": degree}))
+        for end, text in kind.inverse(*shape.parameters)
+    ]
 
 
 def _shared(system: System) -> Iterator[Statement]:
@@ -379,7 +284,7 @@ def _shared(system: System) -> Iterator[Statement]:
     if system.normalization not in ("sum", "max"):
         return
     ys = [f"y{k}" for k in range(1, len(system.outputs) + 1)]
-    logic = _Expressions()
+    logic = Expressions()
     total = " + ".join(ys) if system.normalization == "sum" else logic.join("max", ys)
     yield from logic.assign("total", total, "")
     # if all are 0, they stay 0

@@ -10,8 +10,10 @@ from typing import Any
 from fuzzy_arbiter.definition import System, variable_names
 from fuzzy_arbiter.engines import clipped_centroid
 from fuzzy_arbiter.errors import EngineError
+from fuzzy_arbiter.export import heights
 from fuzzy_arbiter.export.code_functions import in_python
-from fuzzy_arbiter.export.program import TABLES, Assign, Program, Return, Statement, Sweep, formatted, program
+from fuzzy_arbiter.export.program import TABLES, Program, program
+from fuzzy_arbiter.export.statements import FUNCTIONS, Assign, Return, Statement, Sweep, formatted
 
 _MATH = """
 import math
@@ -49,7 +51,7 @@ def to_python(system: System) -> str:
     str
         A module with ``evaluate(inputs, outputs)``, which returns the same as the function of `to_c`, and with
         ``weights(inputs)``, which returns a tuple or raises ``ValueError`` with the name. Both give what the arbiter's
-        own engine does, to the last bit.
+        own engine does, as `to_c` says.
 
     Examples
     --------
@@ -82,6 +84,15 @@ def _module(code: Program) -> Iterator[str]:
             yield from (f"{name}_{k} = {side!r}" for name, side in zip(TABLES, shape, strict=True))
         for function in (clipped_centroid.clipped, clipped_centroid.scaled, clipped_centroid.centroid):
             yield f"\n\n{inspect.getsource(function).rstrip()}"
+    if any(code.heights):
+        yield f"\n\nNODES = {heights.NODES!r}\nWEIGHTS = {heights.WEIGHTS!r}\nENDS = {heights.ENDS!r}"
+        yield from (
+            f"\n\n{inspect.getsource(x).rstrip()}" for x in vars(heights).values() if isinstance(x, FunctionType)
+        )
+    for k, one in enumerate(code.heights, 1):
+        if one is not None:
+            yield f"\n\nEDGES_{k} = {one.edges!r}\n\n\ndef height_{k}(x, cuts):"
+            yield from formatted(one.statements, _simple, _branch, "")
     yield "\n\ndef evaluate(inputs, outputs):"
     yield '    """Fill the outputs; return 0, or -i if the i-th input is bad, or k if the k-th output is undefined."""'
     yield from (f"    x{i} = inputs[{i - 1}]  # {v.name}" for i, v in enumerate(system.inputs, 1))
@@ -95,8 +106,12 @@ def _simple(statement: Statement) -> Iterator[str]:
     match statement:
         case Assign(name, expression, words):
             yield f"{name} = {expression}" + (f"  # {words}" if words else "")
-        case Sweep(name, k, cuts, scales):
-            yield f"{name} = centroid(({', '.join(cuts)},), {', '.join(f'{table}_{k}' for table in TABLES)}, {scales})"
+        case Sweep(name, k, cuts, "clipped" | "scaled" as method):
+            tables = ", ".join(f"{table}_{k}" for table in TABLES)
+            yield f"{name} = centroid(({', '.join(cuts)},), {tables}, {method == 'scaled'})"
+        case Sweep(name, k, cuts, method):
+            function, side = FUNCTIONS[method]
+            yield f"{name} = {function}(height_{k}, ({', '.join(cuts)},), EDGES_{k}, {side})"
         case Return(status):
             yield f"return {status}"
 
