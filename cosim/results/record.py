@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import logging
-import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,14 +18,12 @@ from numpy.typing import NDArray
 from cosim.errors import RunError
 from cosim.io.format_number import require_format
 from cosim.simulation.signals import Array, Column
-from plant_fmu.archive import atomic_file
 
 log = logging.getLogger(__name__)
 
 MAX_ROWS = 100_000_001  # rows of a run with the maximum number of steps that a scenario may have
 RECORD = "record.parquet"
 STREAM = "record.arrows"  # Arrow stream of the rows of a run that is under way or was killed
-_FORMER = "record.parts"  # folder in which earlier versions left the rows of a killed run
 _DIGITS = 9  # maximum number of digits of a format number
 _BLOCK = 10_000  # rows that are read at once
 _SMALL = 2**22  # numbers; a record of at most so many is read as a whole
@@ -118,11 +115,6 @@ class Record(Rows):
     """
 
     def __init__(self, file: Path) -> None:
-        if isinstance(file, list | tuple):  # its former argument
-            warnings.warn("Record takes a file, no list of files", DeprecationWarning, stacklevel=2)
-            if len(file) != 1:
-                raise RunError(f"a record is one file, got {len(file)}")
-            file = file[0]
         self.file = file
         with _opened(file, warn=True) as source:
             self._count = sum(source.group_rows)
@@ -207,28 +199,12 @@ def load_record(folder: Path) -> Record:
     require_utf8(folder)
     files = (folder / name for name in (RECORD, STREAM))
     file = next((file for file in files if file.exists() and file.stat().st_size), None)
-    if file is None and (parts := sorted((folder / _FORMER).glob("*.parquet"))):
-        file = _join(parts, folder / RECORD)
     if file is None:
         raise RunError(f"{folder}: holds no record of a run")
     record = Record(file)
     if not len(record):
         raise RunError(f"{folder}: the record of the run is empty")
     return record
-
-
-def _join(parts: Sequence[Path], path: Path) -> Path:
-    """Write the rows of a killed run of an earlier version, which left them in several files, to its record."""
-    try:
-        schema = pq.read_schema(parts[0])
-        with atomic_file(path) as file, pq.ParquetWriter(file.name, schema, compression="zstd") as writer:
-            for part in parts:
-                for batch in pq.ParquetFile(part).iter_batches():
-                    writer.write_batch(batch)
-    except (OSError, pa.ArrowException, ValueError) as error:
-        raise RunError(f"{path.parent / _FORMER}: cannot be joined to {path.name}: {error}") from error
-    log.warning("%s: its %s of an earlier version is now %s", path.parent, _FORMER, path.name)
-    return path
 
 
 def _column_of(field: pa.Field) -> Column:

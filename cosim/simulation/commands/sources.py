@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import threading
 from collections import deque
 from collections.abc import Callable, Iterable, Sequence
@@ -84,9 +83,6 @@ class CommandQueue:
         return taken
 
 
-_OLDER = re.compile(rb'\{"step": ?\d+, ?"order"')  # beginning of a log of older versions
-
-
 class _Entry(Table, frozen=True):
     """A line of the log."""
 
@@ -101,8 +97,6 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
         content = file.read_bytes()
     except OSError as error:
         raise RunError(f"{file}: {error.strerror or error}") from error
-    if _OLDER.match(content):
-        raise RunError(f"{file}: is a log of an older version ('order'), expected one with 'command'")
     lines, whole = content.splitlines(), content.count(b"\n")
     entries = []
     for number, line in enumerate(lines, 1):

@@ -157,23 +157,6 @@ def test_a_torn_end_is_named_once(tmp_path, endless, caplog):
     assert [r.getMessage().count("its end cannot be read") for r in caplog.records] == [1]
 
 
-def test_parts_of_an_earlier_version_become_one_record(tmp_path, endless, caplog):
-    (tmp_path / "whole").mkdir()
-    recorder = Recorder(tmp_path / "whole", COLUMNS)
-    record(recorder, 50)
-    recorder.close()
-    table, parts = pq.read_table(tmp_path / "whole" / RECORD), tmp_path / "killed" / "record.parts"
-    parts.mkdir(parents=True)
-    for i, rows in enumerate((table.slice(0, 30), table.slice(30))):
-        pq.write_table(rows, parts / f"{i:06}.parquet")
-    assert pq.read_table(load_record(parts.parent).file).equals(table) and len(caplog.records) == 1
-    (parts.parent / RECORD).unlink()
-    (parts / "000001.parquet").write_bytes(b"PAR1")
-    with pytest.raises(RunError, match=r"record\.parts: cannot be joined"):
-        load_record(parts.parent)
-    assert not (parts.parent / RECORD).exists()
-
-
 class Faults:
     """Fail chosen calls among the writes, moves and removals of a recorder, before or after they have worked."""
 

@@ -101,16 +101,6 @@ def stream(seeds: Seeds) -> Case:
     return seeds.file(STREAM, lambda path: list(load_record(path.parent).blocks()), made.getvalue(), folder=True)
 
 
-@reader("record of an earlier version", "parquet", "cosim.results.record:_join", "cosim.results.record:_opened")
-def parts(seeds: Seeds) -> Case:
-    def read(path: Path) -> None:
-        (path.parents[1] / RECORD).unlink(missing_ok=True)
-        list(load_record(path.parents[1]).blocks())
-
-    case = seeds.file("record.parts/000000.parquet", read, record(seeds).contents[0], folder=True)
-    return replace(case, named=str(Path(case.named).parent))
-
-
 @reader("run", "parquet", "cosim.results.record:_opened", "cosim.results.run_result:open_run")
 def run(seeds: Seeds) -> Case:
     """Make every output of a run, for any numbers."""

@@ -216,12 +216,9 @@ def test_broken_log_is_rejected_with_its_line(tmp_path, line):
     assert message.startswith(f"{file}, line 2: ") and message.isprintable() and len(message) < 300 + len(str(file))
 
 
-def test_missing_log_and_one_of_an_older_version_give_one_line_errors(tmp_path):
+def test_missing_log_gives_a_one_line_error(tmp_path):
     with pytest.raises(RunError, match="No such file"):
         ReplayedCommands(tmp_path / "none.jsonl")
-    (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"arm","armed":true}}\n')
-    with pytest.raises(RunError, match=r"orders\.jsonl: is a log of an older version \('order'\), expected"):
-        ReplayedCommands(log)
 
 
 LAST = '{"step":1,"command":{"command":"shift_region","region":"ΩΩΩ","by":[1.25,0.0,0.0]}}'.encode()
