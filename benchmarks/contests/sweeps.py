@@ -9,7 +9,6 @@ import time
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
 
 from benchmarks.contest import Entry
 from benchmarks.contests.closed_loop import CHANGES, RUN, SCENARIO
@@ -32,7 +31,7 @@ def sweep(pool: str, workers: int) -> Entry:
     """
 
     def entry(stack: ExitStack) -> Contestant:
-        contestant = _Sweep(_executor(pool, workers, stack), workers, stack)
+        contestant = _Sweep(stack.enter_context(_executor(pool, workers)), workers, stack)
         for _ in range(2):  # so that each worker has compiled
             contestant.seconds(_WARMING * workers)
         return contestant
@@ -40,14 +39,12 @@ def sweep(pool: str, workers: int) -> Entry:
     return entry
 
 
-def _executor(pool: str, workers: int, stack: ExitStack) -> Executor:
+def _executor(pool: str, workers: int) -> Executor:
     if pool == "processes":
-        return stack.enter_context(ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")))
-    import distributed
+        return ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn"))
+    from cosim.campaigns.workers.cluster import cluster_executor
 
-    untyped: Any = distributed
-    cluster = stack.enter_context(untyped.LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=":0"))
-    executor: Executor = stack.enter_context(untyped.Client(cluster)).get_executor()
+    executor: Executor = cluster_executor(None, workers)
     return executor
 
 

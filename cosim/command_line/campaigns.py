@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import contextlib
+import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
@@ -73,20 +74,23 @@ def add_workers(verb: argparse.ArgumentParser) -> None:
 
 def add_cluster(verb: argparse.ArgumentParser) -> None:
     """Add the flags for the processes that fly: on this machine or in a Dask cluster."""
-    flag(verb, "--workers N", "processes (default: 1)", _WORKERS)
-    flag(verb, "--scheduler tcp://HOST:PORT", "use a Dask cluster instead")
+    flag(verb, "--workers N", "processes (default: 1; with --dask: one a core)", _WORKERS)
+    where = verb.add_mutually_exclusive_group()
+    flag(where, "--dask", "start a Dask cluster on this machine")
+    flag(where, "--scheduler tcp://HOST:PORT", "use an existing Dask cluster")
 
 
 @contextlib.contextmanager
 def executor_of(options: argparse.Namespace) -> Iterator[Executor | None]:
     """Connect to the Dask cluster of the flags; yield its executor, or None without one."""
-    if not options.scheduler:
+    if options.scheduler and options.workers:
+        raise RunError("--workers: expected none with --scheduler: the cluster sets their number")
+    if not (options.dask or options.scheduler):
         yield None
         return
-    refuse_flags(options, ["workers"], "none with --scheduler: the cluster sets their number")
     from cosim.campaigns.workers.cluster import cluster_executor
 
-    with cluster_executor(options.scheduler) as executor:
+    with cluster_executor(options.scheduler, options.workers or os.cpu_count() or 1) as executor:
         yield executor
 
 

@@ -20,6 +20,7 @@ MOST_AT_THE_ROOT = 8  # modules of cosim
 
 # what is optional, heavy or foreign to the rest: the one place that takes it
 ONE_PLACE = {
+    "dask": {"cosim.campaigns.workers.cluster"},
     "distributed": {"cosim.campaigns.workers.cluster"},
     "foxglove_schemas_protobuf": {"cosim.export.mcap_writer", "cosim.export.foxglove_scene"},
     "google": {"cosim.export.foxglove_scene", "cosim.export.protobuf_table"},
@@ -40,7 +41,7 @@ ONE_PLACE = {
 
 # of these, what the base install does not bring, and the modules that cannot be imported without it
 OPTIONAL = {
-    "distributed", "foxglove_schemas_protobuf", "google", "mcap", "mcap_protobuf", "pandas", "rerun", "rosbags",
+    "dask", "distributed", "foxglove_schemas_protobuf", "google", "mcap", "mcap_protobuf", "pandas", "rerun", "rosbags",
 }  # fmt: skip
 WANT_AN_EXTRA = {f"cosim.export.{name}" for name in ("mcap_writer", "rrd_writer", "foxglove_scene", "protobuf_table")}
 

@@ -52,9 +52,10 @@ def test_fmus_are_written_and_load_in_fmpy(bare, fmi):
 
 
 def test_missing_extra_is_named(bare):
-    varied = "--vary", "initial.position.1=-1:1", "--samples", "2", "--scheduler", "tcp://127.0.0.1:9"
     with pytest.raises(AssertionError, match=r'python -m pip install "distributed>=') as failed:
-        bare("cosim", "sweep", "paper", *varied, "--out", "sweep")
+        bare(
+            "cosim", "sweep", "paper", "--vary", "initial.position.1=-1:1", "--samples", "2", "--dask", "--out", "sweep"
+        )
     assert "Traceback" not in str(failed.value)
 
 

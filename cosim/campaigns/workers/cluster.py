@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster."""
+"""Dask: an existing cluster, or a local one with processes on this machine."""
 
 from __future__ import annotations
 
@@ -20,6 +20,14 @@ _COUNT_PERIOD = 5.0  # s between counts of the workers, which may join and leave
 _WORKER_TIMEOUT = 30.0  # s, wait for the first worker, and for a new one in a cluster without workers
 _SCHEDULER_TIMEOUT = 10.0  # s, wait for the scheduler of a cluster
 _RELEASE_TIMEOUT = 2.0  # s, wait for a worker to end its present batch
+# settings of local clusters, whose self-monitoring takes a tenth of two cores by default
+_LOW_OVERHEAD: dict[str, Any] = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.worker.memory.monitor-interval": "1s",
+    "distributed.admin.system-monitor.interval": "5s",
+    "distributed.admin.tick.interval": "1s",
+    "distributed.scheduler.allowed-failures": 0,  # `dispatch` counts crashes itself, and finds the row
+}
 _LOST = "the cluster is lost"
 _SETTLING = 1.0  # s, wait for new workers, so that one that crashes at once is not restarted again
 
@@ -121,9 +129,10 @@ def _quiet(name: str) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def cluster_executor(scheduler: str) -> Iterator[Executor]:
-    """Connect to a cluster by the address of its scheduler."""
+def cluster_executor(scheduler: str | None, workers: int) -> Iterator[Executor]:
+    """Connect to a cluster, or start a local one on this machine."""
     try:
+        import dask
         import distributed
     except ImportError as error:
         raise RunError(f"Dask is not installed; {install_hint('distributed>=2024.5')}") from error
@@ -131,11 +140,22 @@ def cluster_executor(scheduler: str) -> Iterator[Executor]:
     with contextlib.ExitStack() as stack:
         stack.enter_context(_quiet("distributed"))
         try:
-            client = stack.enter_context(untyped.Client(scheduler, timeout=_SCHEDULER_TIMEOUT))
+            if scheduler is None:
+                stack.enter_context(dask.config.set(_LOW_OVERHEAD))
+                with block_interrupts():
+                    cluster = untyped.LocalCluster(
+                        n_workers=workers, threads_per_worker=1, processes=True, silence_logs=logging.CRITICAL,
+                        scheduler_kwargs={"dashboard": False, "dashboard_address": "127.0.0.1:0"},
+                    )  # fmt: skip
+                stack.enter_context(cluster)
+                client = untyped.Client(cluster)
+            else:
+                client = untyped.Client(scheduler, timeout=_SCHEDULER_TIMEOUT)
+            stack.enter_context(client)
             client.wait_for_workers(1, timeout=_WORKER_TIMEOUT)
-        except (OSError, ValueError, TimeoutError) as error:
+        except (OSError, ValueError, TimeoutError, RuntimeError) as error:
             reason = " ".join(str(error).split()) or type(error).__name__
-            raise RunError(f"the cluster {scheduler} cannot be used: {reason}") from error
+            raise RunError(f"the cluster {scheduler or 'on this machine'} cannot be used: {reason}") from error
         executor = client.get_executor()
         stack.callback(executor.shutdown, wait=False)  # not waiting for batches that no worker may be left to finish
         yield executor

@@ -45,6 +45,19 @@ def test_workers_that_are_killed_are_replaced(command):
     assert rows_of(bereft.out) == expected(N)
 
 
+@needs_posix
+@pytest.mark.slow
+def test_ctrl_c_on_dask_keeps_completed_rows(command):
+    interrupted = command(*SLOW, "--workers", 2, "--dask")
+    interrupted.wait_for_rows(3)
+    os.killpg(interrupted.process.pid, signal.SIGINT)  # as a terminal does
+    said, complaints = interrupted.process.communicate(timeout=240)
+    assert interrupted.process.returncode == 130
+    kept = f"what is flown is kept in {interrupted.out}, and the same command goes on"
+    assert complaints == f"cosim: interrupted; {kept}\n" and said == ""
+    assert interrupted.gone() and len(interrupted.keys()) >= 3
+
+
 def check_poisoned(folder, n):
     found, poisoned = rows_of(folder), []
     for row, other in zip(found, expected(n), strict=True):
@@ -59,18 +72,13 @@ def check_poisoned(folder, n):
 # ---- Dask ----
 
 
-def local_cluster(n):
-    """Start a cluster on this machine, at ports that are free."""
-    ports = {"dashboard": False, "dashboard_address": "127.0.0.1:0"}
-    return pytest.importorskip("distributed").LocalCluster(n_workers=n, threads_per_worker=1, scheduler_kwargs=ports)
-
-
 @pytest.fixture(scope="module")
 def cluster():
-    distributed, dask = pytest.importorskip("distributed"), pytest.importorskip("dask")
-    with dask.config.set({"distributed.scheduler.allowed-failures": 0}), local_cluster(2) as cluster:
-        with distributed.Client(cluster) as client:
-            yield client.get_executor()
+    pytest.importorskip("distributed")
+    from cosim.campaigns.workers.cluster import cluster_executor
+
+    with cluster_executor(None, 2) as executor:
+        yield executor
 
 
 @pytest.mark.slow
@@ -113,12 +121,17 @@ def test_campaign_on_dask_gives_the_same_rows(tmp_path, cluster, capfd):
 @pytest.mark.slow
 @pytest.mark.parametrize("verb", [True, False], ids=["verb", "own executor"])
 def test_sweep_ends_after_the_last_dask_worker_is_killed(tmp_path, fakes, monkeypatch, verb):
-    distributed = pytest.importorskip("distributed")
+    distributed, dask = pytest.importorskip("distributed"), pytest.importorskip("dask")
+    patience = dask.config.set({f"distributed.comm.timeouts.{of}": "240s" for of in ("connect", "tcp")})
     monkeypatch.setattr("cosim.campaigns.workers.cluster._WORKER_TIMEOUT", 5.0)
     monkeypatch.setattr("cosim.campaigns.workers.dispatch._CHECK_PERIOD", 0.2)
     out, said = tmp_path / "out", []
     fakes(Slow)
-    with local_cluster(0) as cluster, contextlib.ExitStack() as stack:
+    with (
+        patience,
+        distributed.LocalCluster(n_workers=0, dashboard_address=None) as cluster,
+        contextlib.ExitStack() as stack,
+    ):
         address = cluster.scheduler_address
 
         def start_worker(n):
