@@ -72,7 +72,7 @@ def add_verbs(verbs: Any) -> None:
     flag(verb, "--timeout S", "end if steering cannot begin in so many seconds", float_range(0.1, 1e6))
     flag(verb, "--speedup N", "seconds of a simulated autopilot per second", float_range(0.01, 100.0), 1.0)
     add_remote(verb)
-    add_live_flag(verb, "show the flight in browsers while it goes on")
+    add_live_flag(verb, "show the flight in browsers, with buttons to hold and resume")
     add_run_folder(verb)
 
 

@@ -24,8 +24,14 @@ class Condition:
 GAIN_TOLERANCE = 0.01  # of the pilot gain
 
 CONDITIONS: tuple[Condition, ...] = (
-    Condition("pilot's sticks", 0.0, "", "another station sends deflected sticks", "pilot"),
-    Condition("takeover", 0.0, "", "the companion received DO_PAUSE_CONTINUE with 0", "held"),
+    Condition(
+        "pilot's sticks",
+        0.0,
+        "",
+        "deflected sticks that are not ours are heard, or shown by an ArduSub's RC_CHANNELS",
+        "pilot",
+    ),
+    Condition("takeover", 0.0, "", "the user holds, by terminal, page or DO_PAUSE_CONTINUE", "held"),
     Condition("disarmed", 0.0, "", "the vehicle is disarmed", "pilot"),
     Condition("mode taken", 0.0, "", "the autopilot has left the steering mode", "pilot"),
     Condition("refused mode", 0.8, "s", "since the mode was requested, without success", "held"),
