@@ -139,7 +139,8 @@ class AutopilotSession:
         if self.alignment.offset is not None and self.misplaced and not self.is_placed:
             return f"a position near the scene, not {self.misplaced}: check sign and digits of its origin"
         return self.alignment.missing(reported) or {
-            "disarmed": "arming", "held": f"a command to resume after: {self.supervisor.reason}",
+            "disarmed": "a command to resume" if self._taken_over else "arming",
+            "held": f"a command to resume after: {self.supervisor.reason}",
             "pilot": f"a command to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
             "diving": "the heading alignment", "waiting": self.stick_rejection() or "nothing",
         }.get(self.supervisor.state, "nothing")  # fmt: skip
@@ -240,7 +241,8 @@ class AutopilotSession:
             output.make_messages(wrench, self.reported, period)
         else:
             output.clear()
-        if state == "disarmed" and self._options.arm and self._is_due("arm", 1.0, now):
+        may_arm = self._options.arm and not self._taken_over
+        if state == "disarmed" and may_arm and self._is_due("arm", 1.0, now):
             self._command(self._mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         elif state == "diving":
             self.supervisor.record_mode_request(now)

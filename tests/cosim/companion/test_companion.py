@@ -158,6 +158,10 @@ NOT_STEERED = {
     "no global position": ({"silent": ["GLOBAL_POSITION_INT"]}, {}, None, "the autopilot has no global position"),
     "another vehicle": ({}, {"vehicle_system": 2}, None, "waiting for a heartbeat of an autopilot of system 2"),
     "not armed, by default": ({"armed": False}, {}, None, "waiting for arming"),
+    "held before it is armed": (
+        {"armed": False}, {"arm": True},
+        mavlink.MAVLink_command_long_message(*IDENTITY, mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0, *[0.0] * 7),
+        "waiting for a command to resume"),
     "an ArduSub that would ignore sticks": (
         {"profile": "ardusub"}, {"profile": "ardusub"}, parameter(b"SYSID_MYGCS", 250.0),
         r"SYSID_MYGCS is 250, and the companion's system id 255: .*; expected --system-id 250, or"),
