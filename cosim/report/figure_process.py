@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from cosim.report.web_page import InlineFigure
     from cosim.results.run_result import Run
 
+# of a process that draws: after Ctrl-C the run ends, and then asks for its figures
+_ACTIONS = {signal.SIGINT: signal.SIG_IGN, signal.SIGTERM: signal.SIG_DFL}
 _waiting: list[Connection[Any, Any]] = []  # that with at most one process that waits for a run
 
 
@@ -32,9 +34,14 @@ def drawing_beside() -> Iterator[None]:
         yield
         return
     connection, of_child = Pipe()
+    signals = signal.pthread_sigmask(signal.SIG_BLOCK, _ACTIONS)  # so that the command's handlers do not run in a child
     child = _fork()
     if not child:
+        for number, action in _ACTIONS.items():
+            signal.signal(number, action)
         connection.close()
+    signal.pthread_sigmask(signal.SIG_SETMASK, signals)
+    if not child:
         _serve(of_child)
     of_child.close()
     _waiting.append(connection)
@@ -76,7 +83,6 @@ def _fork() -> int:
 def _serve(connection: Connection[Any, Any]) -> NoReturn:
     """Wait for a run and a folder, draw its figures there in two processes, and send what names each."""
     try:
-        signal.signal(signal.SIGINT, signal.SIG_IGN)  # the run ends, and then asks for its figures
         from cosim.report.figures.figures import drawings
         from cosim.report.figures.sampled_rows import make_figure_data
 
