@@ -1,4 +1,4 @@
-"""Flights of the deployable law with thruster failures, or with a plant that differs from the model.
+"""Flights of the deployable law with thruster failures.
 
 ``python -m benchmarks.thruster_failures VEHICLE CASE N [--lag S] [--seed K]``; the law is not given the lag. With
 ``--sensors`` it navigates by sensors, with ``--lost dvl`` without one of them for 30 s, with ``--slow`` at 1 Hz.
@@ -21,11 +21,7 @@ from cosim.scenario.tables import Failure
 from cosim.scenario.vehicle_model import vehicle_model
 from plant_fmu.vehicle import Vehicle, load_vehicle
 
-# without a failure, the plant differs: true limits 15 to 40 % below the file's, common or of each thruster; a dead band
-# of 10 %; gusts; half the drag; drag and added mass of the other published set of the BlueROV2
-DIFFERENCES = ("weak", "uneven", "dead band", "gusts", "half drag", "other set")
-CASES = ("healthy", "worn", "rolled", "lost", "two lost", "part lost", "stuck", *DIFFERENCES)
-_OTHER_SET = {"bluerov2_heavy": "bluerov2_heavy_wu", "bluerov2_heavy_wu": "bluerov2_heavy"}
+CASES = ("healthy", "worn", "rolled", "lost", "two lost", "part lost", "stuck")
 _FAILURES = {"lost": 1, "part lost": 1, "stuck": 1, "two lost": 2}  # number of failures in each case
 _WINDOW = 25  # control steps of the average: half a second
 
@@ -44,7 +40,6 @@ def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: flo
         parameters |= {f"thrust_time_constant[{j + 1}]": lag for j in range(m)}
     if case == "worn":
         parameters |= {f"thrust_effectiveness[{j + 1}]": rng.uniform(0.7, 1.0) for j in range(m)}
-    parameters |= differences(vehicle, case, rng) | ({"seed": seed} if case == "gusts" else {})
     band = {"type": "depth_band", "depth": start[2], "tolerance": 2.2}
     shapes = [("band", "depth", "in", band)]
     for i in range(int(rng.integers(2, 6))):
@@ -76,33 +71,6 @@ def scene(vehicle: Vehicle, case: str, seed: int, lag: float | None, weight: flo
             for name, criterion, keep, shape in shapes
         ],
     }
-
-
-def differences(vehicle: Vehicle, case: str, rng: np.random.Generator) -> dict[str, float]:
-    """Draw the parameters of a plant that differs from the vehicle by one of `DIFFERENCES`; none for another case."""
-    m, changed = vehicle.n_thrusters, {}
-    if case in ("weak", "uneven"):
-        left = np.full(m, rng.uniform(0.6, 0.85)) if case == "weak" else rng.uniform(0.6, 1.0, m)
-        for j in range(m):
-            changed[f"thrust_max[{j + 1}]"] = left[j] * vehicle.thrust_max[j]
-            changed[f"thrust_min[{j + 1}]"] = left[j] * vehicle.thrust_min[j]
-    elif case == "dead band":
-        changed = {f"thrust_dead_band[{j + 1}]": 0.1 for j in range(m)}
-    elif case == "gusts":
-        spread = rng.uniform(0.15, 0.3)
-        changed = {"current_correlation_time": rng.uniform(2.0, 8.0), "current_variation_period": 1.0}
-        changed |= {
-            f"current_variation.{axis}": spread * part for axis, part in zip("xyz", (1.0, 1.0, 0.3), strict=True)
-        }
-    elif case == "half drag":
-        for name in ("linear_damping", "quadratic_damping"):
-            changed |= {f"{name}[{i + 1}]": 0.5 * value for i, value in enumerate(getattr(vehicle, name))}
-    elif case == "other set":
-        other = load_vehicle(_OTHER_SET[vehicle.name])
-        for name in ("linear_damping", "quadratic_damping"):
-            changed |= {f"{name}[{i + 1}]": value for i, value in enumerate(getattr(other, name))}
-        changed |= {f"added_mass[{i + 1},{i + 1}]": value for i, value in enumerate(np.diag(other.added_mass))}
-    return {name: float(value) for name, value in changed.items()}
 
 
 def through_sensors(table: dict[str, Any], lost: list[str], slow: bool) -> dict[str, Any]:

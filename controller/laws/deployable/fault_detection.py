@@ -10,6 +10,9 @@
 # them: an uncertain effectiveness or lag, unknown restoring moments, W - B, current, the height of the center of
 # gravity. So a thruster that fails at low thrust is detected when it is used.
 #
+# A small missing force cannot be told from a lasting error of the model: while it would be less than `_EXCITED`,
+# evidence raises the sum to at most half the threshold. So a vehicle at rest isolates nothing until it moves.
+#
 # While the innovations are biased, the model does not fit, and evidence counts less: by the square of their misfit. A
 # thruster that saturates does not count as failed, since its true limit is estimated (`thrust_limit`).
 #
@@ -45,6 +48,7 @@ Counts = Annotated[NDArray[np.int64], Shape("m")]
 
 _MOST_A_STEP = 3.0  # limit of the log-likelihood ratio per step, so that no single outlier decides
 _LOSS = 0.6  # fraction of force that the hypothesis of a loss assumes lost: close enough to both a half and all
+_EXCITED = 0.1  # missing force, as a fraction of a thruster's limit, that stands out from errors of the model
 _USEFUL = 0.15  # effectiveness below which a thruster is isolated
 _FITTING = 0.5  # mean effectiveness below which that is less in proportion: then the model does not fit
 _SPREADS = 3.0  # number of standard deviations by which an estimate must be below that
@@ -77,7 +81,7 @@ def detect_fault(fault_state: FaultState, estimate: Estimate, thrusters: Thruste
             ratio[j] = ratio[m + j] = 0.0
             continue
         for kind in range(2):
-            _add_evidence(fault_state, estimate, thrusters, j, kind * m + j)
+            _add_evidence(fault_state, estimate, thrusters, j, kind * m + j, gains)
         likelihood = max(ratio[j], ratio[m + j])
         if likelihood > best:
             best, next_best, suspect = likelihood, best, j
@@ -145,12 +149,18 @@ def _likelier(fault_state: FaultState, j: int, m: int) -> int:
     return j if lost > stuck else m + j
 
 
-def _add_evidence(fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, j: int, hypothesis: int) -> None:
+def _add_evidence(
+    fault_state: FaultState, estimate: Estimate, thrusters: Thrusters, j: int, hypothesis: int, gains: DeployableGains
+) -> None:
     """Add the evidence of the last measurements for a hypothesis about thruster j."""
     weight = 1.0 / square(max(estimate.misfit, 1.0))
     innovations, squares = weight * estimate.evidence[0, hypothesis], weight * estimate.evidence[1, hypothesis]
     loss = _LOSS if hypothesis == j else 1.0
     step = loss * innovations - 0.5 * square(loss) * squares
+    # the force that would be missing now
+    missing = thrusters.acting[j] if hypothesis == j else estimate.missing[j]
+    if abs(missing) < _EXCITED * max(-thrusters.nominal_lower[j], thrusters.nominal_upper[j]):
+        step = min(step, max(0.5 * gains.failure_threshold - fault_state.ratio[hypothesis], 0.0))
     fault_state.ratio[hypothesis] += min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
     fault_state.sums[0, hypothesis] += innovations
     fault_state.sums[1, hypothesis] += squares

@@ -214,21 +214,37 @@ def test_evidence_is_the_log_likelihood_ratio():
 def test_evidence_is_summed_since_the_hypothetical_failure():
     estimate, thrusters, state = started()
     estimate.evidence[:, 2], estimate.evidence[:, 10] = (3.0, 2.0), (1.5, 1.0)
+    thrusters.acting[2] = estimate.missing[2] = 20.0
     for _ in range(2):
-        fault_detection._add_evidence(state, estimate, thrusters, 2, 2)
-        fault_detection._add_evidence(state, estimate, thrusters, 2, 10)
+        fault_detection._add_evidence(state, estimate, thrusters, 2, 2, GAINS)
+        fault_detection._add_evidence(state, estimate, thrusters, 2, 10, GAINS)
     assert state.sums[:, [2, 10]].tolist() == [[6.0, 3.0], [4.0, 2.0]]
     assert state.ratio[[2, 10]] == pytest.approx([2.0 * (0.6 * 3.0 - 0.5 * 0.36 * 2.0), 2.0 * (1.5 - 0.5)])
     estimate.evidence[:, 2] = -30.0, 2.0
-    fault_detection._add_evidence(state, estimate, thrusters, 2, 2)
+    fault_detection._add_evidence(state, estimate, thrusters, 2, 2, GAINS)
     assert state.ratio[2] == 0.0 and not state.sums[:, 2].any()
+
+
+def test_a_small_missing_force_gives_at_most_half_the_threshold():
+    """Below a tenth of the limit, 27 N; what was known before counts, and so does what speaks against a failure."""
+    for force, before, expected in ((2.6, 0.0, 6.0), (-2.6, 9.0, 9.0), (2.8, 0.0, 15.0), (-2.8, 9.0, 24.0)):
+        for hypothesis, evidence in ((2, (10.0, 1.0)), (10, (5.5, 1.0))):
+            estimate, thrusters, state = started()
+            state.ratio[hypothesis], estimate.evidence[:, hypothesis] = before, evidence
+            thrusters.acting[2] = estimate.missing[2] = force
+            for _ in range(5):
+                fault_detection._add_evidence(state, estimate, thrusters, 2, hypothesis, GAINS)
+            assert state.ratio[hypothesis] == pytest.approx(expected)
+            estimate.evidence[0, hypothesis] = -1.0
+            fault_detection._add_evidence(state, estimate, thrusters, 2, hypothesis, GAINS)
+            assert state.ratio[hypothesis] < expected
 
 
 def test_evidence_counts_less_by_the_square_of_the_misfit():
     for misfit, weight in ((0.5, 1.0), (3.0, 1.0 / 9.0)):
         estimate, thrusters, state = started()
         estimate.evidence[:, 2], estimate.misfit = (3.0, 2.0), misfit
-        fault_detection._add_evidence(state, estimate, thrusters, 2, 2)
+        fault_detection._add_evidence(state, estimate, thrusters, 2, 2, GAINS)
         assert state.sums[:, 2] == pytest.approx([3.0 * weight, 2.0 * weight])
         fault_detection._isolate(state, estimate, thrusters, 2, np.nan)  # it explains the misfit
         assert estimate.misfit == 1.0

@@ -1,75 +1,37 @@
 """Flights with a plant that differs from the law's model, no thruster failing: none is isolated."""
 
 import json
+import math
 
 import numpy as np
 import pytest
 
-from benchmarks.thruster_failures import scene
 from cosim.batch.fused import FusedFlyer
 from cosim.batch.variation import Variation
-from cosim.scenario.scenario import load_scenario, validate_scenario
-from plant_fmu.vehicle import load_vehicle
-
-LAG = {"bluerov2_heavy": 0.15, "bluerov2_heavy_wu": 0.15}
-
-
-def fly(scenario):
-    """Fly a scenario; return its outcome, and the isolated thrusters."""
-    with FusedFlyer(Variation(scenario, ())) as flyer:
-        outcome, trace = flyer.fly_one(scenario, trace=True)
-    return outcome, set(np.unique(trace["law.failed_thruster"])) - {0.0}
-
-
-def check(scenario):
-    """Require a flight that keeps its hard regions and isolates nothing; return whether it rests in the goal."""
-    outcome, isolated = fly(scenario)
-    assert not isolated and not outcome["violated"], scenario.title
-    return bool(outcome["settled"])
+from cosim.campaigns.scenes.flyer import SceneFlyer
+from cosim.campaigns.scenes.mismatches import EXCLUDED, make_mismatch
+from cosim.campaigns.scenes.scene_file import decode_scene
+from cosim.scenario.scenario import load_scenario
 
 
 @pytest.mark.medium
 @pytest.mark.parametrize(
-    ("vehicle", "case", "count"),
-    [
-        ("bluerov2_heavy", "uneven", 3),
-        ("odin", "dead band", 3),
-        ("odin", "weak", 8),
-        ("rexrov", "weak", 8),
-        ("bluerov2_heavy", "weak", 8),
-        ("odin", "uneven", 8),
-        ("rexrov", "uneven", 8),
-        ("bluerov2_heavy_wu", "uneven", 8),
-        ("odin", "half drag", 8),
-        ("rexrov", "half drag", 8),
-        ("bluerov2_heavy", "half drag", 8),
-        ("bluerov2_heavy_wu", "half drag", 8),
-        ("bluerov2_heavy_wu", "other set", 4),
-        ("odin", "gusts", 4),
-        ("rexrov", "gusts", 4),
-        pytest.param("bluerov2_heavy", "weak", 60, marks=pytest.mark.slow),
-        pytest.param("bluerov2_heavy", "uneven", 60, marks=pytest.mark.slow),
-    ],
+    "seeds", [range(1000, 1040), pytest.param(range(1040, 1400), marks=pytest.mark.slow)], ids=["few", "many"]
 )
-def test_no_healthy_thruster_is_isolated(vehicle, case, count):
-    model = load_vehicle(vehicle)
-    for seed in range(count):
-        table = scene(model, case, seed, LAG.get(vehicle), 15.0, 0.0) | {"vehicle": vehicle}
-        assert check(validate_scenario(json.loads(json.dumps(table)), f"{case} {seed}"))
-
-
-@pytest.mark.medium
-@pytest.mark.parametrize("seeds", [range(6), pytest.param(range(6, 40), marks=pytest.mark.slow)], ids=["few", "many"])
-def test_regions_are_kept_with_an_eighth_of_the_drag_of_the_file(seeds):
-    """Drag and added mass of the other published set of the BlueROV2."""
-    for seed in seeds:
-        table = scene(load_vehicle("bluerov2_heavy"), "other set", seed, 0.15, 15.0, 0.0) | {
-            "vehicle": "bluerov2_heavy"
-        }
-        with FusedFlyer(Variation(validate_scenario(json.loads(json.dumps(table)), f"other set {seed}"), ())) as flyer:
-            outcome, trace = flyer.fly_one(flyer.variation.base, trace=True)
-        assert outcome["settled"] and not outcome["violated"], seed
-        assert trace["law.drag"].min() < 0.4  # the true one is 0.13 to 0.3
+def test_other_vehicles_keep_their_regions_and_thrusters(seeds):
+    """At most one flight in a hundred isolates a healthy thruster, or puts its limit below half the true one."""
+    scores = []
+    with SceneFlyer("deployable") as flyer:
+        for table in map(make_mismatch, seeds):
+            if table["kind"] == EXCLUDED:
+                continue
+            score, trace = flyer.fly(decode_scene(json.dumps(table).encode()), trace=True)
+            scores.append(score)
+            assert score.min_clearance >= 0.0 and not score.bound_excess > 0.0, table["seed"]
+            if table["kind"] == "other set" and table["scenario"]["vehicle"] == "bluerov2_heavy":
+                assert trace["law.drag"].min() < 0.4  # the true one is 0.13 to 0.3
+    assert sum(score.reached for score in scores) >= 0.98 * len(scores)
+    assert sum(score.healthy_weakened for score in scores) <= math.ceil(0.01 * len(scores))
 
 
 @pytest.mark.medium
@@ -88,4 +50,7 @@ def test_shipped_scenarios_are_flown_with_weak_thrusters(name, limits):
     for limit in limits:
         changes = [f"plant.parameters.thrust_max[{j}]={float(limit)}" for j in range(1, 9)]
         changes += [f"plant.parameters.thrust_min[{j}]={-float(limit)}" for j in range(1, 9)]
-        assert check(load_scenario(name, ["arbiter.engine=closed", "time.duration=60.0", *changes]))
+        scenario = load_scenario(name, ["arbiter.engine=closed", "time.duration=60.0", *changes])
+        with FusedFlyer(Variation(scenario, ())) as flyer:
+            outcome, trace = flyer.fly_one(scenario, trace=True)
+        assert outcome["settled"] and not outcome["violated"] and not np.any(trace["law.failed_thruster"]), limit
