@@ -49,8 +49,8 @@ class ArrayLengths(FunctionCode):
 
     def longer(self, size: str, number: int) -> str:
         """Return the sum of a fixed length and a number."""
-        if not number or size.isdigit():
-            return str(int(size) + number) if number else size
+        if not number:
+            return size
         code = f"{size} - {-number}" if number < 0 else f"{size} + {number}"
         self.fixed[code] = Length(self.fixed[size].path, self.fixed[size].offset + number)
         return code

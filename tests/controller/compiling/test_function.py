@@ -16,6 +16,12 @@ from controller.errors import TranslationError
 from controller.translator.foreign import INT, POINTER, call_c
 
 
+@pytest.fixture(autouse=True)
+def runs_compiled(monkeypatch):
+    """Bind calls to C even where all else is interpreted, as for mutants."""
+    monkeypatch.delenv(INTERPRETED, raising=False)
+
+
 class Pair(NamedTuple):
     first: np.ndarray
     factor: float

@@ -10,13 +10,19 @@ from typing import Annotated, NamedTuple
 import numpy as np
 import pytest
 
-from controller.compiling.function import BoundCall, c_text
+from controller.compiling.function import INTERPRETED, BoundCall, c_text
 from controller.stack_array import Array, Matrix3, Shape, Vector3, interpret
 from tests.controller.translator.building import Called, compiled
 from tests.controller.translator.flights import same_bits
 
 HERE = Path(__file__)
 AXES = {"w": "9", "A": "33", "x": "n", "G": "nm"}  # lengths that are known at translation, or only at run time
+
+
+@pytest.fixture(autouse=True)
+def runs_compiled(monkeypatch):
+    """Bind calls to C even where all else is interpreted, as for mutants."""
+    monkeypatch.delenv(INTERPRETED, raising=False)
 
 
 class Sliced(NamedTuple):
