@@ -5,8 +5,7 @@ from __future__ import annotations
 import re
 import struct
 from collections import OrderedDict
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 from cosim.mavlink.services.packed_parameters import compute_crc32, pack_parameters
 from cosim.mavlink.services.parameter_protocol import ParameterProtocol
@@ -17,36 +16,26 @@ _HEADER = struct.Struct("<HBBBBBBI")  # seq, session, opcode, size, req_opcode, 
 _MAX_DATA = 239  # bytes in a payload
 _PAYLOAD = 251
 _FOLDER, _FILE = "@PARAM", "param.pck"
-_MAX_CLIENTS = 8  # each with one open file; a further client replaces the one unused for longest
+_MAX_CLIENTS = 8  # with an open file, one each; a further client replaces the one unused for longest
 _BURST = 16  # packets
 _MAX_PATH = 100
 
-_NONE, _TERMINATE, _RESET, _LIST, _OPEN, _READ, _CRC, _BURST_READ = 0, 1, 2, 3, 4, 5, 14, 15
+_BURST_READ = 15
 _WRITING = (6, 7, 8, 9, 10, 11, 12, 13)  # create, write, remove, make and remove folders, open, truncate, rename
 _ACK, _NAK = 128, 129
 _INVALID_SIZE, _INVALID_SESSION, _EOF, _UNKNOWN, _PROTECTED, _NOT_FOUND = 3, 4, 6, 7, 9, 10
 
 
-@dataclass(frozen=True)
-class _Request:
-    """A decoded request."""
+class _Request(NamedTuple):
+    """A decoded request of a client: link, system and component."""
 
+    client: tuple[str, int, int]
     seq: int
     session: int
     opcode: int
     size: int
     offset: int
     data: bytes
-
-
-@dataclass
-class _Client:
-    """The session and open file of a ground station."""
-
-    session: int = 0
-    content: bytes | None = None
-    last_request: bytes = b""
-    last_replies: list[bytes] = field(default_factory=list)
 
 
 class FtpError(Exception):
@@ -63,55 +52,67 @@ class FileServer(Service):
     def __init__(self, context: VehicleContext, parameters: ParameterProtocol) -> None:
         super().__init__(context)
         self._parameters = parameters
-        self._clients: OrderedDict[tuple[str, int, int], _Client] = OrderedDict()
+        self._opened: OrderedDict[tuple[str, int, int], tuple[int, bytes]] = OrderedDict()  # session, content by client
 
     def _receive_file_transfer_protocol(self, sender: Sender, message: Any) -> None:
         raw = bytes(message.payload[:_PAYLOAD]).ljust(_PAYLOAD, b"\0")
         seq, session, opcode, size, _, _, _, offset = _HEADER.unpack_from(raw)
         if opcode in (_ACK, _NAK):
             return
-        client = self._client_of(sender)
-        if raw == client.last_request:  # repeated: the reply was lost
-            replies = client.last_replies
-        else:
-            request = _Request(seq, session, opcode, size, offset, raw[_HEADER.size : _HEADER.size + size])
-            replies = self._replies(client, request)
-            client.last_request, client.last_replies = raw, replies
+        client = sender.link.name, sender.system, sender.component
+        request = _Request(client, seq, session, opcode, size, offset, raw[_HEADER.size : _HEADER.size + size])
+        replies = self._replies(request)
         self.reply(sender, [self.context.make("FILE_TRANSFER_PROTOCOL", 0, *sender.address, data) for data in replies])
 
-    def _client_of(self, sender: Sender) -> _Client:
-        key = sender.link.name, sender.system, sender.component
-        if key not in self._clients:
-            if len(self._clients) >= _MAX_CLIENTS:
-                self._clients.popitem(last=False)
-            self._clients[key] = _Client()
-        self._clients.move_to_end(key)
-        return self._clients[key]
-
-    def _replies(self, client: _Client, request: _Request) -> list[bytes]:
+    def _replies(self, request: _Request) -> list[bytes]:
         is_burst = request.opcode == _BURST_READ
         try:
-            parts = _burst(client, request) if is_burst else [(request.offset, self._answer(client, request))]
+            parts = self._burst(request) if is_burst else [(request.offset, self._answer(request))]
         except FtpError as error:
             return [_packet(request, 1, _NAK, bytes([error.code]), request.offset)]
         last = len(parts) if is_burst else 0
         return [_packet(request, i, _ACK, data, offset, i == last) for i, (offset, data) in enumerate(parts, 1)]
 
-    def _answer(self, client: _Client, request: _Request) -> bytes:
-        opcode = request.opcode
-        if opcode in (_NONE, _TERMINATE, _RESET):
-            client.content = client.content if opcode == _NONE else None
-            return b""
-        if opcode == _LIST:
-            return self._listing(_path(request), request.offset)
-        if opcode == _OPEN:
-            client.session, client.content = request.session, self._content(_path(request))
-            return struct.pack("<I", len(client.content))
-        if opcode == _READ:
-            return _read_part(_get_content(client, request), request.offset, request.size)
-        if opcode == _CRC:
-            return struct.pack("<I", compute_crc32(self._content(_path(request))))
-        raise FtpError(_PROTECTED if opcode in _WRITING else _UNKNOWN)
+    def _answer(self, request: _Request) -> bytes:
+        match request.opcode:
+            case 0:  # no operation
+                return b""
+            case 1 | 2:  # the end of a session, or of all
+                self._opened.pop(request.client, None)
+                return b""
+            case 3:  # list a folder
+                return self._listing(_path(request), request.offset)
+            case 4:  # open for reading
+                return self._open(request)
+            case 5:  # read
+                return _read_part(self._content_of(request), request.offset, request.size)
+            case 14:  # CRC-32 of a file
+                return struct.pack("<I", compute_crc32(self._content(_path(request))))
+        raise FtpError(_PROTECTED if request.opcode in _WRITING else _UNKNOWN)
+
+    def _open(self, request: _Request) -> bytes:
+        content = self._content(_path(request))
+        self._opened[request.client] = request.session, content
+        self._opened.move_to_end(request.client)
+        if len(self._opened) > _MAX_CLIENTS:
+            self._opened.popitem(last=False)
+        return struct.pack("<I", len(content))
+
+    def _content_of(self, request: _Request) -> bytes:
+        """Return the content of the file that a client has opened."""
+        session, content = self._opened.get(request.client, (None, b""))
+        if session != request.session:
+            raise FtpError(_INVALID_SESSION)
+        self._opened.move_to_end(request.client)
+        return content
+
+    def _burst(self, request: _Request) -> list[tuple[int, bytes]]:
+        """Return the parts of a burst, each with its offset."""
+        content, offset = self._content_of(request), request.offset
+        parts = [(offset, _read_part(content, offset, request.size))]
+        while len(parts) < _BURST and (offset := offset + len(parts[-1][1])) < len(content):
+            parts.append((offset, _read_part(content, offset, request.size)))
+        return parts
 
     # ---- files ----
 
@@ -146,21 +147,6 @@ def _path(request: _Request) -> str:
 def _number(query: str, key: str, default: int) -> int:
     match = re.search(rf"(?:^|[?&]){key}=([0-9]{{1,5}})(?:&|$)", query)
     return int(match[1]) if match else default
-
-
-def _get_content(client: _Client, request: _Request) -> bytes:
-    if client.content is None or request.session != client.session:
-        raise FtpError(_INVALID_SESSION)
-    return client.content
-
-
-def _burst(client: _Client, request: _Request) -> list[tuple[int, bytes]]:
-    """Return the parts of a burst, each with its offset."""
-    content, offset = _get_content(client, request), request.offset
-    parts = [(offset, _read_part(content, offset, request.size))]
-    while len(parts) < _BURST and (offset := offset + len(parts[-1][1])) < len(content):
-        parts.append((offset, _read_part(content, offset, request.size)))
-    return parts
 
 
 def _read_part(content: bytes, offset: int, size: int) -> bytes:
