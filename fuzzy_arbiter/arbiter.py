@@ -99,8 +99,10 @@ class Arbiter:
         """Validator of the inputs."""
         return self._samples
 
-    def __call__(self, inputs: Sample | None = None, /, **named: float) -> Result[float]:
-        """Return the value of each output for one sample; inputs (inputs,)."""
+    def __call__(self, inputs: Sample | None = None, /, *others: object, **named: float) -> Result[float]:
+        """Return the value of each output for one sample; inputs (inputs,); `others` are refused."""
+        if others:
+            raise InputError(f"got {1 + len(others)} values by position, expected one sample, such as [1, 2], or names")
         if named:
             inputs = named if inputs is None else _one_of(inputs, named)
         if self._shortcut is not None:
@@ -166,11 +168,11 @@ class Arbiter:
 
         return explain(self._engine, self._samples.one(_one_of(inputs, named)))
 
-    def verify(self) -> Verification:
-        """Check that the rules are complete, consistent and exclusive, and that the terms have no gaps."""
+    def verify(self, as_criteria: bool | None = None) -> Verification:
+        """Check that the rules are complete and the terms have no gaps; `as_criteria` as for `verification.verify`."""
         from fuzzy_arbiter.verification import verify
 
-        return verify(self._system)
+        return verify(self._system, as_criteria=as_criteria)
 
     @classmethod
     def load(

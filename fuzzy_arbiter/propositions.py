@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from fuzzy_arbiter.checks import all_of, require_choice, shown
 from fuzzy_arbiter.errors import DefinitionError
@@ -72,8 +73,8 @@ class Is(Proposition):
         if not (isinstance(self.variable, str) and isinstance(self.term, str)):
             raise DefinitionError(f"{shown(self.variable)} is {shown(self.term)}: expected the names of both")
 
-    def __call__(self, value: float) -> float:
-        """Return the degree to which a value is in the term."""
+    def __call__(self, value: Any) -> Any:
+        """Return the degree to which a value, or each of an array, is in the term."""
         if self.shape is None:
             raise DefinitionError(f"{self}: made of names alone, expected such as variable['term'], to be called")
         return self.shape(value)

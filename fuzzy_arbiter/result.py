@@ -41,6 +41,12 @@ class Result(tuple[T, ...]):
             raise AttributeError(f"no output {name!r}, expected one of {', '.join(self._fields)}")
         return super().__getitem__(self._indices[name])
 
+    def __float__(self) -> float:
+        """Return the value of the only output."""
+        if len(self) != 1:
+            raise DefinitionError(f"float: got the outputs {', '.join(self._fields)}, expected one, such as result[0]")
+        return float(super().__getitem__(0))  # type: ignore[arg-type]  # of one sample
+
     def _asdict(self) -> dict[str, T]:
         """Return the values by name, as named tuples do."""
         return dict(zip(self._fields, self, strict=True))

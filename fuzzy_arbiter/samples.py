@@ -16,6 +16,7 @@ from fuzzy_arbiter.errors import InputError
 from fuzzy_arbiter.shapes import Array
 
 _NUMBER: Any = (Real, np.bool_)
+EDGE = 1e-9  # distance from a universe, as a fraction of its width, within which an input counts as its end
 
 
 class Frame(Protocol):
@@ -39,6 +40,7 @@ class Samples:
     def __init__(self, system: System) -> None:
         self._clips = system.outside == "clip"
         self._limits = tuple(v.universe for v in system.inputs)
+        self._tolerance = tuple(EDGE * (high - low) for low, high in self._limits)
         self._names = variable_names(system.inputs)
         self._by_name = itemgetter(*self._names)
 
@@ -90,12 +92,15 @@ class Samples:
         low, high = np.array(self._limits).T
         if values.size and low.max() <= values.min() and values.max() <= high.min():  # for NaN neither holds
             return values, masked
-        valid = ~np.isnan(values) if self._clips else (low <= values) & (values <= high)
+        edge = np.array(self._tolerance)
+        valid = ~np.isnan(values) if self._clips else (low - edge <= values) & (values <= high + edge)
         if not valid.all():
             row, i = np.argwhere(~valid)[0]
             expected = f"expected a number in [{low[i]:g}, {high[i]:g}]"
+            if np.isnan(values[row, i]):
+                expected += ", or rows masked by numpy.ma.masked_invalid"
             raise InputError(f"row {row}: {self._names[i]} is {float(values[row, i])!r}, {expected}")
-        return np.clip(values, low, high) if self._clips else values, masked
+        return np.clip(values, low, high), masked
 
     def columns(self, inputs: Columns) -> Array:
         """Return columns by name as rows, in a masked array if one of them is masked; returns (n, inputs)."""
@@ -120,8 +125,8 @@ class Samples:
     def _converted(self, values: Sequence[Any], masked: bool) -> list[float]:
         """Return values as floats within their universes, so that other number types add no rounding of their own."""
         result = []
-        for name, x, (low, high) in zip(self._names, values, self._limits, strict=True):
-            if not isinstance(x, _NUMBER) or x != x or (not self._clips and not low <= x <= high):
+        for name, x, (low, high), edge in zip(self._names, values, self._limits, self._tolerance, strict=True):
+            if not isinstance(x, _NUMBER) or x != x or (not self._clips and not low - edge <= x <= high + edge):
                 received = "masked" if masked and x is None else shown(x)
                 hint = "; for columns there is batch" if isinstance(x, Sized) and not isinstance(x, str) else ""
                 raise InputError(f"{name}: input is {received}, expected a number in [{low:g}, {high:g}]{hint}")

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from fractions import Fraction
 from operator import itemgetter
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,13 @@ class Membership(ABC):
     monotonic: ClassVar[bool] = False  # true if it only rises or only falls between its features
 
     @abstractmethod
-    def __call__(self, x: float) -> float:
-        """Return the degree at a position."""
+    def __call__(self, x: Any) -> Any:
+        """Return the degree at a position, or the degrees at an array of them."""
+
+    def of_array(self, x: object) -> Array:
+        """Return the degrees at positions, an array of any shape."""
+        positions = np.asarray(x, dtype=np.float64)
+        return self.of_many(positions.ravel()).reshape(positions.shape)
 
     @abstractmethod
     def of_many(self, positions: Array, /) -> Array:
@@ -118,8 +123,10 @@ class Shape(Membership):
                 )
             yield position, height
 
-    def __call__(self, x: float) -> float:
-        """Return the degree at a position."""
+    def __call__(self, x: Any) -> Any:
+        """Return the degree at a position, or the degrees at an array of them."""
+        if type(x) in (list, tuple, np.ndarray):
+            return self.of_array(x)
         if x != x:
             return x
         points = self.points

@@ -34,6 +34,7 @@ from fuzzy_arbiter.export.statements import (
     texts_of,
 )
 from fuzzy_arbiter.propositions import Is
+from fuzzy_arbiter.samples import EDGE
 from fuzzy_arbiter.shapes import Membership, Shape
 from fuzzy_arbiter.terms.curves import Curve
 from fuzzy_arbiter.terms.expressions import Expression, code
@@ -108,10 +109,10 @@ def _inputs(system: System) -> Iterator[Statement]:
     """Check each input, or clip it."""
     for i, variable in enumerate(system.inputs):
         x, (low, high) = f"x{i + 1}", variable.universe
-        valid = f"{x} == {x}" if system.outside == "clip" else f"{low!r} <= {x} and {x} <= {high!r}"
+        edge = EDGE * (high - low)
+        valid = f"{x} == {x}" if system.outside == "clip" else f"{low - edge!r} <= {x} and {x} <= {high + edge!r}"
         yield Choose(((f"not ({valid})", (Return(-i - 1),)),))  # NaN too
-        if system.outside == "clip":
-            yield Assign(x, f"least(greatest({x}, {low!r}), {high!r})")
+        yield Assign(x, f"least(greatest({x}, {low!r}), {high!r})")
 
 
 class _Degrees:

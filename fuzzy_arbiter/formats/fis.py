@@ -114,6 +114,8 @@ def _add_entry(section: Block, line: int, content: str) -> None:
     if not entry:
         refuse(line, f"{content!r}, expected a key, = and its value")
     key, value = entry.groups()
+    if re.match(r"TypeRed|MF[0-9]+[UL]MF", key):
+        refuse(line, f"{key} is of a type-2 system, expected one of type 1")
     if key in _TEXTS:
         quoted = _QUOTED.fullmatch(value)
         value = quoted[1] if quoted else refuse(line, f"{key} is {value}, expected text in single quotes")

@@ -89,8 +89,10 @@ class Curve(Membership):
     def _side(self, i: int, x: float) -> float:
         return self._numbers[i]({"x": x})
 
-    def __call__(self, x: float) -> float:
-        """Return the degree at a position; of a jump the greater one; NaN for a position that is NaN."""
+    def __call__(self, x: Any) -> Any:
+        """Return the degree at a position; of a jump the greater one; NaN for NaN; degrees for an array."""
+        if type(x) in (list, tuple, np.ndarray):
+            return self.of_array(x)
         if x != x:
             return x
         i = bisect_left(self.ends, x)

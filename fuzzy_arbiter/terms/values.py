@@ -168,8 +168,10 @@ class Formula(Value, Membership):
             )
         return parsed
 
-    def __call__(self, x: float) -> float:
-        """Return the degree at a position, held within [0, 1]; NaN for a position that is NaN."""
+    def __call__(self, x: Any) -> Any:
+        """Return the degree at a position, held within [0, 1]; NaN for NaN; degrees for an array."""
+        if type(x) in (list, tuple, np.ndarray):
+            return self.of_array(x)
         return x if x != x else min(max(self._parsed({"x": x}), 0.0), 1.0)
 
     def of_many(self, positions: Array, /) -> Array:

@@ -47,7 +47,7 @@ class Verification:
     """The properties of a system that follow from its definition alone.
 
     Crisp rows are all combinations of terms, each taken as a label. Graded inputs are all real numbers in the
-    universes; what is said of them holds in real arithmetic. A property that is not decided is None.
+    universes; what is said of them holds in real arithmetic. A property that is not decided, or not asked, is None.
 
     Attributes
     ----------
@@ -112,12 +112,13 @@ class Verification:
 
     @property
     def ok(self) -> bool:
-        """True if there is no fault, and `complete`, `consistent` and `graded_complete` are decided."""
-        decided = (self.complete, self.consistent, self.graded_complete)
-        return None not in decided and all(finding.severity != "fault" for finding in self.findings)
+        """True if there is no fault, and `complete`, `graded_complete` and, of criteria, `consistent` are decided."""
+        decides = ("complete", "consistent", "graded_complete")
+        decided = all(check.holds is not None for check in self.checks if check.name in decides)
+        return decided and all(finding.severity != "fault" for finding in self.findings)
 
     def _holds(self, name: str) -> bool | None:
-        return next(check.holds for check in self.checks if check.name == name)
+        return next((check.holds for check in self.checks if check.name == name), None)
 
     def as_dict(self) -> dict[str, Any]:
         """Convert the verification to texts, numbers, Booleans, lists and dicts, which JSON can represent."""

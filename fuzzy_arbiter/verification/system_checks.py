@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -38,8 +39,8 @@ _ROWS, _ALL = "on every crisp row", "for all real inputs"
 _WORST_FIRST = {"fault": 0, "warning": 1, "note": 2}
 
 
-def verify(system: System, effort: int = EFFORT) -> Verification:
-    """Check that a system's rules are complete, consistent and exclusive, and that its terms have no gaps.
+def verify(system: System, effort: int = EFFORT, as_criteria: bool | None = None) -> Verification:
+    """Check that a system's rules are complete and its terms have no gaps; of criteria also their consistency.
 
     Parameters
     ----------
@@ -47,6 +48,9 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
         System to verify.
     effort : int
         Greatest number of statements to evaluate; a check that needs more is undecided.
+    as_criteria : bool, optional
+        True to check also that rules do not contradict each other and that no two outputs are high together; by default
+        for the weights of criteria, as rules of other systems may overlap.
 
     Returns
     -------
@@ -56,8 +60,8 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
     Raises
     ------
     UnsupportedError
-        If the system has more than the checks support: piecewise-linear terms, *min* and *max* or their products, the
-        centroid.
+        If the system has more than the checks support: piecewise-linear terms of inputs, *min* and *max* or their
+        products; of criteria also piecewise-linear terms of outputs and the centroid.
 
     Examples
     --------
@@ -67,7 +71,8 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
     >>> verify(system).complete
     True
     """
-    if reason := unsupported_reason(system):
+    as_criteria = bool(system.weights_of) if as_criteria is None else as_criteria
+    if reason := unsupported_reason(system, any_outputs=not as_criteria):
         raise UnsupportedError(f"verify: {reason}")
     for variable in (*system.inputs, *system.outputs):
         if len(variable.terms) > MAX_TERMS:
@@ -76,8 +81,11 @@ def verify(system: System, effort: int = EFFORT) -> Verification:
             )
     checks = _Checks(system, effort)
     checks.rows()
+    if as_criteria:
+        checks.crisp_criteria()
     checks.support()
-    checks.halves()
+    if as_criteria:
+        checks.halves()
     gaps = tuple(stretch for variable in system.inputs for stretch in stretches(variable))
     findings = [*checks.findings, *map(_stretch, gaps), *unused(system), *redundant(system)]
     row_count = math.prod(len(v.terms) for v in system.inputs)
@@ -101,11 +109,21 @@ class _Checks:
         self.findings: list[Finding] = []
         self._effort = Effort(effort, 8)
         self._terms = {v.name: tuple(Is(v.name, term) for term in v.term_names) for v in system.outputs}
-        self._high = tuple(Is(v.name, greatest_term(v)) for v in system.outputs)
-        self._highs = " or ".join(dict.fromkeys(term.term for term in self._high))
+
+    @functools.cached_property
+    def _high(self) -> tuple[Is, ...]:
+        return tuple(Is(v.name, greatest_term(v)) for v in self.system.outputs)
+
+    @property
+    def _highs(self) -> str:
+        return " or ".join(dict.fromkeys(term.term for term in self._high))
 
     def rows(self) -> None:
-        """Check the rules on crisp rows."""
+        """Check that rules fire on crisp rows."""
+        self._complete("complete", Questions.of_rows(self.system, self._effort), _ROWS)
+
+    def crisp_criteria(self) -> None:
+        """Check the conclusions on crisp rows."""
         ask = Questions.of_rows(self.system, self._effort)
 
         def add_findings(severity: Severity, name: str, answer: Answer, text: str, terms: Sequence[Is]) -> None:
@@ -114,7 +132,6 @@ class _Checks:
                 causes = _causes(self.system, strengths, terms, 1.0 if name == "consistent" else 0.5)
                 self._add(severity, name, f"{text} where {_format_place(place)}: {causes}", place)
 
-        self._complete("complete", ask, _ROWS)
         answers = ask.ask([Goal(tuple(map(ask.fully, terms)), 2, ANY) for terms in self._terms.values()])
         for (output, terms), answer in zip(self._terms.items(), answers, strict=True):
             add_findings("fault", "consistent", answer, f"output {output!r}: rules contradict each other", terms)

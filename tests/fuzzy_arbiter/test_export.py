@@ -286,7 +286,9 @@ def test_exported_code_matches_the_arbiter(make, name, tmp_path):
     for i, variable in enumerate(system.inputs):
         values = [float("nan")]
         if system.outside == "refuse":
-            values += [np.nextafter(variable.universe[0], -np.inf), variable.universe[1] + 1, float("inf")]
+            values += [variable.universe[0] - 1e-6, variable.universe[1] + 1, float("inf")]
+        rounded = np.nextafter(variable.universe[0], -np.inf)  # counts as the end
+        assert evaluate([*good[:i], rounded, *good[i + 1 :]]) == evaluate(good)
         for value in values:
             assert evaluate([*good[:i], value, *good[i + 1 :]])[0] == -i - 1
 

@@ -338,3 +338,34 @@ def test_repr_of_a_system_round_trips_through_public_names(system):
     again = eval(repr(system), {"__builtins__": {}} | public)
     assert again == system and hash(again) == hash(system)
     assert eval(repr(Arbiter(system=system)), {"__builtins__": {}} | public) == Arbiter(system=system)
+
+
+def test_rounding_at_the_end_of_a_universe_is_no_fault(tipping):
+    for high, low in ((10.0000000001, -1e-10), (np.nextafter(10, 11), np.nextafter(0, -1))):
+        assert tipping([high, low]) == tipping([10, 0]) and tipping.batch([[high, low]])[0] == tipping([10, 0])
+    for x in (10.0001, -0.0001):
+        with pytest.raises(InputError):
+            tipping([x, 1])
+        with pytest.raises(InputError):
+            tipping.batch([[x, 1]])
+
+
+def test_terms_take_arrays_and_results_are_numbers_where_there_is_one(tipping):
+    x = np.linspace(0, 10, 7).reshape(7, 1)
+    for shape in (
+        triangle(0, 4, 9),
+        curve("gaussian", 4, 2),
+        Formula("x / 10"),
+        Variable("v", (0, 10), auto_terms(3))["good"],
+    ):
+        assert shape(x).shape == x.shape and shape(x).ravel().tolist() == pytest.approx([shape(y) for y in x.ravel()])
+        assert shape([1, 2]).tolist() == pytest.approx([shape(1), shape(2)])
+    assert float(tipping([9.8, 6.5])) == tipping([9.8, 6.5])[0]
+    with pytest.raises(DefinitionError, match="float: got the outputs obstacle, shape, depth, expected one"):
+        float(Arbiter()([0, 0, 0]))
+    with pytest.raises(InputError, match="got 2 values by position, expected one sample"):
+        tipping(1, 2)
+    rows = tipping.batch(np.ma.masked_invalid([[np.nan, 1.0], [9.8, 6.5]])).filled(np.nan)
+    assert np.isnan(rows[0]).all() and rows[1, 0] == pytest.approx(tipping([9.8, 6.5])[0])
+    with pytest.raises(InputError, match=r"row 0: .* is nan, expected .* masked by numpy.ma.masked_invalid"):
+        tipping.batch([[np.nan, 1.0]])

@@ -5,6 +5,7 @@ import json
 import math
 import re
 from dataclasses import replace
+from functools import partial
 
 import pytest
 
@@ -25,10 +26,11 @@ from fuzzy_arbiter import (
 )
 from fuzzy_arbiter.errors import UnsupportedError
 from fuzzy_arbiter.propositions import Is
-from fuzzy_arbiter.verification import verify
+from fuzzy_arbiter.verification import verify as verify_system
 from fuzzy_arbiter.verification.cells import stretches
 
 LOW_HIGH = {"low": falling(0, 1), "high": rising(0, 1)}
+verify = partial(verify_system, as_criteria=True)
 NAMES = ("complete", "consistent", "exclusive", "graded_complete", "graded_consistent", "graded_exclusive")
 
 
@@ -112,6 +114,21 @@ def test_a_gap_is_a_fault_unless_there_is_a_default():
     v = verify(System((pair("a"),), (output("y", 0.5),), ("if a is on then y is high",)))
     assert (v.ok, v.complete, v.graded_complete) == (True, False, False)
     assert "output 'y': no rule fires where a is off; it has its default 0.5 there" in texts(v, "warning")
+
+
+@pytest.mark.parametrize("defuzzifier", ["centroid", "bisector", "mom", "average"])
+def test_overlapping_rules_are_ok_but_of_criteria(defuzzifier):
+    """Rules that overlap are what a fuzzy system is made of; completeness does not depend on what joins them."""
+    rules = ["if a is on then y is high", "if b is on then y is low", "if a is off then y is low"]
+    made = system(rules)
+    made = replace(made, outputs=(replace(made.outputs[0], defuzzifier=defuzzifier, aggregation=""),))
+    v = Arbiter(system=made).verify()
+    assert (v.ok, v.complete, v.graded_complete, v.consistent, v.exclusive) == (True, True, True, None, None)
+    assert not re.search("contradict|exclusive|consistent|winner|criteri", str(v))
+    short = Arbiter(system=replace(made, rules=made.rules[:2])).verify()
+    assert (short.ok, short.complete, short.graded_complete) == (False, False, False)
+    if defuzzifier == "centroid":
+        assert Arbiter(system=made).verify(as_criteria=True).consistent is False
 
 
 # sizes and forms
