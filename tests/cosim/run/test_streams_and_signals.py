@@ -37,7 +37,7 @@ ROOT = Path(__file__).parents[3]
 PRINTS = {"cosim": ["show"], "plant_fmu": ["list"], "fuzzy_arbiter": ["show", "section-vi"]}
 
 
-# ---- D7: standard output closed --------------------------------------------------------------------------------------
+# ---- standard output closed --------------------------------------------------------------------------------------
 
 
 @pytest.mark.medium(fast=1)
@@ -45,7 +45,7 @@ PRINTS = {"cosim": ["show"], "plant_fmu": ["list"], "fuzzy_arbiter": ["show", "s
     ("program", "words"),
     [("cosim", "run paper"), ("cosim", "--help"), ("plant_fmu", "list"), ("fuzzy_arbiter", "show")],
 )
-def test_D7_process_without_standard_output_exits_with_2_and_does_no_work(program, words, tmp_path):
+def test_process_without_standard_output_exits_with_2_and_does_no_work(program, words, tmp_path):
     command = f"{sys.executable} -m {program} {words} >&-"
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     done = subprocess.run(
@@ -59,13 +59,13 @@ def test_D7_process_without_standard_output_exits_with_2_and_does_no_work(progra
     ("program", "words"),
     [("cosim", ["show", "x"]), ("plant_fmu", ["docs", "--vehicle", "x"]), ("fuzzy_arbiter", ["show", "x"])],
 )
-def test_D7_without_standard_error_messages_do_not_enter_the_output(program, words, capsys, monkeypatch):
+def test_without_standard_error_messages_do_not_enter_the_output(program, words, capsys, monkeypatch):
     monkeypatch.setattr(sys, "stderr", None)
     assert MAINS[program](words) == 2
     assert capsys.readouterr().out == ""
 
 
-def test_D7_closed_standard_input_is_rejected(tmp_path, capsys, monkeypatch):
+def test_closed_standard_input_is_rejected(tmp_path, capsys, monkeypatch):
     monkeypatch.setattr(sys, "stdin", None)
     assert main(["campaign", "-", "--law", "ismail_dunnigan", "--out", str(tmp_path / "out")]) == 2
     assert capsys.readouterr() == ("", "cosim: standard input: is closed\n")
@@ -76,7 +76,7 @@ def test_D7_closed_standard_input_is_rejected(tmp_path, capsys, monkeypatch):
 @pytest.mark.skipif(not os.path.exists("/dev/full"), reason="needs a device that is always full")
 @pytest.mark.parametrize("program", MAINS)
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_D7_full_standard_output_gives_one_line_error(program, unbuffered):
+def test_full_standard_output_gives_one_line_error(program, unbuffered):
     with open("/dev/full", "wb") as full:
         command, buffered = (
             [sys.executable, "-m", program, *PRINTS[program]],
@@ -86,7 +86,7 @@ def test_D7_full_standard_output_gives_one_line_error(program, unbuffered):
     assert (done.returncode, done.stderr) == (2, f"{program}: standard output: No space left on device\n")
 
 
-# ---- D8: texts of --set that are deep, or long -----------------------------------------------------------------------
+# ---- texts of --set that are deep, or long -----------------------------------------------------------------------
 
 DEEP = ".".join("a" for _ in range(5000))
 SETTINGS = {
@@ -114,7 +114,7 @@ SETTINGS = {
      ["sitl", "--port", "9113", "--timeout", "1", "--out", "out"]],
     ids=lambda words: words[0],
 )  # fmt: skip
-def test_D8_deep_or_long_setting_gives_one_line_error(words, setting, tmp_path, capsys, monkeypatch):
+def test_deep_or_long_setting_gives_one_line_error(words, setting, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main([*words, "--set", setting]) == 2
     said = capsys.readouterr()
@@ -137,7 +137,7 @@ def test_D8_deep_or_long_setting_gives_one_line_error(words, setting, tmp_path, 
     ],
     ids=lambda words: " ".join(words)[:40],
 )
-def test_D8_other_text_settings_give_one_line_errors(words, tmp_path, capsys, monkeypatch):
+def test_other_text_settings_give_one_line_errors(words, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert main([*words, "--out", "out"]) == 2
     said = capsys.readouterr()
@@ -145,7 +145,7 @@ def test_D8_other_text_settings_give_one_line_errors(words, tmp_path, capsys, mo
     assert list(tmp_path.iterdir()) == []
 
 
-# ---- D10: a closed terminal ------------------------------------------------------------------------------------------
+# ---- a closed terminal ------------------------------------------------------------------------------------------
 
 
 def receive(number):
@@ -163,7 +163,7 @@ def without_nohup():
 
 @pytest.mark.usefixtures("without_nohup")
 @pytest.mark.parametrize("sent", [signal.SIGHUP, signal.SIGTERM, signal.SIGINT])
-def test_D10_every_verb_handles_termination_signals_like_ctrl_c(sent, capsys, monkeypatch):
+def test_every_verb_handles_termination_signals_like_ctrl_c(sent, capsys, monkeypatch):
     before = [signal.getsignal(number) for number in (signal.SIGHUP, signal.SIGTERM, signal.SIGINT)]
     monkeypatch.setattr("cosim.command_line.show.show", lambda options: receive(sent))
     assert main(["show", "paper"]) == 130
@@ -172,7 +172,7 @@ def test_D10_every_verb_handles_termination_signals_like_ctrl_c(sent, capsys, mo
 
 
 @pytest.mark.usefixtures("without_nohup")
-def test_D10_repeated_hangup_does_not_disturb_shutdown():
+def test_repeated_hangup_does_not_disturb_shutdown():
     with kills_interrupt():
         with pytest.raises(KeyboardInterrupt):
             receive(signal.SIGHUP)
@@ -181,7 +181,7 @@ def test_D10_repeated_hangup_does_not_disturb_shutdown():
             time.sleep(0.01)
 
 
-def test_D10_under_nohup_a_closed_terminal_stays_ignored():
+def test_under_nohup_a_closed_terminal_stays_ignored():
     before = signal.signal(signal.SIGHUP, signal.SIG_IGN)
     try:
         with kills_interrupt():
@@ -195,7 +195,7 @@ def test_D10_under_nohup_a_closed_terminal_stays_ignored():
 
 
 @pytest.mark.slow
-def test_D10_a_run_whose_terminal_is_closed_is_readable(tmp_path):
+def test_a_run_whose_terminal_is_closed_is_readable(tmp_path):
     """The process leads the session of a terminal whose other end is closed."""
     import fcntl
 
@@ -218,7 +218,7 @@ def test_D10_a_run_whose_terminal_is_closed_is_readable(tmp_path):
     assert len(load_record(out)["time"]) > 1
 
 
-# ---- D12: a reader that goes away ------------------------------------------------------------------------------------
+# ---- a reader that goes away ------------------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -288,7 +288,7 @@ NEED = {"watch": "rich", "falsify": "cma", "companion": "pymavlink"}
 NEED |= {"mavlink listen": "pymavlink", "mavlink stream": "pymavlink"}
 
 
-def test_D12_every_verb_has_a_case():
+def test_every_verb_has_a_case():
     assert {verb.partition(" --")[0] for verb in VERBS} == {name for name, _ in all_verbs(_parser())} - {"mavlink"}
 
 
@@ -296,7 +296,7 @@ def test_D12_every_verb_has_a_case():
 @pytest.mark.parametrize(
     "verb", [pytest.param(verb, marks=pytest.mark.slow) if verb in SLOW | WAITING else verb for verb in VERBS]
 )
-def test_D12_closed_output_pipe_exits_with_141_for_every_verb(verb, flown, place, unread, capsys):
+def test_closed_output_pipe_exits_with_141_for_every_verb(verb, flown, place, unread, capsys):
     if verb in NEED:
         pytest.importorskip(NEED[verb])
     if verb == "rerun":
@@ -340,9 +340,7 @@ OTHERS = [
 
 @pytest.mark.medium(fast=3)
 @pytest.mark.parametrize(("program", "words"), OTHERS, ids=lambda value: value if isinstance(value, str) else value[0])
-def test_D12_closed_output_pipe_exits_with_141_for_other_commands(
-    program, words, tmp_path, unread, capsys, monkeypatch
-):
+def test_closed_output_pipe_exits_with_141_for_other_commands(program, words, tmp_path, unread, capsys, monkeypatch):
     monkeypatch.chdir(tmp_path)
     if words == ["check", "odin.fmu"]:
         assert MAINS[program](["build", "--vehicle", "odin"]) == 0
@@ -359,7 +357,7 @@ def test_D12_closed_output_pipe_exits_with_141_for_other_commands(
     ids=lambda value: value if isinstance(value, str) else " ".join(value),
 )
 @pytest.mark.parametrize("unbuffered", ["", "1"])
-def test_D12_process_with_closed_output_pipe_exits_silently_with_141(program, words, unbuffered):
+def test_process_with_closed_output_pipe_exits_silently_with_141(program, words, unbuffered):
     reading, writing = os.pipe()
     os.close(reading)
     command = [sys.executable, "-m", program, *words]
@@ -369,7 +367,7 @@ def test_D12_process_with_closed_output_pipe_exits_silently_with_141(program, wo
     assert (done.returncode, done.stderr) == (141, b"")
 
 
-def test_D12_other_broken_pipes_are_reported(capsys, monkeypatch):
+def test_other_broken_pipes_are_reported(capsys, monkeypatch):
     def broken(options):
         raise BrokenPipeError(32, "Broken pipe")
 
@@ -378,7 +376,7 @@ def test_D12_other_broken_pipes_are_reported(capsys, monkeypatch):
     assert capsys.readouterr() == ("", "cosim: Broken pipe\n")
 
 
-# ---- D13: pipes, devices and folders as files ------------------------------------------------------------------------
+# ---- pipes, devices and folders as files ------------------------------------------------------------------------
 
 
 def make_trap(kind, path):
@@ -396,7 +394,7 @@ def make_trap(kind, path):
 @pytest.mark.medium(fast=17)
 @pytest.mark.parametrize("kind", ["pipe", "folder", "socket", "/dev/null", "/dev/zero"])
 @pytest.mark.parametrize("role", ["scenario", "base", "vehicle", "vehicle of a plant", "definition"])
-def test_D13_non_regular_file_gives_one_line_error_without_hanging(role, kind, tmp_path, capsys, monkeypatch):
+def test_non_regular_file_gives_one_line_error_without_hanging(role, kind, tmp_path, capsys, monkeypatch):
     monkeypatch.chdir(os.path.realpath(tmp_path))  # short enough for the name of a socket
     make_trap(kind, tmp_path / "trap.toml")
     before = set(tmp_path.iterdir())
