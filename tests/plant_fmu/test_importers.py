@@ -12,18 +12,16 @@ from plant_fmu.checking.fmu_file import read_fmu
 from plant_fmu.checking.process import run_importer
 from plant_fmu.checking.task import Task
 from tests.architecture.modules import ROOT
-from tests.plant_fmu.conftest import EACH_FMI, CoSimulationInstance
+from tests.plant_fmu.conftest import EACH_FMI, STATES, WRENCH, CoSimulationInstance
 from tests.plant_fmu.importers import IMPORTERS, JACOBIAN, missing
 
 IMPORTER = {importer.name: importer for importer in (*IMPORTERS, JACOBIAN)}
 
 # off the axes, at a tilt, in a current, pushed and turned: nothing stays zero, and nothing saturates
 START = {
-    "position.z": 2.0,
-    **dict(zip((f"quaternion.e{i}" for i in range(4)), (0.7, 0.5, -0.1, 0.5), strict=True)),
-    **dict(zip((f"velocity.{a}" for a in "uvwpqr"), (0.4, -0.3, 0.2, 0.15, -0.1, 0.25), strict=True)),
+    **dict(zip(STATES[2:], (2.0, 0.7, 0.5, -0.1, 0.5, 0.4, -0.3, 0.2, 0.15, -0.1, 0.25), strict=True)),
     **{f"thrust[{i + 1}]": force for i, force in enumerate((4.0, -3.0, 2.0, 5.0, -1.0, 3.0, 2.0, -4.0))},
-    **dict(zip((f"wrench.{a}" for a in "XYZKMN"), (6.0, -4.0, 5.0, 0.3, -0.2, 0.4), strict=True)),
+    **dict(zip(WRENCH, (6.0, -4.0, 5.0, 0.3, -0.2, 0.4), strict=True)),
     **dict(zip((f"current.{a}" for a in "xyz"), (0.2, -0.1, 0.05), strict=True)),
     **{f"thrust_time_constant[{i + 1}]": 0.1 for i in range(8)},
     "wrench_time_constant": 0.2,

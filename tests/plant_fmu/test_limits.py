@@ -42,24 +42,20 @@ def test_sample_ticks_continue_through_time_zero(make_slave, fmi):
             time = following
 
 
-@pytest.mark.medium
-def test_accumulated_step_times_miss_no_sample(make_slave, fmi):
-    """A minute and more of 10 ms steps at 100 Hz: each step ends with its own sample."""
-    slave = make_slave(fmi=fmi).start(**{"depth_sensor.rate": 100.0, "wrench.Z": 20.0, "substep": 0.01})
-    for _ in range(30_000):
-        slave.step(0.01)
-        measured, true = slave.get("measured.depth", "position.z")
-        assert abs(measured - true) < 1e-7
+@pytest.mark.parametrize(
+    ("start", "step", "force", "count"),
+    [pytest.param(0.0, 0.01, 20.0, 30_000, marks=pytest.mark.medium), (1e8, 0.02, 200.0, 20), (-1e8, 0.02, 200.0, 20)],
+)
+def test_accumulated_step_times_miss_no_sample(make_slave, fmi, start, step, force, count):
+    """Each step ends with its own sample, in minutes of steps and at late times.
 
-
-@pytest.mark.parametrize("start", [1e8, -1e8])
-def test_late_ticks_are_on_time_for_accumulated_step_times(make_slave, fmi, start):
-    """Each addition of 0.02 s to 1e8 s is 4 ns short of it, and half as many again may be those of the tick."""
+    Each addition of 0.02 s to 1e8 s is 4 ns short of it, and half as many again may be those of the tick.
+    """
     slave = make_slave(fmi=fmi)
-    slave.set_values({"depth_sensor.rate": 50.0, "wrench.Z": 200.0, "substep": 0.02})
+    slave.set_values({"depth_sensor.rate": 1.0 / step, "wrench.Z": force, "substep": step})
     slave.begin(start)
-    for _ in range(20):
-        slave.step(0.02)
+    for _ in range(count):
+        slave.step(step)
         measured, true = slave.get("measured.depth", "position.z")
         assert abs(measured - true) < 1e-7
 

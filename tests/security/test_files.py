@@ -60,11 +60,15 @@ SUMMARIES = {
 }
 
 
+def summarized(tmp_path, run):
+    """Return a copy of a run, and its summary."""
+    folder = shutil.copytree(run, tmp_path / "run")
+    return folder, json.loads((folder / SUMMARY).read_text())
+
+
 @pytest.mark.parametrize(("key", "values"), SUMMARIES.items(), ids=SUMMARIES)
 def test_d5_invalid_summary_value_is_rejected_by_key(tmp_path, ordered_run, key, values):
-    folder = tmp_path / "run"
-    shutil.copytree(ordered_run, folder)
-    sound = json.loads((folder / SUMMARY).read_text())
+    folder, sound = summarized(tmp_path, ordered_run)
     for value in values:
         (folder / SUMMARY).write_text(json.dumps(sound | {key: value}))
         for read in (load_run, report_again, lambda of: replay([of]), lambda of: list(snapshots(str(of), None))):
@@ -79,9 +83,7 @@ def test_d5_invalid_summary_value_is_rejected_by_key(tmp_path, ordered_run, key,
 
 @pytest.mark.medium
 def test_d5_summary_texts_are_escaped(tmp_path, shipped_run):
-    folder = tmp_path / "run"
-    shutil.copytree(shipped_run("paper", "time.duration=0.1").folder, folder)
-    sound = json.loads((folder / SUMMARY).read_text())
+    folder, sound = summarized(tmp_path, shipped_run("paper", "time.duration=0.1").folder)
     texts = {"status": "done\n\x1b[31m", "scenario": "a\udc80\x07", "law": "an autopilot\x9b"}
     (folder / SUMMARY).write_text(json.dumps(sound | texts))
     summary, _ = report_again(folder)

@@ -8,16 +8,10 @@ import pytest
 from cosim.errors import IdentificationError
 from cosim.identification.actuation import CommandedForces, steady_forces
 from cosim.identification.log import Log
-from plant_fmu import load_vehicle
 from tests.cosim.identification.pool import THRUST, fly
 from tests.plant_fmu.conftest import WRENCH
 
 STEP = 0.02
-
-
-@pytest.fixture(scope="module")
-def vehicle():
-    return load_vehicle("bluerov2_heavy")
 
 
 def log_of(vehicle, seed=0, rows=60, period=0.05):

@@ -16,7 +16,6 @@ from cosim.identification.parameters import DEFAULT_FREE, free_parameters, nuisa
 from cosim.identification.prediction import validate
 from cosim.identification.residuals import Residuals
 from cosim.identification.windows import cut_windows
-from plant_fmu import load_vehicle
 from tests.cosim.identification.pool import fly
 from tests.plant_fmu.conftest import WRENCH
 
@@ -25,11 +24,6 @@ TRUTH = {
 }  # fmt: skip
 FREE = ("hydrodynamics.quadratic_damping.1", "hydrodynamics.added_mass.1.1", "hydrostatics.buoyancy")
 PERIOD, SECONDS, BIAS = 0.05, 42.0, np.array([0.002, -0.001, 0.003])
-
-
-@pytest.fixture(scope="module")
-def vehicle():
-    return load_vehicle("bluerov2_heavy")
 
 
 @pytest.fixture(scope="module")
@@ -68,9 +62,19 @@ def flown(vehicle, wrench, times, rng, force):
     return Log("pool", times, np.zeros((len(times), 8)), wrench, topics)
 
 
+def with_values_of(log, name, change):
+    """Return a log with other values of a topic."""
+    topics = (dataclasses.replace(t, values=change(t)) if t.name == name else t for t in log.topics)
+    return dataclasses.replace(log, topics=tuple(topics))
+
+
 @pytest.fixture(scope="module")
-def found(log, vehicle):
-    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
+def parameters(log, vehicle):
+    return free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
+
+
+@pytest.fixture(scope="module")
+def found(log, vehicle, parameters):
     return fit([log], vehicle, parameters)
 
 
@@ -156,25 +160,21 @@ def test_delays_are_estimated(log, vehicle, topics, delay):
 
 
 @pytest.mark.slow
-def test_a_cause_that_is_not_estimated_is_named(log, late, vehicle):
+def test_a_cause_that_is_not_estimated_is_named(log, late, vehicle, parameters):
     """Samples that are late, and a DVL that measures 5 % too much; what changes in time has no name."""
-    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
     said = " ".join(warnings(fit([late], vehicle, parameters), [late]))
     assert "Samples come late" in said and "too: --nuisance current bias delay." in said  # what is named now stays
-    scaled = tuple(dataclasses.replace(t, values=1.05 * t.values) if t.name == "velocity" else t for t in log.topics)
-    done = fit([dataclasses.replace(log, topics=scaled)], vehicle, parameters)
+    done = fit([with_values_of(log, "velocity", lambda t: 1.05 * t.values)], vehicle, parameters)
     assert done.causes[0].flag == "--nuisance scale" and done.causes[0].fraction > 0.3
     said = " ".join(warnings(done, [log]))
     assert "the DVL's scale (" in said and "what it names now, --nuisance current bias: give it whole" in said
 
 
 @pytest.mark.slow
-def test_disturbance_is_reported_and_widens_the_intervals(log, vehicle):
+def test_disturbance_is_reported_and_widens_the_intervals(log, vehicle, parameters):
     """A velocity that wanders by 2 cm/s within seconds: the noise alone does not explain it."""
     wander = 0.02 * np.sin(2 * np.pi * log.topic("velocity").times[:, None] / [5.0, 7.0, 9.0])
-    moved = tuple(dataclasses.replace(t, values=t.values + wander) if t.name == "velocity" else t for t in log.topics)
-    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
-    done = fit([dataclasses.replace(log, topics=moved)], vehicle, parameters)
+    done = fit([with_values_of(log, "velocity", lambda t: t.values + wander)], vehicle, parameters)
     said = " ".join(warnings(done, [log]))
     assert done.intervals.chi2 > 1.2 and "does not explain" in said and "the velocity:" in said
     assert "an error of a sensor that changes in time" in said
@@ -182,7 +182,7 @@ def test_disturbance_is_reported_and_widens_the_intervals(log, vehicle):
 
 
 @pytest.mark.slow
-def test_random_force_is_estimated_window_by_window(vehicle, log):
+def test_random_force_is_estimated_window_by_window(vehicle, log, parameters):
     """A force along the world's axes that changes within seconds: without it the model is wrong by name."""
     rng = np.random.default_rng(11)
     times = log.times
@@ -191,7 +191,6 @@ def test_random_force_is_estimated_window_by_window(vehicle, log):
         for period, phase in zip((17.0, 23.0, 19.0), rng.uniform(0.0, 6.0, 3), strict=True)
     ], axis=1)  # fmt: skip
     pushed = flown(vehicle, log.wrench, times, rng, force)
-    parameters = free_parameters(vehicle, FREE) + nuisances(("current", "bias"), [log])
     blind, done = (fit([pushed], vehicle, parameters, random_force=known) for known in (False, True))
     assert blind.causes[0].flag == "--nuisance random_force" and blind.causes[0].fraction > 0.5
     assert "a force that changes in time" in " ".join(warnings(blind, [pushed]))
@@ -239,9 +238,8 @@ def test_fitted_values_are_applied_to_the_vehicle(vehicle):
 def test_windows_that_tumble_or_have_gaps_are_rejected(log, vehicle):
     step = integration_step([log])
     assert step == pytest.approx(PERIOD / 2)
-    rates = next(t for t in log.topics if t.name == "angular_velocity")
-    fast = dataclasses.replace(rates, values=np.where(rates.times[:, None] > 30.0, 4.0, rates.values))
-    tumbling = dataclasses.replace(log, topics=tuple(fast if t.name == rates.name else t for t in log.topics))
+    rates = log.topic("angular_velocity")
+    tumbling = with_values_of(log, rates.name, lambda t: np.where(t.times[:, None] > 30.0, 4.0, t.values))
     _, rejected = cut_windows([tumbling], vehicle, step, 4.0)
     assert rejected == {"it turns at more than 3 rad/s": 3}
     keep = (log.times < 10.0) | (log.times > 12.0)

@@ -5,7 +5,6 @@ import pytest
 
 from cosim.errors import IdentificationError
 from cosim.identification.shooting import STATE_SIZE, Directions, Shooter
-from plant_fmu import load_vehicle
 from tests.cosim.identification.pool import fly
 from tests.plant_fmu.conftest import STATES, WRENCH
 
@@ -15,11 +14,6 @@ BODY = {
     "mass": 13.0, "inertia.xz": 0.02,
 }  # fmt: skip
 STEP, STEPS = 0.02, 100
-
-
-@pytest.fixture(scope="module")
-def vehicle():
-    return load_vehicle("bluerov2_heavy")
 
 
 @pytest.fixture(scope="module")
