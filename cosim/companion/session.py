@@ -20,7 +20,7 @@ from cosim.companion.safety import GAIN_TOLERANCE, Observation, State, Superviso
 from cosim.companion.vehicle_state import ReportedState, requested_rates
 from cosim.mavlink.vehicle.profile import PROFILES
 from cosim.mavlink.wire.dialect import dialect, make_command, make_heartbeat, make_rate_requests
-from cosim.simulation.commands.commands import Arm, Command, Mode
+from cosim.simulation.commands.commands import Arm, Command, Mode, SetMode
 from cosim.simulation.commands.sources import CommandQueue
 from cosim.simulation.signals import Array
 from plant_fmu import Vehicle
@@ -81,7 +81,7 @@ class AutopilotSession:
         self.lateness = max(0.0, now - due)
         self._receive(0.0)
         for command in self.commands.take(0):
-            self._take_over(getattr(command, "mode", "hold") == "hold")
+            self._take_over(command == SetMode("hold"))
         self._warn_of_stations(now)
         before = self.supervisor.state
         state = self.supervisor.update(self._observation(now))
