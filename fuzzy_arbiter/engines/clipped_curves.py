@@ -165,12 +165,15 @@ class ClippedCurves(Defuzzifier):
 
 
 def _summed(factors: Array, rows: Array) -> Array:
-    return np.asarray((factors[:, None] * rows).sum(axis=0))
+    return np.asarray(np.add.reduce(factors[:, None] * rows))
 
 
 def _dot(coefficients: Array, powers: Array) -> Array:
     """Return the values of polynomials, to the same bits for any number of columns; both (count, n)."""
-    return functools.reduce(np.add, coefficients * powers)
+    products = coefficients * powers
+    if products.shape[1] == 1:  # of two columns NumPy adds rows in their order, as of many
+        products = np.repeat(products, 2, axis=1)
+    return np.asarray(np.add.reduce(products)[: powers.shape[1]])
 
 
 def _powers(r: Array, count: int) -> Array:
