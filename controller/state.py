@@ -18,30 +18,10 @@ _NUMBERS: dict[Any, Any] = {float: np.float64, int: np.int64, bool: np.bool_, np
 
 
 class State(tuple[Any, ...]):
-    """A record of the fields that a subclass annotates: numbers, arrays, and other records.
+    """A record of the fields that a subclass annotates: numbers, arrays, and other records."""
 
-    Parameters
-    ----------
-    **given : Any
-        Values of fields, and lengths by the names that `Shape` has. Arrays and records are kept, not copied. A field
-        that is not given has the default of the class, else 0.
-
-    Raises
-    ------
-    TypeError
-        If an array is not given whose shape is not known, has other numbers or another shape than the field, or a name
-        is neither a field nor a length.
-
-    Examples
-    --------
-    >>> class Filter(State):
-    ...     gain: float = 0.5
-    ...     mean: float  # m
-    >>> memory = Filter(gain=0.25)
-    >>> memory.mean += memory.gain * (2.0 - memory.mean)
-    >>> float(memory.mean)
-    0.5
-    """
+    # Keyword arguments are values of fields, and lengths by the names that `Shape` has. Arrays and records are kept,
+    # not copied. A field that is not given has the default of the class, else 0.
 
     _fields: ClassVar[tuple[str, ...]] = ()
     _defaults: ClassVar[dict[str, Any]] = {}

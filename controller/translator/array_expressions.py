@@ -106,7 +106,7 @@ class ArrayExpressions(OperandValues):
         return Grid(DOUBLE, (*a.sizes[:rows], *b.sizes[1:]), at, (*_elsewhere(a), *_elsewhere(b)), True, factors)
 
     def _for_reuse(self, operand: Operand, grid: Grid, node: ast.AST) -> Grid:
-        if isinstance(operand, Grid) and all(self.max_length(n) < math.inf for n in grid.sizes):
+        if isinstance(operand, Grid) and all(self.max_size(n) < math.inf for n in grid.sizes):
             return self.grid(self.materialized(operand, node), node)
         if grid.adds:
             self.fail(node, "a product of a length that is known only at run time within a product")
@@ -223,12 +223,10 @@ class ArrayExpressions(OperandValues):
 
     def _new_array(self, stem: str, node: ast.AST, item: Scalar, sizes: Index) -> View:
         """Return a new array in storage for its maximum lengths."""
-        size = math.prod(map(self.max_length, sizes))
+        size = math.prod(map(self.max_size, sizes))
         if not size < math.inf:
             self.fail(node, "an array of a length that is known only at run time, and no target")
-        sizes = tuple(
-            n if n.isdigit() else self.bounded(self.temporary(INT, n).code, self.max_length(n)) for n in sizes
-        )
+        sizes = tuple(n if n.isdigit() else self.bounded(self.temporary(INT, n).code, self.max_size(n)) for n in sizes)
         name = self.storage(stem, node, item, int(size))
         if known_shape(sizes) is None:  # so that no number is undefined where the array is shorter
             self.declared[name] = self.declared[name].replace(";", " = {0};")
@@ -256,7 +254,7 @@ class ArrayExpressions(OperandValues):
         if any(len(shape) != 1 for shape in shapes):
             self.fail(node, "arrays of several dimensions, or numbers, in one")
         ends = list(itertools.accumulate([n for (n,) in shapes], lambda *terms: plus(terms), initial="0"))
-        total = self.bounded(ends[-1], sum(self.max_length(n) for (n,) in shapes))
+        total = self.bounded(ends[-1], sum(self.max_size(n) for (n,) in shapes))
         target = self._new_array("a", node, DOUBLE, (total,))
         for part, begin, (n,) in zip(self._apart(parts, target, node), ends, shapes, strict=False):
             piece = self.view(DOUBLE, target.data, begin, (n,), ("1",), target.roots)

@@ -35,10 +35,10 @@ class ArrayLengths(FunctionCode):
 
     def extent(self, size: str) -> int | AtMost | None:
         """Return what a type states of a length."""
-        return int(size) if size.isdigit() else None if size in self.fixed else AtMost(self.max_length(size))
+        return int(size) if size.isdigit() else None if size in self.fixed else AtMost(self.max_size(size))
 
-    def max_length(self, size: str) -> float:
-        """Return the maximum of a length, in elements."""
+    def max_size(self, size: str) -> float:
+        """Return the maximum number of elements along an axis."""
         return int(size) if size.isdigit() else self.bounds.get(size, math.inf)
 
     def bounded(self, size: str, bound: float) -> str:
@@ -101,9 +101,9 @@ class ArrayLengths(FunctionCode):
         if a and b:
             self.require(a, "==", b, node)
             return other if other.isdigit() else one
-        if (self.max_length(one) == 1) != (self.max_length(other) == 1):
+        if (self.max_size(one) == 1) != (self.max_size(other) == 1):
             self.fail(node, f"lengths {one} and {other}, of which one may be 1")
         for known, computed in ((one, other), (other, one)):
-            if known.isdigit() and self.max_length(computed) <= int(known):
-                return known if self.max_length(computed) == int(known) else computed
-        return self.bounded(f"min_i64({one}, {other})", min(self.max_length(one), self.max_length(other)))
+            if known.isdigit() and self.max_size(computed) <= int(known):
+                return known if self.max_size(computed) == int(known) else computed
+        return self.bounded(f"min_i64({one}, {other})", min(self.max_size(one), self.max_size(other)))

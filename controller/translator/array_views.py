@@ -78,7 +78,7 @@ class ArrayViews(ArrayLengths):
         sizes = tuple(str(n) if isinstance(n, int) else f"{code}.n{i}" for i, n in enumerate(kind.shape))
         for i, (size, n) in enumerate(zip(sizes, kind.shape, strict=True)):
             if isinstance(n, AtMost):
-                self.bounds[size] = n.length
+                self.bounds[size] = n.size
             elif n is None and (length := self.axis_length(paths, i)):
                 self.fixed[size] = length
         kind = replace(kind, shape=tuple(map(self.extent, sizes)))

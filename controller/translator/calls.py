@@ -205,7 +205,7 @@ class Calls(Subscripts):
                 length = self.length(size)
                 if isinstance(n, int) and length:
                     self.require(length, "==", Length("", n), node)
-                elif isinstance(n, int) and self.max_length(size) != n:
+                elif isinstance(n, int) and self.max_size(size) != n:
                     self.fail(node, f"{name} of a length that is known only at run time, expected {n}")
         return kind
 

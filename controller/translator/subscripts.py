@@ -67,7 +67,7 @@ class Subscripts(Expressions):
                 begin, size = self.index(array.sizes[axis], place), "1"
             terms.append(times(begin, stride))
             for k in array.axes[axis : axis + 1]:
-                limit = self.max_length(size)
+                limit = self.max_size(size)
                 box[k] = plus([box[k][0], begin]), str(limit) if limit < math.inf else size
         if not sizes:
             return Value(array.type.item, f"{array.data}[{plus(terms)}]")
@@ -110,8 +110,8 @@ class Subscripts(Expressions):
         begin = "0" if low == Known(None) else self._clipped(low, size, node)
         end = size if high == Known(None) else self._clipped(high, size, node)
         constant_length = self._constant_length(node) if self.n_writes == n_writes else math.inf
-        max_length = min(self.max_length(size), constant_length)
-        return begin, self.bounded(end if begin == "0" else f"max_i64({end} - {begin}, 0)", max_length)
+        max_size = min(self.max_size(size), constant_length)
+        return begin, self.bounded(end if begin == "0" else f"max_i64({end} - {begin}, 0)", max_size)
 
     def _constant_bounds(self, size: str, length: Length, low: int, high: int | None, node: ast.AST) -> tuple[str, str]:
         """Return the beginning and the length of a slice of an axis of fixed length, which has to be long enough."""

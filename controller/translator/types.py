@@ -32,7 +32,7 @@ _SHORT = {DOUBLE: "f64", INT: "i64", UINT: "u64", REFERENCE: "u32", BOOL: "b8"}
 class AtMost:
     """The maximum of a length that C computes, or inf."""
 
-    length: float
+    size: float
 
 
 @dataclass(frozen=True)
@@ -177,7 +177,7 @@ def unified(one: Type, other: Type) -> Type:
         return Tuple(tuple(map(unified, one.items, other.items)))
     if isinstance(one, Array) and isinstance(other, Array) and (one.item, one.ndim) == (other.item, other.ndim):
         lengths = zip(one.shape, other.shape, strict=True)
-        shape = tuple(a if a == b else AtMost(max(_max_length(a), _max_length(b))) for a, b in lengths)
+        shape = tuple(a if a == b else AtMost(max(_max_size(a), _max_size(b))) for a, b in lengths)
         return Array(one.item, shape, one.contiguous and other.contiguous)
     raise TypeError(f"{name_of(one)} and {name_of(other)} in the same place")
 
@@ -192,8 +192,8 @@ def known_lengths(kind: Array) -> list[int]:
     return [n for n in kind.shape if isinstance(n, int)]
 
 
-def _max_length(length: int | AtMost | None) -> float:
-    return math.inf if length is None else length.length if isinstance(length, AtMost) else length
+def _max_size(length: int | AtMost | None) -> float:
+    return math.inf if length is None else length.size if isinstance(length, AtMost) else length
 
 
 def name_of(kind: Type) -> str:
