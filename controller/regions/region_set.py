@@ -303,7 +303,9 @@ class RegionEvaluator:
         self, position: Sequence[float] | Array, quaternion: Sequence[float] | Array
     ) -> tuple[Array, Array, Array, Array]:
         """Return values, gradients, gradients by rotation and clearances at a pose; position [m, NED]."""
-        self._pose[0][:], self._pose[1][:] = position, quaternion
+        for name, given, kept in zip(("position", "quaternion"), (position, quaternion), self._pose, strict=True):
+            require(np.shape(given) == kept.shape, "evaluate", f"{name}'s shape", np.shape(given), str(kept.shape))
+            kept[:] = given
         self.regions.evaluate(*self._pose, *self._out)
         values, gradients, rotation_gradients, clearances = (part.copy() for part in self._out)
         return values, gradients, rotation_gradients, clearances

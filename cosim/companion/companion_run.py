@@ -43,7 +43,8 @@ _MIN_UNCERTAINTY = 0.05  # m, position error of an autopilot that no measurement
 
 # Errors of an autopilot's estimate are slow: its velocity may be off by some cm/s for a minute, its position has no
 # white noise. With a smaller velocity noise, the law's position would shift by (velocity error) / (rate of its filter).
-_NOISE_GAINS = {"law.gains.position_noise": 0.01, "law.gains.velocity_noise": 0.05}
+# Innovations stay biased, so they are no reason to let disturbances drift.
+_NOISE_GAINS = {"law.gains.position_noise": 0.01, "law.gains.velocity_noise": 0.05, "law.gains.max_drift": 1.0}
 # the autopilot allocates the forces: a thruster's force is not the one that the law commanded
 _WITHOUT_ISOLATION = {"law.gains.failure_threshold": 0.0}
 # the autopilot's attitude loop makes the moments: a law that estimates restoring moments, or the effectiveness of each
@@ -55,8 +56,12 @@ _WITHOUT_MOMENTS = _WITHOUT_ISOLATION | {
 }
 # the depth loop compensates the weight
 _WITHOUT_WEIGHT = {"law.gains.restoring_drift": 0.0, "law.gains.restoring_bound": 1e-3}
-# the velocity loop compensates weight, moments, current and lag: estimates of them by the law would be wrong
-_WITHOUT_ESTIMATES = _WITHOUT_WEIGHT | {"law.gains.lag_bound": 0.0, "law.gains.current_bound": 1e-3}
+# the velocity loop compensates weight, moments, current, drag and lag: estimates of them by the law would be wrong
+_WITHOUT_ESTIMATES = _WITHOUT_WEIGHT | {
+    "law.gains.lag_bound": 0.0,
+    "law.gains.current_bound": 1e-3,
+    "law.gains.drag_estimation": 0.0,
+}
 
 
 def scenario_to_steer(scenario: Scenario, steer_by: SteerBy = "sticks", profile: ProfileName = "ardusub") -> Scenario:

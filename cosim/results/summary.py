@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from controller.regions.region_set import of_attitude
+from cosim.io.strict_json import nan_to_none
 from cosim.results.goal_miss import explain_miss
 from cosim.results.law_reports import DRAG, ISOLATED, REJECTED, Isolations
 from cosim.results.lyapunov_summary import summarize_lyapunov
@@ -81,7 +82,7 @@ def summarize(scenario: Scenario, record: Rows, status: str, wall_time: float | 
         "saturated_time": data.saturated * period,
         "isolations": [{"thruster": j, "time": time} for time, j, isolated in data.isolations.changes if isolated],
         "rejected_samples": last.get(REJECTED),
-        "drag_ratio": last.get(DRAG),
+        "drag_ratio": nan_to_none(last.get(DRAG)),
         "above_surface": above,
         "time_above_surface": min(data.above * period, simulated) if submerged else 0.0,
         "estimate_final": [last[name] for name in _ESTIMATE],

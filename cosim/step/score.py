@@ -39,7 +39,9 @@ class FlightMetrics(State):
     calls: float  # number of calls of a law that gives bounds
     promises: float  # number of those after which it gave one
     healthy_isolated: float  # 1 if the law isolated a thruster that had not failed
-    thrust_limit: float = math.inf  # least limit of a thruster that the law estimated, as a fraction of the vehicle's
+    thrust_limit: float = (
+        math.inf
+    )  # minimum over thrusters of the limit that the law estimated, as a fraction of the vehicle's
 
 
 def fly(
@@ -90,7 +92,7 @@ def score_state(model: StepModel, data: StepData, metrics: FlightMetrics, k: int
             for i in range(data.failures):
                 failed = failed or model.failed[i] + 1 == data.law.report[model.isolated]
             metrics.healthy_isolated = max(metrics.healthy_isolated, 0.0 if failed else 1.0)
-        if model.limit >= 0:
+        if model.limit >= 0 and not np.isnan(data.law.report[model.limit]):
             metrics.thrust_limit = min(metrics.thrust_limit, data.law.report[model.limit])
 
 

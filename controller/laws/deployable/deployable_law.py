@@ -43,6 +43,7 @@ from controller.laws.deployable.diagnostics import (
     DIAGNOSTICS,
     NO_BOUND,
     Report,
+    clear_report,
     write_program_report,
     write_report,
 )
@@ -92,7 +93,8 @@ def step(
     if estimate.time_since_measurement < 0.0 or estimate.time_since_measurement > gains.coast:
         _hold_weight(memory, R, gains, forces)
         thrusters.forces = forces
-        memory.report.time_since_measurement, memory.report.bound = estimate.time_since_measurement, NO_BOUND
+        memory.report.time_since_measurement = estimate.time_since_measurement
+        clear_report(memory.report)
         memory.observation.guaranteed_bound = memory.observation.last_bound = np.nan
         memory.expected[:] = np.nan
         return
@@ -289,6 +291,7 @@ class DeployableLaw(CompiledLaw):
         memory.quaternion, memory.predicted.quaternion[0] = desired, 1.0
         memory.expected[:] = memory.weights[:] = np.nan
         memory.reported[:] = 1.0
+        clear_report(memory.report)
 
     @classmethod
     def validate(cls, gains: Any) -> Any:

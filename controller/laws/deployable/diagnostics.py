@@ -25,17 +25,17 @@ DIAGNOSTICS = (
     Diagnostic("velocity.z", "m/s", "Estimated velocity over ground, down"),
     Diagnostic("current.x", "m/s", "Estimated current, north"),
     Diagnostic("current.y", "m/s", "Estimated current, east"),
-    Diagnostic("desired_speed", "m/s", "Speed that the attraction wants"),
-    Diagnostic("path_cost", "m", "Length of the path into the goal region, and what it costs to pass close"),
+    Diagnostic("desired_speed", "m/s", "Desired speed of the attraction"),
+    Diagnostic("path_cost", "m", "Length of the path into the goal region, plus the price of passing regions closely"),
     Diagnostic("path_corners", "", "Corners of the path"),
     Diagnostic("barriers", "", "Active barriers"),
     Diagnostic("constraint_slack", "m/s2", "Greatest slack of a barrier"),
     Diagnostic("qp_steps", "", "Steps of the quadratic program, negative if it was cut short"),
-    Diagnostic("failed_thruster", "", "Thruster isolated last, from 1; 0 for none"),
+    Diagnostic("failed_thruster", "", "Last isolated thruster, from 1; 0 for none"),
     Diagnostic("time_since_measurement", "s", "Time since the last measurement that was accepted"),
-    Diagnostic("bound", "m", "What the clearance of a hard region may fall to from here; NaN: no promise"),
+    Diagnostic("bound", "m", "Lower bound of the clearances of hard regions from now on; NaN: none"),
     Diagnostic("rejected", "", "Fraction of the position and velocity samples so far that the gate rejected"),
-    Diagnostic("thrust_limit", "", "Least estimated limit of a thruster, as a fraction of that in the vehicle's file"),
+    Diagnostic("thrust_limit", "", "Lowest estimated limit of a thruster, as a fraction of that in the vehicle's file"),
     Diagnostic("drag", "", "Estimated drag of translation, relative to the vehicle's file"),
 )
 
@@ -43,25 +43,30 @@ DIAGNOSTICS = (
 class Report(State):
     """The numbers of `DIAGNOSTICS`, in their order."""
 
-    position: Vector3
-    velocity: Vector3
-    current: Vector2
-    desired_speed: float
-    path_cost: float
+    position: Vector3  # m, NED
+    velocity: Vector3  # m/s over ground, NED
+    current: Vector2  # m/s, north and east
+    desired_speed: float  # m/s
+    path_cost: float  # m
     path_corners: float
     barriers: float
-    constraint_slack: float
+    constraint_slack: float  # m/s2
     qp_steps: float
     failed_thruster: float
-    time_since_measurement: float
-    bound: float
-    rejected: float
-    thrust_limit: float
-    drag: float
+    time_since_measurement: float  # s
+    bound: float  # m
+    rejected: float  # fraction
+    thrust_limit: float  # fraction of the vehicle's
+    drag: float  # relative to the vehicle's
+
+
+def clear_report(report: Report) -> None:
+    """Write that there is no estimate, and no bound."""
+    report.bound, report.thrust_limit, report.drag = NO_BOUND, np.nan, np.nan
 
 
 def write_report(report: Report, estimate: Estimate, cost: float, points: int, health: Array, desired: Vector3) -> None:
-    """Write what there is about estimate, path and thrusters; `report` has the thruster that was isolated last."""
+    """Write the numbers of estimate, path and thrusters; `report` has the thruster that was isolated last."""
     report.position, report.velocity, report.current = estimate.position, estimate.velocity, estimate.water_velocity[:2]
     report.desired_speed, report.path_cost, report.path_corners = norm(desired), cost, points - 1
     last = int(report.failed_thruster)
@@ -78,7 +83,7 @@ def write_report(report: Report, estimate: Estimate, cost: float, points: int, h
 
 
 def write_program_report(report: Report, multipliers: Array, price: Array, rows: int, steps: int) -> None:
-    """Write what there is about barriers and quadratic program."""
+    """Write the numbers of barriers and quadratic program."""
     report.barriers, report.constraint_slack, report.qp_steps = 0.0, 0.0, steps
     for i in range(rows):
         if multipliers[i] > 0.0:

@@ -81,7 +81,9 @@ class Estimate(State):
     gain: Unknowns  # Kalman gain of a measured number
     deviation: Deviations  # true state less estimate by each hypothesis: j, thruster j is lost; m + j, stuck
     supposed: Rows2  # hypothesis of a stuck thruster: its effectiveness; its force [N] at effectiveness 1
-    drift: Vector6  # variance of the drift of current, W - B and moments about the body axes, relative to their gains'
+    # variance of the drift of disturbances, relative to that by the gains: current north and east, W - B; moments about
+    # the body axes
+    drift: Vector6
     missing: VectorM  # N, difference of a stuck thruster's force from the expected one
     direct: Hypotheses  # direct effect of the missing force on the last measured number
     # of the last measurements, divided by variances: innovations times those that each hypothesis expects;
@@ -120,7 +122,7 @@ def reset(estimate: Estimate) -> None:
     P, P_0 = estimate.covariance, estimate.first_covariance
     estimate.state[:EFFECTIVENESS] = estimate.first_state[:EFFECTIVENESS]
     P[:EFFECTIVENESS], P[:, :EFFECTIVENESS] = P_0[:EFFECTIVENESS], P_0[:, :EFFECTIVENESS]
-    estimate.deviation[:, :], estimate.drift[:] = 0.0, 1.0
+    estimate.deviation[:, :], estimate.drift[:], estimate.bias[:], estimate.misfit = 0.0, 1.0, 0.0, 1.0
     estimate.time_since_measurement = -1.0
     publish(estimate)
 
@@ -172,10 +174,15 @@ def inflate_effectiveness(estimate: Estimate, j: int) -> None:
 
 
 def freeze(estimate: Estimate, gains: DeployableGains) -> None:
-    """Freeze lag and effectiveness if the gains exclude them from estimation."""
+    """Freeze drag, lag and effectiveness if the gains exclude them from estimation."""
     P = estimate.covariance
-    for i in range(LAG, estimate.state.size):
-        if (gains.lag_bound if i == LAG else gains.effectiveness_estimation) == 0.0:
+    for i in range(DRAG, estimate.state.size):
+        estimated = gains.effectiveness_estimation
+        if i == DRAG:
+            estimated = gains.drag_estimation
+        elif i == LAG:
+            estimated = gains.lag_bound
+        if estimated == 0.0:
             P[i], P[:, i], P[i, i] = 0.0, 0.0, square(_KNOWN_LAG) if i == LAG else 0.0
 
 

@@ -38,19 +38,22 @@ class DeployableGains(NamedTuple):
     position_noise: float = 0.02  # m, standard deviation of one measurement
     velocity_noise: float = 0.01  # m/s
     # restoring_drift, restoring_bound and moment_bound are for a vehicle of up to 50 kg. For a heavier one, the
-    # first two grow in proportion to its mass, moment_bound to the mass squared
-    restoring_drift: float = 0.3  # N/sqrt(s), how fast W - B may change
+    # first two grow in proportion to its mass, moment_bound to the mass squared. W - B, current and moments also stand
+    # for other disturbances: while innovations are biased, they drift faster
+    restoring_drift: float = 0.3  # N/sqrt(s), of W - B
     current_drift: float = 0.01  # m/s/sqrt(s)
     restoring_bound: float = 50.0  # N, of |W - B|
-    moment_bound: float = 150.0  # N m, of each of the other three of phi
+    moment_bound: float = 150.0  # N m, of each of the other three of phi, and of the moment about z
     current_bound: float = 1.0  # m/s
-    adaptation: float = 0.5  # 1/s, of the moments
+    adaptation: float = 0.5  # 1/s, of the moments, if their drift has not grown
+    max_drift: float = 400.0  # limit of the factor by which the variance of a drift grows meanwhile; 1: none does
     lag_bound: float = 1.0  # s, of the thrusters; 0: no lag is estimated, nor predicted for
     # lost measurements and thrusters
     coast: float = 2.0  # s that the law goes on without valid measurements before it only holds W - B
     rise: float = 0.0  # N, lift once all but attitude is lost for that long, beside the force against W - B
     failure_threshold: float = 12.0  # log-likelihood ratio at which a thruster is isolated; 0: never
     # parts that 0 disables, for comparison
+    drag_estimation: float = 1.0  # without it, the drag is the vehicle's
     effectiveness_estimation: float = 1.0  # without it, of each thruster the same
     path_planning: float = 1.0  # without it, straight at the goal
     barriers: float = 1.0  # without them, no region is kept but by the path
@@ -69,6 +72,7 @@ _MAY_BE_ZERO = {
     "restoring_drift",
     "current_drift",
     "adaptation",
+    "drag_estimation",
     "effectiveness_estimation",
     "lag_bound",
     "path_planning",

@@ -74,6 +74,7 @@ def process_measurement(memory: DeployableMemory, state: VehicleState, gains: De
     else:
         _propagate_attitude(memory)
         memory.attitude.started = 0.0  # the next change of the rates would span several periods
+        estimate.bias[:3] = 0.0
     R, deviation = rotation_matrix(memory.quaternion), memory.deviation
     deviation[:] = np.where(state.deviation >= 0.0, np.minimum(state.deviation, _FARTHEST), _FARTHEST)
     # an estimated state drifts, and jumps by a fraction of its deviation

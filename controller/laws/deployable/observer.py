@@ -43,13 +43,13 @@ _ANGULAR = 0.019  # rad/s2/sqrt(Hz), angular acceleration noise of the model
 _BIAS_SHARE = 0.06  # weight of one innovation in the low-passed ones: 0.3 s at 50 Hz
 _USUAL_BIAS = 0.02  # mean square of the low-passed innovations of a model that fits
 _MISFIT_MEMORY = 3.0  # s, time constant of the misfit
-_GREATEST_MISFIT = 8.0  # limit of what is averaged, so that a failure is detected before it counts as a misfit
+_MAX_MISFIT = 8.0  # limit of what is averaged, so that a failure is detected before it counts as a misfit
+_FORGOTTEN = 1.5  # s without a correction after which an innovation no longer counts as biased
 _GAP_MEMORY = 1.0  # s, time constant at which the longest gap decays
 _RIPPLE = 0.05  # standard deviation of a thruster's force in one period, relative to it
 _WEAR = 0.01  # 1/sqrt(s), drift of an effectiveness
 _SAG = 0.01  # 1/sqrt(s), drift of a ceiling
 _DRIFT_RATE = 0.3  # 1/s, rate at which disturbances are let drift faster while innovations are biased
-_GREATEST_DRIFT = 400.0  # limit of the variance of a drift, relative to that of its gain
 _DRAG_DRIFT = 0.01  # 1/sqrt(s), drift of the drag
 _LAG_DRIFT = 0.003  # s/sqrt(s), drift of the lag
 _CURVED = 0.9  # s, correlation time of the error of the lag's secant, which scales it as noise
@@ -75,7 +75,7 @@ def predict(
     free = free_acceleration(dynamics, R, estimate.velocity, omega_body, loads)
     acceleration = free[:3] + A @ (thrusters.acting * effectiveness)
     curvature = T * (A @ (estimate.curvature * effectiveness))
-    _update_misfit(estimate, T)
+    _update_misfit(estimate, gains, T)
     # derivatives of the next velocity; drag is that of the mean axis, linearized
     linear, quadratic = np.sum(dynamics.linear_damping[:3]) / 3.0, np.sum(dynamics.quadratic_damping[:3]) / 3.0
     speed = np.maximum(abs(estimate.velocity - estimate.water_velocity), _SLOWEST)
@@ -96,10 +96,9 @@ def predict(
     _propagate_covariance(estimate, T)
     for axis in range(3):
         P[VELOCITY + axis, VELOCITY + axis] += square(_UNMODELED) * T + _CURVED / T * square(curvature[axis])
-        # the moments adapt at the rate `adaptation`
-        angular = square(gains.adaptation * _ANGULAR * dynamics.mass[3 + axis, 3 + axis]) * T
-        P[MOMENTS + axis, MOMENTS + axis] += max(drift[3], drift[4]) * angular
-    P[YAW_MOMENT, YAW_MOMENT] += drift[5] * angular
+        # the moments adapt at the rate `adaptation`; phi_2..phi_4 act about x and y of a level vehicle
+        P[MOMENTS + axis, MOMENTS + axis] += max(drift[3], drift[4]) * _moment_drift(dynamics, axis, gains) * T
+    P[YAW_MOMENT, YAW_MOMENT] += drift[5] * _moment_drift(dynamics, 2, gains) * T
     for axis in range(2):
         P[CURRENT + axis, CURRENT + axis] += drift[axis] * square(gains.current_drift) * T
     P[NET_WEIGHT, NET_WEIGHT] += drift[2] * square(gains.restoring_drift * estimate.mass_scale) * T
@@ -120,15 +119,24 @@ def predict(
     publish(estimate)
 
 
-def _update_misfit(estimate: Estimate, period: float) -> None:
+def _moment_drift(dynamics: Dynamics, axis: int, gains: DeployableGains) -> float:
+    """Return the variance of the drift of a moment about a body axis [(N m)2/s]."""
+    return square(gains.adaptation * _ANGULAR * dynamics.mass[3 + axis, 3 + axis])
+
+
+def _update_misfit(estimate: Estimate, gains: DeployableGains, period: float) -> None:
     """Update misfit and drifts over a period [s]: innovations of a model that fits are white."""
+    for group in range(2):  # of position and velocity
+        if estimate.time_since_valid[group] > _FORGOTTEN:
+            estimate.bias[3 + 3 * group : 6 + 3 * group] = 0.0
     # While an innovation is biased, what disturbs the vehicle along its axis is let drift faster, until it is white.
     for axis in range(6):
-        biased = min(square(estimate.bias[(6 + axis) % 9]) / _USUAL_BIAS, _GREATEST_MISFIT)
+        bias = estimate.bias[6 + axis] if axis < 3 else estimate.bias[axis - 3]  # of a velocity, or of a moment
+        biased = min(square(bias) / _USUAL_BIAS, _MAX_MISFIT)
         drift = estimate.drift[axis] * exponential(_DRIFT_RATE * period * (biased - 1.0))
-        estimate.drift[axis] = min(max(drift, 1.0), _GREATEST_DRIFT)
+        estimate.drift[axis] = min(max(drift, 1.0), gains.max_drift)
     mean = float(estimate.bias @ estimate.bias) / estimate.bias.size
-    relative = min(mean / _USUAL_BIAS, _GREATEST_MISFIT)
+    relative = min(mean / _USUAL_BIAS, _MAX_MISFIT)
     estimate.misfit += period / (period + _MISFIT_MEMORY) * (relative - estimate.misfit)
 
 

@@ -45,7 +45,9 @@ class Score(NamedTuple):
 def _least_limit(scenario: Scenario) -> float:
     """Return the least true limit of a thruster, as a fraction of that in the vehicle's file."""
     vehicle, true = scenario.vehicle, true_vehicle(scenario)
-    return float(np.min([true.thrust_min / vehicle.thrust_min, true.thrust_max / vehicle.thrust_max]))
+    limits = np.array([vehicle.thrust_min, vehicle.thrust_max])
+    used = limits != 0.0  # a thruster of one direction has no limit in the other
+    return float(np.min(np.array([true.thrust_min, true.thrust_max])[used] / limits[used]))
 
 
 class SceneFlyer:

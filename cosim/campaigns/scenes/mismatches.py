@@ -1,8 +1,10 @@
 """Scenes whose plant differs from the vehicle's file, which is all that laws receive."""
 
-# A scene is admitted if the path search finds a way past its regions, and the true thrust in the worst direction is at
-# least `_RESERVE` times the unknown net weight and the drag of mean current and gusts. The rule reads the scene alone;
-# scenes that it does not admit have the kind `EXCLUDED`, so that campaigns count them apart.
+# A scene is admitted if the path search of `cosim check` finds a way past its regions as they are at the start, and if
+# the true thrust in the worst direction is at least `_RESERVE` times the sum of |W - B| and the greatest drag of the
+# vehicle at rest, at either end of the depth band, in the mean current plus `_GUSTS` standard deviations. No flight
+# enters the rule. Scenes that are not admitted have the kind `EXCLUDED`: totals of a campaign include them, its
+# numbers by kind do not mix them with others.
 
 from __future__ import annotations
 
@@ -29,8 +31,8 @@ _DEPTHS = (1.5, 6.5)  # m
 _DURATION = 90.0  # s
 _NET_WEIGHT = 0.01  # greatest magnitude of W - B, as a fraction of the weight
 _CURRENT = 0.3  # m/s, maximum speed of the current
-_RESERVE = 1.2
-_GUSTS = 2.0  # number of standard deviations of the current's variation
+_RESERVE = 1.2  # least ratio of the thrust to what is needed
+_GUSTS = 2.0  # standard deviations of the varying current that the thrust must bear
 
 
 def make_mismatch(seed: int) -> Table:
@@ -42,7 +44,7 @@ def make_mismatch(seed: int) -> Table:
     band = {"type": "depth_band", "depth": sum(_DEPTHS) / 2.0, "tolerance": (_DEPTHS[1] - _DEPTHS[0]) / 2.0}
     regions = [hard_region(f"obstacle {i + 1}", obstacle(rng)) for i in range(int(rng.integers(4, 9)))]
     net = _NET_WEIGHT * vehicle.weight * rng.uniform(-1.0, 1.0)
-    parameters = {"buoyancy": float(vehicle.weight - net), **_lags(vehicle, 0.0)}
+    parameters = {"seed": seed, "buoyancy": float(vehicle.weight - net), **_lags(vehicle, 0.0)}
     if "bluerov2" in vehicle.name:
         parameters |= _lags(vehicle, _LAG)
     current = horizontal(rng.uniform(-np.pi, np.pi), rng.uniform(0.0, _CURRENT))
@@ -52,10 +54,10 @@ def make_mismatch(seed: int) -> Table:
     )  # fmt: skip
     _KINDS[kind](rng, vehicle, parameters)
     scenario = validate_scenario(table | {"law": {"name": "deployable"}}, f"mismatch-{seed}", vehicle)
-    return {"seed": seed, "kind": kind if _is_admitted(scenario) else EXCLUDED, "scenario": table}
+    return {"seed": seed, "kind": kind if is_admitted(scenario) else EXCLUDED, "scenario": table}
 
 
-def _is_admitted(scenario: Scenario) -> bool:
+def is_admitted(scenario: Scenario) -> bool:
     """Return True if there is a way to the goal, and thrust for it."""
     vehicle, over = true_vehicle(scenario), scenario.plant.parameters
     level, alive = np.array([1.0, 0.0, 0.0, 0.0]), np.ones((1, scenario.vehicle.n_thrusters))

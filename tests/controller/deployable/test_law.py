@@ -140,7 +140,12 @@ def test_without_measurements_forces_are_zero():
     def nothing(t, state):
         return VehicleState(*(np.full_like(part, np.nan) for part in state[:3]), state.thruster_health)
 
-    assert not fly(law_for(REGIONS), Sea(), steps=50, change=nothing).any()
+    law = law_for(REGIONS)
+    names = [diagnostic.name for diagnostic in law.diagnostics]
+    unknown = [names.index(name) for name in ("bound", "thrust_limit", "drag")]
+    assert np.isnan(law.report[unknown]).all()
+    assert not fly(law, Sea(), steps=50, change=nothing).any()
+    assert np.isnan(law.report[unknown]).all()
 
 
 @pytest.mark.medium

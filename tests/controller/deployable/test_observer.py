@@ -63,11 +63,11 @@ def pushes(dynamics, thrusters, R):
     return np.ascontiguousarray(np.vstack([R @ body[:3], body[3:]]))
 
 
-def predict(estimate, dynamics, thrusters, R=None, omega=(0.0, 0.0, 0.0)):
+def predict(estimate, dynamics, thrusters, R=None, omega=(0.0, 0.0, 0.0), gains=GAINS):
     R = np.eye(3) if R is None else R
     actuator_lag.update_forces(estimate, thrusters, PERIOD)
     given = pushes(dynamics, thrusters, R), R, np.array(omega)
-    observer.predict(estimate, dynamics, thrusters, *given, GAINS, PERIOD)
+    observer.predict(estimate, dynamics, thrusters, *given, gains, PERIOD)
 
 
 def transition(estimate, dynamics, thrusters, by_force):
@@ -340,13 +340,14 @@ def test_reset_keeps_only_effectiveness_and_ceilings():
         predict(estimate, dynamics, thrusters)
         correct(estimate, estimate.position + 0.01, estimate.velocity + 0.01)
     set_effectiveness(estimate, 2, 0.0)
-    kept = estimate.state[EFFECTIVENESS:].copy()
+    kept, estimate.drift[:], estimate.misfit = estimate.state[EFFECTIVENESS:].copy(), 9.0, 4.0
     reset(estimate)
     fresh = make_estimate(ODIN)
     assert np.array_equal(estimate.state[:EFFECTIVENESS], fresh.state[:EFFECTIVENESS])
     assert np.array_equal(estimate.covariance[:EFFECTIVENESS], fresh.covariance[:EFFECTIVENESS])
     assert np.array_equal(estimate.state[EFFECTIVENESS:], kept) and kept[2] == 0.0
-    assert estimate.time_since_measurement == -1.0
+    assert estimate.time_since_measurement == -1.0 and estimate.misfit == 1.0
+    assert np.all(estimate.drift == 1.0) and not estimate.bias.any()
 
 
 def test_disturbances_drift_faster_while_the_innovations_of_their_axis_are_biased():
@@ -366,3 +367,23 @@ def test_disturbances_drift_faster_while_the_innovations_of_their_axis_are_biase
         estimate.bias[channel], estimate.drift[axis] = 0.0, 1.001
         predict(estimate, dynamics, thrusters)
         assert estimate.drift[axis] == 1.0
+
+
+def test_a_lost_sensor_lets_no_disturbance_drift_faster():
+    """Its last innovations were biased, and stay so while none corrects them."""
+    estimate, dynamics, thrusters = started()
+    estimate.bias[3:], seen = 0.5, []
+    for _ in range(500):
+        predict(estimate, dynamics, thrusters)
+        seen.append(estimate.drift[:3].max())
+    assert max(seen) < 30.0 and seen[-1] < 3.0 and estimate.misfit < 3.0
+
+
+def test_drag_that_is_not_estimated_stays_the_vehicles():
+    estimate, dynamics, thrusters = started(velocity=(0.8, 0.1, 0.0))
+    for known, gains in ((False, GAINS), (True, GAINS._replace(drag_estimation=0.0))):
+        seen = copy.deepcopy(estimate)
+        for _ in range(50):
+            predict(seen, dynamics, thrusters, gains=gains)
+            correct(seen, seen.position, seen.velocity + 0.01, gains)
+        assert (seen.drag == 1.0) == known

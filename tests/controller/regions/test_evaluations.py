@@ -3,8 +3,10 @@
 import numpy as np
 import pytest
 
-from controller.regions import Region, pack
+from controller.errors import RegionError
+from controller.regions import Region, Sphere, pack
 from controller.regions.region_set import (
+    RegionEvaluator,
     attitude_clearance,
     clearance_at,
     clearance_of_pose,
@@ -13,6 +15,14 @@ from controller.regions.region_set import (
 from controller.regions.shapes import ENTRIES
 
 SCENE = [Region(name, entry.example, ("in", "out")[i % 2]) for i, (name, entry) in enumerate(ENTRIES.items())]
+
+
+def test_a_pose_of_another_shape_is_rejected():
+    evaluator = RegionEvaluator(pack([Region("rock", Sphere((0.0, 0.0, 2.0), 0.5), "out")]))
+    level = (1.0, 0.0, 0.0, 0.0)
+    for position, quaternion in ((5.0, level), ((1.0, 2.0), level), ((1.0, 2.0, 3.0), 1.0)):
+        with pytest.raises(RegionError, match=r"evaluate: \w+'s shape is \(.*\), expected \([34],\)"):
+            evaluator.evaluate(position, quaternion)
 
 
 def test_all_region_evaluations_agree():

@@ -81,6 +81,7 @@ def assert_sound(law, forces):
             "observation.last_bound",
             "observation.guaranteed_bound",
             "report.bound",
+            "report.drag",
             "report.thrust_limit",
             "thrusters.stuck",
         ):

@@ -1,6 +1,7 @@
 """Scenes that are scenarios: documented conflicts and trials, their own rules, and rejected keys."""
 
 import collections
+import dataclasses
 import json
 
 import numpy as np
@@ -11,10 +12,10 @@ from controller.regions.region_set import clearance_at, pack
 from cosim.campaigns.scenes.as_scenario import scene_scenario
 from cosim.campaigns.scenes.conditions import Conditions
 from cosim.campaigns.scenes.conflicts import make_conflict
-from cosim.campaigns.scenes.flyer import SceneFlyer
+from cosim.campaigns.scenes.flyer import SceneFlyer, _least_limit
 from cosim.campaigns.scenes.generator import generate_scenes
 from cosim.campaigns.scenes.kinds import kind_of
-from cosim.campaigns.scenes.mismatches import make_mismatch
+from cosim.campaigns.scenes.mismatches import is_admitted, make_mismatch
 from cosim.campaigns.scenes.scene_file import decode_scene
 from cosim.campaigns.scenes.trials import make_trial
 from cosim.errors import ScenarioError
@@ -56,14 +57,96 @@ def test_priorities_follow_the_order_of_the_criteria():
     assert len(orders) > 10  # of 24
 
 
+@pytest.fixture(scope="module")
+def mismatches():
+    return [make_mismatch(seed) for seed in range(300)]
+
+
 @pytest.mark.medium
-def test_kinds_and_vehicles_are_evenly_distributed():
+def test_kinds_and_vehicles_are_evenly_distributed(mismatches):
     kinds = collections.Counter(make_conflict(seed)["kind"] for seed in range(900))
     assert len(kinds) == 18 and min(kinds.values()) > 25 and max(kinds.values()) < 80  # 50 expected
     trials = collections.Counter(make_trial(seed)["kind"] for seed in range(700))
     assert len(trials) == 7 and min(trials.values()) > 65 and max(trials.values()) < 140  # 100 expected
-    mismatches = collections.Counter(make_mismatch(seed)["kind"] for seed in range(300))
-    assert len(mismatches) == 12 and 0 < mismatches.pop("excluded") <= 30 and min(mismatches.values()) > 8
+    kinds = collections.Counter(table["kind"] for table in mismatches)
+    assert len(kinds) == 12 and 0 < kinds.pop("excluded") <= 30 and min(kinds.values()) > 8
+
+
+def ratios(vehicle, parameters, name):
+    """Return the ratios of a plant's parameters to those of the vehicle's file, where these are not 0."""
+    given = np.array(getattr(vehicle, name), dtype=float)
+    pairs = [(given[tuple(np.array(key[len(name) + 1 : -1].split(","), int) - 1)], value)
+             for key, value in parameters.items() if key.startswith(f"{name}[")]  # fmt: skip
+    return np.array([value / of for of, value in pairs if of])
+
+
+def is_alike(numbers, low, high):
+    return bool(np.ptp(numbers) < 1e-9 and low <= numbers[0] <= high)
+
+
+DIFFERENCES = {
+    "drag": lambda v, p: all(is_alike(ratios(v, p, f"{n}_damping"), 0.5, 2.0) for n in ("linear", "quadratic")
+                             if np.any(getattr(v, f"{n}_damping"))),
+    "limits": lambda v, p: all(0.5 <= x <= 1.0 for n in ("min", "max") for x in ratios(v, p, f"thrust_{n}")),
+    "added mass": lambda v, p: is_alike(ratios(v, p, "added_mass"), 0.5, 1.5),
+    "mass": lambda v, p: is_alike(
+        np.array([p["mass"] / v.mass, p["weight"] / v.weight, p["inertia.zz"] / v.inertia[2, 2]]), 0.7, 1.3),
+    "dead band": lambda v, p: 0.0 <= p["thrust_dead_band[1]"] <= 0.15,
+    "lag": lambda v, p: 0.0 <= p["thrust_time_constant[1]"] <= 0.5,
+    "gusts": lambda v, p: 0.05 <= p["current_variation.x"] <= 0.2 and 2.0 <= p["current_correlation_time"] <= 8.0,
+    "shear": lambda v, p: 0.0 < np.hypot(p["current_shear.x"], p["current_shear.y"]) <= 0.05,
+    "arms": lambda v, p: np.ptp(ratios(v, p, "thruster_matrix")) > 0.05
+    and np.all(abs(ratios(v, p, "thruster_matrix") - 1.0) <= 0.1 + 1e-9),
+    "other set": lambda v, p: not is_alike(ratios(v, p, "quadratic_damping"), 0.0, 100.0),
+}  # fmt: skip
+
+
+@pytest.mark.medium
+def test_plant_of_a_mismatch_differs_by_what_its_kind_states(mismatches):
+    """W - B is within 1 % of the weight in each; every kind but `several` changes nothing else."""
+    common = {"seed", "buoyancy", "thrust_time_constant"}
+    changed = {
+        "drag": {"linear_damping", "quadratic_damping"}, "limits": {"thrust_min", "thrust_max"},
+        "added mass": {"added_mass"}, "mass": {"mass", "weight", "inertia"}, "dead band": {"thrust_dead_band"},
+        "lag": set(), "gusts": {"current_variation", "current_correlation_time"}, "shear": {"current_shear"},
+        "arms": {"r_B", "thruster_matrix"}, "other set": {"linear_damping", "quadratic_damping", "added_mass"},
+    }  # fmt: skip
+    for table in mismatches:
+        scenario, kind = table["scenario"], table["kind"]
+        vehicle, parameters = load_vehicle(scenario["vehicle"]), scenario["plant"]["parameters"]
+        net = parameters.get("weight", vehicle.weight) - parameters["buoyancy"]
+        assert abs(net) <= 0.01 * vehicle.weight + 1e-9
+        if kind in DIFFERENCES:
+            assert DIFFERENCES[kind](vehicle, parameters), table["seed"]
+            assert {key.partition("[")[0].partition(".")[0] for key in parameters} == common | changed[kind]
+    gusts = [table["scenario"]["plant"]["parameters"]["seed"] for table in mismatches if table["kind"] == "gusts"]
+    assert len(set(gusts)) == len(gusts)
+
+
+@pytest.mark.medium
+def test_admission_needs_a_way_and_thrust_and_no_flight(mismatches):
+    wall = {"type": "box", "center": [5.0, 0.0, 4.0], "size": [0.5, 500.0, 50.0]}
+    for table in [table for table in mismatches if table["kind"] in ("gusts", "shear")][:6]:
+        plant, regions = table["scenario"]["plant"], table["scenario"]["regions"]
+        assert is_admitted(scenario_of(table))
+        m = load_vehicle(table["scenario"]["vehicle"]).n_thrusters
+        weak = {f"thrust_{end}[{j + 1}]": limit for end, limit in (("min", -0.01), ("max", 0.01)) for j in range(m)}
+        for other in (
+            {"regions": [*regions, regions[0] | {"name": "wall", "shape": wall}]},
+            {"plant": plant | {"parameters": plant["parameters"] | weak}},
+            {"plant": plant | {"parameters": plant["parameters"] | {"current_variation.x": 9.0}}},
+            {"plant": plant | {"parameters": plant["parameters"] | {"current_shear.x": 2.0}}},
+            {"plant": plant | {"current": [6.0, 0.0, 0.0]}},
+        ):
+            assert not is_admitted(scenario_of(table | {"scenario": table["scenario"] | other})), other
+
+
+def test_limit_of_a_thruster_is_compared_in_the_directions_that_it_has():
+    table = make_trial(1)
+    vehicle = load_vehicle(table["scenario"]["vehicle"])
+    scenario = scenario_of(table)
+    one_way = dataclasses.replace(vehicle, thrust_min=np.zeros(vehicle.n_thrusters))
+    assert _least_limit(dataclasses.replace(scenario, vehicle=one_way)) == 1.0
 
 
 @pytest.mark.medium
