@@ -58,7 +58,7 @@ READERS = {
 
 
 @pytest.mark.medium(fast=41)
-@pytest.mark.filterwarnings("ignore:.*is taken as Latin-1")
+@pytest.mark.filterwarnings("ignore:.*are taken as Windows-1252")
 @pytest.mark.parametrize("text", BROKEN.values(), ids=BROKEN)
 @pytest.mark.parametrize(("read", "suffix"), READERS.values(), ids=READERS)
 def test_invalid_files_are_rejected(read, suffix, tmp_path, text):

@@ -87,12 +87,12 @@ def test_missed_goal_has_its_cause_in_console_summary_and_events(ran, text, chan
 
 @pytest.mark.medium
 def test_isolated_thruster_is_reported_once_in_the_same_words(ran):
-    run, printed = ran(SENSING + "[[failures]]\nthruster = 5\ntime = 4.0\n", duration=28.0, goal=12.0)
+    run, printed = ran(SENSING + "[[failures]]\nthruster = 6\ntime = 4.0\n", duration=28.0, goal=12.0)
     (isolation,) = run.summary["isolations"]
-    assert isolation["thruster"] == 5 and 4.0 < isolation["time"] < 18.0 and run.summary["goal_miss"] is None
-    assert f"It isolated thruster 5 at {isolation['time']:.2f} s." in printed
+    assert isolation["thruster"] == 6 and 4.0 < isolation["time"] < 18.0 and run.summary["goal_miss"] is None
+    assert f"It isolated thruster 6 at {isolation['time']:.2f} s." in printed
     texts = {event.text: event.time for event in events_of(run, [])}
-    assert texts["The law isolates thruster 5"] == isolation["time"]
+    assert texts["The law isolates thruster 6"] == isolation["time"]
 
 
 @pytest.mark.medium

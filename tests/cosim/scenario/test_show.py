@@ -118,7 +118,7 @@ def test_only_pure_numbers_among_gains_have_no_unit():
         (name, gain) for name, law in LAWS.items() for gain in law.gains_type._fields if not unit_of_gain(name, gain)
     }
     assert without == {("ismail_dunnigan", "k_q"), ("deployable", "braking_share"), ("deployable", "failure_threshold"),
-        *(("deployable", part) for part in ("effectiveness_estimation", "path_planning", "barriers")),
+        *(("deployable", part) for part in ("drag_estimation", "effectiveness_estimation", "max_drift", "path_planning", "barriers")),
     }  # fmt: skip
 
 

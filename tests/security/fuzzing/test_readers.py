@@ -55,14 +55,14 @@ def tried(case: Case, kind: str, numbers: range) -> Counter[str]:
 
 
 @pytest.mark.medium
-@pytest.mark.filterwarnings("ignore:.*is taken as Latin-1")
+@pytest.mark.filterwarnings("ignore:.*are taken as Windows-1252")
 @pytest.mark.parametrize("name", READERS)
 def test_readers_survive_a_few_mutations(name, seeds):
     assert not tried(READERS[name].case(seeds), READERS[name].kind, range(FEW))
 
 
 @pytest.mark.slow
-@pytest.mark.filterwarnings("ignore:.*is taken as Latin-1")
+@pytest.mark.filterwarnings("ignore:.*are taken as Windows-1252")
 @pytest.mark.parametrize("name", READERS)
 def test_readers_survive_many_mutations(name, seeds):
     case = READERS[name].case(seeds)
