@@ -39,9 +39,8 @@ class FlightMetrics(State):
     calls: float  # number of calls of a law that gives bounds
     promises: float  # number of those after which it gave one
     healthy_isolated: float  # 1 if the law isolated a thruster that had not failed
-    thrust_limit: float = (
-        math.inf
-    )  # minimum over thrusters of the limit that the law estimated, as a fraction of the vehicle's
+    # dimensionless: minimum over thrusters of the limit that the law estimated, relative to the vehicle's
+    thrust_limit: float = math.inf
 
 
 def fly(

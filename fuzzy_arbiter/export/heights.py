@@ -121,7 +121,7 @@ def boundary(height: Height, cuts: Sequence[float], top: float, x: float, outsid
 
 
 def position_of_maximum(height: Height, cuts: Sequence[float], edges: Sequence[float], side: int) -> float:
-    """Return the smallest (side -1), mean (0) or largest (1) position of the maximum height; NaN where that is 0."""
+    """Return the smallest (side -1), mean (0) or largest (1) position [-] of the maximum height; NaN if that is 0."""
     width = edges[len(edges) - 1] - edges[0]
     top = 0.0
     for k in range(len(edges) - 1):

@@ -56,7 +56,7 @@ class Report(State):
     time_since_measurement: float  # s
     bound: float  # m
     rejected: float  # fraction
-    thrust_limit: float  # fraction of the vehicle's
+    thrust_limit: float  # dimensionless, relative to the vehicle's
     drag: float  # relative to the vehicle's
 
 

@@ -117,9 +117,11 @@ def test_only_pure_numbers_among_gains_have_no_unit():
     without = {
         (name, gain) for name, law in LAWS.items() for gain in law.gains_type._fields if not unit_of_gain(name, gain)
     }
-    assert without == {("ismail_dunnigan", "k_q"), ("deployable", "braking_share"), ("deployable", "failure_threshold"),
-        *(("deployable", part) for part in ("drag_estimation", "effectiveness_estimation", "max_drift", "path_planning", "barriers")),
-    }  # fmt: skip
+    of_deployable = (
+        "barriers", "braking_share", "drag_estimation", "effectiveness_estimation", "failure_threshold", "max_drift",
+        "path_planning",
+    )  # fmt: skip
+    assert without == {("ismail_dunnigan", "k_q"), *(("deployable", gain) for gain in of_deployable)}
 
 
 def test_every_key_of_a_shape_has_a_unit_or_none():
