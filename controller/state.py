@@ -114,7 +114,12 @@ def _kind(hint: Any) -> tuple[Any, Any]:
     if isinstance(hint, type):
         return _NUMBERS.get(hint, hint), () if hint in _NUMBERS else None
     shape = next((extra.lengths for extra in getattr(hint, "__metadata__", ()) if isinstance(extra, Shape)), None)
-    return (get_args(get_args(hint.__origin__)[1])[0], shape) if shape is not None else (None, None)
+    if shape is None:
+        return None, None
+    item = hint.__origin__
+    while arguments := get_args(item):  # NDArray[item], which in older versions of NumPy is ndarray[..., dtype[item]]
+        item = arguments[-1]
+    return item, shape
 
 
 @functools.cache

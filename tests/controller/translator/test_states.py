@@ -3,11 +3,11 @@
 import copy
 import pickle
 import random
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeVar
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
+from typing_extensions import TypeAliasType
 
 from controller.compiling.function import CompiledFunction, c_text
 from controller.errors import TranslationError
@@ -17,7 +17,9 @@ from tests.controller.translator.building import Called, compiled
 from tests.controller.translator.flights import same_bits
 
 Grid = Annotated[Array, Shape(2, 3)]
-Counts = Annotated[NDArray[np.int64], Shape("k")]
+Item = TypeVar("Item", bound=np.generic)
+Alias = TypeAliasType("Alias", np.ndarray[Any, np.dtype[Item]], type_params=(Item,))  # as NDArray of newer NumPy
+Counts = Annotated[Alias[np.int64], Shape("k")]
 
 
 class Inner(State):
