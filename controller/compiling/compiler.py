@@ -74,6 +74,7 @@ def compiling(source: Path, library: Path, compiler: Sequence[str] | None = None
 def _stop(process: subprocess.Popen[str]) -> None:
     """Stop a compiler and the processes that it has started, which are a process group of their own."""
     if hasattr(os, "killpg"):
-        os.killpg(process.pid, signal.SIGTERM)
+        with contextlib.suppress(ProcessLookupError, PermissionError):  # it has ended meanwhile
+            os.killpg(process.pid, signal.SIGTERM)
     else:
         process.terminate()

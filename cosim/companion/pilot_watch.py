@@ -18,7 +18,9 @@ _DEFLECTED = 0.05  # of a full stick, above which it counts
 _TOLERANCE = 25.0  # us, difference of a channel's pulse above which it counts
 _AXES, _UNUSED = 6, 0xFFFF  # channels of sticks; value of an unused one, as 0
 _ARDUPILOT = 3  # MAV_AUTOPILOT; others report the channels of a radio alone
-_WINDOW = 0.5  # s, time in which our sticks appear in the reported channels
+_WINDOW = (
+    1.5  # s, time in which our sticks appear in the reported channels; after a gap the last ones act for up to 1 s
+)
 _REST_WINDOW = 5.0  # s, time before our first sticks in which channels show their rest
 
 
@@ -37,7 +39,9 @@ class PilotWatch:
         if not self._sent and self._before:
             reported = np.array([pulses for _, pulses in self._before])
             self._rest = reported[np.abs(reported - CENTER).argmin(axis=0), np.arange(_AXES)]
-        _append(self._sent, now, pulses, _WINDOW)
+        self._sent.append((now, pulses))
+        while len(self._sent) > 1 and now - self._sent[1][0] > _WINDOW:  # that before acts as the window begins
+            self._sent.popleft()
 
     def receive(self, system: int, component: int, message: Any, reported: ReportedState, now: float) -> None:
         """Process a message that arrived at our time `now` [s]."""
@@ -59,18 +63,14 @@ class PilotWatch:
     def _has_foreign(self, pulses: Array, now: float) -> bool:
         """Return True if a channel is off its rest and outside the range of our recent sticks."""
         if not self._sent:
-            _append(self._before, now, pulses, _REST_WINDOW)
+            self._before.append((now, pulses))
+            while now - self._before[0][0] > _REST_WINDOW:
+                self._before.popleft()
             return False
-        ours = np.array([np.full(_AXES, CENTER), *(sent for time, sent in self._sent if now - time <= _WINDOW)])
+        sent = self._sent if now - self._sent[-1][0] <= _WINDOW else ()
+        ours = np.array([np.full(_AXES, CENTER), *(pulses for _, pulses in sent)])
         outside = np.maximum(ours.min(axis=0) - pulses, pulses - ours.max(axis=0))
         return bool(((outside > _TOLERANCE) & (np.abs(pulses - self._rest) > _TOLERANCE)).any())
-
-
-def _append(samples: deque[tuple[float, Array]], now: float, pulses: Array, window: float) -> None:
-    """Append pulses at our time `now` [s], and drop those older than a `window` [s]."""
-    samples.append((now, pulses))
-    while now - samples[0][0] > window:
-        samples.popleft()
 
 
 def _pulses(message: Any) -> Array:

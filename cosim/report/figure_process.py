@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import logging
 import os
 import signal
 import sys
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
     from cosim.report.web_page import InlineFigure
     from cosim.results.run_result import Run
 
+log = logging.getLogger(__name__)
+
 # of a process that draws: after Ctrl-C the run ends, and then asks for its figures
 _ACTIONS = {signal.SIGINT: signal.SIG_IGN, signal.SIGTERM: signal.SIG_DFL}
 _waiting: list[Connection[Any, Any]] = []  # that with at most one process that waits for a run
@@ -35,24 +38,28 @@ def drawing_beside() -> Iterator[None]:
         return
     connection, of_child = Pipe()
     signals = signal.pthread_sigmask(signal.SIG_BLOCK, _ACTIONS)  # so that the command's handlers do not run in a child
-    child = _fork()
-    if not child:
+    try:
+        child = _fork()
+    except OSError:  # too many processes: the run draws itself
+        child = None
+    if child == 0:
         for number, action in _ACTIONS.items():
             signal.signal(number, action)
         connection.close()
+        os.setpgid(0, 0)
     signal.pthread_sigmask(signal.SIG_SETMASK, signals)
-    if not child:
+    if child == 0:
         _serve(of_child)
     of_child.close()
-    _waiting.append(connection)
+    if child:
+        _waiting.append(connection)
     try:
         yield
     finally:
         _waiting.clear()
         connection.close()
-        with contextlib.suppress(ProcessLookupError, ChildProcessError):  # where the parent ignores SIGCHLD
-            os.kill(child, signal.SIGKILL)
-            os.waitpid(child, 0)
+        if child:
+            _stop(child)
 
 
 def draw_beside(run: Run, folder: Path) -> dict[str, InlineFigure] | None:
@@ -62,16 +69,25 @@ def draw_beside(run: Run, folder: Path) -> dict[str, InlineFigure] | None:
     if not _waiting:
         return None
     connection = _waiting.pop()
+    figures = {}
     try:
         connection.send((run, folder))
-        drawn = sorted(connection.recv())
-    except (EOFError, OSError):
+        for _, name, caption in sorted(connection.recv()):
+            svg = (folder / f"{name}.svg").read_text(encoding="utf-8")
+            figures[name] = InlineFigure(inline_svg(svg, caption), caption)
+    except Exception:  # a run that cannot be sent, or a process that was ended
+        log.debug("figures are drawn by the run itself", exc_info=True)
         return None
-    figures = {}
-    for _, name, caption in drawn:
-        svg = (folder / f"{name}.svg").read_text(encoding="utf-8")
-        figures[name] = InlineFigure(inline_svg(svg, caption), caption)
     return figures
+
+
+def _stop(child: int) -> None:
+    """End a child, and the process that it may have started."""
+    for end in (os.kill, os.killpg):  # it may have no group of its own yet
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            end(child, signal.SIGKILL)
+    with contextlib.suppress(ChildProcessError):  # where the parent ignores SIGCHLD
+        os.waitpid(child, 0)
 
 
 def _fork() -> int:
@@ -82,13 +98,15 @@ def _fork() -> int:
 
 def _serve(connection: Connection[Any, Any]) -> NoReturn:
     """Wait for a run and a folder, draw its figures there in two processes, and send what names each."""
+    second = 0
     try:
         from cosim.report.figures.figures import drawings
         from cosim.report.figures.sampled_rows import make_figure_data
 
         run, folder = connection.recv()
         half, of_child = Pipe()
-        first = 0 if _fork() else 1
+        second = _fork()
+        first = 0 if second else 1
         drawn = []
         for i, drawing in enumerate(drawings(make_figure_data(run), first, 2)):
             drawing.write(folder)
@@ -99,4 +117,7 @@ def _serve(connection: Connection[Any, Any]) -> NoReturn:
             of_child.close()
             connection.send(drawn + half.recv())
     finally:
+        if second:  # it has sent what it drew, or is no longer needed
+            os.kill(second, signal.SIGKILL)
+            os.waitpid(second, 0)
         os._exit(0)  # whatever it raises: the run then draws itself

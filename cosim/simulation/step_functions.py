@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -40,7 +41,11 @@ def make_plant(scenario: Scenario, law: Law) -> Plant:
         plant = pool.submit(Plant, scenario.vehicle, scenario.plant.fmi)
         try:
             load_functions(*step_functions(scenario, law))
-        except BaseException:
+        except Exception:
             plant.result().close()
+            raise
+        except BaseException:  # Ctrl-C, which ends the FMU's compilers too
+            with contextlib.suppress(Exception):
+                plant.result().close()
             raise
     return plant.result()

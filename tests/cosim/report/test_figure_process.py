@@ -14,12 +14,18 @@ import os, signal, sys
 from cosim.report import figure_process
 from cosim.run.run_scenario import run_scenario
 fork, forked = os.fork, []
-os.fork = lambda: forked.append(fork()) or forked[-1]
+def fork_or_fail():
+    if sys.argv[2] == "refused":
+        raise BlockingIOError("too many processes")
+    forked.append(fork())
+    return forked[-1]
+os.fork = fork_or_fail
 with figure_process.drawing_beside():
     if sys.argv[2] == "killed":
         os.kill(forked[0], signal.SIGKILL)
     run_scenario("paper", sys.argv[1])
-assert ("matplotlib" in sys.modules) == (sys.argv[2] == "killed")
+assert ("matplotlib" in sys.modules) == (sys.argv[2] != "alive")
+assert not signal.pthread_sigmask(signal.SIG_BLOCK, [])
 try:
     os.waitpid(-1, 0)
 except ChildProcessError:
@@ -33,7 +39,7 @@ def figures_of(folder):
 
 @pytest.mark.medium
 @pytest.mark.skipif(sys.platform != "linux" or os.cpu_count() == 1, reason="figures are drawn in the run's process")
-@pytest.mark.parametrize("process", ["alive", "killed"])
+@pytest.mark.parametrize("process", ["alive", "killed", "refused"])
 def test_figures_and_report_are_those_of_the_runs_own_process(tmp_path, process):
     subprocess.run([sys.executable, "-c", RUN, tmp_path / "run", process], check=True, timeout=240)
     page, figures = load_run(tmp_path / "run").files()["report"].read_text(), figures_of(tmp_path / "run")
