@@ -29,14 +29,18 @@ DIAGNOSTICS = (
     Diagnostic("path_cost", "m", "Length of the path into the goal region, plus the price of passing regions closely"),
     Diagnostic("path_corners", "", "Corners of the path"),
     Diagnostic("barriers", "", "Active barriers"),
-    Diagnostic("constraint_slack", "m/s2", "Greatest slack of a barrier"),
+    Diagnostic("constraint_slack", "m/s2", "Maximum slack of a barrier"),
     Diagnostic("qp_steps", "", "Steps of the quadratic program, negative if it was cut short"),
     Diagnostic("failed_thruster", "", "Last isolated thruster, from 1; 0 for none"),
     Diagnostic("time_since_measurement", "s", "Time since the last measurement that was accepted"),
     Diagnostic("bound", "m", "Lower bound of the clearances of hard regions from now on; NaN: none"),
     Diagnostic("rejected", "", "Fraction of the position and velocity samples so far that the gate rejected"),
-    Diagnostic("thrust_limit", "", "Lowest estimated limit of a thruster, as a fraction of that in the vehicle's file"),
-    Diagnostic("drag", "", "Estimated drag of translation, relative to the vehicle's file"),
+    Diagnostic(
+        "thrust_limit",
+        "",
+        "Lowest estimated limit of a thruster, as a fraction of that in the vehicle's file; NaN: none",
+    ),
+    Diagnostic("drag", "", "Estimated drag of translation, relative to the vehicle's file; NaN: none"),
 )
 
 
@@ -61,7 +65,7 @@ class Report(State):
 
 
 def clear_report(report: Report) -> None:
-    """Write that there is no estimate, and no bound."""
+    """Write that there is no bound, and no estimate of limits and drag."""
     report.bound, report.thrust_limit, report.drag = NO_BOUND, np.nan, np.nan
 
 

@@ -11,7 +11,7 @@
 # gravity. So a thruster that fails at low thrust is detected when it is used.
 #
 # A small missing force cannot be told from a lasting error of the model: while it would be less than `_EXCITED`,
-# evidence raises the sum to at most half the threshold. So a vehicle at rest isolates nothing until it moves.
+# evidence raises the sum to at most half the threshold. So a thruster that gives little is isolated once it is used.
 #
 # While the innovations are biased, the model does not fit, and evidence counts less: by the square of their misfit. A
 # thruster that saturates does not count as failed, since its true limit is estimated (`thrust_limit`).
@@ -158,12 +158,13 @@ def _add_evidence(
     loss = _LOSS if hypothesis == j else 1.0
     step = loss * innovations - 0.5 * square(loss) * squares
     # the force that would be missing now
-    missing = thrusters.acting[j] if hypothesis == j else estimate.missing[j]
-    if abs(missing) < _EXCITED * max(-thrusters.nominal_lower[j], thrusters.nominal_upper[j]):
-        step = min(step, max(0.5 * gains.failure_threshold - fault_state.ratio[hypothesis], 0.0))
-    fault_state.ratio[hypothesis] += min(max(step, -_MOST_A_STEP), _MOST_A_STEP)
-    fault_state.sums[0, hypothesis] += innovations
-    fault_state.sums[1, hypothesis] += squares
+    missing = estimate.state[EFFECTIVENESS + j] * thrusters.acting[j] if hypothesis == j else estimate.missing[j]
+    counted = 1.0  # fraction of the evidence
+    if step > 0.0 and abs(missing) < _EXCITED * max(-thrusters.nominal_lower[j], thrusters.nominal_upper[j]):
+        counted = min(max(0.5 * gains.failure_threshold - fault_state.ratio[hypothesis], 0.0) / step, 1.0)
+    fault_state.ratio[hypothesis] += min(max(counted * step, -_MOST_A_STEP), _MOST_A_STEP)
+    fault_state.sums[0, hypothesis] += counted * innovations
+    fault_state.sums[1, hypothesis] += counted * squares
     if not fault_state.ratio[hypothesis] > 0.0:
         _start_anew(fault_state, estimate, thrusters, j, hypothesis)
 

@@ -231,10 +231,15 @@ def test_a_small_missing_force_gives_at_most_half_the_threshold():
         for hypothesis, evidence in ((2, (10.0, 1.0)), (10, (5.5, 1.0))):
             estimate, thrusters, state = started()
             state.ratio[hypothesis], estimate.evidence[:, hypothesis] = before, evidence
-            thrusters.acting[2] = estimate.missing[2] = force
+            thrusters.acting[2], estimate.missing[2] = (force / 0.3, 20.0) if hypothesis == 2 else (20.0, force)
+            estimate.state[EFFECTIVENESS + 2] = 0.3
             for _ in range(5):
                 fault_detection._add_evidence(state, estimate, thrusters, 2, hypothesis, GAINS)
             assert state.ratio[hypothesis] == pytest.approx(expected)
+            counted = (
+                5 if abs(force) > 2.7 else 2 if before == 0.0 else 0
+            )  # what does not count tells nothing of the loss
+            assert state.sums[0, hypothesis] <= counted * evidence[0]
             estimate.evidence[0, hypothesis] = -1.0
             fault_detection._add_evidence(state, estimate, thrusters, 2, hypothesis, GAINS)
             assert state.ratio[hypothesis] < expected
