@@ -29,9 +29,9 @@ _START, _GOAL = np.array([0.0, 0.0, 4.0]), np.array([10.0, 0.0, 4.0])
 _GOAL_RADIUS = 0.5  # m
 _DEPTHS = (1.5, 6.5)  # m
 _DURATION = 90.0  # s
-_NET_WEIGHT = 0.01  # greatest magnitude of W - B, as a fraction of the weight
+_NET_WEIGHT = 0.01  # maximum |W - B|, as a fraction of the weight
 _CURRENT = 0.3  # m/s, maximum speed of the current
-_RESERVE = 1.2  # least ratio of the thrust to what is needed
+_RESERVE = 1.2  # minimum ratio of available to required thrust
 _GUSTS = 2.0  # standard deviations of the varying current that the thrust must bear
 
 
@@ -44,7 +44,7 @@ def make_mismatch(seed: int) -> Table:
     band = {"type": "depth_band", "depth": sum(_DEPTHS) / 2.0, "tolerance": (_DEPTHS[1] - _DEPTHS[0]) / 2.0}
     regions = [hard_region(f"obstacle {i + 1}", obstacle(rng)) for i in range(int(rng.integers(4, 9)))]
     net = _NET_WEIGHT * vehicle.weight * rng.uniform(-1.0, 1.0)
-    parameters = {"seed": seed, "buoyancy": float(vehicle.weight - net), **_lags(vehicle, 0.0)}
+    parameters = {"seed": seed % 2**31, "buoyancy": float(vehicle.weight - net), **_lags(vehicle, 0.0)}
     if "bluerov2" in vehicle.name:
         parameters |= _lags(vehicle, _LAG)
     current = horizontal(rng.uniform(-np.pi, np.pi), rng.uniform(0.0, _CURRENT))

@@ -121,6 +121,7 @@ def test_plant_of_a_mismatch_differs_by_what_its_kind_states(mismatches):
             assert {key.partition("[")[0].partition(".")[0] for key in parameters} == common | changed[kind]
     gusts = [table["scenario"]["plant"]["parameters"]["seed"] for table in mismatches if table["kind"] == "gusts"]
     assert len(set(gusts)) == len(gusts)
+    assert make_mismatch(2**63 - 1)["scenario"]["plant"]["parameters"]["seed"] < 2**31  # as FMI takes them
 
 
 @pytest.mark.medium
