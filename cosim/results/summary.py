@@ -169,7 +169,11 @@ class _SummaryData:
         if ISOLATED in block.units:
             self.isolations.add(time, block[ISOLATED])
         reports = [name for name in (REJECTED, DRAG) if name in block.units]
-        self.last = {name: float(block[name][-1]) for name in ("time", *_POSITION, *_ESTIMATE, *self._place, *reports)}
+        last = {name: float(block[name][-1]) for name in ("time", *_POSITION, *_ESTIMATE, *self._place, *reports)}
+        if DRAG in last:
+            known = block[DRAG][np.isfinite(block[DRAG])]  # a law without measurements has no estimate
+            last[DRAG] = float(known[-1]) if known.size else self.last.get(DRAG, np.nan)
+        self.last = last
 
     @staticmethod
     def _update_extremes(known: dict[str, float], extreme: np.ufunc, signals: dict[str, Array]) -> None:

@@ -46,7 +46,7 @@ class DeployableGains(NamedTuple):
     moment_bound: float = 150.0  # N m, of each of the other three of phi, and of the moment about z
     current_bound: float = 1.0  # m/s
     adaptation: float = 0.5  # 1/s, of the moments, if their drift has not grown
-    max_drift: float = 400.0  # limit of the factor by which the variance of a drift grows meanwhile; 1: none does
+    max_drift: float = 400.0  # maximum factor of the variance of a drift while innovations are biased; 1: no growth
     lag_bound: float = 1.0  # s, of the thrusters; 0: no lag is estimated, nor predicted for
     # lost measurements and thrusters
     coast: float = 2.0  # s that the law goes on without valid measurements before it only holds W - B
@@ -85,4 +85,6 @@ def check_gains(gains: DeployableGains) -> DeployableGains:
     validate_gains(gains, above_zero=set(gains._fields) - _MAY_BE_ZERO)
     if gains.braking_share > 1.0:
         raise LawError(f"law.gains.braking_share is {gains.braking_share}, expected at most 1")
+    if gains.max_drift < 1.0:
+        raise LawError(f"law.gains.max_drift is {gains.max_drift}, expected at least 1")
     return gains

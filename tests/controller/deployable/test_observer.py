@@ -369,8 +369,8 @@ def test_disturbances_drift_faster_while_the_innovations_of_their_axis_are_biase
         assert estimate.drift[axis] == 1.0
 
 
-def test_a_lost_sensor_lets_no_disturbance_drift_faster():
-    """Its last innovations were biased, and stay so while none corrects them."""
+def test_disturbances_stop_drifting_faster_after_a_sensor_is_lost():
+    """Its last innovations were biased, and none corrects them."""
     estimate, dynamics, thrusters = started()
     estimate.bias[3:], seen = 0.5, []
     for _ in range(500):

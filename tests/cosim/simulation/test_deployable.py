@@ -278,8 +278,11 @@ def test_reported_failed_thruster_is_not_used(lost):
 
 @pytest.mark.parametrize(
     ("change", "words"),
-    [({"speed": 0.0}, "speed"), ({"braking_share": 1.5}, "braking_share"), ({"margin": np.nan}, "margin")],
-)
+    [
+        ({"speed": 0.0}, "speed"), ({"braking_share": 1.5}, "braking_share"), ({"max_drift": 0.5}, "max_drift"),
+        ({"margin": np.nan}, "margin"),
+    ],
+)  # fmt: skip
 def test_invalid_gains_are_rejected_by_name(change, words):
     with pytest.raises(LawError, match=f"law.gains.{words}"):
         LAWS["deployable"].for_vehicle(vehicle_model(ODIN), DeployableGains(**change), LEVEL, PERIOD, 0)
