@@ -108,7 +108,8 @@ class Block:
         except DefinitionError as error:
             message = str(error).replace("universe", "range")
             lines = [line for key, (line, _) in self.entries.items() if f" {key.lower()} is " in message]
-            lines += [line for line, text in self.many if repr(text.split(" ")[0]) in message]
+            terms = [(line, repr(text.split(" ")[0])) for line, text in self.many]
+            lines = lines or [line for line, name in terms if f"term {name}" in message or f"named {name}" in message]
             raise type(error)(f"line {lines[-1] if lines else self.line}: {error}") from None
 
     def rules(self, parse: Callable[[int, str], Iterable[Rule]]) -> list[NumberedRule]:

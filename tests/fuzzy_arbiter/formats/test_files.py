@@ -107,3 +107,8 @@ def test_errors_name_the_file(tmp_path):
     path.write_text("x")
     with pytest.raises(FormatError, match=r"a\.fll: line 1: 'x', expected a key, a colon and its value"):
         load(path)
+    term = "  term: tip Ramp 0 1\n"
+    for number, added in ((4, "  range: 1 0\n" + term), (6, "  range: 0 1\n" + 2 * term)):
+        path.write_text(f"Engine: e\nInputVariable: tip\n  enabled: true\n{added}")
+        with pytest.raises(DefinitionError, match=rf"a\.fll: line {number}: "):
+            load(path)
