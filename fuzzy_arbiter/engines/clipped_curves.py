@@ -18,7 +18,7 @@ from fuzzy_arbiter.definition import Output
 from fuzzy_arbiter.engines.defuzzification import HEIGHT_RATIO, positions_of_maximum
 from fuzzy_arbiter.engines.engine import Defuzzifier
 from fuzzy_arbiter.engines.firing import Slot
-from fuzzy_arbiter.engines.panels import Indices, points_of, roots, smooth_panels
+from fuzzy_arbiter.engines.panels import Indices, halved, points_of, roots, smooth_panels
 from fuzzy_arbiter.engines.quadrature import Quadrature, centroid_bound
 from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.shapes import Array, Membership
@@ -58,7 +58,7 @@ class ClippedCurves(Defuzzifier):
         if any(isinstance(s, Formula) or (isinstance(s, Curve) and s.kind == "singleton") for s in shapes):
             raise EngineError(f"output {output.name!r}: a term is a formula or a singleton, expected smooth terms")
         self._make_quadrature = functools.partial(Quadrature, output, slots)
-        self._shapes, self._universe, self._kind = shapes, output.universe, output.defuzzifier
+        self._universe, self._kind = output.universe, output.defuzzifier
         bound = f"within {centroid_bound(output):g} of the universe's width"
         self.method = {
             "centroid": "integrals of polynomials, " + ("to rounding" if all(s.polynomial for s in shapes) else bound)
@@ -67,7 +67,8 @@ class ClippedCurves(Defuzzifier):
         edges = smooth_panels(output.universe, list(dict.fromkeys(shapes)))
         if len(shapes) ** (2 if self._max else 1) * len(edges) * len(_TABLE) > _MAX_TABLE:
             raise EngineError(f"output {output.name!r}: its {len(shapes)} terms have too many panels or crossings")
-        edges = _with_crossings(edges, shapes) if self._max else edges
+        edges = with_crossings(edges, shapes) if self._max else edges
+        edges = halved(edges) if self._scales and self._kind != "centroid" else edges
         self._slots, lines, keys, self._error = _lines(edges, shapes, self._max)
         if not self._error < _ERROR * max(shape.area(output.universe) for shape in shapes):
             raise EngineError(f"output {output.name!r}: its terms are too rough, expected smooth terms")
@@ -195,7 +196,7 @@ def _degrees(shapes: Sequence[Membership], positions: Array) -> Array:
     return np.array([shape.of_many(positions.ravel()).reshape(positions.shape) for shape in shapes])
 
 
-def _with_crossings(edges: Array, shapes: Sequence[Membership]) -> Array:
+def with_crossings(edges: Array, shapes: Sequence[Membership]) -> Array:
     """Return the ends of panels in which terms do not cross, from those in which they are smooth."""
     precision = 4e-16 * float(np.abs(edges[[0, -1]]).max())
     positions = points_of(edges[:-1], edges[1:], _INNER_TABLE)

@@ -91,6 +91,11 @@ def smooth_panels(universe: tuple[float, float], shapes: Sequence[Membership]) -
     return np.unique(edges)
 
 
+def halved(edges: Array) -> Array:
+    """Return the ends of the halves of panels, of which none has the maximum height at both ends only."""
+    return np.sort([*edges, *(edges[1:] + edges[:-1]) / 2])
+
+
 def constant_panels(shape: Membership, middles: Array, degrees: Array) -> Mask:
     """Return True for panels in which a term is constant; a curve that only rounds to 1 is not."""
     if isinstance(shape, Curve):

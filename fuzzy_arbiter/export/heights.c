@@ -1,83 +1,93 @@
 
 typedef double (*Height)(double x, const double *cuts);
 
-/* Adds the area over an interval and its moment about a position to two sums, by one rule of quadrature; returns the
-   area that bends at its ends may hide. */
-static double integrate(Height height, const double *cuts, double start, double end, double low, double sums[2])
+/* Returns the area over an interval, its moment about a position, and the area that bends at its ends may hide. */
+static void integrate(Height height, const double *cuts, double start, double end, double low, double result[3])
 {
     static const double nodes[] = {NODES}, weights[] = {WEIGHTS}, ends[] = {ENDS};
-    double half = (end - start) / 2;
+    double area = 0.0, moment = 0.0, half = (end - start) / 2;
     double first = -height(start + 1e-9 * half, cuts), last = -height(end - 1e-9 * half, cuts);
     for (int i = 0; i < 8; i++) {
         double x = (start + end) / 2 + half * nodes[i], y = height(x, cuts);
-        sums[0] += weights[i] * y * half;
-        sums[1] += weights[i] * y * half * (x - low);
+        area += weights[i] * y * half;
+        moment += weights[i] * y * half * (x - low);
         first += ends[7 - i] * y;
         last += ends[i] * y;
     }
-    return (fabs(first) + fabs(last)) * (1.0 - nodes[7]) * half;
+    result[0] = area;
+    result[1] = moment;
+    result[2] = (fabs(first) + fabs(last)) * (1.0 - nodes[7]) * half;
 }
 
-/* Returns the area, its moment about the start, and the first position up to which the area reaches a target, in sums.
+/* Returns the area, its moment about the start, and the position that halves a total area, of several the middle one.
    Panels are halved until the integral is that over both halves. */
 static void integrate_panels(Height height, const double *cuts, const double *edges, int panels, double tolerance,
-                             double target, double sums[3])
+                             double total, double result[3])
 {
-    double ends[PANELS + 60], start = edges[0];
-    int n = panels;
+    double ends[PANELS + 60], positions[2] = {edges[panels], edges[panels]}; /* the first and the last one */
+    double area = 0.0, moment = 0.0, start = edges[0];
+    int n = panels, halvings = 0;
     for (int k = 0; k < n; k++) {
         ends[k] = edges[n - k]; /* the next one last */
     }
-    sums[0] = sums[1] = 0.0;
-    sums[2] = edges[n];
     while (n > 0) {
-        double whole[2] = {0.0, 0.0}, both[2] = {0.0, 0.0}, end = ends[n - 1], middle = (start + end) / 2;
-        integrate(height, cuts, start, end, edges[0], whole);
-        double left = integrate(height, cuts, start, middle, edges[0], both);
-        double right = integrate(height, cuts, middle, end, edges[0], both);
-        double off = fmax(fabs(both[0] - whole[0]), fmax(left, right));
-        int same = off <= tolerance && fabs(both[1] - whole[1]) <= tolerance * (end - edges[0]);
-        if (same || n == panels + 60 || !(start < middle && middle < end)) {
-            if (sums[0] < target && target <= sums[0] + both[0]) {
-                double inside = start;
-                sums[2] = end;
-                for (int i = 0; i < 60; i++) {
-                    double part[2] = {sums[0], 0.0};
-                    middle = (inside + sums[2]) / 2;
-                    integrate(height, cuts, start, middle, edges[0], part);
-                    *(part[0] < target ? &inside : &sums[2]) = middle;
+        double coarse[3], left[3], right[3], end = ends[n - 1], middle = (start + end) / 2;
+        integrate(height, cuts, start, end, edges[0], coarse);
+        integrate(height, cuts, start, middle, edges[0], left);
+        integrate(height, cuts, middle, end, edges[0], right);
+        double fine = left[0] + right[0];
+        tolerance = fmax(tolerance, 1e-13 * (area + fine));
+        /* of degrees by rounding */
+        double noise = end - start < 1e-6 * (ends[0] - edges[0]) ? 4e-16 * (end - start) : 0.0;
+        double error = fmax(fmax(fabs(fine - coarse[0]), left[2]), right[2]);
+        double moment_error = fabs(left[1] + right[1] - coarse[1]);
+        int converged = error <= tolerance + noise && moment_error <= (tolerance + noise) * (end - edges[0]);
+        if (converged || n == panels + 60 || halvings == 4096 || !(start < middle && middle < end)) {
+            for (int i = 0; i < 2; i++) {
+                double target = total / 2 * (1.0 + (2 * i - 1) * 1e-11), inside = start;
+                if (area < target && target <= area + fine) {
+                    positions[i] = end;
+                    for (int j = 0; j < 60; j++) {
+                        double part[3];
+                        middle = (inside + positions[i]) / 2;
+                        integrate(height, cuts, start, middle, edges[0], part);
+                        *(area + part[0] < target ? &inside : &positions[i]) = middle;
+                    }
                 }
             }
-            sums[0] += both[0];
-            sums[1] += both[1];
+            area += fine;
+            moment += left[1] + right[1];
             start = end;
             n--;
         } else {
             ends[n++] = middle;
+            halvings++;
         }
     }
+    result[0] = area;
+    result[1] = moment;
+    result[2] = (positions[0] + positions[1]) / 2;
 }
 
 /* Returns the centroid, or the position that halves the area, of several the middle one; NaN where there is none. */
-static inline double center_of_area(Height height, const double *cuts, const double *edges, int panels, int halves)
+static inline double center_of_area(Height height, const double *cuts, const double *edges, int panels, int is_bisector)
 {
-    double sums[3], first[3], last[3];
-    integrate_panels(height, cuts, edges, panels, 1e300, 1e300, sums);
-    double tolerance = 1e-13 * sums[0];
-    integrate_panels(height, cuts, edges, panels, tolerance, 1e300, sums);
-    if (!(sums[0] > 0.0)) {
+    double result[3];
+    integrate_panels(height, cuts, edges, panels, 1e300, 1e300, result);
+    double tolerance = 1e-13 * result[0];
+    integrate_panels(height, cuts, edges, panels, tolerance, 1e300, result);
+    if (!(result[0] > 0.0)) {
         return NAN;
     }
-    if (halves) {
-        integrate_panels(height, cuts, edges, panels, tolerance, sums[0] / 2 * (1.0 - 1e-11), first);
-        integrate_panels(height, cuts, edges, panels, tolerance, sums[0] / 2 * (1.0 + 1e-11), last);
-        return (first[2] + last[2]) / 2;
+    if (is_bisector) {
+        integrate_panels(height, cuts, edges, panels, tolerance, result[0], result);
+        return result[2];
     }
-    return fmin(fmax(edges[0] + sums[1] / sums[0], edges[0]), edges[panels]);
+    return fmin(fmax(edges[0] + result[1] / result[0], edges[0]), edges[panels]);
 }
 
 /* Returns a position of the maximum height in an interval. */
-static double highest(Height height, const double *cuts, double start, double end)
+static double find_maximum(Height height, const double *cuts, double start, double end)
 {
     double best = start;
     for (int i = 0; i < 33; i++) {
@@ -95,7 +105,7 @@ static double highest(Height height, const double *cuts, double start, double en
 }
 
 /* Returns the last position from one of the maximum height towards another to which the height is constant. */
-static double boundary(Height height, const double *cuts, double top, double x, double outside)
+static double plateau_end(Height height, const double *cuts, double top, double x, double outside)
 {
     double level = top * (1.0 - 1e-12), inside = height(outside, cuts) >= level ? outside : x;
     for (int i = 0; i < 80; i++) {
@@ -111,18 +121,18 @@ static double boundary(Height height, const double *cuts, double top, double x, 
 static inline double position_of_maximum(Height height, const double *cuts, const double *edges, int panels, int side)
 {
     double width = edges[panels] - edges[0], top = 0.0, length = 0.0, moment = 0.0, count = 0.0, total = 0.0;
-    double smallest = edges[panels], largest = edges[0] - width;
+    double tops[PANELS], smallest = edges[panels], largest = edges[0] - width;
     for (int k = 0; k < panels; k++) {
-        top = fmax(top, height(highest(height, cuts, edges[k], edges[k + 1]), cuts));
+        tops[k] = find_maximum(height, cuts, edges[k], edges[k + 1]);
+        top = fmax(top, height(tops[k], cuts));
     }
     if (!(top > 0.0)) {
         return NAN;
     }
     for (int k = 0; k < panels; k++) {
-        double x = highest(height, cuts, edges[k], edges[k + 1]);
-        if (height(x, cuts) >= top * (1.0 - 1e-12)) {
-            double left = boundary(height, cuts, top, x, edges[k]);
-            double right = boundary(height, cuts, top, x, edges[k + 1]), middle = (left + right) / 2;
+        if (height(tops[k], cuts) >= top * (1.0 - 1e-12)) {
+            double left = plateau_end(height, cuts, top, tops[k], edges[k]);
+            double right = plateau_end(height, cuts, top, tops[k], edges[k + 1]), middle = (left + right) / 2;
             length += right - left;
             moment += (right - left) * (middle - edges[0]);
             count += left - largest > 1e-9 * width ? 1.0 : 0.0;

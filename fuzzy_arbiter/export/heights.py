@@ -17,7 +17,9 @@ NAN = float("nan")
 Height = Callable[[float, Sequence[float]], float]
 
 
-def integral(height: Height, cuts: Sequence[float], start: float, end: float, low: float) -> tuple[float, float, float]:
+def integrate(
+    height: Height, cuts: Sequence[float], start: float, end: float, low: float
+) -> tuple[float, float, float]:
     """Return the area over an interval, its moment about a position, and the area that bends at its ends may hide."""
     area = 0.0
     moment = 0.0
@@ -34,60 +36,66 @@ def integral(height: Height, cuts: Sequence[float], start: float, end: float, lo
     return area, moment, (abs(first) + abs(last)) * (1.0 - NODES[7]) * half
 
 
-def integrals(
-    height: Height, cuts: Sequence[float], edges: Sequence[float], tolerance: float, target: float
+def integrate_panels(
+    height: Height, cuts: Sequence[float], edges: Sequence[float], tolerance: float, total: float
 ) -> tuple[float, float, float]:
-    """Return the area, its moment about the start, and the first position up to which the area reaches a target."""
+    """Return the area, its moment about the start, and the position that halves a total area, of several the middle."""
     area = 0.0
     moment = 0.0
+    halvings = 0
     start = edges[0]
     n = len(edges) - 1
-    position = edges[n]
+    positions = [edges[n]] * 2  # the first and the last one that halve the total
     ends = [edges[n]] * (n + 60)  # of panels, the next one last
     for k in range(n):
         ends[k] = edges[n - k]
     while n > 0:
         end = ends[n - 1]
         middle = (start + end) / 2
-        whole = integral(height, cuts, start, end, edges[0])
-        left = integral(height, cuts, start, middle, edges[0])
-        right = integral(height, cuts, middle, end, edges[0])
-        off = max(abs(left[0] + right[0] - whole[0]), left[2], right[2])
-        off_moment = abs(left[1] + right[1] - whole[1])
-        same = off <= tolerance and off_moment <= tolerance * (end - edges[0])
-        if same or n == len(ends) or not start < middle < end:
-            if area < target <= area + left[0] + right[0]:
-                inside = start
-                position = end
-                for _ in range(60):
-                    middle = (inside + position) / 2
-                    if area + integral(height, cuts, start, middle, edges[0])[0] < target:
-                        inside = middle
-                    else:
-                        position = middle
-            area += left[0] + right[0]
+        coarse = integrate(height, cuts, start, end, edges[0])
+        left = integrate(height, cuts, start, middle, edges[0])
+        right = integrate(height, cuts, middle, end, edges[0])
+        fine = left[0] + right[0]
+        tolerance = max(tolerance, 1e-13 * (area + fine))
+        noise = 4e-16 * (end - start) if end - start < 1e-6 * (ends[0] - edges[0]) else 0.0  # of degrees by rounding
+        error = max(abs(fine - coarse[0]), left[2], right[2])
+        moment_error = abs(left[1] + right[1] - coarse[1])
+        converged = error <= tolerance + noise and moment_error <= (tolerance + noise) * (end - edges[0])
+        if converged or n == len(ends) or halvings == 4096 or not start < middle < end:
+            for i in range(2):
+                target = total / 2 * (1.0 + (2 * i - 1) * 1e-11)
+                if area < target <= area + fine:
+                    inside = start
+                    positions[i] = end
+                    for _ in range(60):
+                        middle = (inside + positions[i]) / 2
+                        if area + integrate(height, cuts, start, middle, edges[0])[0] < target:
+                            inside = middle
+                        else:
+                            positions[i] = middle
+            area += fine
             moment += left[1] + right[1]
             start = end
             n -= 1
         else:
             ends[n] = middle
             n += 1
-    return area, moment, position
+            halvings += 1
+    return area, moment, (positions[0] + positions[1]) / 2
 
 
-def center_of_area(height: Height, cuts: Sequence[float], edges: Sequence[float], halves: int) -> float:
+def center_of_area(height: Height, cuts: Sequence[float], edges: Sequence[float], is_bisector: int) -> float:
     """Return the centroid, or the position that halves the area, of several the middle one; NaN where there is none."""
-    tolerance = 1e-13 * integrals(height, cuts, edges, 1e300, 1e300)[0]
-    area, moment, _ = integrals(height, cuts, edges, tolerance, 1e300)
+    tolerance = 1e-13 * integrate_panels(height, cuts, edges, 1e300, 1e300)[0]
+    area, moment, _ = integrate_panels(height, cuts, edges, tolerance, 1e300)
     if not area > 0.0:
         return NAN
-    if halves:
-        first = integrals(height, cuts, edges, tolerance, area / 2 * (1.0 - 1e-11))[2]
-        return (first + integrals(height, cuts, edges, tolerance, area / 2 * (1.0 + 1e-11))[2]) / 2
+    if is_bisector:
+        return integrate_panels(height, cuts, edges, tolerance, area)[2]
     return min(max(edges[0] + moment / area, edges[0]), edges[len(edges) - 1])
 
 
-def highest(height: Height, cuts: Sequence[float], start: float, end: float) -> float:
+def find_maximum(height: Height, cuts: Sequence[float], start: float, end: float) -> float:
     """Return a position of the maximum height in an interval."""
     best = start
     for i in range(33):
@@ -106,7 +114,7 @@ def highest(height: Height, cuts: Sequence[float], start: float, end: float) -> 
     return best if height(best, cuts) >= height(left, cuts) else left
 
 
-def boundary(height: Height, cuts: Sequence[float], top: float, x: float, outside: float) -> float:
+def plateau_end(height: Height, cuts: Sequence[float], top: float, x: float, outside: float) -> float:
     """Return the last position from one of the maximum height towards another to which the height is constant."""
     inside = x
     if height(outside, cuts) >= top * (1.0 - 1e-12):
@@ -122,31 +130,33 @@ def boundary(height: Height, cuts: Sequence[float], top: float, x: float, outsid
 
 def position_of_maximum(height: Height, cuts: Sequence[float], edges: Sequence[float], side: int) -> float:
     """Return the smallest (side -1), mean (0) or largest (1) position [-] of the maximum height; NaN if that is 0."""
-    width = edges[len(edges) - 1] - edges[0]
+    n = len(edges) - 1
+    width = edges[n] - edges[0]
     top = 0.0
-    for k in range(len(edges) - 1):
-        top = max(top, height(highest(height, cuts, edges[k], edges[k + 1]), cuts))
+    tops = [edges[0]] * n
+    for k in range(n):
+        tops[k] = find_maximum(height, cuts, edges[k], edges[k + 1])
+        top = max(top, height(tops[k], cuts))
     if not top > 0.0:
         return NAN
     length = 0.0
     moment = 0.0
     count = 0.0
     total = 0.0
-    first = edges[len(edges) - 1]
-    last = edges[0] - width
-    for k in range(len(edges) - 1):
-        x = highest(height, cuts, edges[k], edges[k + 1])
-        if height(x, cuts) >= top * (1.0 - 1e-12):
-            left = boundary(height, cuts, top, x, edges[k])
-            right = boundary(height, cuts, top, x, edges[k + 1])
+    smallest = edges[n]
+    largest = edges[0] - width
+    for k in range(n):
+        if height(tops[k], cuts) >= top * (1.0 - 1e-12):
+            left = plateau_end(height, cuts, top, tops[k], edges[k])
+            right = plateau_end(height, cuts, top, tops[k], edges[k + 1])
             middle = (left + right) / 2
             length += right - left
             moment += (right - left) * (middle - edges[0])
-            if left - last > 1e-9 * width:
+            if left - largest > 1e-9 * width:
                 count += 1.0
                 total += middle - edges[0]
-            first = min(first, left)
-            last = right
+            smallest = min(smallest, left)
+            largest = right
     if side != 0:
-        return first if side < 0 else last
+        return smallest if side < 0 else largest
     return edges[0] + (moment / length if length > 1e-9 * width else total / count)

@@ -12,11 +12,11 @@ from fuzzy_arbiter.definition import Output, System, variable_names
 from fuzzy_arbiter.engines import choose
 from fuzzy_arbiter.engines.clipped_centroid import Outline, outline
 from fuzzy_arbiter.engines.clipped_centroid_batch import Centroid
-from fuzzy_arbiter.engines.clipped_curves import ClippedCurves
+from fuzzy_arbiter.engines.clipped_curves import ClippedCurves, with_crossings
 from fuzzy_arbiter.engines.closed import ClosedEngine
 from fuzzy_arbiter.engines.engine import Engine
 from fuzzy_arbiter.engines.firing import Logic, Slot
-from fuzzy_arbiter.engines.panels import smooth_panels
+from fuzzy_arbiter.engines.panels import halved, smooth_panels
 from fuzzy_arbiter.engines.quadrature import Quadrature
 from fuzzy_arbiter.engines.rational_pieces import Piece
 from fuzzy_arbiter.errors import DefinitionError, UnsupportedError
@@ -101,7 +101,10 @@ def _heights(output: Output, slots: Sequence[Slot]) -> Heights:
         statements += chosen(f"d{j}", degree_of("x", output.terms[j].membership, output.universe), output.term_names[j])
     implied = [logic.apply(JOINS[slot.implication], f"cuts[{i}]", f"d{slot.term}") for i, slot in enumerate(slots)]
     statements += logic.assign("height", logic.join(output.aggregation, implied), output.name)
-    edges = smooth_panels(output.universe, [output.terms[slot.term].membership for slot in slots])
+    shapes = list(dict.fromkeys(output.terms[slot.term].membership for slot in slots))
+    edges = with_crossings(smooth_panels(output.universe, shapes), shapes)
+    if output.defuzzifier not in ("centroid", "bisector"):
+        edges = halved(edges)
     return Heights((*statements, Return("height")), tuple(edges.tolist()))
 
 
