@@ -15,8 +15,8 @@ from dataclasses import replace
 from controller.translator.array_lengths import Index
 from controller.translator.array_views import known_shape, plus
 from controller.translator.operand_values import OperandValues
-from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed
-from controller.translator.types import BOOL, DOUBLE, INT, Array, Scalar, Type, unified
+from controller.translator.operands import Grid, Items, Known, Length, Operand, Value, View, bracketed
+from controller.translator.types import BOOL, DOUBLE, INT, Array, Scalar, Type, name_of, unified
 
 _UNROLLED = 9  # maximum number of elements that are written out
 
@@ -76,6 +76,8 @@ class ArrayExpressions(OperandValues):
             self.fail(node, "a power of an array other than 2")
         a, b = self.grid(left, node), self.grid(right, node)
         item = DOUBLE if isinstance(op, ast.Div) else unified(unified(a.item, b.item), INT)
+        if isinstance(op, ast.Mult) and a.item == b.item == BOOL:
+            item = BOOL
         if isinstance(op, ast.Pow):
             return self.elementwise(lambda x: self.arithmetic(op, x[0], right, node), [a], item, node)
         return self.elementwise(lambda x: self.arithmetic(op, x[0], x[1], node), [a, b], item, node)
@@ -83,8 +85,8 @@ class ArrayExpressions(OperandValues):
     def _multiplied(self, left: Operand, right: Operand, node: ast.AST) -> Operand:
         """Return the product of matrices or vectors."""
         a, b = self.grid(left, node), self.grid(right, node)
-        if not (1 <= len(a.sizes) <= 2 and 1 <= len(b.sizes) <= 2):
-            self.fail(node, "a product @ of what are no vectors or matrices")
+        if not (1 <= len(a.sizes) <= 2 and 1 <= len(b.sizes) <= 2) or a.item == b.item == BOOL:
+            self.fail(node, "a product @ of what are no vectors or matrices of numbers")
         length = self.common(a.sizes[-1:], b.sizes[:1], node)[0]
         if len(b.sizes) == 2:  # each element of `a` is read again and again
             a = self._for_reuse(left, a, node)
@@ -124,11 +126,13 @@ class ArrayExpressions(OperandValues):
     def reduced(self, name: str, operand: Operand, node: ast.AST) -> Value:
         """Return the sum, minimum, maximum of all elements, or if any or all are true."""
         grid = self.grid(operand, node)
+        if name in ("min", "max"):
+            self._require_elements(name, grid, node)
+            if grid.item == BOOL:
+                name = "all" if name == "min" else "any"
         if name in ("sum", "any", "all"):
             kind, start = (BOOL, "true" if name == "all" else "false") if name != "sum" else (DOUBLE, "0.0")
         else:
-            if "0" in grid.sizes or grid.item not in (DOUBLE, INT):
-                self.fail(node, f"{name} of no elements, or of what are no numbers")
             kind, first = grid.item, {"min": ("INFINITY", "INT64_MAX"), "max": ("-INFINITY", "INT64_MIN")}[name]
             start = first[kind == INT]
         if name == "sum" and grid.item == BOOL:
@@ -144,6 +148,17 @@ class ArrayExpressions(OperandValues):
 
         self.each(grid.sizes, add)
         return total
+
+    def _require_elements(self, name: str, grid: Grid, node: ast.AST) -> None:
+        """Refuse an extreme of no elements; that of an empty array of floats, of a length that C has, is infinite."""
+        if "0" in grid.sizes:
+            self.fail(node, f"{name} of an empty array")
+        if grid.item not in (DOUBLE, INT, BOOL):
+            self.fail(node, f"{name} of {name_of(grid.item)}")
+        for length in map(self.length, grid.sizes if grid.item != DOUBLE else ()):
+            if length is None:
+                self.fail(node, f"{name} of {name_of(grid.item)}, of a length that C computes")
+            self.require(length, ">=", Length("", 1), node)
 
     def _loop(self, length: str, body: Callable[[str], None]) -> None:
         k = self.new_name("i")

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 
 from controller.translator.function_code import FunctionCode
 from controller.translator.operands import Length, Requirement, Value, View
-from controller.translator.types import AtMost
+from controller.translator.types import MaxLength
 
 Index = tuple[str, ...]
 
@@ -33,9 +33,9 @@ class ArrayLengths(FunctionCode):
         """Return a length if it is known, or fixed when a call is bound."""
         return Length("", int(size)) if size.isdigit() else self.fixed.get(size)
 
-    def extent(self, size: str) -> int | AtMost | None:
+    def extent(self, size: str) -> int | MaxLength | None:
         """Return what a type states of a length."""
-        return int(size) if size.isdigit() else None if size in self.fixed else AtMost(self.max_size(size))
+        return int(size) if size.isdigit() else None if size in self.fixed else MaxLength(self.max_size(size))
 
     def max_size(self, size: str) -> float:
         """Return the maximum number of elements along an axis."""
@@ -62,7 +62,7 @@ class ArrayLengths(FunctionCode):
             return None
         first, *others = [length for length in lengths if length]
         for other in others:
-            self.require(first, "==", other, ast.Pass())
+            self.require(first, "==", other, self.current)
         return first
 
     def _own_length(self, path: str, axis: int) -> Length | None:

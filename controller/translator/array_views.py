@@ -14,7 +14,7 @@ from dataclasses import replace
 
 from controller.translator.array_lengths import ArrayLengths, Index
 from controller.translator.operands import Grid, Operand, Value, View
-from controller.translator.types import DOUBLE, Array, AtMost, Scalar, Type
+from controller.translator.types import DOUBLE, Array, MaxLength, Scalar, Type
 
 ANY = "*"  # root of an array of which nothing is known
 
@@ -77,8 +77,8 @@ class ArrayViews(ArrayLengths):
         """Return the array of a variable, or of a field."""
         sizes = tuple(str(n) if isinstance(n, int) else f"{code}.n{i}" for i, n in enumerate(kind.shape))
         for i, (size, n) in enumerate(zip(sizes, kind.shape, strict=True)):
-            if isinstance(n, AtMost):
-                self.bounds[size] = n.size
+            if isinstance(n, MaxLength):
+                self.bounds[size] = n.n
             elif n is None and (length := self.axis_length(paths, i)):
                 self.fixed[size] = length
         kind = replace(kind, shape=tuple(map(self.extent, sizes)))
@@ -138,16 +138,18 @@ class ArrayViews(ArrayLengths):
         self.declared[name] = self.definition(kind, name)
         if code:
             self.lines.append(f"{name} = {code};")
-        return self.held(kind, name, True, frozenset([ANY]), ())
+        return self.variable_value(kind, name, True, frozenset([ANY]), ())
 
     def new_variable(self, kind: Type, code: str, *values: Value) -> Value:
         """Assign one of some values to a new variable, and return that."""
         name = self.temporary(kind, code).code
         for i, value in enumerate(values):
             self.note_lengths(name, value, again=i > 0)
-        return self.held(kind, name, True, frozenset().union(*(value.roots for value in values)), (name,))
+        return self.variable_value(kind, name, True, frozenset().union(*(value.roots for value in values)), (name,))
 
-    def held(self, kind: Type, code: str, simple: bool, roots: frozenset[str], paths: tuple[str, ...]) -> Value:
+    def variable_value(
+        self, kind: Type, code: str, simple: bool, roots: frozenset[str], paths: tuple[str, ...]
+    ) -> Value:
         """Return what a C variable or member holds; its lengths are known by paths."""
         if isinstance(kind, Array):
             return self.view_of(kind, code, roots, paths) if kind.ndim else Value(kind.item, f"{code}.data[0]")

@@ -34,7 +34,7 @@ class Expressions(ArrayExpressions):
     def _name(self, node: ast.Name) -> Operand:
         if node.id in self.names:
             roots, code = self.roots.get(node.id, frozenset()), self.variable(node.id)
-            return self.held(self.names[node.id], code, True, roots, (node.id,))
+            return self.variable_value(self.names[node.id], code, True, roots, (node.id,))
         if node.id in self.globals:
             return Known(self.global_value(node.id))
         builtins: Any = self.globals["__builtins__"]
@@ -64,7 +64,7 @@ class Expressions(ArrayExpressions):
         item, inside = record.type.items[record.type.fields.index(name)], f"{bracketed(record)}->{name}"
         paths = tuple(f"{root}.{name}" for root in sorted(record.roots))
         roots = frozenset().union(*(self.made.get(path, {path}) for path in paths))
-        return self.held(item, f"(&{inside})" if isinstance(item, Record) else inside, True, roots, paths)
+        return self.variable_value(item, f"(&{inside})" if isinstance(item, Record) else inside, True, roots, paths)
 
     def _tuple(self, node: ast.Tuple) -> Operand:
         return Items(tuple(self.in_order(node.elts)))
@@ -112,6 +112,8 @@ class Expressions(ArrayExpressions):
             return Value(UINT, f"{bracketed(a)} {sign} {bracketed(b)}")
         if isinstance(op, ast.Div):
             return Value(DOUBLE, f"{bracketed(a, DOUBLE)} / {bracketed(b, DOUBLE)}")
+        if a.type == b.type == BOOL and isinstance(op, ast.Mult):
+            return Value(BOOL, f"{bracketed(a)} && {bracketed(b)}")
         kind = unified(unified(a.type, b.type), INT)
         if type(op) in _ARITHMETIC and not a.type == b.type == BOOL:  # a sum of those of NumPy is at most 1
             return Value(kind, f"{bracketed(a, kind)} {_ARITHMETIC[type(op)]} {bracketed(b, kind)}")
@@ -161,7 +163,7 @@ class Expressions(ArrayExpressions):
         sign = "&&" if isinstance(node.op, ast.And) else "||"
         result = self.condition(node.values[0])
         for other in node.values[1:]:
-            value, needed, _ = self.apart(self.condition, other)
+            value, needed, _ = self.evaluate_apart(self.condition, other)
             if not needed:
                 result = Value(BOOL, f"{bracketed(result)} {sign} {bracketed(value)}")
                 continue
@@ -178,7 +180,9 @@ class Expressions(ArrayExpressions):
 
     def _ifexp(self, node: ast.IfExp) -> Operand:
         condition = self.condition(node.test)
-        (a, first, _), (b, second, _) = (self.apart(self._stored, branch) for branch in (node.body, node.orelse))
+        (a, first, _), (b, second, _) = (
+            self.evaluate_apart(self._evaluate_stored, branch) for branch in (node.body, node.orelse)
+        )
         if isinstance(a, Items) and isinstance(b, Items) and not (first or second):
             result = condition if condition.simple else self.temporary(BOOL, condition.code)
             return Items(tuple(self._chosen(result, x, y, node) for x, y in zip(a.items, b.items, strict=True)))
@@ -191,7 +195,7 @@ class Expressions(ArrayExpressions):
         self.lines += [*second, f"{result.code} = {self.converted(y, kind)};", "}"]
         return result
 
-    def _stored(self, node: ast.expr) -> Operand:
+    def _evaluate_stored(self, node: ast.expr) -> Operand:
         operand = self.expression(node)
         return self.materialized(operand, node) if isinstance(operand, Grid) else operand
 

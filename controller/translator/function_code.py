@@ -52,15 +52,16 @@ class FunctionCode:
     globals: dict[str, Any]
     file: str
     first_line: int
+    current: ast.stmt  # that is translated
     names: dict[str, Type]  # types of variables by name, as far as they are known
     lines: list[str]
     n_writes: int  # number of calls so far that write into arrays
     declared: dict[str, str]  # declarations of variables that Python does not have
     made_at: dict[str, ast.AST]  # place in the text of each storage on the stack
-    n_names: int  # number of names that no variable has
-    sites: dict[str, int]  # number of times that each place in the text is met
+    n_names: int  # number of names made so far
+    sites: dict[str, int]  # number of names made so far for each line and column
 
-    def apart(self, evaluate: Callable[[N], T], node: N) -> tuple[T, list[str], bool]:
+    def evaluate_apart(self, evaluate: Callable[[N], T], node: N) -> tuple[T, list[str], bool]:
         """Evaluate a node; return the statements that it needs, which `lines` do not have, and if they write arrays."""
         mark, n_writes = len(self.lines), self.n_writes
         result = evaluate(node)

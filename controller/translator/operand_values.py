@@ -9,7 +9,7 @@ import numpy as np
 
 from controller.translator.array_views import ArrayViews
 from controller.translator.operands import Grid, Items, Known, Operand, Value, View, bracketed, number
-from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Scalar, Tuple, Type, name_of
+from controller.translator.types import BOOL, DOUBLE, INT, UINT, Array, Record, Scalar, Tuple, Type, name_of
 
 
 class OperandValues(ArrayViews):
@@ -27,7 +27,7 @@ class OperandValues(ArrayViews):
         """Return operands, each evaluated before the statements that the next ones need."""
         operands: list[Operand] = []
         for node in nodes:
-            operand, needed, writes = self.apart(self.expression, node)
+            operand, needed, writes = self.evaluate_apart(self.expression, node)
             operands = [self.kept(operand, node, writes) if needed else operand for operand in operands]
             self.lines += needed
             operands.append(operand)
@@ -60,6 +60,8 @@ class OperandValues(ArrayViews):
             return Value(DOUBLE, number(known), True)
         if isinstance(operand, Items) or isinstance(known, tuple):
             values = [self.value(item, node) for item in self.items_of(operand, node)]
+            if any(isinstance(value.type, Record) for value in values):
+                self.fail(node, "a record in a tuple")
             kind, roots = Tuple(tuple(value.type for value in values)), [value.roots for value in values]
             return Value(kind, self.compound(kind, [v.code for v in values]), False, frozenset().union(*roots))
         return self.fail(node, "not a value")
@@ -96,7 +98,7 @@ class OperandValues(ArrayViews):
                 paths = [tuple(f"{path}.{i}" for path in operand.paths) for i in range(len(kind.items))]
                 codes = [f"{code}.{kind.item(i)}" for i in range(len(kind.items))]
                 each = zip(kind.items, codes, paths, strict=True)
-                return [self.held(k, c, operand.simple, operand.roots, p) for k, c, p in each]
+                return [self.variable_value(k, c, operand.simple, operand.roots, p) for k, c, p in each]
             case View() if len(operand.sizes) == 1 and operand.sizes[0].isdigit():
                 return [self.element_of(operand, (str(i),)) for i in range(int(operand.sizes[0]))]
             case Grid():

@@ -72,8 +72,8 @@ class Length:
         if not self.path:
             return str(self.offset)
         index, *items, axis = self.path.split(".")
-        place = "[{}]" if parameters else ".f{}"
-        inside = "".join(place.format(item) if item.isdigit() else f".{item}" for item in items)
+        item_format = "[{}]" if parameters else ".f{}"
+        inside = "".join(item_format.format(item) if item.isdigit() else f".{item}" for item in items)
         code = f"{parameters[int(index)]}{inside}.shape[{axis}]" if parameters else f"w->a{index}{inside}.n{axis}"
         return code + (f" {'-' if self.offset < 0 else '+'} {abs(self.offset)}" if self.offset else "")
 

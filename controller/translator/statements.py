@@ -34,6 +34,7 @@ class Statements(Calls):
 
     def statement(self, node: ast.stmt) -> None:
         """Translate a statement."""
+        self.current = node
         method = getattr(self, f"_do_{type(node).__name__.lower()}", None)
         if method is None:
             self.fail(node, f"{type(node).__name__}")
@@ -163,8 +164,10 @@ class Statements(Calls):
             if isinstance(kind, Array) and isinstance(own, Array):
                 shape = zip(own.shape, kind.shape, strict=True)
                 kind = replace(kind, shape=tuple(None if n is None else m for n, m in shape))
-            if kind != own or (isinstance(kind, Tuple) and _holds_array(kind)):
+            if kind != own:
                 self.fail(node, f"another type for the parameter {name}")
+            if isinstance(kind, Tuple) and _holds_array(kind):
+                self.fail(node, f"new arrays in the parameter {name}")
         self.note_lengths(name, value, again=name in self.names)
         self.names[name] = kind
         self.roots[name] = self.roots.get(name, frozenset()) | value.roots
@@ -199,7 +202,7 @@ class Statements(Calls):
 
     def _write(self, target: ast.Subscript | ast.Attribute, operand: Operand, node: ast.AST) -> None:
         value = operand if self.is_array(operand) else self.value(operand, node)
-        lvalue, needed, writes = self.apart(self._target, target)
+        lvalue, needed, writes = self.evaluate_apart(self._target, target)
         if needed and not (isinstance(value, Value) and value.simple):  # the value is computed first
             value = self.kept(value, node, writes)
         self.lines += needed
@@ -214,17 +217,17 @@ class Statements(Calls):
             old = self.expression(ast.copy_location(ast.Name(target.id, ast.Load()), node))
         else:
             old = self._target(target)
-        other, needed, _ = self.apart(self.expression, node.value)
-        place = self.value(old, node)
-        before = self.temporary(place.type, place.code) if needed and not isinstance(old, View) else old
+        other, needed, _ = self.evaluate_apart(self.expression, node.value)
+        target_value = self.value(old, node)
+        before = self.temporary(target_value.type, target_value.code) if needed and not isinstance(old, View) else old
         self.lines += needed
-        if isinstance(place, View):
-            self.store(place, other, node, node.op)
+        if isinstance(target_value, View):
+            self.store(target_value, other, node, node.op)
         elif isinstance(target, ast.Name):
             self._name_it(target.id, self.arithmetic(node.op, before, other, node), node)
         else:
             value = self.scalar(self.arithmetic(node.op, before, other, node), node)
-            self.lines.append(f"{place.code} = {self.converted(value, place.type)};")
+            self.lines.append(f"{target_value.code} = {self.converted(value, target_value.type)};")
 
     def _do_if(self, node: ast.If) -> None:
         test = self.expression(node.test)
@@ -245,7 +248,7 @@ class Statements(Calls):
     def _do_while(self, node: ast.While) -> None:
         if node.orelse:
             self.fail(node, "else of a loop")
-        condition, needed, _ = self.apart(self.condition, node.test)
+        condition, needed, _ = self.evaluate_apart(self.condition, node.test)
         if needed:
             self.lines += ["for (;;) {", *needed, f"if (!({condition.code})) {{", "break;", "}"]
         else:

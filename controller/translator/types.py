@@ -29,10 +29,10 @@ _SHORT = {DOUBLE: "f64", INT: "i64", UINT: "u64", REFERENCE: "u32", BOOL: "b8"}
 
 
 @dataclass(frozen=True)
-class AtMost:
+class MaxLength:
     """The maximum of a length that C computes, or inf."""
 
-    size: float
+    n: float
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,9 @@ class Array:
     """A view of an array: a pointer, its shape, and its strides where it is not contiguous."""
 
     item: Scalar
-    shape: tuple[int | AtMost | None, ...]  # a length that is known at translation, that C computes, or that a call has
+    shape: tuple[
+        int | MaxLength | None, ...
+    ]  # a length that is known at translation, that C computes, or that a call has
     contiguous: bool = True
 
     @property
@@ -116,12 +118,12 @@ def shaped(owner: Any, name: str, kind: Type) -> Type:
     """Return the type of a parameter or field for a value: with the shape of the annotation, which it has to have."""
     if not isinstance(kind, Array):
         return kind
-    computed = (n if isinstance(n, AtMost) else None for n in kind.shape)
+    computed = (n if isinstance(n, MaxLength) else None for n in kind.shape)
     shape = zip(_annotated(owner, name, kind.shape), computed, strict=True)
     return Array(kind.item, tuple(n if n is not None else m for n, m in shape), kind.contiguous)
 
 
-def _annotated(owner: Any, name: str, shape: Sequence[int | AtMost | None]) -> tuple[int | None, ...]:
+def _annotated(owner: Any, name: str, shape: Sequence[int | MaxLength | None]) -> tuple[int | None, ...]:
     """Return the shape that an annotation states, which a shape has to fit."""
     expected = annotated_shapes(owner).get(name) or (None,) * len(shape)
     if len(expected) != len(shape) or any(
@@ -138,7 +140,7 @@ def check_shapes(function: Any, arguments: Sequence[Any]) -> None:
             _annotated(function, name, argument.shape)
 
 
-def _lengths(shape: Sequence[int | AtMost | None]) -> str:
+def _lengths(shape: Sequence[int | MaxLength | None]) -> str:
     return f"({', '.join(str(n) if isinstance(n, int) else 'any' for n in shape)}{',' if len(shape) == 1 else ''})"
 
 
@@ -177,7 +179,7 @@ def unified(one: Type, other: Type) -> Type:
         return Tuple(tuple(map(unified, one.items, other.items)))
     if isinstance(one, Array) and isinstance(other, Array) and (one.item, one.ndim) == (other.item, other.ndim):
         lengths = zip(one.shape, other.shape, strict=True)
-        shape = tuple(a if a == b else AtMost(max(_max_size(a), _max_size(b))) for a, b in lengths)
+        shape = tuple(a if a == b else MaxLength(max(_max_size(a), _max_size(b))) for a, b in lengths)
         return Array(one.item, shape, one.contiguous and other.contiguous)
     raise TypeError(f"{name_of(one)} and {name_of(other)} in the same place")
 
@@ -192,8 +194,8 @@ def known_lengths(kind: Array) -> list[int]:
     return [n for n in kind.shape if isinstance(n, int)]
 
 
-def _max_size(length: int | AtMost | None) -> float:
-    return math.inf if length is None else length.size if isinstance(length, AtMost) else length
+def _max_size(length: int | MaxLength | None) -> float:
+    return math.inf if length is None else length.n if isinstance(length, MaxLength) else length
 
 
 def name_of(kind: Type) -> str:

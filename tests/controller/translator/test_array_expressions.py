@@ -312,6 +312,7 @@ def branches(r):
     x[1] = 3.0
     r.b[:] = x if r.b[0] > 0.0 and np.all(r.p > -1.0) else turned(r.a, x)
     r.q[:] = np.where(r.p > 0.0, np.sqrt(np.abs(r.p)), -r.p)
+    r.q[0], r.q[1] = np.max(r.p > 0.0), np.min((r.a > -9.0) * (r.b > -9.0))
     r.v[:] = r.K[:, :3] @ r.b if False else np.concatenate((r.K @ r.p, r.q @ r.N))
 
 
@@ -357,7 +358,8 @@ def test_arrays_that_overlap_have_the_bits_of_python(function, tmp_path):
         ("Pair(r.v, r.a)", 2, r"out has shape \(3,\), expected \(6,\)"),
         ("both(r.v)", 0, "a tuple of 2 that is returned"),
         ("r.b[:2] = rest(r.a)", 0, "a view of an argument that is returned"),
-        ("r.a[0] = np.max(r.a[3:])", 2, "max of no elements"),
+        ("r.a[0] = np.max(r.a[3:])", 2, "max of an empty array"),
+        ("r.a[0] = (r.a > 0.0) @ (r.b > 0.0)", 2, "matrices of numbers"),
         ("doubled(r.p)", 0, "run time"),
         ("r.a[0] = np.array([1.0, 2.0])[0]", 2, "List"),
         (f"x = r.a + 0.0\n{LOOP}r.b[:] = x\n        y = x\n        x = x * 2.0\n        r.a[:] = y", 5, "alias"),
@@ -393,6 +395,12 @@ def doubled(x):
 
 def extremes(x, out: Vector3):
     out[0], out[1], out[2] = np.min(x), np.max(x), np.sum(x)
+
+
+def test_extremes_of_integers_need_one():
+    BoundCall(extremes, (np.arange(2), np.zeros(3)))
+    with pytest.raises(TypeError, match=r"x\.shape\[0\] is 0, expected x\.shape\[0\] >= 1"):
+        BoundCall(extremes, (np.arange(0), np.zeros(3)))
 
 
 def test_extremes_of_an_empty_array_read_nothing(tmp_path):

@@ -136,6 +136,8 @@ def tuples(x, n, out):
 
 def order(x, n, out):
     out[9] = 0.0
+    out[7] = (x[0] > 0.0) * (count_calls(out[9:]) > 1.0) - out[9]
+    out[9] = 0.0
     out[0] = count_calls(out[9:]) - 10.0 * count_calls(out[9:])
     out[1] = out[9] + count_calls(out[9:])
     out[2] = count_calls(out[9:]) if out[9] < 2.0 or count_calls(out[9:]) > 100.0 else -1.0
@@ -248,6 +250,8 @@ def test_code_compiles_without_warnings_in_other_compilers(tmp_path):
         ("a = x[: int(count_calls(x))]\n    y = x[int(count_calls(x)) : int(count_calls(x)) + 1] * 2.0", 3, "run time"),
         ("t = (x[:2], x[2:])\n    t[0][:] = (x if x[0] > 0.0 else (1.0, 2.0))", 3, "in the same place"),
         ("y = Nested(Pair(x, x), 1.0, 2) if x[0] > 0.0 else Pair(x, x)", 2, "Nested and Pair in the same place"),
+        ("t = (Pair(x, x), x)", 2, "a record in a tuple"),
+        ("for c in (Pair(x, x[:2]), Pair(x, x[:1])):\n        x[0] = c.second[0]", 3, "lengths 2 and 1"),
         ("if x[0] > 0.0:\n        raise ValueError(1)", 3, "Raise"),
     ],
 )
