@@ -72,7 +72,7 @@ def compiling(source: Path, library: Path, compiler: Sequence[str] | None = None
 
 
 def _stop(process: subprocess.Popen[str]) -> None:
-    """Stop a compiler and the processes that it has started, which are a process group of their own."""
+    """Stop a compiler's process group; it runs on if SIGHUP or SIGKILL ends Python at once."""
     if hasattr(os, "killpg"):
         with contextlib.suppress(ProcessLookupError, PermissionError):  # it has ended meanwhile
             os.killpg(process.pid, signal.SIGTERM)

@@ -13,7 +13,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 
 from controller import CompiledLaw, Law
-from controller.compiling.function import BoundCall
+from controller.compiling.function import BoundCall, load_functions
 from controller.quaternion import from_axis_angle
 from cosim.scenario.law_factory import law_of, with_custom_law
 from cosim.scenario.scenario import Scenario
@@ -29,7 +29,7 @@ from cosim.simulation.lyapunov_signals import LyapunovSignals
 from cosim.simulation.make_step import NoiseSource, make_data, make_model
 from cosim.simulation.pace import Pace
 from cosim.simulation.signals import Array, Signals
-from cosim.simulation.step_functions import make_plant
+from cosim.simulation.step_functions import make_plant, step_functions
 from cosim.simulation.stepped_plant import BoundPlant, SteppedPlant, validate_plant
 from cosim.step.one_step import advance, locate, show_start
 from cosim.step.step_model import LOCATED, MEASURED, set_call
@@ -117,6 +117,8 @@ class Master:
 
         self.plant: SteppedPlant = make_plant(scenario, self._law) if plant is None else plant
         try:
+            if plant is not None:
+                load_functions(*step_functions(scenario, self._law))
             self.plant.set(start_values(scenario))
             self.plant.initialize()
             self.signals = Signals(columns_of(scenario, self.plant, self.law))

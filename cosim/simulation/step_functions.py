@@ -44,7 +44,7 @@ def make_plant(scenario: Scenario, law: Law) -> Plant:
         except Exception:
             plant.result().close()
             raise
-        except BaseException:  # Ctrl-C, which ends the FMU's compilers too
+        except BaseException:  # Ctrl-C ends the FMU's compilers too; a signal to this process alone waits for them
             with contextlib.suppress(Exception):
                 plant.result().close()
             raise
