@@ -5,11 +5,9 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 
-import msgspec
-
 from cosim.errors import CommandError
 from cosim.scenario.scenario import Scenario
-from cosim.simulation.commands.commands import NOT_A_COMMAND, ChangeSetting, Command, SetMission, ShiftRegion
+from cosim.simulation.commands.commands import JSON, NOT_A_COMMAND, ChangeSetting, Command, SetMission, ShiftRegion
 from cosim.simulation.commands.settings import LiveSettings
 from cosim.simulation.commands.sources import CommandQueue
 from plant_fmu.errors import TableError, one_line
@@ -35,7 +33,7 @@ class CommandDesk:
         if isinstance(message, bytes):
             return "binary messages are not commands, expected JSON text"
         try:
-            command: Command = decode(msgspec.json.decode(message), Command)
+            command: Command = decode(JSON.decode(message), Command)
             self._check(command)
             if not self._queue.submit(command, self._run):
                 return self._queue.refusal(command, self._run) or "too many commands at once"  # which were taken since

@@ -18,6 +18,7 @@ Mode = Literal["manual", "hold", "reach", "mission", "surface", "stabilize", "de
 MODES: tuple[Mode, ...] = get_args(Mode)  # a mode's index is its number in the record
 STICK_MODES: tuple[Mode, ...] = ("manual", "stabilize", "depth_hold")  # manual control by sticks, without the law
 
+JSON = msgspec.json.Decoder(float_hook=float)  # 1e999 is inf, which the check of its key refuses
 NOT_A_COMMAND = (msgspec.DecodeError, UnicodeDecodeError, RecursionError)  # raised by msgspec for an invalid text
 
 # maximum coordinates and displacements, radii, velocities, and fractions of the maximum force or moment

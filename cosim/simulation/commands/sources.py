@@ -12,7 +12,7 @@ import msgspec
 
 from cosim.errors import CommandError, RunError
 from cosim.scenario.validation import MAX_STEPS
-from cosim.simulation.commands.commands import NOT_A_COMMAND, Command, Mode, Reset, SetMode, validate_command
+from cosim.simulation.commands.commands import JSON, NOT_A_COMMAND, Command, Mode, Reset, SetMode, validate_command
 from plant_fmu.errors import TableError
 from plant_fmu.toml_tables import Table, decode
 
@@ -97,11 +97,13 @@ def read_log(file: Path) -> list[tuple[int, Command]]:
         content = file.read_bytes()
     except OSError as error:
         raise RunError(f"{file}: {error.strerror or error}") from error
+    if b'"order"' in content[:30]:
+        raise RunError(f"{file}: is a log of an older version ('order'), expected one with 'command'")
     lines, whole = content.splitlines(), content.count(b"\n")
     entries = []
     for number, line in enumerate(lines, 1):
         try:
-            entry: _Entry = decode(msgspec.json.decode(line), _Entry)
+            entry: _Entry = decode(JSON.decode(line), _Entry)
             validate_command(entry.command)
         except (*NOT_A_COMMAND, TableError, CommandError) as error:
             if type(error) in (msgspec.DecodeError, UnicodeDecodeError) and number > whole:

@@ -216,7 +216,10 @@ def test_broken_log_is_rejected_with_its_line(tmp_path, line):
     assert message.startswith(f"{file}, line 2: ") and message.isprintable() and len(message) < 300 + len(str(file))
 
 
-def test_missing_log_gives_a_one_line_error(tmp_path):
+def test_missing_log_and_one_of_an_older_version_give_one_line_errors(tmp_path):
+    (log := tmp_path / "orders.jsonl").write_bytes(b'{"step":0,"order":{"order":"arm","armed":true}}\n')
+    with pytest.raises(RunError, match=r"orders\.jsonl: is a log of an older version \('order'\), expected"):
+        ReplayedCommands(log)
     with pytest.raises(RunError, match="No such file"):
         ReplayedCommands(tmp_path / "none.jsonl")
 
@@ -230,10 +233,21 @@ def test_truncated_last_line_is_ignored(tmp_path, size):
     assert len(ReplayedCommands(file).take(1)) == 1 + (size == len(LAST))
 
 
-@pytest.mark.parametrize("line", [BROKEN["out of range"], LAST[:30] + b"\n"], ids=["whole", "cut, with its end"])
-def test_last_line_that_is_whole_or_has_its_end_is_checked(tmp_path, line):
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (BROKEN["out of range"], r"command\.position\[0\] is 1000000000\.0, expected -100000 to"),
+        (
+            ARMED[:9] + b',"command":{"command":"set_heading","heading":1e999}}',
+            "command.heading is inf, expected a finite",
+        ),
+        (LAST[:30] + b"\n", "Input"),
+    ],
+    ids=["whole", "infinite", "cut, with its end"],
+)
+def test_last_line_that_is_whole_or_has_its_end_is_checked(tmp_path, line, message):
     (file := tmp_path / "commands.jsonl").write_bytes(ARMED + line)
-    with pytest.raises(RunError, match=r"line 2: (command\.position\[0\] is 1000000000\.0, expected -100000 to|Input)"):
+    with pytest.raises(RunError, match=f"line 2: {message}"):
         ReplayedCommands(file)
 
 
