@@ -139,9 +139,6 @@ class Record(Rows):
         if name not in self.units:
             raise KeyError(name)
         self._keep([name])
-        self._kept.move_to_end(name)
-        while len(self._kept) > _MAX_CACHED_SIGNALS and not self._small:
-            self._kept.popitem(last=False)
         return self._kept[name]
 
     def stack(self, names: Sequence[str]) -> Array:
@@ -151,16 +148,20 @@ class Record(Rows):
         return super().stack(names)
 
     def _keep(self, names: Sequence[str]) -> None:
-        """Read signals that are not in memory."""
+        """Read signals that are not in memory, in place of those that were not used for the longest time."""
+        for name in filter(self._kept.__contains__, names):
+            self._kept.move_to_end(name)
         missing = [name for name in names if name not in self._kept]
         if missing:
             columns = self.columns if self._small else self._columns_of(missing)
-            whole, first = np.empty((len(columns), self._count)), 0
+            while self._kept and len(self._kept) + len(columns) > _MAX_CACHED_SIGNALS:
+                self._kept.popitem(last=False)
+            arrays, first = [np.empty(self._count) for _ in columns], 0
             for batch in self._batches(columns):  # a table of the whole would take the memory twice
-                for row, column in zip(whole, columns, strict=True):
+                for row, column in zip(arrays, columns, strict=True):
                     row[first : first + len(batch)] = batch[column.name]
                 first += len(batch)
-            self._kept.update(zip((column.name for column in columns), whole, strict=True))
+            self._kept.update(zip((column.name for column in columns), arrays, strict=True))
 
     def blocks(self, names: Sequence[str] | None = None) -> Iterator[Rows]:
         """Yield all rows in order, in blocks that fit into memory, of all signals or of those in `names`."""
