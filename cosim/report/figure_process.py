@@ -15,8 +15,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from cosim.report.inline_svg import inline_svg
-
 if TYPE_CHECKING:
     from cosim.report.web_page import InlineFigure
     from cosim.results.run_result import Run
@@ -25,15 +23,16 @@ log = logging.getLogger(__name__)
 
 # of a process that draws: after Ctrl-C the run ends, and then asks for its figures
 _ACTIONS = {signal.SIGINT: signal.SIG_IGN, signal.SIGTERM: signal.SIG_DFL}
-_waiting: list[Connection[Any, Any]] = []  # that with at most one process that waits for a run
+_TIMEOUT = 60.0  # s, until the run draws its figures itself
+_waiting: list[Connection[Any, Any]] = []  # connection to the process that waits for a run; empty if there is none
 
 
 @contextlib.contextmanager
 def drawing_beside() -> Iterator[None]:
-    """Have the figures of a report that is written within a block drawn beside it, where that is safe and quicker."""
+    """Fork a process that draws the figures of the report written in this block, if that is safe and faster."""
     # libraries of other systems may not work in a process that is forked, and none do if there are threads
     can_fork = sys.platform == "linux" and threading.active_count() == 1
-    if not can_fork or "matplotlib" in sys.modules or os.cpu_count() == 1:
+    if not can_fork or "matplotlib" in sys.modules or len(os.sched_getaffinity(0)) == 1:
         yield
         return
     connection, of_child = Pipe()
@@ -64,21 +63,15 @@ def drawing_beside() -> Iterator[None]:
 
 def draw_beside(run: Run, folder: Path) -> dict[str, InlineFigure] | None:
     """Have the figures of a run drawn into a folder; return None if no process waits for that, or it fails."""
-    from cosim.report.web_page import InlineFigure
-
     if not _waiting:
         return None
     connection = _waiting.pop()
-    figures = {}
     try:
         connection.send((run, folder))
-        for _, name, caption in sorted(connection.recv()):
-            svg = (folder / f"{name}.svg").read_text(encoding="utf-8")
-            figures[name] = InlineFigure(inline_svg(svg, caption), caption)
+        return {name: figure for _, name, figure in sorted(connection.recv())} if connection.poll(_TIMEOUT) else None
     except Exception:  # a run that cannot be sent, or a process that was ended
         log.debug("figures are drawn by the run itself", exc_info=True)
         return None
-    return figures
 
 
 def _stop(child: int) -> None:
@@ -97,11 +90,12 @@ def _fork() -> int:
 
 
 def _serve(connection: Connection[Any, Any]) -> NoReturn:
-    """Wait for a run and a folder, draw its figures there in two processes, and send what names each."""
+    """Wait for a run and a folder, draw its figures there in two processes, and send each with its name."""
     second = 0
     try:
         from cosim.report.figures.figures import drawings
         from cosim.report.figures.sampled_rows import make_figure_data
+        from cosim.report.web_page import inline_figure
 
         run, folder = connection.recv()
         half, of_child = Pipe()
@@ -109,8 +103,7 @@ def _serve(connection: Connection[Any, Any]) -> NoReturn:
         first = 0 if second else 1
         drawn = []
         for i, drawing in enumerate(drawings(make_figure_data(run), first, 2)):
-            drawing.write(folder)
-            drawn.append((first + 2 * i, drawing.name, drawing.caption))
+            drawn.append((first + 2 * i, drawing.name, inline_figure(drawing, folder)))
         if first:
             of_child.send(drawn)
         else:
