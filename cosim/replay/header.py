@@ -27,7 +27,7 @@ _SEA_WATER = 1026.0 * 9.81  # N/m3; for the size of a hull without a radius in t
 
 
 def header_of(scenario: Scenario, columns: Sequence[Column], commands: bool | list[Mode] = False) -> dict[str, Any]:
-    """Return the header of a run, for a view; `commands` are those of all kinds, none, or changes to some modes."""
+    """Return a run's header; `commands`: True if every command is accepted, False if none, or the modes that are."""
     limits, colors = limits_of(scenario), colors_of_regions(scenario)
     return {
         "version": VERSION,

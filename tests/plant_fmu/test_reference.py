@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 
+from plant_fmu import load_vehicle
 from tests.conftest import DATA
 from tests.plant_fmu.conftest import STATES, WRENCH
 
@@ -33,6 +34,11 @@ def test_fmu_states_match_reference_trajectories(name, fmi, make_slave):
     rows = np.loadtxt(DATA / f"{name}.csv", delimiter=",", skiprows=1)
     states = drive(make_slave(RUNS[name]["vehicle"], fmi), RUNS[name], rows)
     assert np.abs(states - rows[:, 1:]).max() < 1e-6
+
+
+@pytest.mark.parametrize(("vehicle", "limit"), [("odin", 27.0), ("bluerov2_heavy", 40.0)])
+def test_thrust_limits_are_the_published_ones(vehicle, limit):
+    np.testing.assert_array_equal([load_vehicle(vehicle).thrust_max, -load_vehicle(vehicle).thrust_min], limit)
 
 
 def test_error_falls_with_the_fourth_power_of_the_substep(make_slave):

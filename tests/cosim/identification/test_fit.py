@@ -74,36 +74,36 @@ def parameters(log, vehicle):
 
 
 @pytest.fixture(scope="module")
-def found(log, vehicle, parameters):
+def estimate(log, vehicle, parameters):
     return fit([log], vehicle, parameters)
 
 
 @pytest.mark.medium
-def test_fit_recovers_the_true_parameters(found):
-    truth = np.array([TRUTH[p.plant] if p.plant else BIAS[p.index] for p in found.parameters])
-    off = (found.values - truth) / (found.intervals.half / 1.96)
+def test_fit_recovers_the_true_parameters(estimate):
+    truth = np.array([TRUTH[p.plant] if p.plant else BIAS[p.index] for p in estimate.parameters])
+    off = (estimate.values - truth) / (estimate.intervals.half / 1.96)
     assert np.abs(off).max() < 4.0
-    assert found.values[:3] == pytest.approx(truth[:3], rel=0.02)
-    assert found.intervals.chi2 == pytest.approx(1.0, abs=0.1)
-    assert not found.undetermined() and not found.rejected and found.outliers == 0
+    assert estimate.values[:3] == pytest.approx(truth[:3], rel=0.02)
+    assert estimate.intervals.chi2 == pytest.approx(1.0, abs=0.1)
+    assert not estimate.undetermined() and not estimate.rejected and estimate.outliers == 0
 
 
 @pytest.mark.medium
-def test_nominal_intervals_follow_from_the_information_matrix(found):
+def test_nominal_intervals_follow_from_the_information_matrix(estimate):
     """Computed anew from the rows, prior included."""
-    rows = [r.jacobian for r in found.residuals] + [np.diag([1.0 / p.deviation for p in found.parameters])]
+    rows = [r.jacobian for r in estimate.residuals] + [np.diag([1.0 / p.deviation for p in estimate.parameters])]
     covariance = np.linalg.pinv(np.concatenate(rows)) @ np.linalg.pinv(np.concatenate(rows)).T
-    assert found.intervals.nominal == pytest.approx(np.sqrt(np.diag(covariance)), rel=1e-6)
-    assert (found.intervals.half >= 1.96 * found.intervals.nominal).all()
+    assert estimate.intervals.nominal == pytest.approx(np.sqrt(np.diag(covariance)), rel=1e-6)
+    assert (estimate.intervals.half >= 1.96 * estimate.intervals.nominal).all()
 
 
 @pytest.mark.slow
-def test_gradient_matches_the_cost(log, vehicle, found):
+def test_gradient_matches_the_cost(log, vehicle, estimate):
     """The start of each window is eliminated; cost and gradient are still those of all."""
-    windows, _ = cut_windows([log], vehicle, found.step, 20.0)
-    problem = Problem(Residuals([log], vehicle, found.parameters, windows, found.step))
-    deviations = found.intervals.nominal
-    x = found.values + 3.0 * deviations
+    windows, _ = cut_windows([log], vehicle, estimate.step, 20.0)
+    problem = Problem(Residuals([log], vehicle, estimate.parameters, windows, estimate.step))
+    deviations = estimate.intervals.nominal
+    x = estimate.values + 3.0 * deviations
     residual, jacobian = problem._evaluate(x)
     gradient = jacobian.T @ residual
     for j in range(3):
@@ -113,8 +113,8 @@ def test_gradient_matches_the_cost(log, vehicle, found):
 
 
 @pytest.mark.medium
-def test_fitted_model_predicts_better_than_constant_velocity(log, vehicle, found):
-    for p in validate([log], vehicle, found.parameters, found.values, found.step):
+def test_fitted_model_predicts_better_than_constant_velocity(log, vehicle, estimate):
+    for p in validate([log], vehicle, estimate.parameters, estimate.values, estimate.step):
         if p.topic == "velocity":
             assert p.identified[0] < p.start_vehicle[0] and p.identified[0] < 0.5 * p.constant_velocity[0]
 
@@ -122,8 +122,8 @@ def test_fitted_model_predicts_better_than_constant_velocity(log, vehicle, found
 @pytest.mark.slow
 def test_uninformed_parameter_keeps_its_prior(log, vehicle):
     parameters = free_parameters(vehicle, ("thrusters.time_constant", "hydrodynamics.quadratic_damping.1"))
-    found = fit([log], vehicle, parameters)
-    assert [found.parameters[i].name for i in found.undetermined()] == ["thrusters.time_constant"]
+    estimate = fit([log], vehicle, parameters)
+    assert [estimate.parameters[i].name for i in estimate.undetermined()] == ["thrusters.time_constant"]
 
 
 def shift_times(log, names, delay):
@@ -141,8 +141,8 @@ def late(log):
 def test_delays_are_found_before_any_number_is_fitted(log, late, vehicle):
     """The thrusters have no lag, which would look like a delay. Angular velocities of single sines say nothing."""
     for run, delay in ((log, 0.0), (late, 0.2)):
-        found = find_delays([run], vehicle, 0.025)
-        assert [found[topic.name] for topic in run.topics] == pytest.approx([delay] * 4, abs=0.05)
+        estimate = find_delays([run], vehicle, 0.025)
+        assert [estimate[topic.name] for topic in run.topics] == pytest.approx([delay] * 4, abs=0.05)
 
 
 @pytest.mark.slow
@@ -292,10 +292,10 @@ def test_inseparable_delay_and_lag_are_rejected_by_name(vehicle, log, correlatio
     delay = next(i for i, p in enumerate(parameters) if p.kind == "delay")
     matrix = np.eye(len(parameters))
     matrix[lag, delay] = matrix[delay, lag] = correlation
-    found = SimpleNamespace(parameters=parameters, intervals=SimpleNamespace(correlation=matrix))
+    estimate = SimpleNamespace(parameters=parameters, intervals=SimpleNamespace(correlation=matrix))
     if not refused:
-        require_distinguishable(found)
+        require_distinguishable(estimate)
         return
     with pytest.raises(IdentificationError, match=r"are not separated by these runs \(correlation 0\.91\)") as error:
-        require_distinguishable(found)
+        require_distinguishable(estimate)
     assert parameters[lag].name in str(error.value) and parameters[delay].name in str(error.value)

@@ -1,4 +1,4 @@
-"""Flights with a plant that differs from the law's model, no thruster failing: none is isolated."""
+"""Flights with a plant that differs from the law's model, no thruster failing: one is rarely isolated."""
 
 import json
 import math
@@ -19,7 +19,7 @@ from cosim.scenario.scenario import load_scenario
     "seeds", [range(1000, 1040), pytest.param(range(1040, 1400), marks=pytest.mark.slow)], ids=["few", "many"]
 )
 def test_other_vehicles_keep_their_regions_and_thrusters(seeds):
-    """At most one flight in a hundred isolates a healthy thruster, or puts its limit below half the true one."""
+    """At most one flight in each hundred begun isolates a healthy thruster, or limits it to below half its force."""
     scores = []
     with SceneFlyer("deployable") as flyer:
         for table in map(make_mismatch, seeds):
