@@ -18,9 +18,7 @@ _DEFLECTED = 0.05  # of a full stick, above which it counts
 _TOLERANCE = 25.0  # us, difference of a channel's pulse above which it counts
 _AXES, _UNUSED = 6, 0xFFFF  # channels of sticks; value of an unused one, as 0
 _ARDUPILOT = 3  # MAV_AUTOPILOT; others report the channels of a radio alone
-_WINDOW = (
-    1.5  # s, time in which our sticks appear in the reported channels; after a gap the last ones act for up to 1 s
-)
+_WINDOW = 1.5  # s, time in which our sticks appear in the reported channels
 _REST_WINDOW = 5.0  # s, time before our first sticks in which channels show their rest
 
 
@@ -40,7 +38,7 @@ class PilotWatch:
             reported = np.array([pulses for _, pulses in self._before])
             self._rest = reported[np.abs(reported - CENTER).argmin(axis=0), np.arange(_AXES)]
         self._sent.append((now, pulses))
-        while len(self._sent) > 1 and now - self._sent[1][0] > _WINDOW:  # that before acts as the window begins
+        while len(self._sent) > 1 and now - self._sent[1][0] > _WINDOW:  # the one before it still acts at its start
             self._sent.popleft()
 
     def receive(self, system: int, component: int, message: Any, reported: ReportedState, now: float) -> None:
@@ -67,8 +65,7 @@ class PilotWatch:
             while now - self._before[0][0] > _REST_WINDOW:
                 self._before.popleft()
             return False
-        sent = self._sent if now - self._sent[-1][0] <= _WINDOW else ()
-        ours = np.array([np.full(_AXES, CENTER), *(pulses for _, pulses in sent)])
+        ours = np.array([np.full(_AXES, CENTER), *(pulses for _, pulses in self._sent)])
         outside = np.maximum(ours.min(axis=0) - pulses, pulses - ours.max(axis=0))
         return bool(((outside > _TOLERANCE) & (np.abs(pulses - self._rest) > _TOLERANCE)).any())
 

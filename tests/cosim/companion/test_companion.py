@@ -277,6 +277,14 @@ def test_fault_holds_the_vehicle_within_one_second(tmp_path, reason, link):
 
 
 @pytest.mark.medium
+def test_our_last_sticks_are_no_pilots_after_a_stall_of_our_loop(tmp_path):
+    """An ArduSub acts on them for 3 s and reports them."""
+    link = StandIn(profile="ardusub", shift=SHIFT)
+    link.events = [(6.0, lambda: setattr(link, "stall", 2.0))]  # its parameters are awaited for 3 s
+    assert Flight(tmp_path, 4.0, link=link, profile="ardusub").status in ("held: late loop", "held: frame jump")
+
+
+@pytest.mark.medium
 def test_rejected_mode_holds_within_one_second(tmp_path, link):
     link.refused_commands.add(176)
     with pytest.raises(RunError, match="a command to resume after: refused mode"):

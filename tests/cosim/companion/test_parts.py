@@ -477,12 +477,12 @@ def test_only_channels_beyond_our_recent_sticks_and_off_their_rest_are_a_pilot(s
         pilot.record_sent(scale.pulses(own), now)
         late = k - round(delay / 0.02)
         pilot.receive(1, 1, channels(pulses[late] if late >= 0 else rest), state, now)
-    pilot.receive(1, 1, channels(pulses[-1]), state, 4.0)  # the last sticks act on while the link has a gap
+    pilot.receive(1, 1, channels(pulses[-1]), state, 7.0)  # the last sticks act on while our loop stalls
     assert pilot.seen_at == -math.inf
     foreign, recent = pulses[-1].copy(), np.array([np.full(6, 1500.0), *pulses[-77:]])[:, channel]
     foreign[channel] = recent.max() + 40.0 if sign > 0 else recent.min() - 40.0
-    pilot.receive(1, 1, channels(foreign), state, 4.0)
-    assert (pilot.seen_at == 4.0) == (abs(foreign[channel] - rest[channel]) > 26.0)
+    pilot.receive(1, 1, channels(foreign), state, 7.0)
+    assert (pilot.seen_at == 7.0) == (abs(foreign[channel] - rest[channel]) > 26.0)
 
 
 def test_a_px4_mode_is_known_before_its_next_heartbeat():
