@@ -61,6 +61,8 @@ class AutopilotSession:
         self._is_law_active = False  # value of the last `Arm` for the master
         self._sent_at: dict[str, float] = {}
         self._held_at, self._release_until = 0.0, -math.inf
+        self._mode_when_held: int | None = None
+        self._is_released = False  # True once `held` has succeeded, or a pilot has changed the mode
         self._stations, self._station_warnings = set[int](), set[str]()  # system ids of other stations; warnings so far
 
     def clock(self) -> float:
@@ -86,7 +88,7 @@ class AutopilotSession:
         before = self.supervisor.state
         state = self.supervisor.update(self._observation(now))
         if state != before:
-            self._held_at = now
+            self._start_release(now)
             self._announce(state)
             self.output.restart()
             self._was_in_mode = False
@@ -114,9 +116,9 @@ class AutopilotSession:
         """Release the sticks, and request the hold mode until it is on or `seconds` are over."""
         # In the state `pilot`, only finish the release; without steering, do nothing.
         state, begun = self.supervisor.state, self._link.clock()
-        if state in ("diving", "engaging", "steering", "held"):
+        if state in ("diving", "engaging", "steering", "held") and not self._is_released:
             self.supervisor.state, self.supervisor.reason = "held", self.supervisor.reason or "end"
-            self._held_at = begun
+            self._start_release(begun)
             until, waits = begun + self.output.release_time, begun + seconds
         elif state == "pilot":
             until = waits = self._release_until
@@ -265,11 +267,18 @@ class AutopilotSession:
         if state in ("diving", "engaging", "steering"):
             self.pilot.record_sent(output.pulses, now)
 
+    def _start_release(self, now: float) -> None:
+        self._held_at, self._mode_when_held, self._is_released = now, self.reported.mode, False
+
     def _request_hold(self, now: float) -> Sequence[Any]:
         """Request the hold mode, or depth hold if that is refused; return the messages that release the sticks."""
-        since, modes = now - self._held_at, self.profile.custom_modes
-        if self.reported.mode == modes["hold"] and since > self.output.release_time:
-            return ()
+        since, modes, mode = now - self._held_at, self.profile.custom_modes, self.reported.mode
+        if since > self.output.release_time:
+            own = self._mode, modes[self._dive_mode], self._mode_when_held
+            # a mode that we requested before may still follow the hold mode
+            self._is_released |= since > _HOLD_TIMEOUT if mode == modes["hold"] else mode not in own
+            if self._is_released or mode == modes["hold"]:
+                return ()
         refused = since > _HOLD_TIMEOUT
         if self.reported.mode != modes["depth_hold" if refused else "hold"]:
             self._send_mode("depth_hold" if refused else "hold", now)

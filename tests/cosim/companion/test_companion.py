@@ -285,6 +285,16 @@ def test_our_last_sticks_are_no_pilots_after_a_stall_of_our_loop(tmp_path):
 
 
 @pytest.mark.medium
+@pytest.mark.parametrize(("delay", "main"), [(0.5, 1.0), (1.5, 1.0), (1.5, 7.0)])  # 7: the mode that we steer in
+def test_a_pilot_takes_over_by_mode_from_a_held_vehicle(tmp_path, link, delay, main):
+    link.events = [(EVENT, lambda: FAULTS["takeover"](link)), (EVENT + delay, lambda: command(link, 176, 1.0, main))]
+    flight = Flight(tmp_path, link=link)
+    assert flight.status == "held: takeover" and flight.companion.session.reported.mode == int(main) << 16
+    assert not flight.sent_after(EVENT + delay, *STICKS)
+    assert not [m for m in flight.sent_after(EVENT + delay, "COMMAND_LONG") if m.command == 176]
+
+
+@pytest.mark.medium
 def test_rejected_mode_holds_within_one_second(tmp_path, link):
     link.refused_commands.add(176)
     with pytest.raises(RunError, match="a command to resume after: refused mode"):
