@@ -15,6 +15,7 @@ _READ_TIMEOUT = 3.0  # s, from the first request on; an ArduSub does not answer 
 _MAV_PARAM_TYPE_INT32 = 6
 
 _FAILSAFE_ACTIONS = {0: "does nothing", 1: "warns", 2: "disarms"}
+_ON_LOST_STICKS = {**_FAILSAFE_ACTIONS, 1: "warns and centers the sticks"}
 _ON_GCS_LOSS = {**_FAILSAFE_ACTIONS, 3: "holds the depth", 4: "surfaces"}
 _ON_LOST_SET_POINTS = {
     0: "changes to Position", 1: "changes to Altitude", 2: "changes to Stabilized", 3: "returns", 4: "lands",
@@ -34,7 +35,7 @@ class Parameter:
 
 PARAMETERS: dict[ProfileName, tuple[Parameter, ...]] = {
     "ardusub": (
-        Parameter("FS_PILOT_INPUT", "when sticks stop", _FAILSAFE_ACTIONS),
+        Parameter("FS_PILOT_INPUT", "when sticks stop", _ON_LOST_STICKS),
         Parameter("FS_PILOT_TIMEOUT", "s until then"),
         Parameter("RC_OVERRIDE_TIME", "s for which the last sticks stay active, -1 for ever"),
         Parameter("FS_GCS_ENABLE", "on a ground station that falls silent", _ON_GCS_LOSS),
@@ -125,6 +126,8 @@ class Failsafes:
         values, reactions = self.values, _REACTIONS.get(self._profile, ())
         if reactions and all(values.get(name, 0.0) == 0.0 for name in reactions):
             yield f"no reaction is known if the companion fails: {', '.join(reactions)} are 0 or unknown"
+        if values.get("FS_PILOT_INPUT") == 2.0:
+            yield "FS_PILOT_INPUT 2 disarms a held vehicle after FS_PILOT_TIMEOUT, as nobody sends sticks; expected 1"
         lost = values.get("COM_OBL_RC_ACT")
         if lost in _STICK_MODES and values.get("NAV_RCL_ACT") == 0.0:
             yield (
@@ -140,7 +143,7 @@ class Failsafes:
     def held_sticks_warning(self, accepts_unknown: bool = True) -> str:
         """Return the parameters by which the last sticks act for long after a lost link; empty if none is known."""
         if self.values.get("FS_PILOT_INPUT") == 0.0:
-            return "the last sticks outlast a lost link: FS_PILOT_INPUT 0 disables FS_PILOT_TIMEOUT; sticks need 2"
+            return "the last sticks outlast a lost link: FS_PILOT_INPUT 0 disables FS_PILOT_TIMEOUT; expected 1"
         unknown = [name for name in self._missing() if name in ("FS_PILOT_INPUT", *_HOLD_TIMES)]
         if unknown and not accepts_unknown:
             return f"the last sticks may outlast a lost link: {', '.join(unknown)} not answered"

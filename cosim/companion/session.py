@@ -339,7 +339,8 @@ class AutopilotSession:
         elif (accepted or system == self._link.identity[0]) and o.uses_sticks and not o.dry_run:
             yield f"joystick of station {system} competes if on", "; enable it only to take over"
             if failsafes.values.get("FS_PILOT_INPUT") == 0.0:
-                yield f"no failsafe while station {system} runs", "; it satisfies FS_GCS_ENABLE: set FS_PILOT_INPUT"
+                advice = "; it satisfies FS_GCS_ENABLE: set FS_PILOT_INPUT to 1"
+                yield f"no failsafe while station {system} runs", advice
 
     def _take_over(self, is_taken_over: bool) -> None:
         """End steering, or estimate the frame again and resume it."""

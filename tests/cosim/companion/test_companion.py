@@ -170,7 +170,7 @@ NOT_STEERED = {
         r"RC_OVERRIDE_TIME is 3; expected 1 s or less; with --steer-by wrench they would turn the vehicle over"),
     "an ArduSub whose last sticks of all axes would act for ever": (
         {"profile": "ardusub"}, {"profile": "ardusub", "steer_by": "wrench"}, parameter(b"FS_PILOT_INPUT", 0.0),
-        r"FS_PILOT_INPUT 0 disables FS_PILOT_TIMEOUT; sticks need 2; with --steer-by wrench"),
+        r"FS_PILOT_INPUT 0 disables FS_PILOT_TIMEOUT; expected 1; with --steer-by wrench"),
     "an ArduSub whose last sticks of all axes may act on": (
         {"profile": "ardusub"}, {"profile": "ardusub", "steer_by": "wrench"}, parameter(b"RC_OVERRIDE_TIME", 0.5),
         r"may outlast a lost link: FS_PILOT_TIMEOUT not answered; with --steer-by wrench"),
@@ -458,7 +458,7 @@ def answer(**values):
 ONBOARD = mavlink.MAV_TYPE_ONBOARD_CONTROLLER
 COMPETES = "joystick of station {} competes if on; enable it only to take over"
 IGNORED = "ArduSub ignores sticks of station 250: SYSID_MYGCS is 255; set its system id to 255"
-HIDES = "no failsafe while station 255 runs; it satisfies FS_GCS_ENABLE: set FS_PILOT_INPUT"
+HIDES = "no failsafe while station 255 runs; it satisfies FS_GCS_ENABLE: set FS_PILOT_INPUT to 1"
 
 
 @pytest.mark.medium(fast=1)

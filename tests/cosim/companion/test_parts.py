@@ -569,6 +569,8 @@ FOR_EVER = "the last forces act for ever"
     [
         ("ardusub", {"FS_GCS_ENABLE": 0.0}, NO_REACTION),
         ("ardusub", {"FS_PILOT_INPUT": 0.0, "FS_PILOT_TIMEOUT": 0.5}, "FS_PILOT_INPUT 0 disables FS_PILOT_TIMEOUT"),
+        ("ardusub", {"FS_PILOT_INPUT": 2.0}, "FS_PILOT_INPUT 2 disarms a held vehicle"),
+        ("ardusub", {"FS_PILOT_INPUT": 1.0}, None),
         ("px4", {"COM_OF_LOSS_T": 0.0}, f"{NO_REACTION}: COM_OF_LOSS_T"),
         *(("ardusub", {"RC_OVERRIDE_TIME": override, "FS_PILOT_TIMEOUT": pilot},
            OUTLASTS.format(override, pilot) if warns else None)
