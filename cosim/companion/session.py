@@ -61,8 +61,7 @@ class AutopilotSession:
         self._is_law_active = False  # value of the last `Arm` for the master
         self._sent_at: dict[str, float] = {}
         self._held_at, self._release_until = 0.0, -math.inf
-        self._mode_when_held: int | None = None
-        self._is_released = False  # True once `held` has succeeded, or a pilot has changed the mode
+        self._mode_when_held, self._is_released = -1, False  # True once `held` has succeeded, or a pilot has changed the mode
         self._stations, self._station_warnings = set[int](), set[str]()  # system ids of other stations; warnings so far
 
     def clock(self) -> float:
@@ -141,10 +140,11 @@ class AutopilotSession:
         if self.alignment.offset is not None and self.misplaced and not self.is_placed:
             return f"a position near the scene, not {self.misplaced}: check sign and digits of its origin"
         return self.alignment.missing(reported) or {
-            "disarmed": "a command to resume" if self._taken_over else "arming",
+            "disarmed": "arming",
             "held": f"a command to resume after: {self.supervisor.reason}",
             "pilot": f"a command to resume after: {self.supervisor.reason}", "engaging": f"mode {self._mode}",
-            "diving": "the heading alignment", "waiting": self.stick_rejection() or "nothing",
+            "diving": "the heading alignment",
+            "waiting": "a command to resume" if self._taken_over else self.stick_rejection() or "nothing",
         }.get(self.supervisor.state, "nothing")  # fmt: skip
 
     def stick_rejection(self) -> str:
@@ -179,7 +179,8 @@ class AutopilotSession:
 
     def _observation(self, now: float) -> Observation:
         reported, alignment = self.reported, self.alignment
-        has_state = math.isfinite(reported.age(now)) and self.failsafes.is_read(now) and not self.stick_rejection()
+        has_state = math.isfinite(reported.age(now)) and self.failsafes.is_read(now)
+        has_state = has_state and not self.stick_rejection() and not self._taken_over
         values = {
             "lost link": now - reported.received_at,
             "stale estimate": reported.age(now),
@@ -243,8 +244,7 @@ class AutopilotSession:
             output.make_messages(wrench, self.reported, period)
         else:
             output.clear()
-        may_arm = self._options.arm and not self._taken_over
-        if state == "disarmed" and may_arm and self._is_due("arm", 1.0, now):
+        if state == "disarmed" and self._options.arm and self._is_due("arm", 1.0, now):
             self._command(self._mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         elif state == "diving":
             self.supervisor.record_mode_request(now)

@@ -23,6 +23,7 @@ from cosim.mavlink.wire.thrust_body import get_thrust_body
 from cosim.results.run_result import load_run
 from cosim.run.run_folder import report_again
 from cosim.scenario.scenario import load_scenario
+from cosim.simulation.commands.commands import Arm
 from cosim.simulation.environment import RegionEnvironment
 from tests.architecture.modules import ROOT
 from tests.cosim.companion.stand_in import IDENTITY, StandIn
@@ -162,6 +163,10 @@ NOT_STEERED = {
         {"armed": False}, {"arm": True},
         mavlink.MAVLink_command_long_message(*IDENTITY, mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0, *[0.0] * 7),
         "waiting for a command to resume"),
+    "held before somebody arms it": (
+        {"armed": False}, {"timeout": 4.0},
+        mavlink.MAVLink_command_long_message(*IDENTITY, mavlink.MAV_CMD_DO_PAUSE_CONTINUE, 0, *[0.0] * 7),
+        "waiting for a command to resume"),
     "an ArduSub that would ignore sticks": (
         {"profile": "ardusub"}, {"profile": "ardusub"}, parameter(b"SYSID_MYGCS", 250.0),
         r"SYSID_MYGCS is 250, and the companion's system id 255: .*; expected --system-id 250, or"),
@@ -185,9 +190,11 @@ NOT_STEERED = {
 def test_no_setpoints_are_sent_to_a_vehicle_that_cannot_be_steered(tmp_path, kind, options, event, words):
     link = StandIn(**{"profile": "generic", "shift": SHIFT} | kind)
     link.events = [(0.5, lambda: link.hear(event, 1, 1))] if event else []
+    if "timeout" in options:
+        link.events.append((2.0, lambda: link.queue.submit(Arm(True))))
     with pytest.raises(RunError, match=words):
         Flight(tmp_path, link=link, **options)
-    assert not link.of_type(*STICKS) and 400 not in {m.command for m in link.of_type("COMMAND_LONG")}
+    assert not link.of_type(*STICKS) and not {176, 400} & {m.command for m in link.of_type("COMMAND_LONG")}
     assert not (tmp_path / "run").exists()
 
 
