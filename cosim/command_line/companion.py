@@ -8,6 +8,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from cosim.simulation.commands.sources import CommandQueue
 
 _DECIMALS = 7  # of degrees, for centimeters
+_READ_PERIOD = 0.1  # s, between two reads of a terminal from which none is possible
 _COMPONENT = 191  # MAV_COMP_ID_ONBOARD_COMPUTER
 _STEER_BY, _STICKS_BY = ("sticks", "wrench", "velocity", "attitude"), ("manual-control", "rc-override")
 
@@ -121,10 +123,17 @@ def _read_keys(terminal: int, commands: CommandQueue) -> None:
 
     if hasattr(signal, "pthread_sigmask"):  # in the background a read then fails, and does not stop the process
         signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGTTIN})
-    with contextlib.suppress(OSError):
-        while data := os.read(terminal, 256):
-            for line in data.splitlines():
-                commands.submit(SetMode("reach" if line.strip().lower() == b"r" else "hold"))
+    while True:
+        try:
+            data = os.read(terminal, 256)
+        except OSError:  # in the background, or closed
+            data = b""
+        for line in data.splitlines():
+            commands.submit(SetMode("reach" if line.strip().lower() == b"r" else "hold"))
+        if not data:
+            if not os.isatty(terminal):
+                return
+            time.sleep(_READ_PERIOD)  # Ctrl-D ends one read, and a terminal's next one waits again
 
 
 def _scene_origin(text: str) -> tuple[float, float]:

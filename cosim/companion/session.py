@@ -57,11 +57,14 @@ class AutopilotSession:
         self.lateness = self.outside = 0.0  # s; m
         self.is_placed, self.misplaced = False, ""
         self.commands = CommandQueue(("hold", "reach"))  # from page and terminal: end steering, and resume it
-        self._taken_over = self._was_in_mode = False
+        self._taken_over = self._was_in_mode = self._is_ending = False
         self._is_law_active = False  # value of the last `Arm` for the master
         self._sent_at: dict[str, float] = {}
         self._held_at, self._release_until = 0.0, -math.inf
-        self._mode_when_held, self._is_released = -1, False  # True once `held` has succeeded, or a pilot has changed the mode
+        self._mode_when_held, self._is_released = (
+            -1,
+            False,
+        )  # True once `held` has succeeded, or a pilot has changed the mode
         self._stations, self._station_warnings = set[int](), set[str]()  # system ids of other stations; warnings so far
 
     def clock(self) -> float:
@@ -82,7 +85,7 @@ class AutopilotSession:
         self.lateness = max(0.0, now - due)
         self._receive(0.0)
         for command in self.commands.take(0):
-            self._take_over(command == SetMode("hold"))
+            self._set_takeover(command == SetMode("hold"))
         self._warn_of_stations(now)
         before = self.supervisor.state
         state = self.supervisor.update(self._observation(now))
@@ -114,6 +117,7 @@ class AutopilotSession:
     def release(self, seconds: float) -> None:
         """Release the sticks, and request the hold mode until it is on or `seconds` are over."""
         # In the state `pilot`, only finish the release; without steering, do nothing.
+        self._is_ending = True
         state, begun = self.supervisor.state, self._link.clock()
         if state in ("diving", "engaging", "steering", "held") and not self._is_released:
             self.supervisor.state, self.supervisor.reason = "held", self.supervisor.reason or "end"
@@ -342,10 +346,10 @@ class AutopilotSession:
                 advice = "; it satisfies FS_GCS_ENABLE: set FS_PILOT_INPUT to 1"
                 yield f"no failsafe while station {system} runs", advice
 
-    def _take_over(self, is_taken_over: bool) -> None:
+    def _set_takeover(self, is_taken_over: bool) -> None:
         """End steering, or estimate the frame again and resume it."""
         self._taken_over = is_taken_over
-        if not is_taken_over and self.supervisor.state in ("held", "pilot"):
+        if not is_taken_over and not self._is_ending and self.supervisor.state in ("held", "pilot"):
             self.alignment.restart()
             self.is_placed = False
             self.supervisor.resume()
@@ -358,5 +362,5 @@ class AutopilotSession:
         result = m.MAV_RESULT_UNSUPPORTED
         if message.command == m.MAV_CMD_DO_PAUSE_CONTINUE and message.param1 in (0.0, 1.0):
             result = m.MAV_RESULT_ACCEPTED
-            self._take_over(message.param1 == 0.0)
+            self._set_takeover(message.param1 == 0.0)
         self._link.send(m.MAVLink_command_ack_message(message.command, result, 0, 0, system, component))

@@ -6,6 +6,7 @@ import shutil
 import signal
 import subprocess
 import sys
+import threading
 import time
 from importlib import metadata
 from pathlib import Path
@@ -272,6 +273,24 @@ def test_enter_holds_a_companion_and_r_resumes_it():
     commands = CommandQueue(("hold", "reach"))
     _read_keys(reading, commands)
     assert [command.mode for command in commands.take(0)] == ["hold", "reach", "reach", "hold"]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="opens a terminal")
+def test_enter_holds_a_companion_after_the_terminal_s_end_of_file():
+    keyboard, terminal = os.openpty()
+    commands = CommandQueue(("hold", "reach"))
+    reader = threading.Thread(target=_read_keys, args=(terminal, commands), daemon=True)
+    reader.start()
+    os.write(keyboard, b"\x04\n")
+    taken = []
+    while not taken and reader.is_alive():
+        taken = commands.take(0)
+        time.sleep(0.01)
+    assert [command.mode for command in taken] == ["hold"]
+    os.close(keyboard)
+    reader.join(60.0)
+    os.close(terminal)
+    assert not reader.is_alive()
 
 
 # ---- processes -------------------------------------------------------------------------------------------------------

@@ -528,6 +528,17 @@ def test_control_can_be_resumed_after_a_takeover(tmp_path, link):
     assert names[-1] == "steering" and "held" in names and flight.status == "completed"
 
 
+@pytest.mark.medium
+def test_a_command_to_resume_does_not_undo_the_release_at_the_end(tmp_path, link):
+    """The release waits for the hold mode, which is refused here; while it is steered, the command changes nothing."""
+    resume = {"system": IDENTITY[0], "component": IDENTITY[1]}
+    link.events = [(EVENT, lambda: link.refused_commands.add(176))]
+    link.events += [(EVENT + 0.1 * k, lambda: command(link, 193, 1.0, **resume)) for k in range(50)]
+    flight = Flight(tmp_path, 3.0, link=link)
+    assert flight.status == "completed" and flight.companion.session.supervisor.state == "held"
+    assert link.of_type("STATUSTEXT")[-1].text == "Companion steering"
+
+
 def test_every_condition_has_a_test():
     tested = {*FAULTS, *PILOTS, "refused mode", "frame drift", "geofence", "unfinished dive"}
     assert tested == {condition.name for condition in CONDITIONS}
