@@ -156,13 +156,12 @@ class AutopilotSession:
         o = self._options
         if o.dry_run or not o.uses_sticks:
             return ""
-        system = self._link.identity[0]
-        if ignored := self.failsafes.ignored_sticks(system):
+        system, is_read = self._link.identity[0], self.failsafes.is_read(self._link.clock())
+        if is_read and (ignored := self.failsafes.ignored_sticks(system)):
             text = f"{ignored}, and the companion's system id {system}: its sticks would be ignored"
             accepted = self.failsafes.accepted_systems()
             expected = f"from {accepted[0]} to {accepted[-1]}" if accepted[-1] > accepted[0] else f"{accepted[0]}"
             return f"{text}; expected --system-id {expected}, or --steer-by velocity"
-        is_read = self.failsafes.is_read(self._link.clock())
         if o.steer_by == "wrench" and (warning := self.failsafes.held_sticks_warning(accepts_unknown=not is_read)):
             return f"{warning}; with --steer-by wrench they would turn the vehicle over"
         if self._gain_error() > GAIN_TOLERANCE:

@@ -199,6 +199,16 @@ def test_no_setpoints_are_sent_to_a_vehicle_that_cannot_be_steered(tmp_path, kin
 
 
 @pytest.mark.medium
+def test_the_last_system_of_a_range_may_be_answered_after_the_first(tmp_path):
+    link = StandIn(profile="ardusub", shift=SHIFT)
+    link.events = [
+        (0.5, lambda: answer(MAV_GCS_SYSID=250.0)(link)),
+        (1.0, lambda: answer(MAV_GCS_SYSID_HI=255.0)(link)),
+    ]
+    assert Flight(tmp_path, 1.0, link=link, profile="ardusub").status == "completed"
+
+
+@pytest.mark.medium
 def test_companion_arms_the_vehicle_if_it_may(tmp_path):
     flight = Flight(tmp_path, 2.0, link=StandIn(profile="generic", armed=False), arm=True)
     assert flight.status == "completed" and flight.link.now("commands.armed") == 1.0
