@@ -61,10 +61,8 @@ class AutopilotSession:
         self._is_law_active = False  # value of the last `Arm` for the master
         self._sent_at: dict[str, float] = {}
         self._held_at, self._release_until = 0.0, -math.inf
-        self._mode_when_held, self._is_released = (
-            -1,
-            False,
-        )  # True once `held` has succeeded, or a pilot has changed the mode
+        self._mode_when_held = -1
+        self._is_released = False  # True once the hold mode has been on, or a pilot has changed the mode
         self._stations, self._station_warnings = set[int](), set[str]()  # system ids of other stations; warnings so far
 
     def clock(self) -> float:
