@@ -97,8 +97,9 @@ def _parser() -> argparse.ArgumentParser:
     add("--csv", metavar="FILE", help=table)
     add("--out", metavar="FILE", help="file to write (default: standard output)")
     verb("explain", "which rules fire for a sample, how strongly, and which decide", values=True, as_json=True)
-    what = "whether the rules are complete and consistent; exit status 1 if not"
-    verb("verify", what, engine=False, as_json=True)
+    what = "whether the rules are complete and, of criteria, consistent; exit status 1 if not"
+    add = verb("verify", what, engine=False, as_json=True).add_argument
+    add("--as-criteria", action="store_true", default=None, help="check the consistency of any rules")
 
     add = verb("convert", "write a definition in another format, or as source code", engine=False).add_argument
     add("out", metavar="OUT", help=".json, .toml, .fcl, .fis, .fll, or .c, .py for code that evaluates it")
@@ -197,7 +198,7 @@ def _run(options: argparse.Namespace) -> int:
     arbiter = Arbiter(system=system, engine=getattr(options, "engine", "auto"))
     if options.verb in ("verify", "explain"):
         explains = options.verb == "explain"
-        result = arbiter.explain(sample(options.values, system)) if explains else arbiter.verify()
+        result = arbiter.explain(sample(options.values, system)) if explains else arbiter.verify(options.as_criteria)
         print(json.dumps(result.as_dict(), indent=2, ensure_ascii=False) if options.json else result)
         return 0 if isinstance(result, Explanation) or result.ok else FINDINGS
     if options.verb == "show":

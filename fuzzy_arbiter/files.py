@@ -12,8 +12,8 @@ from pathlib import Path
 from fuzzy_arbiter.errors import FormatError
 
 
-def read_text(path: str | Path, max_size: int, is_utf8: bool) -> str:
-    """Read a text file, of which lines that are no UTF-8 are taken as Windows-1252 or Latin-1 unless it `is_utf8`."""
+def read_text(path: str | Path, max_size: int, requires_utf8: bool) -> str:
+    """Read a text file; decode lines that are not UTF-8 as Windows-1252 or Latin-1 unless `requires_utf8`."""
     try:
         if Path(path).exists() and not (Path(path).is_file() or Path(path).is_dir()):  # to open a pipe would wait
             raise FormatError(f"{path}: is a pipe or a device, expected a file")
@@ -22,11 +22,13 @@ def read_text(path: str | Path, max_size: int, is_utf8: bool) -> str:
     except (OSError, ValueError) as error:  # ValueError: a name with a null character
         raise FormatError(f"{path}: {getattr(error, 'strerror', None) or error}") from None
     if len(data) > max_size:
-        raise FormatError(f"{path}: has more than {max_size} bytes, expected a definition for people")
+        raise FormatError(f"{path}: file too large, expected at most {max_size} bytes")
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise FormatError(f"{path}: is UTF-16, expected UTF-8")
     try:
         return data.decode()
     except UnicodeDecodeError as error:
-        if is_utf8 or b"\0" in data:
+        if requires_utf8 or b"\0" in data:
             raise FormatError(f"{path}: byte {error.start} is no UTF-8, expected text in UTF-8") from None
         line = data.count(b"\n", 0, error.start) + 1
         what = f"{path}: line {line} is no UTF-8, so it and others like it are taken as Windows-1252"

@@ -6,7 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Mapping, Sequence
 from numbers import Real
-from typing import Any, NoReturn
+from typing import NoReturn
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -95,13 +95,6 @@ class HysteresisArbiter:
         pairs = list(zip(variables, self._shapes, strict=True))
         self._on_positions, self._off_positions = ([_position(v, shape, x) for v, shape in pairs] for x in (1.0, 0.0))
         self.reset()
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        # earlier versions have other words, and a list of the latches that are closed
-        renamed = {key.replace("_places", "_positions"): value for key, value in state.items()}
-        if closed := renamed.pop("_closed", None):
-            renamed["_since"] = [since if shut else None for since, shut in zip(renamed["_since"], closed, strict=True)]
-        self.__dict__.update(renamed)
 
     def reset(self) -> None:
         """Open all latches and clear the time, as before the first sample."""

@@ -125,7 +125,7 @@ class Shape(Membership):
 
     def __call__(self, x: Any) -> Any:
         """Return the degree at a position, or the degrees at an array of them."""
-        if type(x) in (list, tuple, np.ndarray):
+        if hasattr(x, "__len__"):
             return self.of_array(x)
         if x != x:
             return x

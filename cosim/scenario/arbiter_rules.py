@@ -75,7 +75,7 @@ def read_rules(setup: ArbiterSetup) -> ArbiterSetup:
         raise ScenarioError(f"arbiter.file is {setup.file!r}, expected a suffix of .{', .'.join(FORMATS)}")
     text = setup.text or _text(path)
     if len(text) > MAX_TEXT:
-        raise ScenarioError(f"arbiter.file: {path.name} has more than {MAX_TEXT} characters, expected rules for people")
+        raise ScenarioError(f"arbiter.file: {path.name}: file too large, expected at most {MAX_TEXT} characters")
     return msgspec.structs.replace(setup, file=path.name, text=text)
 
 

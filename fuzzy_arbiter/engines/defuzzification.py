@@ -19,7 +19,7 @@ HEIGHT_RATIO = 1.0 - 1e-12  # quotient of heights above which they count as equa
 _MIN_DISTANCE = 1e-9  # positions that are nearer than this fraction of the universe count as one
 _CLOSER = 2  # times that many points narrow the search for a maximum
 _DENSE = np.linspace(-1.0 + 1e-12, 1.0 - 1e-12, 33)  # these points in a panel, on its side of a jump
-_LIKELY = 0.95  # least height at the points around a maximum, as a fraction of the greatest at any point
+_LIKELY = 0.95  # minimum height at the points around a maximum, as a fraction of the maximum at any point
 
 
 def of_points(quad: Quadrature, cuts: Array) -> float:

@@ -11,7 +11,7 @@ from fuzzy_arbiter.definition import System
 from fuzzy_arbiter.export.code_functions import in_c
 from fuzzy_arbiter.export.heights import ENDS, NODES, WEIGHTS
 from fuzzy_arbiter.export.program import TABLES, Program, program
-from fuzzy_arbiter.export.statements import FUNCTIONS, Assign, Return, Statement, Sweep, formatted
+from fuzzy_arbiter.export.statements import FUNCTIONS, Assign, Return, Statement, Sweep, expressions, format_statements
 
 
 def to_c(system: System) -> str:
@@ -56,7 +56,7 @@ def _file(code: Program) -> Iterator[str]:
     signature = f"int {function}(const double inputs[{n}], double outputs[{m}])"
     yield f"{signature};"
     known = {f"x{i}" for i in range(1, n + 1)}
-    text = "\n".join(formatted(code.statements, lambda statement: _simple(statement, known), _branch, "}"))
+    text = "\n".join(format_statements(code.statements, lambda statement: _simple(statement, known), _branch, "}"))
     yield ""
     yield from (["#include <math.h>", ""] if code.mathematical else [])
     yield from filter(None, map(in_c, code.functions))
@@ -86,7 +86,9 @@ def _file(code: Program) -> Iterator[str]:
             yield f"\nstatic const double EDGES_{k}[] = {{{', '.join(map(repr, one.edges))}}};\n"
             yield f"static double height_{k}(double x, const double *cuts)\n{{"
             known = {"x"}
-            yield from formatted(one.statements, partial(_simple, known=known), _branch, "}")
+            if not any(re.search(r"\bx\b", text) for text in expressions(one.statements)):
+                yield "    (void)x;"
+            yield from format_statements(one.statements, partial(_simple, known=known), _branch, "}")
             yield "}"
     yield "\n/* Fills the outputs and returns 0. Else it leaves them as they are, and returns"
     yield from (

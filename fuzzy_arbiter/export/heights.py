@@ -1,4 +1,4 @@
-"""Values of joined terms from a function of their height, in exported code as they stand."""
+"""Defuzzify a height function; `export` copies this source into its code."""
 
 # The height is smooth between the edges of panels but for where terms meet their cuts and each other. A panel is halved
 # until the integral over it is that over its halves.

@@ -29,9 +29,9 @@ from fuzzy_arbiter.export.statements import (
     Return,
     Statement,
     Sweep,
-    chosen,
+    assign_first,
     degree_of,
-    texts_of,
+    expressions,
 )
 from fuzzy_arbiter.propositions import Is
 from fuzzy_arbiter.samples import EDGE
@@ -58,9 +58,9 @@ class Program:
 
     system: System  # system that the program evaluates
     statements: tuple[Statement, ...]  # statements from the inputs ``x1``, ``x2``, .. to the outputs ``y1``, ``y2``,
-    # outlines of the outputs, if they are swept; None for one of values; empty where there is a closed form
+    # outlines of the outputs, if their centroids are exact; else None; empty where there is a closed form
     outlines: tuple[Outline | None, ...]
-    heights: tuple[Heights | None, ...]  # the same for outputs whose terms are joined otherwise
+    heights: tuple[Heights | None, ...]  # heights of the outputs that need integrals or maxima; else None
     functions: tuple[str, ...]  # names of the functions that the statements call
 
     @property
@@ -88,7 +88,7 @@ def program(system: System) -> Program:
         for (output, one), slots in zip(pairs, engine.firing.slots, strict=False)
     )
     total = (*statements, *_shared(system))
-    texts = texts_of([*total, *(statement for one in heights if one for statement in one.statements)])
+    texts = expressions([*total, *(statement for one in heights if one for statement in one.statements)])
     return Program(system, total, outlines, heights, tuple(called(texts)))
 
 
@@ -96,9 +96,12 @@ def _heights(output: Output, slots: Sequence[Slot]) -> Heights:
     """Return the height of an output's joined terms as statements."""
     statements, logic = list[Statement](), Expressions()
     if drastic := {output.aggregation, *(slot.implication for slot in slots)} & {"drastic_sum", "drastic_product"}:
-        raise UnsupportedError(f"export: output {output.name!r} joins terms by {drastic.pop()}, expected another norm")
+        norm = min(drastic)
+        raise UnsupportedError(f"export: output {output.name!r} has the norm {norm}, expected none that is drastic")
     for j in sorted({slot.term for slot in slots}):
-        statements += chosen(f"d{j}", degree_of("x", output.terms[j].membership, output.universe), output.term_names[j])
+        statements += assign_first(
+            f"d{j}", degree_of("x", output.terms[j].membership, output.universe), output.term_names[j]
+        )
     implied = [logic.apply(JOINS[slot.implication], f"cuts[{i}]", f"d{slot.term}") for i, slot in enumerate(slots)]
     statements += logic.assign("height", logic.join(output.aggregation, implied), output.name)
     shapes = list(dict.fromkeys(output.terms[slot.term].membership for slot in slots))
@@ -136,7 +139,7 @@ class _Degrees:
             name = f"m{len(self._names) + 1}"
             i, variable, shape = self._terms[key]
             values = degree_of(f"x{i}", shape, variable.universe)
-            self.statements += chosen(name, values, str(statement))
+            self.statements += assign_first(name, values, str(statement))
             self._names[key] = name
         return self._names[key]
 
@@ -162,7 +165,7 @@ def _closed(engine: ClosedEngine) -> Iterator[Statement]:
     for k, (output, forms) in enumerate(zip(engine.system.outputs, engine.scaled, strict=True), 1):
         ends = [*(f"h{k} < {piece.start!r}" for piece in forms[1:]), ""]
         values_of_h = [_piece(piece, f"h{k}") for piece in forms]
-        yield from chosen(f"y{k}", list(zip(ends, values_of_h, strict=True)), output.name)
+        yield from assign_first(f"y{k}", list(zip(ends, values_of_h, strict=True)), output.name)
         if engine.clips:
             yield Assign(f"y{k}", f"least(greatest(y{k}, 0.0), 1.0)")
 
@@ -260,7 +263,7 @@ def _valued(output: Output, k: int, cuts: Sequence[str], system: System) -> tupl
         else:
             values = _position(term.shape, cut)
         added = (
-            *chosen(f"v{k}_{j}", values, ""),
+            *assign_first(f"v{k}_{j}", values, ""),
             Assign(f"y{k}", f"y{k} + {cut} * v{k}_{j}"),
             Assign(f"w{k}", f"w{k} + {cut}"),
         )

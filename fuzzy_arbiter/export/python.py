@@ -13,7 +13,7 @@ from fuzzy_arbiter.errors import EngineError
 from fuzzy_arbiter.export import heights
 from fuzzy_arbiter.export.code_functions import in_python
 from fuzzy_arbiter.export.program import TABLES, Program, program
-from fuzzy_arbiter.export.statements import FUNCTIONS, Assign, Return, Statement, Sweep, formatted
+from fuzzy_arbiter.export.statements import FUNCTIONS, Assign, Return, Statement, Sweep, format_statements
 
 _MATH = """
 import math
@@ -92,11 +92,11 @@ def _module(code: Program) -> Iterator[str]:
     for k, one in enumerate(code.heights, 1):
         if one is not None:
             yield f"\n\nEDGES_{k} = {one.edges!r}\n\n\ndef height_{k}(x, cuts):"
-            yield from formatted(one.statements, _simple, _branch, "")
+            yield from format_statements(one.statements, _simple, _branch, "")
     yield "\n\ndef evaluate(inputs, outputs):"
     yield '    """Fill the outputs; return 0, or -i if the i-th input is bad, or k if the k-th output is undefined."""'
     yield from (f"    x{i} = inputs[{i - 1}]  # {v.name}" for i, v in enumerate(system.inputs, 1))
-    yield from formatted(code.statements, _simple, _branch, "")
+    yield from format_statements(code.statements, _simple, _branch, "")
     yield from (f"    outputs[{k - 1}] = y{k}" for k in range(1, len(system.outputs) + 1))
     yield "    return 0"
     yield _TAIL.rstrip().format(inputs=variable_names(system.inputs), outputs=variable_names(system.outputs))

@@ -17,8 +17,8 @@ from fuzzy_arbiter.terms.values import Formula
 
 JOINS = {name: f"{norm.function}({{}}, {{}})" for name, norm in {**T_NORMS, **AGGREGATIONS}.items()}
 JOINS |= {"prod": "({} * {})", "sum": "({} + {})"}
-_DEEPEST = 20  # maximum number of nested parentheses; parsers accept some hundred
-_LONGEST = 16  # maximum number of branches of one choice; parsers accept some hundred
+_MAX_DEPTH = 20  # maximum number of nested parentheses; parsers accept some hundred
+_MAX_BRANCHES = 16  # maximum number of branches of one choice; parsers accept some hundred
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ class Sweep:
     name: str
     k: int
     cuts: tuple[str, ...]
-    method: str  # ``clipped`` or ``scaled``, whose centroid is exact; else the function of its height
+    method: str  # ``clipped`` or ``scaled``, whose centroid is exact; else a defuzzifier in `FUNCTIONS`
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,7 +62,7 @@ FUNCTIONS = {
 }
 
 
-def formatted(
+def format_statements(
     statements: Iterable[Statement],
     simple: Callable[[Statement], Iterable[str]],
     branch: Callable[[int, str], str],
@@ -74,14 +74,14 @@ def formatted(
         if isinstance(statement, Choose):
             for i, (condition, inner) in enumerate(statement.branches):
                 yield indent + branch(i, condition)
-                yield from formatted(inner, simple, branch, end, indent + "    ")
+                yield from format_statements(inner, simple, branch, end, indent + "    ")
             if end:
                 yield indent + end
         else:
             yield from (indent + line for line in simple(statement))
 
 
-def texts_of(statements: Sequence[Statement]) -> Iterator[str]:
+def expressions(statements: Sequence[Statement]) -> Iterator[str]:
     """Yield all expressions."""
     for statement in statements:
         if isinstance(statement, Assign):
@@ -89,7 +89,7 @@ def texts_of(statements: Sequence[Statement]) -> Iterator[str]:
         elif isinstance(statement, Choose):
             for condition, inner in statement.branches:
                 yield condition
-                yield from texts_of(inner)
+                yield from expressions(inner)
 
 
 class Expressions:
@@ -103,7 +103,7 @@ class Expressions:
         """Return the expression of an operator's value."""
         text = template.format(*degrees)
         depth = max(accumulate((sign == "(") - (sign == ")") for sign in text))
-        if depth <= _DEEPEST:
+        if depth <= _MAX_DEPTH:
             return text
         self._names += 1
         self._waiting.append(Assign(f"t{self._names}", text))
@@ -120,7 +120,7 @@ class Expressions:
         yield Assign(name, expression, words)
 
 
-def chosen(name: str, values: Sequence[tuple[str, str]], words: str) -> Iterator[Statement]:
+def assign_first(name: str, values: Sequence[tuple[str, str]], words: str) -> Iterator[Statement]:
     """Give a name to the first value of which the condition holds."""
     if len(values) == 1:
         yield Assign(name, values[0][1], words)
@@ -131,7 +131,7 @@ def chosen(name: str, values: Sequence[tuple[str, str]], words: str) -> Iterator
 
 def _first(name: str, values: Sequence[tuple[str, str]]) -> Choose:
     """Give a name to the first value of which the condition holds, by halves where there are many."""
-    if len(values) <= _LONGEST:
+    if len(values) <= _MAX_BRANCHES:
         return Choose(tuple((condition, (Assign(name, value),)) for condition, value in values))
     half = next(i for i in range(len(values) // 2, len(values)) if " < " in values[i][0])  # rises from one to the next
     condition, value = values[half]

@@ -91,7 +91,7 @@ class Curve(Membership):
 
     def __call__(self, x: Any) -> Any:
         """Return the degree at a position; of a jump the greater one; NaN for NaN; degrees for an array."""
-        if type(x) in (list, tuple, np.ndarray):
+        if hasattr(x, "__len__"):
             return self.of_array(x)
         if x != x:
             return x

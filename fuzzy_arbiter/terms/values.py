@@ -170,7 +170,7 @@ class Formula(Value, Membership):
 
     def __call__(self, x: Any) -> Any:
         """Return the degree at a position, held within [0, 1]; NaN for NaN; degrees for an array."""
-        if type(x) in (list, tuple, np.ndarray):
+        if hasattr(x, "__len__"):
             return self.of_array(x)
         return x if x != x else min(max(self._parsed({"x": x}), 0.0), 1.0)
 

@@ -47,7 +47,7 @@ def verify(system: System, effort: int = EFFORT, as_criteria: bool | None = None
     system : System
         System to verify.
     effort : int
-        Greatest number of statements to evaluate; a check that needs more is undecided.
+        Maximum number of statements to evaluate; a check that needs more is undecided.
     as_criteria : bool, optional
         True to check also that rules do not contradict each other and that no two outputs are high together; by default
         for the weights of criteria, as rules of other systems may overlap.

@@ -166,6 +166,7 @@ def test_explain_and_verify_print_text_or_json(run, refused, gap):
         status, out, _ = run("verify", file)
         assert status == expected and out.splitlines()[-1] == ("ok", "not ok")[expected]
         assert json.loads(run("verify", file, "--json")[1])["ok"] is not bool(expected)
+    assert ["consistent " in run("verify", gap, *options)[1] for options in ([], ["--as-criteria"])] == [False, True]
     assert "none.toml" in refused("verify", "none.toml")
 
 

@@ -88,6 +88,12 @@ SYSTEMS = {
     "wide, shared": replace(WIDE, normalization="sum", outside="clip"),
     "wide, greatest": replace(WIDE, normalization="max", implication="prod"),
     "coding: of no file": prioritized([Criterion("é")], name="coding: of no file"),
+    "constant": System(
+        (Variable("v", (0, 1), UNIT),),
+        (Output("o", (0, 10), {"c": Shape(((0, 0.5),))}, defuzzifier="lom"),),
+        ("if v is t then o is c",),
+        normalization="none",
+    ),
     "long": System(
         tuple(Variable(f"v{i}", (0, 1), UNIT) for i in range(250)),
         (Output("o", (0, 1), UNIT),),
@@ -429,7 +435,7 @@ def test_missing_numba_is_reported(monkeypatch):
     ("change", "fault"),
     [
         ({"lock_previous": True}, "output 'z' keeps its previous value, which a function of one sample has not"),
-        ({"aggregation": "drastic_sum"}, "output 'z' joins terms by drastic_sum, expected another norm"),
+        ({"aggregation": "drastic_sum"}, "output 'z' has the norm drastic_sum, expected none that is drastic"),
     ],
 )
 def test_unsupported_features_are_rejected_by_name(change, fault):

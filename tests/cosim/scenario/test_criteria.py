@@ -205,7 +205,7 @@ def test_binary_or_oversized_arbiter_file_is_rejected(own):
     with pytest.raises(ScenarioError, match="is no UTF-8"):
         load_scenario(own)
     (own.parent / "mine.toml").write_text("#" * 200_001)
-    with pytest.raises(ScenarioError, match="more than 200000 characters"):
+    with pytest.raises(ScenarioError, match="file too large, expected at most 200000 characters"):
         load_scenario(own)
 
 

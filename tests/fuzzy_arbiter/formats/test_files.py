@@ -112,3 +112,6 @@ def test_errors_name_the_file(tmp_path):
         path.write_text(f"Engine: e\nInputVariable: tip\n  enabled: true\n{added}")
         with pytest.raises(DefinitionError, match=rf"a\.fll: line {number}: "):
             load(path)
+    path.write_text(text, encoding="utf-16")
+    with pytest.raises(FormatError, match=r"a\.fll: is UTF-16, expected UTF-8"):
+        load(path)

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from collections import deque
 
 import numpy as np
 import pytest
@@ -11,9 +12,11 @@ from scipy.integrate import quad
 from scipy.special import expit
 from scipy.stats import norm
 
+from fuzzy_arbiter import rising
 from fuzzy_arbiter.errors import DefinitionError
 from fuzzy_arbiter.terms.curves import Curve, curve
 from fuzzy_arbiter.terms.kinds import KINDS
+from fuzzy_arbiter.terms.values import Formula
 
 
 def rises(x, a, b):
@@ -119,6 +122,8 @@ def test_step_takes_the_greater_degree_at_its_jump():
     step = curve("s_shape", 4.0, 4.0)
     assert (step(3.999), step(4.0), step(4.001)) == (0.0, 1.0, 1.0)
     assert step.of_many(np.array([4.0]))[0] == 1.0
+    for term in (step, rising(3.0, 5.0), Formula("x / 8")):  # any sequence, such as a column of a data frame
+        assert term(deque([3.5, 4.0])).tolist() == [term(3.5), term(4.0)]
     assert step.jumps and not curve("s_shape", 3.0, 4.0).jumps
 
 
