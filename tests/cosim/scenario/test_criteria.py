@@ -201,7 +201,7 @@ def test_invalid_arbiter_files_are_rejected_by_name(own, old, new, words):
 
 
 def test_binary_or_oversized_arbiter_file_is_rejected(own):
-    (own.parent / "mine.toml").write_bytes(b"\xff\xfe")
+    (own.parent / "mine.toml").write_bytes(b"\xff\x00")
     with pytest.raises(ScenarioError, match="is no UTF-8"):
         load_scenario(own)
     (own.parent / "mine.toml").write_text("#" * 200_001)
