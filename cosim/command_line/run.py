@@ -12,7 +12,7 @@ from cosim.command_line.flags import add_changes, add_run_folder, add_scenario, 
 from cosim.command_line.link_flags import add_link_flags, add_live_flag, links_from, open_live
 from cosim.command_line.process import INTERRUPTED, print_run
 from cosim.errors import TelemetryError
-from cosim.report.figure_process import drawing_beside
+from cosim.report.figure_process import FigureProcess, figure_process
 
 if TYPE_CHECKING:
     from cosim.mavlink.run_links import Mavlink
@@ -41,12 +41,10 @@ def run(options: argparse.Namespace) -> int:
     import cosim.run.run_scenario  # noqa: F401 -- so that a process to be forked has what it needs
 
     with contextlib.ExitStack() as stack:
-        if not options.no_report:
-            stack.enter_context(drawing_beside())
-        return _run(options, stack)
+        return _run(options, stack, None if options.no_report else stack.enter_context(figure_process()))
 
 
-def _run(options: argparse.Namespace, stack: contextlib.ExitStack) -> int:
+def _run(options: argparse.Namespace, stack: contextlib.ExitStack, drawing: FigureProcess | None) -> int:
     from cosim.run.run_scenario import run_scenario
     from cosim.scenario.scenario import load_scenario
 
@@ -63,7 +61,7 @@ def _run(options: argparse.Namespace, stack: contextlib.ExitStack) -> int:
     live = open_live(options, stack)
     done = run_scenario(
         scenario, options.out, mavlink, None if max_rate == math.inf else max_rate, progress=not options.quiet,
-        report=not options.no_report, commands_log=options.replay_commands, live=live,
+        report=not options.no_report, commands_log=options.replay_commands, live=live, figure_process=drawing,
     )  # fmt: skip
     if options.json:
         print(_json(done), end="")

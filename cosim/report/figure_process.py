@@ -24,16 +24,36 @@ log = logging.getLogger(__name__)
 # of a process that draws: after Ctrl-C the run ends, and then asks for its figures
 _ACTIONS = {signal.SIGINT: signal.SIG_IGN, signal.SIGTERM: signal.SIG_DFL}
 _TIMEOUT = 60.0  # s, until the run draws its figures itself
-_waiting: list[Connection[Any, Any]] = []  # connection to the process that waits for a run; empty if there is none
+
+
+class FigureProcess:
+    """A process that waits to draw the figures of one run, and ends with the block it is entered for."""
+
+    def __init__(self, connection: Connection[Any, Any]) -> None:
+        self._connection: Connection[Any, Any] | None = connection
+
+    def draw(self, run: Run, folder: Path) -> dict[str, InlineFigure] | None:
+        """Have the figures of a run drawn into a folder; return None if that fails, or was done before."""
+        connection, self._connection = self._connection, None
+        try:
+            if connection is None:
+                return None
+            connection.send((run, folder))
+            return (
+                {name: figure for _, name, figure in sorted(connection.recv())} if connection.poll(_TIMEOUT) else None
+            )
+        except Exception:  # a run that cannot be sent, or a process that was ended
+            log.debug("figures are drawn by the run itself", exc_info=True)
+            return None
 
 
 @contextlib.contextmanager
-def drawing_beside() -> Iterator[None]:
-    """Fork a process that draws the figures of the report written in this block, if that is safe and faster."""
+def figure_process() -> Iterator[FigureProcess | None]:
+    """Fork a process that draws the figures of a run, if that is safe and faster."""
     # libraries of other systems may not work in a process that is forked, and none do if there are threads
     can_fork = sys.platform == "linux" and threading.active_count() == 1
     if not can_fork or "matplotlib" in sys.modules or len(os.sched_getaffinity(0)) == 1:
-        yield
+        yield None
         return
     connection, of_child = Pipe()
     signals = signal.pthread_sigmask(signal.SIG_BLOCK, _ACTIONS)  # so that the command's handlers do not run in a child
@@ -50,28 +70,12 @@ def drawing_beside() -> Iterator[None]:
     if child == 0:
         _serve(of_child)
     of_child.close()
-    if child:
-        _waiting.append(connection)
     try:
-        yield
+        yield FigureProcess(connection) if child else None
     finally:
-        _waiting.clear()
         connection.close()
         if child:
             _stop(child)
-
-
-def draw_beside(run: Run, folder: Path) -> dict[str, InlineFigure] | None:
-    """Have the figures of a run drawn into a folder; return None if no process waits for that, or it fails."""
-    if not _waiting:
-        return None
-    connection = _waiting.pop()
-    try:
-        connection.send((run, folder))
-        return {name: figure for _, name, figure in sorted(connection.recv())} if connection.poll(_TIMEOUT) else None
-    except Exception:  # a run that cannot be sent, or a process that was ended
-        log.debug("figures are drawn by the run itself", exc_info=True)
-        return None
 
 
 def _stop(child: int) -> None:

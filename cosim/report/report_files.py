@@ -7,7 +7,7 @@ from collections.abc import Collection
 from pathlib import Path
 
 from cosim.report.contents import contents_of
-from cosim.report.figure_process import draw_beside
+from cosim.report.figure_process import FigureProcess
 from cosim.report.web_page import FIGURES, inline_figure, render_page
 from cosim.results.run_result import REPORT, SCENARIO, SUMMARY, Run
 from plant_fmu.archive import temporary_folder
@@ -15,21 +15,21 @@ from plant_fmu.archive import temporary_folder
 FORMATS = ("html", "png")
 
 
-def write_report(run: Run, formats: Collection[str] = ("html",)) -> list[Path]:
+def write_report(run: Run, formats: Collection[str], figure_process: FigureProcess | None) -> list[Path]:
     """Write the report of a run into its folder."""
     # All files are written to a temporary folder, and replace the old ones at the end.
     with temporary_folder(".report-", run.folder) as scratch:
-        files = _with_figures(run, formats, scratch)
+        files = _with_figures(run, formats, scratch, figure_process)
         shutil.rmtree(run.folder / FIGURES, ignore_errors=True)
         (scratch / FIGURES).replace(run.folder / FIGURES)
         written = [file.replace(run.folder / file.name) for file in files]
         return written + sorted((run.folder / FIGURES).iterdir())
 
 
-def _with_figures(run: Run, formats: Collection[str], folder: Path) -> list[Path]:
+def _with_figures(run: Run, formats: Collection[str], folder: Path, figure_process: FigureProcess | None) -> list[Path]:
     """Write the figures, and the page with them."""
     (folder / FIGURES).mkdir()
-    shown = None if "png" in formats else draw_beside(run, folder / FIGURES)
+    shown = figure_process.draw(run, folder / FIGURES) if figure_process and "png" not in formats else None
     if shown is None:
         # importing Matplotlib takes as long as all other imports together
         from cosim.report.figures.figures import drawings

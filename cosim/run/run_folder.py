@@ -16,6 +16,7 @@ from cosim.errors import RunError
 from cosim.io.atomic_file import reason, write_atomic
 from cosim.io.strict_json import json_text
 from cosim.replay.pages import write_replay
+from cosim.report.figure_process import FigureProcess
 from cosim.report.report_files import write_report
 from cosim.report.web_page import FIGURES
 from cosim.results.log_facts import IMPORT
@@ -152,10 +153,17 @@ def _new_folder(parent: Path, name: str) -> Path:
     raise AssertionError("unreachable")
 
 
-def conclude(path: Path, scenario: Scenario, status: str, wall_time: float | None, report: bool) -> Run:
+def conclude(
+    path: Path,
+    scenario: Scenario,
+    status: str,
+    wall_time: float | None,
+    report: bool,
+    figure_process: FigureProcess | None = None,
+) -> Run:
     """Write summary, report and replay of a run from its record; wall_time [s]."""
     run = open_run(path, scenario, status, wall_time)
-    _write(run, ("html",) if report else ())
+    _write(run, ("html",) if report else (), figure_process)
     return run
 
 
@@ -168,8 +176,8 @@ def report_again(path: Path, formats: Collection[str] = ("html",)) -> tuple[dict
         raise RunError(f"{path}: {error.strerror or error}") from error
 
 
-def _write(run: Run, formats: Collection[str]) -> list[Path]:
+def _write(run: Run, formats: Collection[str], figure_process: FigureProcess | None = None) -> list[Path]:
     summary = write_atomic(run.folder / SUMMARY, json_text(run.summary))
-    pages = write_report(run, formats) if formats else []
+    pages = write_report(run, formats, figure_process) if formats else []
     replay = [write_replay(run)] if "html" in formats else []
     return [*pages[:1], *replay, summary, *pages[1:]]

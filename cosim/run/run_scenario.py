@@ -27,6 +27,7 @@ if TYPE_CHECKING:  # pymavlink and websockets are imported only for runs that ne
     from cosim.live.live_view import LiveView
     from cosim.mavlink.run_links import Mavlink
     from cosim.mavlink.thread import LinkThread
+    from cosim.report.figure_process import FigureProcess
 
 _PROGRESS_STEPS = 200  # updates of the bar
 
@@ -76,6 +77,7 @@ def run_scenario(
     live: LiveView | None = None,
     law: Law | None = None,
     overwrite: bool = False,
+    figure_process: FigureProcess | None = None,
 ) -> Run:
     """Run a scenario and write its folder.
 
@@ -105,6 +107,8 @@ def run_scenario(
         repeating the run needs the law again.
     overwrite : bool
         Replace the run in `out`; a folder with any other content is refused.
+    figure_process : FigureProcess, optional
+        Process that draws the figures, as the command line has one; default: this one.
 
     Returns
     -------
@@ -159,7 +163,7 @@ def run_scenario(
                     queue.end_run()
                     if live is not None and report:
                         live.say("The run is over; its report is being written")
-                    run = conclude(folder.path, scenario, status, wall_time, report)
+                    run = conclude(folder.path, scenario, status, wall_time, report, figure_process)
                     if live is not None:
                         live.end(status, verdict(run.summary))
             if failure:

@@ -11,7 +11,7 @@ from cosim.run.run_folder import report_again
 
 RUN = """
 import os, signal, sys
-from cosim.report import figure_process
+from cosim.report.figure_process import figure_process
 from cosim.run.run_scenario import run_scenario
 fork, forked = os.fork, []
 def fork_or_fail():
@@ -20,10 +20,10 @@ def fork_or_fail():
     forked.append(fork())
     return forked[-1]
 os.fork = fork_or_fail
-with figure_process.drawing_beside():
+with figure_process() as drawing:
     if sys.argv[2] == "killed":
         os.kill(forked[0], signal.SIGKILL)
-    run_scenario("paper", sys.argv[1])
+    run_scenario("paper", sys.argv[1], figure_process=drawing)
 assert ("matplotlib" in sys.modules) == (sys.argv[2] != "alive")
 assert not signal.pthread_sigmask(signal.SIG_BLOCK, [])
 try:
