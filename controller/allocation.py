@@ -50,7 +50,7 @@ def keep_direction(forces: Array, lower: Array, upper: Array) -> bool:
 
 def allocate(inverse: Array, lower: Array, upper: Array, direction: bool, tau: Vector6, forces: Array) -> bool:
     """Write the least-squares thruster forces for a wrench, within limits, into `forces`; lower, upper [N]."""
-    # with tau [N, N m], forces [N]
+    # Units of arguments: tau [N, N m]; forces [N]
     forces[:] = inverse @ tau
     return keep_direction(forces, lower, upper) if direction else clip_each(forces, lower, upper)
 

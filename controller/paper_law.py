@@ -65,7 +65,7 @@ def apply(
     tau: Vector6,
 ) -> None:
     """Write tau: (25) with (26), (29); then update the estimate over a period: (27) with (28)."""
-    # with nu [m/s, rad/s], period [s], estimate [N, N m], tau [N, N m]
+    # Units of arguments: nu [m/s, rad/s]; period [s]; estimate [N, N m]; tau [N, N m]
     k = R[2]  # (12): Z = [-k 0; 0 S(k)] with k = R^T e3
     # (25): Z phi-hat - K_0 e - K_s e_s - K_v nu
     tau[:3] = -k * estimate[0] - R.T @ (gains.k_p1 * e_p + gains.k_q * e_s) - gains.k_v1 * nu[:3]
@@ -91,7 +91,7 @@ def step(
     tau: Vector6,
 ) -> None:
     """Compute the wrench of one control period, then update the estimate over it; velocity_body [m/s, rad/s]."""
-    # with period [s], estimate [N, N m], tau [N, N m]
+    # Units of arguments: period [s]; estimate [N, N m]; tau [N, N m]
     e_p, e_s = primary_error(goal_value, goal_gradient), secondary_error(values, gradients, alphas, gains.k_q)
     e_att, R = error(desired_quaternion, quaternion)[1:], rotation_matrix(quaternion)
     apply(e_p, e_s, e_att, R, velocity_body, gains, period, estimate, tau)

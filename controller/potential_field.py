@@ -76,7 +76,7 @@ def evaluate_field(
     state: VehicleState, goal: PackedRegions, regions: PackedRegions, repulsion: float, reach: float, field: Field
 ) -> None:
     """Evaluate all regions at a pose, and sum up the push of those that depend on position alone; repulsion [N/m]."""
-    # with reach [m]
+    # Units of arguments: reach [m]
     evaluate_regions(state, goal, regions, field)
     field.push[:] = 0.0
     for i in range(field.values.size):
@@ -103,7 +103,7 @@ def add_along(gradient: Vector3, length: float, total: Vector3) -> None:
 
 def set_point_error(field: Field, inset: float, most: float) -> None:
     """Write the vector from the set point to the vehicle [m, NED] into `field.error`, shortened to a length."""
-    # with inset [m], most [m]
+    # Units of arguments: inset [m]; most [m]
     # The set point is the nearest point whose clearance within the goal region is `inset`: the center of a sphere of
     # that radius. No region's deepest point is needed, so that every shape can be a goal.
     field.error[:] = 0.0

@@ -71,7 +71,7 @@ def empty_workspace(barriers: int, thrusters: int) -> Workspace:
 
 def solve(work: Workspace, barriers: int, inverse: Array, lower: Array, upper: Array, forces: Array) -> int:
     """Solve the program with `barriers` rows, right sides and prices in `work`, and with u0 in `nominal`."""
-    # with lower, upper [N], forces [N]
+    # Units of arguments: lower, upper [N]; forces [N]
     n = barriers + 2 * forces.size
     tolerance = _TOLERANCE * _prepare(work, barriers, inverse, lower, upper)
     forces[:] = work.nominal

@@ -17,8 +17,7 @@ RPM: NDArray[np.float64] = _TABLE[7:]  # rev/min, signed as the force
 
 
 def force_of_pulse(pulses: NDArray[np.float64], voltages: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Return the force of a T200 at rest, linear between the published points; pulses [us], voltages [V]."""
-    # with returns [N]
+    """Return the force [N] of a T200 at rest, linear between the published points; pulses [us], voltages [V]."""
     position = np.clip((voltages - VOLTAGES[0]) / 2.0, 0.0, len(VOLTAGES) - 1.0)
     row = np.minimum(np.nan_to_num(position).astype(int), len(VOLTAGES) - 2)
     fraction = position - row

@@ -39,7 +39,7 @@ def to_world(q: Array, at: int, x: float, y: float, z: float) -> tuple[float, fl
 
 def product_distance(first: float, second: float) -> tuple[float, float, float]:
     """Return the signed distance to the product of two sets in perpendicular directions, and its derivatives."""
-    # with first, second [m], returns [m]
+    # Units of arguments and result: first, second [m]; result [m]
     if math.isnan(first) or math.isnan(second):  # a lost position is not safe
         return math.nan, math.nan, math.nan
     if first > 0.0 and second > 0.0:

@@ -24,7 +24,7 @@ _PRISM = Prism.kind
 
 def ray_distances(regions: PackedRegions, origin: Array, directions: Array, farthest: float, distances: Array) -> None:
     """Find the distances along rays at which a region, at its present position, is violated; origin [m, NED]."""
-    # with farthest [m], distances [m]
+    # Units of arguments: farthest [m]; distances [m]
     # A ray advances by the clearance, which changes by at most one meter a meter (sphere tracing). The clearance of a
     # convex shape that is kept out of is convex along the ray, so that its tangent allows longer steps and shows when a
     # ray passes by (Newton's method, from the side that never oversteps). Pipes are split into capsules.

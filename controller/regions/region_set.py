@@ -276,7 +276,7 @@ def position_clearance(regions: PackedRegions, i: int, position: Point, slope: A
 
 
 def clearances_at(points: Array, region: Region) -> Array:
-    """Return the clearance of a region at many points, as it is at time 0; points (m, 3) [m, NED], returns (m,) [m]."""
+    """Return the clearance of a region at many points, as it is at time 0; points (m, 3) [m, NED]."""
     clearances = np.empty(len(points))
     arguments = pack([region]), np.ascontiguousarray(points, dtype=float), clearances
     BoundCall(write_clearances, arguments).call()

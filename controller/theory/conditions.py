@@ -49,7 +49,7 @@ def least_of_potential_test(mass: Array, gradient_norm: float, gains: Gains) -> 
 
 def potential_fits(mass: Array, gradient_norm: float, gains: Gains) -> tuple[Fit, Fit]:
     """Return (38), first and second condition, with the scalar lambda_m of the paper."""
-    # with mass (6, 6) [kg, kg m2]
+    # Units of arguments: mass (6, 6) [kg, kg m2]
     #
     # The second compares the mass in kilograms with an inertia: lambda_m is 187.7 for ODIN, whose inertia is 8 kg m2.
     # The matrix test `least_of_potential_test` does not.
@@ -60,7 +60,7 @@ def potential_fits(mass: Array, gradient_norm: float, gains: Gains) -> tuple[Fit
 
 def secondary_fit(mass: Array, gradient_norms: Array, betas: Array, gains: Gains) -> Fit:
     """Return (38), third condition, over the active regions alone; without any it holds."""
-    # with mass (6, 6) [kg, kg m2]
+    # Units of arguments: mass (6, 6) [kg, kg m2]
     if not len(betas):
         return Fit(math.inf, 0.0)
     steepest = float(np.max(gradient_norms))
@@ -71,7 +71,7 @@ def secondary_fit(mass: Array, gradient_norms: Array, betas: Array, gains: Gains
 
 def greatest_gradient(mass: Array, gains: Gains) -> float:
     """Return the |df/dp| below which the matrix test of (38) holds; 0 if it holds nowhere, inf if everywhere."""
-    # with mass (6, 6) [kg, kg m2]
+    # Units of arguments: mass (6, 6) [kg, kg m2]
     #
     # It follows from the Schur complement: the translation's part of sigma M sigma, plus the effect of the coupling to
     # rotation.
@@ -95,7 +95,7 @@ def damping_fit(
     mass: Array, linear_damping: Array, jacobian_bound: float, gains: Gains, translation_alone: bool = False
 ) -> Fit:
     """Return (45), first condition: lambda_min[D] + lambda_min[K_v] against sigma c_0."""
-    # with linear_damping [N s/m, N m s/rad]
+    # Units of arguments: linear_damping [N s/m, N m s/rad]
     # The right side is the one term of sigma c_0 with de_p/dt alone, from the translational mass: the other terms of
     # (43) come on top unless they happen to cancel it, so this condition is necessary for the full one in general. (The
     # term with D's linear part is no multiple of |nu|^2 at all; (43) holds for it only together with the errors.)
@@ -114,7 +114,7 @@ def gain_fits(gains: Gains) -> tuple[Fit, Fit]:
 
 def sphere_radii(mass: Array, linear_damping: Array, radius: float, gains: Gains) -> tuple[float, float, float]:
     """Return the distances from the center of a spherical goal region within which conditions hold [m]."""
-    # with linear_damping [N s/m, N m s/rad]
+    # Units of arguments: linear_damping [N s/m, N m s/rad]
     potential = 0.5 * greatest_gradient(mass, gains)
     within = []
     for translation_alone in (False, True):

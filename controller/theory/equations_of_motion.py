@@ -65,7 +65,7 @@ def skew_defect(mass: Array, velocity_body: Array) -> float:
 
 def restoring_defect(weight: float, buoyancy: float, r_G: Array, r_B: Array, quaternion: Array) -> float:
     """Return the difference of Z phi of (12) from weight and buoyancy at their centers [N, N m]."""
-    # with weight, buoyancy [N], r_G, r_B [m], returns [N or N m]
+    # Units of arguments and result: weight, buoyancy [N]; r_G, r_B [m]; result [N or N m]
     k = down_in_body(quaternion)
     pull, push = weight * k, -buoyancy * k
     g = -np.concatenate([pull + push, np.cross(r_G, pull) + np.cross(r_B, push)])

@@ -78,7 +78,7 @@ class AutopilotSession:
 
     def exchange(self, wrench: Array, due: float, until: float) -> None:
         """Run one step: update the state, send messages, and receive until the step ends; wrench [N, N m]."""
-        # with due, until [s]
+        # Units of arguments: due, until [s]
         now = self._link.clock()
         self.lateness = max(0.0, now - due)
         self._receive(0.0)

@@ -80,7 +80,7 @@ class LevelLead:
 
     def moments(self, velocity: Array) -> Array:
         """Return the moments about roll and pitch, shape (2,) [N m], that cancel Munk's, v x (M_A v)."""
-        # with velocity [m/s]
+        # Units of arguments: velocity [m/s]
         speed = np.where(np.isfinite(velocity), velocity, 0.0)
         result: Array = np.cross(speed, self._added @ speed)[:2]
         return result
@@ -131,7 +131,7 @@ class VelocityLead:
 
     def hold(self, back: Array, speed_down: float, state: ReportedState, period: float) -> Array:
         """Return the velocity [m/s, NED], shape (3,), that holds a horizontal position during a descent."""
-        # with back [m, NE], speed_down [m/s], period [s]
+        # Units of arguments: back [m, NE]; speed_down [m/s]; period [s]
         # The observer makes up for a current.
         acceleration = np.zeros(3)
         acceleration[:2] = _HOLD_FREQUENCY**2 * back - 2.0 * _HOLD_FREQUENCY * state.velocity[:2]

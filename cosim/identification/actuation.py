@@ -104,7 +104,7 @@ class CommandedForces:
 
 
 def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
-    """Return the steady-state forces of commands, with the plant's limits and curve; commands [N], returns [N]."""
+    """Return the steady-state forces [N] of commands [N], with the plant's limits and curve."""
     limited = np.clip(commands, vehicle.thrust_min, vehicle.thrust_max)
     dead, curve = vehicle.thrust_dead_band, vehicle.thrust_curve
     limit = np.where(limited < 0.0, vehicle.thrust_min, vehicle.thrust_max)
@@ -116,7 +116,7 @@ def steady_forces(commands: Array, vehicle: Vehicle) -> Array:
 
 def error_wrenches(impulses: Impulses, lag: float, step: float, begin: float, steps: int) -> Array:
     """Return the wrench of each error behind the lag, over each step of a window, shape (errors, steps, 2, 6)."""
-    # with lag [s], step [s], begin [s], returns [N, N m]
+    # Units of arguments and result: lag [s]; step [s]; begin [s]; result [N, N m]
     before = int(np.ceil((_TAIL * lag + 2.0 * BIN) / step))  # steps before the window
     grid: Any = begin + step * np.arange(-before, steps + 1)
     used = (impulses.ends > begin - _TAIL * lag - BIN) & (impulses.begins < grid[-1])
@@ -141,7 +141,7 @@ def _overlaps(grid: Any, begin: float, end: float) -> Array:
 
 def _lagged(forces: Array, lag: float, step: float) -> tuple[Array, Array]:
     """Return forces behind a lag as they are over each step of a grid, and the same by the lag; forces [N], lag [s]."""
-    # with step [s], returns [N]
+    # Units of arguments and result: step [s]; result [N]
     zero = np.zeros((1, forces.shape[1]))
     if lag < _MIN_LAG:
         behind = np.diff(forces, axis=0, prepend=forces[:1]) / step

@@ -23,7 +23,7 @@ _SLOW = ("depth", "position")  # topics whose second differences are noise: they
 
 
 def find_delays(logs: Sequence[Log], vehicle: Vehicle, step: float) -> dict[str, float]:
-    """Find the delay of each topic behind the commands, to some hundredths of a second; step [s], returns [s]."""
+    """Find the delay of each topic behind the commands, to some hundredths of a second; step [s]."""
     # Changes of a velocity over 0.3 s are regressed on the impulse of the commanded wrench over the same time, shifted
     # by a delay and filtered by a lag, and on the velocity itself. All topics get the delay with the least residual; a
     # topic whose own delay fits clearly better gets that. Of the vehicle only its thrusters' directions are used.

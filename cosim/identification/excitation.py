@@ -127,7 +127,7 @@ def design(
     current: float = CURRENT,
 ) -> Design:  # fmt: skip
     """Choose stick inputs that give the most information on the free parameters; depth [m], duration [s]."""
-    # with current [m/s]
+    # Units of arguments: current [m/s]
     vehicle = load_vehicle(start)
     count = math.floor((duration - BEGIN + RETURN) / (SECONDS + RETURN))
     _require_possible(box, depth, duration, current, vehicle)

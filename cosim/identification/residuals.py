@@ -88,7 +88,7 @@ class Residuals:
 
     def raw(self, i: int, settings: Sequence[Setting], start: Array, full: bool) -> tuple[Array, Array, Array]:
         """Return residuals of a window from a start, with derivatives by the start and, if `full`, the free numbers."""
-        # with start [N, NED]
+        # Units of arguments: start [N, NED]
         window = self.windows[i]
         setting = settings[window.run]
         inside = slice(window.first, window.first + window.steps)

@@ -89,7 +89,7 @@ class Shooter:
         force: Array | None = None,
     ) -> Motion:
         """Predict the motion under a wrench that is linear over each step; start [m, NED]."""
-        # with wrench [N, N m, body frame], step [s], times [s], force [N, NED]
+        # Units of arguments: wrench [N, N m, body frame]; step [s]; times [s]; force [N, NED]
         along = directions or NO_DIRECTIONS
         d, n = len(along.parameters), len(times)
         references = [self._references[name] for name in parameters]

@@ -67,7 +67,7 @@ class ColumnMap(Table, frozen=True):
 
     def put(self, contents: LogContents, name: str, times: Array, values: Array) -> None:
         """Convert samples of a quantity from the map's unit and frame, and add them to the contents of a log."""
-        # with times [s]
+        # Units of arguments: times [s]
         mapped = self.quantities[name]
         source = contents.source(name, source_name(mapped), QUANTITIES[name].size or len(mapped.columns))
         source.put_many(times, self._converted(name, mapped, values))

@@ -40,7 +40,7 @@ UNITS = {  # factors to SI units, by the SI unit
 
 
 def quaternions_of_angles(angles: Array, order: str) -> Array:
-    """Return unit quaternions of Euler angles; angles (n, 3) [rad], returns (n, 4)."""
+    """Return unit quaternions of Euler angles; angles (n, 3) [rad]."""
     quaternions: Array = Rotation.from_euler(order, angles).as_quat(scalar_first=True)
     return quaternions
 

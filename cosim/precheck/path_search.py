@@ -51,7 +51,7 @@ def find_path(
     regions: Sequence[Region], goal: Region, start: Vector3, gains: DeployableGains, duration: float
 ) -> SearchedPath:
     """Search a path from a start into the goal that satisfies regions throughout, at their positions at time 0."""
-    # with start [m, NED], duration [s]
+    # Units of arguments: start [m, NED]; duration [s]
     at_rest = [dataclasses.replace(region, hard=True, velocity=(0.0, 0.0, 0.0)) for region in regions]
     plan, position = empty_plan(len(at_rest), _SEED), np.array(start, dtype=float)
     limits = path_limits(gains)

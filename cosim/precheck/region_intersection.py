@@ -87,7 +87,7 @@ def _refine(regions: Sequence[Region], point: Array, depth: float, low: Array, h
 
 def box_about(regions: Sequence[Region], points: Sequence[Vector3], margin: float) -> tuple[Array, Array]:
     """Return the corners of a box that holds points and the finite bounds of regions, with a margin."""
-    # with points [m, NED], margin [m]
+    # Units of arguments: points [m, NED]; margin [m]
     low, high = np.min(points, axis=0), np.max(points, axis=0)
     for region in regions:
         lowest, highest = np.array(region.shape.bounds())

@@ -42,7 +42,7 @@ class ThrustMargin:
 
 def held_wrench(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> Array:
     """Return the wrench that keeps a vehicle at rest in a current, (6,) [N, N m], body frame: (11) with nu = 0."""
-    # with phi [N, N m], current [m/s]
+    # Units of arguments: phi [N, N m]; current [m/s]
     relative = np.zeros(6)
     relative[:3] = -rotation_matrix(quaternion).T @ current
     drag = damping(np.array(vehicle.linear_damping), np.array(vehicle.quadratic_damping), relative) * relative
@@ -52,7 +52,7 @@ def held_wrench(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array)
 
 def thrust_margin(vehicle: Vehicle, phi: Array, quaternion: Array, current: Array) -> ThrustMargin:
     """Return the forces that the thrusters can give, and those left while the vehicle is kept still."""
-    # with phi [N, N m], current [m/s]
+    # Units of arguments: phi [N, N m]; current [m/s]
     hold = held_wrench(vehicle, phi, quaternion, current)
     n = vehicle.n_thrusters
     *without, left = least_margins(vehicle, quaternion, hold, ~np.eye(n + 1, n, dtype=bool))

@@ -19,7 +19,7 @@ _DOMINANT_WEIGHT = 0.5  # weight from which a criterion is active even if the ve
 
 def is_resting(goal: Array, velocity: Array) -> NDArray[np.bool_]:
     """Return a mask of the rows in which the vehicle rests in the goal region: slower than 0.02 m/s; goal [m]."""
-    # with velocity [m/s]
+    # Units of arguments: velocity [m/s]
     slow: NDArray[np.bool_] = np.linalg.norm(velocity, axis=1) < _SLOW
     return slow & (goal >= 0.0)
 

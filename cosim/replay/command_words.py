@@ -23,7 +23,7 @@ _MODES = {
 
 
 def command_events(log: Sequence[tuple[int, cmd.Command]], step: float, max_moments: int) -> list[tuple[float, str]]:
-    """List times and texts of the commands, grouped by moments; step [s], returns [s]."""
+    """List times [s] and texts of the commands, grouped by moments; step [s]."""
     steps = sorted({k for k, _ in log})
     gaps = [later - earlier for earlier, later in zip(steps, steps[1:], strict=False)]
     # commands at most this many steps apart share a moment

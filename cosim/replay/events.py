@@ -88,7 +88,7 @@ def _violations(run: Run) -> Iterator[Event]:
 
 
 def active_region_changes(run: Run) -> list[tuple[float, int]]:
-    """List the changes of the active region; of more than 12 those after which it stays longest; returns [s]."""
+    """List the changes of the active region; of more than 12 those after which it stays longest."""
     return _longest_changes(_all_changes(run))
 
 

@@ -16,7 +16,7 @@ def write_replay(run: Run, out: Path | None = None, title: str | None = None, in
     """Write the page of one run."""
     flight = None
     if interactive:
-        from cosim.replay.interactive.data import flight_data  # with the rooms of packaged controllers
+        from cosim.replay.interactive.data import flight_data  # imports all of packaged controllers
 
         flight = flight_data(run)
     trace = trace_of(run, MAX_BYTES_INTERACTIVE if interactive else MAX_BYTES)
@@ -29,7 +29,7 @@ def replay(
     """Write the page of one or several runs that were completed, interrupted or killed."""
     names = _names(folders)
     if interactive and len(folders) > 1:
-        raise RunError(f"{len(folders)} runs, expected one for a page that flies")
+        raise RunError(f"{len(folders)} runs, expected one for an interactive replay")
     file = out or (folders[0] / REPLAY if len(folders) == 1 else Path(REPLAY))
     try:
         if file.exists() and not is_page(file):

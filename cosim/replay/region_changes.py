@@ -45,7 +45,7 @@ def log_of(run: Run) -> Log:
 
 
 def changes_of(run: Run, log: Log) -> list[dict[str, Any]]:
-    """List the changes of regions during a run, except their motion; returns [s]."""
+    """List the changes of regions during a run, except their motion."""
     if not run.scenario.commands.enabled:
         return []
     by_settings = _Changes(run).of(log)

@@ -28,7 +28,7 @@ def sampled_rows(
     moments: NDArray[np.intp],
     max_bytes: int = MAX_BYTES,
 ) -> NDArray[np.intp]:
-    """Select the rows of a page: evenly spaced ones, extremes of the main signals, and events; record [s]."""
+    """Select the rows of a page: evenly spaced ones, extremes of the main signals, and events."""
     n = len(record)
     minutes = (record.value("time", -1) - record.value("time", 0)) / 60.0
     budget = min(_BYTES + _BYTES_A_MINUTE * max(0.0, minutes - 1.0), max_bytes)

@@ -29,8 +29,7 @@ def scenario_as_flown(scenario: Scenario, record: Rows) -> Scenario:
 
 
 def radii_of(record: Rows, name: str) -> Iterator[tuple[Array, Array]]:
-    """Yield times and radii of an obstacle, block by block, from the vehicle's position and the recorded clearance."""
-    # with returns [s]
+    """Yield times [s] and radii [m] of an obstacle by blocks, from the vehicle's position and the clearance."""
     position, shift = ([f"{of}.{axis}" for axis in "xyz"] for of in ("position", f"{name}.shift"))
     for block in record.blocks(["time", *position, *shift, f"{name}.clearance"]):
         shifts = block.stack(shift)

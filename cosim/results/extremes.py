@@ -56,7 +56,7 @@ def even_edges(rows: int, parts: int) -> NDArray[np.intp]:
 
 def rows_at(rows: Rows, times: Sequence[float]) -> NDArray[np.intp]:
     """Return the index of the first row at or after each time; the number of rows for a time after the end."""
-    # with rows [s], times [s]
+    # Units of arguments: times [s]
     indices = np.zeros(len(times), np.intp)
     for block in rows.blocks(["time"]):
         indices += np.searchsorted(block["time"], times)

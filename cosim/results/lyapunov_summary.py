@@ -14,7 +14,7 @@ ROUNDING = 1e-12  # part of the greatest |V| of a run: a smaller rise between tw
 
 
 def summarize_lyapunov(record: Rows) -> dict[str, Any] | None:
-    """Summarize V over a run; returns [N m]."""
+    """Summarize V [N m] over a run."""
     if "lyapunov.rate" not in record.units:
         return None
     return {form: _summarize_form(record, f"lyapunov.{form}") for form in FORMS}

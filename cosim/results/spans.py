@@ -48,8 +48,7 @@ class Spans:
 
 
 def spans(flags: Flags, time: Array) -> list[tuple[float, float]]:
-    """Return the spans in which a condition holds, each up to the first instant at which it no longer holds."""
-    # with time [s], returns [s]
+    """Return the spans [s] in which a condition holds, each up to the first instant at which it no longer does."""
     found = Spans()
     ended = found.add(flags, time)
     return [(span.start, span.end) for span in (*ended, *([found.open] if found.open else []))]

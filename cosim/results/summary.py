@@ -29,7 +29,7 @@ _ESTIMATE = [f"estimate.phi{i}" for i in range(1, 5)]
 
 
 def summarize(scenario: Scenario, record: Rows, status: str, wall_time: float | None) -> dict[str, Any]:
-    """Summarize a run; wall_time [s], returns [rad]."""
+    """Summarize a run; wall_time [s]."""
     names = [secondary.region.name for secondary in scenario.regions]
     first_rows = record.take(range(min(2, len(record))), ["time", *(f"{name}.clearance" for name in names)])
     # period of the record's rows, which may be fewer than the run's steps

@@ -21,7 +21,7 @@ _SHADES = (
 
 
 def colors_of_regions(scenario: Scenario) -> list[str]:
-    """Return the colors of the goal and of the secondary regions, as ``#RRGGBB``; returns ["#009E73", "#D55E00"]."""
+    """Return the colors of the goal and of the secondary regions, as ``#RRGGBB``."""
     # The first region of a criterion has the criterion's color. The others have shades of it, nearer to it in hue than
     # to any other criterion and to the goal; after six regions they repeat.
     own = {criterion.name: criterion.color for criterion in scenario.criteria}

@@ -136,7 +136,7 @@ class RegionEnvironment:
         self, position: Vector3, radius: float | None, velocity: Vector3 = _AT_REST, time: float = 0.0
     ) -> None:
         """Set position, shape and velocity of the target region; position [m, NED], radius [m], velocity [m/s, NED]."""
-        # with time [s]
+        # Units of arguments: time [s]
         if radius is None:
             origin = np.subtract(position, self._middle)
             self._target = _Target(self._goal_shape, self._middle, origin, np.array(velocity))
@@ -198,7 +198,7 @@ def pack_target(goal: Region) -> PackedRegions:
 
 
 def shape_center(shape: Shape) -> Vector3:
-    """Return the center of a shape, the point by which targets are placed; returns [m, NED]."""
+    """Return the center of a shape, the point [m, NED] by which targets are placed."""
     center = shape_entry(shape).center
     if center is not None:
         return center(shape)

@@ -72,7 +72,7 @@ def at_rest(motion: Motion) -> Motion:
 
 def with_vertical_motion(motion: Motion, depth: float, speed: float, acceleration: float) -> Motion:
     """Return the motion of a vehicle that is moved down at the horizontal position and attitude of another motion."""
-    # with depth, speed, acceleration [m, m/s, m/s2]
+    # Units of arguments: depth, speed, acceleration [m, m/s, m/s2]
     to_body = rotation_matrix(np.array(motion.quaternion)).T
     fx, fy, fz = (to_body @ np.array([0.0, 0.0, acceleration - _GRAVITY])).tolist()
     u, v, w = (to_body @ np.array([0.0, 0.0, speed])).tolist()

@@ -34,7 +34,7 @@ class Rangefinder:
 
     def measure(self, position_ned: Array, quaternion: Array, altitude: float) -> float:
         """Return the distance along the body's vertical axis [m], `MAX_RANGE` at the most; 0 inside a region."""
-        # with position_ned [m, NED]
+        # Units of arguments: position_ned [m, NED]
         self._beam[0] = rotation_matrix(quaternion)[:, 2]
         if self._has_bottom:
             down = float(self._beam[0, 2])

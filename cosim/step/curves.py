@@ -56,7 +56,7 @@ def _program(tree: Node) -> list[tuple[int, float]]:
 
 def curve_degree(packed: PackedCurves, k: int, x: float) -> float:
     """Return the degree of a term at `x` in [0, 1], as `fuzzy_arbiter` does: at a jump the greater one."""
-    # with x [m, rad or s]
+    # Units of arguments: x [m, rad or s]
     piece, last = packed.offsets[k], packed.offsets[k + 1] - 1
     while piece < last and x > packed.ends[piece]:
         piece += 1

@@ -40,7 +40,7 @@ def check_fmu(
     importers: Sequence[Importer] = IMPORTERS,
 ) -> list[Result]:
     """Run every importer on an FMU, and compare its outputs at the stop time with those of FMPy's co-simulation."""
-    # with stop_time, step [s]
+    # Units of arguments: stop_time, step [s]
     # A co-simulation that differs from FMPy's has failed. Model exchange has not: it compares the importer's integrator
     # with the one inside the FMU.
     fmu = read_fmu(path)

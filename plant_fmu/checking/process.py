@@ -42,7 +42,7 @@ class Importer:
 
 def run_importer(importer: Importer, fmu: FmuFile, task: Task, timeout: float = TIMEOUT) -> Result:
     """Run a task with an FMU in an importer; failures of its process are results too, and nothing is raised."""
-    # with timeout [s]
+    # Units of arguments: timeout [s]
     # The FMU's binary is run, with the rights of this user: a process of its own guards against crashes, not against
     # malice.
     version = metadata.version(importer.package)

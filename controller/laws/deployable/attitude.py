@@ -75,7 +75,7 @@ def update_desired(
     attitude: Attitude, regions: PackedRegions, position: Vector3, gains: DeployableGains, period: float
 ) -> None:
     """Turn the desired attitude towards the preferred one, or until regions of attitude have their comfort."""
-    # with position [m, NED], period [s]
+    # Units of arguments: position [m, NED]; period [s]
     e, gradient = error(attitude.preferred, attitude.desired), zeros(3)  # desired = preferred * back
     omega = -2.0 * _RETURN * e[1:]
     limited = False

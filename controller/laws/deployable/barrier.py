@@ -161,7 +161,7 @@ def write_rows(
     gains: DeployableGains,
 ) -> int:
     """Write the constraint of each hard region that the thrusters could violate; return the number of rows."""
-    # with lower, upper [N]
+    # Units of arguments: lower, upper [N]
     # Also write the lower bound of the clearances [m]: min(0, margin + h, psi / kappa). The `margin` covers an error of
     # the acceleration of rate kappa margin.
     rows, bound, n, relative = 0, 0.0, zeros(6), zeros(6)
@@ -224,7 +224,7 @@ def add_row(
     upper: Array,
 ) -> int:
     """Add the constraint n^T A u >= rhs, unless no forces within the limits violate it; return the number of rows."""
-    # with thruster_acceleration [m/s2, rad/s2], lower, upper [N]
+    # Units of arguments: thruster_acceleration [m/s2, rad/s2]; lower, upper [N]
     row = work.rows[rows]
     row[:] = n @ thruster_acceleration
     if not rhs > row @ np.where(row > 0.0, lower, upper):

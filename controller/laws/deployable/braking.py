@@ -15,7 +15,7 @@ _NEGLIGIBLE = 1e-6  # force that counts as zero, as a fraction of the greatest l
 
 
 def least_forces(vehicle: VehicleModel) -> Array:
-    """Return the maximum force in the worst direction, with each thruster lost and with none; returns (m + 1,) [N]."""
+    """Return the maximum force in the worst direction, with each thruster lost and with none, (m + 1,) [N]."""
     # Without any moment, over the 26 directions to faces, edges and corners of a cube in body axes: for the shipped
     # vehicles within 2 % of the least over all directions. If the remaining thrusters cannot push in every direction,
     # the force with none lost is returned instead.

@@ -29,7 +29,7 @@ def face_ahead(
     regions: PackedRegions, i: int, position: Vector3, nearest: Vector3, velocity: Vector3, reach: float, face: Vector3
 ) -> float:
     """Find the face of region `i` that the vehicle heads for, beside the nearest one; position [m, NED]."""
-    # with velocity [m/s], reach [m], returns [m]
+    # Units of arguments and result: velocity [m/s]; reach [m]; result [m]
     velocity -= min(float(velocity @ nearest), 0.0) * nearest
     speed = norm(velocity)
     if not speed > 1e-6:

@@ -89,7 +89,7 @@ def surface(shape: Pipe, limits: Bounds) -> Mesh:
 
 
 def _rings(shape: Pipe, around: int) -> tuple[Array, list[Array], Array]:
-    """Return the surface of a pipe as rings with two end points; returns (3,) [m, NED]."""
+    """Return the surface of a pipe as rings with two end points [m, NED]."""
     points = np.array(shape.points)
     ways = np.diff(points, axis=0)
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)

@@ -56,7 +56,7 @@ def run_falsification(work: Search, out: Path, workers: int = 1, progress: bool 
 
 
 def costs_of(rows: Any, objective: Objective, horizon: float) -> NDArray[np.float64]:
-    """Return the costs that a search minimizes; horizon [s], returns (rows,) [m]."""
+    """Return the costs that a search minimizes, in the unit of the objective; horizon [s]."""
     values = to_array(rows[_COLUMNS[objective]]).astype(float)
     if objective == "clearance":
         values = np.where(to_array(pc.is_null(rows["stopped_at"])), values, np.fmin(values, _STOPPED))

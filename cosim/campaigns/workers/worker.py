@@ -39,7 +39,7 @@ _slot = _FlyerSlot()
 
 
 def fly(task: Task, batch: Any) -> tuple[Any, float]:
-    """Fly a batch; threads of one process take turns; returns [s]."""
+    """Fly a batch, and return its table and the wall time [s]; threads of one process take turns."""
     with _slot.lock:
         flyer = _slot.flyer_of(task)
         started = time.perf_counter()

@@ -15,7 +15,7 @@ _MAX_WAIT = 0.1  # s, longest wait for a message
 def follow(
     link: GroundLink, table: TelemetryTable, period: float, seconds: float | None = None, count: int | None = None
 ) -> Iterator[float]:
-    """Receive messages, and yield whenever the table is due to be shown; period [s], seconds [s], returns [s]."""
+    """Receive messages, and yield the time [s] whenever the table is due to be shown; period, seconds [s]."""
     started = now = time.monotonic()
     due, next_heartbeat = started + period, started
     while (seconds is None or now - started < seconds) and (count is None or table.total < count):

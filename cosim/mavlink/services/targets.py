@@ -174,7 +174,7 @@ class Targets(Service):
 
     def go(self, sender: Sender, position: Vector3, yaw: float = math.nan) -> Result:
         """Move the target region, and reach it; without a finite coordinate, hold, as QGroundControl pauses PX4."""
-        # with position [m, NED], yaw [rad]
+        # Units of arguments: position [m, NED]; yaw [rad]
         context = self.context
         if not self.accept_control(sender):
             return Result.DENIED

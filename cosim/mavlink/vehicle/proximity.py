@@ -66,7 +66,7 @@ class Proximity:
         return directions
 
     def scan(self, position_ned: Vector3, heading: float) -> list[float]:
-        """Scan the horizontal plane of the vehicle; position_ned [m], heading [rad], returns [m]."""
+        """Scan the horizontal plane of the vehicle; position_ned [m], heading [rad]."""
         self._position[:] = position_ned
         np.cos(self._angles + heading, out=self._directions[:, 0])
         np.sin(self._angles + heading, out=self._directions[:, 1])

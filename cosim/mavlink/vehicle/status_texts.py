@@ -31,7 +31,7 @@ class StatusTexts:
 
     def send_text(self, text: str, severity: str = "INFO", key: str = "", every: float = 0.0) -> None:
         """Send a text on every link, in parts if it is long; at once, or later if the rate is at its limit."""
-        # with every [s, wall clock]
+        # Units of arguments: every [s, wall clock]
         now = self._clock()
         if every and now - self._last_sent.get(key, -every) < every:
             return

@@ -35,8 +35,8 @@ class Slot:
     """A number that a page may change."""
 
     key: str  # key of the scenario, as in ``--set``
-    words: str  # description and unit for the page
-    unit: str  # description and unit for the page
+    words: str  # description for the page
+    unit: str  # unit of `value`
     value: float  # value in the scenario
     # where the number goes: ``numbers`` or ``gains`` of the module, ``starts`` of the plant, or ``noise``; ``middle``
     # of a cylinder's two ends, ``shift`` from the goal's center, which are ``numbers`` that the page computes

@@ -30,7 +30,7 @@ def flight_data(run: Run) -> dict[str, Any]:
     scenario = run.scenario
     if scenario.log:
         raise RunError(
-            f"{run.folder}: is imported from {scenario.log}, expected a run that was simulated for a page that flies"
+            f"{run.folder}: is imported from {scenario.log}, expected a simulated run for an interactive replay"
         )
     made = flight_module(scenario)
     flight, memory = made.flight, made.memory

@@ -30,7 +30,7 @@ class Flight:
     """The arguments of `cosim.step.score.fly` and of the law for a scenario, with one more thruster failure."""
 
     def __init__(self, scenario: Scenario) -> None:
-        require_fused(scenario, "a page that flies")
+        require_fused(scenario, "an interactive replay")
         self.scenario, self.law, self.start = scenario, law_of(scenario), start_values(scenario)
         self.variables = {v.name: v for v in variables(scenario.vehicle)}
         self._references = {name: i for i, name in enumerate(self.variables)}

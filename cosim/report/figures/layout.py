@@ -40,7 +40,7 @@ def panel_grid(
     heights: Sequence[float], widths: Sequence[float], labels: Sequence[str], titles: float
 ) -> tuple[Figure, Any]:
     """Create a figure and its axes; axes of a column share their x axis, and those of a row their y axis."""
-    # with heights [inch], titles [inch]
+    # Units of arguments: heights [inch]; titles [inch]
     top = TOP + LEGEND_ROW * legend_rows(labels) + titles
     total = top + sum(heights) + _GAP * (len(heights) - 1) + BOTTOM
     figure = new_figure(total)

@@ -73,7 +73,7 @@ class NamedFigure:
 
 
 def thin(time: Array, signal: Array) -> tuple[Array, Array]:
-    """Thin a signal to the minimum and the maximum value in each part of the time; time [s], returns [s]."""
+    """Thin a signal to the minimum and the maximum value in each part of the time."""
     n = len(time)
     if n <= 2 * POINTS:
         return time, signal

@@ -34,8 +34,7 @@ def _lines(labels: Sequence[str], signals: Sequence[Array], colors: Sequence[str
 
 
 def error_of(scenario: Scenario, record: Rows) -> tuple[str, Array]:
-    """Return name and values of the RMS error to the goal's center, or of the distance to a goal without one."""
-    # with returns [m]
+    """Return name and values [m] of the RMS error to the goal's center, or of the distance to a goal without one."""
     bounds = np.array(scenario.goal.bounds())
     if not np.isfinite(bounds).all():
         return "distance to the goal", np.maximum(0.0, -record["goal.clearance"])

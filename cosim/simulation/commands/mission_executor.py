@@ -39,7 +39,7 @@ class MissionExecutor:
 
     def following(self, time: float, clearance: float) -> int | None:
         """Return the index of the next item; None while the present one is not done, or if it is the last one."""
-        # with time [s], clearance [m]
+        # Units of arguments: time [s]; clearance [m]
         if not 0 <= self.at < len(self.items):
             return None
         item = self.items[self.at]

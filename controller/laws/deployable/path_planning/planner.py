@@ -286,7 +286,7 @@ def search_path(
     periods: NDArray[np.int64],
 ) -> None:
     """Improve a path for some periods, or until it is not blocked, while vehicle and regions rest; start [m, NED]."""
-    # with period [s]
+    # Units of arguments: period [s]
     periods[1] = 0
     while periods[1] < periods[0]:
         improve_path(plan, start, goal, regions, limits, period)

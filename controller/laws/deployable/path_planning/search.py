@@ -92,7 +92,7 @@ def clearance_of_all(point: Vector3, regions: PackedRegions) -> float:
 
 def free_length(start: Vector3, end: Vector3, regions: PackedRegions, margin: float) -> float:
     """Return the length to which a line keeps a clearance of all hard regions at their present positions."""
-    # with start, end [m, NED], margin [m], returns [m]
+    # Units of arguments and result: start, end [m, NED]; margin [m]; result [m]
     length, s, free = norm(end - start), 0.0, -1.0
     for _ in range(_LINE_SAMPLES):
         point = start + (end - start) * (s / length if length > 0.0 else 0.0)
@@ -128,7 +128,7 @@ def look_for_path(
     path: Rows3,
 ) -> int:
     """Grow one of the trees by at most one node; return the number of points of a path if one is found, else 0."""
-    # with start, end [m, NED]
+    # Units of arguments: start, end [m, NED]
     margin, of_goal, of_vehicle = line_margin(limits), search.of_goal, search.of_vehicle
     if clearance_of_all(end, regions) < 0.0:  # no path leads there
         return 0

@@ -1,4 +1,4 @@
-// The scripts of a page that flies, without a page: node fly.mjs assets job.json out
+// The scripts of an interactive replay, without a page: node fly.mjs assets job.json out
 // The job has the page's data, the header of its run, and the values and the failure that a reader gives.
 import fs from "node:fs"
 

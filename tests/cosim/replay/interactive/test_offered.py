@@ -1,4 +1,4 @@
-"""What a page that flies offers, before anything is compiled: numbers and their places, and what it refuses."""
+"""What an interactive replay offers, before anything is compiled: numbers and their places, and what it refuses."""
 
 import importlib.util
 import json
@@ -194,10 +194,14 @@ def test_filled_template_equals_the_scenario(docking, tmp_path):
 @pytest.mark.parametrize(
     ("name", "changes", "said"),
     [
-        ("paper", [], "arbiter.engine is 'skfuzzy', expected 'closed' for a page that flies"),
-        ("docking", ["master.order=jacobi"], "master.order is 'jacobi', expected 'gauss-seidel' for a page that flies"),
-        ("docking", ["plant.fmi=2"], "plant.fmi is 2, expected 3 for a page that flies"),
-        ("docking", ["commands.enabled=true"], "commands.enabled is True, expected False for a page that flies"),
+        ("paper", [], "arbiter.engine is 'skfuzzy', expected 'closed' for an interactive replay"),
+        (
+            "docking",
+            ["master.order=jacobi"],
+            "master.order is 'jacobi', expected 'gauss-seidel' for an interactive replay",
+        ),
+        ("docking", ["plant.fmi=2"], "plant.fmi is 2, expected 3 for an interactive replay"),
+        ("docking", ["commands.enabled=true"], "commands.enabled is True, expected False for an interactive replay"),
     ],
 )
 def test_unsupported_scenarios_are_rejected_by_key(name, changes, said):
@@ -207,7 +211,7 @@ def test_unsupported_scenarios_are_rejected_by_key(name, changes, said):
 
 def test_several_runs_are_rejected_without_a_file(tmp_path, capsys):
     assert main(["report", "--replay", "one", "other", "--interactive", "--out", str(tmp_path / "page.html")]) != 0
-    assert "2 runs, expected one for a page that flies" in capsys.readouterr().err
+    assert "2 runs, expected one for an interactive replay" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

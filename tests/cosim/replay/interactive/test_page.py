@@ -1,4 +1,4 @@
-"""The page that flies in real browsers: dragged, by keyboard, on a phone, and without WebAssembly."""
+"""The interactive replay in real browsers: dragged, by keyboard, on a phone, and without WebAssembly."""
 
 import pytest
 
